@@ -1,0 +1,35 @@
+# Flags every Stridewire target shares. One call per target keeps the CMake files short.
+
+function(stridewire_target target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
+  if(STRIDEWIRE_WARNINGS_AS_ERRORS)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  # A fused multiply-add rounds once where two operations round twice; contracted code would give
+  # other bytes on machines that have it. Everything that evaluates a movement must agree everywhere.
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
+  if(STRIDEWIRE_SANITIZE)
+    target_compile_options(${target} PRIVATE -fsanitize=${STRIDEWIRE_SANITIZE}
+                           -fno-omit-frame-pointer -fno-sanitize-recover=all)
+    target_link_options(${target} PUBLIC -fsanitize=${STRIDEWIRE_SANITIZE})
+  endif()
+endfunction()
+
+# stridewire_flatbuffers(TARGET SCHEMA...): C++ headers made by flatc at build time, never edited.
+function(stridewire_flatbuffers target)
+  set(generated_dir ${CMAKE_CURRENT_BINARY_DIR}/generated)
+  set(headers)
+  foreach(schema IN LISTS ARGN)
+    get_filename_component(name ${schema} NAME_WE)
+    set(header ${generated_dir}/${name}_generated.h)
+    add_custom_command(
+      OUTPUT ${header}
+      COMMAND ${STRIDEWIRE_FLATC} --cpp --cpp-std c++17 --scoped-enums --gen-mutable
+              -o ${generated_dir} ${CMAKE_CURRENT_SOURCE_DIR}/${schema}
+      DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/${schema}
+      VERBATIM)
+    list(APPEND headers ${header})
+  endforeach()
+  target_sources(${target} PRIVATE ${headers})
+  target_include_directories(${target} SYSTEM PRIVATE ${generated_dir})
+endfunction()

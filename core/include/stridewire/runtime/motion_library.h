@@ -1,0 +1,151 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stridewire/base/error.h"
+#include "stridewire/runtime/keytimes.h"
+#include "stridewire/runtime/pose.h"
+#include "stridewire/runtime/skeleton.h"
+
+namespace stridewire {
+
+enum class MovementKind : std::uint8_t {
+  kStepLeft = 0,   ///< The left foot moves.
+  kStepRight = 1,  ///< The right foot moves.
+  kJump = 2,
+  kStand = 3,      ///< Holding a pose; has no group.
+};
+
+[[nodiscard]] std::string_view MovementKindName(MovementKind kind);  ///< "step_left", …
+[[nodiscard]] constexpr bool IsStep(MovementKind kind) { return kind <= MovementKind::kStepRight; }
+[[nodiscard]] constexpr MovementKind StepKind(Foot foot) {
+  return foot == Foot::kLeft ? MovementKind::kStepLeft : MovementKind::kStepRight;
+}
+[[nodiscard]] constexpr Foot MovingFoot(MovementKind step) {
+  return step == MovementKind::kStepLeft ? Foot::kLeft : Foot::kRight;
+}
+
+/// Parameters a group may have. The first seven are a general step's, in this order (method,
+/// Section 6): moving foot minus fixed foot at the start in the start's heading frame, the same at
+/// the end in the end's heading frame, heading change. Feet are measured at the balls.
+enum class ParameterName : std::uint8_t {
+  kStartX = 0, kStartY = 1, kStartZ = 2, kEndX = 3, kEndY = 4, kEndZ = 5, kTurn = 6,
+  kLength = 7,  ///< Jump: forward distance between the feet's centres before and after.
+  kHeight = 8,  ///< Jump: height of the landing above the start.
+};
+inline constexpr int kParameterNameCount = 9;
+inline constexpr int kMaxParameters = 7;
+
+/// With its unit: "start_z_m", "turn_rad", "length_m".
+[[nodiscard]] std::string_view ParameterText(ParameterName name);
+
+struct Parameter {
+  ParameterName name = ParameterName::kStartZ;
+  double min = 0.0;
+  double max = 0.0;
+  double centre = 0.0;  ///< Subtracted before the linear part (Section 3: rank deficiency).
+  double scale = 1.0;   ///< Parameters are divided by it before distances are taken; > 0.
+};
+
+/// Grid row: one example's pose at one grid point, as floats
+///   x[padded] y[padded] z[padded] w[padded]  root x, y, z, root yaw, 12 zeros
+/// `padded` is the joint count rounded up to 16. Joint 0's quaternion is the root rotation with
+/// its yaw taken off on the left (r = q_yaw * rest); the yaw is an unwrapped scalar, so examples
+/// may differ by more than half a turn. Positions and yaw are relative to the base frame.
+struct GridLayout {
+  int padded_joints = 0;
+  int row_floats = 0;
+  explicit constexpr GridLayout(int joint_count = 0)
+      : padded_joints((joint_count + 15) / 16 * 16), row_floats(padded_joints * 4 + 16) {}
+  [[nodiscard]] constexpr int root() const { return padded_joints * 4; }
+};
+
+/// Examples that can be blended with each other: one kind, one set of parameters, the same number
+/// of keytimes, one grid. All spans point into the library's bytes.
+///
+/// Sites are the examples, then the pseudoexamples; everything about weights is in site order.
+struct MotionGroup {
+  MovementKind kind = MovementKind::kStepLeft;
+  std::vector<Parameter> parameters;  ///< d of them
+  int example_count = 0;              ///< n
+  int site_count = 0;                 ///< m >= n
+  std::span<const double> sites;      ///< [site][parameter], in physical units
+  std::span<const double> site_weights;  ///< [site - n][example]: rows D of the pseudoexamples
+  std::span<const double> dilations;  ///< [site], scaled units
+  std::span<const double> linear;     ///< [1 + d][example]: a, row 0 the constant
+  std::span<const double> radial;     ///< [site][example]: r
+  std::span<const int> cells;         ///< [interval]: grid cells of each keytime interval
+  int grid_point_count = 0;           ///< sum of cells + 1
+  std::span<const double> keytimes_s;       ///< [example][interval + 1], K_0 = 0
+  std::span<const double> heading_change_rad;  ///< [example]: stride heading at the end
+  std::span<const float> grid;        ///< [grid point][example][row_floats], 64-byte aligned
+  std::vector<std::string_view> sources;  ///< [example]: "16_21.bvh 0.93-1.47 s"
+  std::span<const std::uint8_t> mirrored;      ///< [example]: 1 if made by mirroring
+
+  [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
+  [[nodiscard]] int interval_count() const { return static_cast<int>(cells.size()); }
+  /// Index of a parameter in this group, -1 if the group does not have it.
+  [[nodiscard]] int FindParameter(ParameterName name) const;
+  [[nodiscard]] std::span<const double> site(int s) const {
+    return sites.subspan(static_cast<std::size_t>(s * parameter_count()),
+                         static_cast<std::size_t>(parameter_count()));
+  }
+};
+
+/// An immutable library of examples: a view of verified bytes (a mapped `.swl` file or memory).
+/// Shared between threads by `shared_ptr<const>`.
+///
+/// File: a 64-byte header (magic, version, payload size, XXH3-128 of the payload), then one
+/// FlatBuffers table (`core/schema/motion_library.fbs`) whose float arrays are 64-byte aligned.
+class MotionLibrary {
+ public:
+  static constexpr int kFormatVersion = 1;
+  static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
+
+  /// Verifies header, hash, FlatBuffers structure and meaning before anything is used.
+  /// kMalformed, kVersionMismatch, kLimitExceeded, kIo; `where` names the file.
+  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(const std::filesystem::path& path);
+
+  /// The same on bytes in memory; takes them over.
+  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(std::vector<std::byte> bytes);
+
+  ~MotionLibrary();
+  MotionLibrary(const MotionLibrary&) = delete;
+  MotionLibrary& operator=(const MotionLibrary&) = delete;
+
+  [[nodiscard]] const Skeleton& skeleton() const { return skeleton_; }
+  [[nodiscard]] const GridLayout& layout() const { return layout_; }
+  [[nodiscard]] std::span<const MotionGroup> groups() const { return groups_; }
+  [[nodiscard]] const MotionGroup& group(int index) const { return groups_[static_cast<std::size_t>(index)]; }
+  /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
+  [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
+  /// 32 lower-case hex digits: XXH3-128 of the payload.
+  [[nodiscard]] const std::string& hash() const { return hash_; }
+  /// The whole file, header included: what `Open` read and what may be written elsewhere.
+  [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
+  /// Largest example count over the groups; sizes scratch memory.
+  [[nodiscard]] int max_example_count() const { return max_example_count_; }
+
+ private:
+  MotionLibrary() = default;
+  [[nodiscard]] Status Load(std::span<const std::byte> bytes);
+
+  Skeleton skeleton_;
+  GridLayout layout_;
+  std::vector<MotionGroup> groups_;
+  Pose stand_pose_;
+  std::string hash_;
+  int max_example_count_ = 0;
+  std::span<const std::byte> bytes_;
+  std::vector<std::byte> owned_;
+  void* mapping_ = nullptr;  // mmap of bytes_, unmapped at the end
+};
+
+}  // namespace stridewire

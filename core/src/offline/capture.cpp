@@ -1,0 +1,1 @@
+#include "stridewire/offline/capture.h"
