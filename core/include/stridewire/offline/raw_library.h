@@ -14,10 +14,10 @@ namespace stridewire {
 /// foot stands on. The clip covers [0, last keytime]; frames beyond the last keytime are allowed.
 struct RawExample {
   Clip clip;
-  std::vector<double> keytimes_s;  ///< K_0 = 0 < … < K_n
-  std::vector<double> parameters;  ///< One for each name of the group
+  std::vector<double> keytimes_s;   ///< K_0 = 0 < … < K_n
+  std::vector<double> parameters;   ///< One for each name of the group
   double heading_change_rad = 0.0;  ///< Heading at the end relative to the start (stride heading)
-  std::string source;              ///< "16_21.bvh 0.93-1.47 s", "generated start 0.35 end 0.55"
+  std::string source;               ///< "16_21.bvh 0.93-1.47 s", "generated start 0.35 end 0.55"
   bool mirrored = false;
 };
 

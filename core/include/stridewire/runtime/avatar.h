@@ -62,15 +62,15 @@ struct AvatarEvent {
   std::uint64_t request_id = 0;  ///< 0: the avatar's own doing (closing step).
   MovementKind kind = MovementKind::kStand;
   int group = -1;
-  double time_s = 0.0;  ///< Avatar time (seconds since it was made) at which it happened.
-  ParameterValues requested;  ///< kStarted
-  ParameterValues applied;    ///< kStarted: after clamping to what the examples span
-  bool extrapolated = false;  ///< kStarted: applied lies outside the hull of the examples
-  bool clamped = false;       ///< kStarted: applied differs from requested
-  Foot foot = Foot::kLeft;    ///< kFootStrike
+  double time_s = 0.0;           ///< Avatar time (seconds since it was made) at which it happened.
+  ParameterValues requested;     ///< kStarted
+  ParameterValues applied;       ///< kStarted: after clamping to what the examples span
+  bool extrapolated = false;     ///< kStarted: applied lies outside the hull of the examples
+  bool clamped = false;          ///< kStarted: applied differs from requested
+  Foot foot = Foot::kLeft;       ///< kFootStrike
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike
-  BaseFrame base;             ///< kFinished: base frame after the movement
-  const char* reason = "";    ///< kRejected; static storage
+  BaseFrame base;                ///< kFinished: base frame after the movement
+  const char* reason = "";       ///< kRejected; static storage
 };
 
 /// An avatar: base frame, queue of requests, current movement, displayed pose.

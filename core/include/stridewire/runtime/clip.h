@@ -17,21 +17,26 @@ struct Clip {
   std::vector<Quat> rotations;         ///< [frame * joint_count + joint]
 
   [[nodiscard]] int frame_count() const { return static_cast<int>(root_positions_m.size()); }
-  [[nodiscard]] double duration_s() const { return frame_count() < 2 ? 0.0 : (frame_count() - 1) / fps; }
+  [[nodiscard]] double duration_s() const {
+    return frame_count() < 2 ? 0.0 : (frame_count() - 1) / fps;
+  }
   [[nodiscard]] ConstPoseSpan frame(int f) const {
     return {root_positions_m[static_cast<std::size_t>(f)],
-            std::span(rotations).subspan(static_cast<std::size_t>(f) * static_cast<std::size_t>(joint_count),
-                                         static_cast<std::size_t>(joint_count))};
+            std::span(rotations).subspan(
+                static_cast<std::size_t>(f) * static_cast<std::size_t>(joint_count),
+                static_cast<std::size_t>(joint_count))};
   }
   [[nodiscard]] PoseSpan frame(int f) {
     return {root_positions_m[static_cast<std::size_t>(f)],
-            std::span(rotations).subspan(static_cast<std::size_t>(f) * static_cast<std::size_t>(joint_count),
-                                         static_cast<std::size_t>(joint_count))};
+            std::span(rotations).subspan(
+                static_cast<std::size_t>(f) * static_cast<std::size_t>(joint_count),
+                static_cast<std::size_t>(joint_count))};
   }
   void Resize(int frames, int joints) {
     joint_count = joints;
     root_positions_m.resize(static_cast<std::size_t>(frames), Vec3(0.0f));
-    rotations.resize(static_cast<std::size_t>(frames) * static_cast<std::size_t>(joints), kIdentityQuat);
+    rotations.resize(static_cast<std::size_t>(frames) * static_cast<std::size_t>(joints),
+                     kIdentityQuat);
   }
 
   /// kOutOfRange: fps not in (0, 10000], no frame, no joint; kShapeMismatch: rotation count;

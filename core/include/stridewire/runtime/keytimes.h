@@ -47,7 +47,9 @@ class TimeWarp {
   /// Generic time at `time_s`: GridPosition expressed in keytime intervals.
   [[nodiscard]] double GenericTimeAt(double time_s) const;
 
-  [[nodiscard]] double duration_s() const { return keytimes_s_[static_cast<std::size_t>(interval_count_)]; }
+  [[nodiscard]] double duration_s() const {
+    return keytimes_s_[static_cast<std::size_t>(interval_count_)];
+  }
 
  private:
   int interval_count_ = 0;

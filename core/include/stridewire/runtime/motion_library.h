@@ -20,7 +20,7 @@ enum class MovementKind : std::uint8_t {
   kStepLeft = 0,   ///< The left foot moves.
   kStepRight = 1,  ///< The right foot moves.
   kJump = 2,
-  kStand = 3,      ///< Holding a pose; has no group.
+  kStand = 3,  ///< Holding a pose; has no group.
 };
 
 [[nodiscard]] std::string_view MovementKindName(MovementKind kind);  ///< "step_left", …
@@ -36,7 +36,13 @@ enum class MovementKind : std::uint8_t {
 /// Section 6): moving foot minus fixed foot at the start in the start's heading frame, the same at
 /// the end in the end's heading frame, heading change. Feet are measured at the balls.
 enum class ParameterName : std::uint8_t {
-  kStartX = 0, kStartY = 1, kStartZ = 2, kEndX = 3, kEndY = 4, kEndZ = 5, kTurn = 6,
+  kStartX = 0,
+  kStartY = 1,
+  kStartZ = 2,
+  kEndX = 3,
+  kEndY = 4,
+  kEndZ = 5,
+  kTurn = 6,
   kLength = 7,  ///< Jump: forward distance between the feet's centres before and after.
   kHeight = 8,  ///< Jump: height of the landing above the start.
 };
@@ -73,21 +79,21 @@ struct GridLayout {
 /// Sites are the examples, then the pseudoexamples; everything about weights is in site order.
 struct MotionGroup {
   MovementKind kind = MovementKind::kStepLeft;
-  std::vector<Parameter> parameters;  ///< d of them
-  int example_count = 0;              ///< n
-  int site_count = 0;                 ///< m >= n
-  std::span<const double> sites;      ///< [site][parameter], in physical units
+  std::vector<Parameter> parameters;     ///< d of them
+  int example_count = 0;                 ///< n
+  int site_count = 0;                    ///< m >= n
+  std::span<const double> sites;         ///< [site][parameter], in physical units
   std::span<const double> site_weights;  ///< [site - n][example]: rows D of the pseudoexamples
-  std::span<const double> dilations;  ///< [site], scaled units
-  std::span<const double> linear;     ///< [1 + d][example]: a, row 0 the constant
-  std::span<const double> radial;     ///< [site][example]: r
-  std::span<const int> cells;         ///< [interval]: grid cells of each keytime interval
-  int grid_point_count = 0;           ///< sum of cells + 1
-  std::span<const double> keytimes_s;       ///< [example][interval + 1], K_0 = 0
+  std::span<const double> dilations;     ///< [site], scaled units
+  std::span<const double> linear;        ///< [1 + d][example]: a, row 0 the constant
+  std::span<const double> radial;        ///< [site][example]: r
+  std::span<const int> cells;            ///< [interval]: grid cells of each keytime interval
+  int grid_point_count = 0;              ///< sum of cells + 1
+  std::span<const double> keytimes_s;    ///< [example][interval + 1], K_0 = 0
   std::span<const double> heading_change_rad;  ///< [example]: stride heading at the end
-  std::span<const float> grid;        ///< [grid point][example][row_floats], 64-byte aligned
-  std::vector<std::string_view> sources;  ///< [example]: "16_21.bvh 0.93-1.47 s"
-  std::span<const std::uint8_t> mirrored;      ///< [example]: 1 if made by mirroring
+  std::span<const float> grid;             ///< [grid point][example][row_floats], 64-byte aligned
+  std::vector<std::string_view> sources;   ///< [example]: "16_21.bvh 0.93-1.47 s"
+  std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if made by mirroring
 
   [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
   [[nodiscard]] int interval_count() const { return static_cast<int>(cells.size()); }
@@ -111,10 +117,12 @@ class MotionLibrary {
 
   /// Verifies header, hash, FlatBuffers structure and meaning before anything is used.
   /// kMalformed, kVersionMismatch, kLimitExceeded, kIo; `where` names the file.
-  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(const std::filesystem::path& path);
+  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(
+      const std::filesystem::path& path);
 
   /// The same on bytes in memory; takes them over.
-  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(std::vector<std::byte> bytes);
+  [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(
+      std::vector<std::byte> bytes);
 
   ~MotionLibrary();
   MotionLibrary(const MotionLibrary&) = delete;
@@ -123,7 +131,9 @@ class MotionLibrary {
   [[nodiscard]] const Skeleton& skeleton() const { return skeleton_; }
   [[nodiscard]] const GridLayout& layout() const { return layout_; }
   [[nodiscard]] std::span<const MotionGroup> groups() const { return groups_; }
-  [[nodiscard]] const MotionGroup& group(int index) const { return groups_[static_cast<std::size_t>(index)]; }
+  [[nodiscard]] const MotionGroup& group(int index) const {
+    return groups_[static_cast<std::size_t>(index)];
+  }
   /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
   /// 32 lower-case hex digits: XXH3-128 of the payload.

@@ -22,16 +22,18 @@ struct BaseFrame {
 /// this value, its group and the time.
 struct Movement {
   int group = -1;
-  std::vector<float> weights;               ///< [example], sum 1
+  std::vector<float> weights;                          ///< [example], sum 1
   std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
   int interval_count = 0;
   TimeWarp warp;
-  double heading_change_rad = 0.0;          ///< blended
+  double heading_change_rad = 0.0;  ///< blended
   BaseFrame base;
-  Pose difference;                          ///< D = P - M(0), world frame
-  double ease_out_s = 0.2;                  ///< T = min(0.2 s, duration)
+  Pose difference;          ///< D = P - M(0), world frame
+  double ease_out_s = 0.2;  ///< T = min(0.2 s, duration)
 
-  [[nodiscard]] double duration_s() const { return keytimes_s[static_cast<std::size_t>(interval_count)]; }
+  [[nodiscard]] double duration_s() const {
+    return keytimes_s[static_cast<std::size_t>(interval_count)];
+  }
 };
 
 }  // namespace stridewire

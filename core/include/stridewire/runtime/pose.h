@@ -20,7 +20,8 @@ struct ConstPoseSpan {
 struct PoseSpan {
   Vec3& root_position_m;
   std::span<Quat> rotations;
-  operator ConstPoseSpan() const { return {root_position_m, rotations}; }  // NOLINT: a view of a view
+  // NOLINTNEXTLINE(google-explicit-constructor): a view of a view.
+  operator ConstPoseSpan() const { return {root_position_m, rotations}; }
 };
 
 /// Owned pose.
@@ -29,9 +30,10 @@ struct Pose {
   std::vector<Quat> rotations;
 
   Pose() = default;
-  explicit Pose(int joint_count) : rotations(static_cast<std::size_t>(joint_count), kIdentityQuat) {}
-  operator PoseSpan() { return {root_position_m, rotations}; }                 // NOLINT
-  operator ConstPoseSpan() const { return {root_position_m, rotations}; }      // NOLINT
+  explicit Pose(int joint_count)
+      : rotations(static_cast<std::size_t>(joint_count), kIdentityQuat) {}
+  operator PoseSpan() { return {root_position_m, rotations}; }             // NOLINT
+  operator ConstPoseSpan() const { return {root_position_m, rotations}; }  // NOLINT
 };
 
 /// Joint positions and world rotations of a pose. `positions` and `world_rotations` hold one value

@@ -18,7 +18,7 @@ enum class Foot : std::uint8_t { kLeft = 0, kRight = 1 };
 
 struct Joint {
   std::string name;
-  int parent = -1;            ///< Index of the parent, always smaller than its own; -1 for the root.
+  int parent = -1;  ///< Index of the parent, always smaller than its own; -1 for the root.
   Vec3 offset_m = Vec3(0.0f);  ///< Where the joint sits in its parent's frame; unused for the root.
 };
 
