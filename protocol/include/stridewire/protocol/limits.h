@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace stridewire::protocol {
+
+/// Versions of the messages this build speaks; Hello and Welcome agree on one.
+inline constexpr std::uint16_t kProtocolMin = 1;
+inline constexpr std::uint16_t kProtocolMax = 1;
+
+/// Feature bits of Hello and Welcome: what both sides set may be used. Unknown bits are ignored.
+inline constexpr std::uint64_t kFeatureResume = 1;        ///< Sessions outlive a connection.
+inline constexpr std::uint64_t kFeatureEventReplay = 2;   ///< Events missed are sent again.
+inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuantised.
+inline constexpr std::uint64_t kFeatureMovementMode = 8;  ///< PoseMode::kMovement; reserved.
+
+/// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
+inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;    ///< Payload of Hello.
+inline constexpr std::size_t kMaxControlBytes = std::size_t{1} << 20;   ///< Other small messages.
+inline constexpr std::size_t kMaxBulkBytes = std::size_t{16} << 20;     ///< Crowds and poses.
+inline constexpr std::size_t kMaxItems = 65'536;      ///< Items, avatars or events in a message.
+inline constexpr std::size_t kMaxNameBytes = 64;      ///< Names of worlds, clients, joints.
+inline constexpr std::size_t kMaxTextBytes = 1024;    ///< Texts and reasons.
+inline constexpr std::size_t kMaxAuthTokenBytes = 4096;
+inline constexpr std::size_t kMinResumeTokenBytes = 16;
+inline constexpr std::size_t kMaxResumeTokenBytes = 64;
+inline constexpr std::size_t kMaxJoints = 256;
+inline constexpr std::size_t kMaxEndSites = 256;
+inline constexpr std::size_t kMaxParameters = 7;       ///< Parameters of an event.
+inline constexpr std::uint8_t kParameterNames = 9;     ///< Parameter names are 0 to 8.
+inline constexpr std::uint16_t kMaxEveryNTicks = 3600;
+inline constexpr std::uint16_t kMaxBatchParts = 1024;
+inline constexpr std::uint32_t kReplyMemory = 1024;    ///< Answers a server remembers a session.
+inline constexpr int kMaxDepth = 4;                    ///< Nesting of tables.
+
+}  // namespace stridewire::protocol

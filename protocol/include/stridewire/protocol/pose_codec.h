@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "stridewire/base/error.h"
+#include "stridewire/base/math.h"
+
+namespace stridewire::protocol {
+
+/// How poses travel.
+enum class PoseMode : std::uint8_t {
+  kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
+  kQuantised = 1,  ///< Root in fixed point, 3 x int32; 48 bits a joint ("smallest three").
+  kMovement = 2,   ///< Reserved: what a movement is made of, once a step. No pose is sent.
+};
+
+/// Quantised root: multiples of 2^-14 m (0.061 mm), so the error is at most 2^-15 m = 0.031 mm as
+/// long as float32 itself is that fine (|x| < 256 m), over +-131,071 m from the world's origin.
+inline constexpr float kRootStepsPerM = 16384.0f;
+inline constexpr float kMaxRootM = 131'071.0f;
+
+/// Quantised joint: the largest component is left out (the lowest index of equals), the quaternion
+/// negated first if that component is negative; the others, in order, are round(c sqrt(2) 16383) +
+/// 16384 in 15 bits, so that 0 is exact. Three little-endian u16: component in bits 0-14; bit 15 of
+/// the first and second is bit 0 and 1 of the index left out, bit 15 of the third is zero.
+/// The rotation is off by at most this angle (a component by 2.2e-5; worst where all are 0.5).
+inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
+
+/// How far a quaternion's length may be from 1.
+inline constexpr float kUnitTolerance = 1e-3f;
+
+/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement.
+[[nodiscard]] constexpr std::size_t PoseBytes(PoseMode mode, std::size_t joint_count) {
+  switch (mode) {
+    case PoseMode::kFull: return 12 + 16 * joint_count;
+    case PoseMode::kQuantised: return 12 + 6 * joint_count;
+    case PoseMode::kMovement: return 0;
+  }
+  return 0;
+}
+
+/// Writes one pose. `out` is PoseBytes(mode, rotations.size()) long, of any alignment.
+/// kShapeMismatch: `out` has another size; kOutOfRange: a number is not finite, a quaternion not
+/// unit within kUnitTolerance, or the root beyond kMaxRootM (quantised); `index` is the joint;
+/// kUnsupported: kMovement. On error the content of `out` is unspecified. Never allocates.
+[[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
+                                std::span<const Quat> rotations, std::span<std::byte> out);
+
+/// Reads one pose; `in` is PoseBytes(mode, rotations.size()) long, of any alignment. Errors as
+/// above, and kMalformed for quantised bits that no encoder writes. Quantised quaternions come back
+/// unit to float32; full ones exactly as they were sent. Never allocates.
+[[nodiscard]] Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
+                                std::span<Quat> rotations);
+
+}  // namespace stridewire::protocol
