@@ -1,0 +1,369 @@
+#include "stridewire/protocol/check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "utf8.h"
+
+namespace stridewire::protocol {
+namespace {
+
+/// Keeps the first thing found wrong.
+class Findings {
+ public:
+  void Wrong(ErrorCode code, const char* text, const char* field, std::int64_t index = -1) {
+    if (!error_) error_ = Error{code, text, index, field};
+  }
+
+  void That(bool holds, ErrorCode code, const char* text, const char* field,
+            std::int64_t index = -1) {
+    if (!holds) Wrong(code, text, field, index);
+  }
+
+  void Id(std::uint64_t id, const char* field, std::int64_t index = -1) {
+    That(id != 0, ErrorCode::kOutOfRange, "id is zero", field, index);
+  }
+
+  void Finite(double value, const char* field, std::int64_t index = -1) {
+    That(std::isfinite(value), ErrorCode::kOutOfRange, "number is not finite", field, index);
+  }
+
+  void NotNegative(double value, const char* field) {
+    That(std::isfinite(value) && value >= 0.0, ErrorCode::kOutOfRange,
+         "number is negative or not finite", field);
+  }
+
+  template <typename V>
+  void FiniteVector(const V& v, const char* field, std::int64_t index = -1) {
+    That(std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z), ErrorCode::kOutOfRange,
+         "number is not finite", field, index);
+  }
+
+  void Finite(const Placement& placement, const char* field, std::int64_t index = -1) {
+    FiniteVector(placement.position_m, field, index);
+    Finite(placement.heading_rad, field, index);
+  }
+
+  void Text(std::string_view text, std::size_t max_bytes, const char* field,
+            std::int64_t index = -1) {
+    if (text.size() > max_bytes) {
+      Wrong(ErrorCode::kLimitExceeded, "text is too long", field, index);
+    } else if (!IsCleanUtf8(text)) {
+      Wrong(ErrorCode::kMalformed, "text is not UTF-8 without control characters", field, index);
+    }
+  }
+
+  void Name(std::string_view name, const char* field, std::int64_t index = -1) {
+    That(!name.empty(), ErrorCode::kMalformed, "name is empty", field, index);
+    Text(name, kMaxNameBytes, field, index);
+  }
+
+  void Count(std::size_t count, std::size_t min, std::size_t max, const char* field) {
+    That(count >= min, ErrorCode::kMalformed, "list is empty", field);
+    That(count <= max, ErrorCode::kLimitExceeded, "list is too long", field,
+         static_cast<std::int64_t>(count));
+  }
+
+  template <typename E>
+  void Known(E value, E last, const char* field, std::int64_t index = -1) {
+    using U = std::underlying_type_t<E>;
+    That(static_cast<U>(value) <= static_cast<U>(last), ErrorCode::kMalformed,
+         "unknown enumerator", field, index);
+  }
+
+  void Avatars(std::span<const AvatarNumber> avatars, std::size_t min, const char* field) {
+    Count(avatars.size(), min, kMaxItems, field);
+    const auto zero = std::find(avatars.begin(), avatars.end(), AvatarNumber{0});
+    if (zero != avatars.end()) {
+      Wrong(ErrorCode::kOutOfRange, "id is zero", field, zero - avatars.begin());
+    }
+  }
+
+  void ResumeToken(std::size_t bytes, const char* field) {
+    That(bytes == 0 || (bytes >= kMinResumeTokenBytes && bytes <= kMaxResumeTokenBytes),
+         ErrorCode::kLimitExceeded, "token is not 16 to 64 bytes long", field,
+         static_cast<std::int64_t>(bytes));
+  }
+
+  [[nodiscard]] Status Result() {
+    if (error_) return std::unexpected(std::move(*error_));
+    return {};
+  }
+
+ private:
+  std::optional<Error> error_;
+};
+
+void CheckParameters(Findings& found, const ParameterSet& set, const char* field,
+                     std::int64_t index) {
+  if (set.count > kMaxParameters) {
+    found.Wrong(ErrorCode::kLimitExceeded, "list is too long", field, index);
+    return;
+  }
+  unsigned seen = 0;
+  for (std::size_t p = 0; p < set.count; ++p) {
+    if (set.names[p] >= kParameterNames) {
+      found.Wrong(ErrorCode::kMalformed, "unknown parameter", field, index);
+      return;
+    }
+    const unsigned bit = 1u << set.names[p];
+    found.That((seen & bit) == 0, ErrorCode::kMalformed, "parameter stands twice", field, index);
+    seen |= bit;
+    found.Finite(set.values[p], field, index);
+  }
+}
+
+void CheckSkeleton(Findings& found, const SkeletonInfo& skeleton) {
+  const auto joint_count = static_cast<std::int64_t>(skeleton.joints.size());
+  found.Count(skeleton.joints.size(), 1, kMaxJoints, "WorldInfo.skeleton.joints");
+  found.Count(skeleton.end_sites.size(), 0, kMaxEndSites, "WorldInfo.skeleton.end_sites");
+  std::vector<std::string_view> names;
+  names.reserve(skeleton.joints.size());
+  for (std::int64_t j = 0; j < joint_count; ++j) {
+    const JointInfo& joint = skeleton.joints[static_cast<std::size_t>(j)];
+    found.Name(joint.name, "WorldInfo.joint.name", j);
+    found.That(j == 0 ? joint.parent == -1 : joint.parent >= 0 && joint.parent < j,
+               ErrorCode::kOutOfRange, "parent does not come before its child",
+               "WorldInfo.joint.parent", j);
+    found.FiniteVector(joint.offset_m, "WorldInfo.joint.offset_m", j);
+    names.push_back(joint.name);
+  }
+  std::sort(names.begin(), names.end());
+  found.That(std::adjacent_find(names.begin(), names.end()) == names.end(), ErrorCode::kMalformed,
+             "name stands twice", "WorldInfo.joint.name");
+  for (std::size_t e = 0; e < skeleton.end_sites.size(); ++e) {
+    const EndSiteInfo& site = skeleton.end_sites[e];
+    const auto index = static_cast<std::int64_t>(e);
+    found.That(site.joint < joint_count, ErrorCode::kOutOfRange, "no such joint",
+               "WorldInfo.end_site.joint", index);
+    found.FiniteVector(site.offset_m, "WorldInfo.end_site.offset_m", index);
+  }
+  for (const LegInfo& leg : skeleton.legs) {
+    for (const std::int16_t joint : {leg.hip, leg.knee, leg.ankle, leg.ball}) {
+      found.That(joint >= -1 && joint < joint_count, ErrorCode::kOutOfRange, "no such joint",
+                 "WorldInfo.leg", joint);
+    }
+    found.FiniteVector(leg.ball_offset_m, "WorldInfo.leg.ball_offset_m");
+    found.FiniteVector(leg.toe_tip_offset_m, "WorldInfo.leg.toe_tip_offset_m");
+  }
+}
+
+}  // namespace
+
+Status Check(const Hello& m) {
+  Findings found;
+  found.That(m.protocol_min >= 1 && m.protocol_min <= m.protocol_max, ErrorCode::kOutOfRange,
+             "versions are not 1 <= min <= max", "Hello.protocol_min", m.protocol_min);
+  found.Name(m.client_name, "Hello.client_name");
+  found.Text(m.auth_token, kMaxAuthTokenBytes, "Hello.auth_token");
+  found.ResumeToken(m.resume_token.size(), "Hello.resume_token");
+  return found.Result();
+}
+
+Status Check(const JoinWorld& m) {
+  Findings found;
+  found.Id(m.seq, "JoinWorld.seq");
+  found.Name(m.name, "JoinWorld.name");
+  found.Known(m.role, Role::kObserver, "JoinWorld.role");
+  return found.Result();
+}
+
+Status Check(const LeaveWorld& m) {
+  Findings found;
+  found.Id(m.seq, "LeaveWorld.seq");
+  found.Id(m.world, "LeaveWorld.world");
+  return found.Result();
+}
+
+Status Check(const Spawn& m) {
+  Findings found;
+  found.Id(m.seq, "Spawn.seq");
+  found.Id(m.world, "Spawn.world");
+  found.Count(m.items.size(), 1, kMaxItems, "Spawn.items");
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    found.Finite(m.items[i].start, "Spawn.start", static_cast<std::int64_t>(i));
+  }
+  return found.Result();
+}
+
+Status Check(const Remove& m) {
+  Findings found;
+  found.Id(m.seq, "Remove.seq");
+  found.Id(m.world, "Remove.world");
+  found.Avatars(m.avatars, 1, "Remove.avatars");
+  return found.Result();
+}
+
+Status Check(const Request& m) {
+  Findings found;
+  found.Id(m.seq, "Request.seq");
+  found.Id(m.world, "Request.world");
+  found.Count(m.items.size(), 1, kMaxItems, "Request.items");
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const RequestItem& item = m.items[i];
+    const auto index = static_cast<std::int64_t>(i);
+    found.Id(item.avatar, "Request.avatar", index);
+    found.Id(item.request_id, "Request.request_id", index);
+    if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
+      found.Known(step->foot, FootChoice::kRight, "Request.foot", index);
+      found.Finite(step->length_m, "Request.length_m", index);
+      found.Finite(step->side_m.value_or(0.0), "Request.side_m", index);
+      found.Finite(step->height_m, "Request.height_m", index);
+      found.Finite(step->turn_rad, "Request.turn_rad", index);
+    } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+      found.Finite(jump->length_m, "Request.length_m", index);
+      found.Finite(jump->height_m, "Request.height_m", index);
+      found.Finite(jump->turn_rad, "Request.turn_rad", index);
+    } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
+      found.Finite(stand->seconds, "Request.seconds", index);
+    }
+  }
+  return found.Result();
+}
+
+Status Check(const CancelQueue& m) {
+  Findings found;
+  found.Id(m.seq, "CancelQueue.seq");
+  found.Id(m.world, "CancelQueue.world");
+  found.Avatars(m.avatars, 1, "CancelQueue.avatars");
+  return found.Result();
+}
+
+Status Check(const Observe& m) {
+  Findings found;
+  found.Id(m.seq, "Observe.seq");
+  found.Id(m.world, "Observe.world");
+  found.Id(m.subscription, "Observe.subscription");
+  found.Known(m.mode, PoseMode::kMovement, "Observe.mode");
+  found.Avatars(m.avatars, 0, "Observe.avatars");
+  found.That(m.every_n_ticks >= 1 && m.every_n_ticks <= kMaxEveryNTicks, ErrorCode::kOutOfRange,
+             "not 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
+  return found.Result();
+}
+
+Status Check(const StopObserving& m) {
+  Findings found;
+  found.Id(m.seq, "StopObserving.seq");
+  found.Id(m.subscription, "StopObserving.subscription");
+  return found.Result();
+}
+
+Status Check(const Ping& m) {
+  Findings found;
+  found.Finite(m.time_s, "Ping.time_s");
+  return found.Result();
+}
+
+Status Check(const Goodbye& m) {
+  Findings found;
+  found.Text(m.text, kMaxTextBytes, "Goodbye.text");
+  return found.Result();
+}
+
+Status Check(const Welcome& m) {
+  Findings found;
+  found.Id(m.protocol, "Welcome.protocol");
+  found.Id(m.session, "Welcome.session");
+  found.ResumeToken(m.resume_token.size(), "Welcome.resume_token");
+  found.That(std::isfinite(m.tick_hz) && m.tick_hz > 0.0, ErrorCode::kOutOfRange,
+             "tick rate is not above 0", "Welcome.tick_hz");
+  found.Text(m.server_name, kMaxNameBytes, "Welcome.server_name");
+  found.Text(m.server_version, kMaxNameBytes, "Welcome.server_version");
+  found.NotNegative(m.limits.idle_timeout_s, "Welcome.limits.idle_timeout_s");
+  found.NotNegative(m.limits.resume_window_s, "Welcome.limits.resume_window_s");
+  return found.Result();
+}
+
+Status Check(const WorldInfo& m) {
+  Findings found;
+  found.Id(m.world, "WorldInfo.world");
+  found.Name(m.name, "WorldInfo.name");
+  found.Known(m.role, Role::kObserver, "WorldInfo.role");
+  found.Text(m.library_hash, kMaxNameBytes, "WorldInfo.library_hash");
+  CheckSkeleton(found, m.skeleton);
+  return found.Result();
+}
+
+Status Check(const Reply& m) {
+  Findings found;
+  found.Id(m.seq, "Reply.seq");
+  found.Text(m.text, kMaxTextBytes, "Reply.text");
+  found.Count(m.items.size(), 0, kMaxItems, "Reply.items");
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const auto index = static_cast<std::int64_t>(i);
+    found.That(m.items[i].index < kMaxItems, ErrorCode::kOutOfRange,
+               "no command has so many items", "Reply.index", index);
+    found.Text(m.items[i].text, kMaxReasonBytes, "Reply.item.text", index);
+  }
+  return found.Result();
+}
+
+Status Check(const PoseBatch& m) {
+  Findings found;
+  const PoseBatchInfo& info = m.info;
+  found.Id(info.world, "PoseBatch.world");
+  found.That(info.parts >= 1 && info.parts <= kMaxBatchParts && info.part < info.parts,
+             ErrorCode::kOutOfRange, "not part 0 to parts - 1 of 1 to 1024", "PoseBatch.part",
+             info.part);
+  found.Finite(info.server_time_s, "PoseBatch.server_time_s");
+  found.Known(info.mode, PoseMode::kMovement, "PoseBatch.mode");
+  found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
+             "no pose is sent in this mode", "PoseBatch.mode");
+  found.That(info.joint_count >= 1 && info.joint_count <= kMaxJoints, ErrorCode::kOutOfRange,
+             "not 1 to 256 joints", "PoseBatch.joint_count", info.joint_count);
+  found.Avatars(m.avatars, 0, "PoseBatch.avatars");
+  found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
+             "not one flag an avatar", "PoseBatch.flags", static_cast<std::int64_t>(m.flags.size()));
+  found.That(m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count),
+             ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",
+             static_cast<std::int64_t>(m.poses.size()));
+  return found.Result();
+}
+
+Status Check(const Events& m) {
+  Findings found;
+  found.Id(m.world, "Events.world");
+  found.Count(m.events.size(), 1, kMaxItems, "Events.events");
+  for (std::size_t i = 0; i < m.events.size(); ++i) {
+    const Event& event = m.events[i];
+    const auto index = static_cast<std::int64_t>(i);
+    found.Known(event.type, EventType::kRemoved, "Event.type", index);
+    found.Id(event.avatar, "Event.avatar", index);
+    found.Known(event.kind, MovementKind::kStand, "Event.kind", index);
+    found.That(event.group >= -1, ErrorCode::kOutOfRange, "group is below -1", "Event.group",
+               index);
+    found.Finite(event.time_s, "Event.time_s", index);
+    CheckParameters(found, event.requested, "Event.requested", index);
+    CheckParameters(found, event.applied, "Event.applied", index);
+    found.Known(event.foot, FootSide::kRight, "Event.foot", index);
+    found.FiniteVector(event.position_m, "Event.position_m", index);
+    found.Finite(event.base, "Event.base", index);
+    found.Text(event.reason, kMaxReasonBytes, "Event.reason", index);
+  }
+  return found.Result();
+}
+
+Status Check(const Lagging& m) {
+  Findings found;
+  found.Id(m.world, "Lagging.world");
+  return found.Result();
+}
+
+Status Check(const ErrorNotice& m) {
+  Findings found;
+  found.Text(m.text, kMaxTextBytes, "Error.text");
+  return found.Result();
+}
+
+Status Check(const Pong& m) {
+  Findings found;
+  found.Finite(m.time_s, "Pong.time_s");
+  found.Finite(m.server_time_s, "Pong.server_time_s");
+  return found.Result();
+}
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,376 @@
+#include "stridewire/protocol/decode.h"
+
+#include <bit>
+#include <cstdint>
+#include <optional>
+
+#include "stridewire/protocol/check.h"
+#include "stridewire_generated.h"
+
+namespace stridewire::protocol {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "batches are read in place");
+
+// Tables a payload may hold, itself included. A little above the real counts, so that a list one
+// too long is told as such; far above stops the verifier.
+constexpr std::size_t kFewTables = 1024;
+constexpr std::size_t kCrowdTables = kMaxItems + 1024;
+
+/// Copies a message out of verified bytes. Lengths are looked at before anything is copied: a
+/// FlatBuffers message may name the same bytes many times and so be larger than itself.
+class Unpacker {
+ public:
+  [[nodiscard]] std::optional<Error>& error() { return error_; }
+
+  void Wrong(ErrorCode code, const char* text, const char* field, std::int64_t index = -1) {
+    if (!error_) error_ = stridewire::Error{code, text, index, field};
+  }
+
+  /// Number of entries to read: 0 if there is no list or it is too long, which is an error.
+  template <typename V>
+  std::size_t Count(const V* list, std::size_t max, const char* field) {
+    if (list == nullptr) return 0;
+    if (list->size() <= max) return list->size();
+    Wrong(ErrorCode::kLimitExceeded, "list is too long", field, list->size());
+    return 0;
+  }
+
+  void Text(const flatbuffers::String* text, std::size_t max_bytes, std::string& out,
+            const char* field, std::int64_t index = -1) {
+    if (text == nullptr) return;
+    if (text->size() > max_bytes) {
+      Wrong(ErrorCode::kLimitExceeded, "text is too long", field, index);
+      return;
+    }
+    out.assign(text->data(), text->size());
+  }
+
+  void Bytes(const flatbuffers::Vector<std::uint8_t>* bytes, std::size_t max, const char* field,
+             std::vector<std::byte>& out) {
+    if (const std::size_t count = Count(bytes, max, field); count > 0) {
+      const auto* data = reinterpret_cast<const std::byte*>(bytes->data());
+      out.assign(data, data + count);
+    }
+  }
+
+  void Avatars(const flatbuffers::Vector<std::uint32_t>* avatars, const char* field,
+               std::vector<AvatarNumber>& out) {
+    if (const std::size_t count = Count(avatars, kMaxItems, field); count > 0) {
+      out.assign(avatars->data(), avatars->data() + count);
+    }
+  }
+
+  void Parameters(const flatbuffers::Vector<const wire::ParameterValue*>* list, const char* field,
+                  ParameterSet& out) {
+    const std::size_t count = Count(list, kMaxParameters, field);
+    for (std::size_t p = 0; p < count; ++p) {
+      const auto* value = list->Get(static_cast<flatbuffers::uoffset_t>(p));
+      out.names[p] = value->name();
+      out.values[p] = value->value();
+    }
+    out.count = static_cast<std::uint8_t>(count);
+  }
+
+ private:
+  std::optional<stridewire::Error> error_;
+};
+
+DVec3 FromWire(const wire::Vec3* v) {
+  return v == nullptr ? DVec3(0.0) : DVec3(v->x(), v->y(), v->z());
+}
+
+Vec3 FromWire(const wire::Offset* v) {
+  return v == nullptr ? Vec3(0.0f) : Vec3(v->x(), v->y(), v->z());
+}
+
+void Unpack(Unpacker& u, const wire::Hello& w, Hello& m) {
+  m.protocol_min = w.protocol_min();
+  m.protocol_max = w.protocol_max();
+  u.Text(w.client_name(), kMaxNameBytes, m.client_name, "Hello.client_name");
+  m.features = w.features();
+  u.Text(w.auth_token(), kMaxAuthTokenBytes, m.auth_token, "Hello.auth_token");
+  u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Hello.resume_token", m.resume_token);
+  m.last_events_number = w.last_events_number();
+}
+
+void Unpack(Unpacker& u, const wire::JoinWorld& w, JoinWorld& m) {
+  m.seq = w.seq();
+  u.Text(w.name(), kMaxNameBytes, m.name, "JoinWorld.name");
+  m.role = static_cast<Role>(w.role());
+}
+
+void Unpack(Unpacker&, const wire::LeaveWorld& w, LeaveWorld& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+}
+
+void Unpack(Unpacker& u, const wire::Spawn& w, Spawn& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  m.items.resize(u.Count(w.items(), kMaxItems, "Spawn.items"));
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const auto* item = w.items()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    m.items[i].avatar = item->avatar();
+    m.items[i].start = {FromWire(item->position_m()), item->heading_rad()};
+  }
+}
+
+void Unpack(Unpacker& u, const wire::Remove& w, Remove& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  u.Avatars(w.avatars(), "Remove.avatars", m.avatars);
+}
+
+void Unpack(Unpacker& u, const wire::Request& w, Request& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  m.items.resize(u.Count(w.items(), kMaxItems, "Request.items"));
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const auto* from = w.items()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    RequestItem& item = m.items[i];
+    item.avatar = from->avatar();
+    item.request_id = from->request_id();
+    switch (from->type()) {
+      case wire::MovementType::Step: {
+        StepMovement step{static_cast<FootChoice>(from->foot()), from->length_m(), std::nullopt,
+                          from->height_m(), from->turn_rad()};
+        if (const auto side = from->side_m()) step.side_m = *side;
+        item.movement = step;
+        break;
+      }
+      case wire::MovementType::Jump:
+        item.movement = JumpMovement{from->length_m(), from->height_m(), from->turn_rad()};
+        break;
+      case wire::MovementType::Stand:
+        item.movement = StandMovement{from->seconds()};
+        break;
+      default:
+        u.Wrong(ErrorCode::kMalformed, "unknown enumerator", "Request.type",
+                static_cast<std::int64_t>(i));
+    }
+  }
+}
+
+void Unpack(Unpacker& u, const wire::CancelQueue& w, CancelQueue& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  u.Avatars(w.avatars(), "CancelQueue.avatars", m.avatars);
+}
+
+void Unpack(Unpacker& u, const wire::Observe& w, Observe& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  m.subscription = w.subscription();
+  m.mode = static_cast<PoseMode>(w.mode());
+  u.Avatars(w.avatars(), "Observe.avatars", m.avatars);
+  m.every_n_ticks = w.every_n_ticks();
+  m.with_events = w.with_events();
+}
+
+void Unpack(Unpacker&, const wire::StopObserving& w, StopObserving& m) {
+  m.seq = w.seq();
+  m.subscription = w.subscription();
+}
+
+void Unpack(Unpacker&, const wire::Ping& w, Ping& m) {
+  m.nonce = w.nonce();
+  m.time_s = w.time_s();
+}
+
+void Unpack(Unpacker& u, const wire::Goodbye& w, Goodbye& m) {
+  m.code = static_cast<StatusCode>(w.code());
+  u.Text(w.text(), kMaxTextBytes, m.text, "Goodbye.text");
+}
+
+void Unpack(Unpacker& u, const wire::Welcome& w, Welcome& m) {
+  m.protocol = w.protocol();
+  m.features = w.features();
+  m.session = w.session();
+  u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Welcome.resume_token", m.resume_token);
+  m.resumed = w.resumed();
+  m.last_seq = w.last_seq();
+  m.tick_hz = w.tick_hz();
+  u.Text(w.server_name(), kMaxNameBytes, m.server_name, "Welcome.server_name");
+  u.Text(w.server_version(), kMaxNameBytes, m.server_version, "Welcome.server_version");
+  if (const auto* limits = w.limits()) {
+    m.limits = {limits->max_control_bytes(), limits->max_bulk_bytes(),
+                limits->max_items(),         limits->max_avatars_per_world(),
+                limits->max_queue(),         limits->reply_memory(),
+                limits->idle_timeout_s(),    limits->resume_window_s()};
+  }
+}
+
+void Unpack(const wire::Leg* w, LegInfo& leg) {
+  if (w == nullptr) return;
+  leg = {w->hip(),
+         w->knee(),
+         w->ankle(),
+         w->ball(),
+         FromWire(w->ball_offset_m()),
+         FromWire(w->toe_tip_offset_m())};
+}
+
+void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  u.Text(w.name(), kMaxNameBytes, m.name, "WorldInfo.name");
+  m.role = static_cast<Role>(w.role());
+  m.tick = w.tick();
+  u.Text(w.library_hash(), kMaxNameBytes, m.library_hash, "WorldInfo.library_hash");
+  const auto* skeleton = w.skeleton();
+  if (skeleton == nullptr) return;  // Check tells that there is no joint.
+  m.skeleton.joints.resize(u.Count(skeleton->joints(), kMaxJoints, "WorldInfo.skeleton.joints"));
+  for (std::size_t j = 0; j < m.skeleton.joints.size(); ++j) {
+    const auto* from = skeleton->joints()->Get(static_cast<flatbuffers::uoffset_t>(j));
+    JointInfo& joint = m.skeleton.joints[j];
+    u.Text(from->name(), kMaxNameBytes, joint.name, "WorldInfo.joint.name",
+           static_cast<std::int64_t>(j));
+    joint.parent = from->parent();
+    joint.offset_m = FromWire(from->offset_m());
+  }
+  m.skeleton.end_sites.resize(
+      u.Count(skeleton->end_sites(), kMaxEndSites, "WorldInfo.skeleton.end_sites"));
+  for (std::size_t e = 0; e < m.skeleton.end_sites.size(); ++e) {
+    const auto* from = skeleton->end_sites()->Get(static_cast<flatbuffers::uoffset_t>(e));
+    m.skeleton.end_sites[e] = {from->joint(), FromWire(from->offset_m())};
+  }
+  Unpack(skeleton->left_leg(), m.skeleton.legs[0]);
+  Unpack(skeleton->right_leg(), m.skeleton.legs[1]);
+}
+
+void Unpack(Unpacker& u, const wire::Reply& w, Reply& m) {
+  m.seq = w.seq();
+  m.code = static_cast<StatusCode>(w.code());
+  u.Text(w.text(), kMaxTextBytes, m.text, "Reply.text");
+  m.accepted = w.accepted();
+  m.items.resize(u.Count(w.items(), kMaxItems, "Reply.items"));
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const auto* from = w.items()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    ReplyItem& item = m.items[i];
+    item.index = from->index();
+    item.avatar = from->avatar();
+    item.request_id = from->request_id();
+    item.code = static_cast<StatusCode>(from->code());
+    u.Text(from->text(), kMaxReasonBytes, item.text, "Reply.item.text",
+           static_cast<std::int64_t>(i));
+  }
+}
+
+void Unpack(Unpacker&, const wire::PoseBatch& w, PoseBatch& m) {
+  m.info = {w.world(), w.shard(),         w.part(),
+            w.parts(), w.tick(),          w.server_time_s(),
+            static_cast<PoseMode>(w.mode()), w.joint_count()};
+  if (const auto* avatars = w.avatars()) m.avatars = {avatars->data(), avatars->size()};
+  if (const auto* flags = w.flags()) m.flags = {flags->data(), flags->size()};
+  if (const auto* poses = w.poses()) {
+    m.poses = {reinterpret_cast<const std::byte*>(poses->data()), poses->size()};
+  }
+}
+
+void Unpack(Unpacker& u, const wire::Events& w, Events& m) {
+  m.world = w.world();
+  m.number = w.number();
+  m.tick = w.tick();
+  m.events.resize(u.Count(w.events(), kMaxItems, "Events.events"));
+  for (std::size_t i = 0; i < m.events.size(); ++i) {
+    const auto* from = w.events()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    Event& event = m.events[i];
+    event.type = static_cast<EventType>(from->type());
+    event.avatar = from->avatar();
+    event.request_id = from->request_id();
+    event.kind = static_cast<MovementKind>(from->kind());
+    event.group = from->group();
+    event.tick = from->tick();
+    event.time_s = from->time_s();
+    u.Parameters(from->requested(), "Event.requested", event.requested);
+    u.Parameters(from->applied(), "Event.applied", event.applied);
+    event.extrapolated = from->extrapolated();
+    event.clamped = from->clamped();
+    event.foot = static_cast<FootSide>(from->foot());
+    event.position_m = FromWire(from->position_m());
+    event.base = {FromWire(from->base_position_m()), from->base_heading_rad()};
+    event.code = static_cast<StatusCode>(from->code());
+    u.Text(from->reason(), kMaxReasonBytes, event.reason, "Event.reason",
+           static_cast<std::int64_t>(i));
+  }
+}
+
+void Unpack(Unpacker&, const wire::Lagging& w, Lagging& m) {
+  m.world = w.world();
+  m.dropped_batches = w.dropped_batches();
+  m.dropped_events = w.dropped_events();
+}
+
+void Unpack(Unpacker& u, const wire::Error& w, ErrorNotice& m) {
+  m.code = static_cast<StatusCode>(w.code());
+  u.Text(w.text(), kMaxTextBytes, m.text, "Error.text");
+  m.fatal = w.fatal();
+  m.seq = w.seq();
+}
+
+void Unpack(Unpacker&, const wire::Pong& w, Pong& m) {
+  m.nonce = w.nonce();
+  m.time_s = w.time_s();
+  m.server_time_s = w.server_time_s();
+  m.tick = w.tick();
+}
+
+template <typename Wire, typename T>
+Expected<Message> Decode(std::span<const std::byte> payload) {
+  flatbuffers::Verifier::Options options;
+  options.max_depth = kMaxDepth;
+  options.max_tables =
+      static_cast<flatbuffers::uoffset_t>(IsBulk(T::kType) ? kCrowdTables : kFewTables);
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(payload.data());
+  flatbuffers::Verifier verifier(bytes, payload.size(), options);
+  if (!verifier.VerifyBuffer<Wire>(nullptr)) {
+    return Fail(ErrorCode::kMalformed, "payload is not a well-formed FlatBuffers message",
+                std::string(MessageTypeName(T::kType)));
+  }
+  T message;
+  Unpacker unpacker;
+  Unpack(unpacker, *flatbuffers::GetRoot<Wire>(bytes), message);
+  if (unpacker.error()) return std::unexpected(std::move(*unpacker.error()));
+  if (Status status = Check(message); !status) return std::unexpected(std::move(status.error()));
+  return Message(std::move(message));
+}
+
+}  // namespace
+
+Expected<Message> DecodeMessage(const FrameView& frame) {
+  if (reinterpret_cast<std::uintptr_t>(frame.payload.data()) % kPayloadAlignment != 0) {
+    return Fail(ErrorCode::kInvalidArgument, "payload does not begin on a multiple of 8 bytes");
+  }
+  if (frame.payload.size() > MaxPayloadBytes(frame.type)) {
+    return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
+                std::string(MessageTypeName(frame.type)),
+                static_cast<std::int64_t>(frame.payload.size()));
+  }
+  switch (frame.type) {
+    case MessageType::kHello: return Decode<wire::Hello, Hello>(frame.payload);
+    case MessageType::kJoinWorld: return Decode<wire::JoinWorld, JoinWorld>(frame.payload);
+    case MessageType::kLeaveWorld: return Decode<wire::LeaveWorld, LeaveWorld>(frame.payload);
+    case MessageType::kSpawn: return Decode<wire::Spawn, Spawn>(frame.payload);
+    case MessageType::kRemove: return Decode<wire::Remove, Remove>(frame.payload);
+    case MessageType::kRequest: return Decode<wire::Request, Request>(frame.payload);
+    case MessageType::kCancelQueue: return Decode<wire::CancelQueue, CancelQueue>(frame.payload);
+    case MessageType::kObserve: return Decode<wire::Observe, Observe>(frame.payload);
+    case MessageType::kStopObserving:
+      return Decode<wire::StopObserving, StopObserving>(frame.payload);
+    case MessageType::kPing: return Decode<wire::Ping, Ping>(frame.payload);
+    case MessageType::kGoodbye: return Decode<wire::Goodbye, Goodbye>(frame.payload);
+    case MessageType::kWelcome: return Decode<wire::Welcome, Welcome>(frame.payload);
+    case MessageType::kWorldInfo: return Decode<wire::WorldInfo, WorldInfo>(frame.payload);
+    case MessageType::kReply: return Decode<wire::Reply, Reply>(frame.payload);
+    case MessageType::kPoseBatch: return Decode<wire::PoseBatch, PoseBatch>(frame.payload);
+    case MessageType::kEvents: return Decode<wire::Events, Events>(frame.payload);
+    case MessageType::kLagging: return Decode<wire::Lagging, Lagging>(frame.payload);
+    case MessageType::kError: return Decode<wire::Error, ErrorNotice>(frame.payload);
+    case MessageType::kPong: return Decode<wire::Pong, Pong>(frame.payload);
+  }
+  return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",
+              static_cast<std::int64_t>(frame.type));
+}
+
+}  // namespace stridewire::protocol

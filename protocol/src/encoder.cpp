@@ -1,0 +1,266 @@
+#include "stridewire/protocol/encoder.h"
+
+#include "frame_builder.h"
+#include "stridewire/protocol/check.h"
+
+namespace stridewire::protocol {
+namespace {
+
+using flatbuffers::FlatBufferBuilder;
+using flatbuffers::Offset;
+
+// A builder that grew beyond this for one message gives its memory back.
+constexpr std::size_t kKeptBytes = std::size_t{1} << 20;
+
+wire::Vec3 ToWire(const DVec3& v) { return {v.x, v.y, v.z}; }
+wire::Offset ToWire(const Vec3& v) { return {v.x, v.y, v.z}; }
+std::uint16_t ToWire(StatusCode code) { return static_cast<std::uint16_t>(code); }
+
+Offset<flatbuffers::Vector<std::uint8_t>> Bytes(FlatBufferBuilder& b,
+                                                const std::vector<std::byte>& bytes) {
+  return b.CreateVector(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
+}
+
+// Left out when empty.
+Offset<flatbuffers::String> Text(FlatBufferBuilder& b, const std::string& text) {
+  return text.empty() ? Offset<flatbuffers::String>() : b.CreateString(text);
+}
+
+Offset<wire::Hello> Build(FlatBufferBuilder& b, const Hello& m) {
+  const auto name = b.CreateString(m.client_name);
+  const auto auth = Text(b, m.auth_token);
+  const auto resume =
+      m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>() : Bytes(b, m.resume_token);
+  return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, m.features, auth, resume,
+                           m.last_events_number);
+}
+
+Offset<wire::JoinWorld> Build(FlatBufferBuilder& b, const JoinWorld& m) {
+  return wire::CreateJoinWorld(b, m.seq, b.CreateString(m.name), static_cast<wire::Role>(m.role));
+}
+
+Offset<wire::LeaveWorld> Build(FlatBufferBuilder& b, const LeaveWorld& m) {
+  return wire::CreateLeaveWorld(b, m.seq, m.world);
+}
+
+Offset<wire::Spawn> Build(FlatBufferBuilder& b, const Spawn& m) {
+  std::vector<Offset<wire::SpawnItem>> items;
+  items.reserve(m.items.size());
+  for (const SpawnItem& item : m.items) {
+    const wire::Vec3 position = ToWire(item.start.position_m);
+    items.push_back(wire::CreateSpawnItem(b, item.avatar, &position, item.start.heading_rad));
+  }
+  return wire::CreateSpawn(b, m.seq, m.world, b.CreateVector(items));
+}
+
+Offset<wire::Remove> Build(FlatBufferBuilder& b, const Remove& m) {
+  return wire::CreateRemove(b, m.seq, m.world, b.CreateVector(m.avatars));
+}
+
+Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
+  if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
+    const auto side = step->side_m ? flatbuffers::Optional<double>(*step->side_m)
+                                   : flatbuffers::Optional<double>(flatbuffers::nullopt);
+    return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Step,
+                                   static_cast<wire::FootChoice>(step->foot), step->length_m, side,
+                                   step->height_m, step->turn_rad, 0.0);
+  }
+  if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+    return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Jump,
+                                   wire::FootChoice::Auto, jump->length_m, flatbuffers::nullopt,
+                                   jump->height_m, jump->turn_rad, 0.0);
+  }
+  return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Stand,
+                                 wire::FootChoice::Auto, 0.0, flatbuffers::nullopt, 0.0, 0.0,
+                                 std::get<StandMovement>(item.movement).seconds);
+}
+
+Offset<wire::Request> Build(FlatBufferBuilder& b, const Request& m) {
+  std::vector<Offset<wire::RequestItem>> items;
+  items.reserve(m.items.size());
+  for (const RequestItem& item : m.items) items.push_back(Build(b, item));
+  return wire::CreateRequest(b, m.seq, m.world, b.CreateVector(items));
+}
+
+Offset<wire::CancelQueue> Build(FlatBufferBuilder& b, const CancelQueue& m) {
+  return wire::CreateCancelQueue(b, m.seq, m.world, b.CreateVector(m.avatars));
+}
+
+Offset<wire::Observe> Build(FlatBufferBuilder& b, const Observe& m) {
+  const auto avatars = m.avatars.empty() ? Offset<flatbuffers::Vector<std::uint32_t>>()
+                                         : b.CreateVector(m.avatars);
+  return wire::CreateObserve(b, m.seq, m.world, m.subscription,
+                             static_cast<wire::PoseMode>(m.mode), avatars, m.every_n_ticks,
+                             m.with_events);
+}
+
+Offset<wire::StopObserving> Build(FlatBufferBuilder& b, const StopObserving& m) {
+  return wire::CreateStopObserving(b, m.seq, m.subscription);
+}
+
+Offset<wire::Ping> Build(FlatBufferBuilder& b, const Ping& m) {
+  return wire::CreatePing(b, m.nonce, m.time_s);
+}
+
+Offset<wire::Goodbye> Build(FlatBufferBuilder& b, const Goodbye& m) {
+  return wire::CreateGoodbye(b, ToWire(m.code), Text(b, m.text));
+}
+
+Offset<wire::Welcome> Build(FlatBufferBuilder& b, const Welcome& m) {
+  const ServerLimits& l = m.limits;
+  const auto limits = wire::CreateServerLimits(
+      b, l.max_control_bytes, l.max_bulk_bytes, l.max_items, l.max_avatars_per_world, l.max_queue,
+      l.reply_memory, l.idle_timeout_s, l.resume_window_s);
+  const auto token =
+      m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>() : Bytes(b, m.resume_token);
+  const auto name = Text(b, m.server_name);
+  const auto version = Text(b, m.server_version);
+  return wire::CreateWelcome(b, m.protocol, m.features, m.session, token, m.resumed, m.last_seq,
+                             m.tick_hz, name, version, limits);
+}
+
+Offset<wire::Leg> Build(FlatBufferBuilder& b, const LegInfo& leg) {
+  const wire::Offset ball = ToWire(leg.ball_offset_m);
+  const wire::Offset toe = ToWire(leg.toe_tip_offset_m);
+  return wire::CreateLeg(b, leg.hip, leg.knee, leg.ankle, leg.ball, &ball, &toe);
+}
+
+Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
+  std::vector<Offset<wire::Joint>> joints;
+  joints.reserve(m.skeleton.joints.size());
+  for (const JointInfo& joint : m.skeleton.joints) {
+    const wire::Offset offset = ToWire(joint.offset_m);
+    joints.push_back(wire::CreateJoint(b, b.CreateString(joint.name), joint.parent, &offset));
+  }
+  std::vector<Offset<wire::EndSite>> sites;
+  sites.reserve(m.skeleton.end_sites.size());
+  for (const EndSiteInfo& site : m.skeleton.end_sites) {
+    const wire::Offset offset = ToWire(site.offset_m);
+    sites.push_back(wire::CreateEndSite(b, site.joint, &offset));
+  }
+  const auto left = Build(b, m.skeleton.legs[0]);
+  const auto right = Build(b, m.skeleton.legs[1]);
+  const auto joints_offset = b.CreateVector(joints);
+  const auto sites_offset = b.CreateVector(sites);
+  const auto skeleton = wire::CreateSkeleton(b, joints_offset, sites_offset, left, right);
+  const auto name = b.CreateString(m.name);
+  const auto hash = Text(b, m.library_hash);
+  return wire::CreateWorldInfo(b, m.seq, m.world, name, static_cast<wire::Role>(m.role), m.tick,
+                               hash, skeleton);
+}
+
+Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {
+  std::vector<Offset<wire::ReplyItem>> items;
+  items.reserve(m.items.size());
+  for (const ReplyItem& item : m.items) {
+    // Thousands of items are refused for the same reason: say it once.
+    const auto text = item.text.empty() ? Offset<flatbuffers::String>()
+                                        : b.CreateSharedString(item.text);
+    items.push_back(wire::CreateReplyItem(b, item.index, item.avatar, item.request_id,
+                                          ToWire(item.code), text));
+  }
+  const auto text = Text(b, m.text);
+  const auto items_offset = m.items.empty()
+                                ? Offset<flatbuffers::Vector<Offset<wire::ReplyItem>>>()
+                                : b.CreateVector(items);
+  return wire::CreateReply(b, m.seq, ToWire(m.code), text, m.accepted, items_offset);
+}
+
+Offset<wire::PoseBatch> Build(FlatBufferBuilder& b, const PoseBatch& m) {
+  return BuildPoseBatch(b, m);
+}
+
+Offset<flatbuffers::Vector<const wire::ParameterValue*>> Build(FlatBufferBuilder& b,
+                                                               const ParameterSet& set) {
+  if (set.count == 0) return {};
+  std::array<wire::ParameterValue, kMaxParameters> values;
+  for (std::size_t p = 0; p < set.count; ++p) {
+    values[p] = wire::ParameterValue(set.values[p], set.names[p]);
+  }
+  return b.CreateVectorOfStructs(values.data(), set.count);
+}
+
+Offset<wire::Event> Build(FlatBufferBuilder& b, const Event& event) {
+  const auto requested = Build(b, event.requested);
+  const auto applied = Build(b, event.applied);
+  const auto reason =
+      event.reason.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(event.reason);
+  const wire::Vec3 position = ToWire(event.position_m);
+  const wire::Vec3 base = ToWire(event.base.position_m);
+  return wire::CreateEvent(
+      b, static_cast<wire::EventType>(event.type), event.avatar, event.request_id,
+      static_cast<wire::MovementKind>(event.kind), event.group, event.tick, event.time_s, requested,
+      applied, event.extrapolated, event.clamped, static_cast<wire::Foot>(event.foot),
+      event.position_m == DVec3(0.0) ? nullptr : &position,
+      event.base.position_m == DVec3(0.0) ? nullptr : &base, event.base.heading_rad,
+      ToWire(event.code), reason);
+}
+
+Offset<wire::Events> Build(FlatBufferBuilder& b, const Events& m) {
+  std::vector<Offset<wire::Event>> events;
+  events.reserve(m.events.size());
+  for (const Event& event : m.events) events.push_back(Build(b, event));
+  return wire::CreateEvents(b, m.world, m.number, m.tick, b.CreateVector(events));
+}
+
+Offset<wire::Lagging> Build(FlatBufferBuilder& b, const Lagging& m) {
+  return wire::CreateLagging(b, m.world, m.dropped_batches, m.dropped_events);
+}
+
+Offset<wire::Error> Build(FlatBufferBuilder& b, const ErrorNotice& m) {
+  return wire::CreateError(b, ToWire(m.code), Text(b, m.text), m.fatal, m.seq);
+}
+
+Offset<wire::Pong> Build(FlatBufferBuilder& b, const Pong& m) {
+  return wire::CreatePong(b, m.nonce, m.time_s, m.server_time_s, m.tick);
+}
+
+}  // namespace
+
+struct Encoder::Impl {
+  FrameLimits limits;
+  FlatBufferBuilder builder;
+
+  template <typename T>
+  Status Encode(const T& message, std::vector<std::byte>& frame) {
+    if (Status status = Check(message); !status) return status;
+    builder.Clear();
+    builder.Finish(Build(builder, message));
+    const Status status = AppendFrame(builder, T::kType, limits, frame);
+    if (builder.GetSize() > kKeptBytes) builder.Reset();
+    return status;
+  }
+};
+
+Encoder::Encoder(const FrameLimits& limits) : impl_(std::make_unique<Impl>()) {
+  impl_->limits = limits;
+}
+Encoder::~Encoder() = default;
+Encoder::Encoder(Encoder&&) noexcept = default;
+Encoder& Encoder::operator=(Encoder&&) noexcept = default;
+
+using Frame = std::vector<std::byte>;
+Status Encoder::Encode(const Hello& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const JoinWorld& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const LeaveWorld& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Spawn& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Remove& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Request& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const CancelQueue& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Observe& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const StopObserving& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Ping& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Goodbye& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Welcome& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const WorldInfo& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Reply& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const PoseBatch& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Events& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Lagging& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const ErrorNotice& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Pong& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Message& message, Frame& frame) {
+  return std::visit([&](const auto& m) { return impl_->Encode(m, frame); }, message);
+}
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,135 @@
+#include "stridewire/protocol/frame.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+namespace stridewire::protocol {
+namespace {
+
+// The wire is little-endian and is read in place.
+static_assert(std::endian::native == std::endian::little);
+
+template <typename T>
+T Load(const std::byte* bytes) {
+  T value;
+  std::memcpy(&value, bytes, sizeof(T));
+  return value;
+}
+
+}  // namespace
+
+std::string_view MessageTypeName(MessageType type) {
+  switch (type) {
+    case MessageType::kHello: return "Hello";
+    case MessageType::kJoinWorld: return "JoinWorld";
+    case MessageType::kLeaveWorld: return "LeaveWorld";
+    case MessageType::kSpawn: return "Spawn";
+    case MessageType::kRemove: return "Remove";
+    case MessageType::kRequest: return "Request";
+    case MessageType::kCancelQueue: return "CancelQueue";
+    case MessageType::kObserve: return "Observe";
+    case MessageType::kStopObserving: return "StopObserving";
+    case MessageType::kPing: return "Ping";
+    case MessageType::kGoodbye: return "Goodbye";
+    case MessageType::kWelcome: return "Welcome";
+    case MessageType::kWorldInfo: return "WorldInfo";
+    case MessageType::kReply: return "Reply";
+    case MessageType::kPoseBatch: return "PoseBatch";
+    case MessageType::kEvents: return "Events";
+    case MessageType::kLagging: return "Lagging";
+    case MessageType::kError: return "Error";
+    case MessageType::kPong: return "Pong";
+  }
+  return "unknown";
+}
+
+bool IsKnown(MessageType type) { return MessageTypeName(type) != "unknown"; }
+
+bool MaySend(Sender sender, MessageType type) {
+  if (!IsKnown(type)) return false;
+  if (type == MessageType::kGoodbye) return true;
+  return (sender == Sender::kClient) == (type < MessageType::kGoodbye);
+}
+
+bool IsBulk(MessageType type) {
+  switch (type) {
+    case MessageType::kSpawn:
+    case MessageType::kRemove:
+    case MessageType::kRequest:
+    case MessageType::kCancelQueue:
+    case MessageType::kObserve:
+    case MessageType::kReply:
+    case MessageType::kPoseBatch:
+    case MessageType::kEvents: return true;
+    default: return false;
+  }
+}
+
+std::size_t MaxPayloadBytes(MessageType type, const FrameLimits& limits) {
+  if (IsBulk(type)) return std::min(limits.max_bulk_bytes, kMaxBulkBytes);
+  const std::size_t control = std::min(limits.max_control_bytes, kMaxControlBytes);
+  return type == MessageType::kHello ? std::min(control, kMaxHelloBytes) : control;
+}
+
+void WriteFrameHeader(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> out) {
+  const auto type = static_cast<std::uint16_t>(header.type);
+  std::memcpy(out.data(), kFrameMagic.data(), 4);
+  std::memcpy(out.data() + 4, &kFrameVersion, 2);
+  std::memcpy(out.data() + 6, &type, 2);
+  std::memcpy(out.data() + 8, &header.payload_bytes, 4);
+  std::memset(out.data() + 12, 0, 4);
+}
+
+Expected<FrameHeader> ReadFrameHeader(std::span<const std::byte, kFrameHeaderBytes> bytes,
+                                      Sender sender, const FrameLimits& limits) {
+  if (!std::equal(kFrameMagic.begin(), kFrameMagic.end(), bytes.begin())) {
+    return Fail(ErrorCode::kMalformed, "frame does not begin with the magic bytes", "frame.magic");
+  }
+  const auto version = Load<std::uint16_t>(bytes.data() + 4);
+  if (version != kFrameVersion) {
+    return Fail(ErrorCode::kVersionMismatch, "unknown frame version", "frame.version", version);
+  }
+  const auto type = static_cast<MessageType>(Load<std::uint16_t>(bytes.data() + 6));
+  if (!IsKnown(type)) {
+    return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",
+                static_cast<std::int64_t>(type));
+  }
+  if (!MaySend(sender, type)) {
+    return Fail(ErrorCode::kMalformed, "message type goes the other way", "frame.type",
+                static_cast<std::int64_t>(type));
+  }
+  if (Load<std::uint32_t>(bytes.data() + 12) != 0) {
+    return Fail(ErrorCode::kMalformed, "frame flags are not zero", "frame.flags");
+  }
+  const auto payload_bytes = Load<std::uint32_t>(bytes.data() + 8);
+  if (payload_bytes > MaxPayloadBytes(type, limits)) {
+    return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
+                "frame.payload_bytes", payload_bytes);
+  }
+  if (payload_bytes == 0 || payload_bytes % kPayloadAlignment != 0) {
+    return Fail(ErrorCode::kMalformed, "payload length is not a multiple of 8 above 0",
+                "frame.payload_bytes", payload_bytes);
+  }
+  return FrameHeader{type, payload_bytes};
+}
+
+Expected<FrameView> ParseFrame(std::span<const std::byte> bytes, Sender sender,
+                               const FrameLimits& limits) {
+  if (reinterpret_cast<std::uintptr_t>(bytes.data()) % kPayloadAlignment != 0) {
+    return Fail(ErrorCode::kInvalidArgument, "frame does not begin on a multiple of 8 bytes");
+  }
+  if (bytes.size() < kFrameHeaderBytes) {
+    return Fail(ErrorCode::kMalformed, "frame is shorter than its header",
+                static_cast<std::int64_t>(bytes.size()));
+  }
+  const auto header = ReadFrameHeader(bytes.first<kFrameHeaderBytes>(), sender, limits);
+  if (!header) return std::unexpected(header.error());
+  if (bytes.size() != kFrameHeaderBytes + header->payload_bytes) {
+    return Fail(ErrorCode::kMalformed, "frame is not as long as its header says",
+                "frame.payload_bytes", header->payload_bytes);
+  }
+  return FrameView{header->type, bytes.subspan(kFrameHeaderBytes)};
+}
+
+}  // namespace stridewire::protocol

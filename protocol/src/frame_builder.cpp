@@ -1,0 +1,35 @@
+#include "frame_builder.h"
+
+namespace stridewire::protocol {
+
+Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
+                   const FrameLimits& limits, std::vector<std::byte>& frame) {
+  const std::size_t size = builder.GetSize();
+  const std::size_t padding = (kPayloadAlignment - size % kPayloadAlignment) % kPayloadAlignment;
+  if (size + padding > MaxPayloadBytes(type, limits)) {
+    return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
+                std::string(MessageTypeName(type)), static_cast<std::int64_t>(size + padding));
+  }
+  std::array<std::byte, kFrameHeaderBytes> header;
+  WriteFrameHeader({type, static_cast<std::uint32_t>(size + padding)}, header);
+  const auto* payload = reinterpret_cast<const std::byte*>(builder.GetBufferPointer());
+  frame.reserve(frame.size() + header.size() + size + padding);
+  frame.insert(frame.end(), header.begin(), header.end());
+  frame.insert(frame.end(), payload, payload + size);
+  frame.insert(frame.end(), padding, std::byte{0});
+  return {};
+}
+
+flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(flatbuffers::FlatBufferBuilder& builder,
+                                                    const PoseBatch& batch) {
+  const auto* poses = reinterpret_cast<const std::uint8_t*>(batch.poses.data());
+  const auto poses_offset = builder.CreateVector(poses, batch.poses.size());
+  const auto flags = builder.CreateVector(batch.flags.data(), batch.flags.size());
+  const auto avatars = builder.CreateVector(batch.avatars.data(), batch.avatars.size());
+  const PoseBatchInfo& info = batch.info;
+  return wire::CreatePoseBatch(builder, info.world, info.shard, info.part, info.parts, info.tick,
+                               info.server_time_s, static_cast<wire::PoseMode>(info.mode),
+                               info.joint_count, avatars, flags, poses_offset);
+}
+
+}  // namespace stridewire::protocol

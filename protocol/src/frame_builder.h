@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "stridewire/protocol/messages.h"
+#include "stridewire_generated.h"
+
+namespace stridewire::protocol {
+
+/// Appends header, the finished FlatBuffers message in `builder` and its padding to `frame`.
+/// kLimitExceeded: longer than the type may be; `frame` is left as it was.
+[[nodiscard]] Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
+                                 const FrameLimits& limits, std::vector<std::byte>& frame);
+
+/// The table of a batch; the spans are copied into `builder`.
+[[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
+    flatbuffers::FlatBufferBuilder& builder, const PoseBatch& batch);
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,169 @@
+#include "stridewire/protocol/pose_codec.h"
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace stridewire::protocol {
+namespace {
+
+static_assert(std::endian::native == std::endian::little);
+static_assert(offsetof(Quat, x) == 0 && offsetof(Quat, w) == 12, "x, y, z, w in memory");
+
+constexpr float kComponentSteps = 16383.0f;
+constexpr float kSqrt2 = 1.41421356237309505f;
+constexpr int kZero = 16384;
+constexpr std::uint16_t kComponentMask = 0x7fff;
+constexpr std::uint16_t kHighBit = 0x8000;
+
+// The sum of the squares of the three smaller components is at most 3/4 and a little for rounding.
+constexpr float kMaxThreeSquared = 0.7502f;
+
+bool IsFinite(const Vec3& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+// False for NaN as well. |q|^2 in (1 - t)^2 .. (1 + t)^2.
+bool IsUnit(const Quat& q) {
+  const float squared = Dot(q, q);
+  return squared >= (1.0f - kUnitTolerance) * (1.0f - kUnitTolerance) &&
+         squared <= (1.0f + kUnitTolerance) * (1.0f + kUnitTolerance);
+}
+
+void EncodeSmallestThree(const Quat& q, std::byte* out) {
+  const std::array<float, 4> c = {q.x, q.y, q.z, q.w};
+  int largest = 0;
+  for (int i = 1; i < 4; ++i) {
+    if (std::abs(c[static_cast<std::size_t>(i)]) > std::abs(c[static_cast<std::size_t>(largest)])) {
+      largest = i;
+    }
+  }
+  // Divided by its length, so that a quaternion at the edge of the tolerance keeps its rotation.
+  const float scale = kSqrt2 * kComponentSteps / std::sqrt(Dot(q, q));
+  const float signed_scale = std::signbit(c[static_cast<std::size_t>(largest)]) ? -scale : scale;
+  std::array<std::uint16_t, 3> words{};
+  int word = 0;
+  for (int i = 0; i < 4; ++i) {
+    if (i == largest) continue;
+    const float steps = std::round(c[static_cast<std::size_t>(i)] * signed_scale);
+    const float clamped = std::fmin(std::fmax(steps, -kComponentSteps), kComponentSteps);
+    words[static_cast<std::size_t>(word++)] =
+        static_cast<std::uint16_t>(static_cast<int>(clamped) + kZero);
+  }
+  if (largest & 1) words[0] |= kHighBit;
+  if (largest & 2) words[1] |= kHighBit;
+  std::memcpy(out, words.data(), 6);
+}
+
+// False for bits that no encoder writes.
+bool DecodeSmallestThree(const std::byte* in, Quat& q) {
+  std::array<std::uint16_t, 3> words;
+  std::memcpy(words.data(), in, 6);
+  if (words[2] & kHighBit) return false;
+  const int largest = (words[0] >> 15) | ((words[1] >> 15) << 1);
+  std::array<float, 4> c{};
+  float squared = 0.0f;
+  int word = 0;
+  for (int i = 0; i < 4; ++i) {
+    if (i == largest) continue;
+    const int bits = words[static_cast<std::size_t>(word++)] & kComponentMask;
+    if (bits == 0) return false;
+    const float value = static_cast<float>(bits - kZero) / (kSqrt2 * kComponentSteps);
+    c[static_cast<std::size_t>(i)] = value;
+    squared += value * value;
+  }
+  if (squared > kMaxThreeSquared) return false;
+  c[static_cast<std::size_t>(largest)] = std::sqrt(1.0f - squared);
+  q = Quat(c[3], c[0], c[1], c[2]);
+  return true;
+}
+
+}  // namespace
+
+Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Quat> rotations,
+                  std::span<std::byte> out) {
+  if (mode != PoseMode::kFull && mode != PoseMode::kQuantised) {
+    return Fail(ErrorCode::kUnsupported, "no pose is sent in this mode");
+  }
+  if (out.size() != PoseBytes(mode, rotations.size())) {
+    return Fail(ErrorCode::kShapeMismatch, "space for a pose has another size",
+                static_cast<std::int64_t>(out.size()));
+  }
+  if (!IsFinite(root_position_m)) {
+    return Fail(ErrorCode::kOutOfRange, "root position is not finite");
+  }
+  for (std::size_t j = 0; j < rotations.size(); ++j) {
+    if (!IsUnit(rotations[j])) {
+      return Fail(ErrorCode::kOutOfRange, "rotation is not a unit quaternion",
+                  static_cast<std::int64_t>(j));
+    }
+  }
+  if (mode == PoseMode::kFull) {
+    std::memcpy(out.data(), &root_position_m, 12);
+    if (!rotations.empty()) {
+      std::memcpy(out.data() + 12, rotations.data(), rotations.size_bytes());
+    }
+    return {};
+  }
+  std::array<std::int32_t, 3> root;
+  for (int i = 0; i < 3; ++i) {
+    if (std::abs(root_position_m[i]) > kMaxRootM) {
+      return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
+    }
+    // Exact in double: a float times a power of two.
+    root[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(
+        std::round(static_cast<double>(root_position_m[i]) * kRootStepsPerM));
+  }
+  std::memcpy(out.data(), root.data(), 12);
+  for (std::size_t j = 0; j < rotations.size(); ++j) {
+    EncodeSmallestThree(rotations[j], out.data() + 12 + 6 * j);
+  }
+  return {};
+}
+
+Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
+                  std::span<Quat> rotations) {
+  if (mode != PoseMode::kFull && mode != PoseMode::kQuantised) {
+    return Fail(ErrorCode::kUnsupported, "no pose is sent in this mode");
+  }
+  if (in.size() != PoseBytes(mode, rotations.size())) {
+    return Fail(ErrorCode::kShapeMismatch, "bytes of a pose have another size",
+                static_cast<std::int64_t>(in.size()));
+  }
+  if (mode == PoseMode::kFull) {
+    std::memcpy(&root_position_m, in.data(), 12);
+    if (!IsFinite(root_position_m)) {
+      return Fail(ErrorCode::kOutOfRange, "root position is not finite");
+    }
+    if (!rotations.empty()) {
+      std::memcpy(rotations.data(), in.data() + 12, rotations.size_bytes());
+    }
+    for (std::size_t j = 0; j < rotations.size(); ++j) {
+      if (!IsUnit(rotations[j])) {
+        return Fail(ErrorCode::kOutOfRange, "rotation is not a unit quaternion",
+                    static_cast<std::int64_t>(j));
+      }
+    }
+    return {};
+  }
+  std::array<std::int32_t, 3> root;
+  std::memcpy(root.data(), in.data(), 12);
+  for (int i = 0; i < 3; ++i) {
+    const double metres =
+        static_cast<double>(root[static_cast<std::size_t>(i)]) / static_cast<double>(kRootStepsPerM);
+    if (std::abs(metres) > static_cast<double>(kMaxRootM)) {
+      return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
+    }
+    root_position_m[i] = static_cast<float>(metres);
+  }
+  for (std::size_t j = 0; j < rotations.size(); ++j) {
+    if (!DecodeSmallestThree(in.data() + 12 + 6 * j, rotations[j])) {
+      return Fail(ErrorCode::kMalformed, "rotation has bits that no encoder writes",
+                  static_cast<std::int64_t>(j));
+    }
+  }
+  return {};
+}
+
+}  // namespace stridewire::protocol

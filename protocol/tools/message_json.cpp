@@ -1,0 +1,268 @@
+#include "message_json.h"
+
+#include <string>
+
+#include "stridewire/base/check.h"
+
+namespace stridewire::protocol {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Wide(std::uint64_t value) { return std::to_string(value); }
+
+template <typename E>
+int Number(E e) {
+  return static_cast<int>(e);
+}
+
+template <typename V>
+Json Vector(const V& v) {
+  return Json::array({v.x, v.y, v.z});
+}
+
+std::string Hex(const std::vector<std::byte>& bytes) {
+  static constexpr char kDigits[] = "0123456789abcdef";
+  std::string text;
+  for (const std::byte b : bytes) {
+    text += kDigits[std::to_integer<int>(b) >> 4];
+    text += kDigits[std::to_integer<int>(b) & 15];
+  }
+  return text;
+}
+
+Json Fields(const Hello& m) {
+  return {{"protocol_min", m.protocol_min},
+          {"protocol_max", m.protocol_max},
+          {"client_name", m.client_name},
+          {"features", Wide(m.features)},
+          {"auth_token", m.auth_token},
+          {"resume_token", Hex(m.resume_token)},
+          {"last_events_number", Wide(m.last_events_number)}};
+}
+
+Json Fields(const JoinWorld& m) {
+  return {{"seq", Wide(m.seq)}, {"name", m.name}, {"role", Number(m.role)}};
+}
+
+Json Fields(const LeaveWorld& m) { return {{"seq", Wide(m.seq)}, {"world", m.world}}; }
+
+Json Fields(const Spawn& m) {
+  Json items = Json::array();
+  for (const SpawnItem& item : m.items) {
+    items.push_back({{"avatar", item.avatar},
+                     {"position_m", Vector(item.start.position_m)},
+                     {"heading_rad", item.start.heading_rad}});
+  }
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+}
+
+Json Fields(const Remove& m) {
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
+}
+
+Json Fields(const Request& m) {
+  Json items = Json::array();
+  for (const RequestItem& item : m.items) {
+    Json json = {{"avatar", item.avatar},
+                 {"request_id", Wide(item.request_id)},
+                 {"type", item.movement.index()}};
+    if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
+      json["foot"] = Number(step->foot);
+      json["length_m"] = step->length_m;
+      json["side_m"] = step->side_m ? Json(*step->side_m) : Json(nullptr);
+      json["height_m"] = step->height_m;
+      json["turn_rad"] = step->turn_rad;
+    } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+      json["length_m"] = jump->length_m;
+      json["height_m"] = jump->height_m;
+      json["turn_rad"] = jump->turn_rad;
+    } else {
+      json["seconds"] = std::get<StandMovement>(item.movement).seconds;
+    }
+    items.push_back(json);
+  }
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+}
+
+Json Fields(const CancelQueue& m) {
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
+}
+
+Json Fields(const Observe& m) {
+  return {{"seq", Wide(m.seq)},
+          {"world", m.world},
+          {"subscription", m.subscription},
+          {"mode", Number(m.mode)},
+          {"avatars", m.avatars},
+          {"every_n_ticks", m.every_n_ticks},
+          {"with_events", m.with_events}};
+}
+
+Json Fields(const StopObserving& m) {
+  return {{"seq", Wide(m.seq)}, {"subscription", m.subscription}};
+}
+
+Json Fields(const Ping& m) { return {{"nonce", Wide(m.nonce)}, {"time_s", m.time_s}}; }
+
+Json Fields(const Goodbye& m) { return {{"code", Number(m.code)}, {"text", m.text}}; }
+
+Json Fields(const Welcome& m) {
+  return {{"protocol", m.protocol},
+          {"features", Wide(m.features)},
+          {"session", Wide(m.session)},
+          {"resume_token", Hex(m.resume_token)},
+          {"resumed", m.resumed},
+          {"last_seq", Wide(m.last_seq)},
+          {"tick_hz", m.tick_hz},
+          {"server_name", m.server_name},
+          {"server_version", m.server_version},
+          {"limits",
+           {{"max_control_bytes", m.limits.max_control_bytes},
+            {"max_bulk_bytes", m.limits.max_bulk_bytes},
+            {"max_items", m.limits.max_items},
+            {"max_avatars_per_world", m.limits.max_avatars_per_world},
+            {"max_queue", m.limits.max_queue},
+            {"reply_memory", m.limits.reply_memory},
+            {"idle_timeout_s", m.limits.idle_timeout_s},
+            {"resume_window_s", m.limits.resume_window_s}}}};
+}
+
+Json Leg(const LegInfo& leg) {
+  return {{"hip", leg.hip},
+          {"knee", leg.knee},
+          {"ankle", leg.ankle},
+          {"ball", leg.ball},
+          {"ball_offset_m", Vector(leg.ball_offset_m)},
+          {"toe_tip_offset_m", Vector(leg.toe_tip_offset_m)}};
+}
+
+Json Fields(const WorldInfo& m) {
+  Json joints = Json::array();
+  for (const JointInfo& joint : m.skeleton.joints) {
+    joints.push_back({{"name", joint.name},
+                      {"parent", joint.parent},
+                      {"offset_m", Vector(joint.offset_m)}});
+  }
+  Json end_sites = Json::array();
+  for (const EndSiteInfo& site : m.skeleton.end_sites) {
+    end_sites.push_back({{"joint", site.joint}, {"offset_m", Vector(site.offset_m)}});
+  }
+  return {{"seq", Wide(m.seq)},
+          {"world", m.world},
+          {"name", m.name},
+          {"role", Number(m.role)},
+          {"tick", Wide(m.tick)},
+          {"library_hash", m.library_hash},
+          {"skeleton",
+           {{"joints", joints},
+            {"end_sites", end_sites},
+            {"left_leg", Leg(m.skeleton.legs[0])},
+            {"right_leg", Leg(m.skeleton.legs[1])}}}};
+}
+
+Json Fields(const Reply& m) {
+  Json items = Json::array();
+  for (const ReplyItem& item : m.items) {
+    items.push_back({{"index", item.index},
+                     {"avatar", item.avatar},
+                     {"request_id", Wide(item.request_id)},
+                     {"code", Number(item.code)},
+                     {"text", item.text}});
+  }
+  return {{"seq", Wide(m.seq)},
+          {"code", Number(m.code)},
+          {"text", m.text},
+          {"accepted", m.accepted},
+          {"items", items}};
+}
+
+Json Fields(const PoseBatch& m) {
+  Json poses = Json::array();
+  std::vector<Quat> rotations(m.info.joint_count);
+  for (std::size_t i = 0; i < m.avatars.size(); ++i) {
+    Vec3 root(0.0f);
+    STRIDEWIRE_CHECK(DecodePose(m.info.mode, m.pose(i), root, rotations));
+    Json quats = Json::array();
+    for (const Quat& q : rotations) quats.push_back(Json::array({q.x, q.y, q.z, q.w}));
+    poses.push_back({{"avatar", m.avatars[i]},
+                     {"flags", m.flags[i]},
+                     {"root_position_m", Vector(root)},
+                     {"rotations", quats}});
+  }
+  return {{"world", m.info.world},
+          {"shard", m.info.shard},
+          {"part", m.info.part},
+          {"parts", m.info.parts},
+          {"tick", Wide(m.info.tick)},
+          {"server_time_s", m.info.server_time_s},
+          {"mode", Number(m.info.mode)},
+          {"joint_count", m.info.joint_count},
+          {"poses", poses}};
+}
+
+Json Parameters(const ParameterSet& set) {
+  Json json = Json::array();
+  for (std::size_t p = 0; p < set.count; ++p) {
+    json.push_back({{"name", set.names[p]}, {"value", set.values[p]}});
+  }
+  return json;
+}
+
+Json Fields(const Events& m) {
+  Json events = Json::array();
+  for (const Event& event : m.events) {
+    events.push_back({{"type", Number(event.type)},
+                      {"avatar", event.avatar},
+                      {"request_id", Wide(event.request_id)},
+                      {"kind", Number(event.kind)},
+                      {"group", event.group},
+                      {"tick", Wide(event.tick)},
+                      {"time_s", event.time_s},
+                      {"requested", Parameters(event.requested)},
+                      {"applied", Parameters(event.applied)},
+                      {"extrapolated", event.extrapolated},
+                      {"clamped", event.clamped},
+                      {"foot", Number(event.foot)},
+                      {"position_m", Vector(event.position_m)},
+                      {"base_position_m", Vector(event.base.position_m)},
+                      {"base_heading_rad", event.base.heading_rad},
+                      {"code", Number(event.code)},
+                      {"reason", event.reason}});
+  }
+  return {{"world", m.world},
+          {"number", Wide(m.number)},
+          {"tick", Wide(m.tick)},
+          {"events", events}};
+}
+
+Json Fields(const Lagging& m) {
+  return {{"world", m.world},
+          {"dropped_batches", Wide(m.dropped_batches)},
+          {"dropped_events", Wide(m.dropped_events)}};
+}
+
+Json Fields(const ErrorNotice& m) {
+  return {{"code", Number(m.code)}, {"text", m.text}, {"fatal", m.fatal}, {"seq", Wide(m.seq)}};
+}
+
+Json Fields(const Pong& m) {
+  return {{"nonce", Wide(m.nonce)},
+          {"time_s", m.time_s},
+          {"server_time_s", m.server_time_s},
+          {"tick", Wide(m.tick)}};
+}
+
+}  // namespace
+
+Json ToJson(const Message& message) {
+  return std::visit(
+      [](const auto& m) {
+        Json json = {{"type", MessageTypeName(m.kType)}, {"type_number", Number(m.kType)}};
+        json["fields"] = Fields(m);
+        return json;
+      },
+      message);
+}
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,57 @@
+// Writes the test vectors: one frame a sample message (NAME.bin) and what it says (NAME.json).
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "message_json.h"
+#include "sample_messages.h"
+#include "stridewire/base/version.h"
+#include "stridewire/protocol/encoder.h"
+
+namespace {
+
+bool Write(const std::filesystem::path& path, std::string_view bytes) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!file) std::cerr << "protocol_vectors: cannot write " << path.string() << "\n";
+  return static_cast<bool>(file);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string_view argument = argc == 2 ? argv[1] : "--help";
+  if (argument == "--version") {
+    std::cout << "protocol_vectors " << stridewire::kVersion << "\n";
+    return 0;
+  }
+  if (argument == "--help") {
+    std::cout << "usage: protocol_vectors DIR\n"
+                 "Writes the wire's test vectors into DIR, which exists.\n"
+                 "example: build/release/bin/protocol_vectors protocol/vectors\n";
+    return argc == 2 ? 0 : 2;
+  }
+  const std::filesystem::path directory(argument);
+  if (!std::filesystem::is_directory(directory)) {
+    std::cerr << "protocol_vectors: " << directory.string() << " is not a directory\n";
+    return 2;
+  }
+  stridewire::protocol::Encoder encoder;
+  for (const auto& sample : stridewire::protocol::SampleMessages()) {
+    std::vector<std::byte> frame;
+    if (const auto status = encoder.Encode(sample.message, frame); !status) {
+      std::cerr << "protocol_vectors: " << sample.name << ": "
+                << stridewire::Describe(status.error()) << "\n";
+      return 1;
+    }
+    const std::string_view bytes(reinterpret_cast<const char*>(frame.data()), frame.size());
+    const std::string json = stridewire::protocol::ToJson(sample.message).dump(1) + "\n";
+    if (!Write(directory / (sample.name + ".bin"), bytes) ||
+        !Write(directory / (sample.name + ".json"), json)) {
+      return 1;
+    }
+  }
+  return 0;
+}

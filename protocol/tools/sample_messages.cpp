@@ -1,0 +1,177 @@
+#include "sample_messages.h"
+
+#include <cmath>
+#include <utility>
+
+#include "stridewire/base/check.h"
+#include "stridewire/base/trig.h"
+
+namespace stridewire::protocol {
+namespace {
+
+std::vector<std::byte> Token(int bytes) {
+  std::vector<std::byte> token;
+  for (int i = 0; i < bytes; ++i) token.push_back(static_cast<std::byte>(i * 7 + 1));
+  return token;
+}
+
+SkeletonInfo Skeleton() {
+  SkeletonInfo skeleton;
+  const auto add = [&](const char* name, std::int16_t parent, Vec3 offset_m) {
+    skeleton.joints.push_back({name, parent, offset_m});
+  };
+  add("Hips", -1, Vec3(0.0f));
+  add("LeftUpLeg", 0, Vec3(0.0625f, -0.03125f, 0.0f));
+  add("LeftLeg", 1, Vec3(0.0f, -0.4375f, 0.0f));
+  add("LeftFoot", 2, Vec3(0.0f, -0.4375f, 0.0f));
+  add("RightUpLeg", 0, Vec3(-0.0625f, -0.03125f, 0.0f));
+  add("RightLeg", 4, Vec3(0.0f, -0.4375f, 0.0f));
+  add("RightFoot", 5, Vec3(0.0f, -0.4375f, 0.0f));
+  add("Kopf_\xc3\xa4", 0, Vec3(0.0f, 0.5f, 0.0f));
+  skeleton.end_sites = {{3, Vec3(0.0f, -0.0625f, 0.1875f)}, {7, Vec3(0.0f, 0.25f, 0.0f)}};
+  skeleton.legs[0] = {1, 2, 3, 3, Vec3(0.0f, -0.0625f, 0.125f), Vec3(0.0f, -0.0625f, 0.1875f)};
+  skeleton.legs[1] = {4, 5, 6, -1, Vec3(0.0f, -0.0625f, 0.125f), Vec3(0.0f, -0.0625f, 0.1875f)};
+  return skeleton;
+}
+
+/// Arrays of a batch. Rotations go through every index left out and both signs.
+struct BatchArrays {
+  PoseBatchInfo info;
+  std::vector<AvatarNumber> avatars;
+  std::vector<std::uint8_t> flags;
+  std::vector<std::byte> poses;
+
+  BatchArrays(PoseMode mode, std::uint16_t joint_count, int avatar_count) {
+    info = {3, 1, 2, 4, 123'456, 2057.6, mode, joint_count};
+    const std::size_t bytes = PoseBytes(mode, joint_count);
+    poses.resize(bytes * static_cast<std::size_t>(avatar_count));
+    for (int a = 0; a < avatar_count; ++a) {
+      avatars.push_back(static_cast<AvatarNumber>(a * 1000 + 1));
+      flags.push_back(static_cast<std::uint8_t>(a % 4));
+      std::vector<Quat> rotations;
+      for (int j = 0; j < joint_count; ++j) {
+        const double angle = 0.7 * a + 0.45 * j;
+        const double x = Sin(angle), y = Cos(1.3 * angle), z = Sin(0.4 + 2.1 * angle), w = Cos(angle);
+        const double length = std::sqrt(x * x + y * y + z * z + w * w);
+        rotations.push_back(Quat(static_cast<float>(w / length), static_cast<float>(x / length),
+                                 static_cast<float>(y / length), static_cast<float>(z / length)));
+      }
+      const Vec3 root(1.5f * static_cast<float>(a), 0.9375f, -2.0f + 0.25f * static_cast<float>(a));
+      STRIDEWIRE_CHECK(EncodePose(mode, root, rotations,
+                                  std::span(poses).subspan(bytes * static_cast<std::size_t>(a), bytes)));
+    }
+  }
+
+  [[nodiscard]] PoseBatch view() const { return {info, avatars, flags, poses}; }
+};
+
+ParameterSet Parameters(std::initializer_list<std::pair<int, double>> values) {
+  ParameterSet set;
+  for (const auto& [name, value] : values) {
+    set.names[set.count] = static_cast<std::uint8_t>(name);
+    set.values[set.count] = value;
+    ++set.count;
+  }
+  return set;
+}
+
+std::vector<Event> EveryEvent() {
+  std::vector<Event> events;
+  for (int type = 0; type <= static_cast<int>(EventType::kRemoved); ++type) {
+    Event event;
+    event.type = static_cast<EventType>(type);
+    event.avatar = 7;
+    event.request_id = type == static_cast<int>(EventType::kIdle) ? 0 : 900 + static_cast<RequestId>(type);
+    event.tick = 6000 + static_cast<std::uint64_t>(type);
+    event.time_s = 100.0 + 0.25 * type;
+    switch (event.type) {
+      case EventType::kStarted:
+        event.kind = MovementKind::kStepRight;
+        event.group = 1;
+        event.requested = Parameters({{2, -0.5}, {5, 0.9}});
+        event.applied = Parameters({{2, -0.5}, {5, 0.75}});
+        event.extrapolated = true;
+        event.clamped = true;
+        break;
+      case EventType::kFootStrike:
+        event.kind = MovementKind::kStepRight;
+        event.foot = FootSide::kRight;
+        event.position_m = DVec3(-0.125, 0.0, 3.5);
+        break;
+      case EventType::kFinished:
+      case EventType::kIdle:
+      case EventType::kSpawned: event.base = {DVec3(1.0, 0.0, 3.25), -6.5}; break;
+      case EventType::kRejected:
+        event.kind = MovementKind::kJump;
+        event.code = StatusCode::kNoMovement;
+        event.reason = "the library has no jump";
+        break;
+      case EventType::kAccepted:
+      case EventType::kRemoved: break;
+    }
+    events.push_back(event);
+  }
+  return events;
+}
+
+}  // namespace
+
+std::vector<SampleMessage> SampleMessages() {
+  static const BatchArrays full(PoseMode::kFull, 8, 3);
+  static const BatchArrays quantised(PoseMode::kQuantised, 8, 3);
+  static const BatchArrays nobody(PoseMode::kQuantised, 31, 0);
+
+  std::vector<SampleMessage> samples;
+  const auto add = [&](const char* name, Message message) {
+    samples.push_back({name, std::move(message)});
+  };
+  add("hello", Hello{1, 3, "game-server \xe2\x9c\x93", kFeatureResume | kFeatureQuantised, "", {}, 0});
+  add("hello_resume", Hello{1, 1, "game-server", kFeatureResume | kFeatureEventReplay,
+                            "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
+  add("join_world", JoinWorld{1, "plaza", Role::kObserver});
+  add("leave_world", LeaveWorld{9, 3});
+  add("spawn", Spawn{2, 3, {{0, {DVec3(0.0), 0.0}}, {41, {DVec3(1.5, 0.25, -2.0), 1.75}}}});
+  add("remove", Remove{8, 3, {41, 42, 4'000'000'000u}});
+  {
+    Request request{3, 3, {}};
+    request.items.push_back({41, 1001, StepMovement{FootChoice::kAuto, 0.625, {}, 0.0, 0.0}});
+    request.items.push_back({41, 1002, StepMovement{FootChoice::kLeft, 0.5, 0.125, 0.15, -0.3}});
+    request.items.push_back({41, 1003, StepMovement{FootChoice::kRight, 0.0, 0.0, 0.0, 0.0}});
+    request.items.push_back({42, 1004, JumpMovement{0.875, 0.125, 0.5}});
+    request.items.push_back({43, 18'446'744'073'709'551'615u, StandMovement{1.5}});
+    add("request", request);
+    Request crowd{4, 3, {}};
+    for (AvatarNumber a = 1; a <= 100; ++a) {
+      crowd.items.push_back({a, 5000 + a, StepMovement{FootChoice::kAuto, 0.5 + a / 512.0, {}, 0, 0}});
+    }
+    add("request_crowd", crowd);
+  }
+  add("cancel_queue", CancelQueue{5, 3, {41}});
+  add("observe_all", Observe{6, 3, 1, PoseMode::kQuantised, {}, 1, true});
+  add("observe_some", Observe{7, 3, 2, PoseMode::kFull, {41, 42}, 6, false});
+  add("stop_observing", StopObserving{10, 2});
+  add("ping", Ping{0x0123456789abcdefu, 12.5});
+  add("goodbye", Goodbye{StatusCode::kShuttingDown, "the server is going down"});
+  add("welcome", Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0,
+                         "stridewired", "0.1.0",
+                         ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
+  add("world_info",
+      WorldInfo{1, 3, "plaza", Role::kController, 123'000, "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
+                Skeleton()});
+  add("reply_ok", Reply{6, StatusCode::kOk, "", 1, {}});
+  add("reply_items",
+      Reply{2, StatusCode::kOk, "one of three was refused", 2,
+            {{0, 44, 0, StatusCode::kOk, ""},
+             {1, 41, 0, StatusCode::kAvatarExists, "avatar 41 lives already"},
+             {2, 45, 1002, StatusCode::kOk, ""}}});
+  add("pose_batch_full", full.view());
+  add("pose_batch_quantised", quantised.view());
+  add("pose_batch_empty", nobody.view());
+  add("events", Events{3, 513, 6010, EveryEvent()});
+  add("lagging", Lagging{3, 1200, 4});
+  add("error", ErrorNotice{StatusCode::kBadSequence, "seq 12 leaves a gap after 9", true, 12});
+  add("pong", Pong{0x0123456789abcdefu, 12.5, 2057.625, 123'457});
+  return samples;
+}
+
+}  // namespace stridewire::protocol

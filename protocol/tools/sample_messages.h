@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "stridewire/protocol/messages.h"
+
+namespace stridewire::protocol {
+
+/// A message with every field set to something that is not its default, and variants worth testing.
+struct SampleMessage {
+  std::string name;  ///< File name of its vector, e.g. "request_crowd".
+  Message message;   ///< A PoseBatch borrows arrays that live as long as the program.
+};
+
+/// The messages the test vectors are made of; the same every time.
+[[nodiscard]] std::vector<SampleMessage> SampleMessages();
+
+}  // namespace stridewire::protocol
