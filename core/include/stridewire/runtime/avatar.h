@@ -3,58 +3,22 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
-#include <variant>
 #include <vector>
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement.h"
+#include "stridewire/runtime/movement_request.h"
+#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
-
-/// One step: where the moving foot lands relative to the fixed one.
-struct StepRequest {
-  std::optional<Foot> foot;      ///< Left out: the other foot than last time.
-  double length_m = 0.0;         ///< Forward distance between the feet at the end; 0 closes.
-  std::optional<double> side_m;  ///< Fixed to moving foot, positive to the moving foot's own side.
-  double height_m = 0.0;         ///< Moving above fixed foot at the end.
-  double turn_rad = 0.0;         ///< Change of heading, left positive.
-};
-
-struct JumpRequest {
-  double length_m = 0.0;
-  double height_m = 0.0;
-  double turn_rad = 0.0;
-};
-
-/// Stands for a while; a walking avatar closes its feet first.
-struct StandRequest {
-  double seconds = 0.0;
-};
-
-struct MovementRequest {
-  std::uint64_t id = 0;  ///< The caller's; comes back in events.
-  std::variant<StepRequest, JumpRequest, StandRequest> movement;
-};
-
-/// Limits on what may be asked for, far outside what any library spans: meaning, not taste.
-inline constexpr double kMaxRequestLengthM = 10.0;
-inline constexpr double kMaxStandS = 3600.0;
-
-/// Parameter values by name order of the group they belong to; `count` = group's parameter count.
-struct ParameterValues {
-  std::array<double, kMaxParameters> values{};
-  int count = 0;
-};
 
 enum class AvatarEventType : std::uint8_t {
   kStarted,     ///< A movement began: group, requested and applied parameters.
   kFootStrike,  ///< A foot landed: foot and where its ball is.
   kFinished,    ///< A movement ended: the new base frame. The commit point.
   kIdle,        ///< Queue empty and standing still.
-  kRejected,    ///< A queued request turned out impossible when its turn came: `reason`.
 };
 
 struct AvatarEvent {
@@ -70,7 +34,6 @@ struct AvatarEvent {
   Foot foot = Foot::kLeft;       ///< kFootStrike
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike
   BaseFrame base;                ///< kFinished: base frame after the movement
-  const char* reason = "";       ///< kRejected; static storage
 };
 
 /// An avatar: base frame, queue of requests, current movement, displayed pose.
@@ -102,21 +65,56 @@ class Avatar {
   void Advance(double dt_s);
 
   [[nodiscard]] ConstPoseSpan pose() const { return pose_; }  ///< Displayed, in the world.
-  [[nodiscard]] std::span<const AvatarEvent> events() const;
+  [[nodiscard]] std::span<const AvatarEvent> events() const {
+    return std::span(events_).first(event_count_);
+  }
   [[nodiscard]] const BaseFrame& base() const { return base_; }
-  [[nodiscard]] int queue_size() const;
-  [[nodiscard]] bool idle() const;  ///< Standing, nothing queued.
+  [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
+  /// Standing, nothing queued.
+  [[nodiscard]] bool idle() const { return !is_moving_ && !is_in_stand_ && queue_size() == 0; }
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
 
   /// The movement under way, null while standing; valid until the next Advance.
-  [[nodiscard]] const Movement* movement() const;
+  [[nodiscard]] const Movement* movement() const { return is_moving_ ? &movement_ : nullptr; }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
 
  private:
+  void AddEvent(const AvatarEvent& event);
+  [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
+  [[nodiscard]] FootState MeasureFeet() const;
+  void Evaluate(double time_s);
+  [[nodiscard]] bool StartNext();
+  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
+  void FinishMovement();
+  void FinishStand();
+  void ReportFootStrikes(double before_s, double after_s);
+
   std::shared_ptr<const MotionLibrary> library_;
   BaseFrame base_;
   Pose pose_;
+  double time_s_ = 0.0;  // avatar time
+
+  // One of: a movement under way, a requested stand, or just standing.
+  bool is_moving_ = false;
+  bool is_in_stand_ = false;
+  bool is_idle_reported_ = false;
+  bool is_walking_ = false;       // a step left the feet apart: close before anything but a step
+  bool is_closing_ = false;       // the movement under way is our own closing step
+  std::uint64_t request_id_ = 0;  // of the movement or stand under way
+  double stand_left_s_ = 0.0;
+  Movement movement_;
   double movement_time_s_ = 0.0;
+  double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
+  GridCache cache_;
+  std::vector<double> weight_scratch_;
+
+  FootState stand_feet_;  // of the library's stand pose
+  FootState feet_;
+  Foot last_moved_ = Foot::kRight;
+  std::vector<MovementRequest> queue_;  // live from queue_head_ on
+  std::size_t queue_head_ = 0;
+  std::array<AvatarEvent, kMaxEventsPerAdvance> events_{};
+  std::size_t event_count_ = 0;
 };
 
 }  // namespace stridewire

@@ -114,15 +114,18 @@ class MotionLibrary {
  public:
   static constexpr int kFormatVersion = 1;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
+  static constexpr int kMaxGroups = 256;
+  static constexpr int kMaxExamples = 4096;    ///< A group.
+  static constexpr int kMaxGridPoints = 4096;  ///< A group.
 
   /// Verifies header, hash, FlatBuffers structure and meaning before anything is used.
   /// kMalformed, kVersionMismatch, kLimitExceeded, kIo; `where` names the file.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(
       const std::filesystem::path& path);
 
-  /// The same on bytes in memory; takes them over.
+  /// The same on bytes in memory; copies them.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(
-      std::vector<std::byte> bytes);
+      std::span<const std::byte> bytes);
 
   ~MotionLibrary();
   MotionLibrary(const MotionLibrary&) = delete;
@@ -145,7 +148,7 @@ class MotionLibrary {
 
  private:
   MotionLibrary() = default;
-  [[nodiscard]] Status Load(std::span<const std::byte> bytes);
+  [[nodiscard]] Status Load();
 
   Skeleton skeleton_;
   GridLayout layout_;
@@ -153,9 +156,8 @@ class MotionLibrary {
   Pose stand_pose_;
   std::string hash_;
   int max_example_count_ = 0;
-  std::span<const std::byte> bytes_;
-  std::vector<std::byte> owned_;
-  void* mapping_ = nullptr;  // mmap of bytes_, unmapped at the end
+  std::span<const std::byte> bytes_;  // mapped or allocated, 64-byte aligned
+  bool is_mapped_ = false;
 };
 
 }  // namespace stridewire

@@ -18,6 +18,9 @@ struct BaseFrame {
   double heading_rad = 0.0;  ///< Unwrapped: 2 pi is one full left turn.
 };
 
+/// The longest an old pose is eased out over (paper, Section 5: T).
+inline constexpr double kEaseOutS = 0.2;
+
 /// One synthesized variation: everything that can be seen of an avatar while it lasts follows from
 /// this value, its group and the time.
 struct Movement {
@@ -28,12 +31,58 @@ struct Movement {
   TimeWarp warp;
   double heading_change_rad = 0.0;  ///< blended
   BaseFrame base;
-  Pose difference;          ///< D = P - M(0), world frame
-  double ease_out_s = 0.2;  ///< T = min(0.2 s, duration)
+  Pose difference;                ///< D = P - M(0), world frame
+  double ease_out_s = kEaseOutS;  ///< T = min(kEaseOutS, duration)
 
   [[nodiscard]] double duration_s() const {
     return keytimes_s[static_cast<std::size_t>(interval_count)];
   }
 };
+
+/// The blended grid poses around the present cell. Blending costs n multiply-adds a lane; between
+/// grid points the poses are only interpolated, so a tick blends once a cell. Keeping this or
+/// starting from an empty one gives the same bytes.
+class GridCache {
+ public:
+  explicit GridCache(const GridLayout& layout)
+      : layout_(layout), rows_(static_cast<std::size_t>(4 * layout.row_floats)) {}
+
+  /// Forgets the rows: the movement changed.
+  void Clear() { points_.fill(-1); }
+
+  /// The blended row of a grid point: quaternions unit, hemisphere that of the group's reference.
+  [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
+                                           int point);
+
+  /// Blends whose norm fell below 0.1, where the example of largest weight was taken instead.
+  [[nodiscard]] std::uint64_t degenerate_count() const { return degenerate_count_; }
+
+ private:
+  GridLayout layout_;
+  std::vector<float> rows_;  // four rows, point p in slot p % 4
+  std::array<int, 4> points_{-1, -1, -1, -1};
+  std::uint64_t degenerate_count_ = 0;
+};
+
+/// Fills `movement` (its vectors keep their memory) for a group and parameters [d] at a base frame:
+/// weights (Section 3), keytimes (Eq. (4)), ease-out time; no difference pose.
+void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
+                   const BaseFrame& base, std::span<double> weight_scratch, Movement& movement);
+
+/// The blended pose M(t) in the world, without the difference pose (Eq. (2)). `time_s` is clamped
+/// to the movement. Between grid points C1 (Catmull-Rom). Never allocates.
+void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                   double time_s, GridCache& cache, PoseSpan out);
+
+/// What is displayed: M'(t) = f(t/T) D + M(t) (Eq. (5)). M'(0) = P, M'(t) = M(t) from T on.
+void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                      double time_s, GridCache& cache, PoseSpan out);
+
+/// f(s) = 3(1-s)^2 - 2(1-s)^3, 1 at 0, 0 from 1 on.
+[[nodiscard]] double EaseOut(double s);
+
+/// Base frame after the movement: below the displayed root at its end, heading turned by the blended
+/// change (the paper takes the displayed heading, which swings with the pelvis and veers).
+[[nodiscard]] BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose);
 
 }  // namespace stridewire

@@ -1,0 +1,141 @@
+#include "stridewire/runtime/keytimes.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stridewire {
+namespace {
+
+int LastInterval(std::span<const double> keytimes_s) {
+  return static_cast<int>(keytimes_s.size()) - 2;
+}
+
+double At(std::span<const double> values, int i) { return values[static_cast<std::size_t>(i)]; }
+
+}  // namespace
+
+Status ValidateKeytimes(std::span<const double> keytimes_s) {
+  const int count = static_cast<int>(keytimes_s.size());
+  if (count < 2) return Fail(ErrorCode::kOutOfRange, "a movement needs two keytimes", count);
+  if (count > kMaxIntervals + 1) return Fail(ErrorCode::kOutOfRange, "too many keytimes", count);
+  if (keytimes_s[0] != 0.0) return Fail(ErrorCode::kOutOfRange, "the first keytime must be 0");
+  for (int i = 0; i + 1 < count; ++i) {
+    const double length_s = At(keytimes_s, i + 1) - At(keytimes_s, i);
+    if (!std::isfinite(length_s)) {
+      return Fail(ErrorCode::kOutOfRange, "a keytime is not finite", i + 1);
+    }
+    if (length_s < kMinIntervalS) {
+      return Fail(ErrorCode::kOutOfRange, "a keytime interval is shorter than 1 ms", i);
+    }
+  }
+  return {};
+}
+
+double GenericTime(std::span<const double> keytimes_s, double time_s) {
+  const int last = LastInterval(keytimes_s);
+  const double t = std::clamp(time_s, keytimes_s.front(), keytimes_s.back());
+  int i = last;
+  while (i > 0 && t < At(keytimes_s, i)) --i;
+  const double length_s = At(keytimes_s, i + 1) - At(keytimes_s, i);
+  return length_s > 0.0 ? i + (t - At(keytimes_s, i)) / length_s : i;
+}
+
+double TimeAtGenericTime(std::span<const double> keytimes_s, double generic_time) {
+  const int last = LastInterval(keytimes_s);
+  const double g = std::clamp(generic_time, 0.0, last + 1.0);
+  const int i = std::min(static_cast<int>(g), last);
+  return At(keytimes_s, i) + (g - i) * (At(keytimes_s, i + 1) - At(keytimes_s, i));
+}
+
+void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const float> weights,
+                   std::span<double> out_s) {
+  const std::size_t key_count = out_s.size();
+  out_s[0] = 0.0;
+  for (std::size_t i = 0; i + 1 < key_count; ++i) {
+    double blended = 0.0;
+    double shortest = HUGE_VAL;
+    double longest = 0.0;
+    for (std::size_t e = 0; e < weights.size(); ++e) {
+      const double* keys = &example_keytimes_s[e * key_count];
+      const double length_s = keys[i + 1] - keys[i];
+      blended += static_cast<double>(weights[e]) * length_s;
+      shortest = std::min(shortest, length_s);
+      longest = std::max(longest, length_s);
+    }
+    out_s[i + 1] = out_s[i] + std::clamp(blended, 0.5 * shortest, 2.0 * longest);
+  }
+}
+
+TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cells)
+    : interval_count_(static_cast<int>(cells.size())) {
+  const std::size_t n = cells.size();
+  std::array<double, kMaxIntervals> length{};
+  std::array<double, kMaxIntervals> rate{};  // cells a second in each interval
+  keytimes_s_[0] = keytimes_s[0];
+  for (std::size_t i = 0; i < n; ++i) {
+    keytimes_s_[i + 1] = keytimes_s[i + 1];
+    positions_[i + 1] = positions_[i] + cells[i];
+    length[i] = keytimes_s[i + 1] - keytimes_s[i];
+    rate[i] = cells[i] / length[i];
+  }
+  // Fritsch and Carlson: the weighted harmonic mean of the neighbouring rates keeps the cubic
+  // monotone. All rates are positive here. Ends: one-sided three-point formula, kept within
+  // [0, 3 rate], which is what monotonicity needs.
+  if (n == 1) {
+    slopes_[0] = slopes_[1] = rate[0];
+    return;
+  }
+  for (std::size_t i = 1; i < n; ++i) {
+    const double w1 = 2.0 * length[i] + length[i - 1];
+    const double w2 = length[i] + 2.0 * length[i - 1];
+    slopes_[i] = (w1 + w2) / (w1 / rate[i - 1] + w2 / rate[i]);
+  }
+  const auto end_slope = [](double h0, double h1, double r0, double r1) {
+    return std::clamp(((2.0 * h0 + h1) * r0 - h0 * r1) / (h0 + h1), 0.0, 3.0 * r0);
+  };
+  slopes_[0] = end_slope(length[0], length[1], rate[0], rate[1]);
+  slopes_[n] = end_slope(length[n - 1], length[n - 2], rate[n - 1], rate[n - 2]);
+}
+
+double TimeWarp::GridPosition(double time_s) const {
+  const auto n = static_cast<std::size_t>(interval_count_);
+  if (!(time_s > keytimes_s_[0])) return 0.0;
+  if (time_s >= keytimes_s_[n]) return positions_[n];
+  std::size_t i = n - 1;
+  while (i > 0 && time_s < keytimes_s_[i]) --i;
+  const double h = keytimes_s_[i + 1] - keytimes_s_[i];
+  const double s = (time_s - keytimes_s_[i]) / h;
+  const double rise = positions_[i + 1] - positions_[i];
+  // Cubic Hermite, relative to the interval's start so that small steps keep their precision.
+  const double m0 = slopes_[i] * h;
+  const double m1 = slopes_[i + 1] * h;
+  const double value =
+      positions_[i] + s * (m0 + s * ((3.0 * rise - 2.0 * m0 - m1) + s * (m0 + m1 - 2.0 * rise)));
+  return std::clamp(value, positions_[i], positions_[i + 1]);
+}
+
+double TimeWarp::TimeAt(double grid_position) const {
+  const auto n = static_cast<std::size_t>(interval_count_);
+  if (!(grid_position > 0.0)) return keytimes_s_[0];
+  if (grid_position >= positions_[n]) return keytimes_s_[n];
+  for (std::size_t i = 1; i < n; ++i) {
+    if (grid_position == positions_[i]) return keytimes_s_[i];
+  }
+  double low = keytimes_s_[0];
+  double high = keytimes_s_[n];
+  while (high - low > 1e-12) {
+    const double middle = 0.5 * (low + high);
+    if (middle <= low || middle >= high) break;
+    (GridPosition(middle) < grid_position ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+double TimeWarp::GenericTimeAt(double time_s) const {
+  const double u = GridPosition(time_s);
+  std::size_t i = static_cast<std::size_t>(interval_count_) - 1;
+  while (i > 0 && u < positions_[i]) --i;
+  return static_cast<double>(i) + (u - positions_[i]) / (positions_[i + 1] - positions_[i]);
+}
+
+}  // namespace stridewire

@@ -1,0 +1,394 @@
+#include "stridewire/runtime/motion_library.h"
+
+#include <fcntl.h>
+#include <flatbuffers/flatbuffers.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+
+#include "library_file.h"
+#include "motion_library_generated.h"
+
+namespace stridewire {
+namespace {
+
+constexpr std::size_t kAlignment = 64;
+constexpr double kUnitTolerance = 1e-3;
+constexpr double kLargestNumber = 1e9;
+
+Vec3 ToVec3(const fb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
+
+// A number that arithmetic can be done with: finite and of a size that cannot overflow later.
+template <typename T>
+bool IsSane(T value) {
+  return std::isfinite(value) && std::fabs(static_cast<double>(value)) <= kLargestNumber;
+}
+
+template <typename T>
+bool AllSane(std::span<const T> values) {
+  return std::all_of(values.begin(), values.end(), [](T v) { return IsSane(v); });
+}
+
+template <typename T>
+std::span<const T> ToSpan(const flatbuffers::Vector<T>* vector) {
+  return vector == nullptr ? std::span<const T>()
+                           : std::span<const T>(vector->data(), vector->size());
+}
+
+Leg ToLeg(const fb::Leg& leg) {
+  return {leg.hip(),
+          leg.knee(),
+          leg.ankle(),
+          leg.ball(),
+          ToVec3(leg.ball_offset()),
+          ToVec3(leg.toe_tip_offset())};
+}
+
+Expected<Skeleton> LoadSkeleton(const fb::Skeleton& from) {
+  Skeleton skeleton;
+  if (from.joints()->size() > static_cast<std::size_t>(kMaxJoints)) {
+    return Fail(ErrorCode::kMalformed, "too many joints", from.joints()->size());
+  }
+  for (const fb::Joint* joint : *from.joints()) {
+    skeleton.joints.push_back({joint->name()->str(), joint->parent(), ToVec3(*joint->offset())});
+  }
+  if (from.end_sites() != nullptr) {
+    if (from.end_sites()->size() > static_cast<std::size_t>(kMaxJoints)) {
+      return Fail(ErrorCode::kMalformed, "too many end sites", from.end_sites()->size());
+    }
+    for (const fb::EndSite* site : *from.end_sites()) {
+      skeleton.end_sites.push_back({site->joint(), ToVec3(site->offset())});
+    }
+  }
+  skeleton.legs[0] = ToLeg(*from.left());
+  skeleton.legs[1] = ToLeg(*from.right());
+  if (const Status status = skeleton.Validate(); !status) return std::unexpected(status.error());
+  return skeleton;
+}
+
+// Which parameters a kind may have, as a range of names.
+bool NameFitsKind(ParameterName name, MovementKind kind) {
+  if (IsStep(kind)) return name <= ParameterName::kTurn;
+  return name == ParameterName::kTurn || name == ParameterName::kLength ||
+         name == ParameterName::kHeight;
+}
+
+Status LoadParameters(const fb::Group& from, MotionGroup& group) {
+  const auto d = from.parameters()->size();
+  if (d < 1 || d > static_cast<std::size_t>(kMaxParameters)) {
+    return Fail(ErrorCode::kMalformed, "a group's parameter count is out of range", d);
+  }
+  for (const fb::Parameter* parameter : *from.parameters()) {
+    const auto name = static_cast<ParameterName>(parameter->name());
+    if (parameter->name() >= kParameterNameCount || !NameFitsKind(name, group.kind)) {
+      return Fail(ErrorCode::kMalformed, "a parameter's name is unknown or not of its kind",
+                  parameter->name());
+    }
+    if (group.FindParameter(name) >= 0) {
+      return Fail(ErrorCode::kMalformed, "a parameter stands twice", parameter->name());
+    }
+    if (!IsSane(parameter->min()) || !IsSane(parameter->max()) || !IsSane(parameter->centre()) ||
+        !IsSane(parameter->scale()) || !(parameter->scale() > 1e-9) ||
+        parameter->min() > parameter->max()) {
+      return Fail(ErrorCode::kMalformed, "a parameter's range or scale makes no sense",
+                  parameter->name());
+    }
+    group.parameters.push_back(
+        {name, parameter->min(), parameter->max(), parameter->centre(), parameter->scale()});
+  }
+  return {};
+}
+
+Status LoadWeights(const fb::Group& from, MotionGroup& group) {
+  const auto d = group.parameters.size();
+  const auto n = static_cast<std::size_t>(group.example_count);
+  group.sites = ToSpan(from.sites());
+  if (group.sites.size() % d != 0 || group.sites.size() / d < n ||
+      group.sites.size() / d > 2 * static_cast<std::size_t>(MotionLibrary::kMaxExamples)) {
+    return Fail(ErrorCode::kMalformed, "a group's site count does not fit its examples");
+  }
+  const std::size_t m = group.sites.size() / d;
+  group.site_count = static_cast<int>(m);
+  group.site_weights = ToSpan(from.site_weights());
+  group.dilations = ToSpan(from.dilations());
+  group.linear = ToSpan(from.linear());
+  group.radial = ToSpan(from.radial());
+  if (group.site_weights.size() != (m - n) * n || group.dilations.size() != m ||
+      group.linear.size() != (d + 1) * n || group.radial.size() != m * n) {
+    return Fail(ErrorCode::kMalformed, "a group's weight tables have the wrong size");
+  }
+  if (!AllSane(group.sites) || !AllSane(group.site_weights) || !AllSane(group.dilations) ||
+      !AllSane(group.linear) || !AllSane(group.radial)) {
+    return Fail(ErrorCode::kMalformed, "a group's weight tables hold a number out of range");
+  }
+  for (const double dilation : group.dilations) {
+    if (!(dilation > 1e-9)) return Fail(ErrorCode::kMalformed, "a dilation is not positive");
+  }
+  return {};
+}
+
+Status LoadTimes(const fb::Group& from, MotionGroup& group) {
+  const auto n = static_cast<std::size_t>(group.example_count);
+  group.cells = ToSpan(from.cells());
+  const std::size_t intervals = group.cells.size();
+  if (intervals < 1 || intervals > static_cast<std::size_t>(kMaxIntervals)) {
+    return Fail(ErrorCode::kMalformed, "a group's interval count is out of range",
+                static_cast<std::int64_t>(intervals));
+  }
+  std::int64_t points = 1;
+  for (const int cells : group.cells) {
+    if (cells < 1 || cells > MotionLibrary::kMaxGridPoints) {
+      return Fail(ErrorCode::kMalformed, "a group's cell count is out of range", cells);
+    }
+    points += cells;
+  }
+  if (points > MotionLibrary::kMaxGridPoints) {
+    return Fail(ErrorCode::kMalformed, "a group has too many grid points", points);
+  }
+  group.grid_point_count = static_cast<int>(points);
+  group.keytimes_s = ToSpan(from.keytimes_s());
+  group.heading_change_rad = ToSpan(from.heading_change_rad());
+  if (group.keytimes_s.size() != n * (intervals + 1) || group.heading_change_rad.size() != n) {
+    return Fail(ErrorCode::kMalformed, "a group's time tables have the wrong size");
+  }
+  if (!AllSane(group.heading_change_rad) || !AllSane(group.keytimes_s)) {
+    return Fail(ErrorCode::kMalformed, "a group's time tables hold a number out of range");
+  }
+  for (std::size_t e = 0; e < n; ++e) {
+    const Status status =
+        ValidateKeytimes(group.keytimes_s.subspan(e * (intervals + 1), intervals + 1));
+    if (!status)
+      return Fail(ErrorCode::kMalformed, status.error().text, static_cast<std::int64_t>(e));
+  }
+  return {};
+}
+
+Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joints,
+                MotionGroup& group) {
+  const auto n = static_cast<std::size_t>(group.example_count);
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  group.grid = ToSpan(from.grid());
+  if (group.grid.size() != static_cast<std::size_t>(group.grid_point_count) * n * row_floats) {
+    return Fail(ErrorCode::kMalformed, "a group's grid has the wrong size");
+  }
+  if (reinterpret_cast<std::uintptr_t>(group.grid.data()) % kAlignment != 0) {
+    return Fail(ErrorCode::kMalformed, "a group's grid is not aligned to 64 bytes");
+  }
+  if (!AllSane(group.grid)) {
+    return Fail(ErrorCode::kMalformed, "a group's grid holds a number out of range");
+  }
+  for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
+    const float* x = &group.grid[row];
+    for (std::size_t j = 0; j < joints; ++j) {
+      const double norm = std::sqrt(double{x[j]} * x[j] + double{x[padded + j]} * x[padded + j] +
+                                    double{x[2 * padded + j]} * x[2 * padded + j] +
+                                    double{x[3 * padded + j]} * x[3 * padded + j]);
+      if (std::fabs(norm - 1.0) > kUnitTolerance) {
+        return Fail(ErrorCode::kMalformed, "a stored rotation is not of unit length",
+                    static_cast<std::int64_t>(j));
+      }
+    }
+  }
+  return {};
+}
+
+Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
+                                std::size_t joints) {
+  MotionGroup group;
+  if (from.kind() > static_cast<int>(MovementKind::kJump)) {
+    return Fail(ErrorCode::kMalformed, "a group's kind is unknown", from.kind());
+  }
+  group.kind = static_cast<MovementKind>(from.kind());
+  if (from.example_count() < 1 || from.example_count() > MotionLibrary::kMaxExamples) {
+    return Fail(ErrorCode::kMalformed, "a group's example count is out of range",
+                from.example_count());
+  }
+  group.example_count = from.example_count();
+  const auto n = static_cast<std::size_t>(group.example_count);
+  if (Status status = LoadParameters(from, group); !status) return std::unexpected(status.error());
+  if (Status status = LoadWeights(from, group); !status) return std::unexpected(status.error());
+  if (Status status = LoadTimes(from, group); !status) return std::unexpected(status.error());
+  if (Status status = LoadGrid(from, layout, joints, group); !status) {
+    return std::unexpected(status.error());
+  }
+  if (from.sources()->size() != n || from.mirrored()->size() != n) {
+    return Fail(ErrorCode::kMalformed, "a group's source list has the wrong size");
+  }
+  for (const flatbuffers::String* source : *from.sources()) {
+    group.sources.push_back(source->string_view());
+  }
+  group.mirrored = ToSpan(from.mirrored());
+  return group;
+}
+
+}  // namespace
+
+std::string_view MovementKindName(MovementKind kind) {
+  switch (kind) {
+    case MovementKind::kStepLeft: return "step_left";
+    case MovementKind::kStepRight: return "step_right";
+    case MovementKind::kJump: return "jump";
+    case MovementKind::kStand: return "stand";
+  }
+  return "unknown";
+}
+
+std::string_view ParameterText(ParameterName name) {
+  switch (name) {
+    case ParameterName::kStartX: return "start_x_m";
+    case ParameterName::kStartY: return "start_y_m";
+    case ParameterName::kStartZ: return "start_z_m";
+    case ParameterName::kEndX: return "end_x_m";
+    case ParameterName::kEndY: return "end_y_m";
+    case ParameterName::kEndZ: return "end_z_m";
+    case ParameterName::kTurn: return "turn_rad";
+    case ParameterName::kLength: return "length_m";
+    case ParameterName::kHeight: return "height_m";
+  }
+  return "unknown";
+}
+
+int MotionGroup::FindParameter(ParameterName name) const {
+  for (std::size_t l = 0; l < parameters.size(); ++l) {
+    if (parameters[l].name == name) return static_cast<int>(l);
+  }
+  return -1;
+}
+
+MotionLibrary::~MotionLibrary() {
+  auto* data = const_cast<std::byte*>(bytes_.data());
+  if (is_mapped_) {
+    munmap(data, bytes_.size());
+  } else {
+    std::free(data);
+  }
+}
+
+Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
+    const std::filesystem::path& path) {
+  const std::string where = path.string();
+  const auto failed = [&](ErrorCode code, const char* text) { return Fail(code, text, where); };
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) {
+    return failed(errno == ENOENT ? ErrorCode::kNotFound : ErrorCode::kIo,
+                  errno == ENOENT ? "there is no such file" : "the file cannot be opened");
+  }
+  struct stat info{};
+  if (fstat(file, &info) != 0 || !S_ISREG(info.st_mode)) {
+    close(file);
+    return failed(ErrorCode::kIo, "not a regular file");
+  }
+  const auto size = static_cast<std::size_t>(info.st_size);
+  if (size > kMaxFileBytes || size < kLibraryHeaderBytes) {
+    close(file);
+    return failed(size > kMaxFileBytes ? ErrorCode::kLimitExceeded : ErrorCode::kMalformed,
+                  size > kMaxFileBytes ? "larger than a library may be (1 GiB)"
+                                       : "not a Stridewire library: shorter than its header");
+  }
+  void* mapping = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
+  close(file);
+  if (mapping == MAP_FAILED) return failed(ErrorCode::kIo, "the file cannot be mapped");
+
+  std::shared_ptr<MotionLibrary> library(new MotionLibrary());
+  library->bytes_ = {static_cast<const std::byte*>(mapping), size};
+  library->is_mapped_ = true;
+  if (Status status = library->Load(); !status) {
+    Error error = status.error();
+    error.where = where;
+    return std::unexpected(error);
+  }
+  return library;
+}
+
+Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::FromBytes(
+    std::span<const std::byte> bytes) {
+  if (bytes.size() > kMaxFileBytes) {
+    return Fail(ErrorCode::kLimitExceeded, "larger than a library may be (1 GiB)");
+  }
+  const std::size_t rounded = (bytes.size() + kAlignment) / kAlignment * kAlignment;
+  auto* copy = static_cast<std::byte*>(std::aligned_alloc(kAlignment, rounded));
+  if (copy == nullptr) return Fail(ErrorCode::kLimitExceeded, "out of memory");
+  std::copy(bytes.begin(), bytes.end(), copy);
+  std::shared_ptr<MotionLibrary> library(new MotionLibrary());
+  library->bytes_ = {copy, bytes.size()};
+  if (Status status = library->Load(); !status) return std::unexpected(status.error());
+  return library;
+}
+
+Status MotionLibrary::Load() {
+  if (bytes_.size() < kLibraryHeaderBytes) {
+    return Fail(ErrorCode::kMalformed, "not a Stridewire library: shorter than its header");
+  }
+  if (std::memcmp(bytes_.data(), kLibraryMagic, 8) != 0) {
+    return Fail(ErrorCode::kMalformed, "not a Stridewire library");
+  }
+  std::uint32_t version = 0;
+  std::memcpy(&version, bytes_.data() + 8, 4);
+  if (version != static_cast<std::uint32_t>(kFormatVersion)) {
+    return Fail(ErrorCode::kVersionMismatch, "made for another version of the format", version);
+  }
+  const std::span<const std::byte> payload = bytes_.subspan(kLibraryHeaderBytes);
+  std::uint64_t payload_bytes = 0;
+  std::memcpy(&payload_bytes, bytes_.data() + 16, 8);
+  if (payload_bytes != payload.size()) {
+    return Fail(ErrorCode::kMalformed, payload_bytes > payload.size()
+                                           ? "the file is cut short"
+                                           : "the file goes on past its end");
+  }
+  const auto expected_header = MakeLibraryHeader(payload);
+  if (std::memcmp(expected_header.data(), bytes_.data(), kLibraryHeaderBytes) != 0) {
+    return Fail(ErrorCode::kMalformed, "the content does not match its hash: the file is damaged");
+  }
+  hash_ = HashText(HashPayload(payload));
+
+  const auto* data = reinterpret_cast<const std::uint8_t*>(payload.data());
+  flatbuffers::Verifier verifier(data, payload.size(), 16, 1'000'000);
+  if (!fb::VerifyMotionLibraryBuffer(verifier)) {
+    return Fail(ErrorCode::kMalformed, "the content is not a motion library");
+  }
+  const fb::MotionLibrary& root = *fb::GetMotionLibrary(data);
+  Expected<Skeleton> skeleton = LoadSkeleton(*root.skeleton());
+  if (!skeleton) return std::unexpected(skeleton.error());
+  skeleton_ = std::move(*skeleton);
+  layout_ = GridLayout(skeleton_.joint_count());
+
+  const auto joints = static_cast<std::size_t>(skeleton_.joint_count());
+  if (root.stand_rotations()->size() != joints) {
+    return Fail(ErrorCode::kMalformed, "the stand pose does not fit the skeleton");
+  }
+  stand_pose_ = Pose(skeleton_.joint_count());
+  stand_pose_.root_position_m = ToVec3(*root.stand_root());
+  for (std::size_t j = 0; j < joints; ++j) {
+    const fb::Quat& q = *root.stand_rotations()->Get(static_cast<flatbuffers::uoffset_t>(j));
+    stand_pose_.rotations[j] = Quat(q.w(), q.x(), q.y(), q.z());
+    if (!(std::fabs(glm::length(stand_pose_.rotations[j]) - 1.0f) <= kUnitTolerance)) {
+      return Fail(ErrorCode::kMalformed, "the stand pose holds a rotation not of unit length",
+                  static_cast<std::int64_t>(j));
+    }
+  }
+  const Vec3 stand = stand_pose_.root_position_m;
+  if (!IsSane(stand.x) || !IsSane(stand.y) || !IsSane(stand.z)) {
+    return Fail(ErrorCode::kMalformed, "the stand pose's root is not finite");
+  }
+
+  if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
+    return Fail(ErrorCode::kMalformed, "the group count is out of range", root.groups()->size());
+  }
+  for (const fb::Group* from : *root.groups()) {
+    Expected<MotionGroup> group = LoadGroup(*from, layout_, joints);
+    if (!group) return std::unexpected(group.error());
+    max_example_count_ = std::max(max_example_count_, group->example_count);
+    groups_.push_back(std::move(*group));
+  }
+  return {};
+}
+
+}  // namespace stridewire

@@ -1,0 +1,193 @@
+#include "stridewire/runtime/movement.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/cardinal_basis.h"
+
+namespace stridewire {
+namespace {
+
+constexpr float kSmallestNorm = 0.1f;
+
+// Catmull-Rom weights of the grid points around a cell, ends by quadratic extrapolation.
+struct CellWeights {
+  int first = 0;  // grid point of weights[0]
+  int count = 0;
+  std::array<float, 4> weights{};
+};
+
+CellWeights WeightsAt(double grid_position, int point_count) {
+  const int cell = std::clamp(static_cast<int>(grid_position), 0, point_count - 2);
+  const double f = std::clamp(grid_position - cell, 0.0, 1.0);
+  if (point_count == 2) return {0, 2, {static_cast<float>(1.0 - f), static_cast<float>(f), 0, 0}};
+  const double before = f * (-0.5 + f * (1.0 - 0.5 * f));
+  const double left = 1.0 + f * f * (-2.5 + 1.5 * f);
+  const double right = f * (0.5 + f * (2.0 - 1.5 * f));
+  const double after = f * f * (-0.5 + 0.5 * f);
+  // A missing neighbour is p_-1 = 3 p_0 - 3 p_1 + p_2: the tangent at the end becomes the one-sided
+  // second-order difference.
+  if (cell == 0) {
+    return {0,
+            3,
+            {static_cast<float>(left + 3.0 * before), static_cast<float>(right - 3.0 * before),
+             static_cast<float>(after + before), 0.0f}};
+  }
+  if (cell == point_count - 2) {
+    return {cell - 1,
+            3,
+            {static_cast<float>(before + after), static_cast<float>(left - 3.0 * after),
+             static_cast<float>(right + 3.0 * after), 0.0f}};
+  }
+  return {cell - 1,
+          4,
+          {static_cast<float>(before), static_cast<float>(left), static_cast<float>(right),
+           static_cast<float>(after)}};
+}
+
+}  // namespace
+
+std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
+                                      int point) {
+  const auto slot = static_cast<std::size_t>(point & 3);
+  const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
+  const std::span<float> row = std::span(rows_).subspan(slot * row_floats, row_floats);
+  if (points_[slot] == point) return row;
+  points_[slot] = point;
+
+  const std::size_t n = weights.size();
+  const float* source = &group.grid[static_cast<std::size_t>(point) * n * row_floats];
+  std::fill(row.begin(), row.end(), 0.0f);
+  for (std::size_t e = 0; e < n; ++e) {
+    const float weight = weights[e];
+    const float* example = source + e * row_floats;
+    for (std::size_t i = 0; i < row_floats; ++i) row[i] += weight * example[i];
+  }
+
+  const auto padded = static_cast<std::size_t>(layout_.padded_joints);
+  float* x = row.data();
+  float* y = x + padded;
+  float* z = y + padded;
+  float* w = z + padded;
+  for (std::size_t j = 0; j < padded; ++j) {
+    const float norm = std::sqrt(x[j] * x[j] + y[j] * y[j] + z[j] * z[j] + w[j] * w[j]);
+    if (norm >= kSmallestNorm) {
+      x[j] /= norm;
+      y[j] /= norm;
+      z[j] /= norm;
+      w[j] /= norm;
+      continue;
+    }
+    // Rotations that cancel each other have no mean; the largest example is at least a pose.
+    ++degenerate_count_;
+    const auto largest = static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) -
+                                                  weights.begin());
+    const float* example = source + largest * row_floats;
+    x[j] = example[j];
+    y[j] = example[padded + j];
+    z[j] = example[2 * padded + j];
+    w[j] = example[3 * padded + j];
+  }
+  return row;
+}
+
+double EaseOut(double s) {
+  if (s <= 0.0) return 1.0;
+  if (s >= 1.0) return 0.0;
+  const double r = 1.0 - s;
+  return r * r * (3.0 - 2.0 * r);
+}
+
+void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
+                   const BaseFrame& base, std::span<double> weight_scratch, Movement& movement) {
+  const auto n = static_cast<std::size_t>(group.example_count);
+  movement.group = group_index;
+  movement.base = base;
+  movement.interval_count = group.interval_count();
+  const std::span<double> weights = weight_scratch.first(n);
+  if (n == 1) {
+    weights[0] = 1.0;
+  } else {
+    std::array<double, kMaxParameters> centres{};
+    std::array<double, kMaxParameters> scales{};
+    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+      centres[l] = group.parameters[l].centre;
+      scales[l] = group.parameters[l].scale;
+    }
+    const std::size_t d = group.parameters.size();
+    EvaluateWeights({std::span(centres).first(d), std::span(scales).first(d), group.sites,
+                     group.dilations, group.linear, group.radial},
+                    parameters, weights);
+  }
+  movement.weights.resize(n);
+  movement.heading_change_rad = 0.0;
+  for (std::size_t e = 0; e < n; ++e) {
+    movement.weights[e] = static_cast<float>(weights[e]);
+    movement.heading_change_rad += weights[e] * group.heading_change_rad[e];
+  }
+  const std::span<double> keytimes =
+      std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count + 1));
+  BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
+  movement.warp = TimeWarp(keytimes, group.cells);
+  movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
+}
+
+void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                   double time_s, GridCache& cache, PoseSpan out) {
+  const double u = movement.warp.GridPosition(time_s);
+  const CellWeights cell = WeightsAt(u, group.grid_point_count);
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  const auto root = static_cast<std::size_t>(layout.root());
+  std::array<const float*, 4> rows{};
+  for (int k = 0; k < cell.count; ++k) {
+    rows[static_cast<std::size_t>(k)] = cache.Row(group, movement.weights, cell.first + k).data();
+  }
+
+  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
+    const Quat first(rows[1][3 * padded + j], rows[1][j], rows[1][padded + j],
+                     rows[1][2 * padded + j]);
+    Quat sum(0.0f, 0.0f, 0.0f, 0.0f);
+    for (int k = 0; k < cell.count; ++k) {
+      const float* row = rows[static_cast<std::size_t>(k)];
+      const Quat q(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
+      // Alignment is per grid point, so a track far from the reference may flip between two.
+      const float weight = cell.weights[static_cast<std::size_t>(k)];
+      sum = sum + q * (Dot(first, q) < 0.0f ? -weight : weight);
+    }
+    out.rotations[j] = Normalise(sum);
+  }
+
+  DVec3 position(0.0);
+  double yaw_rad = 0.0;
+  for (int k = 0; k < cell.count; ++k) {
+    const float* row = rows[static_cast<std::size_t>(k)] + root;
+    const double weight = cell.weights[static_cast<std::size_t>(k)];
+    position += weight * DVec3(row[0], row[1], row[2]);
+    yaw_rad += weight * row[3];
+  }
+  out.root_position_m =
+      Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, position));
+  out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
+}
+
+void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                      double time_s, GridCache& cache, PoseSpan out) {
+  EvaluateBlend(group, layout, movement, time_s, cache, out);
+  const auto f = static_cast<float>(EaseOut(time_s / movement.ease_out_s));
+  if (f == 0.0f) return;
+  // M' = f D + M, i.e. r = r_M slerp(1, r_D, f): Add(Scale(f, D), M) without a temporary.
+  out.root_position_m += f * movement.difference.root_position_m;
+  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
+    out.rotations[j] = out.rotations[j] * SlerpFromIdentity(movement.difference.rotations[j], f);
+  }
+}
+
+BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {
+  BaseFrame base = movement.base;
+  base.position_m.x = end_pose.root_position_m.x;
+  base.position_m.z = end_pose.root_position_m.z;
+  base.heading_rad += movement.heading_change_rad;
+  return base;
+}
+
+}  // namespace stridewire

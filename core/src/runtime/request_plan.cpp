@@ -1,0 +1,176 @@
+#include "stridewire/runtime/request_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "stridewire/runtime/convex_hull.h"
+#include "stridewire/runtime/foot_vector.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kMetresPerRadian = 0.5;
+constexpr double kStartWeight = 4.0;     // the start is a fact, the end a wish
+constexpr double kFreeWeight = 0.02;     // a parameter nobody asked for follows the others
+constexpr double kPerParameterM = 1e-3;  // of groups that span a request alike, the plainer
+constexpr double kFootPreferenceM = 0.01;
+constexpr double kChangeM = 1e-6;
+
+// What is wanted of one parameter; not `given`: anything the examples have.
+struct Wish {
+  double value = 0.0;
+  bool given = false;
+  double weight = 1.0;
+};
+using Wishes = std::array<Wish, kParameterNameCount>;
+
+Wish& At(Wishes& wishes, ParameterName name) { return wishes[static_cast<std::size_t>(name)]; }
+
+RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wishes& wishes,
+                        double natural_side_m) {
+  const MotionGroup& group = library.group(group_index);
+  const std::size_t d = group.parameters.size();
+  RequestPlan plan;
+  plan.group = group_index;
+  plan.requested.count = plan.applied.count = static_cast<int>(d);
+  std::array<double, kMaxParameters> metric{};
+  std::array<bool, kParameterNameCount> is_spanned{};
+  for (std::size_t l = 0; l < d; ++l) {
+    const auto name = static_cast<std::size_t>(group.parameters[l].name);
+    const Wish& wish = wishes[name];
+    is_spanned[name] = true;
+    metric[l] = wish.given ? wish.weight : kFreeWeight;
+    plan.requested.values[l] = wish.given ? wish.value : group.parameters[l].centre;
+  }
+
+  const std::span<const double> examples =
+      group.sites.first(static_cast<std::size_t>(group.example_count) * d);
+  const std::span<const double> target = std::span(plan.requested.values).first(d);
+  std::array<double, kMaxParameters> inside{};
+  plan.extrapolated = ProjectOntoHull(examples, std::span(metric).first(d), 0.0, target,
+                                      std::span(inside).first(d)) > kChangeM;
+  plan.distance_m = ProjectOntoHull(examples, std::span(metric).first(d), kHullGrowth, target,
+                                    std::span(plan.applied.values).first(d));
+  for (std::size_t l = 0; l < d; ++l) {
+    const auto name = static_cast<std::size_t>(group.parameters[l].name);
+    if (!wishes[name].given) plan.requested.values[l] = plan.applied.values[l];
+    if (std::fabs(plan.requested.values[l] - plan.applied.values[l]) > kChangeM) {
+      plan.clamped = true;
+    }
+  }
+
+  // What the group has no parameter for is missed by as much as was asked.
+  for (const ParameterName name :
+       {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kEndX ? natural_side_m : 0.0;
+    const double missed = wishes[i].weight * std::fabs(wishes[i].value - natural);
+    if (missed > kChangeM) plan.clamped = true;
+    plan.distance_m += missed;
+  }
+  return plan;
+}
+
+std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
+                                    const Wishes& wishes, double natural_side_m) {
+  std::optional<RequestPlan> best;
+  double best_cost = HUGE_VAL;
+  for (std::size_t g = 0; g < library.groups().size(); ++g) {
+    const MotionGroup& group = library.groups()[g];
+    if (group.kind != kind) continue;
+    const RequestPlan plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m);
+    const double cost = plan.distance_m + kPerParameterM * group.parameter_count();
+    if (cost < best_cost) {
+      best_cost = cost;
+      best = plan;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
+                                    const FootState& feet, Foot last_moved, bool standing) {
+  const FootState stand{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)};
+  const auto plan_foot = [&](Foot foot) {
+    const DVec3 start = feet.Vector(foot);
+    const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+    Wishes wishes;
+    At(wishes, ParameterName::kStartX) = {start.x, true, kStartWeight};
+    At(wishes, ParameterName::kStartY) = {start.y, true, kStartWeight};
+    At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
+    At(wishes, ParameterName::kEndX) = {outward * request.side_m.value_or(0.0),
+                                        request.side_m.has_value(), 1.0};
+    At(wishes, ParameterName::kEndY) = {request.height_m, true, 1.0};
+    At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
+    At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
+    return BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x);
+  };
+
+  if (request.foot) return plan_foot(*request.foot);
+  const std::optional<RequestPlan> expected = plan_foot(OtherFoot(last_moved));
+  if (expected && !standing) return expected;
+  const std::optional<RequestPlan> other = plan_foot(last_moved);
+  if (!expected) return other;
+  if (!other || other->distance_m > expected->distance_m - kFootPreferenceM) return expected;
+  return other;
+}
+
+std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequest& request) {
+  Wishes wishes;
+  At(wishes, ParameterName::kLength) = {request.length_m, true, 1.0};
+  At(wishes, ParameterName::kHeight) = {request.height_m, true, 1.0};
+  At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
+  return BestPlan(library, MovementKind::kJump, wishes, 0.0);
+}
+
+Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request) {
+  const auto within = [](double value, double limit) {
+    return std::isfinite(value) && std::fabs(value) <= limit;
+  };
+  const auto has_kind = [&](MovementKind kind) {
+    return std::any_of(library.groups().begin(), library.groups().end(),
+                       [&](const MotionGroup& group) { return group.kind == kind; });
+  };
+  if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
+    if (!within(step->length_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "step");
+    }
+    if (step->side_m && !within(*step->side_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "side_m is not a number within 10 m", "step");
+    }
+    if (!within(step->height_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "step");
+    }
+    if (!within(step->turn_rad, kMaxRequestTurnRad)) {
+      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "step");
+    }
+    const bool found =
+        step->foot ? has_kind(StepKind(*step->foot))
+                   : has_kind(MovementKind::kStepLeft) || has_kind(MovementKind::kStepRight);
+    if (!found) return Fail(ErrorCode::kUnsupported, "the library has no such step", "step");
+  } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+    if (!within(jump->length_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "jump");
+    }
+    if (!within(jump->height_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "jump");
+    }
+    if (!within(jump->turn_rad, kMaxRequestTurnRad)) {
+      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "jump");
+    }
+    if (!has_kind(MovementKind::kJump)) {
+      return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
+    }
+  } else if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
+    if (!(stand->seconds >= 0.0 && stand->seconds <= kMaxStandS)) {
+      return Fail(ErrorCode::kOutOfRange, "seconds is not a number from 0 to 3600", "stand");
+    }
+  }
+  return {};
+}
+
+}  // namespace stridewire
