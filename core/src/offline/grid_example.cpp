@@ -1,0 +1,122 @@
+#include "grid_example.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/keytimes.h"
+
+namespace stridewire {
+namespace {
+
+Quat QuatOf(const float* row, std::size_t padded, std::size_t j) {
+  return Quat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
+}
+
+void SetQuat(float* row, std::size_t padded, std::size_t j, const Quat& q) {
+  row[j] = q.x;
+  row[padded + j] = q.y;
+  row[2 * padded + j] = q.z;
+  row[3 * padded + j] = q.w;
+}
+
+std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
+  const std::size_t d = examples.front().parameters.size();
+  std::vector<double> mean(d, 0.0);
+  for (const GridExample& example : examples) {
+    for (std::size_t l = 0; l < d; ++l) {
+      mean[l] += example.parameters[l] / static_cast<double>(examples.size());
+    }
+  }
+  std::size_t best = 0;
+  double best_distance = HUGE_VAL;
+  for (std::size_t e = 0; e < examples.size(); ++e) {
+    double distance = 0.0;
+    for (std::size_t l = 0; l < d; ++l) {
+      const double difference = examples[e].parameters[l] - mean[l];
+      distance += difference * difference;
+    }
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = e;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
+                           const GridLayout& layout) {
+  Clip clip = example.clip;
+  MakeSignContinuous(clip);
+  const TimeWarp warp(example.keytimes_s, cells);
+  int point_count = 1;
+  for (const int count : cells) point_count += count;
+
+  GridExample result;
+  result.keytimes_s = example.keytimes_s;
+  result.parameters = example.parameters;
+  result.heading_change_rad = example.heading_change_rad;
+  result.source = example.source;
+  result.mirrored = example.mirrored;
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  const auto root = static_cast<std::size_t>(layout.root());
+  result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
+
+  Pose pose(clip.joint_count);
+  double yaw_rad = 0.0;
+  for (int p = 0; p < point_count; ++p) {
+    SampleClip(clip, warp.TimeAt(p), pose);
+    float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
+    double wrapped_rad = yaw_rad;
+    HeadingOf(pose.rotations[0], wrapped_rad);  // near the vertical the last yaw is kept
+    yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
+    pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
+    for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+      SetQuat(row, padded, j, Normalise(pose.rotations[j]));
+    }
+    row[root] = pose.root_position_m.x;
+    row[root + 1] = pose.root_position_m.y;
+    row[root + 2] = pose.root_position_m.z;
+    row[root + 3] = static_cast<float>(yaw_rad);
+  }
+  return result;
+}
+
+void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
+                      int joint_count) {
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  GridExample& reference = examples[MedoidIndex(examples)];
+  const std::size_t points = reference.rows.size() / row_floats;
+  const auto align = [&](float* row, const float* to, std::size_t j) {
+    const Quat q = QuatOf(row, padded, j);
+    if (Dot(q, QuatOf(to, padded, j)) < 0.0f) SetQuat(row, padded, j, -q);
+  };
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
+    for (std::size_t p = 1; p < points; ++p) {
+      align(&reference.rows[p * row_floats], &reference.rows[(p - 1) * row_floats], j);
+    }
+    for (GridExample& example : examples) {
+      if (&example == &reference) continue;
+      for (std::size_t p = 0; p < points; ++p) {
+        align(&example.rows[p * row_floats], &reference.rows[p * row_floats], j);
+      }
+    }
+  }
+}
+
+Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count) {
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  const auto root = static_cast<std::size_t>(layout.root());
+  Pose pose(joint_count);
+  for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+    pose.rotations[j] = QuatOf(row.data(), padded, j);
+  }
+  pose.root_position_m = {row[root], row[root + 1], row[root + 2]};
+  pose.rotations[0] = YawRotation(row[root + 3]) * pose.rotations[0];
+  return pose;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stridewire/offline/raw_library.h"
+
+namespace stridewire {
+
+// An example resampled on its group's generic-time grid; rows as GridLayout has them.
+struct GridExample {
+  std::vector<float> rows;  // [grid point][row_floats]
+  std::vector<double> keytimes_s;
+  std::vector<double> parameters;
+  double heading_change_rad = 0.0;
+  std::string source;
+  bool mirrored = false;
+};
+
+// Samples the example at the times its own warp gives the grid points.
+[[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
+                                         const GridLayout& layout);
+
+// Flips rotations into the hemisphere of one example (the one nearest to the mean parameters), grid
+// point by grid point; that example's own tracks are continuous in sign. The reference must not
+// depend on the weights, or the blend would jump where it changes.
+void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
+                      int joint_count);
+
+// Pose of a row: root position and yaw put back together.
+[[nodiscard]] Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count);
+
+}  // namespace stridewire

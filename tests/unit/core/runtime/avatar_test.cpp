@@ -1,0 +1,220 @@
+#include "stridewire/runtime/avatar.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "stridewire/offline/library_builder.h"
+#include "stridewire/runtime/foot_vector.h"
+#include "toy_library.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kTickS = 1.0 / 60.0;
+
+class AvatarTest : public testing::Test {
+ protected:
+  void Request(decltype(MovementRequest::movement) movement) {
+    const Status status = avatar_.Enqueue({++last_id_, movement});
+    ASSERT_TRUE(status.has_value()) << Describe(status.error());
+  }
+  // Advances until idle, collecting events; fails after 60 s.
+  std::vector<AvatarEvent> RunUntilIdle() {
+    std::vector<AvatarEvent> all;
+    for (int tick = 0; tick < 3600; ++tick) {
+      avatar_.Advance(kTickS);
+      all.insert(all.end(), avatar_.events().begin(), avatar_.events().end());
+      if (avatar_.idle()) return all;
+    }
+    ADD_FAILURE() << "never idle";
+    return all;
+  }
+  std::vector<AvatarEvent> Of(const std::vector<AvatarEvent>& events, AvatarEventType type) {
+    std::vector<AvatarEvent> found;
+    for (const AvatarEvent& event : events) {
+      if (event.type == type) found.push_back(event);
+    }
+    return found;
+  }
+
+  const std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
+  Avatar avatar_{library_, {}};
+  std::uint64_t last_id_ = 0;
+};
+
+TEST_F(AvatarTest, StandsWhereItIsPut) {
+  Avatar avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
+  EXPECT_NEAR(avatar.pose().root_position_m.x, 2.0, 1e-6);
+  EXPECT_NEAR(avatar.pose().root_position_m.y, 1.9, 1e-6);
+  const Vec3 before = avatar.pose().root_position_m;
+  for (int i = 0; i < 100; ++i) avatar.Advance(kTickS);
+  EXPECT_EQ(avatar.pose().root_position_m, before);
+  EXPECT_TRUE(avatar.idle());
+}
+
+TEST_F(AvatarTest, WalksAndClosesItsFeet) {
+  for (int i = 0; i < 4; ++i) Request(StepRequest{.length_m = 0.4});
+  const auto events = RunUntilIdle();
+  const auto started = Of(events, AvatarEventType::kStarted);
+  ASSERT_EQ(started.size(), 5u) << "four steps and a closing one";
+  EXPECT_EQ(started[0].kind, MovementKind::kStepLeft);
+  EXPECT_EQ(started[1].kind, MovementKind::kStepRight);
+  EXPECT_EQ(started[4].request_id, 0u);
+  EXPECT_EQ(Of(events, AvatarEventType::kFootStrike).size(), 5u);
+  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), 5u);
+  EXPECT_EQ(Of(events, AvatarEventType::kIdle).size(), 1u);
+  // (0 + .4)/2 + 3 * .4 + .4/2 of hip travel
+  EXPECT_NEAR(avatar_.base().position_m.z, 1.6, 0.03);
+  EXPECT_NEAR(avatar_.base().position_m.x, 0.0, 1e-6);
+  const DVec3 feet = FootVector(library_->skeleton(), avatar_.pose(), Foot::kLeft, 0.0);
+  EXPECT_NEAR(feet.z, 0.0, 0.01);
+}
+
+TEST_F(AvatarTest, PoseIsContinuousThroughJoins) {
+  Request(StepRequest{.length_m = 0.5});
+  Request(StepRequest{.length_m = 0.2});
+  Request(StepRequest{.foot = Foot::kRight, .length_m = 0.6});  // the same foot again: a wild join
+  Request(JumpRequest{.length_m = 1.0});
+  const auto Copy = [](ConstPoseSpan from, Pose& to) {
+    to.root_position_m = from.root_position_m;
+    to.rotations.assign(from.rotations.begin(), from.rotations.end());
+  };
+  Pose last(7);
+  Copy(avatar_.pose(), last);
+  double largest_rad = 0.0;
+  float largest_m = 0.0f;
+  while (true) {
+    avatar_.Advance(1.0 / 600.0);
+    largest_rad = std::max(largest_rad, LargestJointAngle(avatar_.pose(), last));
+    largest_m =
+        std::max(largest_m, glm::length(avatar_.pose().root_position_m - last.root_position_m));
+    Copy(avatar_.pose(), last);
+    if (avatar_.idle()) break;
+  }
+  EXPECT_LT(largest_rad, 0.03);  // 18 rad/s
+  EXPECT_LT(largest_m, 0.015f);
+}
+
+TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
+  Request(StepRequest{.length_m = 0.4});
+  Request(JumpRequest{.length_m = 0.6});
+  Request(StepRequest{.length_m = 0.4});
+  Request(StandRequest{.seconds = 0.5});
+  const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
+  ASSERT_EQ(started.size(), 6u);
+  EXPECT_EQ(started[1].request_id, 0u);
+  EXPECT_EQ(started[2].kind, MovementKind::kJump);
+  EXPECT_EQ(started[4].request_id, 0u);
+  EXPECT_EQ(started[5].kind, MovementKind::kStand);
+}
+
+TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
+  // Ten equal steps last as long as their durations say, whatever the tick.
+  for (const double dt : {1.0 / 60.0, 1.0 / 37.0, 0.4}) {
+    Avatar avatar(library_, {});
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.4}}).has_value());
+    }
+    std::vector<double> ends;
+    while (!avatar.idle()) {
+      avatar.Advance(dt);
+      for (const AvatarEvent& event : avatar.events()) {
+        if (event.type == AvatarEventType::kFinished) ends.push_back(event.time_s);
+      }
+    }
+    ASSERT_EQ(ends.size(), 11u);
+    EXPECT_NEAR(ends[9] - ends[1], 8 * 0.58, 0.05) << dt;
+  }
+}
+
+TEST_F(AvatarTest, ClampsWhatTheExamplesDoNotSpanAndSaysSo) {
+  Request(StepRequest{.length_m = 5.0});
+  const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
+  EXPECT_TRUE(started[0].clamped);
+  EXPECT_TRUE(started[0].extrapolated);
+  EXPECT_DOUBLE_EQ(started[0].requested.values[1], 5.0);
+  EXPECT_LT(started[0].applied.values[1], 0.7);
+}
+
+TEST_F(AvatarTest, ReportsWhatItsLibraryCannotDo) {
+  Request(StepRequest{.length_m = 0.3, .height_m = 0.2, .turn_rad = 0.5});
+  const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
+  EXPECT_TRUE(started[0].clamped);
+}
+
+TEST_F(AvatarTest, ALongWalkStaysStraightAndLevel) {
+  for (int i = 0; i < 200; ++i) {
+    Request(StepRequest{.length_m = 0.2 + 0.4 * ((i * 7) % 11) / 10.0});
+  }
+  float lowest = 9.0f;
+  float highest = 0.0f;
+  while (!avatar_.idle()) {
+    avatar_.Advance(kTickS);
+    lowest = std::min(lowest, avatar_.pose().root_position_m.y);
+    highest = std::max(highest, avatar_.pose().root_position_m.y);
+  }
+  EXPECT_EQ(avatar_.base().heading_rad, 0.0);
+  EXPECT_NEAR(avatar_.base().position_m.x, 0.0, 1e-5);
+  EXPECT_EQ(avatar_.base().position_m.y, 0.0);
+  EXPECT_GT(lowest, 0.8f);
+  EXPECT_LT(highest, 0.92f);
+}
+
+TEST_F(AvatarTest, BadRequestsAreRefused) {
+  const auto code = [&](decltype(MovementRequest::movement) movement) {
+    const Status status = avatar_.Enqueue({1, movement});
+    return status ? "none" : std::string(ErrorCodeName(status.error().code));
+  };
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(code(StepRequest{.length_m = nan}), "out_of_range");
+  EXPECT_EQ(code(StepRequest{.length_m = 11.0}), "out_of_range");
+  EXPECT_EQ(code(StepRequest{.length_m = 0.3, .side_m = nan}), "out_of_range");
+  EXPECT_EQ(code(StepRequest{.length_m = 0.3, .height_m = -20.0}), "out_of_range");
+  EXPECT_EQ(code(StepRequest{.length_m = 0.3, .turn_rad = 4.0}), "out_of_range");
+  EXPECT_EQ(code(JumpRequest{.length_m = nan}), "out_of_range");
+  EXPECT_EQ(code(StandRequest{.seconds = -1.0}), "out_of_range");
+  EXPECT_EQ(code(StandRequest{.seconds = nan}), "out_of_range");
+  EXPECT_EQ(avatar_.queue_size(), 0);
+}
+
+TEST_F(AvatarTest, QueueIsBounded) {
+  for (int i = 0; i < Avatar::kMaxQueue; ++i) Request(StandRequest{.seconds = 0.0});
+  const Status status = avatar_.Enqueue({1, StandRequest{}});
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().code, ErrorCode::kLimitExceeded);
+  // A thousand empty stands in one tick must not outrun the event list.
+  const auto events = RunUntilIdle();
+  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), std::size_t{Avatar::kMaxQueue});
+}
+
+TEST_F(AvatarTest, CancelDropsOnlyWhatHasNotStarted) {
+  for (int i = 0; i < 5; ++i) Request(StepRequest{.length_m = 0.4});
+  avatar_.Advance(kTickS);
+  EXPECT_EQ(avatar_.CancelQueue(), 4);
+  EXPECT_EQ(Of(RunUntilIdle(), AvatarEventType::kFinished).size(), 2u);
+}
+
+TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
+  RawLibrary raw = MakeToyRawLibrary();
+  raw.groups.pop_back();
+  raw.groups.pop_back();
+  LibraryBuilder builder;
+  const auto only_left = builder.Build(raw);
+  ASSERT_TRUE(only_left.has_value());
+  Avatar avatar(*only_left, {});
+  const auto code = [&](decltype(MovementRequest::movement) movement) {
+    const Status status = avatar.Enqueue({1, movement});
+    return status ? "none" : std::string(ErrorCodeName(status.error().code));
+  };
+  EXPECT_EQ(code(JumpRequest{.length_m = 0.5}), "unsupported");
+  EXPECT_EQ(code(StepRequest{.foot = Foot::kRight, .length_m = 0.5}), "unsupported");
+  EXPECT_EQ(code(StepRequest{.length_m = 0.5}), "none");
+  for (int i = 0; i < 200; ++i) avatar.Advance(kTickS);
+  EXPECT_TRUE(avatar.idle());
+}
+
+}  // namespace
+}  // namespace stridewire
