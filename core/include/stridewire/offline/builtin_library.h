@@ -1,0 +1,31 @@
+#pragma once
+
+#include "stridewire/base/math.h"
+#include "stridewire/offline/raw_library.h"
+
+namespace stridewire {
+
+/// The heel's contact point in the frame of a generated figure's ankle (joint LeftFoot or
+/// RightFoot), metres. Ball and toe tip are in `Skeleton::legs`.
+inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
+
+/// The default library: a person of 1.75 m who walks, starts, stops and jumps, made of formulas, so
+/// that nothing has to be downloaded. The same bytes on every machine; well under a second.
+///
+///   step_left   15 examples (start_z, end_z): every pair of the states 0, 0.35, 0.55, 0.75 m but
+///               still to still; keytimes start, toe-off, heel-strike, end
+///   step_right  their mirror images
+///   jump        0.3, 0.7, 1.1, 1.5 m; keytimes start, lowest of the crouch, toe-off, landing,
+///               lowest of the absorption, end
+///
+/// A state is the pose in the middle of double support with the feet a length apart, and one
+/// velocity; every example that ends in a state ends in exactly that pose, and every one that
+/// starts in it starts so (mirrored with the leading foot), so steps join without a seam.
+///
+/// Feet come first (heel, flat, ball, toe tip, each exactly fixed), then the pelvis, then the legs
+/// by inverse kinematics, then the rest of the body (paper, Section 6, for the set of steps).
+/// Angles, timing and segments: Winter, Biomechanics and Motor Control of Human Movement; Perry and
+/// Burnfield, Gait Analysis; Grieve and Gear 1966 (cadence), as rounded in textbooks.
+[[nodiscard]] RawLibrary GenerateBuiltinLibrary();
+
+}  // namespace stridewire

@@ -1,0 +1,54 @@
+#pragma once
+
+#include "curve.h"
+#include "figure.h"
+#include "step_timing.h"
+
+namespace stridewire::builtin {
+
+/// Where a foot is: its ankle, and how foot and toes are pitched (radians, toes up positive, in the
+/// example's frame). The foot always points `toe-out` away from straight ahead.
+struct FootPlace {
+  DVec3 ankle_m = DVec3(0.0);
+  double pitch_rad = 0.0;
+  double toe_pitch_rad = 0.0;
+};
+
+/// Rotation of a foot (or of its toes) with that pitch.
+[[nodiscard]] DQuat FootRotation(Foot foot, double pitch_rad);
+
+/// A foot on the ground, lying flat with its ball at `flat_ball_m`, then turned about what touches:
+/// the heel for pitch > 0, the ball for pitch < 0; `toe_rock_rad` > 0 lifts the ball about the tip
+/// of the toes. What touches stays where it is, exactly.
+[[nodiscard]] FootPlace FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad,
+                                     double toe_rock_rad);
+
+/// Where the ball lies when the foot is flat below a hip that stands at x = 0, z = 0.
+[[nodiscard]] DVec3 StandingBall(Foot foot);
+
+/// Both feet of a step. The fixed foot's flat ball is at z = 0.
+///
+///   fixed   heel pivot | flat ........ | ball pivot .............
+///   moving  ball, tip  | swing ..................... | heel pivot
+///           start    toe-off                    heel-strike    end
+class FootPaths {
+ public:
+  FootPaths(Foot moving, const StepTiming& timing);
+
+  [[nodiscard]] FootPlace Fixed(double time_s) const;
+  [[nodiscard]] FootPlace Moving(double time_s) const;
+
+ private:
+  [[nodiscard]] FootPlace MovingBeforeToeOff(double time_s) const;
+  [[nodiscard]] FootPlace MovingInSwing(double time_s) const;
+  void RaiseSwingUntilClear();
+
+  Foot moving_;
+  StepTiming timing_;
+  DVec3 fixed_ball_m_, start_ball_m_, end_ball_m_;
+  Curve fixed_pitch_, moving_pitch_, toe_rock_, toe_bend_;
+  DVec3 toe_off_m_, strike_m_, toe_off_velocity_, strike_velocity_;
+  double lift_m_ = 0.0;
+};
+
+}  // namespace stridewire::builtin

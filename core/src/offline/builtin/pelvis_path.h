@@ -1,0 +1,34 @@
+#pragma once
+
+#include <vector>
+
+#include "curve.h"
+#include "figure.h"
+#include "foot_path.h"
+#include "step_timing.h"
+
+namespace stridewire::builtin {
+
+/// The pelvis of a step: position and rotation. Its height follows the states and rises between
+/// them, and is then lowered smoothly to where both legs reach with the knees a little bent.
+class PelvisPath {
+ public:
+  PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& feet);
+
+  [[nodiscard]] DVec3 Position(double time_s) const;
+  [[nodiscard]] DQuat Rotation(double time_s) const;
+  [[nodiscard]] double Yaw(double time_s) const { return yaw_.At(time_s); }
+  [[nodiscard]] double Roll(double time_s) const { return roll_.At(time_s); }
+  [[nodiscard]] double Tilt(double time_s) const { return tilt_.At(time_s); }
+
+ private:
+  [[nodiscard]] double HeightBeforeReach(double time_s) const;
+  void StayWithinReach(const FootPaths& feet);
+
+  Foot moving_;
+  StepTiming timing_;
+  Curve forward_, side_, yaw_, roll_, tilt_, height_;
+  std::vector<double> lowered_m_;  // at equal times over the step
+};
+
+}  // namespace stridewire::builtin

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "gait_state.h"
+
+namespace stridewire::builtin {
+
+/// A step from one state to the next and its keytimes: start, toe-off, heel-strike, end. Double
+/// support around a state lasts as long on both sides of it whatever the step, so that velocities
+/// agree where steps join.
+struct StepTiming {
+  GaitState start;
+  GaitState end;
+  double toe_off_s = 0.0;
+  double heel_strike_s = 0.0;
+  double end_s = 0.0;
+
+  [[nodiscard]] double swing_s() const { return heel_strike_s - toe_off_s; }
+  [[nodiscard]] std::vector<double> keytimes_s() const {
+    return {0.0, toe_off_s, heel_strike_s, end_s};
+  }
+};
+
+/// From feet `start_length_m` apart to `end_length_m`; not both 0.
+[[nodiscard]] StepTiming MakeStepTiming(double start_length_m, double end_length_m);
+
+}  // namespace stridewire::builtin
