@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string_view>
+#include <vector>
+
+#include "stridewire/base/error.h"
+#include "stridewire/runtime/movement.h"
+#include "stridewire/runtime/movement_request.h"
+
+namespace stridewire {
+
+/// Limits on a choreography; beyond one of them reading ends with kLimitExceeded.
+inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
+inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
+inline constexpr int kMaxChoreographyDepth = 16;  ///< Arrays and objects nested in each other.
+inline constexpr double kMaxChoreographyPositionM = 1e5;   ///< Each coordinate of the start.
+inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, either sign.
+
+/// Movements asked for one after the other, and where the avatar stands before the first.
+///
+///   {"start":{"position_m":[0,0,0],"heading_rad":0},
+///    "movements":[{"step":{"length_m":0.6}},
+///                 {"step":{"foot":"left","length_m":0.5,"side_m":0.1,"height_m":0.15,"turn_rad":0.3}},
+///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
+///                 {"stand":{"seconds":1.5}}]}
+///
+/// `start` and what is in it may be left out (the origin, heading 0). A step and a jump need
+/// `length_m`, a stand `seconds`; the rest may be left out. A key that is not listed here is an
+/// error, so is one that stands twice. `terrain`, `walk_to` and a step's `at_m` are known but not
+/// supported yet.
+struct Choreography {
+  BaseFrame start;
+  std::vector<MovementRequest> movements;  ///< 1 to kMaxChoreographyMovements, ids 1, 2, 3, …
+};
+
+/// Reads a choreography. Numbers are checked against the limits of requests (movement_request.h);
+/// whether a library has such movements is for ValidateRequest to say.
+///
+/// Errors: kNotFound, kIo with `where` = file; kMalformed with "file:line:column" where the text is
+/// not JSON; kMalformed, kOutOfRange, kUnsupported with the field, e.g.
+/// "c.json: movements[3].step.length_m"; kLimitExceeded with file or field.
+[[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
+
+/// As above, from text in memory; `name` takes the path's place.
+[[nodiscard]] Expected<Choreography> ParseChoreography(std::string_view text,
+                                                       std::string_view name);
+
+}  // namespace stridewire

@@ -1,0 +1,316 @@
+#include "stridewire/offline/choreography.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <fstream>
+#include <random>
+#include <string>
+
+namespace stridewire {
+namespace {
+
+constexpr const char* kEverything = R"({
+  "start": {"position_m": [1, 0.5, -2], "heading_rad": 0.25},
+  "movements": [{"step": {"length_m": 0.6}},
+                {"step": {"foot": "left", "length_m": 0.5, "side_m": 0.1, "height_m": 0.15,
+                          "turn_rad": 0.3}},
+                {"step": {"foot": "right", "length_m": -0.25}},
+                {"jump": {"length_m": 0.9, "height_m": 0.125, "turn_rad": -1}},
+                {"stand": {"seconds": 1.5}}]})";
+
+TEST(ParseChoreography, ReadsEveryMovement) {
+  const Expected<Choreography> read = ParseChoreography(kEverything, "c.json");
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  EXPECT_EQ(read->start.position_m, DVec3(1.0, 0.5, -2.0));
+  EXPECT_EQ(read->start.heading_rad, 0.25);
+  ASSERT_EQ(read->movements.size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(read->movements[i].id, i + 1);
+
+  const auto& plain = std::get<StepRequest>(read->movements[0].movement);
+  EXPECT_FALSE(plain.foot.has_value());
+  EXPECT_EQ(plain.length_m, 0.6);
+  EXPECT_FALSE(plain.side_m.has_value());
+  EXPECT_EQ(plain.height_m, 0.0);
+  EXPECT_EQ(plain.turn_rad, 0.0);
+
+  const auto& full = std::get<StepRequest>(read->movements[1].movement);
+  EXPECT_EQ(full.foot, Foot::kLeft);
+  EXPECT_EQ(full.length_m, 0.5);
+  EXPECT_EQ(full.side_m, 0.1);
+  EXPECT_EQ(full.height_m, 0.15);
+  EXPECT_EQ(full.turn_rad, 0.3);
+
+  EXPECT_EQ(std::get<StepRequest>(read->movements[2].movement).foot, Foot::kRight);
+  EXPECT_EQ(std::get<StepRequest>(read->movements[2].movement).length_m, -0.25);
+
+  const auto& jump = std::get<JumpRequest>(read->movements[3].movement);
+  EXPECT_EQ(jump.length_m, 0.9);
+  EXPECT_EQ(jump.height_m, 0.125);
+  EXPECT_EQ(jump.turn_rad, -1.0);
+  EXPECT_EQ(std::get<StandRequest>(read->movements[4].movement).seconds, 1.5);
+}
+
+TEST(ParseChoreography, StartsAtTheOriginUnlessToldOtherwise) {
+  for (const char* text : {R"({"movements":[{"stand":{"seconds":0}}]})",
+                           R"({"start":{},"movements":[{"stand":{"seconds":0}}]})"}) {
+    const Expected<Choreography> read = ParseChoreography(text, "c.json");
+    ASSERT_TRUE(read.has_value()) << Describe(read.error());
+    EXPECT_EQ(read->start.position_m, DVec3(0.0));
+    EXPECT_EQ(read->start.heading_rad, 0.0);
+  }
+}
+
+TEST(ParseChoreography, TakesNumbersAtTheirLimits) {
+  const Expected<Choreography> read = ParseChoreography(
+      R"({"start":{"position_m":[1e5,-1e5,0],"heading_rad":-1e4},
+          "movements":[{"step":{"length_m":10,"side_m":-10,"height_m":-10,"turn_rad":3.2}},
+                       {"stand":{"seconds":3600}}]})",
+      "c.json");
+  EXPECT_TRUE(read.has_value()) << Describe(read.error());
+}
+
+struct BadText {
+  const char* text;
+  ErrorCode code;
+  const char* described;
+};
+
+/// One case per error: the text, its code and the whole sentence a person reads.
+const BadText kBadTexts[] = {
+    {"", ErrorCode::kMalformed, "c.json:1:1: the text is not JSON near here"},
+    {"{\"movements\":[\n  {\"step\" 3}]}", ErrorCode::kMalformed,
+     "c.json:2:12: the text is not JSON near here"},
+    {"{\"movements\":[]} 3", ErrorCode::kMalformed, "c.json:1:18: the text is not JSON near here"},
+    {"{\"movements\":[\xff]}", ErrorCode::kMalformed,
+     "c.json:1:15: the text is not JSON near here"},
+    {R"({"movements":[{"jump":{"length_m":1e999}}]})", ErrorCode::kOutOfRange,
+     "c.json:1:40: the number before this is too large"},
+    {R"({"start":{},"start":{}})", ErrorCode::kMalformed,
+     "c.json:1:19: the key before this stands twice in its object"},
+    {"[[[[[[[[[[[[[[[[[0]]]]]]]]]]]]]]]]]", ErrorCode::kLimitExceeded,
+     "c.json:1:17: arrays and objects are nested too deep"},
+    {"[]", ErrorCode::kMalformed, "c.json: is not an object"},
+    {R"({"movement":[]})", ErrorCode::kMalformed, "c.json: movement: is not a key known here"},
+    {R"({"a\u0007\u00e4":[]})", ErrorCode::kMalformed, "c.json: a???: is not a key known here"},
+    {"{}", ErrorCode::kMalformed, "c.json: movements: is missing"},
+    {R"({"movements":{}})", ErrorCode::kMalformed, "c.json: movements: is not an array"},
+    {R"({"movements":[]})", ErrorCode::kOutOfRange, "c.json: movements: holds no movement"},
+    {R"({"terrain":{},"movements":[]})", ErrorCode::kUnsupported,
+     "c.json: terrain: is not supported yet"},
+    {R"({"start":[],"movements":[]})", ErrorCode::kMalformed, "c.json: start: is not an object"},
+    {R"({"start":{"x":0},"movements":[]})", ErrorCode::kMalformed,
+     "c.json: start.x: is not a key known here"},
+    {R"({"start":{"position_m":[0,0]},"movements":[]})", ErrorCode::kMalformed,
+     "c.json: start.position_m: is not an array of three numbers"},
+    {R"({"start":{"position_m":[0,"0",0]},"movements":[]})", ErrorCode::kMalformed,
+     "c.json: start.position_m[1]: is not a number within 100000 m"},
+    {R"({"start":{"position_m":[0,0,100001]},"movements":[]})", ErrorCode::kOutOfRange,
+     "c.json: start.position_m[2]: is not a number within 100000 m"},
+    {R"({"start":{"heading_rad":1e5},"movements":[]})", ErrorCode::kOutOfRange,
+     "c.json: start.heading_rad: is not a number within 10000 rad"},
+    {R"({"movements":[1]})", ErrorCode::kMalformed, "c.json: movements[0]: is not an object"},
+    {R"({"movements":[{}]})", ErrorCode::kMalformed,
+     "c.json: movements[0]: needs exactly one of step, walk_to, jump and stand"},
+    {R"({"movements":[{"stand":{"seconds":1},"jump":{"length_m":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0]: needs exactly one of step, walk_to, jump and stand"},
+    {R"({"movements":[{"stand":{"seconds":1}},{"hop":{}}]})", ErrorCode::kMalformed,
+     "c.json: movements[1].hop: is not a key known here"},
+    {R"({"movements":[{"walk_to":{"position_m":[0,0,1]}}]})", ErrorCode::kUnsupported,
+     "c.json: movements[0].walk_to: is not supported yet"},
+    {R"({"movements":[{"step":0.6}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step: is not an object"},
+    {R"({"movements":[{"step":{}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.length_m: is missing"},
+    {R"({"movements":[{"step":{"lenght_m":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.lenght_m: is not a key known here"},
+    {R"({"movements":[{"step":{"foot":"right","at_m":[0,0,1],"heading_rad":0}}]})",
+     ErrorCode::kUnsupported, "c.json: movements[0].step.at_m: is not supported yet"},
+    {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.heading_rad: has a meaning only beside at_m"},
+    {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
+    {R"({"movements":[{"step":{"foot":1,"length_m":0.5}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
+    {R"({"movements":[{"step":{"length_m":"0.5"}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.length_m: is not a number within 10 m"},
+    {R"({"movements":[{"step":{"length_m":10.001}}]})", ErrorCode::kOutOfRange,
+     "c.json: movements[0].step.length_m: is not a number within 10 m"},
+    {R"({"movements":[{"step":{"length_m":0.5,"side_m":-11}}]})", ErrorCode::kOutOfRange,
+     "c.json: movements[0].step.side_m: is not a number within 10 m"},
+    {R"({"movements":[{"step":{"length_m":0.5,"height_m":null}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.height_m: is not a number within 10 m"},
+    {R"({"movements":[{"step":{"length_m":0.5,"turn_rad":3.3}}]})", ErrorCode::kOutOfRange,
+     "c.json: movements[0].step.turn_rad: is not a number within 3.2 rad"},
+    {R"({"movements":[{"jump":null}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].jump: is not an object"},
+    {R"({"movements":[{"jump":{"height_m":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].jump.length_m: is missing"},
+    {R"({"movements":[{"jump":{"length_m":1,"side_m":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].jump.side_m: is not a key known here"},
+    {R"({"movements":[{"jump":{"length_m":1,"height_m":-11}}]})", ErrorCode::kOutOfRange,
+     "c.json: movements[0].jump.height_m: is not a number within 10 m"},
+    {R"({"movements":[{"jump":{"length_m":1,"turn_rad":[]}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].jump.turn_rad: is not a number within 3.2 rad"},
+    {R"({"movements":[{"stand":[]}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].stand: is not an object"},
+    {R"({"movements":[{"stand":{}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].stand.seconds: is missing"},
+    {R"({"movements":[{"stand":{"second":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].stand.second: is not a key known here"},
+    {R"({"movements":[{"stand":{"seconds":-0.5}}]})", ErrorCode::kOutOfRange,
+     "c.json: movements[0].stand.seconds: is not a number from 0 to 3600 s"},
+};
+
+TEST(ParseChoreography, TellsFileFieldAndReason) {
+  for (const BadText& bad : kBadTexts) {
+    SCOPED_TRACE(bad.text);
+    const Expected<Choreography> read = ParseChoreography(bad.text, "c.json");
+    ASSERT_FALSE(read.has_value());
+    EXPECT_EQ(Describe(read.error()), bad.described);
+    EXPECT_EQ(read.error().code, bad.code);
+  }
+}
+
+TEST(ParseChoreography, ShortensALongKey) {
+  const std::string text = "{\"" + std::string(1'000'000, 'k') + "\":0}";
+  const Expected<Choreography> read = ParseChoreography(text, "c.json");
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().where, "c.json: " + std::string(64, 'k') + "...");
+}
+
+TEST(ParseChoreography, RefusesMoreThanItsLimits) {
+  std::string many = R"({"movements":[{"stand":{"seconds":1}})";
+  for (std::size_t i = 1; i < kMaxChoreographyMovements; ++i) many += R"(,{"stand":{"seconds":1}})";
+  const Expected<Choreography> most = ParseChoreography(many + "]}", "c.json");
+  ASSERT_TRUE(most.has_value()) << Describe(most.error());
+  EXPECT_EQ(most->movements.size(), kMaxChoreographyMovements);
+
+  const Expected<Choreography> too_many =
+      ParseChoreography(many + R"(,{"stand":{"seconds":1}}]})", "c.json");
+  ASSERT_FALSE(too_many.has_value());
+  EXPECT_EQ(too_many.error().code, ErrorCode::kLimitExceeded);
+  EXPECT_EQ(Describe(too_many.error()), "c.json: movements: holds more than 65536 movements");
+
+  const Expected<Choreography> too_long =
+      ParseChoreography(std::string(kMaxChoreographyBytes + 1, ' '), "c.json");
+  ASSERT_FALSE(too_long.has_value());
+  EXPECT_EQ(too_long.error().code, ErrorCode::kLimitExceeded);
+  EXPECT_EQ(Describe(too_long.error()), "c.json: the file is larger than 4 MiB");
+}
+
+/// What was read is within every stated limit.
+void ExpectWithinLimits(const Choreography& choreography) {
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_LE(std::abs(choreography.start.position_m[axis]), kMaxChoreographyPositionM);
+  }
+  EXPECT_LE(std::abs(choreography.start.heading_rad), kMaxChoreographyHeadingRad);
+  EXPECT_GE(choreography.movements.size(), 1u);
+  std::uint64_t id = 0;
+  for (const MovementRequest& request : choreography.movements) {
+    EXPECT_EQ(request.id, ++id);
+    if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
+      EXPECT_LE(std::abs(step->length_m), kMaxRequestLengthM);
+      EXPECT_LE(std::abs(step->side_m.value_or(0.0)), kMaxRequestLengthM);
+      EXPECT_LE(std::abs(step->height_m), kMaxRequestLengthM);
+      EXPECT_LE(std::abs(step->turn_rad), kMaxRequestTurnRad);
+    } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+      EXPECT_LE(std::abs(jump->length_m), kMaxRequestLengthM);
+      EXPECT_LE(std::abs(jump->height_m), kMaxRequestLengthM);
+      EXPECT_LE(std::abs(jump->turn_rad), kMaxRequestTurnRad);
+    } else {
+      const double seconds = std::get<StandRequest>(request.movement).seconds;
+      EXPECT_GE(seconds, 0.0);
+      EXPECT_LE(seconds, kMaxStandS);
+    }
+  }
+}
+
+TEST(ParseChoreography, SurvivesMutatedText) {
+  const std::uint64_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  const auto below = [&random](std::size_t n) { return random() % n; };
+  const char* const pieces[] = {"{",     "}",    "[",        "]",        ",",          ":",
+                                "\"",    "null", "-1e308",   "1e9",      "10.0000001", "\\u0000",
+                                "false", "\xc3", "\"step\"", "\"at_m\"", "[[[[[[[[",   "0"};
+  int read_count = 0;
+  int refused_count = 0;
+  for (int round = 0; round < 20'000; ++round) {
+    std::string text = kEverything;
+    for (std::size_t change = 0, changes = 1 + below(3); change < changes; ++change) {
+      const std::size_t at = below(text.size());
+      switch (below(4)) {
+        case 0: text[at] = static_cast<char>(below(256)); break;
+        case 1: text.erase(at, 1 + below(12)); break;
+        case 2: text.insert(at, pieces[below(std::size(pieces))]); break;
+        default: text.insert(at, text.substr(below(text.size()), below(40))); break;
+      }
+    }
+    const Expected<Choreography> read = ParseChoreography(text, "c.json");
+    if (read) {
+      ++read_count;
+      ExpectWithinLimits(*read);
+    } else {
+      ++refused_count;
+      EXPECT_TRUE(read.error().where.starts_with("c.json")) << text;
+      EXPECT_NE(std::string(read.error().text), "") << text;
+      EXPECT_EQ(Describe(read.error()).find_first_of("\r\n"), std::string::npos) << text;
+    }
+    if (::testing::Test::HasFailure()) break;
+  }
+  EXPECT_GT(read_count, 0);  // White space and digits are mutated, too.
+  EXPECT_GT(refused_count, 0);
+}
+
+class ReadChoreographyFile : public ::testing::Test {
+ protected:
+  ReadChoreographyFile()
+      : path_(std::filesystem::temp_directory_path() /
+              ("stridewire_choreography_" + std::to_string(::getpid()) + ".json")) {}
+  ~ReadChoreographyFile() override { std::filesystem::remove(path_); }
+
+  std::filesystem::path path_;
+};
+
+TEST_F(ReadChoreographyFile, GivesWhatItsTextGives) {
+  std::ofstream(path_, std::ios::binary) << kEverything;
+  const Expected<Choreography> read = ReadChoreography(path_);
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  EXPECT_EQ(read->movements.size(), 5u);
+  EXPECT_EQ(read->start.heading_rad, 0.25);
+}
+
+TEST_F(ReadChoreographyFile, NamesAFileThatIsNotThere) {
+  const Expected<Choreography> read = ReadChoreography(path_);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(Describe(read.error()), path_.string() + ": there is no such file");
+}
+
+TEST_F(ReadChoreographyFile, NamesADirectory) {
+  const Expected<Choreography> read = ReadChoreography(path_.parent_path());
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().code, ErrorCode::kIo);
+  EXPECT_EQ(Describe(read.error()), path_.parent_path().string() + ": this is a directory");
+}
+
+TEST_F(ReadChoreographyFile, RefusesALongFileWithoutReadingAllOfIt) {
+  std::ofstream(path_, std::ios::binary) << '\n';
+  std::filesystem::resize_file(path_, std::uintmax_t{1} << 40);  // Sparse: takes no room.
+  const Expected<Choreography> read = ReadChoreography(path_);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(read.error().code, ErrorCode::kLimitExceeded);
+}
+
+TEST_F(ReadChoreographyFile, NamesTheFileInItsErrors) {
+  std::ofstream(path_, std::ios::binary) << R"({"movements":[{"step":{"length_m":"far"}}]})";
+  const Expected<Choreography> read = ReadChoreography(path_);
+  ASSERT_FALSE(read.has_value());
+  EXPECT_EQ(Describe(read.error()),
+            path_.string() + ": movements[0].step.length_m: is not a number within 10 m");
+}
+
+}  // namespace
+}  // namespace stridewire
