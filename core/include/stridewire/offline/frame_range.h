@@ -1,0 +1,20 @@
+#pragma once
+
+namespace stridewire {
+
+/// Frames [begin, end) of a capture.
+struct FrameRange {
+  int begin = 0;
+  int end = 0;
+
+  [[nodiscard]] constexpr int size() const { return end - begin; }
+  [[nodiscard]] constexpr bool Contains(const FrameRange& other) const {
+    return begin <= other.begin && end >= other.end;
+  }
+  [[nodiscard]] constexpr bool Overlaps(const FrameRange& other) const {
+    return begin < other.end && other.begin < end;
+  }
+  friend constexpr bool operator==(const FrameRange&, const FrameRange&) = default;
+};
+
+}  // namespace stridewire
