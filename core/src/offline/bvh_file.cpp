@@ -154,12 +154,9 @@ class Parser {
 
   Status NextNumber(double& value, const char* sentence) {
     switch (ReadNumber(Next(), value)) {
-      case NumberFault::kNone:
-        return {};
-      case NumberFault::kNoNumber:
-        return Malformed(sentence);
-      case NumberFault::kTooLarge:
-        break;
+      case NumberFault::kNone: return {};
+      case NumberFault::kNoNumber: return Malformed(sentence);
+      case NumberFault::kTooLarge: break;
     }
     return FailAt(token_line_, ErrorCode::kOutOfRange, "a number is not finite or too large");
   }
@@ -394,8 +391,7 @@ class Parser {
       }
       double value = 0.0;
       switch (ReadNumber(text_.substr(begin, at_ - begin), value)) {
-        case NumberFault::kNone:
-          break;
+        case NumberFault::kNone: break;
         case NumberFault::kNoNumber:
           return FailAt(line_, ErrorCode::kMalformed, "expected a number",
                         static_cast<std::int64_t>(i));

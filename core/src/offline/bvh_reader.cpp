@@ -26,9 +26,12 @@
 namespace stridewire {
 namespace {
 
-constexpr double kSnapCos = 0.906;        // An axis within 25 degrees is meant to be that axis.
-constexpr int kSampledFrames = 64;        // Frames looked at to find directions.
-constexpr double kStandingHipsM = 0.95;   // Hips of a grown-up standing.
+constexpr double kSnapCos = 0.906;       // An axis within 25 degrees is meant to be that axis.
+constexpr int kSampledFrames = 64;       // Frames looked at to find directions.
+constexpr double kFastTurnRadS = 10.5;   // 600 degrees a second
+constexpr double kStandingHipsM = 0.95;  // Hips of a grown-up standing.
+constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
+constexpr double kLeastTravelM = 0.15;
 constexpr double kFootEndIsBall = 0.2;    // End Site nearer to the ankle, in leg lengths: the ball.
 constexpr double kBallShare = 2.0 / 3.0;  // Ball on the level way from ankle to toe tip.
 
@@ -144,7 +147,7 @@ class Reader {
     double fps = 1.0 / frame_time;
     const double whole = std::nearbyint(fps);
     if (whole >= 1.0 && std::fabs(1.0 / whole - frame_time) < file_.frame_time_digit_s &&
-        std::fabs(fps - whole) < 1e-3 * whole) {
+        std::fabs(fps - whole) < 2e-3 * whole) {
       fps = whole;
     }
     capture_.clip.fps = std::min(fps, 10000.0);
@@ -230,6 +233,17 @@ class Reader {
     return {};
   }
 
+  // Joints that turn from frame `f` to the next faster than people can.
+  int FastJoints(int f) const {
+    const Clip& clip = capture_.clip;
+    int fast = 0;
+    for (std::size_t j = 0; j < joints().size(); ++j) {
+      fast += AngleBetween(clip.frame(f).rotations[j], clip.frame(f + 1).rotations[j]) * clip.fps >
+              kFastTurnRadS;
+    }
+    return fast;
+  }
+
   void FindFirstFrame() {
     const Clip& clip = capture_.clip;
     if (clip.frame_count() < 3) return;
@@ -239,10 +253,17 @@ class Reader {
       const double second = AngleBetween(clip.frame(1).rotations[j], clip.frame(2).rotations[j]);
       jumping += first > std::numbers::pi / 18.0 && first > 8.0 * second;
     }
-    if (jumping < 4) return;
-    capture_.first_frame = 1;
-    Note(Text("frame 0 is left out: %d joints jump from it to frame 1, so it is an artificial pose",
-              jumping));
+    // Some programs smooth the way from the artificial pose into the motion; then nothing jumps,
+    // but the root begins at exactly no rotation and many joints rush off.
+    const bool root_at_rest = AngleBetween(clip.frame(0).rotations[0], kIdentityQuat) < 1e-6 &&
+                              AngleBetween(clip.frame(1).rotations[0], kIdentityQuat) > 1e-3;
+    if (jumping < 4 && !(root_at_rest && FastJoints(0) >= 4)) return;
+    int first = 1;
+    const int last = std::min(static_cast<int>(0.1 * clip.fps), clip.frame_count() - 2);
+    while (first < last && FastJoints(first) >= 2) ++first;
+    capture_.first_frame = first;
+    Note(Text("%d frame%s at the start left out: an artificial pose that %d joints rush away from",
+              first, first == 1 ? "" : "s", std::max(jumping, FastJoints(0))));
   }
 
   Status FindLegs() {
@@ -507,6 +528,7 @@ class Reader {
     }
     MakeSignContinuous(clip);
     for (int side = 0; side < 2; ++side) PlaceFoot(found_.legs[side], capture_.skeleton.legs[side]);
+    NoteSlowMotion();
     if (positioned_joints_ > 0) {
       Note(Text(
           "%d joints besides the root have positions; each keeps its mean as offset, at most "
@@ -522,6 +544,50 @@ class Reader {
       return status;
     }
     return {};
+  }
+
+  DVec3 AnklePosition(int frame, int ankle) const {
+    const ConstPoseSpan pose = capture_.clip.frame(frame);
+    DVec3 position(0.0);
+    for (int j = ankle; j >= 0; j = joint(j).parent) {
+      position = DQuat(pose.rotations[Index(j)]) * position;
+      position += DVec3(j == 0 ? pose.root_position_m : joint(j).offset_m);
+    }
+    return position;
+  }
+
+  // Some conversions say 1/30 s of motion taken at 120 Hz. Feet that move at all are flung: over a
+  // window of 50 ms the 99th percentile of an ankle's acceleration is 17 m/s^2 in the slowest walk
+  // of our captures, 68 in the briskest. Four times too slow makes that 1 to 4.
+  void NoteSlowMotion() {
+    const Clip& clip = capture_.clip;
+    const int half = std::max(1, static_cast<int>(std::lround(0.025 * clip.fps)));
+    const int count = clip.frame_count() - capture_.first_frame;
+    if (options_.fps || count < 8 * half) return;
+    std::vector<double> accelerations;
+    double travel_m = 0.0;
+    for (const FoundLeg& leg : found_.legs) {
+      std::vector<DVec3> path(Index(count));
+      for (int f = 0; f < count; ++f) {
+        path[Index(f)] = AnklePosition(capture_.first_frame + f, leg.ankle);
+        travel_m = std::max(travel_m, glm::length(path[Index(f)] - path[0]));
+      }
+      const double scale = clip.fps * clip.fps / (half * half);
+      for (int f = half; f + half < count; ++f) {
+        const DVec3 d = path[Index(f + half)] - 2.0 * path[Index(f)] + path[Index(f - half)];
+        accelerations.push_back(glm::length(d) * scale);
+      }
+    }
+    if (travel_m < kLeastTravelM) return;  // Standing still is no sign.
+    const auto p99 =
+        accelerations.begin() +
+        static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(accelerations.size() - 1));
+    std::nth_element(accelerations.begin(), p99, accelerations.end());
+    if (*p99 >= kSlowestFeetMS2) return;
+    Note(Text(
+        "the feet accelerate by %.1f m/s^2 at most, people's by 17 and more: Frame Time %.6g s "
+        "may be too long (120 frames a second are usual)",
+        *p99, file_.frame_time_s));
   }
 
   // Already in metres and our axes.

@@ -51,8 +51,11 @@ struct BvhReadOptions {
 /// - Up is the way from ankles to hips, over the motion; the rest pose is turned to face +Z.
 /// - The unit is the known one (m, ft, dm, 1/0.45 inch, inch, cm, mm) that makes legs 0.68 to
 ///   1.0 m long; if none does, the standing hips are put at 0.95 m.
-/// - `first_frame` is 1 if frame 0 is an artificial rest pose: four joints or more jump from it to
-///   frame 1 by over 10 degrees and 8 times what they do next.
+/// - `first_frame` is past an artificial rest pose at the start: four joints or more jump from
+///   frame 0 to 1 by over 10 degrees and 8 times what they do next, or rush (600 degrees a second)
+///   from a frame whose root is not turned at all. It is left out as long as two joints rush, at
+///   most 0.1 s.
+/// - A `Frame Time` that makes the feet too slow for people gets a note; `fps` overrides it.
 ///
 /// Errors: kNotFound, kIo; kMalformed, kOutOfRange, kLimitExceeded, kUnsupported with `where` =
 /// "file:line", or the file alone when no line is to blame; kInvalidArgument or kNotFound with the

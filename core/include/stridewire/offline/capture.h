@@ -15,7 +15,7 @@ struct Capture {
   Skeleton skeleton;  ///< With its legs found.
   Clip clip;
   double unit_m = 1.0;             ///< Length of one file unit, found or given.
-  int first_frame = 0;             ///< 1 when frame 0 is an artificial rest pose to be left out.
+  int first_frame = 0;             ///< Frames before it are an artificial pose, to be left out.
   std::vector<std::string> notes;  ///< What was assumed or mended, one sentence each.
 };
 
