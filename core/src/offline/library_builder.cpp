@@ -12,11 +12,12 @@
 #include "library_file.h"
 #include "motion_library_generated.h"
 #include "stridewire/runtime/cardinal_basis.h"
+#include "stridewire/runtime/measure.h"
 
 namespace stridewire {
 namespace {
 
-constexpr double kMetresPerRadian = 0.5;
+
 
 fb::Vec3 ToFb(const Vec3& v) { return {v.x, v.y, v.z}; }
 

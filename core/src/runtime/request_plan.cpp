@@ -6,11 +6,11 @@
 
 #include "stridewire/runtime/convex_hull.h"
 #include "stridewire/runtime/foot_vector.h"
+#include "stridewire/runtime/measure.h"
 
 namespace stridewire {
 namespace {
 
-constexpr double kMetresPerRadian = 0.5;
 constexpr double kStartWeight = 4.0;     // the start is a fact, the end a wish
 constexpr double kFreeWeight = 0.02;     // a parameter nobody asked for follows the others
 constexpr double kPerParameterM = 1e-3;  // of groups that span a request alike, the plainer

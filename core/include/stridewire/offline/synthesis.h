@@ -1,0 +1,56 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "stridewire/base/error.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/clip.h"
+
+namespace stridewire {
+
+/// A foot that stands during a movement, as its keytimes say.
+struct PlantRecord {
+  Foot foot = Foot::kLeft;
+  double from_s = 0.0;
+  double to_s = 0.0;
+  DVec3 anchor_m = DVec3(0.0);  ///< Where its ball is at `from_s`
+  double drift_m = 0.0;         ///< How far the ball gets from there, horizontally
+};
+
+/// What became of one movement. Times count from the start of the choreography.
+struct MovementRecord {
+  MovementKind kind = MovementKind::kStand;
+  std::uint64_t request_id = 0;  ///< 0: inserted (closing step)
+  int group = -1;
+  double start_s = 0.0;
+  double end_s = 0.0;
+  std::vector<double> keytimes_s;
+  ParameterValues requested;
+  ParameterValues applied;   ///< After clamping to what the examples span
+  ParameterValues measured;  ///< a(p) of the synthesized movement
+  bool extrapolated = false;
+  bool clamped = false;
+  std::vector<float> weights;
+  std::vector<PlantRecord> plants;
+  double landing_error_m = 0.0;    ///< Steps: measured against requested end of the moving foot
+  double landing_error_rad = 0.0;  ///< Steps: turn against the requested one
+  BaseFrame base;                  ///< After the movement
+};
+
+struct Synthesis {
+  Clip clip;  ///< World poses; frame 0 is the stand before the first tick
+  std::vector<MovementRecord> movements;
+};
+
+inline constexpr int kMaxSynthesisFrames = 1 << 20;
+
+/// Runs an avatar through requests, without a server: what `fps` ticks a second would show, until it
+/// stands idle. kUnsupported, kOutOfRange: a request is refused (index: its place); kLimitExceeded:
+/// more than kMaxSynthesisFrames.
+[[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
+                                             const BaseFrame& start,
+                                             std::span<const MovementRequest> requests, double fps);
+
+}  // namespace stridewire

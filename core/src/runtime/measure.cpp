@@ -1,0 +1,68 @@
+#include "stridewire/runtime/measure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/foot_vector.h"
+
+namespace stridewire {
+namespace {
+
+struct Feet {
+  DVec3 left;
+  DVec3 right;
+  [[nodiscard]] DVec3 Centre() const { return 0.5 * (left + right); }
+};
+
+Feet FeetOf(const Skeleton& skeleton, ConstPoseSpan pose) {
+  return {DVec3(BallPosition(skeleton, pose, Foot::kLeft)),
+          DVec3(BallPosition(skeleton, pose, Foot::kRight))};
+}
+
+}  // namespace
+
+ParameterValues MeasureMovement(const MotionLibrary& library, const Movement& movement,
+                                GridCache& cache, PoseSpan pose) {
+  const MotionGroup& group = library.group(movement.group);
+  EvaluateBlend(group, library.layout(), movement, 0.0, cache, pose);
+  const Feet before = FeetOf(library.skeleton(), pose);
+  EvaluateBlend(group, library.layout(), movement, movement.duration_s(), cache, pose);
+  const Feet after = FeetOf(library.skeleton(), pose);
+
+  const double sign = group.kind == MovementKind::kStepRight ? -1.0 : 1.0;
+  const double start_heading = movement.base.heading_rad;
+  const double end_heading = start_heading + movement.heading_change_rad;
+  const DVec3 start = sign * RotateYaw(-start_heading, before.left - before.right);
+  const DVec3 end = sign * RotateYaw(-end_heading, after.left - after.right);
+  const DVec3 travel = RotateYaw(-start_heading, after.Centre() - before.Centre());
+
+  ParameterValues measured;
+  measured.count = group.parameter_count();
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    double& value = measured.values[l];
+    switch (group.parameters[l].name) {
+      case ParameterName::kStartX: value = start.x; break;
+      case ParameterName::kStartY: value = start.y; break;
+      case ParameterName::kStartZ: value = start.z; break;
+      case ParameterName::kEndX: value = end.x; break;
+      case ParameterName::kEndY: value = end.y; break;
+      case ParameterName::kEndZ: value = end.z; break;
+      case ParameterName::kTurn: value = movement.heading_change_rad; break;
+      case ParameterName::kLength: value = travel.z; break;
+      case ParameterName::kHeight: value = travel.y; break;
+    }
+  }
+  return measured;
+}
+
+double LargestDifference(const MotionGroup& group, const ParameterValues& a,
+                         const ParameterValues& b) {
+  double largest = 0.0;
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    const double unit = group.parameters[l].name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
+    largest = std::max(largest, unit * std::fabs(a.values[l] - b.values[l]));
+  }
+  return largest;
+}
+
+}  // namespace stridewire

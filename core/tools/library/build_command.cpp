@@ -1,0 +1,153 @@
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <cstdio>
+#include <optional>
+#include <sstream>
+
+#include "command_line.h"
+#include "commands.h"
+#include "library_json.h"
+#include "stridewire/offline/assemble.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/library_builder.h"
+
+namespace stridewire {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Steps whose parameters lie within this of each other are averaged unless --all: captured steps of
+// equal parameters differ by centimetres and would make the weights jump.
+constexpr double kClusterDiameterM = 0.05;
+
+std::optional<BvhAxis> ParseAxis(const std::string& text) {
+  const std::pair<const char*, BvhAxis> axes[] = {
+      {"x", BvhAxis::kPlusX}, {"+x", BvhAxis::kPlusX}, {"-x", BvhAxis::kMinusX},
+      {"y", BvhAxis::kPlusY}, {"+y", BvhAxis::kPlusY}, {"-y", BvhAxis::kMinusY},
+      {"z", BvhAxis::kPlusZ}, {"+z", BvhAxis::kPlusZ}, {"-z", BvhAxis::kMinusZ}};
+  for (const auto& [name, axis] : axes) {
+    if (text == name) return axis;
+  }
+  return std::nullopt;
+}
+
+Json FileToJson(const Extraction& extraction) {
+  Json rejected = Json::array();
+  for (const RejectedTime& time : extraction.rejected) {
+    rejected.push_back({{"from_s", time.from_s}, {"to_s", time.to_s}, {"reason", time.reason}});
+  }
+  return {{"path", extraction.path},
+          {"frames", extraction.frames},
+          {"fps", extraction.fps},
+          {"unit_m", extraction.unit_m},
+          {"steps_left", extraction.steps_left},
+          {"steps_right", extraction.steps_right},
+          {"jumps", extraction.jumps},
+          {"rejected", std::move(rejected)},
+          {"notes", extraction.notes},
+          {"error", extraction.error.empty() ? Json(nullptr) : Json(extraction.error)}};
+}
+
+void PrintFile(const Extraction& extraction) {
+  if (!extraction.error.empty()) {
+    std::printf("%s: left out: %s\n", extraction.path.c_str(), extraction.error.c_str());
+    return;
+  }
+  std::printf("%s: %d frames at %.0f a second; %d left and %d right steps, %d jumps\n",
+              extraction.path.c_str(), extraction.frames, extraction.fps, extraction.steps_left,
+              extraction.steps_right, extraction.jumps);
+  for (const std::string& note : extraction.notes) std::printf("  note: %s\n", note.c_str());
+  for (const RejectedTime& time : extraction.rejected) {
+    std::printf("  left out %.2f-%.2f s: %s\n", time.from_s, time.to_s, time.reason.c_str());
+  }
+}
+
+// "step,jump" into the assembler's switches; empty when fine, else what is wrong.
+std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
+  options.steps = options.jumps = false;
+  std::istringstream list(kinds);
+  for (std::string kind; std::getline(list, kind, ',');) {
+    if (kind == "step") {
+      options.steps = true;
+    } else if (kind == "jump") {
+      options.jumps = true;
+    } else {
+      return "--kinds: \"" + kind + "\" is not a kind; there are step and jump";
+    }
+  }
+  return options.steps || options.jumps ? "" : "--kinds: names no kind";
+}
+
+}  // namespace
+
+int RunBuild(const BuildCommand& command) {
+  AssembleOptions options;
+  options.mirror = command.mirror;
+  if (const std::string wrong = ParseKinds(command.kinds, options); !wrong.empty()) {
+    return Complain(wrong);
+  }
+  BvhReadOptions read;
+  if (command.unit_m != 0.0) read.unit_m = command.unit_m;
+  if (command.fps != 0.0) read.fps = command.fps;
+  if (!command.up.empty()) {
+    read.up = ParseAxis(command.up);
+    if (!read.up)
+      return Complain("--up: \"" + command.up + "\" is not an axis; say x, y, z, -x, …");
+  }
+  read.left_ankle = command.left_ankle;
+  read.right_ankle = command.right_ankle;
+  read.left_ball = command.left_ball;
+  read.right_ball = command.right_ball;
+
+  LibraryAssembler assembler(options);
+  Json files = Json::array();
+  for (const std::string& path : command.files) {
+    const auto capture = ReadBvh(path, read);
+    Extraction unreadable;
+    if (!capture) {
+      // What is wrong with an option is wrong for every file.
+      if (capture.error().code == ErrorCode::kInvalidArgument) return Complain(capture.error());
+      unreadable.path = path;
+      unreadable.error = Describe(capture.error());
+    }
+    const Extraction& extraction = capture ? assembler.Add(*capture) : unreadable;
+    files.push_back(FileToJson(extraction));
+    if (!command.json) PrintFile(extraction);
+    if (!extraction.error.empty()) {
+      std::fprintf(stderr, "stridewire-library: %s\n", extraction.error.c_str());
+    }
+  }
+
+  const auto raw = assembler.Assemble();
+  if (!raw) return Complain(raw.error());
+  LibraryBuilder builder;
+  builder.cluster_diameter = command.all ? 0.0 : kClusterDiameterM;
+  const auto library = builder.Build(*raw);
+  if (!library) return Complain(library.error());
+  if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
+    return Complain(status.error());
+  }
+  if (command.json) {
+    Json json;
+    json["files"] = std::move(files);
+    json["library"] = LibraryToJson(**library, false);
+    std::printf("%s\n", Dump(json).c_str());
+    return kExitDone;
+  }
+  std::printf("\n%s: %zu bytes\n", command.out.c_str(), (*library)->bytes().size());
+  for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
+    const MotionGroup& group = (*library)->groups()[g];
+    std::printf("  group %zu: %s, %d examples, parameters", g,
+                std::string(MovementKindName(group.kind)).c_str(), group.example_count);
+    for (const Parameter& parameter : group.parameters) {
+      std::printf(" %s", std::string(ParameterText(parameter.name)).c_str());
+    }
+    std::printf("\n");
+  }
+  for (const LibraryBuilder::Note& note : builder.notes) {
+    std::printf("  group %d: %s\n", note.group, note.text.c_str());
+  }
+  return kExitDone;
+}
+
+}  // namespace stridewire

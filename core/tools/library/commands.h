@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace stridewire {
+
+// One subcommand each: options as the command line gave them. Run* returns the exit code.
+
+struct BuildCommand {
+  std::vector<std::string> files;
+  std::string out;
+  std::string kinds = "step,jump";
+  bool mirror = false;
+  bool all = false;
+  bool json = false;
+  double unit_m = 0.0;  // 0: found
+  std::string left_ankle, right_ankle, left_ball, right_ball;
+  std::string up;
+  double fps = 0.0;  // 0: the file's
+};
+int RunBuild(const BuildCommand& command);
+
+struct InspectCommand {
+  std::string library;
+  bool json = false;
+  bool examples = false;
+};
+int RunInspect(const InspectCommand& command);
+
+struct SynthesizeCommand {
+  std::string library;
+  std::string choreography;
+  std::string out;
+  double fps = 60.0;
+  bool json = false;
+};
+int RunSynthesize(const SynthesizeCommand& command);
+
+struct ExportCommand {
+  std::string library;
+  std::string out;
+};
+int RunExport(const ExportCommand& command);
+
+}  // namespace stridewire

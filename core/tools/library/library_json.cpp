@@ -1,0 +1,113 @@
+#include "library_json.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "stridewire/offline/interpolation_error.h"
+
+namespace stridewire {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct DurationRange {
+  double min = std::numeric_limits<double>::infinity();
+  double max = 0.0;
+};
+
+DurationRange DurationsOf(const MotionGroup& group) {
+  DurationRange range;
+  const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
+  for (std::size_t e = 0; e < static_cast<std::size_t>(group.example_count); ++e) {
+    const double duration_s = group.keytimes_s[e * keys + keys - 1];
+    range.min = std::min(range.min, duration_s);
+    range.max = std::max(range.max, duration_s);
+  }
+  return range;
+}
+
+void AddSites(const MotionGroup& group, Json& json) {
+  Json sites = Json::array();
+  const auto n = static_cast<std::size_t>(group.example_count);
+  const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
+  for (std::size_t s = 0; s < static_cast<std::size_t>(group.site_count); ++s) {
+    const bool is_example = s < n;
+    Json site;
+    site["parameters"] = group.site(static_cast<int>(s));
+    site["source"] = is_example ? Json(group.sources[s]) : Json(nullptr);
+    site["mirrored"] = is_example && group.mirrored[s] != 0;
+    site["keytimes_s"] =
+        is_example ? Json(group.keytimes_s.subspan(s * keys, keys)) : Json(nullptr);
+    site["pseudoexample"] = !is_example;
+    site["weights"] = is_example ? Json(nullptr) : Json(group.site_weights.subspan((s - n) * n, n));
+    sites.push_back(std::move(site));
+  }
+  json["sites"] = std::move(sites);
+  json["dilations"] = group.dilations;
+  Json centre = Json::array();
+  for (const Parameter& parameter : group.parameters) centre.push_back(parameter.centre);
+  json["centre"] = std::move(centre);
+}
+
+}  // namespace
+
+std::string Dump(const Json& json) {
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+Json ParametersToJson(const MotionGroup& group, const ParameterValues& values) {
+  Json json = Json::object();
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    json[std::string(ParameterText(group.parameters[l].name))] = values.values[l];
+  }
+  return json;
+}
+
+Json BaseToJson(const BaseFrame& base) {
+  return {{"position_m", {base.position_m.x, base.position_m.y, base.position_m.z}},
+          {"heading_rad", base.heading_rad}};
+}
+
+Json LibraryToJson(const MotionLibrary& library, bool examples) {
+  Json json;
+  json["format_version"] = MotionLibrary::kFormatVersion;
+  json["hash"] = library.hash();
+  json["bytes"] = library.bytes().size();
+  const Skeleton& skeleton = library.skeleton();
+  Json names = Json::array();
+  for (const Joint& joint : skeleton.joints) names.push_back(joint.name);
+  const auto ball_name = [&](Foot foot) {
+    return skeleton.joints[static_cast<std::size_t>(skeleton.leg(foot).ball)].name;
+  };
+  json["skeleton"] = {{"joints", skeleton.joint_count()},
+                      {"names", std::move(names)},
+                      {"left_foot", ball_name(Foot::kLeft)},
+                      {"right_foot", ball_name(Foot::kRight)}};
+  Json groups = Json::array();
+  for (std::size_t g = 0; g < library.groups().size(); ++g) {
+    const MotionGroup& group = library.groups()[g];
+    Json entry;
+    entry["kind"] = MovementKindName(group.kind);
+    entry["examples"] = group.example_count;
+    entry["pseudoexamples"] = group.site_count - group.example_count;
+    Json parameters = Json::array();
+    for (const Parameter& parameter : group.parameters) {
+      parameters.push_back({{"name", ParameterText(parameter.name)},
+                            {"min", parameter.min},
+                            {"max", parameter.max},
+                            {"scale", parameter.scale}});
+    }
+    entry["parameters"] = std::move(parameters);
+    const DurationRange durations = DurationsOf(group);
+    entry["duration_s"] = {{"min", durations.min}, {"max", durations.max}};
+    const InterpolationError error = MeasureInterpolationError(library, static_cast<int>(g));
+    entry["error_m"] = {{"max", error.max_m}, {"mean", error.mean_m}, {"samples", error.samples}};
+    entry["corrected_error_m"] = {{"max", error.corrected_max_m}, {"iterations", error.iterations}};
+    if (examples) AddSites(group, entry);
+    groups.push_back(std::move(entry));
+  }
+  json["groups"] = std::move(groups);
+  return json;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,91 @@
+#include <cstdio>
+
+#include "command_line.h"
+#include "commands.h"
+#include "library_json.h"
+#include "stridewire/offline/bvh_writer.h"
+#include "stridewire/offline/choreography.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/offline/synthesis.h"
+
+namespace stridewire {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
+  Json json;
+  json["kind"] = MovementKindName(record.kind);
+  json["start_s"] = record.start_s;
+  json["end_s"] = record.end_s;
+  if (record.group >= 0) {
+    const MotionGroup& group = library.group(record.group);
+    json["keytimes_s"] = record.keytimes_s;
+    json["requested"] = ParametersToJson(group, record.requested);
+    json["applied"] = ParametersToJson(group, record.applied);
+    // Nothing corrects parameters at run time yet: the weights are those of the applied ones.
+    json["corrected"] = ParametersToJson(group, record.applied);
+    json["measured"] = ParametersToJson(group, record.measured);
+    json["extrapolated"] = record.extrapolated;
+    json["clamped"] = record.clamped;
+    json["group"] = record.group;
+    json["weights"] = record.weights;
+    Json plants = Json::array();
+    for (const PlantRecord& plant : record.plants) {
+      plants.push_back({{"foot", plant.foot == Foot::kLeft ? "left" : "right"},
+                        {"from_s", plant.from_s},
+                        {"to_s", plant.to_s},
+                        {"anchor_m", {plant.anchor_m.x, plant.anchor_m.y, plant.anchor_m.z}},
+                        {"drift_m", plant.drift_m}});
+    }
+    json["plants"] = std::move(plants);
+    if (IsStep(record.kind)) {
+      json["landing_error_m"] = record.landing_error_m;
+      json["landing_error_rad"] = record.landing_error_rad;
+    }
+  }
+  json["request"] = record.request_id == 0 ? Json(nullptr) : Json(record.request_id - 1);
+  json["base"] = BaseToJson(record.base);
+  return json;
+}
+
+}  // namespace
+
+int RunSynthesize(const SynthesizeCommand& command) {
+  const auto library = OpenLibrary(command.library);
+  if (!library) return Complain(library.error());
+  const auto choreography = ReadChoreography(command.choreography);
+  if (!choreography) return Complain(choreography.error());
+  auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps);
+  if (!synthesis) {
+    Error error = synthesis.error();
+    error.where = command.choreography + (error.where.empty() ? "" : ": " + error.where);
+    return Complain(error);
+  }
+  if (Status status =
+          WriteBvh((*library)->skeleton(), synthesis->clip, std::filesystem::path(command.out));
+      !status) {
+    return Complain(status.error());
+  }
+  if (command.json) {
+    Json json;
+    json["fps"] = command.fps;
+    json["frames"] = synthesis->clip.frame_count();
+    json["movements"] = Json::array();
+    for (const MovementRecord& record : synthesis->movements) {
+      json["movements"].push_back(RecordToJson(**library, record));
+    }
+    std::printf("%s\n", Dump(json).c_str());
+    return kExitDone;
+  }
+  int clamped = 0;
+  for (const MovementRecord& record : synthesis->movements) clamped += record.clamped ? 1 : 0;
+  std::printf("%s: %d frames, %.1f s, %zu movements", command.out.c_str(),
+              synthesis->clip.frame_count(), synthesis->clip.duration_s(),
+              synthesis->movements.size());
+  if (clamped > 0) std::printf(", %d of them not as asked (see --json)", clamped);
+  std::printf("\n");
+  return kExitDone;
+}
+
+}  // namespace stridewire
