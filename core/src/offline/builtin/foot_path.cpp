@@ -10,9 +10,8 @@ namespace {
 
 constexpr double kClearanceM = 0.015;
 constexpr double kLiftStepM = 0.004;
+constexpr double kLeastLiftM = -0.08;
 constexpr double kMostLiftM = 0.30;
-// The shank swings forward early; without this the knee bends too much and too late.
-constexpr double kSwingAhead = 0.03;
 
 DVec3 Forward(Foot foot) {
   const double yaw = SideSign(foot) * kToeOutRad;
@@ -28,12 +27,13 @@ double ToeOffPitch(const StepTiming& timing) {
 Curve MakeFixedPitch(const StepTiming& timing) {
   const GaitState& start = timing.start;
   const GaitState& end = timing.end;
-  // Heels rise late in single support.
-  const double heel_off_s = timing.toe_off_s + 0.58 * timing.swing_s();
+  // Heels rise from the middle of single support on.
+  const double heel_off_s = timing.toe_off_s + 0.42 * timing.swing_s();
   return Curve({{0.0, start.front_pitch_rad(), start.front_pitch_rate()},
                 {timing.toe_off_s, 0.0, 0.0},
                 {heel_off_s, 0.0, 0.0},
-                {timing.heel_strike_s, -0.30 * end.toe_off_pitch_rad},
+                {timing.heel_strike_s, -0.42 * end.toe_off_pitch_rad,
+                 end.standing() ? 0.0 : -0.22 * end.toe_off_pitch_rad / end.half_support_s},
                 {timing.end_s, end.rear_pitch_rad(), end.rear_pitch_rate()}});
 }
 
@@ -48,12 +48,13 @@ Curve MakeMovingPitch(const StepTiming& timing) {
   } else {
     knots = {{0.0, start.rear_pitch_rad(), start.rear_pitch_rate()}};
   }
-  knots.push_back({timing.toe_off_s, -b, -0.35 * b / std::max(timing.toe_off_s, 0.06) * 0.5});
-  knots.push_back({timing.toe_off_s + 0.13 * swing, -1.06 * b});
-  knots.push_back({timing.toe_off_s + 0.47 * swing, -0.55 * b});
-  knots.push_back({timing.toe_off_s + 0.74 * swing, 0.25 * a});
+  knots.push_back({timing.toe_off_s, -b, -0.32 * b / timing.toe_off_s});
+  knots.push_back({timing.toe_off_s + 0.13 * swing, -1.09 * b});
+  knots.push_back({timing.toe_off_s + 0.47 * swing, -0.45 * b});
+  knots.push_back({timing.toe_off_s + 0.74 * swing, 0.05 * a});
   knots.push_back({timing.toe_off_s + 0.94 * swing, a, 0.0});
-  knots.push_back({timing.heel_strike_s, 0.96 * a, -0.3 * a / 0.06});
+  knots.push_back(
+      {timing.heel_strike_s, 0.97 * a, -0.9 * a / std::max(timing.end.half_support_s, 0.06)});
   knots.push_back({timing.end_s, timing.end.front_pitch_rad(), timing.end.front_pitch_rate()});
   return Curve(knots);
 }
@@ -61,7 +62,7 @@ Curve MakeMovingPitch(const StepTiming& timing) {
 Curve MakeToeRock(const StepTiming& timing) {
   const double rock = timing.start.toe_rock_rad;
   if (rock == 0.0) return Curve({{0.0, 0.0}});
-  return Curve({{0.0, 0.0, 0.0}, {timing.toe_off_s, rock, 1.5 * rock / timing.toe_off_s}});
+  return Curve({{0.0, 0.0, 0.0}, {timing.toe_off_s, rock, 1.9 * rock / timing.toe_off_s}});
 }
 
 // Angle of the toe joint in swing: what it has at toe-off fades to straight.
@@ -141,9 +142,7 @@ FootPlace FootPaths::MovingInSwing(double time_s) const {
   place.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * toe_off_m_ +
                   (u3 - 2.0 * u2 + u) * swing * toe_off_velocity_ +
                   (3.0 * u2 - 2.0 * u3) * strike_m_ + (u3 - u2) * swing * strike_velocity_;
-  const double bump = 16.0 * u2 * (1.0 - u) * (1.0 - u);
-  place.ankle_m.y += lift_m_ * bump;
-  place.ankle_m.z += kSwingAhead * (strike_m_.z - toe_off_m_.z) * bump;
+  place.ankle_m.y += lift_m_ * 16.0 * u2 * (1.0 - u) * (1.0 - u);
   return place;
 }
 
@@ -167,6 +166,7 @@ void FootPaths::RaiseSwingUntilClear() {
     }
     return true;
   };
+  lift_m_ = kLeastLiftM;
   while (!clear() && lift_m_ < kMostLiftM) lift_m_ += kLiftStepM;
 }
 

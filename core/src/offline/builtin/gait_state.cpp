@@ -19,11 +19,11 @@ double SteadyStepTime(double length_m) {
 }
 
 double GaitState::front_pitch_rate() const {
-  return standing() ? 0.0 : -0.5 * strike_pitch_rad / half_support_s;
+  return standing() ? 0.0 : -0.66 * strike_pitch_rad / half_support_s;
 }
 
 double GaitState::rear_pitch_rate() const {
-  return standing() ? 0.0 : -0.35 * toe_off_pitch_rad / half_support_s;
+  return standing() ? 0.0 : -0.37 * toe_off_pitch_rad / half_support_s;
 }
 
 double GaitState::front_ball_back_m() const {
@@ -39,22 +39,16 @@ GaitState MakeGaitState(double length_m) {
   const double step_s = SteadyStepTime(length_m);
   const double mean_speed = length_m / step_s;
   state.half_support_s = ToWholeFrames(0.12 * step_s);
-  state.speed_mps = 1.03 * mean_speed;  // the pelvis is fastest while it is low
+  state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   state.strike_pitch_rad = 22.0 * kDegree * Tanh(length_m / 0.5);
   state.toe_off_pitch_rad = 68.0 * kDegree * Tanh(length_m / 0.5);
-  state.toe_rock_rad = 0.6 * state.toe_off_pitch_rad;
+  state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
   // Straight legs reach less high when the feet are apart.
-  const Curve drop({{0.0, 0.0},
-                    {0.2, 0.002},
-                    {0.4, 0.006},
-                    {0.5, 0.011},
-                    {0.6, 0.019},
-                    {0.7, 0.037},
-                    {0.8, 0.055},
-                    {0.9, 0.078}});
+  // Legs reach less high when the feet are apart; knees bend a little more than they must.
+  const Curve drop({{0.0, 0.0}, {0.35, 0.010}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});
   state.pelvis_drop_m = drop.At(length_m);
-  state.pelvis_ahead_m = 0.02 + (0.655 - 0.02 / 0.75) * length_m;
+  state.pelvis_ahead_m = 0.02 + (0.661 - 0.02 / 0.75) * length_m;
   // Peak to peak 7.0 cm at 0.7 m/s, 3.9 cm at 1.6 m/s (Orendurff et al. 2004).
   state.sway_m = 0.5 * (0.070 - (mean_speed - 0.7) / 0.9 * 0.031);
   return state;

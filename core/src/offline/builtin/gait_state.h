@@ -16,8 +16,8 @@ inline constexpr double kClipFps = 120.0;
 /// pose or a velocity at the start or the end of a step depends on. Length 0 is standing.
 ///
 ///   heel-strike        state          toe-off
-///   front  a            0.45 a         0           foot pitch, toes up positive
-///   rear  -0.3 b       -0.65 b        -b
+///   front  a            0.32 a         0           foot pitch, toes up positive
+///   rear  -0.42 b      -0.72 b        -b
 struct GaitState {
   double length_m = 0.0;
   double half_support_s = 0.0;     ///< heel-strike to state, and state to toe-off
@@ -31,8 +31,8 @@ struct GaitState {
   double sway_m = 0.0;  ///< amplitude toward the stance foot in a step between such states
 
   [[nodiscard]] bool standing() const { return length_m == 0.0; }
-  [[nodiscard]] double front_pitch_rad() const { return 0.45 * strike_pitch_rad; }
-  [[nodiscard]] double rear_pitch_rad() const { return -0.65 * toe_off_pitch_rad; }
+  [[nodiscard]] double front_pitch_rad() const { return 0.32 * strike_pitch_rad; }
+  [[nodiscard]] double rear_pitch_rad() const { return -0.72 * toe_off_pitch_rad; }
   /// Rates of the foot pitches at the state, rad/s.
   [[nodiscard]] double front_pitch_rate() const;
   [[nodiscard]] double rear_pitch_rate() const;

@@ -20,8 +20,6 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kCrouchS = 0.45, kPushS = 0.28, kAbsorbS = 0.35, kStandUpS = 0.45;
-constexpr double kToeOffPitchRad = 52.0 * kDegree;
-constexpr double kToeRockRad = 0.0 * kDegree;
 constexpr double kToeOffKneeRad = 16.0 * kDegree;
 
 /// A jump over a length, as curves of time.
@@ -34,7 +32,7 @@ class JumpPath {
         arm_(lean_),
         elbow_(lean_),
         push_pitch_(lean_),
-        rock_(lean_),
+
         landing_pitch_(lean_),
         leg_length_(lean_),
         leg_angle_(lean_),
@@ -115,12 +113,12 @@ class JumpPath {
 
   void PlanFeet() {
     const double push_s = toe_off_s() - lowest_s();
-    push_pitch_ =
-        Curve({{0.0, 0.0, 0.0},
-               {lowest_s() + 0.15 * push_s, 0.0, 0.0},
-               {toe_off_s(), -kToeOffPitchRad, -1.5 * kToeOffPitchRad / (0.85 * push_s)}});
-    rock_ = Curve({{toe_off_s() - 0.25 * push_s, 0.0, 0.0},
-                   {toe_off_s(), kToeRockRad, 1.5 * kToeRockRad / (0.25 * push_s)}});
+    // The ankles finish the push: near toe-off they rise almost as fast as the body.
+    toe_off_pitch_rad_ = (36.0 + 11.0 * length_m_) * kDegree;
+    const double rate = 0.75 * velocity_.y / kBallAheadOfAnkleM;
+    push_pitch_ = Curve({{0.0, 0.0, 0.0},
+                         {lowest_s() + 0.3 * push_s, 0.0, 0.0},
+                         {toe_off_s(), -toe_off_pitch_rad_, -rate}});
     const double strike = (3.0 + 9.0 * length_m_) * kDegree;
     landing_pitch_ = Curve({{landing_s(), strike, -strike / 0.12}, {landing_s() + 0.09, 0.0, 0.0}});
   }
@@ -130,7 +128,6 @@ class JumpPath {
     const FigurePose standing = StandingPose();
     DVec3 rest = BodyCentre(figure_, standing);
     rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;  // from the balls
-    rest_y_ = rest.y;
 
     // Toe-off: the centre this far ahead of the balls, as high as the legs let it.
     const double toe_off_z = -0.02 + 0.19 * length_m_;
@@ -148,7 +145,7 @@ class JumpPath {
                               {lowest_s(), rest.z + 0.02, 0.05},
                               {toe_off_s(), toe_off_z, velocity_.z}});
     const double absorb_s = absorbed_s() - landing_s();
-    const double absorb_m = 0.06 - 0.06 * falling;
+    const double absorb_m = 0.045 - 0.05 * falling;
     centre_y_after_ = Curve({{landing_s(), landing_y, falling},
                              {landing_s() + 0.35 * absorb_s, landing_y - 0.72 * absorb_m},
                              {absorbed_s(), landing_y - absorb_m, 0.0},
@@ -172,11 +169,11 @@ class JumpPath {
     leg_angle_ = Curve({{0.0, leave.angle_rad, flight_s * (leave.angle_rad - before.angle_rad) / h},
                         {1.0, land.angle_rad, flight_s * (after.angle_rad - land.angle_rad) / h}});
     const double strike = landing_pitch_.At(landing_s());
-    flight_pitch_ = Curve({{0.0, -kToeOffPitchRad, -0.5},
-                           {0.12, -1.05 * kToeOffPitchRad},
+    flight_pitch_ = Curve({{0.0, -toe_off_pitch_rad_, -0.5},
+                           {0.12, -1.05 * toe_off_pitch_rad_},
                            {0.9, strike, 0.0},
                            {1.0, strike, 0.0}});
-    flight_toe_bend_ = Curve({{0.0, kToeOffPitchRad - kToeRockRad, 0.0}, {0.5, 0.0, 0.0}});
+    flight_toe_bend_ = Curve({{0.0, toe_off_pitch_rad_, 0.0}, {0.5, 0.0, 0.0}});
   }
 
   struct LegAim {
@@ -217,7 +214,7 @@ class JumpPath {
   [[nodiscard]] FootPlace Place(Foot foot, double time_s, const FigurePose& pose) const {
     const DVec3 ball(StandingBall(foot).x, 0.0, 0.0);
     if (time_s <= toe_off_s()) {
-      return FootOnGround(foot, ball, push_pitch_.At(time_s), rock_.At(time_s));
+      return FootOnGround(foot, ball, push_pitch_.At(time_s), 0.0);
     }
     if (time_s >= landing_s()) {
       return FootOnGround(foot, ball + DVec3(0.0, 0.0, length_m_), landing_pitch_.At(time_s), 0.0);
@@ -260,11 +257,11 @@ class JumpPath {
   const Skeleton& figure_;
   double length_m_;
   std::array<double, 6> times_{};
-  Curve lean_, arm_, elbow_, push_pitch_, rock_, landing_pitch_;
+  Curve lean_, arm_, elbow_, push_pitch_, landing_pitch_;
   Curve leg_length_, leg_angle_, flight_pitch_, flight_toe_bend_;  // over the flight's 0..1
   Curve centre_y_before_, centre_z_before_, centre_y_after_, centre_z_after_;
   DVec3 velocity_ = DVec3(0.0), toe_off_centre_ = DVec3(0.0);
-  double rest_y_ = 0.0;
+  double toe_off_pitch_rad_ = 0.0;
 };
 
 }  // namespace

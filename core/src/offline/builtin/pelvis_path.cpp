@@ -32,7 +32,8 @@ Curve MakeSide(Foot moving, const StepTiming& timing) {
   const GaitState& end = timing.end;
   const double toward_fixed = SideSign(OtherFoot(moving));
   double sway = 0.5 * (start.sway_m + end.sway_m);
-  if (start.standing() || end.standing()) sway = std::max(start.sway_m, end.sway_m);
+  if (start.standing() || end.standing())
+    sway = 0.036;  // the weight has to come over one foot without any swing
   const double middle_s = timing.toe_off_s + (start.standing() ? 0.3 : 0.5) * timing.swing_s();
   const auto rate = [](const GaitState& state) {
     return state.standing() ? 0.0 : state.sway_m * 0.12 * std::numbers::pi / state.half_support_s;
@@ -70,8 +71,9 @@ Curve MakeTilt(const StepTiming& timing) {
 }
 
 Curve MakeHeight(const StepTiming& timing) {
-  const double top = kStandingHipHeightM - 0.003;
-  const double middle_s = 0.5 * (timing.toe_off_s + timing.heel_strike_s);
+  const double vigour = 0.5 * (timing.start.vigour + timing.end.vigour);
+  const double top = kStandingHipHeightM - 0.003 - 0.0095 * vigour;
+  const double middle_s = 0.42 * timing.end_s;
   std::vector<Curve::Knot> knots = {{0.0, kStandingHipHeightM - timing.start.pelvis_drop_m, 0.0}};
   knots.push_back({middle_s, top, 0.0});
   knots.push_back({timing.end_s, kStandingHipHeightM - timing.end.pelvis_drop_m, 0.0});
