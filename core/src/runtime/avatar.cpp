@@ -13,6 +13,9 @@ namespace {
 // Feet this far from where the stand pose has them are not a stand.
 constexpr double kFeetApartM = 0.12;
 
+// A library may not reach a stand in one step from a long stride; after this many it stands as it is.
+constexpr int kMaxClosingSteps = 3;
+
 // Events one movement can add in a tick: started, two foot-strikes, finished, and the next started.
 constexpr std::size_t kEventReserve = 6;
 
@@ -44,6 +47,7 @@ void Avatar::Teleport(const BaseFrame& start) {
       Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
   pose_.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
+  closing_steps_ = 0;
   feet_ = stand_feet_;
   last_moved_ = Foot::kRight;
   CancelQueue();
@@ -130,8 +134,9 @@ bool Avatar::StartNext() {
     is_walking_ = false;
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
     if (plan) {
+      const int closing_steps = closing_steps_ + 1;
       StartPlan(*plan, 0);
-      is_closing_ = true;
+      closing_steps_ = closing_steps;
       return true;
     }
   }
@@ -172,7 +177,7 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
   Subtract(displayed, movement_.difference, movement_.difference);
 
   is_moving_ = true;
-  is_closing_ = false;
+  closing_steps_ = 0;
   is_idle_reported_ = false;
   movement_time_s_ = 0.0;
   request_id_ = request_id;
@@ -200,7 +205,7 @@ void Avatar::FinishMovement() {
   if (IsStep(finished.kind)) {
     last_moved_ = MovingFoot(finished.kind);
     const DVec3 apart = feet_.left_from_right_m - stand_feet_.left_from_right_m;
-    is_walking_ = !is_closing_ && std::hypot(apart.x, apart.z) > kFeetApartM;
+    is_walking_ = closing_steps_ < kMaxClosingSteps && std::hypot(apart.x, apart.z) > kFeetApartM;
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,

@@ -53,16 +53,21 @@ void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const f
   out_s[0] = 0.0;
   for (std::size_t i = 0; i + 1 < key_count; ++i) {
     double blended = 0.0;
-    double shortest = HUGE_VAL;
-    double longest = 0.0;
+    double positive = 0.0;
+    double positive_weight = 0.0;
     for (std::size_t e = 0; e < weights.size(); ++e) {
       const double* keys = &example_keytimes_s[e * key_count];
+      const double weight = static_cast<double>(weights[e]);
       const double length_s = keys[i + 1] - keys[i];
-      blended += static_cast<double>(weights[e]) * length_s;
-      shortest = std::min(shortest, length_s);
-      longest = std::max(longest, length_s);
+      blended += weight * length_s;
+      if (weight > 0.0) {
+        positive += weight * length_s;
+        positive_weight += weight;
+      }
     }
-    out_s[i + 1] = out_s[i] + std::clamp(blended, 0.5 * shortest, 2.0 * longest);
+    const double typical_s = positive / positive_weight;
+    out_s[i + 1] =
+        out_s[i] + std::clamp(blended, kShortestInterval * typical_s, kLongestInterval * typical_s);
   }
 }
 

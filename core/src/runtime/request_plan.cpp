@@ -15,6 +15,12 @@ constexpr double kStartWeight = 4.0;     // the start is a fact, the end a wish
 constexpr double kFreeWeight = 0.02;     // a parameter nobody asked for follows the others
 constexpr double kPerParameterM = 1e-3;  // of groups that span a request alike, the plainer
 constexpr double kFootPreferenceM = 0.01;
+
+// A step asked for without turn, side or height stays in a straight group unless that misses it by
+// this much more: parameters nobody asked for would bend the walk.
+constexpr double kPlainPreferenceM = 0.15;
+// Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
+constexpr double kStraightMetresPerRadian = 2.0;
 constexpr double kChangeM = 1e-6;
 
 // What is wanted of one parameter; not `given`: anything the examples have.
@@ -74,14 +80,15 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
 }
 
 std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
-                                    const Wishes& wishes, double natural_side_m) {
+                                    const Wishes& wishes, double natural_side_m, bool is_plain) {
   std::optional<RequestPlan> best;
   double best_cost = HUGE_VAL;
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
     const RequestPlan plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m);
-    const double cost = plan.distance_m + kPerParameterM * group.parameter_count();
+    double cost = plan.distance_m + kPerParameterM * group.parameter_count();
+    if (is_plain && group.FindParameter(ParameterName::kTurn) >= 0) cost += kPlainPreferenceM;
     if (cost < best_cost) {
       best_cost = cost;
       best = plan;
@@ -106,8 +113,11 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
                                         request.side_m.has_value(), 1.0};
     At(wishes, ParameterName::kEndY) = {request.height_m, true, 1.0};
     At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
-    At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
-    return BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x);
+    At(wishes, ParameterName::kTurn) = {
+        request.turn_rad, true,
+        request.turn_rad == 0.0 ? kStraightMetresPerRadian : kMetresPerRadian};
+    const bool is_plain = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
+    return BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x, is_plain);
   };
 
   if (request.foot) return plan_foot(*request.foot);
@@ -124,7 +134,8 @@ std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequ
   At(wishes, ParameterName::kLength) = {request.length_m, true, 1.0};
   At(wishes, ParameterName::kHeight) = {request.height_m, true, 1.0};
   At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
-  return BestPlan(library, MovementKind::kJump, wishes, 0.0);
+  return BestPlan(library, MovementKind::kJump, wishes, 0.0,
+                  request.turn_rad == 0.0 && request.height_m == 0.0);
 }
 
 Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request) {

@@ -23,7 +23,7 @@ struct ExtractOptions {
   /// and the moving foot stays on its own side within this of the fixed one.
   double straight_side_max_m = 0.35;
   /// From this distance on the direction of the root tells the heading better than the pelvis.
-  double displacement_heading_min_m = 0.3;
+  double displacement_heading_min_m = 0.2;
   /// Skeleton the examples are for; must have the same joint tree. Null: the capture's own. Bones of
   /// other lengths: contacts and segments are found on the capture's own figure, then the root path
   /// is scaled by the ratio of leg lengths and everything is measured again.

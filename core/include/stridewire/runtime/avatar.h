@@ -99,7 +99,7 @@ class Avatar {
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
   bool is_walking_ = false;       // a step left the feet apart: close before anything but a step
-  bool is_closing_ = false;       // the movement under way is our own closing step
+  int closing_steps_ = 0;         // of our own in a row, the movement under way included
   std::uint64_t request_id_ = 0;  // of the movement or stand under way
   double stand_left_s_ = 0.0;
   Movement movement_;

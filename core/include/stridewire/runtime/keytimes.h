@@ -22,10 +22,17 @@ inline constexpr double kMinIntervalS = 1e-3;  ///< Shorter intervals are reject
 /// Inverse of GenericTime; `generic_time` is clamped to [0, n].
 [[nodiscard]] double TimeAtGenericTime(std::span<const double> keytimes_s, double generic_time);
 
+/// A blended interval stays within these multiples of the mean of that interval over the examples of
+/// positive weight.
+inline constexpr double kShortestInterval = 0.75;
+inline constexpr double kLongestInterval = 4.0 / 3.0;
+
 /// Blended keytimes, paper Eq. (4), with what negative weights demand: interval *lengths* are
-/// blended and each clamped to [1/2 min, 2 max] of that interval over the examples; otherwise
-/// sum w K stops increasing outside the hull. K_0 = 0.
-/// `example_keytimes_s` is [example][interval_count + 1]; `out_s` holds interval_count + 1.
+/// blended and each is clamped as above. Otherwise sum w K stops increasing outside the hull, and
+/// even inside it an interval may shrink much faster than the motion in it, which then rushes: on
+/// steps of 0.64 to 0.76 m of captured subject 16 by 2.7 cm from one 60 Hz frame to the next. K_0 = 0.
+/// `example_keytimes_s` is [example][interval_count + 1]; `out_s` holds interval_count + 1; the
+/// weights sum to 1.
 void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const float> weights,
                    std::span<double> out_s);
 
