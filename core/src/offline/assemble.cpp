@@ -10,6 +10,7 @@
 namespace stridewire {
 namespace {
 
+constexpr std::size_t kExamplesPerParameter = 3;
 constexpr std::size_t kOutlierFreeMin = 4;  // examples from which on extremes are not counted
 
 // Examples of one kind with all their parameters, on their way into a group.
@@ -51,8 +52,7 @@ std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const Par
   std::ranges::stable_sort(candidates, [](const Candidate& a, const Candidate& b) {
     return std::pair(a.fixed, a.spread) > std::pair(b.fixed, b.spread);
   });
-  const std::size_t most =
-      std::max<std::size_t>(always.size(), pool.examples.empty() ? 0 : pool.examples.size() - 1);
+  const std::size_t most = std::max(always.size(), pool.examples.size() / kExamplesPerParameter);
   if (candidates.size() > most) candidates.resize(most);
   std::vector<std::size_t> indices;
   for (const Candidate& candidate : candidates) indices.push_back(candidate.index);

@@ -154,6 +154,7 @@ class StepFinder {
 Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
                      const SegmentOptions& options) {
   Segmentation result;
+  std::vector<FrameRange> held;
   std::vector<FrameRange> explained;  // Flights that are jumps or already reported
   for (const FrameRange& flight : FlightRanges(tracks, contacts)) {
     JumpFinding finding = FindJump(tracks, contacts, flight, options);
@@ -161,6 +162,7 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
       result.jumps.push_back(*finding.jump);
     } else {
       result.rejected.push_back({flight, std::move(finding.reason)});
+      if (finding.held) held.push_back(flight);
     }
     explained.push_back(flight);
   }
@@ -171,6 +173,14 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
   for (const Swing& swing : swings) {
     StepSegment step;
     std::string reason = finder.Find(swing, step);
+    const int before = static_cast<int>(options.reaching_s * tracks.fps);
+    const int after = static_cast<int>(options.letting_go_s * tracks.fps);
+    if (reason.empty() && std::ranges::any_of(held, [&](const FrameRange& range) {
+          return FrameRange{range.begin - before, range.end + after}.Overlaps(
+              {step.start, step.end});
+        })) {
+      reason = "leads to or from being held by something";
+    }
     if (reason.empty()) {
       result.steps.push_back(step);
     } else if (std::ranges::none_of(explained, [&](const FrameRange& flight) {

@@ -130,7 +130,8 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
     }
     return {{},
             Text("both feet off the ground but not falling (%.1f m/s^2): held by something",
-                 acceleration)};
+                 acceleration),
+            true};
   }
   if (seconds > options.flight_max_s) return {{}, Text("in the air for %.1f s", seconds)};
   // Both feet must leave and land together.

@@ -16,6 +16,7 @@ namespace stridewire {
 struct JumpFinding {
   std::optional<JumpSegment> jump;
   std::string reason;
+  bool held = false;  ///< Both feet in the air, yet not falling
 };
 [[nodiscard]] JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                                    const FrameRange& flight, const SegmentOptions& options);

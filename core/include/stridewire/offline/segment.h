@@ -18,7 +18,9 @@ struct SegmentOptions {
   double flight_min_s = 0.15;         ///< Jump: both feet off the ground,
   double flight_max_s = 1.0;
   double feet_apart_max_s = 0.15;  ///< and left and landed together.
-  double still_m_s = 0.1;          ///< Pelvis slower than this stands still.
+  double reaching_s = 0.7;    ///< Steps ending less than this before hanging on something reach
+  double letting_go_s = 1.0;  ///< for it; those starting less than this after let go of it.
+  double still_m_s = 0.1;     ///< Pelvis slower than this stands still.
 };
 
 /// A step of `moving`, frames of the tracks: centre of the double support before, toe-off,
