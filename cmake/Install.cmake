@@ -13,13 +13,14 @@ foreach(part core offline protocol client)
             INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
   endif()
 endforeach()
-install(DIRECTORY core/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY core/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
+        FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${PROJECT_BINARY_DIR}/core/include/stridewire/base/version.h
         DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/stridewire/base)
 foreach(include_dir protocol/include client_sdk/c/include client_sdk/cpp/include)
   if(EXISTS ${PROJECT_SOURCE_DIR}/${include_dir})
     install(DIRECTORY ${include_dir}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-            FILES_MATCHING PATTERN "*.h")
+            FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
   endif()
 endforeach()
 

@@ -9,7 +9,8 @@ set(failures 0)
 
 # Every #include of the files below DIRECTORY has to match ALLOWED and not FORBIDDEN (regexes; empty: no rule).
 function(check directory allowed forbidden reason)
-  file(GLOB_RECURSE files ${ROOT}/${directory}/*.h ${ROOT}/${directory}/*.cpp)
+  file(GLOB_RECURSE files
+       ${ROOT}/${directory}/*.h ${ROOT}/${directory}/*.hpp ${ROOT}/${directory}/*.cpp)
   foreach(file IN LISTS files)
     file(STRINGS ${file} includes REGEX "^[ \t]*#[ \t]*include[ \t]*[<\"]")
     foreach(line IN LISTS includes)
@@ -34,14 +35,14 @@ check(client_sdk/c/include "${public}" "" "${reason}")
 check(client_sdk/cpp/include "${public}" "" "${reason}")
 
 set(reason "dependencies point one way")
-set(above_core "^stridewire/(protocol|server|client)/|^boost/|^spdlog/")
+set(above_core "^stridewire/((protocol|server)/|client)|^boost/|^spdlog/")
 foreach(kind include/stridewire src)
   check(core/${kind}/base "" "^stridewire/(runtime|offline)/|${above_core}" "${reason}")
   check(core/${kind}/runtime "" "^stridewire/offline/|${above_core}" "${reason}")
   check(core/${kind}/offline "" "${above_core}" "${reason}")
 endforeach()
-check(protocol/include "" "^stridewire/(runtime|offline|server|client)/" "${reason}")
-check(protocol/src "" "^stridewire/(runtime|offline|server|client)/" "${reason}")
+check(protocol/include "" "^stridewire/((runtime|offline|server)/|client)" "${reason}")
+check(protocol/src "" "^stridewire/((runtime|offline|server)/|client)" "${reason}")
 check(client_sdk "" "^stridewire/(offline|server)/" "${reason}")
 
 if(found EQUAL 0)
