@@ -237,7 +237,9 @@ TEST(BuiltinLibrary, FeetNeverEnterTheGroundAndClearItInSwing) {
           EXPECT_GE(figure.Heel(moving).y, 0.012) << u;
           EXPECT_GE(figure.Ball(moving).y, 0.012) << u;
         }
-        if (u >= 0.50 && u <= 0.85) EXPECT_GE(figure.ToeTip(moving).y, 0.012) << u;
+        if (u >= 0.50 && u <= 0.85) {
+          EXPECT_GE(figure.ToeTip(moving).y, 0.012) << u;
+        }
       }
     }
   }
