@@ -1,0 +1,60 @@
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+
+#include "message_json.h"
+#include "protocol_testing.h"
+#include "sample_messages.h"
+
+namespace stridewire::protocol {
+namespace {
+
+const std::filesystem::path kDirectory =
+    std::filesystem::path(STRIDEWIRE_SOURCE_DIR) / "protocol" / "vectors";
+
+std::string Read(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file) << path;
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::set<std::string> Names() {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(kDirectory)) {
+    if (entry.path().extension() == ".bin") names.insert(entry.path().stem().string());
+  }
+  return names;
+}
+
+TEST(Vectors, DecodeToWhatIsWrittenBesideThem) {
+  const auto names = Names();
+  ASSERT_FALSE(names.empty());
+  for (const std::string& name : names) {
+    SCOPED_TRACE(name);
+    const std::string bytes = Read(kDirectory / (name + ".bin"));
+    const auto json = nlohmann::ordered_json::parse(Read(kDirectory / (name + ".json")));
+    std::vector<std::byte> frame(bytes.size());
+    std::memcpy(frame.data(), bytes.data(), bytes.size());
+    const auto message = Decode(frame, json.at("type_number").get<MessageType>());
+    ASSERT_TRUE(message) << Describe(message.error());
+    EXPECT_EQ(ToJson(*message), json);
+    EXPECT_EQ(EncodeOrFail(*message), frame);
+  }
+}
+
+TEST(Vectors, AreThoseOfTheSampleMessages) {
+  std::set<std::string> samples;
+  for (const SampleMessage& sample : SampleMessages()) {
+    SCOPED_TRACE(sample.name);
+    samples.insert(sample.name);
+    const auto frame = EncodeOrFail(sample.message);
+    EXPECT_EQ(Read(kDirectory / (sample.name + ".bin")),
+              std::string(reinterpret_cast<const char*>(frame.data()), frame.size()))
+        << "run protocol_vectors, if the wire was meant to change";
+  }
+  EXPECT_EQ(samples, Names());
+}
+
+}  // namespace
+}  // namespace stridewire::protocol
