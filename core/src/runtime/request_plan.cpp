@@ -21,6 +21,8 @@ constexpr double kFootPreferenceM = 0.01;
 constexpr double kPlainPreferenceM = 0.15;
 // Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
 constexpr double kStraightMetresPerRadian = 2.0;
+// Landing higher or lower than asked puts a foot into the air or the ground: worse than falling short.
+constexpr double kHeightWeight = 4.0;
 constexpr double kChangeM = 1e-6;
 
 // What is wanted of one parameter; not `given`: anything the examples have.
@@ -111,7 +113,7 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
     At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
     At(wishes, ParameterName::kEndX) = {outward * request.side_m.value_or(0.0),
                                         request.side_m.has_value(), 1.0};
-    At(wishes, ParameterName::kEndY) = {request.height_m, true, 1.0};
+    At(wishes, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
     At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
     At(wishes, ParameterName::kTurn) = {
         request.turn_rad, true,
