@@ -1,0 +1,281 @@
+#include "stridewire/offline/assemble.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "capture_files.h"
+#include "stridewire/offline/mirror.h"
+#include "stridewire/runtime/foot_vector.h"
+#include "stridewire/runtime/keytimes.h"
+#include "synthetic_walker.h"
+
+namespace stridewire {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+Capture PlainWalk() {
+  return SyntheticWalker{}.Walk({{Foot::kLeft, 0.5},
+                                 {Foot::kRight, 0.6},
+                                 {Foot::kLeft, 0.55},
+                                 {Foot::kRight, 0.5},
+                                 {Foot::kLeft, 0.0}});
+}
+
+Capture StairWalk() {
+  return SyntheticWalker{}.Walk({{Foot::kLeft, 0.4, 0.2},
+                                 {Foot::kRight, 0.4, 0.2},
+                                 {Foot::kLeft, 0.4, 0.2},
+                                 {Foot::kRight, 0.0},
+                                 {Foot::kLeft, 0.35, -0.2},
+                                 {Foot::kRight, 0.35, -0.2},
+                                 {Foot::kLeft, 0.4, -0.2},
+                                 {Foot::kRight, 0.0}});
+}
+
+// What every RawLibrary promises (raw_library.h).
+void ExpectWellFormed(const RawLibrary& library) {
+  EXPECT_TRUE(library.skeleton.Validate().has_value());
+  EXPECT_EQ(library.stand_pose.rotations.size(), library.skeleton.joints.size());
+  for (const RawGroup& group : library.groups) {
+    ASSERT_FALSE(group.examples.empty());
+    EXPECT_LE(group.parameters.size(), static_cast<std::size_t>(kMaxParameters));
+    for (const RawExample& example : group.examples) {
+      EXPECT_TRUE(example.clip.Validate().has_value()) << example.source;
+      EXPECT_EQ(example.clip.joint_count, library.skeleton.joint_count());
+      EXPECT_TRUE(ValidateKeytimes(example.keytimes_s).has_value()) << example.source;
+      EXPECT_EQ(example.keytimes_s.size(), group.examples[0].keytimes_s.size());
+      EXPECT_NEAR(example.keytimes_s.back(), example.clip.duration_s(), 1e-9);
+      EXPECT_EQ(example.parameters.size(), group.parameters.size());
+      EXPECT_NEAR(example.clip.root_positions_m[0].x, 0.0, 1e-6);
+      EXPECT_NEAR(example.clip.root_positions_m[0].z, 0.0, 1e-6);
+      EXPECT_FALSE(example.source.empty());
+    }
+  }
+}
+
+std::vector<std::string> GroupTexts(const RawLibrary& library) {
+  std::vector<std::string> texts;
+  for (const RawGroup& group : library.groups) {
+    std::string text = std::string(MovementKindName(group.kind)) + " " +
+                       std::to_string(group.examples.size()) + ":";
+    for (const ParameterName name : group.parameters) {
+      text.append(" ").append(ParameterText(name));
+    }
+    texts.push_back(std::move(text));
+  }
+  return texts;
+}
+
+TEST(LibraryAssembler, StraightWalksGiveTwoParameterGroupsOnly) {
+  LibraryAssembler assembler;
+  assembler.Add(PlainWalk());
+  assembler.Add(SyntheticWalker{}.Jump(0.6));
+  assembler.Add(SyntheticWalker{}.Jump(0.9));
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value()) << Describe(library.error());
+  ExpectWellFormed(*library);
+  EXPECT_THAT(GroupTexts(*library),
+              ElementsAre("step_left 3: start_z_m end_z_m", "step_right 2: start_z_m end_z_m",
+                          "jump 2: length_m"));
+}
+
+TEST(LibraryAssembler, StairsGiveGroupsWithHeight) {
+  LibraryAssembler assembler;
+  for (int i = 0; i < 3; ++i) assembler.Add(StairWalk());
+  assembler.Add(PlainWalk());
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value()) << Describe(library.error());
+  ExpectWellFormed(*library);
+  // Up and down ahead; nothing turns or goes aside. The level steps are the plain walk's.
+  EXPECT_THAT(GroupTexts(*library),
+              ElementsAre("step_left 3: start_z_m end_z_m", "step_right 2: start_z_m end_z_m",
+                          "step_left 15: start_y_m start_z_m end_y_m end_z_m",
+                          "step_right 14: start_y_m start_z_m end_y_m end_z_m"));
+}
+
+TEST(LibraryAssembler, KindsCanBeLeftOut) {
+  AssembleOptions options;
+  options.steps = false;
+  LibraryAssembler jumps(options);
+  jumps.Add(PlainWalk());
+  EXPECT_EQ(jumps.Assemble().error().code, ErrorCode::kNotFound);
+  jumps.Add(SyntheticWalker{}.Jump(0.7));
+  ASSERT_TRUE(jumps.Assemble().has_value());
+  EXPECT_THAT(GroupTexts(*jumps.Assemble()), ElementsAre("jump 1: length_m"));
+}
+
+TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
+  LibraryAssembler assembler;
+  assembler.Add(PlainWalk());
+  Capture other = PlainWalk();
+  other.skeleton.joints[3].name = "Ankle";
+  EXPECT_EQ(assembler.Add(other).error,
+            "left out: its joint 3 is Ankle where the first capture has LeftFoot");
+  Capture fewer = PlainWalk();
+  fewer.skeleton.joints.pop_back();
+  EXPECT_THAT(assembler.Add(fewer).error, HasSubstr("11 joints, the first capture 12"));
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value());
+  EXPECT_EQ(library->groups[0].examples.size(), 3u);
+  EXPECT_EQ(assembler.files().size(), 3u);
+}
+
+TEST(LibraryAssembler, AnUnusableFirstCaptureDoesNotGiveTheSkeleton) {
+  LibraryAssembler assembler;
+  Capture empty = PlainWalk();
+  empty.clip = Clip{};
+  EXPECT_NE(assembler.Add(empty).error, "");
+  EXPECT_EQ(assembler.Add(PlainWalk()).error, "");
+  EXPECT_TRUE(assembler.Assemble().has_value());
+}
+
+TEST(LibraryAssembler, WithoutMovementsThereIsAnError) {
+  LibraryAssembler none;
+  EXPECT_EQ(none.Assemble().error().code, ErrorCode::kNotFound);
+  none.Add(SyntheticWalker{}.Stand(2.0));
+  EXPECT_EQ(none.Assemble().error().code, ErrorCode::kNotFound);
+}
+
+TEST(LibraryAssembler, OtherBonesAreFittedToTheFirstFigure) {
+  SyntheticWalker tall;
+  tall.leg_scale = 1.15;
+  LibraryAssembler assembler;
+  assembler.Add(PlainWalk());
+  assembler.Add(tall.Walk({{Foot::kLeft, 0.5}, {Foot::kRight, 0.6}, {Foot::kLeft, 0.0}}));
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value());
+  ExpectWellFormed(*library);
+  EXPECT_EQ(library->groups[0].examples.size(), 5u);
+  for (const RawGroup& group : library->groups) {
+    const Foot fixed = OtherFoot(MovingFoot(group.kind));
+    for (const RawExample& example : group.examples) {
+      EXPECT_NEAR(BallPosition(library->skeleton, example.clip.frame(0), fixed).y,
+                  kWalkerBallHeightM, 0.005)
+          << example.source;
+    }
+  }
+}
+
+TEST(LibraryAssembler, RecordingsWithOtherFloorsMeetAtOneHeight) {
+  LibraryAssembler assembler;
+  for (const float rise : {0.0f, 0.02f, -0.01f, 0.5f}) {
+    Capture capture = PlainWalk();
+    for (Vec3& position : capture.clip.root_positions_m) position.y += rise;
+    assembler.Add(capture);
+  }
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value());
+  const float height = library->stand_pose.root_position_m.y;
+  for (const RawGroup& group : library->groups) {
+    for (const RawExample& example : group.examples) {
+      EXPECT_NEAR(example.clip.root_positions_m[0].y, height, 0.005) << example.source;
+    }
+  }
+}
+
+TEST(LibraryAssembler, MirroringFillsBothFeetEqually) {
+  AssembleOptions options;
+  options.mirror = true;
+  LibraryAssembler assembler(options);
+  assembler.Add(PlainWalk());
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value()) << Describe(library.error());
+  ExpectWellFormed(*library);
+  ASSERT_EQ(library->groups.size(), 2u);
+  for (const RawGroup& group : library->groups) {
+    EXPECT_EQ(group.examples.size(), 5u);
+    const Foot moving = MovingFoot(group.kind);
+    int mirrored = 0;
+    for (const RawExample& example : group.examples) {
+      mirrored += example.mirrored;
+      const DVec3 start = FootVector(library->skeleton, example.clip.frame(0), moving, 0.0);
+      EXPECT_NEAR(example.parameters[0], start.z, 1e-5);
+      EXPECT_GT(start.x * (moving == Foot::kLeft ? 1.0 : -1.0), 0.1);
+    }
+    EXPECT_EQ(mirrored, group.kind == MovementKind::kStepLeft ? 2 : 3);
+  }
+}
+
+TEST(LibraryAssembler, MirroringNeedsNamesThatTellSides) {
+  AssembleOptions options;
+  options.mirror = true;
+  LibraryAssembler assembler(options);
+  Capture capture = PlainWalk();
+  capture.skeleton.joints[1].name = "LeftThing";
+  assembler.Add(capture);
+  EXPECT_EQ(assembler.Assemble().error().code, ErrorCode::kUnsupported);
+}
+
+TEST(MirrorExample, TwiceIsTheSame) {
+  const Extraction found = Extract(PlainWalk());
+  const std::optional<std::vector<int>> partners = FindMirrorJoints(found.skeleton);
+  ASSERT_TRUE(partners.has_value());
+  for (const ExtractedExample& step : found.general_steps) {
+    const ExtractedExample once =
+        MirrorExample(found.skeleton, *partners, kGeneralStepParameters, step);
+    EXPECT_NE(once.kind, step.kind);
+    EXPECT_TRUE(once.example.mirrored);
+    const ExtractedExample twice =
+        MirrorExample(found.skeleton, *partners, kGeneralStepParameters, once);
+    EXPECT_EQ(twice.kind, step.kind);
+    EXPECT_FALSE(twice.example.mirrored);
+    EXPECT_TRUE(twice.example.clip.rotations == step.example.clip.rotations);
+    EXPECT_TRUE(twice.example.clip.root_positions_m == step.example.clip.root_positions_m);
+    for (std::size_t i = 0; i < 7; ++i) {
+      EXPECT_NEAR(twice.example.parameters[i], step.example.parameters[i], 1e-6);
+    }
+  }
+}
+
+TEST(FindMirrorJoints, KnowsTheNamesInUse) {
+  const auto partners = [](const std::vector<std::string>& names) {
+    Skeleton skeleton;
+    for (const std::string& name : names) {
+      skeleton.joints.push_back({name, skeleton.joints.empty() ? -1 : 0, Vec3(0.0f)});
+    }
+    return FindMirrorJoints(skeleton);
+  };
+  EXPECT_EQ(partners({"Hips", "LHipJoint", "RHipJoint", "LowerBack", "LThumb", "RThumb"}),
+            (std::vector<int>{0, 2, 1, 3, 5, 4}));
+  EXPECT_EQ(partners({"hip", "lThigh", "rThigh", "neck", "rEye", "lEye"}),
+            (std::vector<int>{0, 2, 1, 3, 5, 4}));
+  EXPECT_EQ(partners({"root", "mixamorig:LeftUpLeg", "mixamorig:RightUpLeg"}),
+            (std::vector<int>{0, 2, 1}));
+  EXPECT_EQ(partners({"root", "LeftUpLeg"}), std::nullopt);
+}
+
+TEST(LibraryAssembler, PutsTheCapturesOfASubjectTogether) {
+  const std::vector<std::filesystem::path> captures = MocapFiles("cmu/16");
+  STRIDEWIRE_SKIP_WITHOUT(captures);
+  LibraryAssembler assembler;
+  for (const std::filesystem::path& file : captures) {
+    const Expected<Capture> capture = ReadBvh(file);
+    ASSERT_TRUE(capture.has_value());
+    EXPECT_EQ(assembler.Add(*capture).error, "");
+  }
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value());
+  ExpectWellFormed(*library);
+  ASSERT_EQ(library->groups.size(), 5u);
+  EXPECT_GE(library->groups[0].examples.size(), 25u);
+  EXPECT_GE(library->groups[1].examples.size(), 20u);
+  EXPECT_EQ(library->groups[4].kind, MovementKind::kJump);
+  EXPECT_EQ(library->groups[4].examples.size(), 5u);
+  for (std::size_t g = 0; g < 2; ++g) {
+    for (const RawExample& example : library->groups[g].examples) {
+      EXPECT_EQ(example.heading_change_rad, 0.0);
+      // A row of straight steps does not veer: each ends on the line it started on, but for those
+      // too short to tell their direction.
+      const Vec3 end = example.clip.root_positions_m.back();
+      EXPECT_NEAR(end.x, 0.0, end.z > 0.3f ? 1e-4 : 0.05) << example.source;
+    }
+  }
+  const DVec3 feet = FootVector(library->skeleton, library->stand_pose, Foot::kLeft, 0.0);
+  EXPECT_NEAR(feet.z, 0.0, 0.06);
+  EXPECT_NEAR(library->stand_pose.root_position_m.y, 1.0, 0.03);
+}
+
+}  // namespace
+}  // namespace stridewire

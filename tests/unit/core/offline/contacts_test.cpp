@@ -1,0 +1,139 @@
+#include "stridewire/offline/contacts.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+namespace stridewire {
+namespace {
+
+constexpr double kFps = 120.0;
+
+// Tracks of a standing figure; tests then move a foot.
+BodyTracks StandingTracks(int frames) {
+  BodyTracks tracks;
+  tracks.frames = {0, frames};
+  tracks.fps = kFps;
+  const auto count = static_cast<std::size_t>(frames);
+  for (int f = 0; f < 2; ++f) {
+    const double x = f == 0 ? 0.1 : -0.1;
+    tracks.feet[f].ankle_m.assign(count, DVec3(x, 0.09, 0.0));
+    tracks.feet[f].ball_m.assign(count, DVec3(x, 0.04, 0.12));
+    tracks.feet[f].toe_tip_m.assign(count, DVec3(x, 0.03, 0.2));
+  }
+  tracks.pelvis_m.assign(count, DVec3(0.0, 0.95, 0.0));
+  tracks.pelvis_speed_m_s.assign(count, 0.0);
+  tracks.pelvis_yaw_rad.assign(count, 0.0);
+  return tracks;
+}
+
+// Adds `offset(i)` to all points of a foot.
+template <typename Offset>
+void Move(BodyTracks::FootTrack& foot, Offset offset) {
+  for (auto* points : {&foot.ankle_m, &foot.ball_m, &foot.toe_tip_m}) {
+    for (std::size_t i = 0; i < points->size(); ++i) (*points)[i] += offset(static_cast<int>(i));
+  }
+}
+
+// 0.6 m ahead at constant speed during [begin, end), lifted by `lift_m`.
+auto Swing(int begin, int end, double lift_m) {
+  return [=](int i) {
+    const double u = std::clamp(static_cast<double>(i - begin) / (end - begin), 0.0, 1.0);
+    return DVec3(0.0, lift_m * std::sin(std::numbers::pi * u), 0.6 * u);
+  };
+}
+
+TEST(FindContacts, SplitsAStandAtASwing) {
+  BodyTracks tracks = StandingTracks(240);
+  Move(tracks.feet[0], Swing(100, 150, 0.1));
+  const FootContacts contacts = FindContacts(tracks);
+  EXPECT_TRUE(contacts.single_floor);
+  ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
+  EXPECT_EQ(contacts.foot(Foot::kLeft)[0].frames.begin, 0);
+  EXPECT_NEAR(contacts.foot(Foot::kLeft)[0].frames.end, 100, 3);
+  EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].frames.begin, 150, 3);
+  EXPECT_EQ(contacts.foot(Foot::kLeft)[1].frames.end, 240);
+  EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].ball_height_m, 0.04, 1e-9);
+  ASSERT_EQ(contacts.foot(Foot::kRight).size(), 1u);
+  EXPECT_EQ(contacts.foot(Foot::kRight)[0].frames, (FrameRange{0, 240}));
+}
+
+TEST(FindContacts, OnePointIsEnough) {
+  // The foot rolls over the toes: ankle and ball rise and move, the tip stays.
+  BodyTracks tracks = StandingTracks(120);
+  for (std::size_t i = 60; i < 120; ++i) {
+    const double moved = (static_cast<double>(i) - 60.0) / kFps * 2.0;
+    tracks.feet[1].ankle_m[i] += DVec3(0.0, moved, moved);
+    tracks.feet[1].ball_m[i] += DVec3(0.0, moved, moved);
+  }
+  const FootContacts contacts = FindContacts(tracks);
+  ASSERT_EQ(contacts.foot(Foot::kRight).size(), 1u);
+  EXPECT_EQ(contacts.foot(Foot::kRight)[0].frames, (FrameRange{0, 120}));
+}
+
+TEST(FindContacts, SlowButHighIsNoContactOnASingleFloor) {
+  // Held still 20 cm up for a quarter of a second: lifted, not standing.
+  BodyTracks tracks = StandingTracks(360);
+  Move(tracks.feet[0], [](int i) {
+    if (i < 100 || i >= 170) return DVec3(0.0);
+    const double ramp = std::min({(i - 100) / 20.0, (170 - i) / 20.0, 1.0});
+    return DVec3(0.0, 0.2 * ramp, 0.0);
+  });
+  const FootContacts contacts = FindContacts(tracks);
+  EXPECT_TRUE(contacts.single_floor);
+  ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
+}
+
+TEST(FindContacts, DropsTheHeightTestOnBlocks) {
+  // Steps onto a block of 30 cm and stays there.
+  BodyTracks tracks = StandingTracks(360);
+  Move(tracks.feet[0], [](int i) {
+    const double u = std::clamp((i - 100) / 40.0, 0.0, 1.0);
+    return DVec3(0.0, 0.3 * u, 0.4 * u);
+  });
+  const FootContacts contacts = FindContacts(tracks);
+  EXPECT_FALSE(contacts.single_floor);
+  ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
+  EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].frames.begin, 140, 4);
+  EXPECT_NEAR(contacts.foot(Foot::kLeft)[1].ball_height_m, 0.34, 1e-6);
+}
+
+TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {
+  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot rests for five
+  // frames (42 ms) in a long swing: no contact.
+  BodyTracks tracks = StandingTracks(400);
+  Move(tracks.feet[0], [](int i) { return DVec3(0.0, 0.0, i >= 50 && i < 53 ? 0.05 : 0.0); });
+  Move(tracks.feet[1], [](int i) {
+    const int moving = std::clamp(i - 200, 0, 40) + std::clamp(i - 245, 0, 40);
+    return DVec3(0.0, 0.0, 0.02 * moving);
+  });
+  ContactOptions options;
+  options.smooth_s = 0.0;
+  const FootContacts contacts = FindContacts(tracks, options);
+  EXPECT_EQ(contacts.foot(Foot::kLeft).size(), 1u);
+  ASSERT_EQ(contacts.foot(Foot::kRight).size(), 2u);
+  EXPECT_NEAR(contacts.foot(Foot::kRight)[0].frames.end, 200, 2);
+  EXPECT_NEAR(contacts.foot(Foot::kRight)[1].frames.begin, 285, 2);
+}
+
+TEST(FindContacts, ThereIsNoneWithoutFrames) {
+  const FootContacts contacts = FindContacts(StandingTracks(0));
+  EXPECT_TRUE(contacts.foot(Foot::kLeft).empty());
+  EXPECT_TRUE(contacts.foot(Foot::kRight).empty());
+}
+
+TEST(SmoothPath, KeepsLinesAndLengths) {
+  std::vector<DVec3> line;
+  for (int i = 0; i < 20; ++i) line.emplace_back(i, 2.0 * i, -i);
+  const std::vector<DVec3> smooth = SmoothPath(line, 5);
+  ASSERT_EQ(smooth.size(), line.size());
+  for (std::size_t i = 2; i + 2 < line.size(); ++i) {
+    EXPECT_NEAR(glm::length(smooth[i] - line[i]), 0.0, 1e-9) << i;
+  }
+  const std::vector<double> speed = PathSpeed(line, 10.0);
+  for (const double s : speed) EXPECT_NEAR(s, 10.0 * std::sqrt(6.0), 1e-9);
+}
+
+}  // namespace
+}  // namespace stridewire

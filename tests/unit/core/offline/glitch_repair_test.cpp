@@ -1,0 +1,114 @@
+#include "stridewire/offline/glitch_repair.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "synthetic_walker.h"
+
+namespace stridewire {
+namespace {
+
+// A walking figure and one of its joints. The true motion is smooth.
+struct Figure {
+  Capture capture = SyntheticWalker{}.Walk({{Foot::kLeft, 0.5}, {Foot::kRight, 0.6}});
+  int joint = 0;
+
+  explicit Figure(const char* name) : joint(capture.skeleton.FindJoint(name)) {}
+  Quat& At(int frame) {
+    return capture.clip.frame(frame).rotations[static_cast<std::size_t>(joint)];
+  }
+  GlitchReport Repair() {
+    return RepairGlitches(capture.skeleton, capture.first_frame, capture.clip);
+  }
+};
+
+TEST(RepairGlitches, LeavesSmoothMotionAlone) {
+  Figure figure("LeftLeg");
+  const Clip before = figure.capture.clip;
+  const GlitchReport report = figure.Repair();
+  EXPECT_TRUE(report.repaired.empty());
+  EXPECT_TRUE(report.left.empty());
+  EXPECT_TRUE(before.rotations == figure.capture.clip.rotations);
+}
+
+TEST(RepairGlitches, InterpolatesOverAFlipOfAFrameOrTwo) {
+  for (const int bad : {1, 2, 3}) {
+    Figure figure("LeftLeg");
+    const Clip truth = figure.capture.clip;
+    for (int f = 100; f < 100 + bad; ++f) figure.At(f) = figure.At(f) * YawRotation(1.2);
+    const GlitchReport report = figure.Repair();
+    ASSERT_EQ(report.repaired.size(), 1u) << bad;
+    EXPECT_EQ(report.repaired[0].joint, figure.joint);
+    EXPECT_EQ(report.repaired[0].frames, (FrameRange{100, 100 + bad}));
+    EXPECT_NEAR(report.repaired[0].angle_rad, 1.2, 0.1);
+    EXPECT_TRUE(report.left.empty());
+    for (int f = 95; f < 110; ++f) {
+      EXPECT_LT(LargestJointAngle(truth.frame(f), figure.capture.clip.frame(f)), 0.02) << f;
+    }
+  }
+}
+
+TEST(RepairGlitches, ReplacesBadFramesAtTheEnds) {
+  Figure figure("LeftArm");
+  const int end = figure.capture.clip.frame_count();
+  for (const int f : {0, 1, end - 1}) figure.At(f) = YawRotation(1.6);
+  const GlitchReport report = figure.Repair();
+  EXPECT_EQ(report.repaired.size(), 2u);
+  EXPECT_TRUE(report.left.empty());
+  for (int f = 0; f < end; ++f) EXPECT_LT(AngleBetween(figure.At(f), kIdentityQuat), 1e-3) << f;
+}
+
+TEST(RepairGlitches, DoesNotLookBeforeTheFirstFrame) {
+  Figure figure("LeftArm");
+  figure.capture.first_frame = 1;
+  figure.At(0) = YawRotation(1.6);  // As the artificial T-pose of a recording
+  EXPECT_TRUE(figure.Repair().repaired.empty());
+  EXPECT_NEAR(AngleBetween(figure.At(0), YawRotation(1.6)), 0.0, 1e-3);
+}
+
+TEST(RepairGlitches, SpreadsALastingSmallJump) {
+  Figure figure("LeftArm");
+  for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(0.6);
+  const GlitchReport report = figure.Repair();
+  EXPECT_EQ(report.repaired.size(), 1u);
+  EXPECT_TRUE(report.left.empty());
+  for (int f = 90; f < 110; ++f) {
+    EXPECT_LT(AngleBetween(figure.At(f), figure.At(f + 1)), 0.1) << f;
+  }
+  EXPECT_LT(AngleBetween(figure.At(90), kIdentityQuat), 1e-3);
+  EXPECT_LT(AngleBetween(figure.At(110), YawRotation(0.6)), 1e-3);
+}
+
+TEST(RepairGlitches, SpreadsAnyJumpAtTheEndOfALimb) {
+  Figure figure("LeftToeBase");
+  for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(2.5);
+  const GlitchReport report = figure.Repair();
+  EXPECT_EQ(report.repaired.size(), 1u);
+  EXPECT_TRUE(report.left.empty());
+}
+
+TEST(RepairGlitches, ReportsALastingLargeJumpOfALimb) {
+  Figure figure("LeftArm");  // 60 cm of arm hang on it
+  for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(1.6);
+  const GlitchReport report = figure.Repair();
+  EXPECT_TRUE(report.repaired.empty());
+  ASSERT_EQ(report.left.size(), 1u);
+  EXPECT_EQ(DescribeFlip(figure.capture.skeleton, report.left[0], 120.0),
+            "LeftArm turns 92 degrees at once at 0.83 s");
+}
+
+TEST(RepairGlitches, TellsOncePerJoint) {
+  Figure figure("LeftLeg");
+  for (const int f : {60, 90, 130}) figure.At(f) = figure.At(f) * YawRotation(f == 90 ? 1.2 : 0.8);
+  const GlitchReport report = figure.Repair();
+  EXPECT_EQ(report.repaired.size(), 3u);
+  const std::vector<std::string> told =
+      DescribeRepairs(figure.capture.skeleton, report, figure.capture.clip.fps);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_THAT(told[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
+                                        ::testing::HasSubstr("0.75 s"),
+                                        ::testing::EndsWith("as 2 smaller flips of it")));
+}
+
+}  // namespace
+}  // namespace stridewire
