@@ -8,7 +8,7 @@
 namespace stridewire::builtin {
 namespace {
 
-constexpr double kClearanceM = 0.015;
+constexpr double kClearanceM = 0.017;  // 15 mm, and what blending takes off it
 constexpr double kLiftStepM = 0.004;
 constexpr double kLeastLiftM = -0.08;
 constexpr double kMostLiftM = 0.30;
@@ -162,7 +162,7 @@ void FootPaths::RaiseSwingUntilClear() {
       const DVec3 ball = place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, kBallAheadOfAnkleM);
       const double tip = (ball + toes * DVec3(0.0, 0.0, kToeM)).y;
       if (i >= 30 && (heel < kClearanceM || ball.y < kClearanceM)) return false;
-      if (tip < (i >= 30 ? kClearanceM : 0.0)) return false;
+      if (tip < (i >= 50 ? kClearanceM : i >= 30 ? 0.012 : 0.0)) return false;
     }
     return true;
   };

@@ -42,13 +42,16 @@ GaitState MakeGaitState(double length_m) {
   state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   state.strike_pitch_rad = 22.0 * kDegree * Tanh(length_m / 0.5);
-  state.toe_off_pitch_rad = 68.0 * kDegree * Tanh(length_m / 0.5);
+  // Between 68 tanh(L / 0.5) and what keeps the poses of blended lengths nearest to their own.
+  const Curve toe_off_deg({{0.0, 0.0}, {0.35, 30.0}, {0.55, 54.0}, {0.75, 61.5}, {0.9, 64.5}});
+  state.toe_off_pitch_rad = toe_off_deg.At(length_m) * kDegree;
   state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
   // Straight legs reach less high when the feet are apart.
   // Legs reach less high when the feet are apart; knees bend a little more than they must.
-  const Curve drop({{0.0, 0.0}, {0.35, 0.010}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});
+  const Curve drop({{0.0, 0.0}, {0.35, 0.003}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});
   state.pelvis_drop_m = drop.At(length_m);
-  state.pelvis_ahead_m = 0.02 + (0.661 - 0.02 / 0.75) * length_m;
+  const Curve ahead({{0.0, 0.02}, {0.35, 0.240}, {0.55, 0.405}, {0.75, 0.4955}, {0.9, 0.59}});
+  state.pelvis_ahead_m = ahead.At(length_m);
   // Peak to peak 7.0 cm at 0.7 m/s, 3.9 cm at 1.6 m/s (Orendurff et al. 2004).
   state.sway_m = 0.5 * (0.070 - (mean_speed - 0.7) / 0.9 * 0.031);
   return state;

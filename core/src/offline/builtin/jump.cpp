@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kGravity = 9.81;
 constexpr double kCrouchS = 0.45, kPushS = 0.28, kAbsorbS = 0.35, kStandUpS = 0.45;
-constexpr double kToeOffKneeRad = 16.0 * kDegree;
+constexpr double kToeOffKneeRad = 24.0 * kDegree;
 
 /// A jump over a length, as curves of time.
 class JumpPath {
@@ -51,7 +51,7 @@ class JumpPath {
       PlanFeet();
       PlanCentre();
       lower_m = toe_off_centre_.y -
-                CentreHeightAtKnee(landing_s(), landing_z(), (26.0 + 8.0 * length_m_) * kDegree);
+                CentreHeightAtKnee(landing_s(), landing_z(), (28.0 + 6.0 * length_m_) * kDegree);
     }
     PlanFlight();
   }
@@ -73,12 +73,13 @@ class JumpPath {
     const double rise = 0.06 + 0.10 * length_m_;
     const double up = std::sqrt(2.0 * kGravity * rise);
     const double flight = (up + std::sqrt(up * up + 2.0 * kGravity * lower_m)) / kGravity;
-    velocity_.y = up;
     times_[0] = 0.0;
     const std::array lengths = {kCrouchS, kPushS, flight, kAbsorbS, kStandUpS};
     for (std::size_t i = 0; i < lengths.size(); ++i)
       times_[i + 1] = times_[i] + ToWholeFrames(lengths[i]);
     for (double& time_s : times_) time_s = ToWholeFrames(time_s);
+    const double flight_s = landing_s() - toe_off_s();
+    velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;  // so rounded, still that low
   }
 
   void PlanBody() {
@@ -147,7 +148,7 @@ class JumpPath {
     const double absorb_s = absorbed_s() - landing_s();
     const double absorb_m = 0.045 - 0.05 * falling;
     centre_y_after_ = Curve({{landing_s(), landing_y, falling},
-                             {landing_s() + 0.35 * absorb_s, landing_y - 0.72 * absorb_m},
+                             {landing_s() + 0.35 * absorb_s, landing_y - 0.66 * absorb_m},
                              {absorbed_s(), landing_y - absorb_m, 0.0},
                              {end_s(), rest.y, 0.0}});
     centre_z_after_ = Curve({{landing_s(), landing_z(), velocity_.z},
@@ -163,9 +164,9 @@ class JumpPath {
     const double flight_s = landing_s() - toe_off_s();
     const double tucked = std::min(leave.length_m, land.length_m) - 0.03 - 0.07 * length_m_;
     leg_length_ = Curve(
-        {{0.0, leave.length_m, flight_s * std::min(0.3, (leave.length_m - before.length_m) / h)},
+        {{0.0, leave.length_m, flight_s * std::min(0.8, (leave.length_m - before.length_m) / h)},
          {0.55, tucked, 0.0},
-         {1.0, land.length_m, flight_s * std::max(-0.3, (after.length_m - land.length_m) / h)}});
+         {1.0, land.length_m, flight_s * std::max(-1.5, (after.length_m - land.length_m) / h)}});
     leg_angle_ = Curve({{0.0, leave.angle_rad, flight_s * (leave.angle_rad - before.angle_rad) / h},
                         {1.0, land.angle_rad, flight_s * (after.angle_rad - land.angle_rad) / h}});
     const double strike = landing_pitch_.At(landing_s());
