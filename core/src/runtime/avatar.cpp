@@ -10,8 +10,10 @@
 namespace stridewire {
 namespace {
 
-// Feet this far from where the stand pose has them are not a stand.
-constexpr double kFeetApartM = 0.12;
+// Feet this far from where the stand pose has them, forward or aside, are not a stand. Few libraries
+// have steps that bring feet together sideways, so a wide stand is left alone for longer.
+constexpr double kFeetApartForwardM = 0.12;
+constexpr double kFeetApartAsideM = 0.3;
 
 // A library may not reach a stand in one step from a long stride; after this many it stands as it is.
 constexpr int kMaxClosingSteps = 3;
@@ -205,7 +207,8 @@ void Avatar::FinishMovement() {
   if (IsStep(finished.kind)) {
     last_moved_ = MovingFoot(finished.kind);
     const DVec3 apart = feet_.left_from_right_m - stand_feet_.left_from_right_m;
-    is_walking_ = closing_steps_ < kMaxClosingSteps && std::hypot(apart.x, apart.z) > kFeetApartM;
+    is_walking_ = closing_steps_ < kMaxClosingSteps && (std::fabs(apart.z) > kFeetApartForwardM ||
+                                                        std::fabs(apart.x) > kFeetApartAsideM);
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,
