@@ -17,6 +17,7 @@ constexpr double kFeetApartAsideM = 0.3;
 
 // A library may not reach a stand in one step from a long stride; after this many it stands as it is.
 constexpr int kMaxClosingSteps = 3;
+constexpr double kClosingGainM = 0.03;  // a second one must be worth taking
 
 // Events one movement can add in a tick: started, two foot-strikes, finished, and the next started.
 constexpr std::size_t kEventReserve = 6;
@@ -127,6 +128,13 @@ void Avatar::Advance(double dt_s) {
   if (is_moving_) Evaluate(movement_time_s_);
 }
 
+bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
+  const int end_z = library_->group(plan.group).FindParameter(ParameterName::kEndZ);
+  if (end_z < 0) return false;
+  return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
+         std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
+}
+
 bool Avatar::StartNext() {
   const bool is_empty = queue_size() == 0;
   const bool next_is_step =
@@ -135,7 +143,7 @@ bool Avatar::StartNext() {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
-    if (plan) {
+    if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
       const int closing_steps = closing_steps_ + 1;
       StartPlan(*plan, 0);
       closing_steps_ = closing_steps;
