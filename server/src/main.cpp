@@ -1,0 +1,66 @@
+#include <csignal>
+#include <cstdio>
+#include <exception>
+
+#include "ops/command_line.h"
+#include "ops/libraries.h"
+#include "ops/logging.h"
+#include "ops/server.h"
+
+namespace {
+
+constexpr int kExitFailure = 1;
+constexpr int kExitBadInput = 2;
+
+int Complain(const stridewire::Error& error, int exit_code) {
+  std::fprintf(stderr, "stridewired: %s\n", stridewire::Describe(error).c_str());
+  return exit_code;
+}
+
+int Main(int argc, char** argv) {
+  using namespace stridewire::server;
+  using Action = CommandLine::Action;
+  const auto command = ReadCommandLine(argc, argv, SystemEnvironment);
+  if (!command) return Complain(command.error(), kExitBadInput);
+  if (command->action == Action::kPrintText || command->action == Action::kPrintConfig) {
+    const std::string text =
+        command->action == Action::kPrintText ? command->text : PrintConfig(command->config);
+    std::fputs(text.c_str(), stdout);
+    return 0;
+  }
+
+  auto libraries = Libraries::Load(command->config);
+  if (!libraries) return Complain(libraries.error(), kExitBadInput);
+  if (command->action == Action::kCheckConfig) {
+    std::puts("the configuration is good");
+    return 0;
+  }
+
+  std::signal(SIGPIPE, SIG_IGN);
+  StartLog(command->config.log_level);
+  int exit_code = 0;
+  {
+    Server server(command->config, *std::move(libraries));
+    server.WatchSignals();
+    if (const auto status = server.Start(); !status) {
+      exit_code = Complain(status.error(), kExitFailure);
+    } else {
+      std::printf("%s\n", server.ReadyLine().c_str());
+      std::fflush(stdout);
+      if (!server.Run()) exit_code = kExitFailure;
+    }
+  }
+  EndLog();
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Main(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "stridewired: %s\n", error.what());
+    return kExitFailure;
+  }
+}

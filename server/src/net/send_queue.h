@@ -1,0 +1,83 @@
+#pragma once
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <vector>
+
+#include "net/shared_frame.h"
+#include "world/mail.h"
+
+namespace stridewire::server {
+
+/// What waits to be sent over one connection: control messages in order, and of poses the latest.
+///
+///   control   [Reply][Events][Pong]…                     a budget of bytes
+///   lane      world 1, quantised, shard 0: [tick 7][tick 8]   a backlog of ticks; a new tick
+///   lane      world 1, quantised, shard 1: [tick 7]           drives out the oldest
+///
+/// Control goes first, but every write also takes poses, so neither starves the other. Memory is
+/// bounded: control by its budget (events beyond it are refused; replies are bounded by whoever
+/// stops reading commands), poses by lanes times backlog, in frames that all observers share.
+class SendQueue {
+ public:
+  SendQueue(std::size_t control_budget_bytes, int backlog_ticks);
+
+  /// Always taken. The caller keeps an eye on control_bytes().
+  void PushControl(SharedFrame frame);
+
+  /// False, and not taken, when it would exceed the control budget.
+  [[nodiscard]] bool PushEvents(SharedFrame frame);
+
+  /// Takes a batch; returns how many frames of older ones it drove out.
+  [[nodiscard]] std::size_t PushPoses(const PoseDelivery& delivery);
+
+  /// Forgets the poses of a world, or of all.
+  void DropPoses(WorldId world, protocol::PoseMode mode);
+  void DropAllPoses();
+
+  /// What one write takes, in the order to be sent.
+  struct Gathered {
+    std::vector<SharedFrame> frames;
+    std::size_t bytes = 0;
+    std::uint64_t poses = 0;
+    std::uint64_t batches = 0;
+    void clear();
+  };
+
+  /// Moves frames to `out`, which is cleared first: control until `max_bytes`, then poses until
+  /// `max_bytes` more, lane after lane; of either at least one frame that waits.
+  void Gather(std::size_t max_bytes, Gathered& out);
+
+  [[nodiscard]] bool empty() const { return control_.empty() && waiting_batches_ == 0; }
+  [[nodiscard]] bool control_empty() const { return control_.empty(); }
+  [[nodiscard]] std::size_t control_bytes() const { return control_bytes_; }
+  [[nodiscard]] std::size_t waiting_batches() const { return waiting_batches_; }
+
+ private:
+  struct LaneKey {
+    WorldId world = 0;
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
+    int shard = 0;
+    auto operator<=>(const LaneKey&) const = default;
+  };
+  struct Batch {
+    std::vector<SharedFrame> parts;
+    std::size_t next_part = 0;
+    std::uint64_t avatars = 0;
+    [[nodiscard]] std::size_t left() const { return parts.size() - next_part; }
+  };
+  using Lane = std::deque<Batch>;
+
+  std::size_t control_budget_bytes_;
+  std::size_t backlog_ticks_;
+  std::deque<SharedFrame> control_;
+  std::size_t control_bytes_ = 0;
+  std::map<LaneKey, Lane> lanes_;
+  std::size_t waiting_batches_ = 0;
+  LaneKey last_lane_;  // where the last gathering stopped
+};
+
+}  // namespace stridewire::server

@@ -1,0 +1,319 @@
+#include "ops/config.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <thread>
+
+#include "stridewire/protocol/limits.h"
+#include "stridewire/runtime/avatar.h"
+
+namespace stridewire::server {
+namespace {
+
+constexpr int kMaxShards = 64;
+
+template <typename T>
+bool ParseWhole(std::string_view text, T& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+std::string NumberText(double value) {
+  char buffer[32];
+  const auto result = std::to_chars(buffer, buffer + sizeof(buffer), value);
+  std::string text(buffer, result.ptr);
+  // TOML tells floats from integers; both are taken for these keys, but say what it is.
+  if (text.find_first_of(".e") == std::string::npos) text += ".0";
+  return text;
+}
+
+ConfigKey Text(const char* name, const char* help, std::string Config::* member,
+               Status (*check)(std::string_view) = nullptr) {
+  return {.name = name,
+          .section = "",
+          .help = help,
+          .is_text = true,
+          .set = [member, check](Config& config, std::string_view text) -> Status {
+            if (check != nullptr) {
+              if (Status status = check(text); !status) return status;
+            }
+            config.*member = std::string(text);
+            return {};
+          },
+          .get = [member](const Config& config) { return config.*member; }};
+}
+
+ConfigKey Address(const char* name, const char* help, Endpoint Config::* member) {
+  return {.name = name,
+          .section = "",
+          .help = help,
+          .is_text = true,
+          .set = [member](Config& config, std::string_view text) -> Status {
+            auto endpoint = ParseEndpoint(text);
+            if (!endpoint) return std::unexpected(endpoint.error());
+            config.*member = *std::move(endpoint);
+            return {};
+          },
+          .get = [member](const Config& config) { return ToText(config.*member); }};
+}
+
+ConfigKey Flag(const char* name, const char* help, bool Config::* member) {
+  return {.name = name,
+          .section = "",
+          .help = help,
+          .is_flag = true,
+          .set = [member](Config& config, std::string_view text) -> Status {
+            if (text == "true" || text == "1") {
+              config.*member = true;
+            } else if (text == "false" || text == "0") {
+              config.*member = false;
+            } else {
+              return Fail(ErrorCode::kInvalidArgument, "expected true or false");
+            }
+            return {};
+          },
+          .get = [member](const Config& config) { return config.*member ? "true" : "false"; }};
+}
+
+// A number of `Owner`, which is Config or its Limits.
+template <typename Owner, typename T>
+ConfigKey Number(const char* name, const char* help, T Owner::* member, T min, T max) {
+  constexpr bool kIsLimit = std::is_same_v<Owner, Limits>;
+  const auto owner = []<typename C>(C& config) -> auto& {
+    if constexpr (kIsLimit) {
+      return config.limits;
+    } else {
+      return config;
+    }
+  };
+  return {.name = name,
+          .section = kIsLimit ? "limits" : "",
+          .help = fmt::format("{} ({} to {})", help, min, max),
+          .set = [=](Config& config, std::string_view text) -> Status {
+            T value{};
+            if (!ParseWhole(text, value)) {
+              return Fail(ErrorCode::kInvalidArgument, std::is_same_v<T, double>
+                                                           ? "expected a number"
+                                                           : "expected a whole number");
+            }
+            // A range that excludes NaN as well.
+            if (!(value >= min && value <= max)) {
+              return Fail(ErrorCode::kOutOfRange, "number is outside its range");
+            }
+            owner(config).*member = value;
+            return {};
+          },
+          .get =
+              [=](const Config& config) {
+                if constexpr (std::is_same_v<T, double>) {
+                  return NumberText(owner(config).*member);
+                } else {
+                  return std::to_string(owner(config).*member);
+                }
+              }};
+}
+
+Status CheckLogLevel(std::string_view text) {
+  constexpr std::array kLevels = {"trace", "debug", "info", "warning", "error", "off"};
+  if (std::ranges::find(kLevels, text) != kLevels.end()) return {};
+  return Fail(ErrorCode::kInvalidArgument, "expected trace, debug, info, warning, error or off");
+}
+
+Status CheckNotEmpty(std::string_view text) {
+  if (!text.empty()) return {};
+  return Fail(ErrorCode::kInvalidArgument, "expected a file or 'builtin'");
+}
+
+std::vector<ConfigKey> MakeKeys() {
+  constexpr std::size_t kMiB = std::size_t{1} << 20;
+  std::vector<ConfigKey> keys = {
+      Address("listen", "Where clients connect, HOST:PORT; port 0: any", &Config::listen),
+      Address("http", "Where metrics and health are, HOST:PORT", &Config::http),
+      Flag("http_enabled", "Serve HTTP at all", &Config::http_enabled),
+      Text("library", "Library of worlds that name none: a .swl file or builtin", &Config::library,
+           CheckNotEmpty),
+      Text("data_dir", "Reserved for stored worlds; nothing is written yet", &Config::data_dir),
+      Number("tick_hz", "Ticks a second", &Config::tick_hz, 1.0, 1000.0),
+      Number("shards", "Threads that advance avatars; 0: one a processor", &Config::shards, 0,
+             kMaxShards),
+      Number("max_catch_up_ticks", "Missed ticks whose animation time is made up for",
+             &Config::max_catch_up_ticks, 0, 1000),
+      Flag("allow_insecure", "Listen beyond this machine without tokens and TLS",
+           &Config::allow_insecure),
+      Flag("open_worlds", "Worlds the file does not name come into being when joined",
+           &Config::open_worlds),
+      Flag("persistent", "Avatars outlive the session that spawned them", &Config::persistent),
+      Text("log_level", "trace, debug, info, warning, error or off", &Config::log_level,
+           CheckLogLevel),
+      Number("drain_timeout_s", "How long a drain waits for clients to take what is theirs",
+             &Config::drain_timeout_s, 0.0, 600.0),
+  };
+  const auto limit = [&]<typename T>(const char* name, const char* help, T Limits::* member, T min,
+                                     T max) {
+    keys.push_back(Number(name, help, member, min, max));
+  };
+  limit("max_control_bytes", "Payload of a small message", &Limits::max_control_bytes,
+        std::size_t{1024}, protocol::kMaxControlBytes);
+  limit("max_bulk_bytes", "Payload of a crowd's message or a batch", &Limits::max_bulk_bytes,
+        std::size_t{64 * 1024}, protocol::kMaxBulkBytes);
+  limit("max_handshakes", "Connections that have not said Hello yet", &Limits::max_handshakes, 1,
+        65'536);
+  limit("max_sessions", "Sessions", &Limits::max_sessions, 1, 65'536);
+  limit("max_sessions_per_address", "Sessions and handshakes of one address",
+        &Limits::max_sessions_per_address, 1, 65'536);
+  limit("handshake_timeout_s", "From accept to a whole Hello", &Limits::handshake_timeout_s, 0.05,
+        600.0);
+  limit("idle_timeout_s", "Silence after which a connection is closed; 0: never",
+        &Limits::idle_timeout_s, 0.0, 86'400.0);
+  limit("write_timeout_s", "A client that takes no byte for so long is disconnected",
+        &Limits::write_timeout_s, 0.05, 86'400.0);
+  limit("resume_window_s", "How long a session waits for its client; 0: not at all",
+        &Limits::resume_window_s, 0.0, 86'400.0);
+  limit("max_worlds", "Worlds", &Limits::max_worlds, 1, 65'536);
+  limit("max_worlds_per_session", "Worlds one session is in", &Limits::max_worlds_per_session, 1,
+        65'536);
+  limit("max_subscriptions", "Subscriptions of one session", &Limits::max_subscriptions, 1, 65'536);
+  limit("max_avatars", "Avatars in all worlds", &Limits::max_avatars, 1, 10'000'000);
+  limit("max_avatars_per_world", "Avatars in one world", &Limits::max_avatars_per_world, 1,
+        10'000'000);
+  limit("max_queue", "Requests waiting for one avatar", &Limits::max_queue, 1, Avatar::kMaxQueue);
+  limit("requests_per_s", "Items of commands one session may send a second",
+        &Limits::requests_per_s, 1, 100'000'000);
+  limit("request_burst", "Items one session may send at once", &Limits::request_burst, 1,
+        100'000'000);
+  limit("messages_per_s", "Messages of one session a second; beyond, reading pauses",
+        &Limits::messages_per_s, 1, 100'000'000);
+  limit("max_pending_commands", "Commands of one session not answered yet; beyond, reading pauses",
+        &Limits::max_pending_commands, 1, static_cast<int>(protocol::kReplyMemory));
+  limit("control_buffer_bytes", "Waiting for one session, poses apart",
+        &Limits::control_buffer_bytes, std::size_t{64 * 1024}, 1024 * kMiB);
+  limit("observer_backlog_ticks", "Batches kept for a slow observer, per world, mode and shard",
+        &Limits::observer_backlog_ticks, 1, 1000);
+  limit("reply_memory_bytes", "Replies remembered for one session", &Limits::reply_memory_bytes,
+        std::size_t{4096}, 1024 * kMiB);
+  limit("event_replay_bytes", "Events kept for a session without connection",
+        &Limits::event_replay_bytes, std::size_t{0}, 1024 * kMiB);
+  limit("socket_send_buffer_bytes", "SO_SNDBUF of a connection; 0: the system's choice",
+        &Limits::socket_send_buffer_bytes, std::size_t{0}, 64 * kMiB);
+  limit("max_http_connections", "HTTP connections", &Limits::max_http_connections, 1, 65'536);
+  return keys;
+}
+
+std::string Quoted(std::string_view text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') {
+      quoted += '\\';
+      quoted += c;
+    } else if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+      quoted += fmt::format("\\u{:04x}", static_cast<unsigned char>(c));
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + '"';
+}
+
+}  // namespace
+
+int Config::shard_count() const {
+  if (shards > 0) return shards;
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxShards);
+}
+
+std::string ConfigKey::option() const {
+  std::string text = "--" + name;
+  std::ranges::replace(text, '_', '-');
+  return text;
+}
+
+std::string ConfigKey::environment() const {
+  std::string text = "STRIDEWIRE_" + name;
+  std::ranges::transform(text, text.begin(), [](char c) {
+    return c >= 'a' && c <= 'z' ? static_cast<char>(c - 32) : c;
+  });
+  return text;
+}
+
+const std::vector<ConfigKey>& ConfigKeys() {
+  static const std::vector<ConfigKey> keys = MakeKeys();
+  return keys;
+}
+
+Expected<Endpoint> ParseEndpoint(std::string_view text) {
+  const auto colon = text.rfind(':');
+  if (colon == std::string_view::npos || colon == 0) {
+    return Fail(ErrorCode::kInvalidArgument, "expected HOST:PORT, such as 127.0.0.1:7420");
+  }
+  std::string_view host = text.substr(0, colon);
+  if (host.front() == '[' && host.back() == ']' && host.size() > 2) {
+    host = host.substr(1, host.size() - 2);
+  } else if (host.find_first_of(":[]") != std::string_view::npos) {
+    return Fail(ErrorCode::kInvalidArgument, "an IPv6 address stands in brackets: [::1]:7420");
+  }
+  int port = 0;
+  if (!ParseWhole(text.substr(colon + 1), port) || port < 0 || port > 65'535) {
+    return Fail(ErrorCode::kOutOfRange, "expected a port from 0 to 65535 after the last colon");
+  }
+  return Endpoint{std::string(host), static_cast<std::uint16_t>(port)};
+}
+
+std::string ToText(const Endpoint& endpoint) {
+  const bool is_v6 = endpoint.host.find(':') != std::string::npos;
+  return fmt::format("{}{}{}:{}", is_v6 ? "[" : "", endpoint.host, is_v6 ? "]" : "", endpoint.port);
+}
+
+bool IsLoopback(const Endpoint& endpoint) {
+  return endpoint.host == "localhost" || endpoint.host == "::1" ||
+         endpoint.host.starts_with("127.");
+}
+
+bool IsWorldName(std::string_view name) {
+  if (name.empty() || name.size() > protocol::kMaxNameBytes || name.front() == '.') return false;
+  return std::ranges::all_of(name, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+           c == '-' || c == '.';
+  });
+}
+
+Status CheckConfig(const Config& config) {
+  if (!IsLoopback(config.listen) && !config.allow_insecure) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "an address beyond this machine, without tokens or TLS anyone could command "
+                "avatars; say allow_insecure to do it all the same",
+                "listen: " + ToText(config.listen));
+  }
+  // Metrics tell little and nothing can be commanded over HTTP, but the same caution holds.
+  if (config.http_enabled && !IsLoopback(config.http) && !config.allow_insecure) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "an address beyond this machine without TLS; say allow_insecure to do it all the "
+                "same",
+                "http: " + ToText(config.http));
+  }
+  return {};
+}
+
+std::string PrintConfig(const Config& config) {
+  std::string text;
+  std::string section;
+  for (const ConfigKey& key : ConfigKeys()) {
+    if (key.section != section) {
+      section = key.section;
+      text += fmt::format("\n[{}]\n", section);
+    }
+    const std::string value = key.get(config);
+    text += fmt::format("{} = {}\n", key.name, key.is_text ? Quoted(value) : value);
+  }
+  for (const auto& [name, world] : config.worlds) {
+    text += fmt::format("\n[worlds.{}]\n", Quoted(name));
+    if (!world.library.empty()) text += fmt::format("library = {}\n", Quoted(world.library));
+    text += fmt::format("persistent = {}\n", world.persistent);
+  }
+  return text;
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,34 @@
+#include "ops/libraries.h"
+
+#include <set>
+
+#include "stridewire/offline/builtin_library.h"
+#include "stridewire/offline/library_builder.h"
+
+namespace stridewire::server {
+
+Expected<std::shared_ptr<const MotionLibrary>> LoadLibrary(const std::string& name) {
+  if (name == "builtin") return LibraryBuilder().Build(GenerateBuiltinLibrary());
+  return MotionLibrary::Open(name);
+}
+
+Expected<Libraries> Libraries::Load(const Config& config) {
+  std::set<std::string> names = {config.library};
+  for (const auto& [world, settings] : config.worlds) {
+    if (!settings.library.empty()) names.insert(settings.library);
+  }
+  Libraries libraries;
+  for (const std::string& name : names) {
+    auto library = LoadLibrary(name);
+    if (!library) return std::unexpected(library.error());
+    libraries.Add(name, *std::move(library));
+  }
+  return libraries;
+}
+
+std::shared_ptr<const MotionLibrary> Libraries::Find(const std::string& name) const {
+  const auto it = libraries_.find(name);
+  return it == libraries_.end() ? nullptr : it->second;
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,178 @@
+#include "ops/metrics.h"
+
+#include <prometheus/collectable.h>
+#include <prometheus/metric_family.h>
+#include <prometheus/text_serializer.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/base/version.h"
+
+namespace stridewire::server {
+namespace {
+
+using prometheus::ClientMetric;
+using prometheus::MetricFamily;
+using prometheus::MetricType;
+
+MetricFamily Simple(MetricType type, const char* name, const char* help, double value) {
+  MetricFamily family{name, help, type, {}};
+  ClientMetric metric;
+  (type == MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
+  family.metric.push_back(std::move(metric));
+  return family;
+}
+
+}  // namespace
+
+void TimeHistogram::Observe(double time_s) {
+  const auto bin = std::ranges::lower_bound(kUpperBoundsS, time_s) - kUpperBoundsS.begin();
+  const auto time_ns = static_cast<std::uint64_t>(std::llround(std::max(time_s, 0.0) * 1e9));
+  bins_[static_cast<std::size_t>(bin)].Add();
+  sum_ns_.Add(time_ns);
+  if (time_ns > max_ns_.value()) max_ns_.Set(time_ns);
+  // A reader may set this one back to 0 at the same time; then the larger value must survive.
+  std::uint64_t recent = recent_max_ns_.load(std::memory_order_relaxed);
+  while (recent < time_ns && !recent_max_ns_.compare_exchange_weak(recent, time_ns)) {
+  }
+}
+
+double TimeHistogram::TakeRecentMax() {
+  return 1e-9 * static_cast<double>(recent_max_ns_.exchange(0));
+}
+
+Metrics::Metrics(int shard_count) {
+  for (int i = 0; i <= shard_count; ++i) threads_.push_back(std::make_unique<ThreadMetrics>());
+}
+
+Metrics::~Metrics() = default;
+
+ThreadMetrics& Metrics::shard(int index) { return *threads_[static_cast<std::size_t>(index)]; }
+ThreadMetrics& Metrics::ops() { return *threads_.back(); }
+
+std::uint64_t Metrics::Sum(Count ThreadMetrics::* number) const {
+  std::uint64_t sum = 0;
+  for (const auto& thread : threads_) sum += ((*thread).*number).value();
+  return sum;
+}
+
+std::uint64_t Metrics::Sum(Limit limit) const {
+  std::uint64_t sum = 0;
+  for (const auto& thread : threads_) {
+    sum += thread->limits[static_cast<std::size_t>(limit)].value();
+  }
+  return sum;
+}
+
+std::string Metrics::Text() {
+  std::vector<MetricFamily> families;
+  const auto counter = [&](const char* name, const char* help, Count ThreadMetrics::* number) {
+    families.push_back(Simple(MetricType::Counter, name, help, static_cast<double>(Sum(number))));
+  };
+  const auto gauge = [&](const char* name, const char* help, double value) {
+    families.push_back(Simple(MetricType::Gauge, name, help, value));
+  };
+  const auto histogram = [&](const char* name, const char* help,
+                             TimeHistogram ThreadMetrics::* times) {
+    MetricFamily family{name, help, MetricType::Histogram, {}};
+    ClientMetric metric;
+    std::uint64_t cumulative = 0;
+    for (std::size_t i = 0; i <= TimeHistogram::kUpperBoundsS.size(); ++i) {
+      for (const auto& thread : threads_) cumulative += ((*thread).*times).bin(i);
+      const bool is_last = i == TimeHistogram::kUpperBoundsS.size();
+      metric.histogram.bucket.push_back(
+          {cumulative, is_last ? INFINITY : TimeHistogram::kUpperBoundsS[i]});
+    }
+    metric.histogram.sample_count = cumulative;
+    double max_s = 0.0;
+    double recent_max_s = 0.0;
+    for (const auto& thread : threads_) {
+      metric.histogram.sample_sum += ((*thread).*times).sum_s();
+      max_s = std::max(max_s, ((*thread).*times).max_s());
+      recent_max_s = std::max(recent_max_s, ((*thread).*times).TakeRecentMax());
+    }
+    family.metric.push_back(std::move(metric));
+    families.push_back(std::move(family));
+    const std::string base(name);
+    families.push_back(Simple(MetricType::Gauge, (base + "_max").c_str(),
+                              "The largest of these since the server started.", max_s));
+    families.push_back(Simple(MetricType::Gauge, (base + "_max_since_scrape").c_str(),
+                              "The largest of these since this page was last read.", recent_max_s));
+  };
+
+  gauge("stridewire_avatars", "Avatars that live.",
+        static_cast<double>(Sum(&ThreadMetrics::avatars)));
+  gauge("stridewire_worlds", "Worlds that exist.", static_cast<double>(worlds_.value()));
+  const auto attached = static_cast<double>(Sum(&ThreadMetrics::sessions_attached));
+  const auto detached = static_cast<double>(Sum(&ThreadMetrics::sessions_detached));
+  gauge("stridewire_sessions", "Sessions, connected or waiting for their client.",
+        attached + detached);
+  gauge("stridewire_sessions_detached", "Sessions waiting for their client to come back.",
+        detached);
+
+  counter("stridewire_ticks_total", "Ticks done, over all shards.", &ThreadMetrics::ticks);
+  counter("stridewire_ticks_missed_total", "Ticks whose time passed without one, over all shards.",
+          &ThreadMetrics::ticks_missed);
+  counter("stridewire_ticks_slipped_total",
+          "Missed ticks whose animation time was lost as well (a stall).",
+          &ThreadMetrics::ticks_slipped);
+  histogram("stridewire_tick_seconds", "Time a shard's tick took.", &ThreadMetrics::tick);
+  histogram("stridewire_tick_late_seconds", "How long after it was due a tick began.",
+            &ThreadMetrics::tick_late);
+
+  counter("stridewire_poses_encoded_total", "Poses encoded.", &ThreadMetrics::poses_encoded);
+  counter("stridewire_poses_sent_total", "Poses handed to observers' sockets.",
+          &ThreadMetrics::poses_sent);
+  counter("stridewire_pose_errors_total", "Poses that could not be encoded.",
+          &ThreadMetrics::pose_errors);
+  counter("stridewire_batches_sent_total", "Pose batches handed to observers' sockets.",
+          &ThreadMetrics::batches_sent);
+  counter("stridewire_batches_dropped_total", "Pose batches slow observers lost.",
+          &ThreadMetrics::batches_dropped);
+  counter("stridewire_events_dropped_total", "Events slow or absent sessions lost.",
+          &ThreadMetrics::events_dropped);
+  counter("stridewire_sent_bytes_total", "Bytes the system took for clients.",
+          &ThreadMetrics::bytes_sent);
+  counter("stridewire_received_bytes_total", "Bytes that came from clients.",
+          &ThreadMetrics::bytes_received);
+  counter("stridewire_messages_received_total", "Messages that came from clients.",
+          &ThreadMetrics::messages_received);
+  counter("stridewire_requests_accepted_total", "Movements asked for and queued.",
+          &ThreadMetrics::requests_accepted);
+  counter("stridewire_requests_rejected_total", "Movements asked for and refused.",
+          &ThreadMetrics::requests_rejected);
+  counter("stridewire_protocol_errors_total", "Connections closed for what they sent.",
+          &ThreadMetrics::protocol_errors);
+  counter("stridewire_connections_accepted_total", "Connections accepted.",
+          &ThreadMetrics::connections_accepted);
+  counter("stridewire_connections_closed_total", "Connections of sessions that ended.",
+          &ThreadMetrics::connections_closed);
+  counter("stridewire_sessions_opened_total", "Sessions begun.", &ThreadMetrics::sessions_opened);
+  counter("stridewire_sessions_resumed_total", "Sessions that went on over another connection.",
+          &ThreadMetrics::sessions_resumed);
+  counter("stridewire_sessions_ended_total", "Sessions ended.", &ThreadMetrics::sessions_ended);
+  counter("stridewire_http_requests_total", "HTTP requests answered.",
+          &ThreadMetrics::http_requests);
+
+  MetricFamily limits{
+      "stridewire_limit_reached_total", "How often a limit was reached.", MetricType::Counter, {}};
+  for (std::size_t i = 0; i < kLimitNames.size(); ++i) {
+    ClientMetric metric;
+    metric.label.push_back({"limit", std::string(kLimitNames[i])});
+    metric.counter.value = static_cast<double>(Sum(static_cast<Limit>(i)));
+    limits.metric.push_back(std::move(metric));
+  }
+  families.push_back(std::move(limits));
+
+  MetricFamily build{"stridewire_build_info", "Version of this build.", MetricType::Gauge, {}};
+  ClientMetric version;
+  version.label.push_back({"version", kVersion});
+  version.gauge.value = 1.0;
+  build.metric.push_back(std::move(version));
+  families.push_back(std::move(build));
+
+  return prometheus::TextSerializer().Serialize(families);
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,194 @@
+#include "ops/server.h"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/post.hpp>
+#include <csignal>
+#include <utility>
+
+#include "stridewire/base/version.h"
+
+namespace stridewire::server {
+
+namespace asio = boost::asio;
+
+Server::Server(Config config, Libraries libraries)
+    : config_(std::move(config)),
+      libraries_(std::move(libraries)),
+      metrics_(config_.shard_count()),
+      avatar_budget_(config_.limits.max_avatars_per_world, config_.limits.max_avatars),
+      worlds_(config_, libraries_),
+      sessions_(config_.limits, config_.shard_count()),
+      listener_(context_),
+      http_listener_(context_),
+      http_(config_.limits.max_http_connections, metrics_.ops()),
+      gate_(context_, config_.limits, metrics_.ops(), sessions_,
+            [this](int shard, Shard::Arrival arrival) {
+              shards_[static_cast<std::size_t>(shard)]->Adopt(std::move(arrival));
+            }),
+      signals_(context_),
+      housekeeping_timer_(context_),
+      drain_timer_(context_) {
+  for (int i = 0; i < config_.shard_count(); ++i) {
+    shards_.push_back(
+        std::make_unique<Shard>(i, config_, avatar_budget_, metrics_.shard(i), *this));
+  }
+}
+
+Server::~Server() {
+  // All threads end before any shard goes: they post to each other.
+  for (const auto& shard : shards_) shard->Stop();
+}
+
+Status Server::Start() {
+  if (Status status = listener_.Open(config_.listen, "listen"); !status) return status;
+  if (config_.http_enabled) {
+    if (Status status = http_listener_.Open(config_.http, "http"); !status) return status;
+    AddPages();
+    http_listener_.Start([this](auto socket) { http_.Accept(std::move(socket)); });
+  }
+  if (!IsLoopback(config_.listen)) {
+    spdlog::warn(
+        "listening on {} WITHOUT tokens and TLS: whoever can reach it can command every avatar",
+        ToText(config_.listen));
+  }
+  const TickClock clock(TickClock::Clock::now(), config_.tick_hz);
+  std::vector<Shard*> peers;
+  for (const auto& shard : shards_) peers.push_back(shard.get());
+  for (const auto& shard : shards_) shard->Prepare(clock, peers);
+  for (const auto& shard : shards_) shard->Start();
+  listener_.Start([this](auto socket) { gate_.Accept(std::move(socket)); });
+  ScheduleHousekeeping();
+  spdlog::info("stridewired {} ready: {} shards, {} Hz, library {} ({})", kVersion, shards_.size(),
+               config_.tick_hz, config_.library, libraries_.Find(config_.library)->hash());
+  return {};
+}
+
+std::string Server::ReadyLine() const {
+  return fmt::format("ready listen={} http={} library={} shards={}", ToText(listen_endpoint()),
+                     config_.http_enabled ? ToText(http_endpoint()) : "off", config_.library,
+                     shards_.size());
+}
+
+void Server::WatchSignals() {
+  signals_.add(SIGTERM);
+  signals_.add(SIGINT);
+  signals_.async_wait([this](const boost::system::error_code& error, int signal) {
+    if (error) return;
+    if (is_draining_) {
+      spdlog::warn("signal {} again: ending at once", signal);
+      Finish(false);
+      return;
+    }
+    spdlog::info("signal {}: draining", signal);
+    DoDrain();
+    WatchSignals();
+  });
+}
+
+bool Server::Run() {
+  context_.run();
+  for (const auto& shard : shards_) shard->Stop();
+  return was_drained_;
+}
+
+void Server::Drain() {
+  asio::post(context_, [this] { DoDrain(); });
+}
+
+void Server::Stop() {
+  asio::post(context_, [this] { Finish(false); });
+}
+
+void Server::DoDrain() {
+  if (is_draining_) return;
+  is_draining_ = true;
+  listener_.Close();
+  gate_.Close();
+  shards_to_drain_ = static_cast<int>(shards_.size());
+  for (const auto& shard : shards_) {
+    shard->Drain();
+    shard->WhenDrained([this] {
+      asio::post(context_, [this] {
+        if (--shards_to_drain_ == 0) Finish(true);
+      });
+    });
+  }
+  drain_timer_.expires_after(std::chrono::duration_cast<std::chrono::nanoseconds>(
+      std::chrono::duration<double>(config_.drain_timeout_s)));
+  drain_timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error) return;
+    spdlog::warn("some clients did not take what was theirs in {} s", config_.drain_timeout_s);
+    Finish(true);
+  });
+}
+
+void Server::Finish(bool is_drained) {
+  was_drained_ = is_drained;
+  context_.stop();
+}
+
+void Server::ScheduleHousekeeping() {
+  housekeeping_timer_.expires_after(std::chrono::milliseconds(500));
+  housekeeping_timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error) return;
+    for (const WorldId world : worlds_.DropEmpty()) spdlog::debug("world {} ends", world);
+    metrics_.set_world_count(worlds_.size());
+    ScheduleHousekeeping();
+  });
+}
+
+// ---- from the shards
+
+void Server::JoinWorld(int shard, SessionId session, protocol::Seq seq, std::string name) {
+  asio::post(context_, [this, shard, session, seq, name = std::move(name)] {
+    auto joined = worlds_.Join(name);
+    metrics_.set_world_count(worlds_.size());
+    if (!joined && joined.error().code == protocol::StatusCode::kLimitReached) {
+      metrics_.ops().Reached(Limit::kWorlds);
+    }
+    shards_[static_cast<std::size_t>(shard)]->Deliver(session, seq, std::move(joined));
+  });
+}
+
+void Server::LeaveWorld(WorldId world) {
+  asio::post(context_, [this, world] { worlds_.Leave(world); });
+}
+
+void Server::SessionEnded(SessionId session) {
+  asio::post(context_, [this, session] { sessions_.Close(session); });
+}
+
+void Server::SessionBegan(int shard, SessionIdentity identity) {
+  asio::post(context_,
+             [this, shard, identity = std::move(identity)] { sessions_.Restore(shard, identity); });
+}
+
+// ---- HTTP
+
+void Server::AddPages() {
+  http_.AddPage("/healthz", [] { return HttpAnswer{.body = "ok\n"}; });
+  http_.AddPage("/readyz", [this] {
+    return is_draining_ ? HttpAnswer{.status = 503, .body = "draining\n"}
+                        : HttpAnswer{.body = "ready\n"};
+  });
+  http_.AddPage("/metrics", [this] {
+    return HttpAnswer{.content_type = "text/plain; version=0.0.4; charset=utf-8",
+                      .body = metrics_.Text()};
+  });
+  http_.AddPage("/", [this] {
+    return HttpAnswer{
+        .content_type = "text/html; charset=utf-8",
+        .body = fmt::format(
+            "<!doctype html><html lang=\"en\"><title>Stridewire</title>"
+            "<h1>Stridewire {}</h1><p>{}. {} avatars in {} worlds, {} sessions, {} shards at {} "
+            "Hz. Clients connect to {}.</p>"
+            "<p><a href=\"/metrics\">metrics</a> <a href=\"/healthz\">healthz</a> "
+            "<a href=\"/readyz\">readyz</a></p></html>\n",
+            kVersion, is_draining_ ? "Draining" : "Ready", avatar_budget_.total(), worlds_.size(),
+            sessions_.size(), shards_.size(), config_.tick_hz, ToText(listen_endpoint()))};
+  });
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,40 @@
+#include "session/reply_memory.h"
+
+#include <utility>
+
+#include "stridewire/base/check.h"
+
+namespace stridewire::server {
+
+ReplyMemory::Verdict ReplyMemory::Judge(protocol::Seq seq) const {
+  if (seq > last_seq()) return seq == last_seq() + 1 ? Verdict::kNew : Verdict::kGap;
+  if (seq < first_) return Verdict::kForgotten;
+  return answers_[seq - first_].reply == nullptr ? Verdict::kPending : Verdict::kAnswered;
+}
+
+void ReplyMemory::Take(protocol::Seq seq) {
+  STRIDEWIRE_CHECK(seq == last_seq() + 1);
+  answers_.emplace_back();
+}
+
+std::size_t ReplyMemory::Remember(protocol::Seq seq, SharedFrame reply, WorldId joined) {
+  STRIDEWIRE_CHECK(Judge(seq) == Verdict::kPending);
+  bytes_ += reply->size();
+  answers_[seq - first_] = {std::move(reply), joined};
+  std::size_t forgotten = 0;
+  while (answers_.size() > 1 && (answers_.size() > max_count_ || bytes_ > max_bytes_) &&
+         answers_.front().reply != nullptr) {
+    bytes_ -= answers_.front().reply->size();
+    answers_.pop_front();
+    ++first_;
+    ++forgotten;
+  }
+  return forgotten;
+}
+
+const ReplyMemory::Answer& ReplyMemory::Find(protocol::Seq seq) const {
+  STRIDEWIRE_CHECK(Judge(seq) == Verdict::kAnswered);
+  return answers_[seq - first_];
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,696 @@
+#include "session/session.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "stridewire/base/check.h"
+#include "stridewire/base/version.h"
+#include "world/convert.h"
+
+namespace stridewire::server {
+
+using protocol::PoseMode;
+using protocol::Reply;
+using protocol::ReplyItem;
+using protocol::Seq;
+using protocol::StatusCode;
+
+namespace {
+
+// An event takes under 512 bytes of a frame, so this many stay below the smallest frame limit.
+constexpr std::size_t kEventsPerFrame = 128;
+// A refused item takes under 256 bytes of a Reply; with no more items a Reply always fits.
+constexpr std::size_t kReplyItemBytes = 256;
+
+std::size_t MaxItems(const Limits& limits) {
+  return std::min(protocol::kMaxItems, limits.max_bulk_bytes / kReplyItemBytes);
+}
+
+// Encodes a message of the server's own making, which cannot be wrong; null if it was all the
+// same, and then says so.
+template <typename Message>
+SharedFrame EncodeFrame(protocol::Encoder& encoder, const Message& message) {
+  auto frame = std::make_shared<std::vector<std::byte>>();
+  const Status status = encoder.Encode(message, *frame);
+  if (status) return frame;
+  spdlog::error("a {} could not be encoded: {}",
+                protocol::MessageTypeName(std::remove_cvref_t<Message>::kType),
+                Describe(status.error()));
+  return nullptr;
+}
+
+template <typename Function>
+void ForEachEventFrame(const EventDelivery& delivery, Function&& function) {
+  const std::vector<protocol::Event>& events = *delivery.events;
+  for (std::size_t first = 0; first < events.size(); first += kEventsPerFrame) {
+    const std::size_t count = std::min(kEventsPerFrame, events.size() - first);
+    protocol::Events message;
+    message.world = delivery.world;
+    message.tick = delivery.tick;
+    message.events.assign(events.begin() + static_cast<std::ptrdiff_t>(first),
+                          events.begin() + static_cast<std::ptrdiff_t>(first + count));
+    function(std::move(message));
+  }
+}
+
+}  // namespace
+
+const std::vector<SharedFrame>& SharedEvents::frames() {
+  if (frames_.empty()) {
+    ForEachEventFrame(delivery_, [this](protocol::Events&& message) {
+      if (auto frame = EncodeFrame(encoder_, message)) frames_.push_back(std::move(frame));
+    });
+  }
+  return frames_;
+}
+
+Session::Session(SessionIdentity identity, SessionHost& host)
+    : identity_(std::move(identity)),
+      host_(host),
+      replies_(protocol::kReplyMemory, host.config().limits.reply_memory_bytes),
+      event_replay_(host.config().limits.event_replay_bytes),
+      request_tokens_(host.config().limits.requests_per_s, host.config().limits.request_burst),
+      message_tokens_(host.config().limits.messages_per_s, host.config().limits.messages_per_s) {}
+
+Session::~Session() {
+  if (connection_ != nullptr) connection_->set_handler(nullptr);
+}
+
+// ---- connection
+
+void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hello& hello,
+                     bool resumed, std::span<const std::byte> received) {
+  if (connection_ != nullptr) {
+    Fail(StatusCode::kReplaced, "the session goes on over another connection");
+  }
+  const Limits& limits = host_.config().limits;
+  connection_ = std::move(connection);
+  client_name_ = hello.client_name;
+  std::uint64_t offered = kServerFeatures;
+  if (limits.resume_window_s <= 0.0) offered &= ~protocol::kFeatureResume;
+  features_ = hello.features & offered;
+
+  protocol::Welcome welcome;
+  welcome.protocol = std::min(hello.protocol_max, protocol::kProtocolMax);
+  welcome.features = features_;
+  welcome.session = identity_.id;
+  welcome.resume_token = identity_.token;
+  welcome.resumed = resumed;
+  welcome.last_seq = replies_.last_seq();
+  welcome.tick_hz = host_.clock().tick_hz();
+  welcome.server_name = "stridewired";
+  welcome.server_version = kVersion;
+  welcome.limits.max_control_bytes = static_cast<std::uint32_t>(limits.max_control_bytes);
+  welcome.limits.max_bulk_bytes = static_cast<std::uint32_t>(limits.max_bulk_bytes);
+  welcome.limits.max_items = static_cast<std::uint32_t>(MaxItems(limits));
+  welcome.limits.max_avatars_per_world = static_cast<std::uint32_t>(limits.max_avatars_per_world);
+  welcome.limits.max_queue = static_cast<std::uint32_t>(limits.max_queue);
+  welcome.limits.idle_timeout_s = limits.idle_timeout_s;
+  welcome.limits.resume_window_s = limits.resume_window_s;
+  Send(welcome);
+  for (auto& [id, membership] : worlds_) SendWorldInfo(0, membership);
+
+  // Whatever was on its way when the connection broke goes out again.
+  event_replay_.ForEachAfter(hello.last_events_number, [this](const EventReplay::Kept& kept) {
+    if (!connection_->SendEvents(kept.frame)) host_.metrics().events_dropped.Add(kept.events);
+  });
+  for (auto& [id, membership] : worlds_) {
+    membership.told_dropped = 0;
+    SendLagging(membership);
+  }
+  for (auto& [id, membership] : worlds_) host_.InterestChanged(membership.world);
+  spdlog::info("session {:016x} of '{}' ({}) {}", identity_.id, client_name_, identity_.address,
+               resumed ? "goes on" : "begins");
+  connection_->Start(this, received);
+}
+
+void Session::Detach() {
+  if (connection_ == nullptr) return;
+  connection_->set_handler(nullptr);
+  connection_ = nullptr;
+  host_.metrics().connections_closed.Add();
+  detached_since_ = Clock::now();
+  if ((features_ & protocol::kFeatureResume) == 0) {
+    End();
+    return;
+  }
+  for (auto& [id, membership] : worlds_) host_.InterestChanged(membership.world);
+}
+
+void Session::OnClosed() {
+  if (connection_ == nullptr) return;
+  spdlog::info("session {:016x} lost its connection", identity_.id);
+  Detach();
+}
+
+void Session::Fail(StatusCode code, std::string text, Seq seq) {
+  if (connection_ == nullptr) return;
+  spdlog::info("session {:016x}: {}", identity_.id, text);
+  Send(protocol::ErrorNotice{.code = code, .text = std::move(text), .fatal = true, .seq = seq});
+  const auto connection = connection_;
+  // A connection that makes room for the next one leaves the session attached in all but name.
+  if (code == StatusCode::kReplaced) {
+    connection_ = nullptr;
+    host_.metrics().connections_closed.Add();
+  } else {
+    Detach();
+  }
+  connection->CloseGently();
+}
+
+void Session::OnBadFrame(const Error& error) {
+  host_.metrics().protocol_errors.Add();
+  if (error.code == ErrorCode::kLimitExceeded) host_.metrics().Reached(Limit::kFrameBytes);
+  Fail(FrameStatusCode(error.code), Describe(error));
+}
+
+void Session::OnIdle() {
+  host_.metrics().Reached(Limit::kIdleTimeout);
+  Fail(StatusCode::kTimeout, "nothing was heard for too long");
+}
+
+void Session::OnStuck() {
+  host_.metrics().Reached(Limit::kWriteTimeout);
+  Fail(StatusCode::kTooSlow, "what was sent is not being read");
+}
+
+void Session::Drain() {
+  if (connection_ == nullptr) {
+    End();
+    return;
+  }
+  // Not a Goodbye: the client may come back as soon as there is a server again.
+  Fail(StatusCode::kShuttingDown, "the server is shutting down");
+}
+
+void Session::End() {
+  if (is_ended_) return;
+  is_ended_ = true;
+  while (!worlds_.empty()) Leave(worlds_.begin()->first);
+  if (connection_ != nullptr) {
+    const auto connection = std::exchange(connection_, nullptr);
+    host_.metrics().connections_closed.Add();
+    connection->CloseGently();
+  }
+  spdlog::info("session {:016x} ends", identity_.id);
+  host_.SessionEnded(identity_.id);
+}
+
+void Session::Housekeep(Clock::time_point now) {
+  if (is_ended_) return;
+  const Limits& limits = host_.config().limits;
+  if (connection_ == nullptr) {
+    const double waited_s = std::chrono::duration<double>(now - detached_since_).count();
+    if (waited_s >= limits.resume_window_s) {
+      host_.metrics().Reached(Limit::kResumeWindow);
+      End();
+    }
+    return;
+  }
+  for (auto& [id, membership] : worlds_) {
+    // One at a time, so that a peer that reads nothing does not pile them up.
+    if (connection_->queue().control_empty()) SendLagging(membership);
+  }
+  UpdatePause();
+}
+
+void Session::UpdatePause() {
+  if (connection_ == nullptr) return;
+  const Limits& limits = host_.config().limits;
+  message_tokens_.AdvanceTime(host_.clock().ServerTime(Clock::now()));
+  const bool is_pending_full =
+      pending_.size() >= static_cast<std::size_t>(limits.max_pending_commands) ||
+      pending_items_ > protocol::kMaxItems;
+  const bool is_too_chatty = message_tokens_.tokens() < 1.0;
+  // Replies cannot be dropped, so commands wait until the peer has read some.
+  const bool is_unread = connection_->queue().control_bytes() > limits.control_buffer_bytes / 2;
+  if (is_pending_full || is_too_chatty || is_unread) {
+    connection_->PauseReading();
+  } else {
+    connection_->ResumeReading();
+  }
+}
+
+// ---- messages
+
+void Session::OnMessage(protocol::Message&& message) {
+  ThreadMetrics& metrics = host_.metrics();
+  message_tokens_.AdvanceTime(host_.clock().ServerTime(Clock::now()));
+  static_cast<void>(message_tokens_.Take(1.0));  // UpdatePause sees to it that there is one
+  std::visit(
+      [&]<typename T>(T&& arrived) {
+        using Arrived = std::remove_cvref_t<T>;
+        if constexpr (requires { this->Execute(std::move(arrived)); }) {
+          Handle(std::move(arrived));
+        } else if constexpr (std::is_same_v<Arrived, protocol::Ping>) {
+          Send(protocol::Pong{.nonce = arrived.nonce,
+                              .time_s = arrived.time_s,
+                              .server_time_s = host_.clock().ServerTime(Clock::now()),
+                              .tick = host_.tick()});
+        } else if constexpr (std::is_same_v<Arrived, protocol::Goodbye>) {
+          spdlog::info("session {:016x}: its client says goodbye", identity_.id);
+          End();
+        } else {
+          metrics.protocol_errors.Add();
+          Fail(StatusCode::kUnexpectedMessage,
+               std::string(protocol::MessageTypeName(Arrived::kType)) +
+                   " is not expected in this state");
+        }
+      },
+      std::move(message));
+  if (connection_ == nullptr) return;
+  if (message_tokens_.tokens() < 1.0) metrics.Reached(Limit::kMessagesPerSecond);
+  if (pending_.size() >= static_cast<std::size_t>(host_.config().limits.max_pending_commands)) {
+    metrics.Reached(Limit::kPendingCommands);
+  }
+  UpdatePause();
+}
+
+template <typename Command>
+void Session::Handle(Command&& command) {
+  const Seq seq = command.seq;
+  switch (replies_.Judge(seq)) {
+    case ReplyMemory::Verdict::kNew: break;
+    case ReplyMemory::Verdict::kPending: return;
+    case ReplyMemory::Verdict::kAnswered: {
+      const ReplyMemory::Answer& answer = replies_.Find(seq);
+      if (const auto it = worlds_.find(answer.joined); it != worlds_.end()) {
+        SendWorldInfo(seq, it->second);
+      }
+      connection_->SendControl(answer.reply);
+      return;
+    }
+    case ReplyMemory::Verdict::kForgotten:
+      Send(Reply{.seq = seq,
+                 .code = StatusCode::kForgotten,
+                 .text = "it was done so long ago that the answer is not kept"});
+      return;
+    case ReplyMemory::Verdict::kGap:
+      host_.metrics().protocol_errors.Add();
+      Fail(StatusCode::kBadSequence, "a command before this one is missing", seq);
+      return;
+  }
+  replies_.Take(seq);
+  if (host_.is_draining()) {
+    Answer(seq, StatusCode::kShuttingDown, "the server is shutting down");
+    return;
+  }
+  Execute(std::move(command));
+}
+
+bool Session::Affords(Seq seq, std::size_t item_count) {
+  const Limits& limits = host_.config().limits;
+  if (item_count > MaxItems(limits)) {
+    host_.metrics().Reached(Limit::kFrameBytes);
+    Answer(seq, StatusCode::kLimitReached, "more items than one message may have here");
+    return false;
+  }
+  request_tokens_.AdvanceTime(host_.clock().ServerTime(Clock::now()));
+  if (request_tokens_.Take(static_cast<double>(item_count))) return true;
+  host_.metrics().Reached(Limit::kRequestsPerSecond);
+  host_.metrics().requests_rejected.Add(item_count);
+  Answer(seq, StatusCode::kLimitReached, "more items a second than a session may send");
+  return false;
+}
+
+Session::Membership* Session::Commanding(Seq seq, WorldId world) {
+  const auto it = worlds_.find(world);
+  if (it == worlds_.end()) {
+    Answer(seq, StatusCode::kNotJoined, "this session is not in that world");
+    return nullptr;
+  }
+  if (it->second.role != protocol::Role::kController) {
+    Answer(seq, StatusCode::kNotAllowed, "an observer commands nothing");
+    return nullptr;
+  }
+  return &it->second;
+}
+
+void Session::Execute(protocol::JoinWorld&& command) {
+  const Limits& limits = host_.config().limits;
+  if (worlds_.size() >= static_cast<std::size_t>(limits.max_worlds_per_session)) {
+    host_.metrics().Reached(Limit::kWorldsPerSession);
+    Answer(command.seq, StatusCode::kLimitReached, "the session is in as many worlds as it may");
+    return;
+  }
+  Pending& pending = pending_[command.seq];
+  pending.outstanding = 1;
+  pending.role = command.role;
+  host_.JoinWorld(identity_.id, command.seq, std::move(command.name));
+}
+
+void Session::OnJoined(Seq seq, Outcome<std::shared_ptr<World>>&& outcome) {
+  const auto it = pending_.find(seq);
+  if (is_ended_ || it == pending_.end()) {
+    if (outcome) host_.LeaveWorld((*outcome)->id);
+    return;
+  }
+  const protocol::Role role = it->second.role;
+  pending_.erase(it);
+  if (!outcome) {
+    Answer(seq, outcome.error().code, std::move(outcome.error().text));
+    return;
+  }
+  const std::shared_ptr<World> world = *std::move(outcome);
+  if (worlds_.contains(world->id)) {
+    host_.LeaveWorld(world->id);
+    Answer(seq, StatusCode::kAlreadyJoined, "the session is in that world already");
+    return;
+  }
+  if (worlds_.size() >= static_cast<std::size_t>(host_.config().limits.max_worlds_per_session)) {
+    host_.metrics().Reached(Limit::kWorldsPerSession);
+    host_.LeaveWorld(world->id);
+    Answer(seq, StatusCode::kLimitReached, "the session is in as many worlds as it may");
+    return;
+  }
+  const auto& membership =
+      worlds_.emplace(world->id, Membership{.world = world, .role = role}).first->second;
+  host_.InterestChanged(world);
+  SendWorldInfo(seq, membership);
+  Answer(Reply{.seq = seq}, world->id);
+}
+
+void Session::Execute(protocol::LeaveWorld&& command) {
+  if (!worlds_.contains(command.world)) {
+    Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
+    return;
+  }
+  Leave(command.world);
+  Answer(command.seq, StatusCode::kOk);
+}
+
+void Session::Leave(WorldId id) {
+  const auto it = worlds_.find(id);
+  const std::shared_ptr<World> world = it->second.world;
+  const bool is_controller = it->second.role == protocol::Role::kController;
+  worlds_.erase(it);
+  std::erase_if(subscriptions_, [&](const auto& item) { return item.second.world == world; });
+  if (connection_ != nullptr) {
+    connection_->DropPoses(id, PoseMode::kFull);
+    connection_->DropPoses(id, PoseMode::kQuantised);
+  }
+  if (is_controller) {
+    for (int shard = 0; shard < host_.shard_count(); ++shard) {
+      host_.Submit(shard, {.world = world,
+                           .from_shard = host_.shard_index(),
+                           .session = identity_.id,
+                           .seq = 0,
+                           .part = ReleasePart{}});
+    }
+  }
+  host_.InterestChanged(world);
+  host_.LeaveWorld(id);
+}
+
+template <typename Part>
+void Session::SubmitParts(Seq seq, const std::shared_ptr<World>& world, std::vector<Part>&& parts,
+                          Pending&& pending) {
+  const auto is_empty = [](const Part& part) {
+    if constexpr (requires { part.items; }) {
+      return part.items.empty();
+    } else {
+      return part.avatars.empty();
+    }
+  };
+  for (const Part& part : parts) {
+    if (!is_empty(part)) ++pending.outstanding;
+  }
+  pending.reply.seq = seq;
+  if (pending.outstanding == 0) {
+    Answer(std::move(pending.reply));
+    return;
+  }
+  pending_items_ += pending.item_count;
+  pending_.emplace(seq, std::move(pending));
+  for (std::size_t shard = 0; shard < parts.size(); ++shard) {
+    if (is_empty(parts[shard])) continue;
+    host_.Submit(static_cast<int>(shard), {.world = world,
+                                           .from_shard = host_.shard_index(),
+                                           .session = identity_.id,
+                                           .seq = seq,
+                                           .part = std::move(parts[shard])});
+  }
+}
+
+void Session::Execute(protocol::Spawn&& command) {
+  const Membership* membership = Commanding(command.seq, command.world);
+  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
+  World& world = *membership->world;
+  std::vector<SpawnPart> parts(static_cast<std::size_t>(host_.shard_count()));
+  Pending pending{.item_count = command.items.size(), .reply = {}};
+  std::uint32_t index = 0;
+  for (protocol::SpawnItem& item : command.items) {
+    ReplyItem refused{.index = index, .avatar = item.avatar, .code = StatusCode::kLimitReached};
+    switch (host_.avatar_budget().Reserve(world)) {
+      case AvatarBudget::Verdict::kOk:
+        if (item.avatar != 0) {
+          NoteNumber(world, item.avatar);
+        } else {
+          item.avatar = NextNumber(world);
+        }
+        if (item.avatar == 0) {
+          host_.avatar_budget().Release(world);
+          refused.text = "no avatar number is left";
+          pending.reply.items.push_back(std::move(refused));
+        } else {
+          parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))]
+              .items.push_back({index, item});
+        }
+        break;
+      case AvatarBudget::Verdict::kWorldFull:
+        host_.metrics().Reached(Limit::kAvatarsPerWorld);
+        refused.text = "the world has as many avatars as it takes";
+        pending.reply.items.push_back(std::move(refused));
+        break;
+      case AvatarBudget::Verdict::kServerFull:
+        host_.metrics().Reached(Limit::kAvatars);
+        refused.text = "the server has as many avatars as it takes";
+        pending.reply.items.push_back(std::move(refused));
+        break;
+    }
+    ++index;
+  }
+  SubmitParts(command.seq, membership->world, std::move(parts), std::move(pending));
+}
+
+void Session::Execute(protocol::Request&& command) {
+  const Membership* membership = Commanding(command.seq, command.world);
+  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
+  std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()));
+  std::uint32_t index = 0;
+  for (const protocol::RequestItem& item : command.items) {
+    parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(
+        {index++, item});
+  }
+  SubmitParts(command.seq, membership->world, std::move(parts),
+              Pending{.item_count = command.items.size(), .reply = {}});
+}
+
+template <typename Part>
+void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars) {
+  const Membership* membership = Commanding(seq, world);
+  if (membership == nullptr || !Affords(seq, avatars.size())) return;
+  std::vector<Part> parts(static_cast<std::size_t>(host_.shard_count()));
+  std::uint32_t index = 0;
+  for (const AvatarNumber avatar : avatars) {
+    parts[static_cast<std::size_t>(ShardOf(avatar, host_.shard_count()))].avatars.push_back(
+        {index++, avatar});
+  }
+  SubmitParts(seq, membership->world, std::move(parts),
+              Pending{.item_count = avatars.size(), .reply = {}});
+}
+
+void Session::Execute(protocol::Remove&& command) {
+  SubmitAvatars<RemovePart>(command.seq, command.world, command.avatars);
+}
+
+void Session::Execute(protocol::CancelQueue&& command) {
+  SubmitAvatars<CancelPart>(command.seq, command.world, command.avatars);
+}
+
+void Session::OnResult(CommandResult&& result) {
+  const auto it = pending_.find(result.seq);
+  if (is_ended_ || it == pending_.end()) return;
+  Pending& pending = it->second;
+  pending.reply.accepted += result.accepted;
+  std::ranges::move(result.items, std::back_inserter(pending.reply.items));
+  if (--pending.outstanding > 0) return;
+  // Shards answer in any order.
+  std::ranges::sort(pending.reply.items, {}, &ReplyItem::index);
+  Reply reply = std::move(pending.reply);
+  pending_items_ -= pending.item_count;
+  pending_.erase(it);
+  Answer(std::move(reply));
+  UpdatePause();
+}
+
+void Session::Execute(protocol::Observe&& command) {
+  const auto it = worlds_.find(command.world);
+  if (it == worlds_.end()) {
+    Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
+    return;
+  }
+  if (subscriptions_.contains(command.subscription)) {
+    Answer(command.seq, StatusCode::kSubscriptionExists, "a subscription has that number already");
+    return;
+  }
+  if (subscriptions_.size() >= static_cast<std::size_t>(host_.config().limits.max_subscriptions)) {
+    host_.metrics().Reached(Limit::kSubscriptions);
+    Answer(command.seq, StatusCode::kLimitReached,
+           "the session has as many subscriptions as it may");
+    return;
+  }
+  if (command.mode == PoseMode::kMovement) {
+    Answer(command.seq, StatusCode::kUnsupported, "the mode 'movement' does not exist yet");
+    return;
+  }
+  if (command.mode == PoseMode::kQuantised && (features_ & protocol::kFeatureQuantised) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'quantised poses' was not agreed on in the handshake");
+    return;
+  }
+  const std::shared_ptr<World> world = it->second.world;
+  subscriptions_.emplace(command.subscription, Subscription{.world = world,
+                                                            .mode = command.mode,
+                                                            .every_n_ticks = command.every_n_ticks,
+                                                            .with_events = command.with_events});
+  host_.InterestChanged(world);
+  Answer(command.seq, StatusCode::kOk);
+}
+
+void Session::Execute(protocol::StopObserving&& command) {
+  const auto it = subscriptions_.find(command.subscription);
+  if (it == subscriptions_.end()) {
+    Answer(command.seq, StatusCode::kNoSuchSubscription, "no subscription of that number");
+    return;
+  }
+  const Subscription stopped = std::move(it->second);
+  subscriptions_.erase(it);
+  const bool is_last = std::ranges::none_of(subscriptions_, [&](const auto& item) {
+    return item.second.world == stopped.world && item.second.mode == stopped.mode;
+  });
+  if (is_last && connection_ != nullptr) connection_->DropPoses(stopped.world->id, stopped.mode);
+  host_.InterestChanged(stopped.world);
+  Answer(command.seq, StatusCode::kOk);
+}
+
+// ---- what the server sends
+
+template <typename Message>
+void Session::Send(const Message& message) {
+  if (connection_ == nullptr) return;
+  if (auto frame = EncodeFrame(host_.encoder(), message)) {
+    connection_->SendControl(std::move(frame));
+  }
+}
+
+void Session::Answer(Seq seq, StatusCode code, std::string text) {
+  Answer(Reply{.seq = seq, .code = code, .text = std::move(text)});
+}
+
+void Session::Answer(Reply&& reply, WorldId joined) {
+  const SharedFrame frame = EncodeFrame(host_.encoder(), reply);
+  STRIDEWIRE_CHECK(frame != nullptr);  // MaxItems sees to it that a Reply fits
+  const std::size_t forgotten = replies_.Remember(reply.seq, frame, joined);
+  if (forgotten > 0 && replies_.bytes() > host_.config().limits.reply_memory_bytes / 2) {
+    host_.metrics().Reached(Limit::kReplyMemory, forgotten);
+  }
+  if (connection_ != nullptr) connection_->SendControl(frame);
+}
+
+void Session::SendWorldInfo(Seq seq, const Membership& membership) {
+  const World& world = *membership.world;
+  Send(protocol::WorldInfo{.seq = seq,
+                           .world = world.id,
+                           .name = world.name,
+                           .role = membership.role,
+                           .tick = host_.tick(),
+                           .library_hash = world.library->hash(),
+                           .skeleton = ToWire(world.library->skeleton())});
+}
+
+void Session::SendLagging(Membership& membership) {
+  const std::uint64_t dropped = membership.dropped_batches + membership.dropped_events;
+  if (connection_ == nullptr || dropped == membership.told_dropped) return;
+  membership.told_dropped = dropped;
+  Send(protocol::Lagging{.world = membership.world->id,
+                         .dropped_batches = membership.dropped_batches,
+                         .dropped_events = membership.dropped_events});
+}
+
+bool Session::WantsEvents(WorldId world) const {
+  // Without a connection they are only of use to be sent again later.
+  if (connection_ == nullptr && (features_ & protocol::kFeatureEventReplay) == 0) return false;
+  const auto it = worlds_.find(world);
+  if (it == worlds_.end()) return false;
+  if (it->second.role == protocol::Role::kController) return true;
+  return std::ranges::any_of(subscriptions_, [&](const auto& item) {
+    return item.second.world->id == world && item.second.with_events;
+  });
+}
+
+std::uint16_t Session::Every(WorldId world, PoseMode mode) const {
+  std::uint16_t every = 0;
+  if (connection_ == nullptr) return every;
+  for (const auto& [id, subscription] : subscriptions_) {
+    if (subscription.world->id == world && subscription.mode == mode) {
+      every = std::gcd(every, subscription.every_n_ticks);
+    }
+  }
+  return every;
+}
+
+void Session::OnPoses(const PoseDelivery& delivery) {
+  if (connection_ == nullptr) return;
+  const bool is_wanted = std::ranges::any_of(subscriptions_, [&](const auto& item) {
+    const Subscription& subscription = item.second;
+    return subscription.world->id == delivery.world && subscription.mode == delivery.mode &&
+           delivery.tick % subscription.every_n_ticks == 0;
+  });
+  if (!is_wanted) return;
+  const std::size_t dropped = connection_->SendPoses(delivery);
+  if (dropped == 0) return;
+  worlds_.at(delivery.world).dropped_batches += dropped;
+  host_.metrics().batches_dropped.Add(dropped);
+  host_.metrics().Reached(Limit::kObserverBacklog);
+}
+
+void Session::OnEvents(SharedEvents& events) {
+  const EventDelivery& delivery = events.delivery();
+  if (is_ended_ || !WantsEvents(delivery.world)) return;
+  std::uint64_t dropped = 0;
+  if ((features_ & protocol::kFeatureEventReplay) == 0) {
+    bool is_full = false;
+    for (const SharedFrame& frame : events.frames()) {
+      is_full |= !connection_->SendEvents(frame);
+    }
+    if (is_full) dropped = delivery.events->size();
+  } else {
+    ForEachEventFrame(delivery, [&](protocol::Events&& message) {
+      message.number = ++events_number_;
+      const SharedFrame frame = EncodeFrame(host_.encoder(), message);
+      if (frame == nullptr) return;
+      const bool was_sent = connection_ != nullptr && connection_->SendEvents(frame);
+      // What a full connection did not take is lost: sent later it would be out of order.
+      if (connection_ != nullptr && !was_sent) {
+        dropped += message.events.size();
+        return;
+      }
+      event_replay_.Keep({message.number, message.events.size(), was_sent, frame});
+      if (const std::uint64_t forgotten = event_replay_.TakeForgotten(); forgotten > 0) {
+        dropped += forgotten;
+        host_.metrics().Reached(Limit::kEventReplay);
+      }
+    });
+  }
+  if (dropped == 0) return;
+  if (connection_ != nullptr) host_.metrics().Reached(Limit::kControlBuffer);
+  // Forgotten ones may have been of another of its worlds; their sum is what counts.
+  worlds_.at(delivery.world).dropped_events += dropped;
+  host_.metrics().events_dropped.Add(dropped);
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,165 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "net/connection.h"
+#include "session/event_replay.h"
+#include "session/refusal.h"
+#include "session/reply_memory.h"
+#include "session/session_host.h"
+#include "session/token_bucket.h"
+
+namespace stridewire::server {
+
+/// Features this server has.
+inline constexpr std::uint64_t kServerFeatures =
+    protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised;
+
+/// Who a session is; made when it begins, the same for its whole life.
+struct SessionIdentity {
+  SessionId id = 0;
+  std::vector<std::byte> token;
+  std::string address;
+};
+
+/// Events of one delivery as frames without number, encoded when the first session asks.
+class SharedEvents {
+ public:
+  SharedEvents(const EventDelivery& delivery, protocol::Encoder& encoder)
+      : delivery_(delivery), encoder_(encoder) {}
+  [[nodiscard]] const std::vector<SharedFrame>& frames();
+  [[nodiscard]] const EventDelivery& delivery() const { return delivery_; }
+
+ private:
+  const EventDelivery& delivery_;
+  protocol::Encoder& encoder_;
+  std::vector<SharedFrame> frames_;
+};
+
+/// One client: worlds joined, subscriptions, commands under way and answered. Lives on one shard
+/// and outlives its connection for the resume window (STATE_MACHINE.md).
+///
+/// Memory: what Limits allow (reply_memory_bytes + event_replay_bytes + control_buffer_bytes + the
+/// connection), whatever the client does.
+class Session : private ConnectionHandler {
+ public:
+  using Clock = Connection::Clock;
+
+  Session(SessionIdentity identity, SessionHost& host);
+  ~Session() override;
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Takes a connection whose client said `hello`; the one before is closed. `received` came
+  /// behind the Hello.
+  void Attach(std::shared_ptr<Connection> connection, const protocol::Hello& hello, bool resumed,
+              std::span<const std::byte> received);
+
+  void OnResult(CommandResult&& result);
+  void OnJoined(protocol::Seq seq, Outcome<std::shared_ptr<World>>&& outcome);
+  void OnPoses(const PoseDelivery& delivery);
+  void OnEvents(SharedEvents& events);
+
+  /// Now and then: what is due by time.
+  void Housekeep(Clock::time_point now);
+
+  /// The server goes down: tells the client, which may come back later.
+  void Drain();
+
+  /// Leaves all worlds and closes. Afterwards it may be destroyed.
+  void End();
+
+  [[nodiscard]] const SessionIdentity& identity() const { return identity_; }
+  [[nodiscard]] bool is_ended() const { return is_ended_; }
+  [[nodiscard]] bool is_attached() const { return connection_ != nullptr; }
+
+  // What this session wants of a world, for the shard to sum up.
+  [[nodiscard]] bool WantsEvents(WorldId world) const;
+  /// Greatest common divisor of the ticks wanted, 0: none.
+  [[nodiscard]] std::uint16_t Every(WorldId world, protocol::PoseMode mode) const;
+
+ private:
+  struct Membership {
+    std::shared_ptr<World> world;
+    protocol::Role role = protocol::Role::kController;
+    std::uint64_t dropped_batches = 0;
+    std::uint64_t dropped_events = 0;
+    std::uint64_t told_dropped = 0;  // sum of the two when Lagging was last sent
+  };
+  struct Subscription {
+    std::shared_ptr<World> world;
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
+    std::uint16_t every_n_ticks = 1;
+    bool with_events = false;
+  };
+  struct Pending {
+    int outstanding = 0;  // shards that have not answered
+    std::size_t item_count = 0;
+    protocol::Role role = protocol::Role::kController;  // of a JoinWorld
+    protocol::Reply reply;
+  };
+
+  void OnMessage(protocol::Message&& message) override;
+  void OnBadFrame(const Error& error) override;
+  void OnSent() override { UpdatePause(); }
+  void OnIdle() override;
+  void OnStuck() override;
+  void OnClosed() override;
+
+  template <typename Command>
+  void Handle(Command&& command);
+  void Execute(protocol::JoinWorld&& command);
+  void Execute(protocol::LeaveWorld&& command);
+  void Execute(protocol::Spawn&& command);
+  void Execute(protocol::Remove&& command);
+  void Execute(protocol::Request&& command);
+  void Execute(protocol::CancelQueue&& command);
+  void Execute(protocol::Observe&& command);
+  void Execute(protocol::StopObserving&& command);
+
+  /// The membership a controller's command needs; answers and returns null if there is none.
+  Membership* Commanding(protocol::Seq seq, WorldId world);
+  bool Affords(protocol::Seq seq, std::size_t item_count);
+  template <typename Part>
+  void SubmitParts(protocol::Seq seq, const std::shared_ptr<World>& world,
+                   std::vector<Part>&& parts, Pending&& pending);
+  template <typename Part>
+  void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars);
+  void Leave(WorldId world);
+
+  void Answer(protocol::Seq seq, protocol::StatusCode code, std::string text = {});
+  void Answer(protocol::Reply&& reply, WorldId joined = 0);
+  void SendWorldInfo(protocol::Seq seq, const Membership& membership);
+  void SendLagging(Membership& membership);
+  template <typename Message>
+  void Send(const Message& message);
+  /// Says why and lets the connection go; the session waits for its client.
+  void Fail(protocol::StatusCode code, std::string text, protocol::Seq seq = 0);
+  void Detach();
+  void UpdatePause();
+
+  SessionIdentity identity_;
+  SessionHost& host_;
+  std::shared_ptr<Connection> connection_;
+  std::string client_name_;
+  std::uint64_t features_ = 0;
+  bool is_ended_ = false;
+  Clock::time_point detached_since_;
+
+  std::map<WorldId, Membership> worlds_;
+  std::map<protocol::SubscriptionId, Subscription> subscriptions_;
+  std::map<protocol::Seq, Pending> pending_;
+  std::size_t pending_items_ = 0;
+  ReplyMemory replies_;
+  EventReplay event_replay_;
+  std::uint64_t events_number_ = 0;
+  TokenBucket request_tokens_;
+  TokenBucket message_tokens_;
+};
+
+}  // namespace stridewire::server

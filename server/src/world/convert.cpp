@@ -1,0 +1,133 @@
+#include "world/convert.h"
+
+#include <algorithm>
+#include <type_traits>
+
+namespace stridewire::server {
+namespace {
+
+protocol::LegInfo LegToWire(const Leg& leg) {
+  return {.hip = static_cast<std::int16_t>(leg.hip),
+          .knee = static_cast<std::int16_t>(leg.knee),
+          .ankle = static_cast<std::int16_t>(leg.ankle),
+          .ball = static_cast<std::int16_t>(leg.ball),
+          .ball_offset_m = leg.ball_offset_m,
+          .toe_tip_offset_m = leg.toe_tip_offset_m};
+}
+
+protocol::ParameterSet ParametersToWire(const ParameterValues& values, const MotionGroup& group) {
+  protocol::ParameterSet set;
+  const int count =
+      std::min({values.count, group.parameter_count(), static_cast<int>(protocol::kMaxParameters)});
+  for (int i = 0; i < count; ++i) {
+    const auto p = static_cast<std::size_t>(i);
+    set.names[p] = static_cast<std::uint8_t>(group.parameters[p].name);
+    set.values[p] = values.values[p];
+  }
+  set.count = static_cast<std::uint8_t>(count);
+  return set;
+}
+
+protocol::EventType TypeToWire(AvatarEventType type) {
+  switch (type) {
+    case AvatarEventType::kStarted: return protocol::EventType::kStarted;
+    case AvatarEventType::kFootStrike: return protocol::EventType::kFootStrike;
+    case AvatarEventType::kFinished: return protocol::EventType::kFinished;
+    case AvatarEventType::kIdle: return protocol::EventType::kIdle;
+  }
+  return protocol::EventType::kIdle;
+}
+
+// Both sides number these alike; a change of either must be seen here.
+static_assert(static_cast<int>(MovementKind::kStepLeft) ==
+              static_cast<int>(protocol::MovementKind::kStepLeft));
+static_assert(static_cast<int>(MovementKind::kStand) ==
+              static_cast<int>(protocol::MovementKind::kStand));
+static_assert(static_cast<int>(Foot::kRight) == static_cast<int>(protocol::FootSide::kRight));
+static_assert(static_cast<int>(ParameterName::kHeight) + 1 == protocol::kParameterNames);
+
+}  // namespace
+
+protocol::SkeletonInfo ToWire(const Skeleton& skeleton) {
+  protocol::SkeletonInfo info;
+  for (const Joint& joint : skeleton.joints) {
+    info.joints.push_back({joint.name, static_cast<std::int16_t>(joint.parent), joint.offset_m});
+  }
+  for (const EndSite& site : skeleton.end_sites) {
+    info.end_sites.push_back({static_cast<std::uint16_t>(site.joint), site.offset_m});
+  }
+  info.legs = {LegToWire(skeleton.leg(Foot::kLeft)), LegToWire(skeleton.leg(Foot::kRight))};
+  return info;
+}
+
+protocol::Placement ToWire(const BaseFrame& base) { return {base.position_m, base.heading_rad}; }
+
+BaseFrame FromWire(const protocol::Placement& placement) {
+  return {placement.position_m, placement.heading_rad};
+}
+
+MovementRequest FromWire(const protocol::RequestItem& item) {
+  MovementRequest request;
+  request.id = item.request_id;
+  std::visit(
+      [&]<typename T>(const T& movement) {
+        if constexpr (std::is_same_v<T, protocol::StepMovement>) {
+          StepRequest step;
+          if (movement.foot == protocol::FootChoice::kLeft) step.foot = Foot::kLeft;
+          if (movement.foot == protocol::FootChoice::kRight) step.foot = Foot::kRight;
+          step.length_m = movement.length_m;
+          step.side_m = movement.side_m;
+          step.height_m = movement.height_m;
+          step.turn_rad = movement.turn_rad;
+          request.movement = step;
+        } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
+          request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad};
+        } else {
+          request.movement = StandRequest{movement.seconds};
+        }
+      },
+      item.movement);
+  return request;
+}
+
+protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
+  protocol::Event wire;
+  wire.type = TypeToWire(event.type);
+  wire.request_id = event.request_id;
+  wire.kind = static_cast<protocol::MovementKind>(event.kind);
+  wire.group = static_cast<std::int16_t>(event.group);
+  if (event.group >= 0) {
+    const MotionGroup& group = library.group(event.group);
+    wire.requested = ParametersToWire(event.requested, group);
+    wire.applied = ParametersToWire(event.applied, group);
+  }
+  wire.extrapolated = event.extrapolated;
+  wire.clamped = event.clamped;
+  wire.foot = static_cast<protocol::FootSide>(event.foot);
+  wire.position_m = DVec3(event.position_m);
+  wire.base = ToWire(event.base);
+  return wire;
+}
+
+protocol::StatusCode ToStatusCode(ErrorCode code) {
+  using protocol::StatusCode;
+  switch (code) {
+    case ErrorCode::kInvalidArgument: return StatusCode::kInvalidArgument;
+    case ErrorCode::kOutOfRange: return StatusCode::kOutOfRange;
+    case ErrorCode::kUnsupported: return StatusCode::kNoMovement;
+    case ErrorCode::kLimitExceeded: return StatusCode::kQueueFull;
+    default: return StatusCode::kInternal;
+  }
+}
+
+protocol::StatusCode FrameStatusCode(ErrorCode code) {
+  using protocol::StatusCode;
+  switch (code) {
+    case ErrorCode::kLimitExceeded: return StatusCode::kLimitReached;
+    case ErrorCode::kVersionMismatch: return StatusCode::kVersionMismatch;
+    case ErrorCode::kUnsupported: return StatusCode::kUnsupported;
+    default: return StatusCode::kMalformed;
+  }
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "net/shared_frame.h"
+#include "stridewire/protocol/messages.h"
+#include "world/world.h"
+
+/// What shards send each other. Values only; the receiver owns what it gets.
+namespace stridewire::server {
+
+/// Items of a command with their position in it.
+struct SpawnPart {
+  struct Item {
+    std::uint32_t index = 0;
+    protocol::SpawnItem spawn;
+  };
+  std::vector<Item> items;
+};
+struct RequestPart {
+  struct Item {
+    std::uint32_t index = 0;
+    protocol::RequestItem request;
+  };
+  std::vector<Item> items;
+};
+struct AvatarRef {
+  std::uint32_t index = 0;
+  AvatarNumber avatar = 0;
+};
+struct RemovePart {
+  std::vector<AvatarRef> avatars;
+};
+struct CancelPart {
+  std::vector<AvatarRef> avatars;
+};
+/// Removes what a session spawned: it has ended, or left the world.
+struct ReleasePart {};
+
+/// What a shard has to do for a session at its next tick.
+struct WorldCommand {
+  std::shared_ptr<World> world;
+  int from_shard = 0;  ///< The session's shard.
+  SessionId session = 0;
+  protocol::Seq seq = 0;  ///< 0: no answer is wanted.
+  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart> part;
+};
+
+/// What came of it on one shard.
+struct CommandResult {
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  std::uint32_t accepted = 0;
+  std::vector<protocol::ReplyItem> items;  ///< As in Reply, of this shard's items.
+};
+
+/// What the sessions of a shard want of a world; replaces what that shard said before.
+struct Interest {
+  std::shared_ptr<World> world;
+  int shard = 0;                 ///< Whose.
+  std::uint16_t every_full = 0;  ///< Ticks that this divides, 0: none.
+  std::uint16_t every_quantised = 0;
+  bool events = false;
+};
+
+/// Poses of one world, shard, mode and tick: the parts of a batch.
+struct PoseDelivery {
+  WorldId world = 0;
+  protocol::PoseMode mode = protocol::PoseMode::kFull;
+  int from_shard = 0;
+  std::uint64_t tick = 0;
+  std::uint32_t avatar_count = 0;
+  std::vector<SharedFrame> parts;
+};
+
+/// Events of one world, shard and tick.
+struct EventDelivery {
+  WorldId world = 0;
+  std::uint64_t tick = 0;
+  std::shared_ptr<const std::vector<protocol::Event>> events;
+};
+
+/// All that one shard has for another after a tick; one post.
+struct TickMail {
+  std::vector<CommandResult> results;
+  std::vector<EventDelivery> events;
+  std::vector<PoseDelivery> poses;
+
+  [[nodiscard]] bool empty() const { return results.empty() && events.empty() && poses.empty(); }
+};
+
+}  // namespace stridewire::server

@@ -1,0 +1,321 @@
+#include "world/shard.h"
+
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <boost/asio/post.hpp>
+#include <numeric>
+#include <utility>
+
+#include "stridewire/base/check.h"
+
+namespace stridewire::server {
+namespace {
+
+namespace asio = boost::asio;
+using protocol::PoseMode;
+using Clock = TickClock::Clock;
+
+constexpr std::chrono::milliseconds kHousekeepingInterval{100};
+
+}  // namespace
+
+Shard::Shard(int index, const Config& config, AvatarBudget& budget, ThreadMetrics& metrics,
+             ShardPeers& peers)
+    : index_(index),
+      config_(config),
+      budget_(budget),
+      metrics_(metrics),
+      peers_(peers),
+      clock_(Clock::time_point{}, config.tick_hz),
+      work_(context_.get_executor()),
+      tick_timer_(context_),
+      housekeeping_timer_(context_),
+      encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}),
+      batch_encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}) {}
+
+Shard::~Shard() { Stop(); }
+
+void Shard::Prepare(const TickClock& clock, std::vector<Shard*> shards) {
+  clock_ = clock;
+  shards_ = std::move(shards);
+  outgoing_.resize(shards_.size());
+}
+
+void Shard::Start() {
+  tick_ = clock_.TickAt(Clock::now());
+  ScheduleTick();
+  ScheduleHousekeeping();
+  thread_ = std::jthread([this] {
+    pthread_setname_np(pthread_self(), ("shard " + std::to_string(index_)).c_str());
+    context_.run();
+  });
+}
+
+void Shard::Stop() {
+  context_.stop();
+  if (thread_.joinable()) thread_.join();
+}
+
+// ---- ticks
+
+void Shard::ScheduleTick() {
+  tick_timer_.expires_at(clock_.Due(tick_ + 1));
+  tick_timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error) return;
+    Tick();
+    ScheduleTick();
+  });
+}
+
+void Shard::Tick() {
+  const auto begin = Clock::now();
+  const std::uint64_t tick = clock_.TickAt(begin);
+  if (tick <= tick_) return;  // the timer was early by less than the clock can tell
+  metrics_.tick_late.Observe(std::chrono::duration<double>(begin - clock_.Due(tick)).count());
+
+  // A late tick is published once. Avatars make up for the time that passed, up to a bound, beyond
+  // which a stalled server goes on where it was instead of stalling again.
+  const std::uint64_t missed = tick - tick_ - 1;
+  const std::uint64_t caught_up =
+      std::min(missed, static_cast<std::uint64_t>(config_.max_catch_up_ticks));
+  metrics_.ticks_missed.Add(missed);
+  metrics_.ticks_slipped.Add(missed - caught_up);
+  tick_ = tick;
+
+  for (const WorldCommand& command : inbox_) {
+    CommandResult result = WorldOf(command.world).Execute(command, tick);
+    if (command.seq == 0) continue;
+    outgoing_[static_cast<std::size_t>(command.from_shard)].results.push_back(std::move(result));
+  }
+  inbox_.clear();
+  for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
+  Publish();
+
+  metrics_.ticks.Add();
+  metrics_.tick.Observe(std::chrono::duration<double>(Clock::now() - begin).count());
+  UpdateGauges();
+}
+
+void Shard::Publish() {
+  for (auto& [id, world] : worlds_) {
+    if (const auto events = world->TakeEvents()) {
+      for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
+        if (!world->WantsEvents(static_cast<int>(shard))) continue;
+        outgoing_[shard].events.push_back({id, tick_, events});
+      }
+    }
+    for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+      PoseDelivery delivery;
+      bool is_encoded = false;
+      for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
+        if (!world->WantsPoses(static_cast<int>(shard), mode, tick_)) continue;
+        if (!is_encoded && !world->Encode(mode, tick_, batch_encoder_, delivery)) break;
+        is_encoded = true;
+        outgoing_[shard].poses.push_back(delivery);
+      }
+    }
+  }
+  for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
+    if (outgoing_[shard].empty()) continue;
+    Shard* receiver = shards_[shard];
+    asio::post(receiver->context_,
+               [receiver, mail = std::exchange(outgoing_[shard], {})]() mutable {
+                 receiver->Receive(std::move(mail));
+               });
+  }
+}
+
+void Shard::Receive(TickMail&& mail) {
+  for (CommandResult& result : mail.results) {
+    const auto it = sessions_.find(result.session);
+    if (it != sessions_.end()) it->second->OnResult(std::move(result));
+  }
+  for (const EventDelivery& delivery : mail.events) {
+    SharedEvents events(delivery, encoder_);
+    for (Session* session : WatchersOf(delivery.world)) session->OnEvents(events);
+  }
+  for (const PoseDelivery& delivery : mail.poses) {
+    for (Session* session : WatchersOf(delivery.world)) session->OnPoses(delivery);
+  }
+}
+
+std::span<Session* const> Shard::WatchersOf(WorldId world) const {
+  const auto it = watchers_.find(world);
+  return it == watchers_.end() ? std::span<Session* const>() : it->second;
+}
+
+WorldShard& Shard::WorldOf(const std::shared_ptr<World>& world) {
+  std::unique_ptr<WorldShard>& entry = worlds_[world->id];
+  if (entry == nullptr) {
+    entry = std::make_unique<WorldShard>(world, index_, shard_count(), config_.limits.max_queue,
+                                         clock_, budget_, metrics_);
+  }
+  return *entry;
+}
+
+// ---- between shards
+
+void Shard::Submit(int shard, WorldCommand&& command) {
+  if (shard == index_) {
+    inbox_.push_back(std::move(command));
+    return;
+  }
+  Shard* receiver = shards_[static_cast<std::size_t>(shard)];
+  asio::post(receiver->context_, [receiver, command = std::move(command)]() mutable {
+    receiver->inbox_.push_back(std::move(command));
+  });
+}
+
+void Shard::InterestChanged(const std::shared_ptr<World>& world) {
+  Interest interest{.world = world, .shard = index_};
+  std::vector<Session*>& watchers = watchers_[world->id];
+  watchers.clear();
+  for (const auto& [id, session] : sessions_) {
+    const std::uint16_t every_full = session->Every(world->id, PoseMode::kFull);
+    const std::uint16_t every_quantised = session->Every(world->id, PoseMode::kQuantised);
+    const bool events = session->WantsEvents(world->id);
+    if (every_full == 0 && every_quantised == 0 && !events) continue;
+    watchers.push_back(session.get());
+    interest.every_full = std::gcd(interest.every_full, every_full);
+    interest.every_quantised = std::gcd(interest.every_quantised, every_quantised);
+    interest.events |= events;
+  }
+  const bool is_none = watchers.empty();
+  if (is_none) watchers_.erase(world->id);
+  const auto told = told_interest_.find(world->id);
+  const bool is_told = told != told_interest_.end();
+  if (is_told ? told->second.every_full == interest.every_full &&
+                    told->second.every_quantised == interest.every_quantised &&
+                    told->second.events == interest.events
+              : is_none) {
+    return;
+  }
+  if (is_none) {
+    told_interest_.erase(told);
+  } else {
+    told_interest_[world->id] = interest;
+  }
+  for (Shard* shard : shards_) {
+    if (shard == this) {
+      OnInterest(interest);
+    } else {
+      asio::post(shard->context_, [shard, interest] { shard->OnInterest(interest); });
+    }
+  }
+}
+
+void Shard::OnInterest(const Interest& interest) { WorldOf(interest.world).SetInterest(interest); }
+
+// ---- sessions
+
+void Shard::JoinWorld(SessionId session, protocol::Seq seq, std::string name) {
+  peers_.JoinWorld(index_, session, seq, std::move(name));
+}
+
+void Shard::LeaveWorld(WorldId world) { peers_.LeaveWorld(world); }
+
+void Shard::Deliver(SessionId session, protocol::Seq seq, Outcome<std::shared_ptr<World>> joined) {
+  asio::post(context_, [this, session, seq, joined = std::move(joined)]() mutable {
+    const auto it = sessions_.find(session);
+    if (it != sessions_.end()) {
+      it->second->OnJoined(seq, std::move(joined));
+    } else if (joined) {
+      peers_.LeaveWorld((*joined)->id);
+    }
+  });
+}
+
+void Shard::Adopt(Arrival arrival) {
+  asio::post(context_,
+             [this, arrival = std::move(arrival)]() mutable { DoAdopt(std::move(arrival)); });
+}
+
+void Shard::DoAdopt(Arrival&& arrival) {
+  Connection::Socket socket(context_);
+  boost::system::error_code error;
+  socket.assign(arrival.is_v6 ? asio::ip::tcp::v6() : asio::ip::tcp::v4(), arrival.socket, error);
+  if (error) {
+    spdlog::error("a connection could not be taken over: {}", error.message());
+    ::close(arrival.socket);
+    if (!arrival.is_resuming) peers_.SessionEnded(arrival.identity.id);
+    return;
+  }
+  auto connection = std::make_shared<Connection>(std::move(socket), config_.limits, metrics_);
+  connections_.push_back(connection);
+  std::unique_ptr<Session>& session = sessions_[arrival.identity.id];
+  const bool is_resumed = arrival.is_resuming && session != nullptr && !session->is_ended();
+  if (session == nullptr || session->is_ended()) {
+    // It ended while its client was on the way: a new one under the same token.
+    if (arrival.is_resuming) peers_.SessionBegan(index_, arrival.identity);
+    session = std::make_unique<Session>(std::move(arrival.identity), *this);
+  }
+  (is_resumed ? metrics_.sessions_resumed : metrics_.sessions_opened).Add();
+  session->Attach(std::move(connection), arrival.hello, is_resumed, arrival.received);
+  UpdateGauges();
+}
+
+void Shard::SessionEnded(SessionId session) {
+  // Not at once: it is in the middle of something.
+  asio::post(context_, [this, session] {
+    const auto it = sessions_.find(session);
+    if (it == sessions_.end() || !it->second->is_ended()) return;
+    sessions_.erase(it);
+    metrics_.sessions_ended.Add();
+    peers_.SessionEnded(session);
+    UpdateGauges();
+  });
+}
+
+void Shard::ScheduleHousekeeping() {
+  housekeeping_timer_.expires_after(kHousekeepingInterval);
+  housekeeping_timer_.async_wait([this](const boost::system::error_code& error) {
+    if (error) return;
+    const auto now = Clock::now();
+    for (auto& [id, session] : sessions_) session->Housekeep(now);
+    // What nobody is interested in and nothing lives in is made again when it is needed.
+    std::erase_if(worlds_, [](const auto& item) {
+      return item.second->avatar_count() == 0 && !item.second->HasInterest();
+    });
+    std::erase_if(connections_, [](const auto& connection) { return connection.expired(); });
+    ScheduleHousekeeping();
+  });
+}
+
+void Shard::UpdateGauges() {
+  std::size_t avatars = 0;
+  for (const auto& [id, world] : worlds_) avatars += world->avatar_count();
+  std::size_t attached = 0;
+  for (const auto& [id, session] : sessions_) attached += session->is_attached() ? 1 : 0;
+  metrics_.avatars.Set(avatars);
+  metrics_.sessions_attached.Set(attached);
+  metrics_.sessions_detached.Set(sessions_.size() - attached);
+}
+
+void Shard::Drain() {
+  asio::post(context_, [this] {
+    is_draining_ = true;
+    for (auto& [id, session] : sessions_) session->Drain();
+  });
+}
+
+void Shard::WhenDrained(std::function<void()> done) {
+  asio::post(context_, [this, done = std::move(done)]() mutable {
+    const bool is_done = std::ranges::all_of(connections_, [](const auto& weak) {
+      const auto connection = weak.lock();
+      return connection == nullptr || connection->is_closed();
+    });
+    if (is_done) {
+      done();
+      return;
+    }
+    auto timer = std::make_shared<asio::steady_timer>(context_, std::chrono::milliseconds(5));
+    timer->async_wait([this, timer, done = std::move(done)](const auto& error) mutable {
+      if (!error) WhenDrained(std::move(done));
+    });
+  });
+}
+
+}  // namespace stridewire::server

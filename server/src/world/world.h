@@ -1,0 +1,85 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "stridewire/protocol/messages.h"
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire::server {
+
+using protocol::AvatarNumber;
+using protocol::WorldId;
+using SessionId = std::uint64_t;
+
+/// What all shards and sessions share of a world. Immutable but for the two counters.
+struct World {
+  WorldId id = 0;
+  std::string name;
+  std::shared_ptr<const MotionLibrary> library;
+  bool persistent = false;  ///< Avatars outlive the session that spawned them.
+
+  std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
+  std::atomic<AvatarNumber> last_number{0};   ///< Largest avatar number ever asked for.
+};
+
+/// The shard an avatar lives on.
+[[nodiscard]] constexpr int ShardOf(AvatarNumber avatar, int shard_count) {
+  return static_cast<int>(avatar % static_cast<AvatarNumber>(shard_count));
+}
+
+/// An avatar number nobody has used in this world; 0 when there is none left.
+[[nodiscard]] inline AvatarNumber NextNumber(World& world) {
+  AvatarNumber last = world.last_number.load(std::memory_order_relaxed);
+  do {
+    if (last == ~AvatarNumber{0}) return 0;
+  } while (!world.last_number.compare_exchange_weak(last, last + 1, std::memory_order_relaxed));
+  return last + 1;
+}
+
+/// Numbers the server chooses are larger than any a client chose.
+inline void NoteNumber(World& world, AvatarNumber number) {
+  AvatarNumber last = world.last_number.load(std::memory_order_relaxed);
+  while (last < number &&
+         !world.last_number.compare_exchange_weak(last, number, std::memory_order_relaxed)) {
+  }
+}
+
+/// Counts avatars against the limits of a world and of the server. Any thread.
+class AvatarBudget {
+ public:
+  enum class Verdict : std::uint8_t { kOk, kWorldFull, kServerFull };
+
+  AvatarBudget(std::int64_t max_per_world, std::int64_t max_total)
+      : max_per_world_(max_per_world), max_total_(max_total) {}
+
+  /// Takes the place of one avatar, or nothing.
+  [[nodiscard]] Verdict Reserve(World& world) {
+    if (!TakeOne(world.avatar_count, max_per_world_)) return Verdict::kWorldFull;
+    if (!TakeOne(total_, max_total_)) {
+      world.avatar_count.fetch_sub(1, std::memory_order_relaxed);
+      return Verdict::kServerFull;
+    }
+    return Verdict::kOk;
+  }
+  void Release(World& world, std::int64_t count = 1) {
+    world.avatar_count.fetch_sub(count, std::memory_order_relaxed);
+    total_.fetch_sub(count, std::memory_order_relaxed);
+  }
+  [[nodiscard]] std::int64_t total() const { return total_.load(std::memory_order_relaxed); }
+
+ private:
+  static bool TakeOne(std::atomic<std::int64_t>& counter, std::int64_t max) {
+    if (counter.fetch_add(1, std::memory_order_relaxed) < max) return true;
+    counter.fetch_sub(1, std::memory_order_relaxed);
+    return false;
+  }
+
+  std::int64_t max_per_world_;
+  std::int64_t max_total_;
+  std::atomic<std::int64_t> total_{0};
+};
+
+}  // namespace stridewire::server

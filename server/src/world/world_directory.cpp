@@ -1,0 +1,59 @@
+#include "world/world_directory.h"
+
+#include "stridewire/base/check.h"
+
+namespace stridewire::server {
+
+using protocol::StatusCode;
+
+Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
+  if (!IsWorldName(name)) {
+    return Refuse(StatusCode::kInvalidArgument,
+                  "a world's name has 1 to 64 letters, digits, _ - . and no dot first");
+  }
+  if (const auto it = worlds_.find(name); it != worlds_.end()) {
+    ++it->second.members;
+    return it->second.world;
+  }
+  const auto configured = config_.worlds.find(name);
+  const bool is_configured = configured != config_.worlds.end();
+  if (!is_configured && !config_.open_worlds) {
+    return Refuse(StatusCode::kNoSuchWorld, "no world of that name, and worlds are not open here");
+  }
+  if (worlds_.size() >= static_cast<std::size_t>(config_.limits.max_worlds)) {
+    return Refuse(StatusCode::kLimitReached, "the server has as many worlds as it takes");
+  }
+  auto world = std::make_shared<World>();
+  world->id = ++last_id_;
+  world->name = std::string(name);
+  world->persistent = is_configured ? configured->second.persistent : config_.persistent;
+  const bool has_library = is_configured && !configured->second.library.empty();
+  world->library = libraries_.Find(has_library ? configured->second.library : config_.library);
+  STRIDEWIRE_CHECK(world->library != nullptr);  // all that are configured were loaded at the start
+  worlds_.emplace(world->name, Entry{world, 1});
+  return world;
+}
+
+void WorldDirectory::Leave(WorldId id) {
+  for (auto& [name, entry] : worlds_) {
+    if (entry.world->id != id) continue;
+    STRIDEWIRE_CHECK(entry.members > 0);
+    --entry.members;
+    return;
+  }
+  STRIDEWIRE_CHECK(false && "a world that is left exists");
+}
+
+std::vector<WorldId> WorldDirectory::DropEmpty() {
+  std::vector<WorldId> dropped;
+  std::erase_if(worlds_, [&](const auto& item) {
+    const Entry& entry = item.second;
+    // Avatars are counted before their spawning is passed on, so none can still be under way.
+    if (entry.members > 0 || entry.world->avatar_count.load() > 0) return false;
+    dropped.push_back(entry.world->id);
+    return true;
+  });
+  return dropped;
+}
+
+}  // namespace stridewire::server

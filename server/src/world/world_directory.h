@@ -1,0 +1,47 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "ops/config.h"
+#include "ops/libraries.h"
+#include "session/refusal.h"
+#include "world/world.h"
+
+namespace stridewire::server {
+
+/// Which worlds there are. One thread's; a world comes into being when it is first joined and ends
+/// when nobody is in it and no avatar lives.
+class WorldDirectory {
+ public:
+  /// Borrows both.
+  WorldDirectory(const Config& config, const Libraries& libraries)
+      : config_(config), libraries_(libraries) {}
+
+  /// One member more. kInvalidArgument: no name for a world; kNoSuchWorld: not configured, and
+  /// worlds are not open; kLimitReached: max_worlds.
+  [[nodiscard]] Outcome<std::shared_ptr<World>> Join(std::string_view name);
+
+  /// One member less.
+  void Leave(WorldId id);
+
+  /// Forgets empty worlds and says which.
+  [[nodiscard]] std::vector<WorldId> DropEmpty();
+
+  [[nodiscard]] std::size_t size() const { return worlds_.size(); }
+
+ private:
+  struct Entry {
+    std::shared_ptr<World> world;
+    int members = 0;
+  };
+  const Config& config_;
+  const Libraries& libraries_;
+  std::map<std::string, Entry, std::less<>> worlds_;
+  WorldId last_id_ = 0;
+};
+
+}  // namespace stridewire::server

@@ -1,0 +1,526 @@
+// Sessions over real sockets: greeting, commands, coming back.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+#include "test_server.h"
+
+namespace stridewire {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::AvatarNumber;
+using protocol::ErrorNotice;
+using protocol::EventType;
+using protocol::PoseMode;
+using protocol::Reply;
+using protocol::StatusCode;
+using server::Limit;
+using server::ThreadMetrics;
+using testing::ElementsAre;
+
+std::vector<std::byte> Encoded(const protocol::Message& message) {
+  std::vector<std::byte> frame;
+  EXPECT_TRUE(protocol::Encoder().Encode(message, frame));
+  return frame;
+}
+
+TEST(ServerSession, WelcomesAHello) {
+  TestServer server;
+  RawClient client = server.Connect();
+  const auto welcome = client.SayHello();
+  ASSERT_TRUE(welcome);
+  EXPECT_EQ(welcome->protocol, 1);
+  EXPECT_NE(welcome->session, 0u);
+  EXPECT_GE(welcome->resume_token.size(), protocol::kMinResumeTokenBytes);
+  EXPECT_FALSE(welcome->resumed);
+  EXPECT_EQ(welcome->last_seq, 0u);
+  EXPECT_EQ(welcome->tick_hz, 60.0);
+  EXPECT_EQ(welcome->features, server::kServerFeatures);
+  EXPECT_EQ(welcome->limits.max_queue, 256u);
+  EXPECT_EQ(welcome->limits.max_items, protocol::kMaxItems);
+}
+
+TEST(ServerSession, GivesOnlyFeaturesBothHave) {
+  TestServer server;
+  RawClient client = server.Connect();
+  const auto welcome = client.SayHello(protocol::kFeatureQuantised | 1ull << 63);
+  ASSERT_TRUE(welcome);
+  EXPECT_EQ(welcome->features, protocol::kFeatureQuantised);
+}
+
+struct BadGreeting {
+  const char* name;
+  std::vector<std::byte> bytes;
+  StatusCode code;
+};
+
+std::vector<BadGreeting> BadGreetings() {
+  const std::vector<std::byte> hello = Encoded(protocol::Hello{.client_name = "test"});
+  const auto changed = [&](std::size_t at, unsigned char value) {
+    std::vector<std::byte> bytes = hello;
+    bytes[at] = std::byte{value};
+    return bytes;
+  };
+  std::vector<std::byte> garbage(4096);
+  std::mt19937 random(20261121);
+  for (std::byte& byte : garbage) byte = static_cast<std::byte>(random());
+  std::vector<std::byte> torn = hello;
+  std::fill(torn.begin() + protocol::kFrameHeaderBytes, torn.end(), std::byte{0xff});
+  return {
+      {"bad magic", changed(0, 'X'), StatusCode::kMalformed},
+      {"unknown frame version", changed(4, 9), StatusCode::kVersionMismatch},
+      {"unknown type", changed(6, 200), StatusCode::kUnsupported},
+      {"a server's message", changed(6, 64), StatusCode::kMalformed},
+      {"flags", changed(12, 1), StatusCode::kMalformed},
+      {"a length beyond its cap", changed(10, 0x7f), StatusCode::kLimitReached},
+      {"garbage", garbage, StatusCode::kMalformed},
+      {"a payload of no message", torn, StatusCode::kMalformed},
+      {"not a Hello", Encoded(protocol::Ping{.nonce = 1}), StatusCode::kUnexpectedMessage},
+      {"a version of tomorrow",
+       Encoded(protocol::Hello{.protocol_min = 7, .protocol_max = 9, .client_name = "test"}),
+       StatusCode::kVersionMismatch},
+  };
+}
+
+TEST(ServerSession, RefusesBadGreetingsAndSaysWhy) {
+  TestServer server;
+  for (const BadGreeting& greeting : BadGreetings()) {
+    SCOPED_TRACE(greeting.name);
+    RawClient client = server.Connect();
+    client.SendBytes(greeting.bytes);
+    const auto notice = client.Await<ErrorNotice>();
+    ASSERT_TRUE(notice);
+    EXPECT_TRUE(notice->fatal);
+    EXPECT_EQ(notice->code, greeting.code) << notice->text;
+    EXPECT_FALSE(notice->text.empty());
+    EXPECT_TRUE(client.AwaitClose());
+  }
+  // And it goes on serving.
+  RawClient client = server.Connect();
+  EXPECT_TRUE(client.SayHello());
+}
+
+TEST(ServerSession, HoldsNothingLargeForAPeerWithoutHello) {
+  TestServer server;
+  RawClient client = server.Connect();
+  // A Request may be 16 MiB later; before Hello its header alone ends the connection.
+  std::vector<std::byte> frame =
+      Encoded(protocol::Request{.seq = 1, .world = 1, .items = Steps(1, 2000, 0.5)});
+  frame.resize(64);
+  client.SendBytes(frame);
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kLimitReached);
+  EXPECT_EQ(server.metrics().Sum(Limit::kFrameBytes), 1u);
+}
+
+TEST(ServerSession, GivesUpAGreetingThatDoesNotCome) {
+  server::Config config = TestConfig();
+  config.limits.handshake_timeout_s = 0.1;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kTimeout);
+  EXPECT_TRUE(client.AwaitClose());
+  EXPECT_EQ(server.metrics().Sum(Limit::kHandshakeTimeout), 1u);
+}
+
+TEST(ServerSession, ClosesASilentConnection) {
+  server::Config config = TestConfig();
+  config.limits.idle_timeout_s = 0.2;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kTimeout);
+  EXPECT_EQ(server.metrics().Sum(Limit::kIdleTimeout), 1u);
+}
+
+TEST(ServerSession, AnswersPing) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  client.Send(protocol::Ping{.nonce = 42, .time_s = 1.5});
+  const auto pong = client.Await<protocol::Pong>();
+  ASSERT_TRUE(pong);
+  EXPECT_EQ(pong->nonce, 42u);
+  EXPECT_EQ(pong->time_s, 1.5);
+  EXPECT_GT(pong->server_time_s, 0.0);
+}
+
+TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("plaza");
+  ASSERT_TRUE(world);
+  EXPECT_EQ(world->name, "plaza");
+  EXPECT_EQ(world->library_hash.size(), 32u);
+  EXPECT_EQ(world->skeleton.joints.size(), 7u);
+
+  const auto spawned = client.Spawn(world->world, {{.avatar = 7, .start = {{1, 0, 2}, 0.5}}});
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->code, StatusCode::kOk);
+  EXPECT_EQ(spawned->accepted, 1u);
+  ASSERT_EQ(spawned->items.size(), 1u);
+  EXPECT_EQ(spawned->items[0].avatar, 7u);
+
+  ASSERT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
+  const auto requested = client.Request(world->world, Steps(7, 2, 0.4));
+  ASSERT_TRUE(requested);
+  EXPECT_EQ(requested->accepted, 2u);
+  EXPECT_TRUE(requested->items.empty());
+
+  std::vector<EventType> types;
+  std::vector<protocol::Event> events;
+  std::uint64_t last_tick = 0;
+  std::size_t batches = 0;
+  while (types.empty() || types.back() != EventType::kIdle ||
+         std::ranges::count(types, EventType::kFinished) < 3) {
+    auto message = client.Receive();
+    ASSERT_TRUE(message);
+    if (const auto* told = std::get_if<protocol::Events>(&*message)) {
+      EXPECT_EQ(told->world, world->world);
+      for (const protocol::Event& event : told->events) {
+        EXPECT_EQ(event.avatar, 7u);
+        types.push_back(event.type);
+        events.push_back(event);
+      }
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+      EXPECT_GT(batch->info.tick, last_tick);
+      EXPECT_DOUBLE_EQ(batch->info.server_time_s, static_cast<double>(batch->info.tick) / 60.0);
+      last_tick = batch->info.tick;
+      ++batches;
+      ASSERT_THAT(batch->avatars, ElementsAre(7u));
+    }
+  }
+  EXPECT_GT(batches, 10u);
+  // Two steps asked for and the avatar's own closing step.
+  std::erase_if(types, [](EventType type) { return type == EventType::kFootStrike; });
+  // The avatar may have said that it is idle before the request came.
+  std::erase(types, EventType::kIdle);
+  std::erase(types, EventType::kSpawned);
+  EXPECT_THAT(types, ElementsAre(EventType::kAccepted, EventType::kAccepted, EventType::kStarted,
+                                 EventType::kFinished, EventType::kStarted, EventType::kFinished,
+                                 EventType::kStarted, EventType::kFinished));
+  const auto started = std::ranges::find(events, EventType::kStarted, &protocol::Event::type);
+  EXPECT_EQ(started->request_id, 1u);
+  EXPECT_GT(started->requested.count, 0);
+  EXPECT_EQ(started->requested.count, started->applied.count);
+  const auto finished = std::ranges::find(events, EventType::kFinished, &protocol::Event::type);
+  EXPECT_NE(finished->base.position_m, DVec3(1, 0, 2));
+  EXPECT_TRUE(std::ranges::is_sorted(events, {}, &protocol::Event::tick));
+}
+
+TEST(ServerSession, ChoosesAvatarNumbersNobodyHas) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  const auto reply =
+      client.Spawn(world->world, {{.avatar = 5}, {.avatar = 0}, {.avatar = 0}, {.avatar = 5}});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->accepted, 3u);
+  ASSERT_EQ(reply->items.size(), 4u);
+  EXPECT_EQ(reply->items[0].avatar, 5u);
+  EXPECT_EQ(reply->items[1].avatar, 6u);
+  EXPECT_EQ(reply->items[2].avatar, 7u);
+  EXPECT_EQ(reply->items[3].code, StatusCode::kAvatarExists);
+}
+
+TEST(ServerSession, RefusesItemsOneByOne) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  const auto spawned =
+      client.Spawn(world->world, {{.avatar = 1}, {.avatar = 2, .start = {{1e9, 0, 0}, 0}}});
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->accepted, 1u);
+  EXPECT_EQ(spawned->items[1].code, StatusCode::kOutOfRange);
+
+  std::vector<protocol::RequestItem> items = Steps(1, 1, 0.5);
+  items.push_back({.avatar = 9, .request_id = 77, .movement = protocol::StandMovement{1.0}});
+  items.push_back({.avatar = 1, .request_id = 78, .movement = protocol::StandMovement{-1.0}});
+  const auto requested = client.Request(world->world, items);
+  ASSERT_TRUE(requested);
+  EXPECT_EQ(requested->code, StatusCode::kOk);
+  EXPECT_EQ(requested->accepted, 1u);
+  ASSERT_EQ(requested->items.size(), 2u);
+  EXPECT_EQ(requested->items[0].index, 1u);
+  EXPECT_EQ(requested->items[0].request_id, 77u);
+  EXPECT_EQ(requested->items[0].code, StatusCode::kNoSuchAvatar);
+  EXPECT_EQ(requested->items[1].index, 2u);
+  EXPECT_EQ(requested->items[1].code, StatusCode::kOutOfRange);
+}
+
+TEST(ServerSession, CancelsAndRemoves) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}}));
+  ASSERT_TRUE(client.Request(world->world, Steps(1, 100, 0.5)));
+  client.Send(
+      protocol::CancelQueue{.seq = client.NextSeq(), .world = world->world, .avatars = {1, 3}});
+  const auto cancelled = client.Await<Reply>();
+  ASSERT_TRUE(cancelled);
+  EXPECT_EQ(cancelled->accepted, 1u);
+  ASSERT_EQ(cancelled->items.size(), 1u);
+  EXPECT_EQ(cancelled->items[0].code, StatusCode::kNoSuchAvatar);
+  client.Send(protocol::Remove{.seq = client.NextSeq(), .world = world->world, .avatars = {2, 1}});
+  const auto removed = client.Await<Reply>();
+  ASSERT_TRUE(removed);
+  EXPECT_EQ(removed->accepted, 2u);
+  EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 0; }));
+}
+
+TEST(ServerSession, RefusesCommandsThatDoNotFitItsState) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto code = [&](const auto& command) {
+    client.Send(command);
+    const auto reply = client.Await<Reply>();
+    return reply ? reply->code : StatusCode::kInternal;
+  };
+  const auto seq = [&] { return client.NextSeq(); };
+  EXPECT_EQ(code(protocol::Spawn{.seq = seq(), .world = 1, .items = {{}}}), StatusCode::kNotJoined);
+  EXPECT_EQ(code(protocol::LeaveWorld{.seq = seq(), .world = 1}), StatusCode::kNotJoined);
+  EXPECT_EQ(code(protocol::Observe{.seq = seq(), .world = 1, .subscription = 1, .avatars = {}}),
+            StatusCode::kNotJoined);
+  EXPECT_EQ(code(protocol::StopObserving{.seq = seq(), .subscription = 1}),
+            StatusCode::kNoSuchSubscription);
+  EXPECT_EQ(code(protocol::JoinWorld{.seq = seq(), .name = "../etc"}),
+            StatusCode::kInvalidArgument);
+  const auto world = client.Join("w", protocol::Role::kObserver);
+  ASSERT_TRUE(world);
+  EXPECT_EQ(code(protocol::JoinWorld{.seq = seq(), .name = "w"}), StatusCode::kAlreadyJoined);
+  EXPECT_EQ(code(protocol::Spawn{.seq = seq(), .world = world->world, .items = {{}}}),
+            StatusCode::kNotAllowed);
+  EXPECT_EQ(code(protocol::Observe{.seq = seq(),
+                                   .world = world->world,
+                                   .subscription = 1,
+                                   .mode = PoseMode::kMovement,
+                                   .avatars = {}}),
+            StatusCode::kUnsupported);
+  EXPECT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
+  EXPECT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code,
+            StatusCode::kSubscriptionExists);
+}
+
+TEST(ServerSession, ASecondHelloEndsTheConnection) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  client.Send(protocol::Hello{.client_name = "again"});
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kUnexpectedMessage);
+  EXPECT_TRUE(client.AwaitClose());
+}
+
+TEST(ServerSession, DoesACommandOnceHoweverOftenItComes) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  const protocol::Spawn spawn{.seq = client.NextSeq(), .world = world->world, .items = {{}}};
+  client.Send(spawn);
+  const auto first = client.Await<Reply>();
+  client.Send(spawn);
+  const auto second = client.Await<Reply>();
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(*first, *second);
+  EXPECT_EQ(server.metrics().Sum(&ThreadMetrics::avatars), 1u);
+
+  client.Send(protocol::Spawn{.seq = spawn.seq + 2, .world = world->world, .items = {{}}});
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kBadSequence);
+  EXPECT_EQ(notice->seq, spawn.seq + 2);
+}
+
+TEST(ServerSession, GoesOnAfterALostConnection) {
+  TestServer server;
+  RawClient client = server.Connect();
+  const auto welcome = client.SayHello();
+  ASSERT_TRUE(welcome);
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kQuantised));
+  std::uint64_t last_number = 0;
+  ASSERT_TRUE(client.Await<protocol::PoseBatch>([&](const protocol::Message& message) {
+    if (const auto* events = std::get_if<protocol::Events>(&message)) last_number = events->number;
+  }));
+  // This one's answer is lost: the connection breaks right behind it.
+  const protocol::Request request{
+      .seq = client.NextSeq(), .world = world->world, .items = Steps(1, 3, 0.4)};
+  client.Send(request);
+  ASSERT_TRUE(
+      Eventually([&] { return server.metrics().Sum(&ThreadMetrics::requests_accepted) == 3; }));
+  client.Abort();
+  ASSERT_TRUE(
+      Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
+
+  RawClient again = server.Connect();
+  const auto back = again.SayHello(~0ull, welcome->resume_token, last_number);
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(back->resumed);
+  EXPECT_EQ(back->session, welcome->session);
+  EXPECT_EQ(back->last_seq, request.seq);
+  EXPECT_EQ(back->resume_token, welcome->resume_token);
+  const auto info = again.Await<protocol::WorldInfo>();
+  ASSERT_TRUE(info);
+  EXPECT_EQ(info->seq, 0u);
+  EXPECT_EQ(info->world, world->world);
+
+  // The command sent again is answered, and was done once.
+  again.Send(request);
+  std::set<std::uint64_t> numbers;
+  std::size_t accepted = 0;
+  std::size_t batches = 0;
+  bool is_answered = false;
+  while (!is_answered || batches == 0 || accepted < 3) {
+    const auto message = again.Receive();
+    ASSERT_TRUE(message);
+    if (const auto* events = std::get_if<protocol::Events>(&*message)) {
+      EXPECT_GT(events->number, last_number);
+      EXPECT_TRUE(numbers.insert(events->number).second);
+      for (const auto& event : events->events) accepted += event.type == EventType::kAccepted;
+    } else if (const auto* reply = std::get_if<Reply>(&*message)) {
+      EXPECT_EQ(reply->seq, request.seq);
+      EXPECT_EQ(reply->accepted, 3u);
+      is_answered = true;
+    } else if (std::holds_alternative<protocol::PoseBatch>(*message)) {
+      ++batches;
+    }
+  }
+  EXPECT_EQ(accepted, 3u);
+  EXPECT_EQ(server.metrics().Sum(&ThreadMetrics::requests_accepted), 3u);
+  EXPECT_EQ(server.metrics().Sum(&ThreadMetrics::sessions_resumed), 1u);
+  EXPECT_EQ(*numbers.begin(), last_number + 1);
+}
+
+TEST(ServerSession, MovesToANewConnectionWhileTheOldOneIsHalfOpen) {
+  TestServer server;
+  RawClient old = server.Connect();
+  const auto welcome = old.SayHello();
+  ASSERT_TRUE(welcome);
+  RawClient fresh = server.Connect();
+  const auto back = fresh.SayHello(~0ull, welcome->resume_token);
+  ASSERT_TRUE(back);
+  EXPECT_TRUE(back->resumed);
+  const auto notice = old.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kReplaced);
+  EXPECT_TRUE(old.AwaitClose());
+  fresh.Send(protocol::Ping{.nonce = 1});
+  EXPECT_TRUE(fresh.Await<protocol::Pong>());
+}
+
+TEST(ServerSession, EndsWhenItsClientDoesNotComeBack) {
+  server::Config config = TestConfig();
+  config.limits.resume_window_s = 0.05;
+  config.worlds["kept"] = {.library = "", .persistent = true};
+  TestServer server(config);
+  RawClient client = server.Connect();
+  const auto welcome = client.SayHello();
+  ASSERT_TRUE(welcome);
+  const auto passing = client.Join("passing");
+  const auto kept = client.Join("kept");
+  ASSERT_TRUE(passing && kept);
+  ASSERT_EQ(client.Spawn(passing->world, {{}, {}, {}})->accepted, 3u);
+  ASSERT_EQ(client.Spawn(kept->world, {{}, {}})->accepted, 2u);
+  client.Abort();
+  // Its avatars go with it, but not those of a persistent world.
+  ASSERT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 2; }));
+  ASSERT_TRUE(
+      Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_ended) == 1; }));
+  RawClient again = server.Connect();
+  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  ASSERT_TRUE(back);
+  EXPECT_FALSE(back->resumed);
+  EXPECT_NE(back->session, welcome->session);
+  EXPECT_EQ(back->last_seq, 0u);
+}
+
+TEST(ServerSession, EndsWithGoodbye) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{}}));
+  client.Send(protocol::Goodbye{});
+  EXPECT_TRUE(client.AwaitClose());
+  EXPECT_TRUE(
+      Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_ended) == 1; }));
+  EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 0; }));
+}
+
+TEST(ServerSession, StartsAnewAfterARestart) {
+  auto server = std::make_unique<TestServer>();
+  RawClient client = server->Connect();
+  const auto welcome = client.SayHello();
+  ASSERT_TRUE(welcome);
+  server::Config config = TestConfig();
+  config.listen.port = server->port();
+  EXPECT_TRUE(server->DrainAndJoin());
+  const auto notice = client.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kShuttingDown);
+  EXPECT_TRUE(client.AwaitClose());
+  server = nullptr;
+
+  // On the same port at once, though connections of the one before still linger.
+  TestServer restarted(config);
+  RawClient again = restarted.Connect();
+  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  ASSERT_TRUE(back);
+  EXPECT_FALSE(back->resumed);
+  EXPECT_TRUE(again.Join("w"));
+}
+
+TEST(ServerSession, SurvivesMutatedFrames) {
+  const unsigned seed = std::random_device()();
+  std::printf("seed %u\n", seed);
+  std::mt19937 random(seed);
+  TestServer server;
+  const std::vector<std::vector<std::byte>> frames = {
+      Encoded(protocol::JoinWorld{.seq = 1, .name = "w"}),
+      Encoded(protocol::Spawn{.seq = 2, .world = 1, .items = {{.avatar = 1}, {.avatar = 2}}}),
+      Encoded(protocol::Request{.seq = 3, .world = 1, .items = Steps(1, 4, 0.5)}),
+      Encoded(protocol::Observe{.seq = 4, .world = 1, .subscription = 1, .avatars = {1}}),
+      Encoded(protocol::Ping{.nonce = 1}),
+  };
+  for (int round = 0; round < 200; ++round) {
+    RawClient client = server.Connect();
+    ASSERT_TRUE(client.SayHello(0));
+    for (const std::vector<std::byte>& frame : frames) {
+      std::vector<std::byte> mutated = frame;
+      const unsigned flips = random() % 3;
+      for (unsigned i = 0; i < flips; ++i) {
+        mutated[random() % mutated.size()] = static_cast<std::byte>(random());
+      }
+      client.SendBytes(mutated);
+    }
+  }
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  EXPECT_TRUE(client.Join("after"));
+}
+
+}  // namespace
+}  // namespace stridewire

@@ -1,0 +1,48 @@
+#include "test_server.h"
+
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "toy_library.h"
+
+namespace stridewire {
+
+server::Config TestConfig(int shards) {
+  server::Config config;
+  config.listen.port = 0;
+  config.http.port = 0;
+  config.library = "toy";
+  config.shards = shards;
+  config.log_level = "warning";
+  return config;
+}
+
+TestServer::TestServer(server::Config config) {
+  server::Libraries libraries;
+  libraries.Add(config.library, MakeToyLibrary());
+  server_ = std::make_unique<server::Server>(std::move(config), std::move(libraries));
+  if (const Status status = server_->Start(); !status) {
+    std::fprintf(stderr, "the test's server did not start: %s\n", Describe(status.error()).c_str());
+    std::abort();
+  }
+  thread_ = std::thread([this] { was_drained_ = server_->Run(); });
+}
+
+TestServer::~TestServer() {
+  if (!thread_.joinable()) return;
+  server_->Stop();
+  thread_.join();
+}
+
+RawClient TestServer::Connect(int receive_buffer_bytes) const {
+  return {"127.0.0.1", port(), receive_buffer_bytes};
+}
+
+bool TestServer::DrainAndJoin() {
+  server_->Drain();
+  thread_.join();
+  return was_drained_;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "ops/server.h"
+#include "raw_client.h"
+
+namespace stridewire {
+
+/// A configuration for tests: this machine, ports the system chooses.
+[[nodiscard]] server::Config TestConfig(int shards = 2);
+
+/// A server in this process, on the toy library, with real sockets.
+class TestServer {
+ public:
+  explicit TestServer(server::Config config = TestConfig());
+  ~TestServer();
+  TestServer(const TestServer&) = delete;
+  TestServer& operator=(const TestServer&) = delete;
+
+  [[nodiscard]] RawClient Connect(int receive_buffer_bytes = 0) const;
+  [[nodiscard]] std::uint16_t port() const { return server_->listen_endpoint().port; }
+  [[nodiscard]] std::uint16_t http_port() const { return server_->http_endpoint().port; }
+  [[nodiscard]] server::Server& server() { return *server_; }
+  [[nodiscard]] server::Metrics& metrics() { return server_->metrics(); }
+
+  /// Drains it and waits for its end. True: it was drained in time.
+  bool DrainAndJoin();
+
+ private:
+  std::unique_ptr<server::Server> server_;
+  bool was_drained_ = false;
+  std::thread thread_;
+};
+
+/// Waits until a condition holds, at most RawClient::kPatience; true if it does.
+template <typename Condition>
+bool Eventually(Condition&& condition) {
+  const auto until = std::chrono::steady_clock::now() + RawClient::kPatience;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+}  // namespace stridewire
