@@ -71,8 +71,8 @@ class Findings {
   template <typename E>
   void Known(E value, E last, const char* field, std::int64_t index = -1) {
     using U = std::underlying_type_t<E>;
-    That(static_cast<U>(value) <= static_cast<U>(last), ErrorCode::kMalformed,
-         "unknown enumerator", field, index);
+    That(static_cast<U>(value) <= static_cast<U>(last), ErrorCode::kMalformed, "unknown enumerator",
+         field, index);
   }
 
   void Avatars(std::span<const AvatarNumber> avatars, std::size_t min, const char* field) {
@@ -295,8 +295,8 @@ Status Check(const Reply& m) {
   found.Count(m.items.size(), 0, kMaxItems, "Reply.items");
   for (std::size_t i = 0; i < m.items.size(); ++i) {
     const auto index = static_cast<std::int64_t>(i);
-    found.That(m.items[i].index < kMaxItems, ErrorCode::kOutOfRange,
-               "no command has so many items", "Reply.index", index);
+    found.That(m.items[i].index < kMaxItems, ErrorCode::kOutOfRange, "no command has so many items",
+               "Reply.index", index);
     found.Text(m.items[i].text, kMaxReasonBytes, "Reply.item.text", index);
   }
   return found.Result();
@@ -317,7 +317,8 @@ Status Check(const PoseBatch& m) {
              "not 1 to 256 joints", "PoseBatch.joint_count", info.joint_count);
   found.Avatars(m.avatars, 0, "PoseBatch.avatars");
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
-             "not one flag an avatar", "PoseBatch.flags", static_cast<std::int64_t>(m.flags.size()));
+             "not one flag an avatar", "PoseBatch.flags",
+             static_cast<std::int64_t>(m.flags.size()));
   found.That(m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count),
              ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",
              static_cast<std::int64_t>(m.poses.size()));

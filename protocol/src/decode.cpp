@@ -142,9 +142,7 @@ void Unpack(Unpacker& u, const wire::Request& w, Request& m) {
       case wire::MovementType::Jump:
         item.movement = JumpMovement{from->length_m(), from->height_m(), from->turn_rad()};
         break;
-      case wire::MovementType::Stand:
-        item.movement = StandMovement{from->seconds()};
-        break;
+      case wire::MovementType::Stand: item.movement = StandMovement{from->seconds()}; break;
       default:
         u.Wrong(ErrorCode::kMalformed, "unknown enumerator", "Request.type",
                 static_cast<std::int64_t>(i));
@@ -194,10 +192,9 @@ void Unpack(Unpacker& u, const wire::Welcome& w, Welcome& m) {
   u.Text(w.server_name(), kMaxNameBytes, m.server_name, "Welcome.server_name");
   u.Text(w.server_version(), kMaxNameBytes, m.server_version, "Welcome.server_version");
   if (const auto* limits = w.limits()) {
-    m.limits = {limits->max_control_bytes(), limits->max_bulk_bytes(),
-                limits->max_items(),         limits->max_avatars_per_world(),
-                limits->max_queue(),         limits->reply_memory(),
-                limits->idle_timeout_s(),    limits->resume_window_s()};
+    m.limits = {limits->max_control_bytes(),     limits->max_bulk_bytes(), limits->max_items(),
+                limits->max_avatars_per_world(), limits->max_queue(),      limits->reply_memory(),
+                limits->idle_timeout_s(),        limits->resume_window_s()};
   }
 }
 
@@ -258,9 +255,14 @@ void Unpack(Unpacker& u, const wire::Reply& w, Reply& m) {
 }
 
 void Unpack(Unpacker&, const wire::PoseBatch& w, PoseBatch& m) {
-  m.info = {w.world(), w.shard(),         w.part(),
-            w.parts(), w.tick(),          w.server_time_s(),
-            static_cast<PoseMode>(w.mode()), w.joint_count()};
+  m.info = {w.world(),
+            w.shard(),
+            w.part(),
+            w.parts(),
+            w.tick(),
+            w.server_time_s(),
+            static_cast<PoseMode>(w.mode()),
+            w.joint_count()};
   if (const auto* avatars = w.avatars()) m.avatars = {avatars->data(), avatars->size()};
   if (const auto* flags = w.flags()) m.flags = {flags->data(), flags->size()};
   if (const auto* poses = w.poses()) {

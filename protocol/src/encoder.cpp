@@ -29,8 +29,8 @@ Offset<flatbuffers::String> Text(FlatBufferBuilder& b, const std::string& text) 
 Offset<wire::Hello> Build(FlatBufferBuilder& b, const Hello& m) {
   const auto name = b.CreateString(m.client_name);
   const auto auth = Text(b, m.auth_token);
-  const auto resume =
-      m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>() : Bytes(b, m.resume_token);
+  const auto resume = m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>()
+                                             : Bytes(b, m.resume_token);
   return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, m.features, auth, resume,
                            m.last_events_number);
 }
@@ -87,11 +87,10 @@ Offset<wire::CancelQueue> Build(FlatBufferBuilder& b, const CancelQueue& m) {
 }
 
 Offset<wire::Observe> Build(FlatBufferBuilder& b, const Observe& m) {
-  const auto avatars = m.avatars.empty() ? Offset<flatbuffers::Vector<std::uint32_t>>()
-                                         : b.CreateVector(m.avatars);
-  return wire::CreateObserve(b, m.seq, m.world, m.subscription,
-                             static_cast<wire::PoseMode>(m.mode), avatars, m.every_n_ticks,
-                             m.with_events);
+  const auto avatars =
+      m.avatars.empty() ? Offset<flatbuffers::Vector<std::uint32_t>>() : b.CreateVector(m.avatars);
+  return wire::CreateObserve(b, m.seq, m.world, m.subscription, static_cast<wire::PoseMode>(m.mode),
+                             avatars, m.every_n_ticks, m.with_events);
 }
 
 Offset<wire::StopObserving> Build(FlatBufferBuilder& b, const StopObserving& m) {
@@ -108,11 +107,11 @@ Offset<wire::Goodbye> Build(FlatBufferBuilder& b, const Goodbye& m) {
 
 Offset<wire::Welcome> Build(FlatBufferBuilder& b, const Welcome& m) {
   const ServerLimits& l = m.limits;
-  const auto limits = wire::CreateServerLimits(
-      b, l.max_control_bytes, l.max_bulk_bytes, l.max_items, l.max_avatars_per_world, l.max_queue,
-      l.reply_memory, l.idle_timeout_s, l.resume_window_s);
-  const auto token =
-      m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>() : Bytes(b, m.resume_token);
+  const auto limits = wire::CreateServerLimits(b, l.max_control_bytes, l.max_bulk_bytes,
+                                               l.max_items, l.max_avatars_per_world, l.max_queue,
+                                               l.reply_memory, l.idle_timeout_s, l.resume_window_s);
+  const auto token = m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>()
+                                            : Bytes(b, m.resume_token);
   const auto name = Text(b, m.server_name);
   const auto version = Text(b, m.server_version);
   return wire::CreateWelcome(b, m.protocol, m.features, m.session, token, m.resumed, m.last_seq,
@@ -154,15 +153,14 @@ Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {
   items.reserve(m.items.size());
   for (const ReplyItem& item : m.items) {
     // Thousands of items are refused for the same reason: say it once.
-    const auto text = item.text.empty() ? Offset<flatbuffers::String>()
-                                        : b.CreateSharedString(item.text);
+    const auto text =
+        item.text.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(item.text);
     items.push_back(wire::CreateReplyItem(b, item.index, item.avatar, item.request_id,
                                           ToWire(item.code), text));
   }
   const auto text = Text(b, m.text);
-  const auto items_offset = m.items.empty()
-                                ? Offset<flatbuffers::Vector<Offset<wire::ReplyItem>>>()
-                                : b.CreateVector(items);
+  const auto items_offset = m.items.empty() ? Offset<flatbuffers::Vector<Offset<wire::ReplyItem>>>()
+                                            : b.CreateVector(items);
   return wire::CreateReply(b, m.seq, ToWire(m.code), text, m.accepted, items_offset);
 }
 
@@ -187,13 +185,13 @@ Offset<wire::Event> Build(FlatBufferBuilder& b, const Event& event) {
       event.reason.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(event.reason);
   const wire::Vec3 position = ToWire(event.position_m);
   const wire::Vec3 base = ToWire(event.base.position_m);
-  return wire::CreateEvent(
-      b, static_cast<wire::EventType>(event.type), event.avatar, event.request_id,
-      static_cast<wire::MovementKind>(event.kind), event.group, event.tick, event.time_s, requested,
-      applied, event.extrapolated, event.clamped, static_cast<wire::Foot>(event.foot),
-      event.position_m == DVec3(0.0) ? nullptr : &position,
-      event.base.position_m == DVec3(0.0) ? nullptr : &base, event.base.heading_rad,
-      ToWire(event.code), reason);
+  return wire::CreateEvent(b, static_cast<wire::EventType>(event.type), event.avatar,
+                           event.request_id, static_cast<wire::MovementKind>(event.kind),
+                           event.group, event.tick, event.time_s, requested, applied,
+                           event.extrapolated, event.clamped, static_cast<wire::Foot>(event.foot),
+                           event.position_m == DVec3(0.0) ? nullptr : &position,
+                           event.base.position_m == DVec3(0.0) ? nullptr : &base,
+                           event.base.heading_rad, ToWire(event.code), reason);
 }
 
 Offset<wire::Events> Build(FlatBufferBuilder& b, const Events& m) {
@@ -259,8 +257,8 @@ Status Encoder::Encode(const Events& m, Frame& frame) { return impl_->Encode(m, 
 Status Encoder::Encode(const Lagging& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const ErrorNotice& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Pong& m, Frame& frame) { return impl_->Encode(m, frame); }
-Status Encoder::Encode(const Message& message, Frame& frame) {
-  return std::visit([&](const auto& m) { return impl_->Encode(m, frame); }, message);
+Status Encoder::Encode(const Message& m, Frame& frame) {
+  return std::visit([&](const auto& alternative) { return impl_->Encode(alternative, frame); }, m);
 }
 
 }  // namespace stridewire::protocol

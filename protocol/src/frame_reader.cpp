@@ -38,8 +38,7 @@ Expected<std::optional<FrameView>> FrameReader::Next(std::span<const std::byte>&
     }
     const std::size_t frame_bytes = kFrameHeaderBytes + header->payload_bytes;
     if (bytes.size() >= frame_bytes) {
-      const FrameView view{header->type,
-                           bytes.subspan(kFrameHeaderBytes, header->payload_bytes)};
+      const FrameView view{header->type, bytes.subspan(kFrameHeaderBytes, header->payload_bytes)};
       bytes = bytes.subspan(frame_bytes);
       return view;
     }
@@ -50,10 +49,10 @@ Expected<std::optional<FrameView>> FrameReader::Next(std::span<const std::byte>&
     const std::size_t count = std::min(until - buffer_.size(), bytes.size());
     const std::size_t needed = buffer_.size() + count;
     if (needed > buffer_.capacity()) {
-      buffer_.reserve(
-          std::max(needed, std::min(until, std::max(2 * buffer_.size(), kFirstBytes))));
+      buffer_.reserve(std::max(needed, std::min(until, std::max(2 * buffer_.size(), kFirstBytes))));
     }
-    buffer_.insert(buffer_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
+    buffer_.insert(buffer_.end(), bytes.begin(),
+                   bytes.begin() + static_cast<std::ptrdiff_t>(count));
     bytes = bytes.subspan(count);
     return buffer_.size() == until;
   };

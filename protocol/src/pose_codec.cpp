@@ -1,5 +1,6 @@
 #include "stridewire/protocol/pose_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -31,28 +32,28 @@ bool IsUnit(const Quat& q) {
          squared <= (1.0f + kUnitTolerance) * (1.0f + kUnitTolerance);
 }
 
+// The components that stay when one is left out.
+constexpr std::size_t kStaying[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+
 void EncodeSmallestThree(const Quat& q, std::byte* out) {
   const std::array<float, 4> c = {q.x, q.y, q.z, q.w};
-  int largest = 0;
-  for (int i = 1; i < 4; ++i) {
-    if (std::abs(c[static_cast<std::size_t>(i)]) > std::abs(c[static_cast<std::size_t>(largest)])) {
-      largest = i;
-    }
+  std::size_t largest = 0;
+  float magnitude = std::abs(c[0]);
+  for (std::size_t i = 1; i < 4; ++i) {
+    const bool larger = std::abs(c[i]) > magnitude;
+    largest = larger ? i : largest;
+    magnitude = larger ? std::abs(c[i]) : magnitude;
   }
   // Divided by its length, so that a quaternion at the edge of the tolerance keeps its rotation.
-  const float scale = kSqrt2 * kComponentSteps / std::sqrt(Dot(q, q));
-  const float signed_scale = std::signbit(c[static_cast<std::size_t>(largest)]) ? -scale : scale;
-  std::array<std::uint16_t, 3> words{};
-  int word = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (i == largest) continue;
-    const float steps = std::round(c[static_cast<std::size_t>(i)] * signed_scale);
-    const float clamped = std::fmin(std::fmax(steps, -kComponentSteps), kComponentSteps);
-    words[static_cast<std::size_t>(word++)] =
-        static_cast<std::uint16_t>(static_cast<int>(clamped) + kZero);
+  const float scale = std::copysign(kSqrt2 * kComponentSteps / std::sqrt(Dot(q, q)), c[largest]);
+  std::array<std::uint16_t, 3> words;
+  for (std::size_t k = 0; k < 3; ++k) {
+    // Never negative, so that cutting off the fraction rounds; std::round is a call.
+    const float steps = c[kStaying[largest][k]] * scale + (kZero + 0.5f);
+    words[k] = static_cast<std::uint16_t>(std::clamp(static_cast<int>(steps), 1, 2 * kZero - 1));
   }
-  if (largest & 1) words[0] |= kHighBit;
-  if (largest & 2) words[1] |= kHighBit;
+  words[0] |= static_cast<std::uint16_t>((largest & 1) << 15);
+  words[1] |= static_cast<std::uint16_t>((largest >> 1) << 15);
   std::memcpy(out, words.data(), 6);
 }
 
@@ -61,20 +62,19 @@ bool DecodeSmallestThree(const std::byte* in, Quat& q) {
   std::array<std::uint16_t, 3> words;
   std::memcpy(words.data(), in, 6);
   if (words[2] & kHighBit) return false;
-  const int largest = (words[0] >> 15) | ((words[1] >> 15) << 1);
+  const auto largest = static_cast<std::size_t>((words[0] >> 15) | ((words[1] >> 15) << 1));
   std::array<float, 4> c{};
   float squared = 0.0f;
-  int word = 0;
-  for (int i = 0; i < 4; ++i) {
-    if (i == largest) continue;
-    const int bits = words[static_cast<std::size_t>(word++)] & kComponentMask;
-    if (bits == 0) return false;
+  bool zero = false;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const int bits = words[k] & kComponentMask;
+    zero |= bits == 0;
     const float value = static_cast<float>(bits - kZero) / (kSqrt2 * kComponentSteps);
-    c[static_cast<std::size_t>(i)] = value;
+    c[kStaying[largest][k]] = value;
     squared += value * value;
   }
-  if (squared > kMaxThreeSquared) return false;
-  c[static_cast<std::size_t>(largest)] = std::sqrt(1.0f - squared);
+  if (zero || squared > kMaxThreeSquared) return false;
+  c[largest] = std::sqrt(1.0f - squared);
   q = Quat(c[3], c[0], c[1], c[2]);
   return true;
 }
@@ -150,8 +150,8 @@ Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_posit
   std::array<std::int32_t, 3> root;
   std::memcpy(root.data(), in.data(), 12);
   for (int i = 0; i < 3; ++i) {
-    const double metres =
-        static_cast<double>(root[static_cast<std::size_t>(i)]) / static_cast<double>(kRootStepsPerM);
+    const double metres = static_cast<double>(root[static_cast<std::size_t>(i)]) /
+                          static_cast<double>(kRootStepsPerM);
     if (std::abs(metres) > static_cast<double>(kMaxRootM)) {
       return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
     }

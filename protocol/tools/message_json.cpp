@@ -90,12 +90,8 @@ Json Fields(const CancelQueue& m) {
 }
 
 Json Fields(const Observe& m) {
-  return {{"seq", Wide(m.seq)},
-          {"world", m.world},
-          {"subscription", m.subscription},
-          {"mode", Number(m.mode)},
-          {"avatars", m.avatars},
-          {"every_n_ticks", m.every_n_ticks},
+  return {{"seq", Wide(m.seq)},          {"world", m.world},     {"subscription", m.subscription},
+          {"mode", Number(m.mode)},      {"avatars", m.avatars}, {"every_n_ticks", m.every_n_ticks},
           {"with_events", m.with_events}};
 }
 
@@ -140,9 +136,8 @@ Json Leg(const LegInfo& leg) {
 Json Fields(const WorldInfo& m) {
   Json joints = Json::array();
   for (const JointInfo& joint : m.skeleton.joints) {
-    joints.push_back({{"name", joint.name},
-                      {"parent", joint.parent},
-                      {"offset_m", Vector(joint.offset_m)}});
+    joints.push_back(
+        {{"name", joint.name}, {"parent", joint.parent}, {"offset_m", Vector(joint.offset_m)}});
   }
   Json end_sites = Json::array();
   for (const EndSiteInfo& site : m.skeleton.end_sites) {
@@ -230,10 +225,8 @@ Json Fields(const Events& m) {
                       {"code", Number(event.code)},
                       {"reason", event.reason}});
   }
-  return {{"world", m.world},
-          {"number", Wide(m.number)},
-          {"tick", Wide(m.tick)},
-          {"events", events}};
+  return {
+      {"world", m.world}, {"number", Wide(m.number)}, {"tick", Wide(m.tick)}, {"events", events}};
 }
 
 Json Fields(const Lagging& m) {

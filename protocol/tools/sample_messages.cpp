@@ -51,14 +51,16 @@ struct BatchArrays {
       std::vector<Quat> rotations;
       for (int j = 0; j < joint_count; ++j) {
         const double angle = 0.7 * a + 0.45 * j;
-        const double x = Sin(angle), y = Cos(1.3 * angle), z = Sin(0.4 + 2.1 * angle), w = Cos(angle);
+        const double x = Sin(angle), y = Cos(1.3 * angle), z = Sin(0.4 + 2.1 * angle),
+                     w = Cos(angle);
         const double length = std::sqrt(x * x + y * y + z * z + w * w);
         rotations.push_back(Quat(static_cast<float>(w / length), static_cast<float>(x / length),
                                  static_cast<float>(y / length), static_cast<float>(z / length)));
       }
       const Vec3 root(1.5f * static_cast<float>(a), 0.9375f, -2.0f + 0.25f * static_cast<float>(a));
-      STRIDEWIRE_CHECK(EncodePose(mode, root, rotations,
-                                  std::span(poses).subspan(bytes * static_cast<std::size_t>(a), bytes)));
+      STRIDEWIRE_CHECK(
+          EncodePose(mode, root, rotations,
+                     std::span(poses).subspan(bytes * static_cast<std::size_t>(a), bytes)));
     }
   }
 
@@ -81,7 +83,8 @@ std::vector<Event> EveryEvent() {
     Event event;
     event.type = static_cast<EventType>(type);
     event.avatar = 7;
-    event.request_id = type == static_cast<int>(EventType::kIdle) ? 0 : 900 + static_cast<RequestId>(type);
+    event.request_id =
+        type == static_cast<int>(EventType::kIdle) ? 0 : 900 + static_cast<RequestId>(type);
     event.tick = 6000 + static_cast<std::uint64_t>(type);
     event.time_s = 100.0 + 0.25 * type;
     switch (event.type) {
@@ -125,7 +128,8 @@ std::vector<SampleMessage> SampleMessages() {
   const auto add = [&](const char* name, Message message) {
     samples.push_back({name, std::move(message)});
   };
-  add("hello", Hello{1, 3, "game-server \xe2\x9c\x93", kFeatureResume | kFeatureQuantised, "", {}, 0});
+  add("hello",
+      Hello{1, 3, "game-server \xe2\x9c\x93", kFeatureResume | kFeatureQuantised, "", {}, 0});
   add("hello_resume", Hello{1, 1, "game-server", kFeatureResume | kFeatureEventReplay,
                             "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
   add("join_world", JoinWorld{1, "plaza", Role::kObserver});
@@ -142,7 +146,8 @@ std::vector<SampleMessage> SampleMessages() {
     add("request", request);
     Request crowd{4, 3, {}};
     for (AvatarNumber a = 1; a <= 100; ++a) {
-      crowd.items.push_back({a, 5000 + a, StepMovement{FootChoice::kAuto, 0.5 + a / 512.0, {}, 0, 0}});
+      crowd.items.push_back(
+          {a, 5000 + a, StepMovement{FootChoice::kAuto, 0.5 + a / 512.0, {}, 0, 0}});
     }
     add("request_crowd", crowd);
   }
@@ -152,18 +157,19 @@ std::vector<SampleMessage> SampleMessages() {
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});
   add("goodbye", Goodbye{StatusCode::kShuttingDown, "the server is going down"});
-  add("welcome", Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0,
-                         "stridewired", "0.1.0",
-                         ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
-  add("world_info",
-      WorldInfo{1, 3, "plaza", Role::kController, 123'000, "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
-                Skeleton()});
+  add("welcome",
+      Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0, "stridewired",
+              "0.1.0", ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
+  add("world_info", WorldInfo{1, 3, "plaza", Role::kController, 123'000,
+                              "0f1e2d3c4b5a69788796a5b4c3d2e1f0", Skeleton()});
   add("reply_ok", Reply{6, StatusCode::kOk, "", 1, {}});
-  add("reply_items",
-      Reply{2, StatusCode::kOk, "one of three was refused", 2,
-            {{0, 44, 0, StatusCode::kOk, ""},
-             {1, 41, 0, StatusCode::kAvatarExists, "avatar 41 lives already"},
-             {2, 45, 1002, StatusCode::kOk, ""}}});
+  add("reply_items", Reply{2,
+                           StatusCode::kOk,
+                           "one of three was refused",
+                           2,
+                           {{0, 44, 0, StatusCode::kOk, ""},
+                            {1, 41, 0, StatusCode::kAvatarExists, "avatar 41 lives already"},
+                            {2, 45, 1002, StatusCode::kOk, ""}}});
   add("pose_batch_full", full.view());
   add("pose_batch_quantised", quantised.view());
   add("pose_batch_empty", nobody.view());

@@ -55,8 +55,9 @@ struct Mutator {
       case 1: bytes[at] = static_cast<std::byte>(random()); break;
       case 2: {
         static constexpr std::uint32_t kEdges[] = {
-            0, 1, 2, 4, 8, 16, 0x7f, 0x80, 0xff, 0x7fff, 0x8000, 0xffff, 0x10000, 65536, 65537,
-            0x7fffffff, 0x80000000, 0xfffffffc, 0xffffffff};
+            0,     1,          2,          4,          8,         16,      0x7f,
+            0x80,  0xff,       0x7fff,     0x8000,     0xffff,    0x10000, 65536,
+            65537, 0x7fffffff, 0x80000000, 0xfffffffc, 0xffffffff};
         const std::uint32_t value = kEdges[Below(std::size(kEdges))];
         Store(bytes, word, &value, 4);
         break;
@@ -74,7 +75,9 @@ struct Mutator {
         break;
       }
       case 5: bytes.resize(at); break;
-      case 6: bytes.insert(bytes.end(), 8 * (1 + Below(64)), static_cast<std::byte>(random())); break;
+      case 6:
+        bytes.insert(bytes.end(), 8 * (1 + Below(64)), static_cast<std::byte>(random()));
+        break;
       case 7: {  // a piece of the same frame elsewhere
         const std::size_t from = Below(bytes.size());
         const std::size_t size = std::min({Below(64) + 1, bytes.size() - from, bytes.size() - at});

@@ -38,7 +38,9 @@ void ResetPeak() { peak_bytes = live_bytes.load(); }
 void* operator new(std::size_t size) { return stridewire::counted_memory::Allocate(size); }
 void* operator new[](std::size_t size) { return stridewire::counted_memory::Allocate(size); }
 void operator delete(void* memory) noexcept { stridewire::counted_memory::Free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { stridewire::counted_memory::Free(memory); }
+void operator delete(void* memory, std::size_t) noexcept {
+  stridewire::counted_memory::Free(memory);
+}
 void operator delete[](void* memory) noexcept { stridewire::counted_memory::Free(memory); }
 void operator delete[](void* memory, std::size_t) noexcept {
   stridewire::counted_memory::Free(memory);

@@ -15,12 +15,29 @@ constexpr double kSameGroundM = 0.03;
 // What counts how much, beside the mean joint speed in m/s.
 constexpr double kStridePerM = 2.0;  // One foot ahead of the other
 constexpr double kCrouchPerM = 4.0;  // Pelvis lower than it stands otherwise
+constexpr double kLeanPerM = 2.0;    // Pelvis off the feet, or the top of the body off the pelvis
 
 double StandHeight(const BodyTracks& tracks) {
   std::vector<double> heights;
   heights.reserve(tracks.pelvis_m.size());
   for (const DVec3& p : tracks.pelvis_m) heights.push_back(p.y);
   return Percentile(std::move(heights), 75.0);
+}
+
+double HorizontalDistance(const DVec3& a, const DVec3& b) {
+  return std::hypot(a.x - b.x, a.z - b.z);
+}
+
+// The still moments of a capture may be a crouch before a jump or a reach for a bar: how far the body
+// is from upright, pelvis above the ankles and the highest joint above the pelvis.
+double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
+  const DVec3 pelvis(positions[0]);
+  const auto at = [&](int joint) { return DVec3(positions[static_cast<std::size_t>(joint)]); };
+  const DVec3 ankles =
+      0.5 * (at(skeleton.leg(Foot::kLeft).ankle) + at(skeleton.leg(Foot::kRight).ankle));
+  const auto top = std::max_element(positions.begin(), positions.end(),
+                                    [](const Vec3& a, const Vec3& b) { return a.y < b.y; });
+  return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
 }
 
 }  // namespace
@@ -61,7 +78,8 @@ std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip&
     for (std::size_t j = 0; j < joints; ++j) moved += glm::length(after[j] - before[j]);
     const double speed = moved / static_cast<double>(joints) * clip.fps / (2.0 * reach);
     const double unrest = speed + kStridePerM * std::fabs(apart.z) +
-                          kCrouchPerM * std::max(0.0, stand_height - tracks.pelvis_m[k].y);
+                          kCrouchPerM * std::max(0.0, stand_height - tracks.pelvis_m[k].y) +
+                          kLeanPerM * Lean(skeleton, after);
     if (!best || unrest < *best) {
       best = unrest;
       best_frame = i;

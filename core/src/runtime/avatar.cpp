@@ -10,11 +10,14 @@
 namespace stridewire {
 namespace {
 
-// Feet this far from where the stand pose has them are not a stand.
-constexpr double kFeetApartM = 0.12;
+// Feet this far from where the stand pose has them, forward or aside, are not a stand. Few libraries
+// have steps that bring feet together sideways, so a wide stand is left alone for longer.
+constexpr double kFeetApartForwardM = 0.12;
+constexpr double kFeetApartAsideM = 0.3;
 
 // A library may not reach a stand in one step from a long stride; after this many it stands as it is.
 constexpr int kMaxClosingSteps = 3;
+constexpr double kClosingGainM = 0.03;  // a second one must be worth taking
 
 // Events one movement can add in a tick: started, two foot-strikes, finished, and the next started.
 constexpr std::size_t kEventReserve = 6;
@@ -125,6 +128,13 @@ void Avatar::Advance(double dt_s) {
   if (is_moving_) Evaluate(movement_time_s_);
 }
 
+bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
+  const int end_z = library_->group(plan.group).FindParameter(ParameterName::kEndZ);
+  if (end_z < 0) return false;
+  return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
+         std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
+}
+
 bool Avatar::StartNext() {
   const bool is_empty = queue_size() == 0;
   const bool next_is_step =
@@ -133,7 +143,7 @@ bool Avatar::StartNext() {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
-    if (plan) {
+    if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
       const int closing_steps = closing_steps_ + 1;
       StartPlan(*plan, 0);
       closing_steps_ = closing_steps;
@@ -205,7 +215,8 @@ void Avatar::FinishMovement() {
   if (IsStep(finished.kind)) {
     last_moved_ = MovingFoot(finished.kind);
     const DVec3 apart = feet_.left_from_right_m - stand_feet_.left_from_right_m;
-    is_walking_ = closing_steps_ < kMaxClosingSteps && std::hypot(apart.x, apart.z) > kFeetApartM;
+    is_walking_ = closing_steps_ < kMaxClosingSteps && (std::fabs(apart.z) > kFeetApartForwardM ||
+                                                        std::fabs(apart.x) > kFeetApartAsideM);
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,

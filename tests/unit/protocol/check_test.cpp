@@ -76,7 +76,7 @@ void RefusedTexts(const T& good, const std::function<std::string&(T&)>& field_of
   refused("tab\t", ErrorCode::kMalformed);
   refused(std::string("a\0b", 3), ErrorCode::kMalformed);
   refused("\x7f", ErrorCode::kMalformed);
-  refused("\xc2\x85", ErrorCode::kMalformed);          // a C1 control
+  refused("\xc2\x85", ErrorCode::kMalformed);  // a C1 control
   refused("\xff", ErrorCode::kMalformed);
   refused("\x80", ErrorCode::kMalformed);              // a lone continuation
   refused("\xc3", ErrorCode::kMalformed);              // cut short
@@ -96,40 +96,48 @@ void RefusedTexts(const T& good, const std::function<std::string&(T&)>& field_of
 }
 
 TEST(Check, Hello) {
-  Refused<Hello>(GoodHello(), [](Hello& m) { m.protocol_min = 0; }, ErrorCode::kOutOfRange,
-                 "Hello.protocol_min");
-  Refused<Hello>(GoodHello(), [](Hello& m) { m.protocol_min = 2; }, ErrorCode::kOutOfRange,
-                 "Hello.protocol_min");
-  RefusedTexts<Hello>(GoodHello(), [](Hello& m) -> std::string& { return m.client_name; },
-                      kMaxNameBytes, false, "Hello.client_name");
-  RefusedTexts<Hello>(GoodHello(), [](Hello& m) -> std::string& { return m.auth_token; },
-                      kMaxAuthTokenBytes, true, "Hello.auth_token");
+  Refused<Hello>(
+      GoodHello(), [](Hello& m) { m.protocol_min = 0; }, ErrorCode::kOutOfRange,
+      "Hello.protocol_min");
+  Refused<Hello>(
+      GoodHello(), [](Hello& m) { m.protocol_min = 2; }, ErrorCode::kOutOfRange,
+      "Hello.protocol_min");
+  RefusedTexts<Hello>(
+      GoodHello(), [](Hello& m) -> std::string& { return m.client_name; }, kMaxNameBytes, false,
+      "Hello.client_name");
+  RefusedTexts<Hello>(
+      GoodHello(), [](Hello& m) -> std::string& { return m.auth_token; }, kMaxAuthTokenBytes, true,
+      "Hello.auth_token");
   for (const std::size_t bytes : {1u, 15u, 65u}) {
-    Refused<Hello>(GoodHello(), [&](Hello& m) { m.resume_token.resize(bytes); },
-                   ErrorCode::kLimitExceeded, "Hello.resume_token");
+    Refused<Hello>(
+        GoodHello(), [&](Hello& m) { m.resume_token.resize(bytes); }, ErrorCode::kLimitExceeded,
+        "Hello.resume_token");
   }
 }
 
 TEST(Check, Worlds) {
-  Refused<JoinWorld>(GoodJoin(), [](JoinWorld& m) { m.seq = 0; }, ErrorCode::kOutOfRange,
-                     "JoinWorld.seq");
-  RefusedTexts<JoinWorld>(GoodJoin(), [](JoinWorld& m) -> std::string& { return m.name; },
-                          kMaxNameBytes, false, "JoinWorld.name");
-  Refused<JoinWorld>(GoodJoin(), [](JoinWorld& m) { m.role = static_cast<Role>(2); },
-                     ErrorCode::kMalformed, "JoinWorld.role");
-  Refused<LeaveWorld>({1, 2}, [](LeaveWorld& m) { m.seq = 0; }, ErrorCode::kOutOfRange,
-                      "LeaveWorld.seq");
-  Refused<LeaveWorld>({1, 2}, [](LeaveWorld& m) { m.world = 0; }, ErrorCode::kOutOfRange,
-                      "LeaveWorld.world");
+  Refused<JoinWorld>(
+      GoodJoin(), [](JoinWorld& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "JoinWorld.seq");
+  RefusedTexts<JoinWorld>(
+      GoodJoin(), [](JoinWorld& m) -> std::string& { return m.name; }, kMaxNameBytes, false,
+      "JoinWorld.name");
+  Refused<JoinWorld>(
+      GoodJoin(), [](JoinWorld& m) { m.role = static_cast<Role>(2); }, ErrorCode::kMalformed,
+      "JoinWorld.role");
+  Refused<LeaveWorld>(
+      {1, 2}, [](LeaveWorld& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "LeaveWorld.seq");
+  Refused<LeaveWorld>(
+      {1, 2}, [](LeaveWorld& m) { m.world = 0; }, ErrorCode::kOutOfRange, "LeaveWorld.world");
 }
 
 TEST(Check, Spawn) {
   Refused<Spawn>(GoodSpawn(), [](Spawn& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "Spawn.seq");
   Refused<Spawn>(GoodSpawn(), [](Spawn& m) { m.world = 0; }, ErrorCode::kOutOfRange, "Spawn.world");
-  Refused<Spawn>(GoodSpawn(), [](Spawn& m) { m.items.clear(); }, ErrorCode::kMalformed,
-                 "Spawn.items");
-  Refused<Spawn>(GoodSpawn(), [](Spawn& m) { m.items.resize(kMaxItems + 1); },
-                 ErrorCode::kLimitExceeded, "Spawn.items");
+  Refused<Spawn>(
+      GoodSpawn(), [](Spawn& m) { m.items.clear(); }, ErrorCode::kMalformed, "Spawn.items");
+  Refused<Spawn>(
+      GoodSpawn(), [](Spawn& m) { m.items.resize(kMaxItems + 1); }, ErrorCode::kLimitExceeded,
+      "Spawn.items");
   for (int k = 0; k < 3; ++k) {
     RefusedWhenNotFinite<Spawn>(
         GoodSpawn(), [k](Spawn& m) -> double& { return m.items[1].start.position_m[k]; },
@@ -147,8 +155,9 @@ void RefusesAvatarLists(const std::string& name) {
   Refused<T>(good, [](T& m) { m.world = 0; }, ErrorCode::kOutOfRange, name + ".world");
   Refused<T>(good, [](T& m) { m.avatars[1] = 0; }, ErrorCode::kOutOfRange, name + ".avatars", 1);
   Refused<T>(good, [](T& m) { m.avatars.clear(); }, ErrorCode::kMalformed, name + ".avatars");
-  Refused<T>(good, [](T& m) { m.avatars.assign(kMaxItems + 1, 1); }, ErrorCode::kLimitExceeded,
-             name + ".avatars");
+  Refused<T>(
+      good, [](T& m) { m.avatars.assign(kMaxItems + 1, 1); }, ErrorCode::kLimitExceeded,
+      name + ".avatars");
 }
 
 TEST(Check, RemoveAndCancel) {
@@ -160,17 +169,21 @@ TEST(Check, Request) {
   const Request good = GoodRequest();
   Refused<Request>(good, [](Request& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "Request.seq");
   Refused<Request>(good, [](Request& m) { m.world = 0; }, ErrorCode::kOutOfRange, "Request.world");
-  Refused<Request>(good, [](Request& m) { m.items.clear(); }, ErrorCode::kMalformed,
-                   "Request.items");
-  Refused<Request>(good, [](Request& m) { m.items.assign(kMaxItems + 1, m.items[0]); },
-                   ErrorCode::kLimitExceeded, "Request.items");
-  Refused<Request>(good, [](Request& m) { m.items[2].avatar = 0; }, ErrorCode::kOutOfRange,
-                   "Request.avatar", 2);
-  Refused<Request>(good, [](Request& m) { m.items[1].request_id = 0; }, ErrorCode::kOutOfRange,
-                   "Request.request_id", 1);
+  Refused<Request>(
+      good, [](Request& m) { m.items.clear(); }, ErrorCode::kMalformed, "Request.items");
+  Refused<Request>(
+      good, [](Request& m) { m.items.assign(kMaxItems + 1, m.items[0]); },
+      ErrorCode::kLimitExceeded, "Request.items");
+  Refused<Request>(
+      good, [](Request& m) { m.items[2].avatar = 0; }, ErrorCode::kOutOfRange, "Request.avatar", 2);
+  Refused<Request>(
+      good, [](Request& m) { m.items[1].request_id = 0; }, ErrorCode::kOutOfRange,
+      "Request.request_id", 1);
   Refused<Request>(
       good,
-      [](Request& m) { std::get<StepMovement>(m.items[0].movement).foot = static_cast<FootChoice>(3); },
+      [](Request& m) {
+        std::get<StepMovement>(m.items[0].movement).foot = static_cast<FootChoice>(3);
+      },
       ErrorCode::kMalformed, "Request.foot", 0);
   const auto step = [](Request& m) -> StepMovement& {
     return std::get<StepMovement>(m.items[0].movement);
@@ -179,20 +192,20 @@ TEST(Check, Request) {
     return std::get<JumpMovement>(m.items[1].movement);
   };
   using R = Request;
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return step(m).length_m; },
-                          "Request.length_m", 0);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return step(m).side_m.emplace(); },
-                          "Request.side_m", 0);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return step(m).height_m; },
-                          "Request.height_m", 0);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return step(m).turn_rad; },
-                          "Request.turn_rad", 0);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return jump(m).length_m; },
-                          "Request.length_m", 1);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return jump(m).height_m; },
-                          "Request.height_m", 1);
-  RefusedWhenNotFinite<R>(good, [&](R& m) -> double& { return jump(m).turn_rad; },
-                          "Request.turn_rad", 1);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return step(m).length_m; }, "Request.length_m", 0);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return step(m).side_m.emplace(); }, "Request.side_m", 0);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return step(m).height_m; }, "Request.height_m", 0);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return step(m).turn_rad; }, "Request.turn_rad", 0);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return jump(m).length_m; }, "Request.length_m", 1);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return jump(m).height_m; }, "Request.height_m", 1);
+  RefusedWhenNotFinite<R>(
+      good, [&](R& m) -> double& { return jump(m).turn_rad; }, "Request.turn_rad", 1);
   RefusedWhenNotFinite<R>(
       good, [](R& m) -> double& { return std::get<StandMovement>(m.items[2].movement).seconds; },
       "Request.seconds", 2);
@@ -202,122 +215,146 @@ TEST(Check, Observe) {
   const Observe good = GoodObserve();
   Refused<Observe>(good, [](Observe& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "Observe.seq");
   Refused<Observe>(good, [](Observe& m) { m.world = 0; }, ErrorCode::kOutOfRange, "Observe.world");
-  Refused<Observe>(good, [](Observe& m) { m.subscription = 0; }, ErrorCode::kOutOfRange,
-                   "Observe.subscription");
-  Refused<Observe>(good, [](Observe& m) { m.mode = static_cast<PoseMode>(3); },
-                   ErrorCode::kMalformed, "Observe.mode");
-  Refused<Observe>(good, [](Observe& m) { m.avatars[0] = 0; }, ErrorCode::kOutOfRange,
-                   "Observe.avatars", 0);
-  Refused<Observe>(good, [](Observe& m) { m.avatars.assign(kMaxItems + 1, 1); },
-                   ErrorCode::kLimitExceeded, "Observe.avatars");
+  Refused<Observe>(
+      good, [](Observe& m) { m.subscription = 0; }, ErrorCode::kOutOfRange, "Observe.subscription");
+  Refused<Observe>(
+      good, [](Observe& m) { m.mode = static_cast<PoseMode>(3); }, ErrorCode::kMalformed,
+      "Observe.mode");
+  Refused<Observe>(
+      good, [](Observe& m) { m.avatars[0] = 0; }, ErrorCode::kOutOfRange, "Observe.avatars", 0);
+  Refused<Observe>(
+      good, [](Observe& m) { m.avatars.assign(kMaxItems + 1, 1); }, ErrorCode::kLimitExceeded,
+      "Observe.avatars");
   for (const int ticks : {0, 3601, 65535}) {
-    Refused<Observe>(good,
-                     [&](Observe& m) { m.every_n_ticks = static_cast<std::uint16_t>(ticks); },
-                     ErrorCode::kOutOfRange, "Observe.every_n_ticks");
+    Refused<Observe>(
+        good, [&](Observe& m) { m.every_n_ticks = static_cast<std::uint16_t>(ticks); },
+        ErrorCode::kOutOfRange, "Observe.every_n_ticks");
   }
-  Refused<StopObserving>({1, 2}, [](StopObserving& m) { m.seq = 0; }, ErrorCode::kOutOfRange,
-                         "StopObserving.seq");
-  Refused<StopObserving>({1, 2}, [](StopObserving& m) { m.subscription = 0; },
-                         ErrorCode::kOutOfRange, "StopObserving.subscription");
+  Refused<StopObserving>(
+      {1, 2}, [](StopObserving& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "StopObserving.seq");
+  Refused<StopObserving>(
+      {1, 2}, [](StopObserving& m) { m.subscription = 0; }, ErrorCode::kOutOfRange,
+      "StopObserving.subscription");
 }
 
 TEST(Check, PingPongGoodbyeErrorLagging) {
   RefusedWhenNotFinite<Ping>({}, [](Ping& m) -> double& { return m.time_s; }, "Ping.time_s");
   RefusedWhenNotFinite<Pong>({}, [](Pong& m) -> double& { return m.time_s; }, "Pong.time_s");
-  RefusedWhenNotFinite<Pong>({}, [](Pong& m) -> double& { return m.server_time_s; },
-                             "Pong.server_time_s");
-  RefusedTexts<Goodbye>({}, [](Goodbye& m) -> std::string& { return m.text; }, kMaxTextBytes, true,
-                        "Goodbye.text");
-  RefusedTexts<ErrorNotice>({}, [](ErrorNotice& m) -> std::string& { return m.text; },
-                            kMaxTextBytes, true, "Error.text");
-  Refused<Lagging>({1, 0, 0}, [](Lagging& m) { m.world = 0; }, ErrorCode::kOutOfRange,
-                   "Lagging.world");
+  RefusedWhenNotFinite<Pong>(
+      {}, [](Pong& m) -> double& { return m.server_time_s; }, "Pong.server_time_s");
+  RefusedTexts<Goodbye>(
+      {}, [](Goodbye& m) -> std::string& { return m.text; }, kMaxTextBytes, true, "Goodbye.text");
+  RefusedTexts<ErrorNotice>(
+      {}, [](ErrorNotice& m) -> std::string& { return m.text; }, kMaxTextBytes, true, "Error.text");
+  Refused<Lagging>(
+      {1, 0, 0}, [](Lagging& m) { m.world = 0; }, ErrorCode::kOutOfRange, "Lagging.world");
 }
 
 TEST(Check, Welcome) {
   const Welcome good = GoodWelcome();
-  Refused<Welcome>(good, [](Welcome& m) { m.protocol = 0; }, ErrorCode::kOutOfRange,
-                   "Welcome.protocol");
-  Refused<Welcome>(good, [](Welcome& m) { m.session = 0; }, ErrorCode::kOutOfRange,
-                   "Welcome.session");
+  Refused<Welcome>(
+      good, [](Welcome& m) { m.protocol = 0; }, ErrorCode::kOutOfRange, "Welcome.protocol");
+  Refused<Welcome>(
+      good, [](Welcome& m) { m.session = 0; }, ErrorCode::kOutOfRange, "Welcome.session");
   for (const std::size_t bytes : {15u, 65u}) {
-    Refused<Welcome>(good, [&](Welcome& m) { m.resume_token.resize(bytes); },
-                     ErrorCode::kLimitExceeded, "Welcome.resume_token");
+    Refused<Welcome>(
+        good, [&](Welcome& m) { m.resume_token.resize(bytes); }, ErrorCode::kLimitExceeded,
+        "Welcome.resume_token");
   }
   for (const double hz : {0.0, -60.0, kNaN, kInfinity}) {
-    Refused<Welcome>(good, [&](Welcome& m) { m.tick_hz = hz; }, ErrorCode::kOutOfRange,
-                     "Welcome.tick_hz");
+    Refused<Welcome>(
+        good, [&](Welcome& m) { m.tick_hz = hz; }, ErrorCode::kOutOfRange, "Welcome.tick_hz");
   }
   for (const double seconds : {-1.0, kNaN, kInfinity}) {
-    Refused<Welcome>(good, [&](Welcome& m) { m.limits.idle_timeout_s = seconds; },
-                     ErrorCode::kOutOfRange, "Welcome.limits.idle_timeout_s");
-    Refused<Welcome>(good, [&](Welcome& m) { m.limits.resume_window_s = seconds; },
-                     ErrorCode::kOutOfRange, "Welcome.limits.resume_window_s");
+    Refused<Welcome>(
+        good, [&](Welcome& m) { m.limits.idle_timeout_s = seconds; }, ErrorCode::kOutOfRange,
+        "Welcome.limits.idle_timeout_s");
+    Refused<Welcome>(
+        good, [&](Welcome& m) { m.limits.resume_window_s = seconds; }, ErrorCode::kOutOfRange,
+        "Welcome.limits.resume_window_s");
   }
-  RefusedTexts<Welcome>(good, [](Welcome& m) -> std::string& { return m.server_name; },
-                        kMaxNameBytes, true, "Welcome.server_name");
-  RefusedTexts<Welcome>(good, [](Welcome& m) -> std::string& { return m.server_version; },
-                        kMaxNameBytes, true, "Welcome.server_version");
+  RefusedTexts<Welcome>(
+      good, [](Welcome& m) -> std::string& { return m.server_name; }, kMaxNameBytes, true,
+      "Welcome.server_name");
+  RefusedTexts<Welcome>(
+      good, [](Welcome& m) -> std::string& { return m.server_version; }, kMaxNameBytes, true,
+      "Welcome.server_version");
 }
 
 TEST(Check, WorldInfo) {
   using W = WorldInfo;
   const W good = GoodWorldInfo();
   Refused<W>(good, [](W& m) { m.world = 0; }, ErrorCode::kOutOfRange, "WorldInfo.world");
-  RefusedTexts<W>(good, [](W& m) -> std::string& { return m.name; }, kMaxNameBytes, false,
-                  "WorldInfo.name");
-  RefusedTexts<W>(good, [](W& m) -> std::string& { return m.library_hash; }, kMaxNameBytes, true,
-                  "WorldInfo.library_hash");
-  Refused<W>(good, [](W& m) { m.role = static_cast<Role>(9); }, ErrorCode::kMalformed,
-             "WorldInfo.role");
-  Refused<W>(good, [](W& m) { m.skeleton.joints.clear(); }, ErrorCode::kMalformed,
-             "WorldInfo.skeleton.joints");
-  Refused<W>(good, [](W& m) { m.skeleton.joints.resize(kMaxJoints + 1); },
-             ErrorCode::kLimitExceeded, "WorldInfo.skeleton.joints");
-  Refused<W>(good, [](W& m) { m.skeleton.end_sites.resize(kMaxEndSites + 1); },
-             ErrorCode::kLimitExceeded, "WorldInfo.skeleton.end_sites");
-  RefusedTexts<W>(good, [](W& m) -> std::string& { return m.skeleton.joints[1].name; },
-                  kMaxNameBytes, false, "WorldInfo.joint.name", 1);
-  Refused<W>(good, [](W& m) { m.skeleton.joints[2].name = m.skeleton.joints[0].name; }, ErrorCode::kMalformed,
-             "WorldInfo.joint.name");
-  Refused<W>(good, [](W& m) { m.skeleton.joints[0].parent = 0; }, ErrorCode::kOutOfRange,
-             "WorldInfo.joint.parent", 0);
+  RefusedTexts<W>(
+      good, [](W& m) -> std::string& { return m.name; }, kMaxNameBytes, false, "WorldInfo.name");
+  RefusedTexts<W>(
+      good, [](W& m) -> std::string& { return m.library_hash; }, kMaxNameBytes, true,
+      "WorldInfo.library_hash");
+  Refused<W>(
+      good, [](W& m) { m.role = static_cast<Role>(9); }, ErrorCode::kMalformed, "WorldInfo.role");
+  Refused<W>(
+      good, [](W& m) { m.skeleton.joints.clear(); }, ErrorCode::kMalformed,
+      "WorldInfo.skeleton.joints");
+  Refused<W>(
+      good, [](W& m) { m.skeleton.joints.resize(kMaxJoints + 1); }, ErrorCode::kLimitExceeded,
+      "WorldInfo.skeleton.joints");
+  Refused<W>(
+      good, [](W& m) { m.skeleton.end_sites.resize(kMaxEndSites + 1); }, ErrorCode::kLimitExceeded,
+      "WorldInfo.skeleton.end_sites");
+  RefusedTexts<W>(
+      good, [](W& m) -> std::string& { return m.skeleton.joints[1].name; }, kMaxNameBytes, false,
+      "WorldInfo.joint.name", 1);
+  Refused<W>(
+      good, [](W& m) { m.skeleton.joints[2].name = m.skeleton.joints[0].name; },
+      ErrorCode::kMalformed, "WorldInfo.joint.name");
+  Refused<W>(
+      good, [](W& m) { m.skeleton.joints[0].parent = 0; }, ErrorCode::kOutOfRange,
+      "WorldInfo.joint.parent", 0);
   for (const int parent : {-2, -1, 2, 3}) {
-    Refused<W>(good,
-               [&](W& m) { m.skeleton.joints[2].parent = static_cast<std::int16_t>(parent); },
-               ErrorCode::kOutOfRange, "WorldInfo.joint.parent", 2);
+    Refused<W>(
+        good, [&](W& m) { m.skeleton.joints[2].parent = static_cast<std::int16_t>(parent); },
+        ErrorCode::kOutOfRange, "WorldInfo.joint.parent", 2);
   }
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  Refused<W>(good, [&](W& m) { m.skeleton.joints[1].offset_m.y = nan; }, ErrorCode::kOutOfRange,
-             "WorldInfo.joint.offset_m", 1);
-  Refused<W>(good, [](W& m) { m.skeleton.end_sites[0].joint = 3; }, ErrorCode::kOutOfRange,
-             "WorldInfo.end_site.joint", 0);
-  Refused<W>(good, [&](W& m) { m.skeleton.end_sites[0].offset_m.z = nan; }, ErrorCode::kOutOfRange,
-             "WorldInfo.end_site.offset_m", 0);
-  for (std::int16_t LegInfo::*joint :
+  Refused<W>(
+      good, [&](W& m) { m.skeleton.joints[1].offset_m.y = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.joint.offset_m", 1);
+  Refused<W>(
+      good, [](W& m) { m.skeleton.end_sites[0].joint = 3; }, ErrorCode::kOutOfRange,
+      "WorldInfo.end_site.joint", 0);
+  Refused<W>(
+      good, [&](W& m) { m.skeleton.end_sites[0].offset_m.z = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.end_site.offset_m", 0);
+  for (std::int16_t LegInfo::* joint :
        {&LegInfo::hip, &LegInfo::knee, &LegInfo::ankle, &LegInfo::ball}) {
     for (const int bad : {-2, 3}) {
-      Refused<W>(good, [&](W& m) { m.skeleton.legs[1].*joint = static_cast<std::int16_t>(bad); },
-                 ErrorCode::kOutOfRange, "WorldInfo.leg");
+      Refused<W>(
+          good, [&](W& m) { m.skeleton.legs[1].*joint = static_cast<std::int16_t>(bad); },
+          ErrorCode::kOutOfRange, "WorldInfo.leg");
     }
   }
-  Refused<W>(good, [&](W& m) { m.skeleton.legs[0].ball_offset_m.x = nan; }, ErrorCode::kOutOfRange,
-             "WorldInfo.leg.ball_offset_m");
-  Refused<W>(good, [&](W& m) { m.skeleton.legs[1].toe_tip_offset_m.x = nan; },
-             ErrorCode::kOutOfRange, "WorldInfo.leg.toe_tip_offset_m");
+  Refused<W>(
+      good, [&](W& m) { m.skeleton.legs[0].ball_offset_m.x = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.leg.ball_offset_m");
+  Refused<W>(
+      good, [&](W& m) { m.skeleton.legs[1].toe_tip_offset_m.x = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.leg.toe_tip_offset_m");
 }
 
 TEST(Check, Reply) {
   const Reply good = GoodReply();
   Refused<Reply>(good, [](Reply& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "Reply.seq");
-  RefusedTexts<Reply>(good, [](Reply& m) -> std::string& { return m.text; }, kMaxTextBytes, true,
-                      "Reply.text");
-  RefusedTexts<Reply>(good, [](Reply& m) -> std::string& { return m.items[0].text; },
-                      kMaxReasonBytes, true, "Reply.item.text", 0);
-  Refused<Reply>(good, [](Reply& m) { m.items[0].index = kMaxItems; }, ErrorCode::kOutOfRange,
-                 "Reply.index", 0);
-  Refused<Reply>(good, [](Reply& m) { m.items.resize(kMaxItems + 1); }, ErrorCode::kLimitExceeded,
-                 "Reply.items");
+  RefusedTexts<Reply>(
+      good, [](Reply& m) -> std::string& { return m.text; }, kMaxTextBytes, true, "Reply.text");
+  RefusedTexts<Reply>(
+      good, [](Reply& m) -> std::string& { return m.items[0].text; }, kMaxReasonBytes, true,
+      "Reply.item.text", 0);
+  Refused<Reply>(
+      good, [](Reply& m) { m.items[0].index = kMaxItems; }, ErrorCode::kOutOfRange, "Reply.index",
+      0);
+  Refused<Reply>(
+      good, [](Reply& m) { m.items.resize(kMaxItems + 1); }, ErrorCode::kLimitExceeded,
+      "Reply.items");
 }
 
 TEST(Check, PoseBatch) {
@@ -331,28 +368,34 @@ TEST(Check, PoseBatch) {
   Refused<B>(good, [](B& m) { m.info.world = 0; }, ErrorCode::kOutOfRange, "PoseBatch.world");
   Refused<B>(good, [](B& m) { m.info.parts = 0; }, ErrorCode::kOutOfRange, "PoseBatch.part");
   Refused<B>(good, [](B& m) { m.info.part = 1; }, ErrorCode::kOutOfRange, "PoseBatch.part");
-  Refused<B>(good, [](B& m) { m.info.parts = kMaxBatchParts + 1; }, ErrorCode::kOutOfRange,
-             "PoseBatch.part");
-  RefusedWhenNotFinite<B>(good, [](B& m) -> double& { return m.info.server_time_s; },
-                          "PoseBatch.server_time_s");
-  Refused<B>(good, [](B& m) { m.info.mode = static_cast<PoseMode>(3); }, ErrorCode::kMalformed,
-             "PoseBatch.mode");
-  Refused<B>(good, [](B& m) { m.info.mode = PoseMode::kMovement; }, ErrorCode::kUnsupported,
-             "PoseBatch.mode");
+  Refused<B>(
+      good, [](B& m) { m.info.parts = kMaxBatchParts + 1; }, ErrorCode::kOutOfRange,
+      "PoseBatch.part");
+  RefusedWhenNotFinite<B>(
+      good, [](B& m) -> double& { return m.info.server_time_s; }, "PoseBatch.server_time_s");
+  Refused<B>(
+      good, [](B& m) { m.info.mode = static_cast<PoseMode>(3); }, ErrorCode::kMalformed,
+      "PoseBatch.mode");
+  Refused<B>(
+      good, [](B& m) { m.info.mode = PoseMode::kMovement; }, ErrorCode::kUnsupported,
+      "PoseBatch.mode");
   for (const int joints : {0, 257}) {
-    Refused<B>(good, [&](B& m) { m.info.joint_count = static_cast<std::uint16_t>(joints); },
-               ErrorCode::kOutOfRange, "PoseBatch.joint_count");
+    Refused<B>(
+        good, [&](B& m) { m.info.joint_count = static_cast<std::uint16_t>(joints); },
+        ErrorCode::kOutOfRange, "PoseBatch.joint_count");
   }
-  Refused<B>(good, [](B& m) { m.avatars = with_zero; }, ErrorCode::kOutOfRange,
-             "PoseBatch.avatars", 1);
-  Refused<B>(good, [](B& m) { m.avatars = too_many; }, ErrorCode::kLimitExceeded,
-             "PoseBatch.avatars");
-  Refused<B>(good, [](B& m) { m.flags = m.flags.first(1); }, ErrorCode::kShapeMismatch,
-             "PoseBatch.flags");
-  Refused<B>(good, [](B& m) { m.poses = m.poses.first(m.poses.size() - 1); },
-             ErrorCode::kShapeMismatch, "PoseBatch.poses");
-  Refused<B>(good, [](B& m) { m.info.mode = PoseMode::kFull; }, ErrorCode::kShapeMismatch,
-             "PoseBatch.poses");
+  Refused<B>(
+      good, [](B& m) { m.avatars = with_zero; }, ErrorCode::kOutOfRange, "PoseBatch.avatars", 1);
+  Refused<B>(
+      good, [](B& m) { m.avatars = too_many; }, ErrorCode::kLimitExceeded, "PoseBatch.avatars");
+  Refused<B>(
+      good, [](B& m) { m.flags = m.flags.first(1); }, ErrorCode::kShapeMismatch, "PoseBatch.flags");
+  Refused<B>(
+      good, [](B& m) { m.poses = m.poses.first(m.poses.size() - 1); }, ErrorCode::kShapeMismatch,
+      "PoseBatch.poses");
+  Refused<B>(
+      good, [](B& m) { m.info.mode = PoseMode::kFull; }, ErrorCode::kShapeMismatch,
+      "PoseBatch.poses");
 }
 
 TEST(Check, Events) {
@@ -360,29 +403,34 @@ TEST(Check, Events) {
   const E good = GoodEvents();
   Refused<E>(good, [](E& m) { m.world = 0; }, ErrorCode::kOutOfRange, "Events.world");
   Refused<E>(good, [](E& m) { m.events.clear(); }, ErrorCode::kMalformed, "Events.events");
-  Refused<E>(good, [](E& m) { m.events.resize(kMaxItems + 1, m.events[0]); },
-             ErrorCode::kLimitExceeded, "Events.events");
-  Refused<E>(good, [](E& m) { m.events[1].type = static_cast<EventType>(8); },
-             ErrorCode::kMalformed, "Event.type", 1);
+  Refused<E>(
+      good, [](E& m) { m.events.resize(kMaxItems + 1, m.events[0]); }, ErrorCode::kLimitExceeded,
+      "Events.events");
+  Refused<E>(
+      good, [](E& m) { m.events[1].type = static_cast<EventType>(8); }, ErrorCode::kMalformed,
+      "Event.type", 1);
   Refused<E>(good, [](E& m) { m.events[1].avatar = 0; }, ErrorCode::kOutOfRange, "Event.avatar", 1);
-  Refused<E>(good, [](E& m) { m.events[1].kind = static_cast<MovementKind>(4); },
-             ErrorCode::kMalformed, "Event.kind", 1);
+  Refused<E>(
+      good, [](E& m) { m.events[1].kind = static_cast<MovementKind>(4); }, ErrorCode::kMalformed,
+      "Event.kind", 1);
   Refused<E>(good, [](E& m) { m.events[1].group = -2; }, ErrorCode::kOutOfRange, "Event.group", 1);
-  Refused<E>(good, [](E& m) { m.events[1].foot = static_cast<FootSide>(2); },
-             ErrorCode::kMalformed, "Event.foot", 1);
-  RefusedWhenNotFinite<E>(good, [](E& m) -> double& { return m.events[1].time_s; }, "Event.time_s",
-                          1);
+  Refused<E>(
+      good, [](E& m) { m.events[1].foot = static_cast<FootSide>(2); }, ErrorCode::kMalformed,
+      "Event.foot", 1);
+  RefusedWhenNotFinite<E>(
+      good, [](E& m) -> double& { return m.events[1].time_s; }, "Event.time_s", 1);
   for (int k = 0; k < 3; ++k) {
-    RefusedWhenNotFinite<E>(good, [k](E& m) -> double& { return m.events[1].position_m[k]; },
-                            "Event.position_m", 1);
-    RefusedWhenNotFinite<E>(good, [k](E& m) -> double& { return m.events[1].base.position_m[k]; },
-                            "Event.base", 1);
+    RefusedWhenNotFinite<E>(
+        good, [k](E& m) -> double& { return m.events[1].position_m[k]; }, "Event.position_m", 1);
+    RefusedWhenNotFinite<E>(
+        good, [k](E& m) -> double& { return m.events[1].base.position_m[k]; }, "Event.base", 1);
   }
-  RefusedWhenNotFinite<E>(good, [](E& m) -> double& { return m.events[1].base.heading_rad; },
-                          "Event.base", 1);
-  RefusedTexts<E>(good, [](E& m) -> std::string& { return m.events[1].reason; }, kMaxReasonBytes,
-                  true, "Event.reason", 1);
-  const auto parameters = [&](ParameterSet Event::*set, std::string_view field) {
+  RefusedWhenNotFinite<E>(
+      good, [](E& m) -> double& { return m.events[1].base.heading_rad; }, "Event.base", 1);
+  RefusedTexts<E>(
+      good, [](E& m) -> std::string& { return m.events[1].reason; }, kMaxReasonBytes, true,
+      "Event.reason", 1);
+  const auto parameters = [&](ParameterSet Event::* set, std::string_view field) {
     const auto with = [&](auto change) {
       return [=](E& m) {
         ParameterSet& values = m.events[0].*set;
@@ -399,8 +447,8 @@ TEST(Check, Events) {
                ErrorCode::kLimitExceeded, field, 0);
     Refused<E>(good, with([](ParameterSet& s) { s.names[1] = kParameterNames; }),
                ErrorCode::kMalformed, field, 0);
-    Refused<E>(good, with([](ParameterSet& s) { s.names[1] = s.names[0]; }),
-               ErrorCode::kMalformed, field, 0);
+    Refused<E>(good, with([](ParameterSet& s) { s.names[1] = s.names[0]; }), ErrorCode::kMalformed,
+               field, 0);
     Refused<E>(good, with([](ParameterSet& s) { s.values[1] = kNaN; }), ErrorCode::kOutOfRange,
                field, 0);
   };
@@ -427,7 +475,8 @@ TEST(Encoder, ACrowdOfTheLargestSizeFits) {
   Spawn spawn{2, 1, {}};
   Reply reply{2, StatusCode::kOk, "", 65'536, {}};
   for (AvatarNumber a = 1; a <= kMaxItems; ++a) {
-    request.items.push_back({a, 1'000'000 + a, StepMovement{FootChoice::kLeft, 0.1, 0.2, 0.3, 0.4}});
+    request.items.push_back(
+        {a, 1'000'000 + a, StepMovement{FootChoice::kLeft, 0.1, 0.2, 0.3, 0.4}});
     spawn.items.push_back({a, {DVec3(1.0, 2.0, 3.0), 4.0}});
     reply.items.push_back({a - 1, a, 1'000'000 + a, StatusCode::kQueueFull, "the queue is full"});
   }

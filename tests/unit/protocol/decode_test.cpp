@@ -186,16 +186,20 @@ TEST(Decode, ANewerPeersFieldsAreSkipped) {
 
 TEST(Decode, LongTextsAreRefusedBeforeTheyAreCopied) {
   FlatBufferBuilder builder;
-  const auto text = [&](std::size_t bytes) { return builder.CreateString(std::string(bytes, 'x')); };
+  const auto text = [&](std::size_t bytes) {
+    return builder.CreateString(std::string(bytes, 'x'));
+  };
   ExpectError(MessageType::kHello, Finished(builder, wire::CreateHello(builder, 1, 1, text(65))),
               ErrorCode::kLimitExceeded, "Hello.client_name");
   builder.Clear();
   const auto name = text(1);
   const auto token = text(4097);
-  ExpectError(MessageType::kHello, Finished(builder, wire::CreateHello(builder, 1, 1, name, 0, token)),
+  ExpectError(MessageType::kHello,
+              Finished(builder, wire::CreateHello(builder, 1, 1, name, 0, token)),
               ErrorCode::kLimitExceeded, "Hello.auth_token");
   builder.Clear();
-  ExpectError(MessageType::kJoinWorld, Finished(builder, wire::CreateJoinWorld(builder, 1, text(65))),
+  ExpectError(MessageType::kJoinWorld,
+              Finished(builder, wire::CreateJoinWorld(builder, 1, text(65))),
               ErrorCode::kLimitExceeded, "JoinWorld.name");
   builder.Clear();
   ExpectError(MessageType::kGoodbye, Finished(builder, wire::CreateGoodbye(builder, 0, text(1025))),
@@ -299,9 +303,10 @@ TEST(Decode, LongListsAreRefusedBeforeTheyAreCopied) {
   builder.Clear();
   {
     const std::vector items(kMaxItems + 1, wire::CreateEvent(builder));
-    ExpectError(MessageType::kEvents,
-                Finished(builder, wire::CreateEvents(builder, 1, 1, 1, builder.CreateVector(items))),
-                ErrorCode::kLimitExceeded, "Events.events");
+    ExpectError(
+        MessageType::kEvents,
+        Finished(builder, wire::CreateEvents(builder, 1, 1, 1, builder.CreateVector(items))),
+        ErrorCode::kLimitExceeded, "Events.events");
   }
   builder.Clear();
   {
@@ -328,27 +333,25 @@ TEST(Decode, SkeletonsAreCounted) {
   const auto name = builder.CreateString("j");
   const std::vector joints(kMaxJoints + 1, wire::CreateJoint(builder, name));
   ExpectError(MessageType::kWorldInfo,
-              Finished(builder, World(builder, wire::CreateSkeleton(builder,
-                                                                    builder.CreateVector(joints)))),
+              Finished(builder,
+                       World(builder, wire::CreateSkeleton(builder, builder.CreateVector(joints)))),
               ErrorCode::kLimitExceeded, "WorldInfo.skeleton.joints");
   builder.Clear();
   const std::vector sites(kMaxEndSites + 1, wire::CreateEndSite(builder));
-  ExpectError(
-      MessageType::kWorldInfo,
-      Finished(builder,
-               World(builder, wire::CreateSkeleton(builder, 0, builder.CreateVector(sites)))),
-      ErrorCode::kLimitExceeded, "WorldInfo.skeleton.end_sites");
+  ExpectError(MessageType::kWorldInfo,
+              Finished(builder, World(builder, wire::CreateSkeleton(builder, 0,
+                                                                    builder.CreateVector(sites)))),
+              ErrorCode::kLimitExceeded, "WorldInfo.skeleton.end_sites");
   builder.Clear();
   ExpectError(MessageType::kWorldInfo, Finished(builder, World(builder, 0)), ErrorCode::kMalformed,
               "WorldInfo.skeleton.joints");
   builder.Clear();
   const std::vector long_name = {
       wire::CreateJoint(builder, builder.CreateString(std::string(65, 'x')))};
-  ExpectError(
-      MessageType::kWorldInfo,
-      Finished(builder,
-               World(builder, wire::CreateSkeleton(builder, builder.CreateVector(long_name)))),
-      ErrorCode::kLimitExceeded, "WorldInfo.joint.name", 0);
+  ExpectError(MessageType::kWorldInfo,
+              Finished(builder, World(builder, wire::CreateSkeleton(
+                                                   builder, builder.CreateVector(long_name)))),
+              ErrorCode::kLimitExceeded, "WorldInfo.joint.name", 0);
 }
 
 TEST(Decode, ManyOffsetsToOneTableStopTheVerifier) {
@@ -375,10 +378,9 @@ TEST(Decode, BatchesMustMatchTheirCounts) {
     const auto poses = builder.CreateVector(std::vector<std::uint8_t>(bytes));
     const auto flag_list = builder.CreateVector(std::vector<std::uint8_t>(flags));
     const auto avatar_list = builder.CreateVector(std::vector<std::uint32_t>(avatars, 1));
-    return Finished(builder,
-                    wire::CreatePoseBatch(builder, 1, 0, 0, 1, 1, 0.0,
-                                          static_cast<wire::PoseMode>(mode), 2, avatar_list,
-                                          flag_list, poses));
+    return Finished(builder, wire::CreatePoseBatch(builder, 1, 0, 0, 1, 1, 0.0,
+                                                   static_cast<wire::PoseMode>(mode), 2,
+                                                   avatar_list, flag_list, poses));
   };
   const auto type = MessageType::kPoseBatch;
   EXPECT_TRUE(DecodeMessage({type, batch(3, 3, 3 * 24, 1)}));

@@ -23,8 +23,8 @@ ErrorCode CodeOf(const HeaderBytes& bytes, Sender sender, const FrameLimits& lim
 
 TEST(Frame, HeaderIsSixteenStatedBytes) {
   const HeaderBytes bytes = Header(MessageType::kPoseBatch, 0x00123458);
-  const std::array<int, 16> stated = {0x53, 0x57, 0x50, 0x1a, 1,    0,    67, 0,
-                                      0x58, 0x34, 0x12, 0x00, 0,    0,    0,  0};
+  const std::array<int, 16> stated = {0x53, 0x57, 0x50, 0x1a, 1, 0, 67, 0,
+                                      0x58, 0x34, 0x12, 0x00, 0, 0, 0,  0};
   for (std::size_t i = 0; i < stated.size(); ++i) {
     EXPECT_EQ(std::to_integer<int>(bytes[i]), stated[i]) << i;
   }

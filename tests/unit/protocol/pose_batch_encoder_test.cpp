@@ -18,7 +18,8 @@ TEST(PoseBatchEncoder, HoldsWhatWasAdded) {
       ASSERT_TRUE(encoder.Begin(Info(mode, 31)));
       const std::vector<Quat> rotations(31, YawRotation(0.25));
       for (AvatarNumber a = 1; a <= 1000; ++a) {
-        ASSERT_TRUE(encoder.Add(a, a % 4, Vec3(0.5f * static_cast<float>(a), 1.0f, 0.0f), rotations));
+        ASSERT_TRUE(
+            encoder.Add(a, a % 4, Vec3(0.5f * static_cast<float>(a), 1.0f, 0.0f), rotations));
       }
       EXPECT_EQ(encoder.size(), 1000u);
       std::vector<std::byte> frame;

@@ -1,12 +1,12 @@
 #include "stridewire/protocol/pose_codec.h"
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 namespace stridewire::protocol {
 namespace {

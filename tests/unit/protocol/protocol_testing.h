@@ -1,10 +1,10 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cstring>
 #include <ostream>
 #include <vector>
-
-#include <gtest/gtest.h>
 
 #include "stridewire/protocol/decode.h"
 #include "stridewire/protocol/encoder.h"

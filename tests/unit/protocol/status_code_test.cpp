@@ -1,8 +1,8 @@
 #include "stridewire/protocol/status_code.h"
 
-#include <set>
-
 #include <gtest/gtest.h>
+
+#include <set>
 
 namespace stridewire::protocol {
 namespace {

@@ -83,6 +83,7 @@ class Avatar {
   [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
+  [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
   void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
   void FinishMovement();

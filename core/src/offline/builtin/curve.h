@@ -15,6 +15,8 @@ class Curve {
     std::optional<double> slope = std::nullopt;
   };
 
+  Curve() : Curve({{0.0, 0.0}}) {}
+
   /// `knots` in order of time, at least one; a knot less than 1e-9 s after its forerunner is left out.
   explicit Curve(const std::vector<Knot>& knots);
 

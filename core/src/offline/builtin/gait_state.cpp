@@ -46,7 +46,6 @@ GaitState MakeGaitState(double length_m) {
   const Curve toe_off_deg({{0.0, 0.0}, {0.35, 30.0}, {0.55, 54.0}, {0.75, 61.5}, {0.9, 64.5}});
   state.toe_off_pitch_rad = toe_off_deg.At(length_m) * kDegree;
   state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
-  // Straight legs reach less high when the feet are apart.
   // Legs reach less high when the feet are apart; knees bend a little more than they must.
   const Curve drop({{0.0, 0.0}, {0.35, 0.003}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});
   state.pelvis_drop_m = drop.At(length_m);

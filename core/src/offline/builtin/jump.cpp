@@ -25,23 +25,7 @@ constexpr double kToeOffKneeRad = 24.0 * kDegree;
 /// A jump over a length, as curves of time.
 class JumpPath {
  public:
-  JumpPath(const Skeleton& figure, double length_m)
-      : figure_(figure),
-        length_m_(length_m),
-        lean_(Curve({{0.0, 0.0}})),
-        arm_(lean_),
-        elbow_(lean_),
-        push_pitch_(lean_),
-
-        landing_pitch_(lean_),
-        leg_length_(lean_),
-        leg_angle_(lean_),
-        flight_pitch_(lean_),
-        flight_toe_bend_(lean_),
-        centre_y_before_(lean_),
-        centre_z_before_(lean_),
-        centre_y_after_(lean_),
-        centre_z_after_(lean_) {
+  JumpPath(const Skeleton& figure, double length_m) : figure_(figure), length_m_(length_m) {
     // How far the centre falls below its height at toe-off follows from the pose at landing, whose
     // curves need the times: three times round settles it to the frame.
     double lower_m = 0.15;
@@ -194,7 +178,7 @@ class JumpPath {
   // Height of the centre, `z_m` ahead, at which the legs on the ground have that knee angle.
   [[nodiscard]] double CentreHeightAtKnee(double time_s, double z_m, double knee_rad) const {
     double low = 0.5, high = 1.5;
-    for (int i = 0; i < 40; ++i) {
+    for (int i = 0; i < 28; ++i) {
       const double y = 0.5 * (low + high);
       const FigurePose pose = PoseWithCentre(time_s, DVec3(0.0, y, z_m));
       const DVec3 hip = pose.root_m + pose.rotations[kHips] * DVec3(kHipHalfWidthM, 0.0, 0.0);
@@ -230,7 +214,8 @@ class JumpPath {
     return place;
   }
 
-  // Legs follow the root and move the centre themselves, so this is iterated.
+  // Legs follow the root and move the centre themselves, so this is iterated; on the ground they
+  // take up a part of each shift, hence a little more than what is missing.
   [[nodiscard]] FigurePose PoseWithCentre(double time_s, const DVec3& centre_m) const {
     UpperBody body = StandingUpperBody();
     body.thorax_lean = lean_.At(time_s);
@@ -247,7 +232,7 @@ class JumpPath {
       SolveLeg(Foot::kRight, Place(Foot::kRight, time_s, pose), pose);
       DVec3 miss = centre_m - BodyCentre(figure_, pose);
       miss.x = -pose.root_m.x;  // both sides are alike
-      pose.root_m += miss;
+      pose.root_m += 1.15 * miss;
       if (glm::dot(miss, miss) < 1e-20) break;
     }
     SolveLeg(Foot::kLeft, Place(Foot::kLeft, time_s, pose), pose);

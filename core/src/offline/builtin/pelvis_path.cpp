@@ -95,8 +95,6 @@ PelvisPath::PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& f
   StayWithinReach(feet);
 }
 
-double PelvisPath::HeightBeforeReach(double time_s) const { return height_.At(time_s); }
-
 DVec3 PelvisPath::Position(double time_s) const {
   const double at = std::clamp(time_s / timing_.end_s, 0.0, 1.0) * (kSamples - 1);
   const int i = std::clamp(static_cast<int>(at), 1, kSamples - 3);
@@ -106,7 +104,7 @@ DVec3 PelvisPath::Position(double time_s) const {
   const double m0 = 0.5 * (y(i + 1) - y(i - 1)), m1 = 0.5 * (y(i + 2) - y(i));
   const double lowered = y(i) + s * (m0 + s * (3.0 * (y(i + 1) - y(i)) - 2.0 * m0 - m1 +
                                                s * (m0 + m1 - 2.0 * (y(i + 1) - y(i)))));
-  return {side_.At(time_s), HeightBeforeReach(time_s) - lowered, forward_.At(time_s)};
+  return {side_.At(time_s), height_.At(time_s) - lowered, forward_.At(time_s)};
 }
 
 DQuat PelvisPath::Rotation(double time_s) const {

@@ -22,7 +22,6 @@ class PelvisPath {
   [[nodiscard]] double Tilt(double time_s) const { return tilt_.At(time_s); }
 
  private:
-  [[nodiscard]] double HeightBeforeReach(double time_s) const;
   void StayWithinReach(const FootPaths& feet);
 
   Foot moving_;

@@ -13,7 +13,7 @@
 namespace stridewire::builtin {
 namespace {
 
-constexpr double kArmAbductionRad = 8.0 * kDegree;
+constexpr double kArmAbductionRad = 6.0 * kDegree;
 constexpr double kStandingElbowRad = 14.0 * kDegree;
 constexpr double kStandingArmRad = -1.0 * kDegree;
 

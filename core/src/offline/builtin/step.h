@@ -2,6 +2,7 @@
 
 #include "figure.h"
 #include "stridewire/offline/raw_library.h"
+#include "upper_body.h"
 
 namespace stridewire::builtin {
 
@@ -13,7 +14,6 @@ namespace stridewire::builtin {
 [[nodiscard]] FigurePose StandingPose();
 
 /// Arms, trunk and head of someone standing.
-struct UpperBody;
 [[nodiscard]] UpperBody StandingUpperBody();
 
 }  // namespace stridewire::builtin

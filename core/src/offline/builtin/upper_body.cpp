@@ -3,6 +3,9 @@
 namespace stridewire::builtin {
 namespace {
 
+// Upper arms hang turned inward, so that bending elbows bring the hands before the body.
+constexpr double kInwardTurnRad = 18.0 * kDegree;
+
 DQuat Small(double yaw, double roll, double lean) {
   return RotateY(yaw) * RotateZ(roll) * RotateX(lean);
 }
@@ -30,7 +33,7 @@ void SetUpperBody(const UpperBody& body, double pelvis_yaw, double pelvis_roll, 
     pose.rotations[shoulder] = RotateY(-out * 0.12 * body.arm_flexion[s]);
     pose.rotations[shoulder + 1] = RotateX(-body.arm_flexion[s]) *
                                    RotateZ(-out * (90.0 * kDegree - body.arm_abduction)) *
-                                   RotateX(out * 0.0);
+                                   RotateX(kInwardTurnRad);
     pose.rotations[shoulder + 2] = RotateY(-out * body.elbow_flexion[s]);
     pose.rotations[shoulder + 3] = RotateY(-out * (4.0 * kDegree + 0.15 * body.elbow_flexion[s]));
   }

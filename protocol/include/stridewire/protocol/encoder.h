@@ -24,26 +24,26 @@ class Encoder {
   Encoder(Encoder&&) noexcept;
   Encoder& operator=(Encoder&&) noexcept;
 
-  [[nodiscard]] Status Encode(const Hello& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const JoinWorld& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const LeaveWorld& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Spawn& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Remove& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Request& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const CancelQueue& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Observe& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const StopObserving& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Ping& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Goodbye& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Welcome& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const WorldInfo& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Reply& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const PoseBatch& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Events& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Lagging& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const ErrorNotice& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Pong& message, std::vector<std::byte>& frame);
-  [[nodiscard]] Status Encode(const Message& message, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Hello& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const JoinWorld& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const LeaveWorld& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Spawn& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Remove& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Request& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const CancelQueue& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Observe& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const StopObserving& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Ping& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Goodbye& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Welcome& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const WorldInfo& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Reply& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const PoseBatch& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Events& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Lagging& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const ErrorNotice& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Pong& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Message& m, std::vector<std::byte>& frame);
 
  private:
   struct Impl;

@@ -16,23 +16,23 @@ inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuanti
 inline constexpr std::uint64_t kFeatureMovementMode = 8;  ///< PoseMode::kMovement; reserved.
 
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
-inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;    ///< Payload of Hello.
-inline constexpr std::size_t kMaxControlBytes = std::size_t{1} << 20;   ///< Other small messages.
-inline constexpr std::size_t kMaxBulkBytes = std::size_t{16} << 20;     ///< Crowds and poses.
-inline constexpr std::size_t kMaxItems = 65'536;      ///< Items, avatars or events in a message.
-inline constexpr std::size_t kMaxNameBytes = 64;      ///< Names of worlds, clients, joints.
-inline constexpr std::size_t kMaxTextBytes = 1024;    ///< Texts of a whole message.
-inline constexpr std::size_t kMaxReasonBytes = 256;   ///< Text of one item or event.
+inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;   ///< Payload of Hello.
+inline constexpr std::size_t kMaxControlBytes = std::size_t{1} << 20;  ///< Other small messages.
+inline constexpr std::size_t kMaxBulkBytes = std::size_t{16} << 20;    ///< Crowds and poses.
+inline constexpr std::size_t kMaxItems = 65'536;     ///< Items, avatars or events in a message.
+inline constexpr std::size_t kMaxNameBytes = 64;     ///< Names of worlds, clients, joints.
+inline constexpr std::size_t kMaxTextBytes = 1024;   ///< Texts of a whole message.
+inline constexpr std::size_t kMaxReasonBytes = 256;  ///< Text of one item or event.
 inline constexpr std::size_t kMaxAuthTokenBytes = 4096;
 inline constexpr std::size_t kMinResumeTokenBytes = 16;
 inline constexpr std::size_t kMaxResumeTokenBytes = 64;
 inline constexpr std::size_t kMaxJoints = 256;
 inline constexpr std::size_t kMaxEndSites = 256;
-inline constexpr std::size_t kMaxParameters = 7;       ///< Parameters of an event.
-inline constexpr std::uint8_t kParameterNames = 9;     ///< Parameter names are 0 to 8.
+inline constexpr std::size_t kMaxParameters = 7;    ///< Parameters of an event.
+inline constexpr std::uint8_t kParameterNames = 9;  ///< Parameter names are 0 to 8.
 inline constexpr std::uint16_t kMaxEveryNTicks = 3600;
 inline constexpr std::uint16_t kMaxBatchParts = 1024;
-inline constexpr std::uint32_t kReplyMemory = 1024;    ///< Answers a server remembers a session.
-inline constexpr int kMaxDepth = 4;                    ///< Nesting of tables.
+inline constexpr std::uint32_t kReplyMemory = 1024;  ///< Answers a server remembers a session.
+inline constexpr int kMaxDepth = 4;                  ///< Nesting of tables.
 
 }  // namespace stridewire::protocol

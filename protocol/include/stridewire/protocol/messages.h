@@ -47,11 +47,11 @@ struct Hello {
   static constexpr MessageType kType = MessageType::kHello;
   std::uint16_t protocol_min = kProtocolMin;  ///< 1 <= min <= max
   std::uint16_t protocol_max = kProtocolMax;
-  std::string client_name;                    ///< 1 to kMaxNameBytes, for logs.
+  std::string client_name;  ///< 1 to kMaxNameBytes, for logs.
   std::uint64_t features = 0;
-  std::string auth_token;                     ///< May be empty.
-  std::vector<std::byte> resume_token;        ///< Empty: a new session. Else from Welcome.
-  std::uint64_t last_events_number = 0;       ///< Resuming: Events::number last received.
+  std::string auth_token;                ///< May be empty.
+  std::vector<std::byte> resume_token;   ///< Empty: a new session. Else from Welcome.
+  std::uint64_t last_events_number = 0;  ///< Resuming: Events::number last received.
   bool operator==(const Hello&) const = default;
 };
 
@@ -142,7 +142,7 @@ struct Observe {
   static constexpr MessageType kType = MessageType::kObserve;
   Seq seq = 0;
   WorldId world = 0;
-  SubscriptionId subscription = 0;    ///< Not 0.
+  SubscriptionId subscription = 0;  ///< Not 0.
   PoseMode mode = PoseMode::kFull;
   std::vector<AvatarNumber> avatars;  ///< Empty: all. A batch may hold more than was asked for.
   std::uint16_t every_n_ticks = 1;    ///< 1 to kMaxEveryNTicks
@@ -182,10 +182,10 @@ struct ServerLimits {
   std::uint32_t max_bulk_bytes = static_cast<std::uint32_t>(kMaxBulkBytes);
   std::uint32_t max_items = static_cast<std::uint32_t>(kMaxItems);
   std::uint32_t max_avatars_per_world = 0;
-  std::uint32_t max_queue = 0;         ///< Requests waiting, per avatar.
+  std::uint32_t max_queue = 0;  ///< Requests waiting, per avatar.
   std::uint32_t reply_memory = kReplyMemory;
-  double idle_timeout_s = 0.0;         ///< A connection silent for longer is closed; 0: never.
-  double resume_window_s = 0.0;        ///< How long a session waits for its client; 0: not at all.
+  double idle_timeout_s = 0.0;   ///< A connection silent for longer is closed; 0: never.
+  double resume_window_s = 0.0;  ///< How long a session waits for its client; 0: not at all.
   bool operator==(const ServerLimits&) const = default;
 };
 
@@ -230,7 +230,7 @@ struct LegInfo {
 struct SkeletonInfo {
   std::vector<JointInfo> joints;  ///< 1 to kMaxJoints
   std::vector<EndSiteInfo> end_sites;
-  std::array<LegInfo, 2> legs;    ///< Left, right.
+  std::array<LegInfo, 2> legs;  ///< Left, right.
   bool operator==(const SkeletonInfo&) const = default;
 };
 
@@ -249,7 +249,7 @@ struct WorldInfo {
 };
 
 struct ReplyItem {
-  std::uint32_t index = 0;   ///< Position in the command's items or avatars.
+  std::uint32_t index = 0;  ///< Position in the command's items or avatars.
   AvatarNumber avatar = 0;
   RequestId request_id = 0;  ///< Only for Request.
   StatusCode code = StatusCode::kOk;
@@ -263,8 +263,8 @@ struct Reply {
   Seq seq = 0;
   StatusCode code = StatusCode::kOk;  ///< Of the command as a whole.
   std::string text;
-  std::uint32_t accepted = 0;         ///< How many of its items were done.
-  std::vector<ReplyItem> items;       ///< Spawn: every item. Otherwise only those refused.
+  std::uint32_t accepted = 0;    ///< How many of its items were done.
+  std::vector<ReplyItem> items;  ///< Spawn: every item. Otherwise only those refused.
   bool operator==(const Reply&) const = default;
 };
 
@@ -280,9 +280,9 @@ struct PoseBatchInfo {
   std::uint16_t part = 0;  ///< A shard with more avatars than fit in a frame sends several parts.
   std::uint16_t parts = 1;
   std::uint64_t tick = 0;
-  double server_time_s = 0.0;         ///< The server's clock at that tick.
-  PoseMode mode = PoseMode::kFull;    ///< kFull or kQuantised
-  std::uint16_t joint_count = 0;      ///< 1 to kMaxJoints
+  double server_time_s = 0.0;       ///< The server's clock at that tick.
+  PoseMode mode = PoseMode::kFull;  ///< kFull or kQuantised
+  std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
   bool operator==(const PoseBatchInfo&) const = default;
 };
 
@@ -329,7 +329,7 @@ struct Event {
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
   std::uint64_t tick = 0;
-  double time_s = 0.0;       ///< On the server's clock, as PoseBatchInfo::server_time_s.
+  double time_s = 0.0;  ///< On the server's clock, as PoseBatchInfo::server_time_s.
   ParameterSet requested;
   ParameterSet applied;
   bool extrapolated = false;
@@ -380,9 +380,8 @@ struct Pong {
   bool operator==(const Pong&) const = default;
 };
 
-using Message =
-    std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue, Observe,
-                 StopObserving, Ping, Goodbye, Welcome, WorldInfo, Reply, PoseBatch, Events, Lagging,
-                 ErrorNotice, Pong>;
+using Message = std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue,
+                             Observe, StopObserving, Ping, Goodbye, Welcome, WorldInfo, Reply,
+                             PoseBatch, Events, Lagging, ErrorNotice, Pong>;
 
 }  // namespace stridewire::protocol

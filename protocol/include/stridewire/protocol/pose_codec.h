@@ -22,8 +22,8 @@ inline constexpr float kRootStepsPerM = 16384.0f;
 inline constexpr float kMaxRootM = 131'071.0f;
 
 /// Quantised joint: the largest component is left out (the lowest index of equals), the quaternion
-/// negated first if that component is negative; the others, in order, are round(c sqrt(2) 16383) +
-/// 16384 in 15 bits, so that 0 is exact. Three little-endian u16: component in bits 0-14; bit 15 of
+/// negated first if that component is negative; the others, in order, are floor(c sqrt(2) 16383 +
+/// 16384.5) in 15 bits, so that 0 is exact. Three little-endian u16: component in bits 0-14; bit 15 of
 /// the first and second is bit 0 and 1 of the index left out, bit 15 of the third is zero.
 /// The rotation is off by at most this angle (a component by 2.2e-5; worst where all are 0.5).
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
