@@ -1,6 +1,7 @@
 #include "stridewire/offline/glitch_repair.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -15,6 +16,9 @@ constexpr double kJumpMaxRad = 60.0 * kDegree;   // At 30 Hz 1800 degrees/s woul
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;
 constexpr double kLimbEndM = 0.15;
+constexpr double kRootOffPathM = 0.01;
+constexpr double kRootAcceleration_m_s2 = 40.0;
+constexpr int kMedianReach = 2;
 constexpr double kSmallJumpRad = 45.0 * kDegree;
 
 class Track {
@@ -110,6 +114,46 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   }
 }
 
+// One or two frames at which the root is beside its path: the solver that made the recording
+// gave them to another joint (16_17: pelvis 4 cm aside and 30 degrees turned for a frame).
+void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
+  std::vector<Vec3>& path = clip.root_positions_m;
+  const int end = clip.frame_count();
+  const double limit = std::max(kRootOffPathM, kRootAcceleration_m_s2 / (clip.fps * clip.fps));
+  std::vector<double> off(path.size(), 0.0);
+  for (int f = first_frame + kMedianReach; f + kMedianReach < end; ++f) {
+    Vec3 median;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<float, 2 * kMedianReach + 1> values;
+      for (int k = -kMedianReach; k <= kMedianReach; ++k) {
+        values[static_cast<std::size_t>(k + kMedianReach)] =
+            path[static_cast<std::size_t>(f + k)][axis];
+      }
+      std::ranges::nth_element(values, values.begin() + kMedianReach);
+      median[axis] = values[kMedianReach];
+    }
+    off[static_cast<std::size_t>(f)] = glm::length(path[static_cast<std::size_t>(f)] - median);
+  }
+  // A fast walk moves 2 cm a frame at 120 Hz, but its median moves along.
+  for (int f = first_frame + 1; f + 1 < end; ++f) {
+    if (off[static_cast<std::size_t>(f)] <= limit) continue;
+    int last = f;
+    double largest = 0.0;
+    while (last + 1 < end && off[static_cast<std::size_t>(last)] > limit) {
+      largest = std::max(largest, off[static_cast<std::size_t>(last)]);
+      ++last;
+    }
+    const Vec3 from = path[static_cast<std::size_t>(f - 1)];
+    const Vec3 to = path[static_cast<std::size_t>(last)];
+    for (int g = f; g < last; ++g) {
+      const float fraction = static_cast<float>(g - f + 1) / static_cast<float>(last - f + 1);
+      path[static_cast<std::size_t>(g)] = from + fraction * (to - from);
+    }
+    report.repaired.push_back({0, {f, last}, 0.0, largest});
+    f = last;
+  }
+}
+
 }  // namespace
 
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip) {
@@ -117,14 +161,21 @@ GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& cli
   for (int joint = 0; joint < clip.joint_count; ++joint) {
     RepairJoint(skeleton, joint, std::max(0, first_frame), clip, report);
   }
+  RepairRootPath(std::max(0, first_frame), clip, report);
   if (!report.repaired.empty()) MakeSignContinuous(clip);
   return report;
 }
 
 std::string DescribeFlip(const Skeleton& skeleton, const JointFlip& flip, double fps) {
   char text[64];
-  std::snprintf(text, sizeof text, " turns %.0f degrees at once at %.2f s",
-                flip.angle_rad / kDegree, 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps);
+  const double middle_s = 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps;
+  if (flip.distance_m > 0.0) {
+    std::snprintf(text, sizeof text, " moves %.1f cm at once at %.2f s", 100.0 * flip.distance_m,
+                  middle_s);
+  } else {
+    std::snprintf(text, sizeof text, " turns %.0f degrees at once at %.2f s",
+                  flip.angle_rad / kDegree, middle_s);
+  }
   return skeleton.joints[static_cast<std::size_t>(flip.joint)].name + text;
 }
 
@@ -135,7 +186,7 @@ std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchR
     int count = 0;
     const JointFlip* worst = nullptr;
     for (const JointFlip& flip : report.repaired) {
-      if (flip.joint != joint) continue;
+      if (flip.joint != joint || flip.distance_m > 0.0) continue;
       ++count;
       if (worst == nullptr || flip.angle_rad > worst->angle_rad) worst = &flip;
     }
@@ -143,6 +194,9 @@ std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchR
     std::string sentence = DescribeFlip(skeleton, *worst, fps) + ": mended";
     if (count > 1) sentence += ", as " + std::to_string(count - 1) + " smaller flips of it";
     sentences.push_back(std::move(sentence));
+  }
+  for (const JointFlip& flip : report.repaired) {
+    if (flip.distance_m > 0.0) sentences.push_back(DescribeFlip(skeleton, flip, fps) + ": mended");
   }
   return sentences;
 }

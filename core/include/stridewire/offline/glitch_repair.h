@@ -9,11 +9,12 @@
 
 namespace stridewire {
 
-/// A joint that turned faster than a body can.
+/// A joint that turned, or the root that moved, faster than a body can.
 struct JointFlip {
   int joint = 0;
-  FrameRange frames;       ///< Of the clip: the frames that were replaced, or around the flip.
-  double angle_rad = 0.0;  ///< Largest turn between two neighbouring frames.
+  FrameRange frames;        ///< Of the clip: the frames that were replaced, or around the flip.
+  double angle_rad = 0.0;   ///< Largest turn between two neighbouring frames,
+  double distance_m = 0.0;  ///< or how far the root left its path (angle 0).
 };
 
 struct GlitchReport {
@@ -30,7 +31,9 @@ struct GlitchReport {
 ///   the nearest good one;
 /// - a jump that stays is spread over 80 ms when it is small (up to 45 degrees) or less than 15 cm
 ///   of the body lie beyond the joint (fingers, thumbs, toes, which flip by up to 180 degrees);
-/// - any other is left and reported.
+/// - any other is left and reported;
+/// - a root that leaves its path (the median over five frames) by more than 1 cm and what 40 m/s^2
+///   may do in a frame is interpolated.
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip);
 
 /// "LeftArm turns 94 degrees at once at 0.02 s".

@@ -97,6 +97,25 @@ TEST(RepairGlitches, ReportsALastingLargeJumpOfALimb) {
             "LeftArm turns 92 degrees at once at 0.83 s");
 }
 
+TEST(RepairGlitches, BringsTheRootBackOnItsPath) {
+  for (const int bad : {1, 2}) {
+    Figure figure("Hips");
+    const std::vector<Vec3> truth = figure.capture.clip.root_positions_m;
+    for (int f = 100; f < 100 + bad; ++f) {
+      figure.capture.clip.root_positions_m[static_cast<std::size_t>(f)] += Vec3(0.03f, 0.0f, 0.02f);
+    }
+    const GlitchReport report = figure.Repair();
+    ASSERT_EQ(report.repaired.size(), 1u) << bad;
+    EXPECT_EQ(report.repaired[0].frames, (FrameRange{100, 100 + bad}));
+    EXPECT_NEAR(report.repaired[0].distance_m, 0.036, 0.01);
+    for (std::size_t f = 0; f < truth.size(); ++f) {
+      EXPECT_LT(glm::length(truth[f] - figure.capture.clip.root_positions_m[f]), 0.002f) << f;
+    }
+    EXPECT_THAT(DescribeRepairs(figure.capture.skeleton, report, 120.0),
+                ::testing::ElementsAre(::testing::HasSubstr("Hips moves 3")));
+  }
+}
+
 TEST(RepairGlitches, TellsOncePerJoint) {
   Figure figure("LeftLeg");
   for (const int f : {60, 90, 130}) figure.At(f) = figure.At(f) * YawRotation(f == 90 ? 1.2 : 0.8);
