@@ -247,7 +247,7 @@ const Extraction& LibraryAssembler::Add(const Capture& capture) {
     file.unit_m = capture.unit_m;
     file.notes = capture.notes;
     file.skeleton = capture.skeleton;
-    file.error = "left out: " + TreeDifference(skeleton_, capture.skeleton);
+    file.error = TreeDifference(skeleton_, capture.skeleton);
     return file;
   }
   ExtractOptions extract = options_.extract;

@@ -100,7 +100,9 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
   while (next < requests.size() || !avatar.idle()) {
     while (next < requests.size() && avatar.queue_size() < Avatar::kMaxQueue) {
       if (Status status = avatar.Enqueue(requests[next]); !status) {
-        return std::unexpected(status.error());
+        Error error = status.error();
+        error.index = static_cast<std::int64_t>(next);
+        return std::unexpected(std::move(error));
       }
       ++next;
     }

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <optional>
@@ -50,7 +51,7 @@ Json FileToJson(const Extraction& extraction) {
 
 void PrintFile(const Extraction& extraction) {
   if (!extraction.error.empty()) {
-    std::printf("%s: left out: %s\n", extraction.path.c_str(), extraction.error.c_str());
+    std::printf("%s: left out\n", extraction.path.c_str());  // why is on stderr
     return;
   }
   std::printf("%s: %d frames at %.0f a second; %d left and %d right steps, %d jumps\n",
@@ -60,6 +61,25 @@ void PrintFile(const Extraction& extraction) {
   for (const RejectedTime& time : extraction.rejected) {
     std::printf("  left out %.2f-%.2f s: %s\n", time.from_s, time.to_s, time.reason.c_str());
   }
+}
+
+// The reader names options by their fields: unit_m is --unit-m here.
+Error NameOption(Error error) {
+  for (const char* field :
+       {"unit_m", "fps", "left_ankle", "right_ankle", "left_ball", "right_ball"}) {
+    if (error.where != field) continue;
+    std::string option = std::string("--") + field;
+    std::replace(option.begin(), option.end(), '_', '-');
+    error.where = option;
+    break;
+  }
+  return error;
+}
+
+// Why a file was left out, as a sentence that names it.
+std::string WithPath(const Extraction& extraction) {
+  return extraction.error.starts_with(extraction.path) ? extraction.error
+                                                       : extraction.path + ": " + extraction.error;
 }
 
 // "step,jump" into the assembler's switches; empty when fine, else what is wrong.
@@ -86,18 +106,31 @@ int RunBuild(const BuildCommand& command) {
   if (const std::string wrong = ParseKinds(command.kinds, options); !wrong.empty()) {
     return Complain(wrong);
   }
+  for (const std::string& path : command.files) {
+    if (IsSameFile(command.out, path)) {
+      return Complain("--out: " + command.out + " is a file to read from");
+    }
+  }
+  if (Status status = CheckOutputFile(command.out); !status) {
+    return ComplainOfOutput(status.error());
+  }
   BvhReadOptions read;
-  if (command.unit_m != 0.0) read.unit_m = command.unit_m;
-  if (command.fps != 0.0) read.fps = command.fps;
+  read.unit_m = command.unit_m;
+  read.fps = command.fps;
   if (!command.up.empty()) {
     read.up = ParseAxis(command.up);
     if (!read.up)
-      return Complain("--up: \"" + command.up + "\" is not an axis; say x, y, z, -x, …");
+      return Complain("--up: \"" + command.up +
+                      "\" is not an axis; there are x, y, z, -x, -y and -z");
   }
   read.left_ankle = command.left_ankle;
   read.right_ankle = command.right_ankle;
   read.left_ball = command.left_ball;
   read.right_ball = command.right_ball;
+
+  if (command.left_ankle.empty() != command.right_ankle.empty()) {
+    return Complain("--left-ankle and --right-ankle belong together: give both or none");
+  }
 
   LibraryAssembler assembler(options);
   Json files = Json::array();
@@ -105,27 +138,25 @@ int RunBuild(const BuildCommand& command) {
     const auto capture = ReadBvh(path, read);
     Extraction unreadable;
     if (!capture) {
-      // What is wrong with an option is wrong for every file.
-      if (capture.error().code == ErrorCode::kInvalidArgument) return Complain(capture.error());
       unreadable.path = path;
-      unreadable.error = Describe(capture.error());
+      unreadable.error = Describe(NameOption(capture.error()));
     }
     const Extraction& extraction = capture ? assembler.Add(*capture) : unreadable;
     files.push_back(FileToJson(extraction));
     if (!command.json) PrintFile(extraction);
     if (!extraction.error.empty()) {
-      std::fprintf(stderr, "stridewire-library: %s\n", extraction.error.c_str());
+      Complain(WithPath(extraction));
     }
   }
 
   const auto raw = assembler.Assemble();
-  if (!raw) return Complain(raw.error());
+  if (!raw) return ComplainOfInput(raw.error());
   LibraryBuilder builder;
   builder.cluster_diameter = command.all ? 0.0 : kClusterDiameterM;
   const auto library = builder.Build(*raw);
-  if (!library) return Complain(library.error());
+  if (!library) return ComplainOfInput(library.error());
   if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
-    return Complain(status.error());
+    return ComplainOfOutput(status.error());
   }
   if (command.json) {
     Json json;

@@ -13,9 +13,29 @@ int Complain(const std::string& sentence, int exit_code) {
   return exit_code;
 }
 
-int Complain(const Error& error) {
-  // What the operating system refuses is a failure; everything else is input to be mended.
-  return Complain(Describe(error), error.code == ErrorCode::kIo ? kExitFailure : kExitBadInput);
+int ComplainOfInput(const Error& error) { return Complain(Describe(error), kExitBadInput); }
+
+int ComplainOfOutput(const Error& error) { return Complain(Describe(error), kExitFailure); }
+
+Status CheckOutputFile(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const std::filesystem::file_status status = std::filesystem::status(path, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    return Fail(ErrorCode::kIo, "is there already and no plain file", path.string());
+  }
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    return Fail(ErrorCode::kIo, "its folder is not there", path.string());
+  }
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) {
+    return Fail(ErrorCode::kIo, "its folder cannot be written to", path.string());
+  }
+  return {};
+}
+
+bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b) {
+  std::error_code failed;
+  return std::filesystem::equivalent(a, b, failed) && !failed;
 }
 
 Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {

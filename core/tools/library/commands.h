@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,10 @@ struct BuildCommand {
   bool mirror = false;
   bool all = false;
   bool json = false;
-  double unit_m = 0.0;  // 0: found
+  std::optional<double> unit_m;  // else found
   std::string left_ankle, right_ankle, left_ball, right_ball;
   std::string up;
-  double fps = 0.0;  // 0: the file's
+  std::optional<double> fps;  // else the file's
 };
 int RunBuild(const BuildCommand& command);
 

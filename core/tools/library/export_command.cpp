@@ -35,7 +35,7 @@ Clip ExampleClip(const MotionLibrary& library, int group_index, int example) {
 
 int RunExport(const ExportCommand& command) {
   const auto library = OpenLibrary(command.library);
-  if (!library) return Complain(library.error());
+  if (!library) return ComplainOfInput(library.error());
   std::error_code failed;
   std::filesystem::create_directories(command.out, failed);
   if (failed) return Complain(command.out + ": the folder cannot be made", kExitFailure);
@@ -49,7 +49,7 @@ int RunExport(const ExportCommand& command) {
       const std::filesystem::path path = std::filesystem::path(command.out) / name;
       const Clip clip = ExampleClip(**library, static_cast<int>(g), e);
       if (Status status = WriteBvh((*library)->skeleton(), clip, path); !status) {
-        return Complain(status.error());
+        return ComplainOfOutput(status.error());
       }
       ++count;
     }

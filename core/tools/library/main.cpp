@@ -1,8 +1,13 @@
 // stridewire-library: turns motion capture into libraries, looks into them, plays them.
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <string_view>
+#include <system_error>
 
 #include "command_line.h"
 #include "commands.h"
@@ -15,64 +20,126 @@ constexpr const char kExamples[] = R"(Examples:
   stridewire-library build --out walk.swl captures/16_*.bvh
   stridewire-library inspect walk.swl
   stridewire-library synthesize builtin --choreography walk.json --out walk.bvh
-  stridewire-library export-capture builtin --out examples/)";
+  stridewire-library export-capture builtin --out examples/
+)";
+
+// A number that lies in [min, max], or in (min, max] if `is_open`.
+CLI::Validator Number(double min, double max, bool is_open) {
+  const auto check = [=](const std::string& text) -> std::string {
+    double value = 0.0;
+    const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_number = failed == std::errc() && end == text.data() + text.size();
+    if (is_number && (is_open ? value > min : value >= min) && value <= max) return {};
+    char sentence[128];
+    std::snprintf(sentence, sizeof(sentence), "is not a number %s %g %s %g",
+                  is_open ? "above" : "from", min, is_open ? "and up to" : "to", max);
+    return "\"" + text + "\" " + sentence;
+  };
+  return CLI::Validator(check, "");
+}
+
+CLI::Validator NotEmpty() {
+  return CLI::Validator(
+      [](const std::string& text) { return text.empty() ? "is empty" : std::string(); }, "");
+}
+
+// What is wrong with the first word, as a sentence; empty when it is a command or an option that can
+// stand there. CLI11 would complain of a missing command where an unknown one is given.
+std::string FirstWordError(const CLI::App& app, const std::string& word) {
+  if (word.starts_with('-')) {
+    if (word == "-h" || word == "--help" || word == "--version") return {};
+    return "a command comes first, not " + word;
+  }
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  const bool is_known = std::any_of(commands.begin(), commands.end(), [&](const CLI::App* command) {
+    return command->get_name() == word;
+  });
+  return is_known ? "" : "\"" + word + "\" is no command";
+}
 
 int Run(int argc, char** argv) {
   CLI::App app{"Turns motion capture into libraries, looks into them and plays them."};
+  app.name("stridewire-library");
   app.set_version_flag("--version", std::string("stridewire-library ") + kVersion);
   app.footer(kExamples);
   app.require_subcommand(1);
 
   BuildCommand build;
   CLI::App* build_app = app.add_subcommand("build", "Builds a library from captures (BVH)");
-  build_app->add_option("--out", build.out, "The library to write (.swl)")->required();
+  build_app->add_option("--out", build.out, "The library to write (.swl)")
+      ->required()
+      ->check(NotEmpty());
   build_app->add_option("--kinds", build.kinds, "Movements to look for: step, jump")
       ->capture_default_str();
   build_app->add_flag("--mirror", build.mirror, "Add every step mirrored to the other foot");
-  build_app->add_option("--unit-m", build.unit_m, "Length of one file unit in metres; else found");
-  build_app->add_option("--fps", build.fps, "Frames a second, where the files are wrong");
+  build_app->add_option("--unit-m", build.unit_m, "Length of one file unit in metres; else found")
+      ->check(Number(0.0, 1000.0, true));
+  build_app->add_option("--fps", build.fps, "Frames a second, where the files are wrong")
+      ->check(Number(0.0, 10000.0, true));
   build_app->add_option("--up", build.up, "Up axis of the files: x, y, z, -x, -y, -z; else found");
-  build_app->add_option("--left-ankle", build.left_ankle, "Joint name; else found");
-  build_app->add_option("--right-ankle", build.right_ankle, "Joint name; else found");
-  build_app->add_option("--left-ball", build.left_ball, "Joint name; else found");
-  build_app->add_option("--right-ball", build.right_ball, "Joint name; else found");
+  build_app->add_option("--left-ankle", build.left_ankle, "Joint name; else found")
+      ->check(NotEmpty());
+  build_app->add_option("--right-ankle", build.right_ankle, "Joint name; else found")
+      ->check(NotEmpty());
+  build_app->add_option("--left-ball", build.left_ball, "Joint name; else found")
+      ->check(NotEmpty());
+  build_app->add_option("--right-ball", build.right_ball, "Joint name; else found")
+      ->check(NotEmpty());
   build_app->add_flag("--all", build.all, "Keep every usable movement: average none");
   build_app->add_flag("--json", build.json, "Report as one JSON object on stdout");
-  build_app->add_option("files", build.files, "Captures, BVH")->required();
-  build_app->footer("Example:\n  stridewire-library build --out walk.swl --all 16_*.bvh");
+  build_app->add_option("files", build.files, "Captures, BVH")->required()->check(NotEmpty());
+  build_app->footer("Example:\n  stridewire-library build --out walk.swl --all 16_*.bvh\n");
 
   InspectCommand inspect;
   CLI::App* inspect_app = app.add_subcommand("inspect", "Tells what a library holds");
-  inspect_app->add_option("library", inspect.library, "A .swl file or builtin")->required();
+  inspect_app->add_option("library", inspect.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
   inspect_app->add_flag("--json", inspect.json, "As one JSON object on stdout");
   inspect_app->add_flag("--examples", inspect.examples, "Every example as well");
-  inspect_app->footer("Example:\n  stridewire-library inspect builtin --examples");
+  inspect_app->footer("Example:\n  stridewire-library inspect builtin --examples\n");
 
   SynthesizeCommand synthesize;
   CLI::App* synthesize_app =
       app.add_subcommand("synthesize", "Plays a choreography into a BVH file");
-  synthesize_app->add_option("library", synthesize.library, "A .swl file or builtin")->required();
+  synthesize_app->add_option("library", synthesize.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
   synthesize_app->add_option("--choreography", synthesize.choreography, "What to do (JSON)")
-      ->required();
-  synthesize_app->add_option("--out", synthesize.out, "The BVH file to write")->required();
+      ->required()
+      ->check(NotEmpty());
+  synthesize_app->add_option("--out", synthesize.out, "The BVH file to write")
+      ->required()
+      ->check(NotEmpty());
   synthesize_app->add_option("--fps", synthesize.fps, "Frames a second")
       ->capture_default_str()
-      ->check(CLI::Range(10.0, 1000.0));
+      ->check(Number(10.0, 1000.0, false));
   synthesize_app->add_flag("--json", synthesize.json, "Report as one JSON object on stdout");
   synthesize_app->footer(
       "Example:\n  echo '{\"movements\":[{\"step\":{\"length_m\":0.6}}]}' > c.json\n"
-      "  stridewire-library synthesize builtin --choreography c.json --out walk.bvh");
+      "  stridewire-library synthesize builtin --choreography c.json --out walk.bvh\n");
 
   ExportCommand export_command;
   CLI::App* export_app =
       app.add_subcommand("export-capture", "Writes every example of a library as BVH");
-  export_app->add_option("library", export_command.library, "A .swl file or builtin")->required();
-  export_app->add_option("--out", export_command.out, "The folder to write into")->required();
-  export_app->footer("Example:\n  stridewire-library export-capture builtin --out examples/");
+  export_app->add_option("library", export_command.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
+  export_app->add_option("--out", export_command.out, "The folder to write into")
+      ->required()
+      ->check(NotEmpty());
+  export_app->footer("Example:\n  stridewire-library export-capture builtin --out examples/\n");
 
   for (const char* name : {"refine", "report"}) {
     CLI::App* later = app.add_subcommand(name, "Not supported yet");
     later->allow_extras();
+    later->footer("Example:\n  stridewire-library " + std::string(name) + " walk.swl --out " +
+                  (std::string_view(name) == "refine" ? "better.swl\n" : "pictures/\n"));
+  }
+
+  const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
+  if (!wrong.empty()) {
+    return Complain(wrong + "; there are build, inspect, synthesize and export-capture");
   }
 
   try {
@@ -84,7 +151,9 @@ int Run(int argc, char** argv) {
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
   } catch (const CLI::ParseError& error) {
-    return Complain(error.what());
+    const auto commands = app.get_subcommands();
+    const std::string command = commands.empty() ? "" : commands.front()->get_name() + ": ";
+    return Complain(command + error.what());
   }
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);
@@ -98,7 +167,11 @@ int Run(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   try {
-    return stridewire::Run(argc, argv);
+    const int exit_code = stridewire::Run(argc, argv);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+      return stridewire::Complain("the report cannot be written", stridewire::kExitFailure);
+    }
+    return exit_code;
   } catch (const std::exception& error) {
     return stridewire::Complain(std::string("failed: ") + error.what(), stridewire::kExitFailure);
   }

@@ -52,20 +52,30 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
 }  // namespace
 
 int RunSynthesize(const SynthesizeCommand& command) {
+  if (IsSameFile(command.out, command.choreography) || IsSameFile(command.out, command.library)) {
+    return Complain("--out: " + command.out + " is a file to read from");
+  }
+  if (Status status = CheckOutputFile(command.out); !status) {
+    return ComplainOfOutput(status.error());
+  }
   const auto library = OpenLibrary(command.library);
-  if (!library) return Complain(library.error());
+  if (!library) return ComplainOfInput(library.error());
   const auto choreography = ReadChoreography(command.choreography);
-  if (!choreography) return Complain(choreography.error());
+  if (!choreography) return ComplainOfInput(choreography.error());
   auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps);
   if (!synthesis) {
     Error error = synthesis.error();
-    error.where = command.choreography + (error.where.empty() ? "" : ": " + error.where);
-    return Complain(error);
+    std::string where = command.choreography;
+    if (error.index >= 0) where += ": movements[" + std::to_string(error.index) + "]";
+    if (!error.where.empty()) where += (error.index >= 0 ? "." : ": ") + error.where;
+    error.where = std::move(where);
+    error.index = -1;
+    return ComplainOfInput(error);
   }
   if (Status status =
           WriteBvh((*library)->skeleton(), synthesis->clip, std::filesystem::path(command.out));
       !status) {
-    return Complain(status.error());
+    return ComplainOfOutput(status.error());
   }
   if (command.json) {
     Json json;

@@ -1,0 +1,624 @@
+// stridewire-library as a program: what it prints, leaves behind and answers, option by option.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "run_program.h"
+#include "scratch_folder.h"
+#include "stridewire/base/version.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+namespace {
+
+using nlohmann::json;
+using test::ProgramResult;
+using test::ReadWhole;
+using test::ScratchFolder;
+using testing::AllOf;
+using testing::Contains;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+using testing::StartsWith;
+
+using Arguments = std::vector<std::string>;
+
+// From Debian's assimp-testmodels: ten standing jumps; steps, a ladder, turns.
+constexpr const char* kJumps = "/usr/share/assimp/models/BVH/01_01.bvh";
+constexpr const char* kSteps = "/usr/share/assimp/models/BVH/01_03.bvh";
+
+ProgramResult Tool(const Arguments& arguments) {
+  return test::RunProgram(STRIDEWIRE_LIBRARY_TOOL, arguments);
+}
+
+Arguments Join(Arguments a, const Arguments& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+std::string Text(const Arguments& arguments) {
+  std::string text = "stridewire-library";
+  for (const std::string& argument : arguments) text += " \"" + argument + "\"";
+  return text;
+}
+
+// One sentence of the program's own, naming what is wrong.
+void ExpectSentence(const std::string& err, const std::string& named) {
+  EXPECT_THAT(err, StartsWith("stridewire-library: "));
+  EXPECT_THAT(err, HasSubstr(named));
+  EXPECT_EQ(std::count(err.begin(), err.end(), '\n'), 1) << err;
+  EXPECT_LT(err.size(), 400u) << err;
+}
+
+void ExpectFailure(const Arguments& arguments, int exit_code, const std::string& named) {
+  SCOPED_TRACE(Text(arguments));
+  const ProgramResult result = Tool(arguments);
+  EXPECT_EQ(result.exit_code, exit_code) << result.err;
+  EXPECT_THAT(result.out, IsEmpty());
+  ExpectSentence(result.err, named);
+}
+
+json ParseOutput(const std::string& out) {
+  // Throws, and so fails the test, on anything before or after the one object.
+  json parsed = json::parse(out);
+  EXPECT_TRUE(parsed.is_object());
+  return parsed;
+}
+
+std::vector<std::string> Keys(const json& object) {
+  std::vector<std::string> keys;
+  for (const auto& item : object.items()) keys.push_back(item.key());
+  return keys;
+}
+
+class LibraryTool : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(std::filesystem::exists(kJumps) && std::filesystem::exists(kSteps))
+        << "Debian's assimp-testmodels is not installed";
+  }
+  std::string Out(const std::string& name = "out.swl") const { return folder_.File(name); }
+
+  const ScratchFolder folder_;
+};
+
+TEST_F(LibraryTool, TellsItsVersion) {
+  const ProgramResult result = Tool({"--version"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_EQ(result.out, std::string("stridewire-library ") + kVersion + "\n");
+  EXPECT_THAT(result.err, IsEmpty());
+}
+
+TEST_F(LibraryTool, HelpsEveryCommandWithAnExample) {
+  const ProgramResult all = Tool({"--help"});
+  EXPECT_EQ(all.exit_code, 0);
+  for (const char* command : {"build", "inspect", "synthesize", "export-capture"}) {
+    EXPECT_THAT(all.out, HasSubstr(std::string("\n  stridewire-library ") + command));
+  }
+  for (const char* command :
+       {"build", "inspect", "synthesize", "export-capture", "refine", "report"}) {
+    SCOPED_TRACE(command);
+    const ProgramResult result = Tool({command, "--help"});
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.out, HasSubstr(std::string("Example:\n")));
+    EXPECT_THAT(result.out, HasSubstr(std::string("stridewire-library ") + command));
+    EXPECT_THAT(result.out, testing::EndsWith("\n"));
+    EXPECT_THAT(result.err, IsEmpty());
+  }
+}
+
+TEST_F(LibraryTool, NamesAnUnknownOrMissingCommand) {
+  ExpectFailure({}, 2, "a command is needed");
+  ExpectFailure({"frobnicate"}, 2, "\"frobnicate\"");
+  ExpectFailure({""}, 2, "is no command");
+  ExpectFailure({"--frobnicate"}, 2, "--frobnicate");
+}
+
+TEST_F(LibraryTool, NamesMissingOptionsAndArguments) {
+  ExpectFailure({"build", kJumps}, 2, "--out is required");
+  ExpectFailure({"build", "--out"}, 2, "--out");
+  ExpectFailure({"build", "--out", Out()}, 2, "files is required");
+  ExpectFailure({"inspect"}, 2, "library is required");
+  ExpectFailure({"synthesize"}, 2, "is required");
+  ExpectFailure({"synthesize", "builtin", "--out", Out()}, 2, "--choreography is required");
+  ExpectFailure({"synthesize", "builtin", "--choreography", Out("c.json")}, 2, "--out is required");
+  ExpectFailure({"export-capture", "builtin"}, 2, "--out is required");
+}
+
+TEST_F(LibraryTool, NamesUnknownOptions) {
+  ExpectFailure({"build", "--out", Out(), "--frobnicate", kJumps}, 2, "--frobnicate");
+  ExpectFailure({"inspect", "builtin", "--frobnicate"}, 2, "--frobnicate");
+  ExpectFailure({"inspect", "builtin", "more"}, 2, "more");
+  ExpectFailure({"synthesize", "builtin", "--frobnicate"}, 2, "synthesize: ");
+  ExpectFailure({"export-capture", "builtin", "--out", Out(), "--frobnicate"}, 2, "--frobnicate");
+  ExpectFailure({"build", "--out", Out(), "--out", Out("b.swl"), kJumps}, 2, "--out");
+  EXPECT_EQ(folder_.Count(), 0);
+}
+
+TEST_F(LibraryTool, RefusesOptionValuesThatMakeNoSense) {
+  const Arguments build = {"build", "--out", Out(), kJumps};
+  for (const char* value : {"nan", "inf", "-inf", "-1", "0", "-0.01", "1e9", "abc", "", "1 m"}) {
+    ExpectFailure(Join(build, {"--unit-m", value}), 2, "--unit-m");
+    ExpectFailure(Join(build, {"--fps", value}), 2, "--fps");
+  }
+  for (const char* value : {"w", "+", "xy", "", "--x", "up"}) {
+    if (*value != '\0') ExpectFailure(Join(build, {std::string("--up=") + value}), 2, "--up");
+  }
+  ExpectFailure(Join(build, {"--kinds", "walk"}), 2, "--kinds: \"walk\"");
+  ExpectFailure(Join(build, {"--kinds", "step,walk"}), 2, "--kinds: \"walk\"");
+  ExpectFailure(Join(build, {"--kinds", "step,,jump"}), 2, "--kinds: \"\"");
+  ExpectFailure(Join(build, {"--kinds", ""}), 2, "--kinds");
+  ExpectFailure(Join(build, {"--left-ankle", "LeftFoot"}), 2, "--right-ankle");
+  ExpectFailure(Join(build, {"--right-ankle", "RightFoot"}), 2, "--left-ankle");
+  for (const char* option : {"--left-ankle", "--right-ankle", "--left-ball", "--right-ball"}) {
+    ExpectFailure(Join(build, {option, ""}), 2, option);
+  }
+  ExpectFailure({"build", "--out", "", kJumps}, 2, "--out");
+  ExpectFailure({"build", "--out", Out(), ""}, 2, "files");
+  ExpectFailure({"inspect", ""}, 2, "library");
+  ExpectFailure({"export-capture", "builtin", "--out", ""}, 2, "--out");
+  EXPECT_EQ(folder_.Count(), 0);
+}
+
+TEST_F(LibraryTool, RefusesAFrameRateOutOfRange) {
+  const std::string choreography =
+      folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}}]})");
+  for (const char* fps : {"9.9", "1001", "0", "-60", "nan", "inf", "fast", ""}) {
+    ExpectFailure(
+        {"synthesize", "builtin", "--choreography", choreography, "--out", Out(), "--fps", fps}, 2,
+        "--fps");
+  }
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, NamesJointsThatAreNotThere) {
+  for (const char* option : {"--left-ball", "--right-ball"}) {
+    const ProgramResult result = Tool({"build", "--out", Out(), option, "Tail", kJumps});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, AllOf(HasSubstr(kJumps), HasSubstr(option), HasSubstr("no joint")));
+  }
+  const ProgramResult result =
+      Tool({"build", "--out", Out(), "--left-ankle", "Tail", "--right-ankle", "Fin", kJumps});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr(kJumps), HasSubstr("--left-ankle")));
+  EXPECT_EQ(folder_.Count(), 0);
+}
+
+TEST_F(LibraryTool, NamesFilesThatAreNoLibraries) {
+  const std::string none = folder_.File("none.swl");
+  const std::string empty = folder_.Write("empty.swl", "");
+  const std::string foreign = folder_.Write("foreign.swl", std::string(5000, 'x'));
+  const std::string choreography =
+      folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}}]})");
+  struct Case {
+    std::string file;
+    const char* text;
+  };
+  const std::vector<Case> cases = {{none, "no such file"},
+                                   {folder_.path().string(), "not a regular file"},
+                                   {"/dev/null", "not a regular file"},
+                                   {empty, "shorter than its header"},
+                                   {foreign, "not a Stridewire library"},
+                                   {kJumps, "not a Stridewire library"}};
+  for (const Case& c : cases) {
+    for (const Arguments& arguments :
+         {Arguments{"inspect", c.file}, Arguments{"inspect", c.file, "--json"},
+          Arguments{"synthesize", c.file, "--choreography", choreography, "--out", Out("o.bvh")},
+          Arguments{"export-capture", c.file, "--out", Out("examples")}}) {
+      ExpectFailure(arguments, 2, c.file + ": ");
+      ExpectFailure(arguments, 2, c.text);
+    }
+  }
+  EXPECT_EQ(folder_.Count(), 3) << "a failing command left something behind";
+}
+
+TEST_F(LibraryTool, NamesDamagedLibraries) {
+  ASSERT_EQ(Tool({"build", "--out", Out(), kJumps}).exit_code, 0);
+  const std::string whole = ReadWhole(Out());
+  std::string damaged = whole;
+  damaged[whole.size() / 2] ^= 0x10;
+  std::string other_version = whole;
+  other_version[8] = 77;
+  ExpectFailure({"inspect", folder_.Write("damaged.swl", damaged)}, 2, "damaged.swl: the content");
+  ExpectFailure({"inspect", folder_.Write("version.swl", other_version)}, 2, "version");
+  ExpectFailure({"inspect", folder_.Write("short.swl", whole.substr(0, whole.size() - 1))}, 2,
+                "cut short");
+  ExpectFailure({"inspect", folder_.Write("long.swl", whole + "x")}, 2, "past its end");
+}
+
+TEST_F(LibraryTool, NamesUnusableCapturesAndLeavesNothing) {
+  const std::string none = folder_.File("none.bvh");
+  const std::string foreign = folder_.Write("foreign.bvh", "this is\nno capture\n");
+  const std::string malformed =
+      folder_.Write("bad.bvh", "HIERARCHY\nROOT Hips\n{\nOFFSET 0 zero 0\n");
+  struct Case {
+    std::string file;
+    std::string named;
+  };
+  const std::vector<Case> cases = {{none, none + ": there is no such file"},
+                                   {folder_.path().string(), folder_.path().string() + ": "},
+                                   {foreign, foreign + ":1: "},
+                                   {malformed, malformed + ":4: "}};
+  const int before = folder_.Count();
+  for (const Case& c : cases) {
+    for (const bool as_json : {false, true}) {
+      Arguments arguments = {"build", "--out", Out(), c.file};
+      if (as_json) arguments.push_back("--json");
+      SCOPED_TRACE(Text(arguments));
+      const ProgramResult result = Tool(arguments);
+      EXPECT_EQ(result.exit_code, 2);
+      EXPECT_THAT(result.err, HasSubstr("stridewire-library: " + c.named));
+      EXPECT_THAT(result.err, HasSubstr("no usable step or jump"));
+      if (as_json) {
+        EXPECT_THAT(result.out, IsEmpty());
+      }
+    }
+  }
+  EXPECT_EQ(folder_.Count(), before);
+}
+
+TEST_F(LibraryTool, AFailingBuildLeavesTheOldLibrary) {
+  folder_.Write("out.swl", "what was there");
+  EXPECT_EQ(Tool({"build", "--out", Out(), folder_.File("none.bvh")}).exit_code, 2);
+  EXPECT_EQ(ReadWhole(Out()), "what was there");
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, RefusesFilesThatCannotBeRead) {
+  if (geteuid() == 0) GTEST_SKIP() << "root may read everything";
+  const std::string capture = folder_.Write("secret.bvh", ReadWhole(kJumps));
+  const std::string library = folder_.Write("secret.swl", "x");
+  const std::string choreography = folder_.Write("secret.json", "{}");
+  for (const std::string& file : {capture, library, choreography}) {
+    std::filesystem::permissions(file, std::filesystem::perms::none);
+  }
+  EXPECT_EQ(Tool({"build", "--out", Out(), capture}).exit_code, 2);
+  ExpectFailure({"inspect", library}, 2, library);
+  ExpectFailure({"synthesize", "builtin", "--choreography", choreography, "--out", Out()}, 2,
+                choreography);
+}
+
+TEST_F(LibraryTool, RefusesPlacesThatCannotBeWritten) {
+  const std::string choreography =
+      folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}}]})");
+  const std::string missing = folder_.File("no/such/folder/out");
+  for (const std::string& out : {missing, folder_.path().string(), std::string("/dev/null")}) {
+    ExpectFailure({"build", "--out", out, kJumps}, 1, out);
+    ExpectFailure({"synthesize", "builtin", "--choreography", choreography, "--out", out}, 1, out);
+  }
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  ExpectFailure({"export-capture", "builtin", "--out", choreography}, 1, choreography);
+  ExpectFailure({"export-capture", "builtin", "--out", choreography + "/examples"}, 1,
+                choreography);
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, NeverWritesOverWhatItReads) {
+  const std::string capture = folder_.Write("a.bvh", ReadWhole(kJumps));
+  ExpectFailure({"build", "--out", capture, kSteps, capture}, 2, "--out");
+  EXPECT_EQ(ReadWhole(capture), ReadWhole(kJumps));
+  const std::string text = R"({"movements":[{"step":{"length_m":0.5}}]})";
+  const std::string choreography = folder_.Write("c.json", text);
+  ExpectFailure({"synthesize", "builtin", "--choreography", choreography, "--out", choreography}, 2,
+                "--out");
+  EXPECT_EQ(ReadWhole(choreography), text);
+}
+
+TEST_F(LibraryTool, NamesTheFieldOfAMalformedChoreography) {
+  struct Case {
+    const char* text;
+    const char* named;
+  };
+  const std::vector<Case> cases = {
+      {"", "c.json"},
+      {"[]", "c.json"},
+      {"{", "c.json"},
+      {R"({"movements":[]})", "movements"},
+      {R"({"start":{}})", "movements"},
+      {R"({"movements":[{"step":{}}]})", "movements[0].step.length_m"},
+      {R"({"movements":[{"step":{"length_m":"far"}}]})", "movements[0].step.length_m"},
+      {R"({"movements":[{"step":{"length_m":11}}]})", "movements[0].step.length_m"},
+      {R"({"movements":[{"step":{"length_m":0.5,"turn_rad":9}}]})", "step.turn_rad"},
+      {R"({"movements":[{"step":{"length_m":0.5,"side_m":1e9}}]})", "step.side_m"},
+      {R"({"movements":[{"step":{"length_m":0.5,"height_m":null}}]})", "step.height_m"},
+      {R"({"movements":[{"step":{"length_m":0.5,"foot":"both"}}]})", "step.foot"},
+      {R"({"movements":[{"step":{"length_m":0.5,"knee":1}}]})", "step.knee"},
+      {R"({"movements":[{"jump":{"length_m":0.5}},{"jump":{}}]})", "movements[1].jump.length_m"},
+      {R"({"movements":[{"stand":{"seconds":-1}}]})", "movements[0].stand.seconds"},
+      {R"({"movements":[{"stand":{"seconds":1},"step":{"length_m":0}}]})", "movements[0]"},
+      {R"({"movements":[{"dance":{}}]})", "movements[0].dance"},
+      {R"({"movements":[7]})", "movements[0]"},
+      {R"({"movements":[{"stand":{"seconds":1}}],"start":{"position_m":[0,0]}})",
+       "start.position_m"},
+      {R"({"movements":[{"stand":{"seconds":1}}],"start":{"heading_rad":"north"}})",
+       "start.heading_rad"},
+      {R"({"movements":[{"stand":{"seconds":1}}],"tempo":1})", "tempo"}};
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.text);
+    const std::string choreography = folder_.Write("c.json", c.text);
+    ExpectFailure({"synthesize", "builtin", "--choreography", choreography, "--out", Out()}, 2,
+                  c.named);
+  }
+  ExpectFailure({"synthesize", "builtin", "--choreography", Out("none.json"), "--out", Out()}, 2,
+                "none.json: there is no such file");
+  ExpectFailure(
+      {"synthesize", "builtin", "--choreography", folder_.path().string(), "--out", Out()}, 2,
+      folder_.path().string());
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, SaysWhatIsNotSupportedYet) {
+  const std::vector<std::pair<const char*, const char*>> cases = {
+      {R"({"movements":[{"step":{"at_m":[0,0,1],"heading_rad":0}}]})", "movements[0].step.at_m"},
+      {R"({"movements":[{"stand":{"seconds":1}},{"walk_to":{"position_m":[0,0,5]}}]})",
+       "movements[1].walk_to"},
+      {R"({"terrain":{"boxes":[]},"movements":[{"stand":{"seconds":1}}]})", "terrain"}};
+  for (const auto& [text, named] : cases) {
+    SCOPED_TRACE(text);
+    const std::string choreography = folder_.Write("c.json", text);
+    const Arguments arguments = {"synthesize", "builtin", "--choreography",
+                                 choreography, "--out",   Out()};
+    ExpectFailure(arguments, 2, named);
+    ExpectFailure(arguments, 2, "not supported yet");
+  }
+  ExpectFailure({"refine", "builtin", "--out", Out()}, 2, "refine is not supported yet");
+  ExpectFailure({"report", "builtin", "--out", Out()}, 2, "report is not supported yet");
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, NamesAMovementTheLibraryDoesNotHave) {
+  ASSERT_EQ(Tool({"build", "--out", Out(), "--kinds", "jump", kJumps}).exit_code, 0);
+  const std::string choreography = folder_.Write(
+      "c.json", R"({"movements":[{"jump":{"length_m":0.9}},{"step":{"length_m":0.5}}]})");
+  ExpectFailure({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh")}, 2,
+                "c.json: movements[1].step: ");
+  EXPECT_FALSE(std::filesystem::exists(Out("o.bvh")));
+}
+
+TEST_F(LibraryTool, OneBadFileDoesNotStopTheOthers) {
+  const std::string bad = folder_.Write("bad.bvh", "HIERARCHY\nROOT Hips\n{\nOFFSET 0 zero 0\n");
+  const std::string none = folder_.File("none.bvh");
+  const ProgramResult result = Tool({"build", "--out", Out(), "--json", none, kJumps, bad, kSteps});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, AllOf(HasSubstr(none + ": "), HasSubstr(bad + ":4: ")));
+  const json report = ParseOutput(result.out);
+  ASSERT_EQ(report["files"].size(), 4u);
+  for (const std::size_t i : {0u, 2u}) EXPECT_TRUE(report["files"][i]["error"].is_string());
+  for (const std::size_t i : {1u, 3u}) EXPECT_TRUE(report["files"][i]["error"].is_null());
+  EXPECT_EQ(report["files"][0]["path"], none);
+  EXPECT_EQ(report["files"][1]["jumps"], 10);
+  EXPECT_GT(report["files"][3]["steps_left"], 5);
+  EXPECT_TRUE(MotionLibrary::Open(Out()).has_value());
+
+  const ProgramResult text = Tool({"build", "--out", Out(), none, kJumps, bad});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_THAT(text.out, AllOf(HasSubstr(none + ": left out"), HasSubstr(bad + ": left out"),
+                              HasSubstr("10 jumps")));
+}
+
+TEST_F(LibraryTool, BuildsTheSameBytesTwice) {
+  const Arguments files = {kJumps, kSteps};
+  for (const Arguments& options : {Arguments{}, Arguments{"--all"}, Arguments{"--mirror"}}) {
+    ASSERT_EQ(Tool(Join(Join({"build", "--out", Out("a.swl")}, options), files)).exit_code, 0);
+    ASSERT_EQ(Tool(Join(Join({"build", "--out", Out("b.swl")}, options), files)).exit_code, 0);
+    EXPECT_FALSE(ReadWhole(Out("a.swl")).empty());
+    EXPECT_EQ(ReadWhole(Out("a.swl")), ReadWhole(Out("b.swl")));
+  }
+  EXPECT_EQ(folder_.Count(), 2);
+}
+
+TEST_F(LibraryTool, BuildOptionsChangeWhatTheyAreFor) {
+  const auto build = [&](const Arguments& options) {
+    const ProgramResult result =
+        Tool(Join(Join({"build", "--out", Out(), "--json"}, options), {kJumps, kSteps}));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ParseOutput(result.out);
+  };
+  const auto examples = [](const json& report, const std::string& kind) {
+    int count = 0;
+    for (const json& group : report["library"]["groups"]) {
+      if (group["kind"] == kind) count += group["examples"].get<int>();
+    }
+    return count;
+  };
+  const json plain = build({});
+  const json all = build({"--all"});
+  EXPECT_GT(examples(all, "step_left"), examples(plain, "step_left"));
+  EXPECT_GT(examples(build({"--all", "--mirror"}), "step_left"), examples(all, "step_left"));
+  EXPECT_EQ(examples(build({"--kinds", "step"}), "jump"), 0);
+  EXPECT_EQ(examples(build({"--kinds", "jump"}), "step_left"), 0);
+  EXPECT_EQ(examples(build({"--kinds", "jump"}), "jump"), examples(plain, "jump"));
+  EXPECT_DOUBLE_EQ(build({"--unit-m", "0.05"})["files"][0]["unit_m"], 0.05);
+  EXPECT_DOUBLE_EQ(build({"--fps", "100"})["files"][0]["fps"], 100.0);
+  EXPECT_EQ(build({"--up", "y"}), plain) << "the captures are y up";
+  EXPECT_EQ(build({"--left-ankle", "LeftFoot", "--right-ankle", "RightFoot", "--left-ball",
+                   "LeftToeBase", "--right-ball", "RightToeBase"})["library"],
+            plain["library"]);
+  // Lying down nobody walks: found out, or at least another library.
+  const ProgramResult lying = Tool({"build", "--out", Out(), "--json", "--up", "x", kJumps});
+  if (lying.exit_code == 0) {
+    EXPECT_NE(ParseOutput(lying.out)["library"]["hash"], plain["library"]["hash"]);
+  } else {
+    EXPECT_EQ(lying.exit_code, 2);
+  }
+}
+
+TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
+  const ProgramResult result = Tool({"build", "--out", Out(), "--json", kJumps});
+  ASSERT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.err, IsEmpty());
+  const json report = ParseOutput(result.out);
+  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("files", "library"));
+  for (const char* key : {"path", "frames", "fps", "unit_m", "steps_left", "steps_right", "jumps",
+                          "rejected", "error"}) {
+    EXPECT_THAT(Keys(report["files"][0]), Contains(key));
+  }
+  ASSERT_FALSE(report["files"][0]["rejected"].empty());
+  for (const json& rejected : report["files"][0]["rejected"]) {
+    EXPECT_THAT(Keys(rejected), testing::UnorderedElementsAre("from_s", "to_s", "reason"));
+  }
+  const ProgramResult inspected = Tool({"inspect", Out(), "--json"});
+  EXPECT_EQ(report["library"], ParseOutput(inspected.out));
+}
+
+TEST_F(LibraryTool, InspectsAsOneJsonObject) {
+  for (const bool examples : {false, true}) {
+    Arguments arguments = {"inspect", "builtin", "--json"};
+    if (examples) arguments.push_back("--examples");
+    const ProgramResult result = Tool(arguments);
+    ASSERT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.err, IsEmpty());
+    const json report = ParseOutput(result.out);
+    EXPECT_EQ(report["format_version"], MotionLibrary::kFormatVersion);
+    EXPECT_EQ(report["hash"].get<std::string>().size(), 32u);
+    EXPECT_GT(report["bytes"], 1000);
+    EXPECT_EQ(report["skeleton"]["joints"].get<std::size_t>(), report["skeleton"]["names"].size());
+    for (const char* foot : {"left_foot", "right_foot"}) {
+      EXPECT_THAT(report["skeleton"]["names"].get<std::vector<std::string>>(),
+                  Contains(report["skeleton"][foot].get<std::string>()));
+    }
+    ASSERT_EQ(report["groups"].size(), 3u);
+    for (const json& group : report["groups"]) {
+      for (const char* key : {"kind", "examples", "pseudoexamples", "parameters", "duration_s",
+                              "error_m", "corrected_error_m"}) {
+        EXPECT_THAT(Keys(group), Contains(key));
+      }
+      EXPECT_THAT(Keys(group["parameters"][0]),
+                  testing::UnorderedElementsAre("name", "min", "max", "scale"));
+      EXPECT_THAT(Keys(group["error_m"]), testing::UnorderedElementsAre("max", "mean", "samples"));
+      EXPECT_THAT(Keys(group["corrected_error_m"]),
+                  testing::UnorderedElementsAre("max", "iterations"));
+      EXPECT_EQ(group.contains("sites"), examples);
+      if (!examples) continue;
+      EXPECT_EQ(group["sites"].size(), group["examples"].get<std::size_t>());
+      EXPECT_EQ(group["dilations"].size(), group["sites"].size());
+      EXPECT_EQ(group["centre"].size(), group["parameters"].size());
+      EXPECT_THAT(Keys(group["sites"][0]),
+                  testing::UnorderedElementsAre("parameters", "source", "mirrored", "keytimes_s",
+                                                "pseudoexample", "weights"));
+    }
+  }
+}
+
+TEST_F(LibraryTool, InspectsAsText) {
+  const ProgramResult result = Tool({"inspect", "builtin", "--examples"});
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("step_left, 15 examples"), HasSubstr("start_z_m"),
+                                HasSubstr("jump, 4 examples")));
+  EXPECT_THAT(Tool({"inspect", "builtin"}).out, Not(HasSubstr("(mirrored)")));
+}
+
+constexpr const char* kWalk =
+    R"({"start":{"position_m":[1,0,2],"heading_rad":0.5},
+        "movements":[{"step":{"length_m":0.6}},{"step":{"length_m":0.6,"foot":"right"}},
+                     {"stand":{"seconds":0.3}},{"jump":{"length_m":0.9}}]})";
+
+TEST_F(LibraryTool, SynthesizesTheSameBytesTwice) {
+  const std::string choreography = folder_.Write("c.json", kWalk);
+  Arguments arguments = {"synthesize", "builtin", "--choreography",
+                         choreography, "--json",  "--out"};
+  const ProgramResult first = Tool(Join(arguments, {Out("a.bvh")}));
+  const ProgramResult second = Tool(Join(arguments, {Out("b.bvh")}));
+  ASSERT_EQ(first.exit_code, 0) << first.err;
+  EXPECT_EQ(first.out, second.out);
+  EXPECT_FALSE(ReadWhole(Out("a.bvh")).empty());
+  EXPECT_EQ(ReadWhole(Out("a.bvh")), ReadWhole(Out("b.bvh")));
+  EXPECT_EQ(folder_.Count(), 3);
+}
+
+TEST_F(LibraryTool, SynthesizesWhatItReports) {
+  const std::string choreography = folder_.Write("c.json", kWalk);
+  const ProgramResult result = Tool({"synthesize", "builtin", "--choreography", choreography,
+                                     "--out", Out("o.bvh"), "--fps", "50", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  const json report = ParseOutput(result.out);
+  EXPECT_EQ(report["fps"], 50.0);
+  const Expected<Capture> capture = ReadBvh(Out("o.bvh"));
+  ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
+  EXPECT_EQ(report["frames"], capture->clip.frame_count());
+  EXPECT_EQ(capture->clip.fps, 50.0);
+  double before_s = 0.0;
+  for (const json& movement : report["movements"]) {
+    for (const char* key : {"kind", "start_s", "end_s", "base"}) {
+      EXPECT_THAT(Keys(movement), Contains(key));
+    }
+    EXPECT_GE(movement["start_s"], before_s - 1e-9);
+    EXPECT_GT(movement["end_s"], movement["start_s"]);
+    before_s = movement["end_s"];
+    if (movement["kind"] == "stand") continue;
+    for (const char* key : {"keytimes_s", "requested", "applied", "corrected", "measured",
+                            "extrapolated", "group", "weights", "plants"}) {
+      EXPECT_THAT(Keys(movement), Contains(key));
+    }
+    EXPECT_DOUBLE_EQ(movement["keytimes_s"].front(), movement["start_s"]);
+    double sum = 0.0;
+    for (const json& weight : movement["weights"]) sum += weight.get<double>();
+    EXPECT_NEAR(sum, 1.0, 1e-5);
+  }
+  std::vector<std::string> kinds;
+  for (const json& movement : report["movements"]) {
+    if (!movement["request"].is_null()) kinds.push_back(movement["kind"]);
+  }
+  ASSERT_EQ(kinds.size(), 4u);
+  EXPECT_THAT(kinds[0], StartsWith("step_"));
+  EXPECT_EQ(kinds[1], "step_right");
+  EXPECT_EQ(kinds[2], "stand");
+  EXPECT_EQ(kinds[3], "jump");
+
+  const ProgramResult text =
+      Tool({"synthesize", "builtin", "--choreography", choreography, "--out", Out("o.bvh")});
+  EXPECT_EQ(text.exit_code, 0);
+  EXPECT_THAT(text.out, HasSubstr("movements"));
+}
+
+TEST_F(LibraryTool, ExportsExamplesThatCanBeReadBack) {
+  ASSERT_EQ(Tool({"build", "--out", Out(), kJumps}).exit_code, 0);
+  for (const std::string& name : {std::string("builtin"), Out()}) {
+    SCOPED_TRACE(name);
+    const std::string out = folder_.File("examples of " + name.substr(name.size() - 3));
+    const ProgramResult result = Tool({"export-capture", name, "--out", out});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const auto library = OpenLibrary(name);
+    ASSERT_TRUE(library.has_value());
+    std::size_t examples = 0;
+    for (const MotionGroup& group : (*library)->groups()) {
+      examples += static_cast<std::size_t>(group.example_count);
+    }
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(out)) {
+      SCOPED_TRACE(entry.path().string());
+      ++files;
+      const Expected<Capture> capture = ReadBvh(entry.path());
+      ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
+      const Skeleton& skeleton = (*library)->skeleton();
+      ASSERT_EQ(capture->skeleton.joint_count(), skeleton.joint_count());
+      for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+        EXPECT_EQ(capture->skeleton.joints[j].name, skeleton.joints[j].name);
+        EXPECT_EQ(capture->skeleton.joints[j].parent, skeleton.joints[j].parent);
+      }
+      EXPECT_GT(capture->clip.frame_count(), 10);
+    }
+    EXPECT_EQ(files, examples);
+  }
+}
+
+TEST_F(LibraryTool, FailsWhenTheReportCannotBeWritten) {
+  // A full device takes the place of stdout.
+  const ProgramResult result = test::RunProgram(
+      "/bin/sh", {"-c", "exec \"$0\" inspect builtin --json >/dev/full", STRIDEWIRE_LIBRARY_TOOL});
+  EXPECT_EQ(result.exit_code, 1);
+  ExpectSentence(result.err, "cannot be written");
+}
+
+}  // namespace
+}  // namespace stridewire
