@@ -19,6 +19,11 @@ constexpr double kFeetApartAsideM = 0.3;
 constexpr int kMaxClosingSteps = 3;
 constexpr double kClosingGainM = 0.03;  // a second one must be worth taking
 
+// Parameters of height are measured at the balls, which differ by some centimetres on level ground
+// at the middle of double support, since feet roll. Taken for ground, that climbs half a metre in a
+// hundred level steps.
+constexpr double kLevelRiseM = 0.05;
+
 // Events one movement can add in a tick: started, two foot-strikes, finished, and the next started.
 constexpr std::size_t kEventReserve = 6;
 
@@ -193,7 +198,8 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
   request_id_ = request_id;
   const int rise =
       next.FindParameter(IsStep(next.kind) ? ParameterName::kEndY : ParameterName::kHeight);
-  ground_rise_m_ = rise >= 0 ? plan.applied.values[static_cast<std::size_t>(rise)] : 0.0;
+  const double rise_m = rise >= 0 ? plan.applied.values[static_cast<std::size_t>(rise)] : 0.0;
+  ground_rise_m_ = std::fabs(rise_m) > kLevelRiseM ? rise_m : 0.0;
   AddEvent({.type = AvatarEventType::kStarted,
             .request_id = request_id,
             .kind = next.kind,
