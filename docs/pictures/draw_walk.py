@@ -120,7 +120,7 @@ set title "{options.title}"; set xlabel 'm'; unset key; set border 3; set tics n
 plot $right w l lc rgb '#0072b2' lw 1, $middle w l lc rgb '#555555' lw 1, $left w l lc rgb '#d55e00' lw 1, 0 lc rgb '#000000' lw 0.5
 set size noratio; set size 1,0.27; unset title; set key top right horizontal; set xlabel ''
 set xrange [{first * step_s:.2f}:{(first + len(frames)) * step_s:.2f}]; set lmargin 8; set rmargin 2
-set origin 0,0.26; set yrange [-0.02:0.45]; set ylabel 'height, m'
+set origin 0,0.26; set yrange [-0.02:0.6]; set ylabel 'height, m'
 plot $curves u 1:2 w l lc rgb '#d55e00' lw 1.5 t 'left ball', '' u 1:3 w l lc rgb '#0072b2' lw 1.5 t 'right ball', '' u 1:($4-0.7) w l lc rgb '#555555' t 'pelvis less 0.7 m'
 set origin 0,0; set yrange [0:5.5]; set ylabel 'speed, m/s'; set xlabel 's'
 plot $curves u 1:5 w l lc rgb '#d55e00' lw 1.5 t 'left ball', '' u 1:6 w l lc rgb '#0072b2' lw 1.5 t 'right ball', '' u 1:7 w l lc rgb '#555555' lw 1.5 t 'pelvis'
