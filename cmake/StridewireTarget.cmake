@@ -1,7 +1,8 @@
 # Flags every Stridewire target shares. One call per target keeps the CMake files short.
 
 function(stridewire_target target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow
+                         $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>)
   # Designated initialisers leave the rest at its default on purpose; g++ 12 warns all the same.
   target_compile_options(${target} PRIVATE -Wno-missing-field-initializers)
   if(STRIDEWIRE_WARNINGS_AS_ERRORS)
