@@ -1,0 +1,139 @@
+#include "world_view.h"
+
+#include <utility>
+
+namespace stridewire::client {
+
+void WorldView::SetInfo(const protocol::WorldInfo& info) {
+  if (has_info_ && !(skeleton_ == info.skeleton)) Clear();
+  has_info_ = true;
+  skeleton_ = info.skeleton;
+  library_hash_ = info.library_hash;
+  scratch_.assign(skeleton_.joints.size(), kIdentityQuat);
+}
+
+void WorldView::ClearPoses() {
+  for (auto track = tracks_.begin(); track != tracks_.end();) track = Erase(track);
+  shards_.clear();
+}
+
+void WorldView::Clear() {
+  ClearPoses();
+  has_info_ = false;
+  skeleton_ = {};
+  library_hash_.clear();
+}
+
+void WorldView::SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter) {
+  filter_ = std::move(filter);
+  if (!filter_) return;
+  for (auto track = tracks_.begin(); track != tracks_.end();) {
+    track = filter_->contains(track->first) ? std::next(track) : Erase(track);
+  }
+}
+
+WorldView::Tracks::iterator WorldView::Erase(Tracks::iterator track) {
+  budget_.used_bytes -= PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
+  return tracks_.erase(track);
+}
+
+Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks,
+                       Counts& counts) {
+  const protocol::PoseBatchInfo& info = batch.info;
+  const std::size_t joints = skeleton_.joints.size();
+  if (info.joint_count != joints) {
+    return Fail(ErrorCode::kShapeMismatch, "poses have another number of joints than the skeleton",
+                info.joint_count);
+  }
+  ++counts.batches;
+
+  const auto key = std::pair(info.shard, info.mode);
+  if (!shards_.contains(key) && shards_.size() == kMaxShards) {
+    return Fail(ErrorCode::kLimitExceeded, "poses come from too many shards", info.shard);
+  }
+  Shard& shard = shards_[key];
+  if (shard.epoch != epoch_) {
+    shard = Shard{info.tick, 0, epoch_, info.mode};
+  } else if (info.tick > shard.tick) {
+    if (every_n_ticks > 0 && info.tick - shard.tick > every_n_ticks) {
+      counts.missing += (info.tick - shard.tick - 1) / every_n_ticks;
+    }
+    shard.tick = info.tick;
+    shard.parts_seen = 0;
+  } else if (info.tick < shard.tick) {
+    return Fail(ErrorCode::kMalformed, "the ticks of a shard run backwards");
+  }
+  ++shard.parts_seen;
+
+  for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
+    const protocol::AvatarNumber avatar = batch.avatars[i];
+    if (filter_ && !filter_->contains(avatar)) continue;
+    Vec3 root_position_m;
+    if (Status status = protocol::DecodePose(info.mode, batch.pose(i), root_position_m, scratch_);
+        !status) {
+      return status;
+    }
+    auto track = tracks_.find(avatar);
+    if (track == tracks_.end()) {
+      const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
+      if (budget_.used_bytes + bytes > budget_.limit_bytes) {
+        ++counts.refused;
+        continue;
+      }
+      budget_.used_bytes += bytes;
+      track = tracks_.emplace(avatar, Track{}).first;
+      track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
+    }
+    Track& t = track->second;
+    const PoseStamp stamp{
+        .tick = info.tick,
+        .time_s = info.server_time_s,
+        .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0 || t.epoch != epoch_,
+        .standing = (batch.flags[i] & protocol::kPoseStanding) != 0};
+    if (t.history->Push(stamp, root_position_m, scratch_)) {
+      ++counts.poses;
+      t.epoch = epoch_;
+      t.gone = false;
+    } else if (info.tick != t.seen_tick) {  // Equal ticks are a second subscription's.
+      ++counts.refused;
+    }
+    t.shard = info.shard;
+    t.seen_tick = info.tick;
+  }
+  if (shard.parts_seen >= info.parts) Sweep(info.shard, info.tick, info.server_time_s);
+  return {};
+}
+
+void WorldView::Sweep(std::uint16_t shard, std::uint64_t tick, double time_s) {
+  for (auto track = tracks_.begin(); track != tracks_.end();) {
+    Track& t = track->second;
+    if (t.shard == shard && t.seen_tick < tick) t.gone = true;
+    const bool forget = t.gone && t.history->size() > 0 &&
+                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
+    track = forget ? Erase(track) : std::next(track);
+  }
+}
+
+void WorldView::Remove(protocol::AvatarNumber avatar) {
+  if (auto track = tracks_.find(avatar); track != tracks_.end()) track->second.gone = true;
+}
+
+const PoseHistory* WorldView::Find(protocol::AvatarNumber avatar) const {
+  const auto track = tracks_.find(avatar);
+  return track == tracks_.end() ? nullptr : track->second.history.get();
+}
+
+bool WorldView::IsGone(protocol::AvatarNumber avatar) const {
+  const auto track = tracks_.find(avatar);
+  return track == tracks_.end() || track->second.gone;
+}
+
+std::vector<protocol::AvatarNumber> WorldView::Avatars() const {
+  std::vector<protocol::AvatarNumber> avatars;
+  for (const auto& [avatar, track] : tracks_) {
+    if (!track.gone) avatars.push_back(avatar);
+  }
+  return avatars;
+}
+
+}  // namespace stridewire::client

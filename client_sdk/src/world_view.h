@@ -1,0 +1,107 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "pose_history.h"
+#include "stridewire/protocol/messages.h"
+
+namespace stridewire::client {
+
+/// Memory that all pose histories of a client share.
+struct PoseBudget {
+  std::size_t limit_bytes = 0;
+  std::size_t used_bytes = 0;
+};
+
+/// What is seen of a world: its figure, and the poses of its avatars.
+class WorldView {
+ public:
+  /// Poses of an avatar that is gone can still be sampled for this long.
+  static constexpr double kKeepGone_s = 2.0;
+  /// More shards than this in one world are refused.
+  static constexpr std::size_t kMaxShards = 1024;
+
+  struct Counts {
+    std::uint64_t batches = 0;
+    std::uint64_t poses = 0;
+    std::uint64_t refused = 0;  ///< No memory, or not after the newest.
+    std::uint64_t missing = 0;  ///< Batches, by gaps in the ticks.
+  };
+
+  WorldView(std::size_t pose_history, PoseBudget& budget)
+      : pose_history_(pose_history), budget_(budget) {}
+  ~WorldView() { Clear(); }
+  WorldView(const WorldView&) = delete;
+  WorldView& operator=(const WorldView&) = delete;
+
+  /// The world was joined, or joined again. Another figure than before clears the poses.
+  void SetInfo(const protocol::WorldInfo& info);
+  [[nodiscard]] bool has_info() const { return has_info_; }
+  [[nodiscard]] const protocol::SkeletonInfo& skeleton() const { return skeleton_; }
+  [[nodiscard]] const std::string& library_hash() const { return library_hash_; }
+
+  /// Forgets figure and poses.
+  void Clear();
+  void ClearPoses();
+
+  /// Marks that what comes next does not continue what was there before (a connection resumed, a
+  /// subscription begun), though the server cannot say so in a shared batch.
+  void Break() { ++epoch_; }
+
+  /// Which avatars' poses to keep; empty: all.
+  void SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter);
+
+  /// Takes in one batch. `every_n_ticks` is the rate asked for, to count gaps. kMalformed and others:
+  /// a pose that is none, or another figure than announced; what came before it is kept.
+  Status Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
+
+  /// The server said that the avatar is gone.
+  void Remove(protocol::AvatarNumber avatar);
+
+  /// Nullptr if nothing is known of it.
+  [[nodiscard]] const PoseHistory* Find(protocol::AvatarNumber avatar) const;
+  [[nodiscard]] bool IsGone(protocol::AvatarNumber avatar) const;
+
+  /// Avatars that are there, in growing order.
+  [[nodiscard]] std::vector<protocol::AvatarNumber> Avatars() const;
+
+ private:
+  struct Track {
+    std::unique_ptr<PoseHistory> history;
+    std::uint16_t shard = 0;
+    std::uint64_t seen_tick = 0;
+    std::uint64_t epoch = 0;
+    bool gone = false;
+  };
+  struct Shard {
+    std::uint64_t tick = 0;  ///< Of the batch whose parts are coming in.
+    std::uint32_t parts_seen = 0;
+    std::uint64_t epoch = 0;
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
+  };
+  using Tracks = std::map<protocol::AvatarNumber, Track>;
+
+  /// After the last part of a shard's batch: who was not in it is gone.
+  void Sweep(std::uint16_t shard, std::uint64_t tick, double time_s);
+  Tracks::iterator Erase(Tracks::iterator track);
+
+  std::size_t pose_history_;
+  PoseBudget& budget_;
+  bool has_info_ = false;
+  protocol::SkeletonInfo skeleton_;
+  std::string library_hash_;
+  std::optional<std::set<protocol::AvatarNumber>> filter_;
+  Tracks tracks_;
+  std::map<std::pair<std::uint16_t, protocol::PoseMode>, Shard> shards_;
+  std::uint64_t epoch_ = 1;
+  std::vector<Quat> scratch_;
+};
+
+}  // namespace stridewire::client

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <variant>
+#include <vector>
+
+#include "stridewire/protocol/encoder.h"
+#include "stridewire/protocol/frame_reader.h"
+#include "stridewire/protocol/messages.h"
+
+/// A server that does exactly what a test tells it to, over a real socket on 127.0.0.1. Blocking,
+/// without threads of its own; nothing waits longer than kPatience_s.
+namespace stridewire {
+
+class FakeConnection {
+ public:
+  FakeConnection() = default;
+  explicit FakeConnection(int fd) : fd_(fd) {}
+  ~FakeConnection() { Close(); }
+  FakeConnection(FakeConnection&& other) noexcept;
+  FakeConnection& operator=(FakeConnection&& other) noexcept;
+
+  [[nodiscard]] bool is_open() const { return fd_ >= 0; }
+
+  template <typename Message>
+  void Send(const Message& message) {
+    std::vector<std::byte> frame;
+    if (encoder_.Encode(message, frame)) SendBytes(frame);
+  }
+  void SendBytes(std::span<const std::byte> bytes);
+
+  /// The next message that is no Ping (those are counted, and answered unless `mute_pongs`). Empty:
+  /// none came in time, or the client closed.
+  [[nodiscard]] std::optional<protocol::Message> Receive();
+
+  /// The next message, if it is one of these.
+  template <typename Message>
+  [[nodiscard]] std::optional<Message> Expect() {
+    auto message = Receive();
+    if (!message || !std::holds_alternative<Message>(*message)) return std::nullopt;
+    return std::get<Message>(std::move(*message));
+  }
+
+  /// Whether the client closes in time; drops what it still sends.
+  [[nodiscard]] bool WaitForClose();
+
+  void Close();
+
+  bool mute_pongs = false;
+  int pings = 0;
+
+ private:
+  int fd_ = -1;
+  protocol::Encoder encoder_;
+  protocol::FrameReader reader_{protocol::Sender::kClient};
+  std::vector<std::byte> input_;
+  std::size_t taken_ = 0;
+};
+
+class FakeServer {
+ public:
+  static constexpr double kPatience_s = 20.0;
+
+  /// Listens on a port of the system's choice, or on `port`.
+  explicit FakeServer(std::uint16_t port = 0);
+  ~FakeServer();
+  FakeServer(const FakeServer&) = delete;
+  FakeServer& operator=(const FakeServer&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+
+  /// The next client; not open when none came in time.
+  [[nodiscard]] FakeConnection Accept();
+
+ private:
+  int fd_ = -1;
+  std::uint16_t port_ = 0;
+};
+
+}  // namespace stridewire

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stridewire/protocol/encoder.h"
+#include "stridewire/protocol/messages.h"
+#include "stridewire/protocol/pose_batch_encoder.h"
+
+/// What a small, made-up server would say, for tests of clients.
+namespace stridewire::toy {
+
+inline constexpr int kJoints = 3;
+inline constexpr double kTickHz = 60.0;
+
+inline protocol::Welcome Welcome(bool resumed = false) {
+  protocol::Welcome welcome;
+  welcome.features =
+      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised;
+  welcome.session = 7;
+  welcome.resume_token = std::vector<std::byte>(16, std::byte{0x5a});
+  welcome.resumed = resumed;
+  welcome.tick_hz = kTickHz;
+  welcome.server_name = "toy";
+  welcome.server_version = "0";
+  welcome.limits.max_avatars_per_world = 1000;
+  welcome.limits.max_queue = 64;
+  welcome.limits.idle_timeout_s = 30.0;
+  welcome.limits.resume_window_s = 60.0;
+  return welcome;
+}
+
+inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
+                                     const std::string& name) {
+  protocol::WorldInfo info;
+  info.seq = seq;
+  info.world = world;
+  info.name = name;
+  info.library_hash = "0123456789abcdef";
+  info.skeleton.joints = {{"hips", -1, Vec3(0.0f)},
+                          {"spine", 0, Vec3(0.0f, 0.2f, 0.0f)},
+                          {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
+  info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
+  return info;
+}
+
+inline protocol::Reply Ok(protocol::Seq seq, std::uint32_t accepted = 1) {
+  protocol::Reply reply;
+  reply.seq = seq;
+  reply.accepted = accepted;
+  return reply;
+}
+
+inline double TickTime(std::uint64_t tick) { return static_cast<double>(tick) / kTickHz; }
+
+/// Pose of an avatar that walks along +z at 1.5 m/s and turns its head at 1 rad/s.
+inline Vec3 RootAt(double time_s, std::uint32_t avatar = 1) {
+  return {static_cast<float>(avatar), 1.0f, static_cast<float>(1.5 * time_s)};
+}
+inline std::vector<Quat> RotationsAt(double time_s) {
+  return {kIdentityQuat, kIdentityQuat, YawRotation(time_s)};
+}
+
+struct AvatarAt {
+  std::uint32_t avatar = 1;
+  std::uint8_t flags = 0;
+};
+
+/// The frame of one batch: those avatars at that tick.
+inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t tick,
+                                        const std::vector<AvatarAt>& avatars,
+                                        protocol::PoseMode mode = protocol::PoseMode::kFull,
+                                        std::uint16_t shard = 0, int joints = kJoints) {
+  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchInfo info;
+  info.world = world;
+  info.shard = shard;
+  info.tick = tick;
+  info.server_time_s = TickTime(tick);
+  info.mode = mode;
+  info.joint_count = static_cast<std::uint16_t>(joints);
+  std::vector<std::byte> frame;
+  (void)encoder.Begin(info);
+  auto rotations = RotationsAt(info.server_time_s);
+  rotations.resize(static_cast<std::size_t>(joints), kIdentityQuat);
+  for (const AvatarAt& a : avatars) {
+    (void)encoder.Add(a.avatar, a.flags, RootAt(info.server_time_s, a.avatar), rotations);
+  }
+  (void)encoder.Finish(frame);
+  return frame;
+}
+
+}  // namespace stridewire::toy

@@ -1,0 +1,5 @@
+#include <gtest/gtest.h>
+
+extern "C" int StridewireUsedFromC(void);
+
+TEST(ClientHeader, IsUsableFromC99) { EXPECT_EQ(StridewireUsedFromC(), 0); }

@@ -1,0 +1,736 @@
+#include "session.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "stridewire/protocol/decode.h"
+#include "toy_world.h"
+
+namespace stridewire::client {
+namespace {
+
+using protocol::Message;
+using State = Session::State;
+
+/// Plays the server and the clock: no socket, no thread.
+class SessionTest : public testing::Test {
+ protected:
+  void Use(const SessionOptions& options) { session_ = std::make_unique<Session>(options); }
+
+  void SetUp() override { Use({}); }
+
+  /// The client's next attempt reaches a server; returns its Hello.
+  protocol::Hello Connect() {
+    for (int i = 0; i < 1000 && !session_->ConnectDue(now_s_); ++i) now_s_ += 0.01;
+    EXPECT_TRUE(session_->ConnectDue(now_s_));
+    session_->StartConnecting(now_s_);
+    session_->OnConnected(now_s_);
+    reader_.emplace(protocol::Sender::kClient);
+    const auto sent = Sent();
+    EXPECT_EQ(sent.size(), 1u);
+    return sent.empty() ? protocol::Hello{} : std::get<protocol::Hello>(sent[0]);
+  }
+
+  void Ready(bool resumed = false) {
+    Connect();
+    Tell(toy::Welcome(resumed));
+    EXPECT_EQ(session_->state(), State::kReady);
+  }
+
+  /// Opened, ready, and in world "plaza", which the server calls 5.
+  stridewire_world Joined() {
+    EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+    Ready();
+    stridewire_world world = 0;
+    EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, world, command_),
+              STRIDEWIRE_OK);
+    LetIn();
+    return world;
+  }
+
+  /// Answers the JoinWorld that has been sent.
+  void LetIn(protocol::WorldId server_id = 5) {
+    const auto sent = Sent();
+    ASSERT_GE(sent.size(), 1u);
+    const auto& join = std::get<protocol::JoinWorld>(sent[0]);
+    Tell(toy::WorldInfo(join.seq, server_id, join.name));
+    Tell(toy::Ok(join.seq));
+  }
+
+  template <typename M>
+  void Tell(const M& message) {
+    std::vector<std::byte> frame;
+    const Status status = encoder_.Encode(message, frame);
+    ASSERT_TRUE(status) << Describe(status.error());
+    session_->OnBytes(frame, now_s_);
+  }
+
+  /// What the client has sent since, without pings.
+  std::vector<Message> Sent() {
+    std::vector<Message> messages;
+    std::vector<std::byte> bytes;
+    while (session_->TakeOutput(bytes)) {
+      session_->OnOutputWritten();
+      std::span<const std::byte> rest(bytes);
+      for (;;) {
+        auto frame = reader_->Next(rest);
+        EXPECT_TRUE(frame) << Describe(frame.error());
+        if (!frame || !*frame) break;
+        auto message = protocol::DecodeMessage(**frame);
+        EXPECT_TRUE(message) << Describe(message.error());
+        if (!message) break;
+        if (std::holds_alternative<protocol::Ping>(*message)) {
+          ++pings_;
+        } else {
+          messages.push_back(std::move(*message));
+        }
+      }
+    }
+    return messages;
+  }
+
+  std::vector<stridewire_event> Events() {
+    std::vector<stridewire_event> events(session_->events().size());
+    session_->events().Take(events);
+    return events;
+  }
+  std::vector<int> EventTypes() {
+    std::vector<int> types;
+    for (const auto& event : Events()) types.push_back(event.type);
+    return types;
+  }
+
+  static protocol::Spawn SpawnOf(std::vector<std::uint32_t> avatars) {
+    protocol::Spawn spawn;
+    for (const std::uint32_t a : avatars) spawn.items.push_back({a, {DVec3(a, 0.0, 0.0), 0.5}});
+    return spawn;
+  }
+  static protocol::Request StepOf(std::uint32_t avatar, std::uint64_t request_id) {
+    protocol::StepMovement step;
+    step.length_m = 0.6;
+    return {0, 0, {{avatar, request_id, step}}};
+  }
+  static protocol::Reply SpawnReply(const protocol::Spawn& spawn) {
+    protocol::Reply reply = toy::Ok(spawn.seq, static_cast<std::uint32_t>(spawn.items.size()));
+    for (std::uint32_t i = 0; i < spawn.items.size(); ++i) {
+      reply.items.push_back({i, spawn.items[i].avatar, 0, protocol::StatusCode::kOk, ""});
+    }
+    return reply;
+  }
+
+  std::unique_ptr<Session> session_;
+  double now_s_ = 1.0;
+  std::uint64_t command_ = 0;
+  std::optional<protocol::FrameReader> reader_;
+  protocol::Encoder encoder_;
+  int pings_ = 0;
+};
+
+TEST_F(SessionTest, GreetsJoinsAndIsLetIn) {
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  const protocol::Hello hello = Connect();
+  EXPECT_TRUE(hello.resume_token.empty());
+  EXPECT_TRUE(hello.features & protocol::kFeatureResume);
+  stridewire_world world = 0;
+  // Given before the welcome: it waits.
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kObserver, world, command_),
+            STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  Tell(toy::Welcome());
+  LetIn();
+  EXPECT_THAT(EventTypes(),
+              testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTED, STRIDEWIRE_EVENT_WORLD_JOINED,
+                                   STRIDEWIRE_EVENT_REPLY));
+  ASSERT_NE(session_->FindWorld(world), nullptr);
+  EXPECT_EQ(session_->FindWorld(world)->skeleton().joints.size(), 3u);
+}
+
+TEST_F(SessionTest, CommandsGivenEarlyWaitForTheWorldAndKeepTheirOrder) {
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  stridewire_world world = 0;
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, world, command_), 0);
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1, 2}), command_), 0);
+  EXPECT_EQ(session_->Request(world, StepOf(1, 10), command_), 0);
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), 0);
+  Ready();
+  LetIn();
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 3u);
+  EXPECT_EQ(std::get<protocol::Spawn>(sent[0]).seq, 2u);
+  EXPECT_EQ(std::get<protocol::Spawn>(sent[0]).world, 5u);
+  EXPECT_EQ(std::get<protocol::Request>(sent[1]).seq, 3u);
+  EXPECT_EQ(std::get<protocol::Observe>(sent[2]).seq, 4u);
+  EXPECT_EQ(std::get<protocol::Observe>(sent[2]).subscription, subscription);
+}
+
+TEST_F(SessionTest, SendsUnansweredCommandsAgainUnderTheirNumbers) {
+  const stridewire_world world = Joined();
+  for (std::uint64_t r = 1; r <= 4; ++r) {
+    EXPECT_EQ(session_->Request(world, StepOf(1, r), command_), STRIDEWIRE_OK);
+  }
+  const auto first = Sent();
+  ASSERT_EQ(first.size(), 4u);
+  Tell(toy::Ok(std::get<protocol::Request>(first[1]).seq));  // Only the second is answered.
+  (void)Events();
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "pulled", now_s_);
+  EXPECT_EQ(session_->Request(world, StepOf(1, 5), command_), STRIDEWIRE_OK);  // While away.
+
+  const protocol::Hello hello = Connect();
+  EXPECT_EQ(hello.resume_token, toy::Welcome().resume_token);
+  Tell(toy::Welcome(true));
+  Tell(toy::WorldInfo(0, 5, "plaza"));
+  const auto again = Sent();
+  ASSERT_EQ(again.size(), 4u);
+  EXPECT_EQ(std::get<protocol::Request>(again[0]), std::get<protocol::Request>(first[0]));
+  EXPECT_EQ(std::get<protocol::Request>(again[1]), std::get<protocol::Request>(first[2]));
+  EXPECT_EQ(std::get<protocol::Request>(again[2]), std::get<protocol::Request>(first[3]));
+  EXPECT_EQ(std::get<protocol::Request>(again[3]).seq, 6u);  // The new one follows on.
+  EXPECT_EQ(session_->Statistics().commands_resent, 3u);
+  for (const auto& m : again) Tell(toy::Ok(std::get<protocol::Request>(m).seq));
+  Tell(toy::Ok(std::get<protocol::Request>(again[0]).seq));  // Twice: the second is nothing.
+
+  EXPECT_THAT(EventTypes(),
+              testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTION_LOST, STRIDEWIRE_EVENT_CONNECTED,
+                                   STRIDEWIRE_EVENT_REPLY, STRIDEWIRE_EVENT_REPLY,
+                                   STRIDEWIRE_EVENT_REPLY, STRIDEWIRE_EVENT_REPLY));
+  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
+}
+
+// A server by the book under random losses: each command is done once, in order, and answered once.
+TEST_F(SessionTest, EachCommandIsDoneOnceHoweverOftenTheConnectionBreaks) {
+  const std::uint64_t seed = 77;
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  std::mt19937_64 random(seed);
+  const stridewire_world world = Joined();
+  (void)Events();
+  constexpr std::uint64_t kCommands = 500;
+  std::uint64_t given = 0;
+  std::vector<std::uint64_t> done;
+  std::set<protocol::Seq> taken;
+  protocol::Seq last_seq = 1;  // JoinWorld.
+  std::uint64_t replies = 0;
+  int breaks = 0;
+  for (int round = 0; round < 20'000 && replies < kCommands; ++round) {
+    while (given < kCommands && random() % 3 != 0) {
+      ASSERT_EQ(session_->Request(world, StepOf(1, given + 1), command_), STRIDEWIRE_OK);
+      ++given;
+    }
+    for (const Message& m : Sent()) {
+      const auto& request = std::get<protocol::Request>(m);
+      if (random() % 8 == 0) break;  // The rest is lost on the way.
+      if (request.seq <= last_seq) {
+        ASSERT_TRUE(taken.contains(request.seq));
+      } else {
+        ASSERT_EQ(request.seq, last_seq + 1) << "a gap";
+        last_seq = request.seq;
+        taken.insert(request.seq);
+        done.push_back(request.items[0].request_id);
+      }
+      if (random() % 4 != 0) Tell(toy::Ok(request.seq));  // Else the answer is lost.
+    }
+    // Whatever was lost breaks the connection, for TCP loses nothing else.
+    session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+    ++breaks;
+    Ready(true);
+    Tell(toy::WorldInfo(0, 5, "plaza"));
+    for (const auto& event : Events()) replies += event.type == STRIDEWIRE_EVENT_REPLY;
+  }
+  EXPECT_EQ(replies, kCommands);
+  ASSERT_EQ(done.size(), kCommands);
+  for (std::uint64_t i = 0; i < kCommands; ++i) EXPECT_EQ(done[i], i + 1);
+  EXPECT_GT(breaks, 50);
+}
+
+TEST_F(SessionTest, ALostSessionIsToldAndWhatWasWantedIsAskedForAgain) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  const std::uint64_t observe_command = command_;
+  EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_OK);
+  const std::uint64_t request_command = command_;
+  (void)Sent();  // Both are under way when the server dies.
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  EXPECT_EQ(session_->Request(world, StepOf(1, 2), command_), STRIDEWIRE_OK);
+  (void)Events();
+
+  EXPECT_EQ(Connect().resume_token, toy::Welcome().resume_token);
+  Tell(toy::Welcome(false));
+  LetIn(9);  // The new server numbers worlds otherwise.
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 2u);
+  const auto& observe = std::get<protocol::Observe>(sent[0]);
+  EXPECT_EQ(observe.seq, 2u);
+  EXPECT_EQ(observe.world, 9u);
+  EXPECT_EQ(observe.subscription, subscription);
+  EXPECT_EQ(std::get<protocol::Request>(sent[1]).items[0].request_id, 2u);
+  Tell(toy::Ok(2));
+  Tell(toy::Ok(3));
+
+  const auto events = Events();
+  std::vector<int> types;
+  for (const auto& e : events) types.push_back(e.type);
+  ASSERT_THAT(types, testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTED, STRIDEWIRE_EVENT_SESSION_LOST,
+                                          STRIDEWIRE_EVENT_REPLY, STRIDEWIRE_EVENT_WORLD_JOINED,
+                                          STRIDEWIRE_EVENT_REPLY, STRIDEWIRE_EVENT_REPLY));
+  EXPECT_EQ(events[0].resumed, 0);
+  EXPECT_EQ(events[2].command, request_command);  // Whether it was done nobody knows.
+  EXPECT_EQ(events[2].status, STRIDEWIRE_SESSION_LOST);
+  EXPECT_EQ(events[3].world, world);  // The caller's number stays.
+  EXPECT_EQ(events[4].command, observe_command);
+  EXPECT_EQ(events[4].status, STRIDEWIRE_OK);
+}
+
+TEST_F(SessionTest, RespawnsItsAvatarsWhereTheyLastWere) {
+  SessionOptions options;
+  options.respawn = true;
+  Use(options);
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1, 2, 3}), command_), STRIDEWIRE_OK);
+  Tell(SpawnReply(std::get<protocol::Spawn>(Sent().at(0))));
+  protocol::Event finished;
+  finished.type = protocol::EventType::kFinished;
+  finished.avatar = 1;
+  finished.base = {DVec3(4.0, 0.0, 7.0), 1.25};
+  protocol::Event removed;
+  removed.type = protocol::EventType::kRemoved;
+  removed.avatar = 2;
+  protocol::Event other = finished;
+  other.avatar = 44;  // Somebody else's.
+  Tell(protocol::Events{5, 1, 100, {finished, removed, other}});
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  (void)Events();
+
+  Ready(false);
+  LetIn();
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 1u);
+  const auto& spawn = std::get<protocol::Spawn>(sent[0]);
+  ASSERT_EQ(spawn.items.size(), 2u);
+  EXPECT_EQ(spawn.items[0], (protocol::SpawnItem{1, finished.base}));
+  EXPECT_EQ(spawn.items[1], (protocol::SpawnItem{3, {DVec3(3.0, 0.0, 0.0), 0.5}}));
+
+  // One is still there, for the world outlived the session: no harm. Our own answers make no event.
+  protocol::Reply reply = SpawnReply(spawn);
+  reply.items[0].code = protocol::StatusCode::kAvatarExists;
+  Tell(reply);
+  EXPECT_THAT(EventTypes(),
+              testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTED, STRIDEWIRE_EVENT_SESSION_LOST,
+                                   STRIDEWIRE_EVENT_WORLD_JOINED));
+
+  // And once more, before the answer came.
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  LetIn();
+  EXPECT_EQ(std::get<protocol::Spawn>(Sent().at(0)).items.size(), 2u);
+}
+
+TEST_F(SessionTest, WithoutRespawnAvatarsAreTheCallersBusiness) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_OK);
+  Tell(SpawnReply(std::get<protocol::Spawn>(Sent().at(0))));
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  LetIn();
+  EXPECT_TRUE(Sent().empty());
+}
+
+TEST_F(SessionTest, EventsSentAgainAreHeardOnce) {
+  const stridewire_world world = Joined();
+  (void)Events();
+  protocol::Event idle;
+  idle.type = protocol::EventType::kIdle;
+  idle.avatar = 1;
+  Tell(protocol::Events{5, 1, 10, {idle}});
+  Tell(protocol::Events{5, 2, 11, {idle}});
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  EXPECT_EQ(Connect().last_events_number, 2u);
+  Tell(toy::Welcome(true));
+  Tell(toy::WorldInfo(0, 5, "plaza"));
+  Tell(protocol::Events{5, 2, 11, {idle}});
+  Tell(protocol::Events{5, 3, 12, {idle}});
+  int idles = 0;
+  for (const auto& event : Events()) {
+    if (event.type != STRIDEWIRE_EVENT_IDLE) continue;
+    ++idles;
+    EXPECT_EQ(event.world, world);
+  }
+  EXPECT_EQ(idles, 3);
+}
+
+TEST_F(SessionTest, PosesAreNotInterpolatedAcrossAResume) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  Tell(toy::Ok(std::get<protocol::Observe>(Sent().at(0)).seq));
+  session_->OnBytes(toy::PoseFrame(5, 60, {{1}}), now_s_);
+  session_->OnBytes(toy::PoseFrame(5, 61, {{1}}), now_s_);
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(true);
+  Tell(toy::WorldInfo(0, 5, "plaza"));
+  session_->OnBytes(toy::PoseFrame(5, 90, {{1}}), now_s_);
+  session_->OnBytes(toy::PoseFrame(5, 91, {{1}}), now_s_);
+  const PoseHistory* history = session_->FindWorld(world)->Find(1);
+  ASSERT_NE(history, nullptr);
+  ASSERT_EQ(history->size(), 4u);
+  EXPECT_FALSE(history->stamp(1).discontinuity);
+  EXPECT_TRUE(history->stamp(2).discontinuity);
+  EXPECT_FALSE(history->stamp(3).discontinuity);
+  EXPECT_EQ(session_->Statistics().batches_missing, 0u);
+}
+
+TEST_F(SessionTest, NothingOfAnEarlierServerIsShownAfterALostSession) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  Tell(toy::Ok(std::get<protocol::Observe>(Sent().at(0)).seq));
+  session_->OnBytes(toy::PoseFrame(5, 6000, {{1}}), now_s_);
+  EXPECT_TRUE(session_->clock().ready());
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  EXPECT_FALSE(session_->clock().ready());
+  EXPECT_EQ(session_->FindWorld(world)->Find(1), nullptr);
+  LetIn();
+  session_->OnBytes(toy::PoseFrame(5, 3, {{1}}), now_s_);  // Its ticks begin anew.
+  ASSERT_NE(session_->FindWorld(world)->Find(1), nullptr);
+  EXPECT_TRUE(session_->FindWorld(world)->Find(1)->stamp(0).discontinuity);
+}
+
+TEST_F(SessionTest, CommandsAreBounded) {
+  SessionOptions options;
+  options.max_commands = 10;
+  Use(options);
+  const stridewire_world world = Joined();
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), 0);
+  EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_COMMANDS_FULL);
+  Tell(toy::Ok(2));
+  EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_OK);
+
+  options = {};
+  options.max_command_bytes = 64 * 1024;
+  Use(options);
+  const stridewire_world other = Joined();
+  std::vector<std::uint32_t> crowd(10'000, 1);
+  EXPECT_EQ(session_->Remove(other, {0, 0, crowd}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Remove(other, {0, 0, crowd}, command_), STRIDEWIRE_COMMANDS_FULL);
+  EXPECT_LE(session_->Statistics().buffered_bytes, 2u << 20);
+}
+
+TEST_F(SessionTest, KeepsNoMoreUnansweredThanTheServerRemembers) {
+  SessionOptions options;
+  options.max_commands = 100;
+  Use(options);
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Connect();
+  protocol::Welcome welcome = toy::Welcome();
+  welcome.limits.reply_memory = 4;
+  Tell(welcome);
+  stridewire_world world = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, world, command_), 0);
+  LetIn();
+  for (int i = 0; i < 50; ++i) EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), 0);
+  EXPECT_EQ(Sent().size(), 4u);
+  Tell(toy::Ok(2));
+  Tell(toy::Ok(4));
+  EXPECT_EQ(Sent().size(), 2u);
+}
+
+TEST_F(SessionTest, BadArgumentsAreToldAtOnceAndNamed) {
+  const stridewire_world world = Joined();
+  protocol::Request nan = StepOf(1, 1);
+  std::get<protocol::StepMovement>(nan.items[0].movement).length_m = std::nan("");
+  EXPECT_EQ(session_->Request(world, nan, command_), STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_THAT(session_->last_text(), testing::HasSubstr("length_m"));
+  EXPECT_EQ(session_->Request(world, StepOf(0, 1), command_), STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_EQ(session_->Request(world, StepOf(1, 0), command_), STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_NE(session_->Spawn(world, {}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Spawn(77, SpawnOf({1}), command_), STRIDEWIRE_NO_SUCH_WORLD);
+  std::uint32_t subscription = 0;
+  protocol::Observe movement;
+  movement.mode = protocol::PoseMode::kMovement;
+  EXPECT_EQ(session_->Observe(world, movement, subscription, command_), STRIDEWIRE_UNSUPPORTED);
+  protocol::Observe never;
+  never.every_n_ticks = 0;
+  EXPECT_EQ(session_->Observe(world, never, subscription, command_), STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_EQ(session_->StopObserving(9, command_), STRIDEWIRE_NO_SUCH_SUBSCRIPTION);
+  stridewire_world second = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kObserver, second, command_),
+            STRIDEWIRE_ALREADY_JOINED);
+  EXPECT_NE(session_->JoinWorld("", protocol::Role::kObserver, second, command_), STRIDEWIRE_OK);
+  EXPECT_NE(session_->JoinWorld(std::string(65, 'x'), protocol::Role::kObserver, second, command_),
+            STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+}
+
+TEST_F(SessionTest, ARefusedWorldEndsWhatWaitedForIt) {
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Ready();
+  stridewire_world world = 0;
+  EXPECT_EQ(session_->JoinWorld("nowhere", protocol::Role::kObserver, world, command_), 0);
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_OK);
+  protocol::Reply refusal = toy::Ok(1);
+  refusal.code = protocol::StatusCode::kNoSuchWorld;
+  refusal.text = "there is no world \"nowhere\"";
+  (void)Sent();
+  Tell(refusal);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[1].status, STRIDEWIRE_NO_SUCH_WORLD);
+  EXPECT_EQ(events[2].status, STRIDEWIRE_NOT_JOINED);
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_NOT_JOINED);
+  EXPECT_EQ(session_->JoinWorld("nowhere", protocol::Role::kObserver, world, command_),
+            STRIDEWIRE_OK);
+}
+
+TEST_F(SessionTest, LeavesAWorldAndForgetsIt) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->LeaveWorld(world, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_NOT_JOINED);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 1u);
+  Tell(toy::Ok(std::get<protocol::LeaveWorld>(sent[0]).seq));
+  EXPECT_EQ(session_->FindWorld(world), nullptr);
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({1}), command_), STRIDEWIRE_NO_SUCH_WORLD);
+  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
+}
+
+TEST_F(SessionTest, StopsObservingAndForgetsThePoses) {
+  const stridewire_world world = Joined();
+  std::uint32_t subscription = 0;
+  EXPECT_EQ(session_->Observe(world, {}, subscription, command_), STRIDEWIRE_OK);
+  Tell(toy::Ok(std::get<protocol::Observe>(Sent().at(0)).seq));
+  session_->OnBytes(toy::PoseFrame(5, 1, {{1}}), now_s_);
+  EXPECT_EQ(session_->StopObserving(subscription, command_), STRIDEWIRE_OK);
+  session_->OnBytes(toy::PoseFrame(5, 2, {{1}}), now_s_);  // Was under way.
+  EXPECT_EQ(session_->FindWorld(world)->Find(1), nullptr);
+  EXPECT_EQ(std::get<protocol::StopObserving>(Sent().at(0)).subscription, subscription);
+  // A lost session does not bring it back.
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(false);
+  LetIn();
+  EXPECT_TRUE(Sent().empty());
+}
+
+TEST_F(SessionTest, RefusedItemsAndChosenNumbersAreTold) {
+  const stridewire_world world = Joined();
+  (void)Events();
+  EXPECT_EQ(session_->Spawn(world, SpawnOf({0, 2}), command_), STRIDEWIRE_OK);
+  const auto spawn = std::get<protocol::Spawn>(Sent().at(0));
+  protocol::Reply reply = toy::Ok(spawn.seq, 1);
+  reply.items = {{0, 17, 0, protocol::StatusCode::kOk, ""},
+                 {1, 2, 0, protocol::StatusCode::kAvatarExists, "avatar 2 is there"}};
+  Tell(reply);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].type, STRIDEWIRE_EVENT_ITEM);
+  EXPECT_EQ(events[0].avatar, 17u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_OK);
+  EXPECT_EQ(events[1].status, STRIDEWIRE_AVATAR_EXISTS);
+  EXPECT_STREQ(events[1].text, "avatar 2 is there");
+  EXPECT_EQ(events[2].type, STRIDEWIRE_EVENT_REPLY);
+  EXPECT_EQ(events[2].command, command_);
+  EXPECT_EQ(events[2].accepted, 1u);
+}
+
+TEST_F(SessionTest, GivesUpWhenRefusedForGoodAndComesBackOtherwise) {
+  struct Case {
+    protocol::StatusCode code;
+    State then;
+  };
+  for (const Case& c : {Case{protocol::StatusCode::kUnauthorised, State::kClosed},
+                        Case{protocol::StatusCode::kVersionMismatch, State::kClosed},
+                        Case{protocol::StatusCode::kMalformed, State::kClosed},
+                        Case{protocol::StatusCode::kReplaced, State::kClosed},
+                        Case{protocol::StatusCode::kTimeout, State::kWaiting},
+                        Case{protocol::StatusCode::kTooSlow, State::kWaiting},
+                        Case{protocol::StatusCode::kLimitReached, State::kWaiting},
+                        Case{static_cast<protocol::StatusCode>(349), State::kWaiting},
+                        Case{static_cast<protocol::StatusCode>(149), State::kClosed}}) {
+    Use({});
+    const stridewire_world world = Joined();
+    EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_OK);
+    Tell(protocol::ErrorNotice{c.code, "so it is", true, 0});
+    EXPECT_EQ(session_->state(), c.then) << static_cast<int>(c.code);
+    EXPECT_EQ(session_->last_text(), "so it is");
+    const auto events = Events();
+    if (c.then == State::kClosed) {
+      ASSERT_GE(events.size(), 2u);
+      EXPECT_EQ(events.back().type, STRIDEWIRE_EVENT_CLOSED);
+      EXPECT_EQ(events[events.size() - 2].type, STRIDEWIRE_EVENT_REPLY);
+      EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_CLOSED);
+      EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+    } else {
+      EXPECT_EQ(events.back().type, STRIDEWIRE_EVENT_CONNECTION_LOST);
+    }
+  }
+}
+
+TEST_F(SessionTest, AServerThatShutsDownEndsTheSessionAndIsTriedAgain) {
+  (void)Joined();
+  (void)Events();
+  Tell(protocol::Goodbye{protocol::StatusCode::kShuttingDown, "see you"});
+  EXPECT_EQ(session_->state(), State::kWaiting);
+  EXPECT_TRUE(Connect().resume_token.empty());
+  Tell(toy::Welcome(false));
+  EXPECT_THAT(EventTypes(),
+              testing::ElementsAre(STRIDEWIRE_EVENT_CONNECTION_LOST, STRIDEWIRE_EVENT_CONNECTED,
+                                   STRIDEWIRE_EVENT_SESSION_LOST));
+}
+
+TEST_F(SessionTest, TimesOutWherePeersFallSilent) {
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  session_->StartConnecting(now_s_);
+  now_s_ += 5.1;
+  session_->AdvanceTime(now_s_);  // No TCP.
+  EXPECT_EQ(session_->state(), State::kWaiting);
+  EXPECT_EQ(session_->last_status(), STRIDEWIRE_TIMEOUT);
+  Connect();
+  now_s_ += 5.1;
+  session_->AdvanceTime(now_s_);  // No welcome.
+  EXPECT_EQ(session_->state(), State::kWaiting);
+  Ready();
+  now_s_ += 29.0;
+  session_->AdvanceTime(now_s_);
+  EXPECT_EQ(session_->state(), State::kReady);
+  now_s_ += 1.1;
+  session_->AdvanceTime(now_s_);  // Idle.
+  EXPECT_EQ(session_->state(), State::kWaiting);
+}
+
+TEST_F(SessionTest, PingsOftenEnoughForTheServersIdleLimit) {
+  SessionOptions options;
+  options.ping_interval_s = 600.0;
+  Use(options);
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Ready();
+  (void)Sent();
+  pings_ = 0;
+  for (int i = 0; i < 300; ++i) {
+    now_s_ += 0.1;
+    session_->AdvanceTime(now_s_);
+    Tell(protocol::Pong{1, now_s_, 0.0, 0});
+  }
+  (void)Sent();
+  EXPECT_GE(pings_, 2);
+  EXPECT_LE(pings_, 4);  // 30 s of silence allowed: one in 10 s.
+}
+
+TEST_F(SessionTest, MeasuresTheRoundTrip) {
+  EXPECT_EQ(session_->Ping(now_s_), STRIDEWIRE_NOT_READY);
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Ready();
+  EXPECT_EQ(session_->Ping(now_s_), STRIDEWIRE_OK);
+  const double sent_s = now_s_;
+  now_s_ += 0.025;
+  Tell(protocol::Pong{2, sent_s, 99.0, 40});
+  const auto events = Events();
+  ASSERT_EQ(events.back().type, STRIDEWIRE_EVENT_PONG);
+  EXPECT_NEAR(events.back().rtt_s, 0.025, 1e-9);
+  EXPECT_NEAR(session_->Statistics().rtt_s, 0.025, 1e-9);
+  EXPECT_NEAR(session_->clock().ServerTime(now_s_), 99.0, 1e-9);
+}
+
+TEST_F(SessionTest, CountsWhatTheServerDropped) {
+  (void)Joined();
+  (void)Events();
+  Tell(protocol::Lagging{5, 10, 0});
+  Tell(protocol::Lagging{5, 25, 3});
+  EXPECT_EQ(session_->Statistics().dropped_batches, 25u);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[1].type, STRIDEWIRE_EVENT_LAGGING);
+  EXPECT_EQ(events[1].dropped_events, 3u);
+}
+
+TEST_F(SessionTest, DisconnectingAnswersWhatIsOpenAndSaysGoodbye) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->Request(world, StepOf(1, 1), command_), STRIDEWIRE_OK);
+  (void)Events();
+  session_->Close(now_s_);
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_CANCELLED);
+  EXPECT_EQ(events[1].type, STRIDEWIRE_EVENT_CLOSED);
+  EXPECT_TRUE(session_->NeedsSocket());
+  const auto sent = Sent();
+  ASSERT_FALSE(sent.empty());
+  EXPECT_TRUE(std::holds_alternative<protocol::Goodbye>(sent.back()));
+  EXPECT_EQ(session_->state(), State::kIdle);
+  EXPECT_FALSE(session_->NeedsSocket());
+}
+
+TEST_F(SessionTest, WhatAServerMayNotSayBreaksTheConnectionAndNothingElse) {
+  const auto breaks = [&](const auto& say) {
+    Use({});
+    (void)Joined();
+    std::uint32_t subscription = 0;
+    EXPECT_EQ(session_->Observe(1, {}, subscription, command_), STRIDEWIRE_OK);
+    say();
+    EXPECT_EQ(session_->state(), State::kWaiting);
+    EXPECT_EQ(session_->last_status(), STRIDEWIRE_PROTOCOL_ERROR);
+    EXPECT_FALSE(session_->last_text().empty());
+    Ready(true);
+  };
+  breaks([&] { Tell(toy::Welcome()); });
+  breaks([&] { session_->OnBytes(toy::PoseFrame(5, 1, {{1}}, {}, 0, 7), now_s_); });
+  breaks([&] {
+    const std::vector<std::byte> http(64, std::byte{'H'});
+    session_->OnBytes(http, now_s_);
+  });
+  breaks([&] {
+    auto frame = toy::PoseFrame(5, 1, {{1}});
+    for (std::size_t i = 24; i < frame.size(); ++i) frame[i] = std::byte{0xff};
+    session_->OnBytes(frame, now_s_);
+  });
+  // Another number's poses are somebody else's: no harm.
+  Use({});
+  (void)Joined();
+  session_->OnBytes(toy::PoseFrame(999, 1, {{1}}), now_s_);
+  EXPECT_EQ(session_->state(), State::kReady);
+}
+
+TEST_F(SessionTest, MutatedFramesOfAServerNeverHarm) {
+  const std::uint64_t seed = 4242;
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  std::mt19937_64 random(seed);
+  std::vector<std::vector<std::byte>> frames;
+  const auto add = [&](const auto& message) {
+    std::vector<std::byte> frame;
+    ASSERT_TRUE(encoder_.Encode(message, frame));
+    frames.push_back(frame);
+  };
+  add(toy::Welcome());
+  add(toy::WorldInfo(1, 5, "plaza"));
+  add(toy::Ok(1));
+  protocol::Event event;
+  event.avatar = 1;
+  add(protocol::Events{5, 1, 10, {event}});
+  add(protocol::Lagging{5, 10, 1});
+  add(protocol::Pong{1, 0.5, 1.0, 3});
+  add(protocol::ErrorNotice{protocol::StatusCode::kInternal, "oh", false, 2});
+  frames.push_back(toy::PoseFrame(5, 7, {{1}, {2}}));
+  frames.push_back(toy::PoseFrame(5, 8, {{1}, {2}}, protocol::PoseMode::kQuantised));
+  int survived = 0;
+  (void)Joined();
+  for (int i = 0; i < 20'000; ++i) {
+    if (session_->state() != State::kReady) {
+      Use({});
+      (void)Joined();
+      std::uint32_t subscription = 0;
+      (void)session_->Observe(1, {}, subscription, command_);
+    }
+    auto frame = frames[random() % frames.size()];
+    for (std::uint64_t n = random() % 3; n > 0; --n) {
+      frame[random() % frame.size()] = static_cast<std::byte>(random());
+    }
+    session_->OnBytes(frame, now_s_);
+    survived += session_->state() == State::kReady;
+    ASSERT_LT(session_->Statistics().buffered_bytes, std::size_t{80} << 20);
+  }
+  EXPECT_GT(survived, 1000);
+}
+
+}  // namespace
+}  // namespace stridewire::client

@@ -1,0 +1,121 @@
+#include "world_view.h"
+
+#include <gtest/gtest.h>
+
+#include "stridewire/protocol/decode.h"
+#include "toy_world.h"
+
+namespace stridewire::client {
+namespace {
+
+class WorldViewTest : public testing::Test {
+ protected:
+  WorldViewTest() { view_.SetInfo(toy::WorldInfo(1, 1, "plaza")); }
+
+  Status Take(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars,
+              std::uint16_t shard = 0) {
+    const auto frame = toy::PoseFrame(1, tick, avatars, protocol::PoseMode::kFull, shard);
+    const auto message =
+        protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
+    return view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
+  }
+
+  PoseBudget budget_{std::size_t{1} << 20, 0};
+  WorldView::Counts counts_;
+  WorldView view_{8, budget_};
+};
+
+TEST_F(WorldViewTest, KnowsWhoIsThere) {
+  ASSERT_TRUE(Take(1, {{3}, {1}, {2}}));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 2, 3}));
+  ASSERT_TRUE(Take(2, {{3}, {1}}));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 3}));
+  EXPECT_TRUE(view_.IsGone(2));
+  EXPECT_NE(view_.Find(2), nullptr);  // It can still be shown at a time when it was there.
+  view_.Remove(1);
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{3}));
+}
+
+TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {
+  ASSERT_TRUE(Take(1, {{1}}, 0));
+  ASSERT_TRUE(Take(1, {}, 1));
+  ASSERT_TRUE(Take(2, {}, 0));
+  ASSERT_TRUE(Take(2, {{1}}, 1));
+  ASSERT_TRUE(Take(3, {}, 0));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1}));
+  EXPECT_FALSE(view_.Find(1)->stamp(1).discontinuity);
+}
+
+TEST_F(WorldViewTest, ForgetsWhoHasBeenGoneForLongAndGivesTheMemoryBack) {
+  ASSERT_TRUE(Take(1, {{1}, {2}}));
+  const std::size_t two = budget_.used_bytes;
+  std::uint64_t tick = 2;
+  for (; toy::TickTime(tick) < 1.0 + WorldView::kKeepGone_s; ++tick) ASSERT_TRUE(Take(tick, {{1}}));
+  EXPECT_EQ(view_.Find(2), nullptr);
+  EXPECT_EQ(budget_.used_bytes, two / 2);
+  view_.Clear();
+  EXPECT_EQ(budget_.used_bytes, 0u);
+}
+
+TEST_F(WorldViewTest, StaysWithinItsMemory) {
+  budget_.limit_bytes = 5 * PoseHistory::Bytes(8, toy::kJoints);
+  std::vector<toy::AvatarAt> crowd;
+  for (std::uint32_t a = 1; a <= 20; ++a) crowd.push_back({a});
+  ASSERT_TRUE(Take(1, crowd));
+  ASSERT_TRUE(Take(2, crowd));
+  EXPECT_EQ(view_.Avatars().size(), 5u);
+  EXPECT_LE(budget_.used_bytes, budget_.limit_bytes);
+  EXPECT_EQ(counts_.poses, 10u);
+  EXPECT_EQ(counts_.refused, 30u);
+}
+
+TEST_F(WorldViewTest, CountsMissingTicks) {
+  ASSERT_TRUE(Take(10, {{1}}));
+  ASSERT_TRUE(Take(11, {{1}}));
+  ASSERT_TRUE(Take(15, {{1}}));
+  EXPECT_EQ(counts_.missing, 3u);
+}
+
+TEST_F(WorldViewTest, ABreakMarksTheNextPoseOfEachAvatar) {
+  ASSERT_TRUE(Take(1, {{1}}));
+  ASSERT_TRUE(Take(2, {{1}}));
+  view_.Break();
+  ASSERT_TRUE(Take(9, {{1}}));
+  ASSERT_TRUE(Take(10, {{1}}));
+  const PoseHistory& history = *view_.Find(1);
+  EXPECT_TRUE(history.stamp(0).discontinuity);  // The first of all.
+  EXPECT_FALSE(history.stamp(1).discontinuity);
+  EXPECT_TRUE(history.stamp(2).discontinuity);
+  EXPECT_FALSE(history.stamp(3).discontinuity);
+  EXPECT_EQ(counts_.missing, 0u);  // Nobody promised those ticks.
+}
+
+TEST_F(WorldViewTest, TheServersFlagMarksToo) {
+  ASSERT_TRUE(Take(1, {{1}}));
+  ASSERT_TRUE(Take(2, {{1, protocol::kPoseDiscontinuity}}));
+  ASSERT_TRUE(Take(3, {{1, protocol::kPoseStanding}}));
+  EXPECT_TRUE(view_.Find(1)->stamp(1).discontinuity);
+  EXPECT_FALSE(view_.Find(1)->stamp(2).discontinuity);
+  EXPECT_TRUE(view_.Find(1)->stamp(2).standing);
+}
+
+TEST_F(WorldViewTest, KeepsOnlyWhoIsWanted) {
+  ASSERT_TRUE(Take(1, {{1}, {2}, {3}}));
+  view_.SetFilter(std::set<std::uint32_t>{2});
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2}));
+  ASSERT_TRUE(Take(2, {{1}, {2}, {3}}));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2}));
+  EXPECT_EQ(view_.Find(2)->size(), 2u);
+}
+
+TEST_F(WorldViewTest, RefusesAnotherFigureAndTicksThatRunBackwards) {
+  const auto frame = toy::PoseFrame(1, 1, {{1}}, protocol::PoseMode::kFull, 0, 5);
+  const auto message =
+      protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
+  EXPECT_FALSE(view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_));
+  ASSERT_TRUE(Take(5, {{1}}));
+  EXPECT_FALSE(Take(4, {{1}}));
+}
+
+}  // namespace
+}  // namespace stridewire::client
