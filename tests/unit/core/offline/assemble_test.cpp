@@ -114,7 +114,7 @@ TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
   Capture other = PlainWalk();
   other.skeleton.joints[3].name = "Ankle";
   EXPECT_EQ(assembler.Add(other).error,
-            "left out: its joint 3 is Ankle where the first capture has LeftFoot");
+            "its joint 3 is Ankle where the first capture has LeftFoot");
   Capture fewer = PlainWalk();
   fewer.skeleton.joints.pop_back();
   EXPECT_THAT(assembler.Add(fewer).error, HasSubstr("11 joints, the first capture 12"));
