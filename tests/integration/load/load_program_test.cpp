@@ -1,0 +1,248 @@
+// stridewire-load against the real server: what it counts, and what it says when things go wrong.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "run_program.h"
+#include "scratch_folder.h"
+#include "server_metrics.h"
+
+namespace stridewire::load {
+namespace {
+
+using nlohmann::json;
+using test::ProgramResult;
+using test::RunProgram;
+using testing::HasSubstr;
+
+/// The real server on ports the system chose; killed at the end.
+class RealServer {
+ public:
+  explicit RealServer(const std::string& shards = "2") {
+    std::array<int, 2> output{};
+    EXPECT_EQ(pipe2(output.data(), O_CLOEXEC), 0);
+    child_ = fork();
+    if (child_ == 0) {
+      dup2(output[1], STDOUT_FILENO);
+      execl(STRIDEWIRE_STRIDEWIRED, STRIDEWIRE_STRIDEWIRED, "--listen", "127.0.0.1:0", "--http",
+            "127.0.0.1:0", "--shards", shards.c_str(), "--log-level", "warning", nullptr);
+      _exit(127);
+    }
+    close(output[1]);
+    char c = 0;
+    while (read(output[0], &c, 1) == 1 && c != '\n') ready_ += c;
+    close(output[0]);
+  }
+  ~RealServer() { Kill(); }
+  RealServer(const RealServer&) = delete;
+  RealServer& operator=(const RealServer&) = delete;
+
+  void Kill() {
+    if (child_ <= 0) return;
+    kill(child_, SIGKILL);
+    waitpid(child_, nullptr, 0);
+    child_ = -1;
+  }
+
+  /// "listen" -> "127.0.0.1:40123"
+  [[nodiscard]] std::string Address(const std::string& key) const {
+    const std::size_t at = ready_.find(key + "=");
+    if (at == std::string::npos) return "127.0.0.1:1";
+    const std::size_t from = at + key.size() + 1;
+    return ready_.substr(from, ready_.find(' ', from) - from);
+  }
+
+  /// How many avatars it says it has; -1 if it says nothing.
+  [[nodiscard]] int AvatarCount() const {
+    const std::string http = Address("http");
+    const auto port = static_cast<std::uint16_t>(std::stoi(http.substr(http.rfind(':') + 1)));
+    const Expected<ServerMetrics> metrics = ScrapeServerMetrics({"127.0.0.1", port}, 10.0);
+    return metrics ? static_cast<int>(metrics->avatars) : -1;
+  }
+
+  [[nodiscard]] ProgramResult Load(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.end(),
+                     {"--connect", Address("listen"), "--http", Address("http"), "--json"});
+    return RunProgram(STRIDEWIRE_LOAD, arguments, 120.0);
+  }
+
+ private:
+  pid_t child_ = -1;
+  std::string ready_;
+};
+
+/// The report, which must be one JSON object and nothing else.
+json ReportOf(const ProgramResult& result) {
+  EXPECT_FALSE(result.timed_out);
+  json report = json::parse(result.out, nullptr, false);
+  EXPECT_TRUE(report.is_object()) << result.out << result.err;
+  return report;
+}
+
+/// All poses came, but those of ticks the server says it missed and of batches it says it dropped:
+/// on a busy machine there may be some. Two ticks more, for the server counts them a moment apart.
+void ExpectAllPoses(const json& report) {
+  const auto expected = report["poses_expected"].get<std::int64_t>();
+  const auto received = report["poses_received"].get<std::int64_t>();
+  const auto avatars = report["avatars"].get<std::int64_t>();
+  const auto observers = report["observers"].get<std::int64_t>();
+  const auto missed = report["ticks_missed"].get<std::int64_t>();
+  const auto dropped = report["batches_dropped"].get<std::int64_t>();
+  EXPECT_LE(received, expected) << report;
+  const std::int64_t excused =
+      missed == 0 && dropped == 0 ? 0 : (missed + 2) * avatars * observers + dropped * avatars;
+  EXPECT_GE(received, expected - excused) << report;
+  EXPECT_GT(received, 0) << report;
+}
+
+/// Nothing went wrong but, perhaps, that the machine was too busy.
+void ExpectNoErrorsButLateness(const json& report) {
+  for (const json& error : report["errors"]) {
+    const auto text = error.get<std::string>();
+    EXPECT_TRUE(text.starts_with("this program could not keep up") ||
+                text.starts_with("the server dropped") || text.find("had not moved") != text.npos)
+        << text;
+  }
+  EXPECT_EQ(report["poses_invalid"], 0) << report;
+}
+
+TEST(LoadProgram, CountsEveryPoseOfFiftyWanderingAvatars) {
+  const RealServer server;
+  const ProgramResult result =
+      server.Load({"--avatars", "50", "--observers", "2", "--seconds", "3"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report["poses_expected"], 50 * 2 * 180);
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+  EXPECT_EQ(report["seconds"], 3.0);
+  EXPECT_EQ(report["mode"], "quantised");
+  EXPECT_GT(report["requests"]["sent"], 50);
+  EXPECT_EQ(report["requests"]["accepted"], report["requests"]["sent"]);
+  EXPECT_EQ(report["requests"]["rejected"], 0);
+  EXPECT_EQ(report["reconnects"], 0);
+  // 24 joints at 6 bytes, 12 for the root, and a little for what a batch says of itself.
+  EXPECT_GT(report["bytes_per_pose"], 156.0);
+  EXPECT_LT(report["bytes_per_pose"], 170.0);
+  EXPECT_GT(report["moving_share"], 0.2);
+  // Every avatar begins at least one outing within the first two seconds.
+  EXPECT_GE(report["steps_measured"], 25);
+  EXPECT_GT(report["step_latency_ms"]["max"], 0.0);
+  EXPECT_LE(report["step_latency_ms"]["p50"], report["step_latency_ms"]["p99"]);
+  EXPECT_LE(report["step_latency_ms"]["p99"], report["step_latency_ms"]["max"]);
+  EXPECT_GT(report["tick_ms"]["max"], 0.0);
+  EXPECT_LE(report["tick_ms"]["p50"], report["tick_ms"]["max"]);
+  // It leaves nothing behind.
+  EXPECT_EQ(server.AvatarCount(), 0);
+}
+
+TEST(LoadProgram, SpreadsAChoreographyOverWorldsAndThreads) {
+  const test::ScratchFolder scratch;
+  const std::string file =
+      scratch.Write("c.json", R"({"start":{"position_m":[5,0,-5],"heading_rad":1},
+    "movements":[{"step":{"length_m":0.6}},{"jump":{"length_m":0.9}},{"stand":{"seconds":0.2}},
+                 {"step":{"foot":"left","length_m":0.5}}]})");
+  const RealServer server("1");
+  const ProgramResult result =
+      server.Load({"--worlds", "3", "--avatars", "10", "--observers", "3", "--seconds", "2",
+                   "--mode", "full", "--choreography", file, "--threads", "2"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report["worlds"], 3);
+  EXPECT_EQ(report["mode"], "full");
+  EXPECT_EQ(report["poses_expected"], 10 * 3 * 120);
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+  EXPECT_EQ(report["requests"]["sent"].get<int>() % 4, 0);
+  EXPECT_GE(report["requests"]["accepted"], 40);
+  EXPECT_GE(report["steps_measured"], 10);
+}
+
+TEST(LoadProgram, ExpectsNoPosesOfObserversItDroppedItself) {
+  const RealServer server;
+  const ProgramResult result = server.Load({"--avatars", "20", "--observers", "4", "--seconds", "3",
+                                            "--churn", "5", "--observe", "all"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GE(report["reconnects"], 5);
+  EXPECT_LT(report["poses_expected"], 20 * 4 * 180);
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+}
+
+TEST(LoadProgram, EndsWithOneWhenAThresholdIsCrossed) {
+  const RealServer server;
+  const ProgramResult result =
+      server.Load({"--avatars", "5", "--observers", "1", "--seconds", "0.5", "--fail-if",
+                   "poses_received>0", "--fail-if", "poses_invalid>0"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("--fail-if poses_received>0: it is "));
+  EXPECT_THAT(result.err, testing::Not(HasSubstr("poses_invalid")));
+  EXPECT_GT(ReportOf(result)["poses_received"], 0);
+}
+
+TEST(LoadProgram, ReportsAServerThatIsKilledAndEndsInTime) {
+  RealServer server;
+  std::jthread killer([&server] {
+    for (int i = 0; i < 600 && server.AvatarCount() < 20; ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    server.Kill();
+  });
+  const ProgramResult result =
+      server.Load({"--avatars", "20", "--observers", "2", "--seconds", "5"});
+  killer.join();
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(report["errors"].dump(), HasSubstr("connection lost"));
+  EXPECT_THAT(result.err, HasSubstr("connection lost"));
+  // A session says so once, however often it tries to come back; then the metrics.
+  EXPECT_LE(report["errors"].size(), 8u) << report;
+  // On a very slow machine it may have been killed before anything was expected.
+  if (report["poses_expected"] > 0) {
+    EXPECT_LT(report["poses_received"], report["poses_expected"]);
+  }
+  EXPECT_TRUE(report["tick_ms"]["p99"].is_null());
+}
+
+TEST(LoadProgram, SaysThatNobodyIsThere) {
+  const ProgramResult result =
+      RunProgram(STRIDEWIRE_LOAD, {"--connect", "127.0.0.1:1", "--avatars", "5", "--observers", "1",
+                                   "--seconds", "1", "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("cannot connect: Connection refused"));
+  EXPECT_EQ(ReportOf(result)["errors"].size(), 1u);
+}
+
+TEST(LoadProgram, EndsWithTwoOnBadOptions) {
+  const ProgramResult none = RunProgram(STRIDEWIRE_LOAD, {});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_EQ(none.err, "stridewire-load: --connect is required: see --help\n");
+  EXPECT_EQ(none.out, "");
+  const ProgramResult file =
+      RunProgram(STRIDEWIRE_LOAD, {"--connect", "127.0.0.1:1", "--avatars", "5", "--observers", "1",
+                                   "--seconds", "1", "--choreography", "/nowhere/c.json"});
+  EXPECT_EQ(file.exit_code, 2);
+  EXPECT_EQ(file.err, "stridewire-load: --choreography /nowhere/c.json: there is no such file\n");
+}
+
+TEST(LoadProgram, HelpsAndTellsItsVersion) {
+  EXPECT_EQ(RunProgram(STRIDEWIRE_LOAD, {"--help"}).exit_code, 0);
+  const ProgramResult version = RunProgram(STRIDEWIRE_LOAD, {"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_THAT(version.out, testing::StartsWith("stridewire-load "));
+}
+
+}  // namespace
+}  // namespace stridewire::load

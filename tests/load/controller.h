@@ -1,0 +1,111 @@
+#pragma once
+
+#include <atomic>
+#include <boost/asio/steady_timer.hpp>
+#include <cstdint>
+#include <map>
+#include <queue>
+#include <string>
+#include <vector>
+
+#include "latency_histogram.h"
+#include "latency_probes.h"
+#include "run_state.h"
+#include "session.h"
+#include "wander.h"
+
+namespace stridewire::load {
+
+/// What a controller counted; read it when its thread has ended.
+struct ControllerCounts {
+  std::uint64_t requests_sent = 0;
+  std::uint64_t requests_accepted = 0;
+  std::uint64_t requests_rejected = 0;  ///< At once, or when their turn came.
+  std::map<protocol::StatusCode, std::uint64_t> rejected_by_code;
+  LatencyHistogram send_late;  ///< From when a request was to be sent to when it was.
+};
+
+/// A simulated game server: puts the avatars of one world there, asks for their movements by a plan,
+/// and takes them away at the end. What it asks for in one moment goes out in one message.
+class Controller final : public Session {
+ public:
+  static constexpr std::size_t kMaxItemsPerMessage = 2048;
+  /// Commands without an answer; beyond, requests wait (and their latency tells).
+  static constexpr std::size_t kMaxUnanswered = 64;
+  /// Of a choreography at most so many movements wait in the server.
+  static constexpr std::size_t kMaxAhead = 48;
+
+  Controller(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
+             int world, LatencyProbes* probes);
+
+  /// All its avatars live.
+  [[nodiscard]] bool has_spawned() const { return has_spawned_.load(); }
+  [[nodiscard]] bool has_cleaned_up() const { return has_cleaned_up_.load(); }
+
+  void StopMoving() { moves_ = false; }
+  /// Removes the avatars, then finishes.
+  void CleanUp();
+
+  [[nodiscard]] const ControllerCounts& counts() const { return counts_; }
+
+ private:
+  enum class Command { kJoin, kSpawn, kSpawnAgain, kRemove, kRemoveLast, kRequest };
+  struct Pending {
+    Command command = Command::kJoin;
+    std::vector<protocol::AvatarNumber> avatars;  ///< kSpawn
+    std::uint64_t items = 0;                      ///< kRequest
+  };
+  struct Walker {
+    Wanderer wanderer;
+    std::size_t next = 0;     ///< Choreography: its movement that is asked for next
+    std::size_t waiting = 0;  ///< Choreography: asked for and not started
+  };
+  struct Due {
+    std::int64_t at_ns = 0;
+    std::size_t walker = 0;
+    bool operator>(const Due& other) const { return at_ns > other.at_ns; }
+  };
+
+  void OnWelcome() override;
+  void OnMessage(protocol::Message& message, std::size_t frame_bytes, std::int64_t now_ns) override;
+  void OnLost(const std::string& why, bool by_us) override;
+
+  void OnReply(const protocol::Reply& reply);
+  void OnRequestReply(const protocol::Reply& reply, const Pending& pending);
+  void OnSpawnReply(const protocol::Reply& reply, const Pending& pending);
+  void OnEvent(const protocol::Event& event);
+
+  void Spawn(const std::vector<protocol::AvatarNumber>& avatars, Command command);
+  void Remove(const std::vector<protocol::AvatarNumber>& avatars, Command last);
+  [[nodiscard]] protocol::Placement Place(protocol::AvatarNumber number) const;
+
+  void StartMoving();
+  void Schedule(std::size_t walker, std::int64_t at_ns);
+  void ArmTimer();
+  void SendDue();
+  /// Adds what is due for a walker to `request`.
+  void AddOuting(const Due& due, std::int64_t now_ns, protocol::Request& request);
+  void AddChoreography(std::size_t walker, std::int64_t due_ns, std::int64_t now_ns,
+                       protocol::Request& request);
+  void SendRequest(protocol::Request& request);
+  /// How many movements of a choreography may wait.
+  [[nodiscard]] std::size_t Ahead() const;
+
+  RunState& run_;
+  const int world_;
+  LatencyProbes* probes_;  ///< Null: nobody watches.
+  protocol::WorldId world_id_ = 0;
+  std::map<protocol::Seq, Pending> pending_;
+  std::size_t spawned_count_ = 0;
+  std::vector<Walker> walkers_;
+  std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
+  boost::asio::steady_timer timer_;
+  protocol::RequestId last_request_ = 0;
+  bool may_jump_ = true;
+  bool moves_ = true;
+  ControllerCounts counts_;
+  std::atomic<bool> has_spawned_{false};
+  std::atomic<bool> has_cleaned_up_{false};
+};
+
+}  // namespace stridewire::load

@@ -1,0 +1,230 @@
+#include "observer.h"
+
+#include <algorithm>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <utility>
+
+namespace stridewire::load {
+
+Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server,
+                   RunState& run, int index, LatencyProbes* probes)
+    : Session(context, server, "load observer " + std::to_string(index)),
+      run_(run),
+      index_(index),
+      probes_(probes) {
+  const Layout& layout = run.layout;
+  for (int world = 0; world < layout.worlds; ++world) {
+    if (!run.options.observe_all && world != index % layout.worlds) continue;
+    World& added = worlds_.emplace_back();
+    added.index = world;
+    added.seen.resize(layout.CountIn(world));
+    avatar_count_ += added.seen.size();
+  }
+}
+
+void Observer::OnWelcome() {
+  run_.tick_hz = welcome().tick_hz;
+  world_by_id_.clear();
+  pending_joins_.clear();
+  pending_observes_.clear();
+  for (std::size_t i = 0; i < worlds_.size(); ++i) {
+    const protocol::Seq seq = NextSeq();
+    pending_joins_[seq] = i;
+    Send(protocol::JoinWorld{
+        .seq = seq, .name = WorldName(worlds_[i].index), .role = protocol::Role::kObserver});
+  }
+}
+
+void Observer::OnMessage(protocol::Message& message, std::size_t frame_bytes, std::int64_t now_ns) {
+  if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
+    return OnBatch(*batch, frame_bytes, now_ns);
+  }
+  if (const auto* info = std::get_if<protocol::WorldInfo>(&message)) return OnWorldInfo(*info);
+  if (const auto* reply = std::get_if<protocol::Reply>(&message)) return OnReply(*reply);
+  if (const auto* lagging = std::get_if<protocol::Lagging>(&message)) {
+    const auto world = world_by_id_.find(lagging->world);
+    if (world == world_by_id_.end()) return;
+    std::uint64_t& told = worlds_[world->second].batches_dropped;
+    if (lagging->dropped_batches > told) counts_.batches_dropped += lagging->dropped_batches - told;
+    told = lagging->dropped_batches;
+  }
+}
+
+void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
+  const auto pending = pending_joins_.find(info.seq);
+  if (pending == pending_joins_.end()) return Lose("a world that was not joined");
+  World& world = worlds_[pending->second];
+  world.joint_count = info.skeleton.joints.size();
+  world.pose_bytes = protocol::PoseBytes(run_.options.mode, world.joint_count);
+  if (probes_ != nullptr) world.last_poses.assign(world.seen.size() * world.pose_bytes, {});
+  rotations_.resize(std::max(rotations_.size(), world.joint_count));
+  world_by_id_[info.world] = pending->second;
+  const protocol::Seq seq = NextSeq();
+  pending_observes_[seq] = pending->second;
+  Send(protocol::Observe{.seq = seq,
+                         .world = info.world,
+                         .subscription = static_cast<protocol::SubscriptionId>(pending->second + 1),
+                         .mode = run_.options.mode,
+                         .avatars = {},
+                         .every_n_ticks = 1,
+                         .with_events = false});
+}
+
+void Observer::OnReply(const protocol::Reply& reply) {
+  const bool joins = pending_joins_.erase(reply.seq) > 0;
+  const bool observes = pending_observes_.erase(reply.seq) > 0;
+  if (!joins && !observes) return Lose("a reply to nothing");
+  if (reply.code == protocol::StatusCode::kOk) return;
+  run_.Problem(name() + ": the server would not let it " + (joins ? "join" : "observe") + ": " +
+               std::string(protocol::StatusCodeName(reply.code)) + " " + reply.text);
+}
+
+void Observer::OnLost(const std::string& why, bool by_us) {
+  was_dropped_ = by_us;
+  for (World& world : worlds_) {
+    for (Seen& seen : world.seen) seen = Seen{};
+    for (Stream& stream : world.streams) {
+      if (by_us && stream.away_since == 0) stream.away_since = stream.tick + 1;
+      stream.tick = 0;  // A server that was restarted may count anew.
+    }
+    if (probes_ != nullptr && by_us) {
+      for (std::size_t i = 0; i < world.seen.size(); ++i) {
+        probes_->Abandon(run_.layout.Number(world.index, i) - 1);
+      }
+    }
+    world.batches_dropped = 0;
+  }
+  seen_count_ = 0;
+  sees_all_ = false;
+  if (!by_us && !run_.is_ending) run_.Problem(name() + ": " + why);
+}
+
+void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes,
+                       std::int64_t now_ns) {
+  const auto found = world_by_id_.find(batch.info.world);
+  if (found == world_by_id_.end()) return Lose("poses of a world that is not observed");
+  World& world = worlds_[found->second];
+  const std::uint64_t tick = batch.info.tick;
+  if (batch.info.mode != run_.options.mode || batch.info.joint_count != world.joint_count) {
+    return Invalid(world, tick, "a batch of another mode or number of joints than agreed");
+  }
+  if (!AdvanceStream(world, batch)) return;
+  const bool counts = run_.window.Contains(tick);
+  if (counts) counts_.bytes_received += frame_bytes;
+  const bool verifies =
+      batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
+  for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
+    const protocol::AvatarNumber number = batch.avatars[i];
+    if (!run_.layout.IsOurs(world.index, number)) continue;  // Somebody else's, in our world.
+    Seen& seen = world.seen[run_.layout.IndexIn(number)];
+    if (seen.tick >= tick) {
+      Invalid(world, tick, "avatar " + std::to_string(number) + " came twice, or too late");
+      continue;
+    }
+    if (seen.tick == 0) ++seen_count_;
+    if (probes_ != nullptr) Measure(world, batch, i, now_ns);
+    if (verifies) (void)CheckPose(world, seen, batch, i);
+    seen.tick = tick;
+    if (!counts) continue;
+    ++counts_.poses_received;
+    if ((batch.flags[i] & protocol::kPoseStanding) == 0) ++counts_.poses_moving;
+  }
+  UpdateProgress();
+}
+
+bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
+  const std::uint32_t key = std::uint32_t{batch.info.shard} << 16 | batch.info.part;
+  auto stream = std::ranges::find(world.streams, key, &Stream::key);
+  if (stream == world.streams.end()) {
+    world.streams.push_back({.key = key});
+    stream = world.streams.end() - 1;
+  }
+  const std::uint64_t tick = batch.info.tick;
+  if (stream->away_since != 0) {
+    counts_.poses_excused +=
+        stream->avatar_count * run_.window.CountBetween(stream->away_since, tick - 1);
+    stream->away_since = 0;
+  } else if (tick <= stream->tick) {
+    Invalid(world, tick, "a batch that is not newer than the last one of its shard");
+    return false;
+  }
+  stream->tick = tick;
+  stream->avatar_count = 0;
+  for (const protocol::AvatarNumber number : batch.avatars) {
+    if (run_.layout.IsOurs(world.index, number)) ++stream->avatar_count;
+  }
+  return true;
+}
+
+bool Observer::CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch,
+                         std::size_t i) {
+  const std::uint64_t tick = batch.info.tick;
+  Vec3 root_m(0.0f);
+  const Status decoded = protocol::DecodePose(batch.info.mode, batch.pose(i), root_m,
+                                              std::span(rotations_).first(world.joint_count));
+  if (!decoded) {
+    Invalid(world, tick,
+            "avatar " + std::to_string(batch.avatars[i]) + ": " + Describe(decoded.error()));
+    return false;
+  }
+  const bool jumps = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0;
+  const Vec3 before_m = std::exchange(seen.root_m, root_m);
+  const std::uint64_t before_tick = std::exchange(seen.root_tick, tick);
+  if (before_tick == 0 || jumps) return true;
+  const double elapsed_s = static_cast<double>(tick - before_tick) / run_.tick_hz;
+  const double moved_m = glm::length(DVec3(root_m) - DVec3(before_m));
+  if (moved_m <= kMaxSpeedMPerS * elapsed_s + kSpeedSlackM) return true;
+  Invalid(world, tick,
+          "avatar " + std::to_string(batch.avatars[i]) + " moved " + std::to_string(moved_m) +
+              " m in " + std::to_string(elapsed_s) + " s without a discontinuity");
+  return false;
+}
+
+void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size_t i,
+                       std::int64_t now_ns) {
+  const protocol::AvatarNumber number = batch.avatars[i];
+  const std::size_t index = run_.layout.IndexIn(number);
+  std::byte* const last = world.last_poses.data() + index * world.pose_bytes;
+  const std::span<const std::byte> pose = batch.pose(i);
+  const bool changed = std::memcmp(last, pose.data(), pose.size()) != 0;
+  const bool is_first = world.seen[index].tick == 0;
+  if (changed) std::memcpy(last, pose.data(), pose.size());
+  // What was asked for while nobody watched, by our own doing, tells nothing of the server.
+  if (is_first && was_dropped_) probes_->Abandon(number - 1);
+  if (changed && !is_first) probes_->Pose(number - 1, batch.info.tick, now_ns, true);
+}
+
+void Observer::Invalid(const World& world, std::uint64_t tick, const std::string& what) {
+  ++counts_.poses_invalid;
+  run_.Problem(name() + ": " + WorldName(world.index) + " at tick " + std::to_string(tick) + ": " +
+               what);
+}
+
+void Observer::UpdateProgress() {
+  if (seen_count_ >= avatar_count_) sees_all_ = true;
+  std::uint64_t newest = 0;
+  bool saw_last = run_.window.is_set();
+  for (const World& world : worlds_) {
+    for (const Stream& stream : world.streams) {
+      newest = std::max(newest, stream.tick);
+      saw_last = saw_last && stream.tick >= run_.window.last();
+    }
+  }
+  latest_tick_ = newest;
+  if (saw_last) saw_last_tick_ = true;
+}
+
+ObserverCounts Observer::Counts() const {
+  ObserverCounts counts = counts_;
+  for (const World& world : worlds_) {
+    for (const Stream& stream : world.streams) {
+      if (stream.away_since == 0) continue;
+      counts.poses_excused +=
+          stream.avatar_count * run_.window.CountBetween(stream.away_since, run_.window.last());
+    }
+  }
+  return counts;
+}
+
+}  // namespace stridewire::load

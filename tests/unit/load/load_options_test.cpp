@@ -1,0 +1,147 @@
+#include "load_options.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+namespace stridewire::load {
+namespace {
+
+using Arguments = std::vector<std::string>;
+
+Expected<LoadCommandLine> Read(const Arguments& arguments) {
+  std::vector<const char*> argv = {"stridewire-load"};
+  for (const std::string& argument : arguments) argv.push_back(argument.c_str());
+  return ReadLoadCommandLine(static_cast<int>(argv.size()), argv.data());
+}
+
+const Arguments kEnough = {"--connect", "127.0.0.1:7420", "--avatars", "10", "--observers",
+                           "2",         "--seconds",      "1.5"};
+
+/// What is always needed, and this.
+Arguments With(const Arguments& more) {
+  Arguments all = kEnough;
+  all.insert(all.end(), more.begin(), more.end());
+  return all;
+}
+
+/// What is always needed, with one value changed.
+Arguments Changed(const std::string& option, const std::string& value) {
+  Arguments all = kEnough;
+  *(std::find(all.begin(), all.end(), option) + 1) = value;
+  return all;
+}
+
+std::string ErrorOf(const Arguments& arguments) {
+  const Expected<LoadCommandLine> line = Read(arguments);
+  return line ? "no error" : Describe(line.error());
+}
+
+TEST(LoadOptions, NeedLittle) {
+  const Expected<LoadCommandLine> line = Read(kEnough);
+  ASSERT_TRUE(line.has_value()) << Describe(line.error());
+  const LoadOptions& options = line->options;
+  EXPECT_EQ(line->text, "");
+  EXPECT_EQ(options.server, (Address{"127.0.0.1", 7420}));
+  EXPECT_EQ(options.http, (Address{"127.0.0.1", 7421}));
+  EXPECT_EQ(options.worlds, 1);
+  EXPECT_EQ(options.avatars, 10);
+  EXPECT_EQ(options.observers, 2);
+  EXPECT_EQ(options.seconds, 1.5);
+  EXPECT_EQ(options.mode, protocol::PoseMode::kQuantised);
+  EXPECT_TRUE(options.observe_all);
+  EXPECT_FALSE(options.json);
+}
+
+TEST(LoadOptions, TakeEverything) {
+  const Expected<LoadCommandLine> line =
+      Read(With({"--http",         "[::1]:80",  "--worlds",        "3",         "--mode",  "full",
+                 "--choreography", "c.json",    "--observe",       "one",       "--churn", "2.5",
+                 "--threads",      "2",         "--verify-one-in", "7",         "--seed",  "42",
+                 "--json",         "--fail-if", "ticks_missed>0",  "--fail-if", "errors>1"}));
+  ASSERT_TRUE(line.has_value()) << Describe(line.error());
+  const LoadOptions& options = line->options;
+  EXPECT_EQ(options.http, (Address{"::1", 80}));
+  EXPECT_EQ(ToText(*options.http), "[::1]:80");
+  EXPECT_EQ(options.worlds, 3);
+  EXPECT_EQ(options.mode, protocol::PoseMode::kFull);
+  EXPECT_EQ(options.choreography, "c.json");
+  EXPECT_FALSE(options.observe_all);
+  EXPECT_EQ(options.churn_per_s, 2.5);
+  EXPECT_EQ(options.threads, 2);
+  EXPECT_EQ(options.verify_one_in, 7);
+  EXPECT_EQ(options.seed, 42u);
+  EXPECT_TRUE(options.json);
+  ASSERT_EQ(options.fail_ifs.size(), 2u);
+  EXPECT_EQ(options.fail_ifs[1].name(), "errors");
+}
+
+TEST(LoadOptions, MayLeaveTheMetricsAlone) {
+  const Expected<LoadCommandLine> line = Read(With({"--http", "none", "--wander"}));
+  ASSERT_TRUE(line.has_value()) << Describe(line.error());
+  EXPECT_FALSE(line->options.http.has_value());
+}
+
+TEST(LoadOptions, GiveHelpWithExamplesAndVersion) {
+  const Expected<LoadCommandLine> help = Read({"--help"});
+  ASSERT_TRUE(help.has_value());
+  EXPECT_NE(help->text.find("stridewire-load --connect 127.0.0.1:7420"), std::string::npos);
+  const Expected<LoadCommandLine> version = Read({"--version"});
+  ASSERT_TRUE(version.has_value());
+  EXPECT_TRUE(version->text.starts_with("stridewire-load ")) << version->text;
+}
+
+TEST(LoadOptions, NameTheOptionThatIsWrong) {
+  EXPECT_EQ(ErrorOf({}), "--connect is required: see --help");
+  EXPECT_NE(ErrorOf(With({"--speed", "3"})).find("--speed"), std::string::npos);
+  EXPECT_NE(ErrorOf(Changed("--avatars", "many")).find("--avatars"), std::string::npos);
+  const std::string range = ": is out of its range (see --help)";
+  EXPECT_EQ(ErrorOf(Changed("--avatars", "0")), "--avatars 0" + range);
+  EXPECT_EQ(ErrorOf(Changed("--avatars", "100001")), "--avatars 100001" + range);
+  EXPECT_EQ(ErrorOf(Changed("--observers", "-1")), "--observers -1" + range);
+  EXPECT_EQ(ErrorOf(Changed("--observers", "10001")), "--observers 10001" + range);
+  EXPECT_EQ(ErrorOf(Changed("--seconds", "0")), "--seconds 0" + range);
+  EXPECT_EQ(ErrorOf(Changed("--seconds", "3601")), "--seconds 3601" + range);
+  EXPECT_EQ(ErrorOf(Changed("--seconds", "nan")), "--seconds nan" + range);
+  EXPECT_EQ(ErrorOf(With({"--worlds", "0"})), "--worlds 0" + range);
+  EXPECT_EQ(ErrorOf(With({"--worlds", "1001"})), "--worlds 1001" + range);
+  EXPECT_EQ(ErrorOf(With({"--worlds", "11"})), "--worlds 11: leaves worlds without an avatar");
+  EXPECT_EQ(ErrorOf(With({"--churn", "-0.5"})), "--churn -0.5" + range);
+  EXPECT_EQ(ErrorOf(With({"--churn", "1001"})), "--churn 1001" + range);
+  EXPECT_EQ(ErrorOf(With({"--threads", "0"})), "--threads 0" + range);
+  EXPECT_EQ(ErrorOf(With({"--threads", "65"})), "--threads 65" + range);
+  EXPECT_EQ(ErrorOf(With({"--verify-one-in", "0"})), "--verify-one-in 0" + range);
+  EXPECT_EQ(ErrorOf(With({"--mode", "raw"})), "--mode raw: is neither full nor quantised");
+  EXPECT_EQ(ErrorOf(With({"--mode", "movement"})), "--mode movement: is not supported yet");
+  EXPECT_EQ(ErrorOf(With({"--observe", "none"})), "--observe none: is neither all nor one");
+  EXPECT_EQ(ErrorOf(With({"--wander", "--choreography", "c.json"})),
+            "--wander: excludes --choreography");
+  EXPECT_NE(ErrorOf(With({"--seed", "x"})).find("--seed"), std::string::npos);
+  EXPECT_TRUE(ErrorOf(With({"--fail-if", "tick>0"})).starts_with("--fail-if 'tick>0': "));
+
+  Arguments alone = Changed("--observers", "0");
+  alone.insert(alone.end(), {"--churn", "1"});
+  EXPECT_EQ(ErrorOf(alone), "--churn 1: has no observers to drop and bring back");
+}
+
+TEST(LoadOptions, TellAnAddressThatIsNone) {
+  for (const char* address : {"localhost", ":7420", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536",
+                              "127.0.0.1:-1", "127.0.0.1:80x", "::1:7420", "[]:7420"}) {
+    EXPECT_EQ(ErrorOf(Changed("--connect", address)),
+              "--connect " + std::string(address) +
+                  ": is not HOST:PORT, such as 127.0.0.1:7420 or [::1]:7420");
+  }
+  EXPECT_TRUE(ErrorOf(With({"--http", "x"})).starts_with("--http x: is not HOST:PORT"));
+}
+
+TEST(LoadOptions, TakeSoManyThresholdsAndNoMore) {
+  Arguments many = kEnough;
+  for (int i = 0; i < kMaxFailIfs; ++i) many.insert(many.end(), {"--fail-if", "errors>0"});
+  EXPECT_EQ(ErrorOf(many), "no error");
+  many.insert(many.end(), {"--fail-if", "errors>0"});
+  EXPECT_EQ(ErrorOf(many), "--fail-if: may be given 32 times");
+}
+
+}  // namespace
+}  // namespace stridewire::load
