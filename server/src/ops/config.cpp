@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <boost/asio/ip/address.hpp>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -268,8 +269,9 @@ std::string ToText(const Endpoint& endpoint) {
 }
 
 bool IsLoopback(const Endpoint& endpoint) {
-  return endpoint.host == "localhost" || endpoint.host == "::1" ||
-         endpoint.host.starts_with("127.");
+  boost::system::error_code error;
+  const auto address = boost::asio::ip::make_address(endpoint.host, error);
+  return error ? endpoint.host == "localhost" : address.is_loopback();
 }
 
 bool IsWorldName(std::string_view name) {

@@ -32,10 +32,10 @@ class EventReplay {
     }
   }
 
-  /// Everything after `last_number`, in order.
+  /// Calls with a Kept&, in order, for everything after `last_number`.
   template <typename Function>
-  void ForEachAfter(std::uint64_t last_number, Function&& function) const {
-    for (const Kept& kept : kept_) {
+  void ForEachAfter(std::uint64_t last_number, Function&& function) {
+    for (Kept& kept : kept_) {
       if (kept.number > last_number) function(kept);
     }
   }

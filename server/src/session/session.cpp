@@ -21,7 +21,7 @@ using protocol::StatusCode;
 namespace {
 
 // An event takes under 512 bytes of a frame, so this many stay below the smallest frame limit.
-constexpr std::size_t kEventsPerFrame = 128;
+constexpr std::size_t kEventsPerFrame = 100;
 // A refused item takes under 256 bytes of a Reply; with no more items a Reply always fits.
 constexpr std::size_t kReplyItemBytes = 256;
 
@@ -114,8 +114,9 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   for (auto& [id, membership] : worlds_) SendWorldInfo(0, membership);
 
   // Whatever was on its way when the connection broke goes out again.
-  event_replay_.ForEachAfter(hello.last_events_number, [this](const EventReplay::Kept& kept) {
-    if (!connection_->SendEvents(kept.frame)) host_.metrics().events_dropped.Add(kept.events);
+  event_replay_.ForEachAfter(hello.last_events_number, [this](EventReplay::Kept& kept) {
+    kept.was_sent = connection_->SendEvents(kept.frame);
+    if (!kept.was_sent) host_.metrics().events_dropped.Add(kept.events);
   });
   for (auto& [id, membership] : worlds_) {
     membership.told_dropped = 0;
@@ -182,6 +183,8 @@ void Session::Drain() {
     End();
     return;
   }
+  // What was taken on is answered first; Housekeep comes back to it.
+  if (!pending_.empty()) return;
   // Not a Goodbye: the client may come back as soon as there is a server again.
   Fail(StatusCode::kShuttingDown, "the server is shutting down");
 }
@@ -201,6 +204,10 @@ void Session::End() {
 
 void Session::Housekeep(Clock::time_point now) {
   if (is_ended_) return;
+  if (host_.is_draining()) {
+    Drain();
+    return;
+  }
   const Limits& limits = host_.config().limits;
   if (connection_ == nullptr) {
     const double waited_s = std::chrono::duration<double>(now - detached_since_).count();

@@ -68,7 +68,8 @@ class Session : private ConnectionHandler {
   /// Now and then: what is due by time.
   void Housekeep(Clock::time_point now);
 
-  /// The server goes down: tells the client, which may come back later.
+  /// The server goes down: tells the client, which may come back later, once nothing it asked for
+  /// is still under way.
   void Drain();
 
   /// Leaves all worlds and closes. Afterwards it may be destroyed.

@@ -22,7 +22,7 @@ inline constexpr double kMaxSpawnHeadingRad = 10'000.0;
 /// The avatars of one world that live on one shard. Knows no socket and no thread: time is an
 /// argument, and what it makes is taken from it.
 ///
-/// An avatar costs about 2.5 KB and its queue (docs/OPERATIONS.md, "Memory").
+/// An avatar takes about 8 KB and its queue (docs/SERVER.md, "Memory").
 class WorldShard {
  public:
   /// Borrows budget and metrics.

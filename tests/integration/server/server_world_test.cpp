@@ -1,0 +1,624 @@
+// Worlds over real sockets: poses, events, limits, slow readers, and the same bytes whatever the
+// number of shards.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <fstream>
+#include <map>
+
+#include "counted_memory.h"
+#include "stridewire/runtime/avatar.h"
+#include "test_server.h"
+#include "toy_library.h"
+
+namespace stridewire {
+namespace {
+
+using namespace std::chrono_literals;
+using protocol::AvatarNumber;
+using protocol::EventType;
+using protocol::PoseMode;
+using protocol::Reply;
+using protocol::StatusCode;
+using server::Limit;
+using server::ThreadMetrics;
+using testing::ElementsAre;
+
+double ResidentMiB() {
+  std::ifstream statm("/proc/self/statm");
+  double total = 0;
+  double resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+// ---- the same bytes everywhere
+
+std::vector<protocol::RequestItem> Choreography(AvatarNumber avatar) {
+  using namespace protocol;
+  const double length_m = 0.3 + 0.02 * avatar;
+  return {
+      {.avatar = avatar, .request_id = 1, .movement = StepMovement{.length_m = length_m}},
+      {.avatar = avatar, .request_id = 2, .movement = StepMovement{.length_m = 0.5}},
+      {.avatar = avatar, .request_id = 3, .movement = StandMovement{0.1}},
+      {.avatar = avatar, .request_id = 4, .movement = JumpMovement{.length_m = 0.7}},
+      {.avatar = avatar,
+       .request_id = 5,
+       .movement = StepMovement{.foot = FootChoice::kLeft, .length_m = 0.2}},
+  };
+}
+
+protocol::Placement Start(AvatarNumber avatar) {
+  return {{3.0 * avatar, 0.0, -1.0 * avatar}, 0.3 * avatar};
+}
+
+// Pose bytes by avatar and number of ticks since its first movement began.
+using PoseStreams = std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>>;
+
+PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
+  server::Config config = TestConfig(shards);
+  config.max_catch_up_ticks = 1000;  // a busy machine may be late, but loses no time
+  config.limits.observer_backlog_ticks = 1000;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  PoseStreams streams;
+  if (!client.SayHello()) return streams;
+  const auto world = client.Join("stage");
+  std::vector<protocol::SpawnItem> spawns;
+  std::vector<protocol::RequestItem> requests;
+  for (int i = 1; i <= avatars; ++i) {
+    const auto avatar = static_cast<AvatarNumber>(i);
+    spawns.push_back({avatar, Start(avatar)});
+    std::ranges::copy(Choreography(avatar), std::back_inserter(requests));
+  }
+  client.Spawn(world->world, spawns);
+  client.Observe(world->world, 1, mode);
+  client.Send(protocol::Request{.seq = client.NextSeq(), .world = world->world, .items = requests});
+
+  std::map<AvatarNumber, std::uint64_t> started;
+  std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>> by_tick;
+  std::size_t idle = 0;
+  while (idle < static_cast<std::size_t>(avatars)) {
+    const auto message = client.Receive();
+    if (!message) break;
+    if (const auto* events = std::get_if<protocol::Events>(&*message)) {
+      for (const protocol::Event& event : events->events) {
+        if (event.type == EventType::kStarted && event.request_id == 1) {
+          started[event.avatar] = event.tick;
+        }
+        // Those who were idle before they were asked said so, too.
+        if (event.type == EventType::kIdle && started.contains(event.avatar)) ++idle;
+      }
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+      for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
+        const auto pose = batch->pose(i);
+        by_tick[batch->avatars[i]][batch->info.tick].assign(pose.begin(), pose.end());
+      }
+    }
+  }
+  EXPECT_EQ(server.metrics().Sum(&ThreadMetrics::ticks_slipped), 0u);
+  for (const auto& [avatar, tick] : started) {
+    for (auto& [at, pose] : by_tick[avatar]) {
+      if (at >= tick) streams[avatar][at - tick] = std::move(pose);
+    }
+  }
+  return streams;
+}
+
+// The same, without a server.
+PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
+  PoseStreams streams;
+  for (int i = 1; i <= avatars; ++i) {
+    const auto number = static_cast<AvatarNumber>(i);
+    const protocol::Placement start = Start(number);
+    Avatar avatar(MakeToyLibrary(), {start.position_m, start.heading_rad});
+    const auto step = [&](double length_m) {
+      return MovementRequest{1, StepRequest{.length_m = length_m}};
+    };
+    EXPECT_TRUE(avatar.Enqueue(step(0.3 + 0.02 * number)));
+    EXPECT_TRUE(avatar.Enqueue(step(0.5)));
+    EXPECT_TRUE(avatar.Enqueue({1, StandRequest{0.1}}));
+    EXPECT_TRUE(avatar.Enqueue({1, JumpRequest{.length_m = 0.7}}));
+    EXPECT_TRUE(avatar.Enqueue({1, StepRequest{.foot = Foot::kLeft, .length_m = 0.2}}));
+    const std::uint64_t last = like.at(number).rbegin()->first;
+    for (std::uint64_t tick = 0; tick <= last; ++tick) {
+      avatar.Advance(1.0 / 60.0);
+      const ConstPoseSpan pose = avatar.pose();
+      std::vector<std::byte>& bytes = streams[number][tick];
+      bytes.resize(protocol::PoseBytes(mode, pose.rotations.size()));
+      EXPECT_TRUE(
+          protocol::EncodePose(mode, pose.root_position_m, pose.rotations, bytes).has_value());
+    }
+  }
+  return streams;
+}
+
+void ExpectSameWhereBothHave(const PoseStreams& a, const PoseStreams& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (const auto& [avatar, poses] : a) {
+    std::size_t common = 0;
+    for (const auto& [tick, pose] : poses) {
+      const auto other = b.at(avatar).find(tick);
+      if (other == b.at(avatar).end()) continue;  // a tick a busy machine missed
+      ++common;
+      ASSERT_EQ(pose, other->second) << "avatar " << avatar << ", tick " << tick;
+    }
+    EXPECT_GE(common, 20u) << "avatar " << avatar;
+  }
+}
+
+TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
+  constexpr int kAvatars = 6;
+  const PoseStreams one = PlayOnServer(1, kAvatars, PoseMode::kFull);
+  ASSERT_EQ(one.size(), static_cast<std::size_t>(kAvatars));
+  // And they are the library's own.
+  ExpectSameWhereBothHave(one, PlayAlone(kAvatars, PoseMode::kFull, one));
+  for (const int shards : {2, 4}) {
+    SCOPED_TRACE(shards);
+    ExpectSameWhereBothHave(one, PlayOnServer(shards, kAvatars, PoseMode::kFull));
+  }
+  const PoseStreams quantised = PlayOnServer(4, kAvatars, PoseMode::kQuantised);
+  ExpectSameWhereBothHave(quantised, PlayAlone(kAvatars, PoseMode::kQuantised, quantised));
+}
+
+// ---- watching
+
+TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
+  TestServer server;
+  RawClient controller = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(controller.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
+
+  RawClient watcher = server.Connect();
+  ASSERT_TRUE(watcher.SayHello());
+  ASSERT_TRUE(watcher.Join("w", protocol::Role::kObserver));
+  ASSERT_EQ(watcher.Observe(world->world, 1, PoseMode::kQuantised, false, 4)->code,
+            StatusCode::kOk);
+  // A second one of the same mode gets no copy: 6 and 4 are both served by one stream.
+  ASSERT_EQ(watcher.Observe(world->world, 2, PoseMode::kQuantised, false, 6)->code,
+            StatusCode::kOk);
+  std::map<std::pair<std::uint64_t, int>, int> seen;
+  for (int i = 0; i < 40; ++i) {
+    const auto message = watcher.Receive();
+    ASSERT_TRUE(message);
+    // An observer that did not ask for events hears of none.
+    ASSERT_FALSE(std::holds_alternative<protocol::Events>(*message));
+    const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
+    if (batch == nullptr) continue;
+    EXPECT_EQ(batch->info.mode, PoseMode::kQuantised);
+    EXPECT_EQ(batch->info.joint_count, 7);
+    EXPECT_TRUE(batch->info.tick % 4 == 0 || batch->info.tick % 6 == 0);
+    EXPECT_EQ((++seen[{batch->info.tick, batch->info.shard}]), 1);
+    for (const AvatarNumber avatar : batch->avatars) {
+      EXPECT_EQ(avatar % 2, batch->info.shard);
+    }
+  }
+  // Nothing is encoded for nobody: after the last subscription ends poses cease.
+  watcher.Send(protocol::StopObserving{.seq = watcher.NextSeq(), .subscription = 1});
+  ASSERT_TRUE(watcher.Await<Reply>());
+  watcher.Send(protocol::StopObserving{.seq = watcher.NextSeq(), .subscription = 2});
+  ASSERT_TRUE(watcher.Await<Reply>());
+  EXPECT_TRUE(Eventually([&] {
+    const auto before = server.metrics().Sum(&ThreadMetrics::poses_encoded);
+    std::this_thread::sleep_for(150ms);
+    return server.metrics().Sum(&ThreadMetrics::poses_encoded) == before;
+  }));
+}
+
+TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
+  TestServer server(TestConfig(1));
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kFull));
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  auto batch = client.Await<protocol::PoseBatch>();
+  ASSERT_TRUE(batch);
+  ASSERT_THAT(batch->avatars, ElementsAre(1u));
+  EXPECT_EQ(batch->flags[0] & protocol::kPoseDiscontinuity, protocol::kPoseDiscontinuity);
+  EXPECT_EQ(batch->flags[0] & protocol::kPoseStanding, protocol::kPoseStanding);
+  batch = client.Await<protocol::PoseBatch>();
+  ASSERT_TRUE(batch);
+  EXPECT_EQ(batch->flags[0] & protocol::kPoseDiscontinuity, 0);
+
+  // The last avatar's end shows as one empty batch.
+  client.Send(protocol::Remove{.seq = client.NextSeq(), .world = world->world, .avatars = {1}});
+  do {
+    batch = client.Await<protocol::PoseBatch>();
+    ASSERT_TRUE(batch);
+  } while (!batch->avatars.empty());
+}
+
+TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {
+  TestServer server;
+  RawClient controller = server.Connect();
+  RawClient other = server.Connect();
+  RawClient watcher = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  ASSERT_TRUE(other.SayHello(0));  // without replay: shared, unnumbered
+  ASSERT_TRUE(watcher.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(other.Join("w"));
+  ASSERT_TRUE(watcher.Join("w", protocol::Role::kObserver));
+  ASSERT_TRUE(watcher.Observe(world->world, 1, PoseMode::kFull, true));
+  ASSERT_TRUE(controller.Spawn(world->world, {{.avatar = 4, .start = {{1, 2, 3}, 4}}}));
+  for (RawClient* client : {&other, &watcher}) {
+    const auto events = client->Await<protocol::Events>();
+    ASSERT_TRUE(events);
+    EXPECT_EQ(events->number, client == &other ? 0u : 1u);
+    EXPECT_EQ(events->events[0].type, EventType::kSpawned);
+    EXPECT_EQ(events->events[0].avatar, 4u);
+    EXPECT_EQ(events->events[0].base, (protocol::Placement{{1, 2, 3}, 4}));
+  }
+}
+
+TEST(ServerWorld, ComesIntoBeingWhenJoinedAndEndsWhenLeft) {
+  server::Config config = TestConfig();
+  config.open_worlds = false;
+  config.worlds["known"] = {};
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  client.Send(protocol::JoinWorld{.seq = client.NextSeq(), .name = "unknown"});
+  const auto refused = client.Await<Reply>();
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, StatusCode::kNoSuchWorld);
+  const auto world = client.Join("known");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  EXPECT_NE(server.metrics().Text().find("stridewire_worlds 1\n"), std::string::npos);
+  client.Send(protocol::LeaveWorld{.seq = client.NextSeq(), .world = world->world});
+  ASSERT_TRUE(client.Await<Reply>());
+  EXPECT_TRUE(Eventually(
+      [&] { return server.metrics().Text().find("stridewire_worlds 0\n") != std::string::npos; }));
+  // Joined again it is another one.
+  const auto again = client.Join("known");
+  ASSERT_TRUE(again);
+  EXPECT_NE(again->world, world->world);
+}
+
+// ---- limits
+
+TEST(ServerLimits, EachIsKeptAndCounted) {
+  server::Config config = TestConfig(2);
+  config.limits.max_worlds = 2;
+  config.limits.max_worlds_per_session = 2;
+  config.limits.max_avatars_per_world = 3;
+  config.limits.max_avatars = 4;
+  config.limits.max_queue = 2;
+  config.limits.max_subscriptions = 1;
+  config.limits.max_sessions_per_address = 2;
+  TestServer server(config);
+  const auto reached = [&](Limit limit) { return server.metrics().Sum(limit); };
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto a = client.Join("a");
+  const auto b = client.Join("b");
+  ASSERT_TRUE(a && b);
+  client.Send(protocol::JoinWorld{.seq = client.NextSeq(), .name = "c"});
+  EXPECT_EQ(client.Await<Reply>()->code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kWorldsPerSession), 1u);
+
+  auto spawned = client.Spawn(a->world, {{}, {}, {}, {}});
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->accepted, 3u);
+  EXPECT_EQ(spawned->items[3].code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kAvatarsPerWorld), 1u);
+  spawned = client.Spawn(b->world, {{}, {}});
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->accepted, 1u);
+  EXPECT_EQ(reached(Limit::kAvatars), 1u);
+  // What is removed makes room.
+  client.Send(protocol::Remove{.seq = client.NextSeq(), .world = a->world, .avatars = {1, 2}});
+  ASSERT_TRUE(client.Await<Reply>());
+  EXPECT_EQ(client.Spawn(b->world, {{}, {}})->accepted, 2u);
+
+  const auto requested = client.Request(a->world, Steps(3, 8, 0.5));
+  ASSERT_TRUE(requested);
+  EXPECT_EQ(requested->accepted, 2u);
+  ASSERT_EQ(requested->items.size(), 6u);
+  EXPECT_EQ(requested->items[0].code, StatusCode::kQueueFull);
+  EXPECT_EQ(reached(Limit::kQueue), 6u);
+
+  ASSERT_EQ(client.Observe(a->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
+  EXPECT_EQ(client.Observe(a->world, 2, PoseMode::kFull)->code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kSubscriptions), 1u);
+
+  RawClient second = server.Connect();
+  ASSERT_TRUE(second.SayHello());
+  second.Send(protocol::JoinWorld{.seq = second.NextSeq(), .name = "c"});
+  EXPECT_EQ(second.Await<Reply>()->code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kWorlds), 1u);
+
+  RawClient third = server.Connect();
+  third.Send(protocol::Hello{.client_name = "third"});
+  const auto notice = third.Await<protocol::ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kSessionsPerAddress), 1u);
+}
+
+TEST(ServerLimits, SessionsOfAll) {
+  server::Config config = TestConfig();
+  config.limits.max_sessions = 1;
+  TestServer server(config);
+  RawClient first = server.Connect();
+  ASSERT_TRUE(first.SayHello());
+  RawClient second = server.Connect();
+  second.Send(protocol::Hello{.client_name = "second"});
+  const auto notice = second.Await<protocol::ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kLimitReached);
+  EXPECT_EQ(server.metrics().Sum(Limit::kSessions), 1u);
+  // One that ends makes room.
+  first.Send(protocol::Goodbye{});
+  ASSERT_TRUE(first.AwaitClose());
+  EXPECT_TRUE(Eventually([&] {
+    RawClient next = server.Connect();
+    next.Send(protocol::Hello{.client_name = "next"});
+    const auto answer = next.Receive();
+    return answer && std::holds_alternative<protocol::Welcome>(*answer);
+  }));
+}
+
+TEST(ServerLimits, Handshakes) {
+  server::Config config = TestConfig();
+  config.limits.max_handshakes = 2;
+  TestServer server(config);
+  const RawClient first = server.Connect();
+  const RawClient second = server.Connect();
+  RawClient third = server.Connect();
+  EXPECT_TRUE(third.AwaitClose());
+  EXPECT_EQ(server.metrics().Sum(Limit::kHandshakes), 1u);
+}
+
+TEST(ServerLimits, ItemsASecond) {
+  server::Config config = TestConfig();
+  config.limits.requests_per_s = 1;
+  config.limits.request_burst = 10;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_EQ(client.Spawn(world->world, {{.avatar = 1}})->code, StatusCode::kOk);
+  EXPECT_EQ(client.Request(world->world, Steps(1, 8, 0.5))->code, StatusCode::kOk);
+  const auto refused = client.Request(world->world, Steps(1, 9, 0.5));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, StatusCode::kLimitReached);
+  EXPECT_EQ(refused->accepted, 0u);
+  EXPECT_EQ(server.metrics().Sum(Limit::kRequestsPerSecond), 1u);
+}
+
+TEST(ServerLimits, MessagesASecondSlowAClientDownButAllAreAnswered) {
+  server::Config config = TestConfig();
+  config.limits.messages_per_s = 100;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  constexpr std::uint64_t kPings = 150;
+  for (std::uint64_t i = 1; i <= kPings; ++i) client.Send(protocol::Ping{.nonce = i});
+  for (std::uint64_t i = 1; i <= kPings; ++i) {
+    const auto pong = client.Await<protocol::Pong>();
+    ASSERT_TRUE(pong);
+    EXPECT_EQ(pong->nonce, i);
+  }
+  EXPECT_GT(server.metrics().Sum(Limit::kMessagesPerSecond), 0u);
+}
+
+TEST(ServerLimits, PendingCommandsWaitForTheirTurn) {
+  server::Config config = TestConfig();
+  config.limits.max_pending_commands = 4;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  constexpr int kCommands = 40;
+  for (int i = 0; i < kCommands; ++i) {
+    client.Send(
+        protocol::CancelQueue{.seq = client.NextSeq(), .world = world->world, .avatars = {1}});
+  }
+  for (int i = 0; i < kCommands; ++i) {
+    const auto reply = client.Await<Reply>();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->accepted, 1u);
+  }
+  EXPECT_GT(server.metrics().Sum(Limit::kPendingCommands), 0u);
+}
+
+// ---- memory
+
+TEST(ServerMemory, AnAvatarCostsWhatTheServersPageSays) {
+  const auto library = server::LoadLibrary("builtin");
+  ASSERT_TRUE(library);
+  auto world = std::make_shared<server::World>();
+  world->library = *library;
+  server::AvatarBudget budget(10'000, 10'000);
+  ThreadMetrics metrics;
+  const server::TickClock clock(server::TickClock::Clock::time_point{}, 60.0);
+  server::WorldShard shard(world, 0, 1, 256, clock, budget, metrics);
+  constexpr std::size_t kAvatars = 1000;
+  const std::size_t before = counted_memory::LiveBytes();
+  server::SpawnPart spawn;
+  server::RequestPart walk;
+  for (std::uint32_t i = 0; i < kAvatars; ++i) {
+    ASSERT_EQ(budget.Reserve(*world), server::AvatarBudget::Verdict::kOk);
+    spawn.items.push_back({i, {.avatar = i + 1}});
+    for (const protocol::RequestItem& step : Steps(i + 1, 8, 0.5)) walk.items.push_back({i, step});
+  }
+  const std::size_t parts = counted_memory::LiveBytes() - before;
+  EXPECT_EQ(shard.Execute({.world = world, .part = spawn}, 1).accepted, kAvatars);
+  const std::size_t standing = counted_memory::LiveBytes() - before - parts;
+  EXPECT_EQ(shard.Execute({.world = world, .part = walk}, 1).accepted, 8 * kAvatars);
+  for (std::uint64_t tick = 1; tick < 30; ++tick) shard.Advance(tick, 1);
+  const std::size_t walking = counted_memory::LiveBytes() - before - parts;
+  std::printf("an avatar of %d joints: %zu bytes standing, %zu walking with 8 requests queued\n",
+              (*library)->skeleton().joint_count(), standing / kAvatars, walking / kAvatars);
+  EXPECT_LT(walking / kAvatars, 16u << 10);
+}
+
+// ---- slow readers
+
+TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
+  server::Config config = TestConfig(2);
+  config.tick_hz = 240.0;  // the same load in a quarter of the time
+  config.limits.socket_send_buffer_bytes = 64 << 10;
+  TestServer server(config);
+  RawClient controller = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  std::vector<protocol::SpawnItem> crowd(200);
+  ASSERT_EQ(controller.Spawn(world->world, crowd)->accepted, 200u);
+  std::vector<protocol::RequestItem> walk;
+  for (AvatarNumber avatar = 1; avatar <= 200; ++avatar) {
+    std::ranges::copy(Steps(avatar, 40, 0.4), std::back_inserter(walk));
+  }
+  ASSERT_EQ(controller.Request(world->world, walk)->accepted, walk.size());
+
+  RawClient good = server.Connect();
+  RawClient stuck = server.Connect(4096);
+  ASSERT_TRUE(good.SayHello());
+  ASSERT_TRUE(stuck.SayHello());
+  ASSERT_TRUE(good.Join("w", protocol::Role::kObserver));
+  ASSERT_TRUE(stuck.Join("w", protocol::Role::kObserver));
+  ASSERT_TRUE(good.Observe(world->world, 1, PoseMode::kQuantised));
+  ASSERT_TRUE(stuck.Observe(world->world, 1, PoseMode::kFull, true));
+
+  // The good one reads while the other one does not; then both views of memory, early and late.
+  const auto read_until_dropped = [&](std::uint64_t dropped) {
+    std::uint64_t last_tick = 0;
+    while (server.metrics().Sum(&ThreadMetrics::batches_dropped) < dropped) {
+      const auto batch = good.Await<protocol::PoseBatch>();
+      if (!batch) break;
+      last_tick = std::max(last_tick, batch->info.tick);
+    }
+    return last_tick;
+  };
+  const std::uint64_t early_tick = read_until_dropped(50);
+  ASSERT_GE(server.metrics().Sum(&ThreadMetrics::batches_dropped), 50u);
+  const std::size_t early_bytes = counted_memory::LiveBytes();
+  const double early_mib = ResidentMiB();
+  const std::uint64_t late_tick = read_until_dropped(800);
+  ASSERT_GE(server.metrics().Sum(&ThreadMetrics::batches_dropped), 800u);
+  const std::size_t late_bytes = counted_memory::LiveBytes();
+  std::printf(
+      "a stuck observer lost %llu batches; heap %.2f -> %.2f MiB, resident %.1f -> %.1f "
+      "MiB, longest tick %.2f ms, %llu missed\n",
+      static_cast<unsigned long long>(server.metrics().Sum(&ThreadMetrics::batches_dropped)),
+      static_cast<double>(early_bytes) / (1 << 20), static_cast<double>(late_bytes) / (1 << 20),
+      early_mib, ResidentMiB(),
+      1e3 *
+          std::max(server.metrics().shard(0).tick.max_s(), server.metrics().shard(1).tick.max_s()),
+      static_cast<unsigned long long>(server.metrics().Sum(&ThreadMetrics::ticks_missed)));
+  // 800 full batches of 100 avatars would be 10 MB; events are bounded by the control buffer.
+  EXPECT_LT(late_bytes, early_bytes + config.limits.control_buffer_bytes + (std::size_t{1} << 20));
+  EXPECT_GT(late_tick, early_tick);
+
+  // When it reads again it hears what it lost, and then the present, not the past.
+  std::uint64_t told = 0;
+  std::uint64_t newest = 0;
+  while (told == 0 || newest < late_tick) {
+    const auto message = stuck.Receive();
+    ASSERT_TRUE(message);
+    if (const auto* lagging = std::get_if<protocol::Lagging>(&*message)) {
+      told = lagging->dropped_batches;
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+      newest = std::max(newest, batch->info.tick);
+    }
+  }
+  EXPECT_GT(told, 0u);
+}
+
+TEST(ServerSlowReader, IsDisconnectedWhenItTakesNothingForTooLong) {
+  server::Config config = TestConfig(1);
+  config.limits.write_timeout_s = 0.2;
+  config.limits.socket_send_buffer_bytes = 4096;
+  TestServer server(config);
+  RawClient client = server.Connect(4096);
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, std::vector<protocol::SpawnItem>(500)));
+  ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kFull));
+  EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(Limit::kWriteTimeout) == 1; }));
+  EXPECT_TRUE(
+      Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
+}
+
+TEST(ServerSlowReader, CommandsWaitWhileAnswersAreNotRead) {
+  server::Config config = TestConfig(1);
+  config.limits.control_buffer_bytes = 64 << 10;
+  config.limits.socket_send_buffer_bytes = 4096;
+  config.limits.messages_per_s = 1'000'000;
+  TestServer server(config);
+  RawClient client = server.Connect(4096);
+  ASSERT_TRUE(client.SayHello());
+  const std::size_t before = counted_memory::LiveBytes();
+  // Pongs pile up until the server reads no more; the last pings stay in the sockets' buffers.
+  constexpr int kPings = 100'000;
+  std::thread sender([&] {
+    for (int i = 1; i <= kPings; ++i) {
+      client.Send(protocol::Ping{.nonce = static_cast<std::uint64_t>(i)});
+    }
+  });
+  std::this_thread::sleep_for(300ms);
+  EXPECT_LT(counted_memory::LiveBytes(), before + (std::size_t{1} << 20));
+  std::uint64_t next = 1;
+  RawClient* reader = &client;
+  while (next <= kPings) {
+    const auto pong = reader->Await<protocol::Pong>();
+    ASSERT_TRUE(pong);
+    ASSERT_EQ(pong->nonce, next);
+    ++next;
+  }
+  sender.join();
+}
+
+TEST(ServerDrain, EndsThoughAClientDoesNotRead) {
+  server::Config config = TestConfig(2);
+  config.drain_timeout_s = 0.3;
+  TestServer server(config);
+  RawClient client = server.Connect(4096);
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, std::vector<protocol::SpawnItem>(500)));
+  ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kFull));
+  EXPECT_TRUE(server.DrainAndJoin());
+}
+
+TEST(ServerDrain, AnswersWhatItHasTakenOn) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  client.Send(
+      protocol::Request{.seq = client.NextSeq(), .world = world->world, .items = Steps(1, 4, 0.5)});
+  // Taken on, though not done before the next tick.
+  const auto received = [&] { return server.metrics().Sum(&ThreadMetrics::messages_received); };
+  ASSERT_TRUE(Eventually([&] { return received() >= 4; }));
+  server.server().Drain();
+  bool is_answered = false;
+  std::optional<protocol::ErrorNotice> notice =
+      client.Await<protocol::ErrorNotice>([&](const protocol::Message& message) {
+        is_answered |= std::holds_alternative<Reply>(message);
+      });
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kShuttingDown);
+  EXPECT_TRUE(is_answered);
+}
+
+}  // namespace
+}  // namespace stridewire

@@ -1,0 +1,184 @@
+#include "ops/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <set>
+
+namespace stridewire::server {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Config, DefaultsAreThoseOfTheCommandsPage) {
+  const Config config;
+  EXPECT_EQ(ToText(config.listen), "127.0.0.1:7420");
+  EXPECT_EQ(ToText(config.http), "127.0.0.1:7421");
+  EXPECT_EQ(config.library, "builtin");
+  EXPECT_EQ(config.tick_hz, 60.0);
+  EXPECT_GE(config.shard_count(), 1);
+  EXPECT_TRUE(CheckConfig(config));
+}
+
+TEST(Config, EveryKeyTakesItsOwnDefault) {
+  const Config defaults;
+  std::set<std::string> names;
+  for (const ConfigKey& key : ConfigKeys()) {
+    SCOPED_TRACE(key.name);
+    EXPECT_TRUE(names.insert(key.name).second);
+    Config config;
+    EXPECT_TRUE(key.set(config, key.get(defaults)));
+    EXPECT_EQ(key.get(config), key.get(defaults));
+  }
+}
+
+TEST(Config, EveryKeyRefusesNonsenseAndKeepsItsValue) {
+  const Config defaults;
+  for (const ConfigKey& key : ConfigKeys()) {
+    if (key.name == "data_dir" || key.name == "library") continue;  // any text may be a path
+    for (const char* nonsense : {"", "many", "1e", "-", "0x10", "nan", "inf", "-1",
+                                 "99999999999999", "1 ", " 1", "true1", "127.0.0.1", "[::1:80"}) {
+      SCOPED_TRACE(key.name + " = '" + nonsense + "'");
+      Config config;
+      const Status status = key.set(config, nonsense);
+      ASSERT_FALSE(status);
+      EXPECT_NE(status.error().text, std::string());
+      EXPECT_EQ(key.get(config), key.get(defaults));
+    }
+  }
+}
+
+TEST(Config, EveryNumberHasBothEndsOfItsRange) {
+  for (const ConfigKey& key : ConfigKeys()) {
+    if (key.is_text || key.is_flag) continue;
+    SCOPED_TRACE(key.name);
+    // "… (MIN to MAX)" is what --help says; hold it to that.
+    const auto open = key.help.rfind('(');
+    const auto middle = key.help.rfind(" to ");
+    ASSERT_NE(open, std::string::npos);
+    ASSERT_NE(middle, std::string::npos);
+    const std::string min = key.help.substr(open + 1, middle - open - 1);
+    const std::string max = key.help.substr(middle + 4, key.help.size() - middle - 5);
+    Config config;
+    EXPECT_TRUE(key.set(config, min)) << min;
+    EXPECT_TRUE(key.set(config, max)) << max;
+    EXPECT_FALSE(key.set(config, max + "0")) << max << "0";
+    EXPECT_FALSE(key.set(config, "-" + max)) << "-" << max;
+  }
+}
+
+TEST(Config, PrintsWhatItReads) {
+  Config config;
+  config.listen = {"::1", 9};
+  config.library = "a \"strange\" \\ name\n";
+  config.tick_hz = 29.97;
+  config.allow_insecure = true;
+  config.limits.max_sessions = 3;
+  config.limits.idle_timeout_s = 0.0;
+  config.worlds["hall"] = {.library = "hall.swl", .persistent = true};
+  config.worlds["a.b-c_1"] = {};
+  const std::string text = PrintConfig(config);
+  Config read;
+  const Status status = ReadConfigText(text, "printed", read);
+  ASSERT_TRUE(status) << Describe(status.error()) << "\n" << text;
+  EXPECT_EQ(PrintConfig(read), text);
+  EXPECT_EQ(read.listen, config.listen);
+  EXPECT_EQ(read.library, config.library);
+  EXPECT_EQ(read.tick_hz, 29.97);
+  EXPECT_EQ(read.worlds, config.worlds);
+  EXPECT_EQ(read.limits.idle_timeout_s, 0.0);
+}
+
+TEST(Config, FileErrorsNameFileLineAndKey) {
+  struct Case {
+    const char* text;
+    const char* where;
+    const char* what;
+  };
+  const Case cases[] = {
+      {"\nlissten = \"x:1\"", "f.toml:2: lissten", "no such key"},
+      {"listen = 7420", "f.toml:1: listen", "in quotes"},
+      {"listen = \"localhost\"", "f.toml:1: listen", "HOST:PORT"},
+      {"listen = \"h:70000\"", "f.toml:1: listen", "0 to 65535"},
+      {"tick_hz = \"60\"", "f.toml:1: tick_hz", "expected a number"},
+      {"tick_hz = 0", "f.toml:1: tick_hz", "outside its range"},
+      {"tick_hz = nan", "f.toml:1: tick_hz", "outside its range"},
+      {"shards = 1.5", "f.toml:1: shards", "whole number"},
+      {"allow_insecure = 1", "f.toml:1: allow_insecure", "true or false"},
+      {"log_level = \"loud\"", "f.toml:1: log_level", "warning"},
+      {"limits = 3", "f.toml:1: limits", "section"},
+      {"[limits]\n\nmax_session = 3", "f.toml:3: limits.max_session", "no such key"},
+      {"[limits]\nmax_sessions = 0", "f.toml:2: limits.max_sessions", "outside its range"},
+      {"max_sessions = 3", "f.toml:1: max_sessions", "no such key"},
+      {"[worlds]\nhall = 1", "f.toml:2: worlds.hall", "section"},
+      {"[worlds.\"../x\"]\nlibrary = \"a\"", "worlds.../x", "a world's name"},
+      {"[worlds.hall]\nlibrary = 1", "f.toml:2: worlds.hall.library", "in quotes"},
+      {"[worlds.hall]\nlibrary = \"\"", "f.toml:2: worlds.hall.library", "in quotes"},
+      {"[worlds.hall]\npersistent = \"yes\"", "f.toml:2: worlds.hall.persistent", "true or false"},
+      {"[worlds.hall]\nbig = true", "f.toml:2: worlds.hall.big", "no such key"},
+      {"tick_hz = = 3", "f.toml:1", "not TOML"},
+      {"a\xff = 3", "f.toml:1", "not TOML"},
+  };
+  for (const Case& bad : cases) {
+    SCOPED_TRACE(bad.text);
+    Config config;
+    const Status status = ReadConfigText(bad.text, "f.toml", config);
+    ASSERT_FALSE(status);
+    EXPECT_THAT(Describe(status.error()), HasSubstr(bad.where));
+    EXPECT_THAT(Describe(status.error()), HasSubstr(bad.what));
+  }
+}
+
+TEST(Config, AFileWithAnErrorChangesNothing) {
+  Config config;
+  EXPECT_FALSE(ReadConfigText("tick_hz = 30\nshards = \"x\"", "f", config));
+  EXPECT_EQ(config.tick_hz, 60.0);
+}
+
+TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTo) {
+  for (const char* address : {"0.0.0.0:7420", "192.168.1.2:7420", "[::]:7420", "example.org:1",
+                              "127.0.0.1.example.org:1"}) {
+    SCOPED_TRACE(address);
+    Config config;
+    config.listen = *ParseEndpoint(address);
+    const Status status = CheckConfig(config);
+    ASSERT_FALSE(status);
+    EXPECT_THAT(Describe(status.error()), HasSubstr("allow_insecure"));
+    config.allow_insecure = true;
+    EXPECT_TRUE(CheckConfig(config));
+  }
+  for (const char* address : {"127.0.0.1:0", "127.8.9.1:1", "[::1]:1", "localhost:1"}) {
+    SCOPED_TRACE(address);
+    Config config;
+    config.listen = *ParseEndpoint(address);
+    EXPECT_TRUE(CheckConfig(config));
+  }
+  Config config;
+  config.http = {"0.0.0.0", 1};
+  EXPECT_FALSE(CheckConfig(config));
+  config.http_enabled = false;
+  EXPECT_TRUE(CheckConfig(config));
+}
+
+TEST(Config, KnowsWorldNames) {
+  for (const char* name : {"a", "load-0", "A.b_c", "0"}) EXPECT_TRUE(IsWorldName(name)) << name;
+  for (const char* name : {"", ".", "..", ".hidden", "a/b", "a b", "a\n", "\xc3\xa9"}) {
+    EXPECT_FALSE(IsWorldName(name)) << name;
+  }
+  EXPECT_TRUE(IsWorldName(std::string(64, 'x')));
+  EXPECT_FALSE(IsWorldName(std::string(65, 'x')));
+}
+
+TEST(Config, ReadsAddresses) {
+  EXPECT_EQ(*ParseEndpoint("[::1]:80"), (Endpoint{"::1", 80}));
+  EXPECT_EQ(ToText(*ParseEndpoint("[::1]:80")), "[::1]:80");
+  EXPECT_EQ(*ParseEndpoint("host.name:0"), (Endpoint{"host.name", 0}));
+  for (const char* bad :
+       {"", ":", ":80", "host", "host:", "host:x", "host:-1", "host:65536", "::1:80", "[]:80"}) {
+    EXPECT_FALSE(ParseEndpoint(bad)) << bad;
+  }
+}
+
+}  // namespace
+}  // namespace stridewire::server

@@ -1,0 +1,141 @@
+#include "net/send_queue.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace stridewire::server {
+namespace {
+
+using protocol::PoseMode;
+using testing::ElementsAre;
+
+SharedFrame Frame(std::size_t bytes, int mark = 0) {
+  return std::make_shared<const std::vector<std::byte>>(bytes, static_cast<std::byte>(mark));
+}
+
+PoseDelivery Batch(std::uint64_t tick, int shard = 0, WorldId world = 1, int parts = 1,
+                   std::size_t bytes = 100, PoseMode mode = PoseMode::kFull) {
+  PoseDelivery delivery{
+      .world = world, .mode = mode, .from_shard = shard, .tick = tick, .avatar_count = 5};
+  for (int i = 0; i < parts; ++i) {
+    delivery.parts.push_back(Frame(bytes, static_cast<int>(tick)));
+  }
+  return delivery;
+}
+
+std::vector<int> Marks(const SendQueue::Gathered& gathered) {
+  std::vector<int> marks;
+  for (const SharedFrame& frame : gathered.frames) marks.push_back(static_cast<int>((*frame)[0]));
+  return marks;
+}
+
+TEST(SendQueue, SendsControlInOrderAndBeforePoses) {
+  SendQueue queue(1000, 4);
+  EXPECT_EQ(queue.PushPoses(Batch(50)), 0u);
+  queue.PushControl(Frame(10, 1));
+  queue.PushControl(Frame(10, 2));
+  SendQueue::Gathered out;
+  queue.Gather(1 << 20, out);
+  EXPECT_THAT(Marks(out), ElementsAre(1, 2, 50));
+  EXPECT_EQ(out.bytes, 120u);
+  EXPECT_EQ(out.poses, 5u);
+  EXPECT_EQ(out.batches, 1u);
+  EXPECT_TRUE(queue.empty());
+  EXPECT_EQ(queue.control_bytes(), 0u);
+}
+
+TEST(SendQueue, ASlowObserverKeepsTheLatestTicks) {
+  SendQueue queue(1000, 3);
+  std::size_t dropped = 0;
+  for (int tick = 1; tick <= 100; ++tick) {
+    dropped += queue.PushPoses(Batch(static_cast<std::uint64_t>(tick)));
+    EXPECT_LE(queue.waiting_batches(), 3u);
+  }
+  EXPECT_EQ(dropped, 97u);
+  SendQueue::Gathered out;
+  queue.Gather(1 << 20, out);
+  EXPECT_THAT(Marks(out), ElementsAre(98, 99, 100));
+}
+
+TEST(SendQueue, CountsThePartsOfABatchThatWereNotSentYet) {
+  SendQueue queue(1000, 1);
+  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1, 4, 100)), 0u);
+  SendQueue::Gathered out;
+  queue.Gather(150, out);  // two parts: the second crosses the mark
+  EXPECT_EQ(out.frames.size(), 2u);
+  EXPECT_EQ(out.poses, 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(2)), 2u);
+  queue.Gather(1000, out);
+  EXPECT_THAT(Marks(out), ElementsAre(2));
+}
+
+TEST(SendQueue, OneWorldDoesNotDriveOutAnother) {
+  SendQueue queue(1000, 2);
+  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, 1, 1)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 2)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1, 1, 100, PoseMode::kQuantised)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(2, 0, 1)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(3, 0, 1)), 1u);
+  EXPECT_EQ(queue.waiting_batches(), 5u);
+  queue.DropPoses(1, PoseMode::kFull);
+  EXPECT_EQ(queue.waiting_batches(), 2u);
+  queue.DropAllPoses();
+  EXPECT_TRUE(queue.empty());
+}
+
+TEST(SendQueue, EveryLaneGetsItsTurn) {
+  SendQueue queue(1000, 8);
+  for (int shard = 0; shard < 4; ++shard) {
+    for (int i = 0; i < 8; ++i) {
+      EXPECT_EQ(queue.PushPoses(Batch(static_cast<std::uint64_t>(10 * shard + i), shard)), 0u);
+    }
+  }
+  // Room for one batch a time: four turns take one of each lane, each its oldest.
+  std::set<int> first;
+  SendQueue::Gathered out;
+  for (int turn = 0; turn < 4; ++turn) {
+    queue.Gather(1, out);
+    ASSERT_EQ(out.frames.size(), 1u);
+    first.insert(Marks(out)[0]);
+  }
+  EXPECT_THAT(first, ElementsAre(0, 10, 20, 30));
+}
+
+TEST(SendQueue, NeitherControlNorPosesStarve) {
+  SendQueue queue(1 << 20, 4);
+  for (int i = 0; i < 1000; ++i) queue.PushControl(Frame(1000));
+  EXPECT_EQ(queue.PushPoses(Batch(7)), 0u);
+  SendQueue::Gathered out;
+  queue.Gather(10'000, out);
+  EXPECT_EQ(out.frames.size(), 11u);
+  EXPECT_EQ(Marks(out).back(), 7);
+  EXPECT_FALSE(queue.empty());
+}
+
+TEST(SendQueue, RefusesEventsBeyondTheBudgetButNeverReplies) {
+  SendQueue queue(1000, 4);
+  EXPECT_TRUE(queue.PushEvents(Frame(600)));
+  EXPECT_FALSE(queue.PushEvents(Frame(401)));
+  EXPECT_TRUE(queue.PushEvents(Frame(400)));
+  queue.PushControl(Frame(500));
+  EXPECT_EQ(queue.control_bytes(), 1500u);
+  EXPECT_FALSE(queue.PushEvents(Frame(1)));
+}
+
+TEST(SendQueue, SharesFrames) {
+  const PoseDelivery batch = Batch(1);
+  SendQueue a(1000, 4);
+  SendQueue b(1000, 4);
+  EXPECT_EQ(a.PushPoses(batch) + b.PushPoses(batch), 0u);
+  SendQueue::Gathered out_a;
+  SendQueue::Gathered out_b;
+  a.Gather(1000, out_a);
+  b.Gather(1000, out_b);
+  EXPECT_EQ(out_a.frames[0].get(), out_b.frames[0].get());
+}
+
+}  // namespace
+}  // namespace stridewire::server

@@ -1,0 +1,324 @@
+#include "world/world_shard.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "stridewire/protocol/decode.h"
+#include "toy_library.h"
+#include "world/world_directory.h"
+
+namespace stridewire::server {
+namespace {
+
+using protocol::EventType;
+using protocol::PoseMode;
+using protocol::StatusCode;
+using testing::ElementsAre;
+
+const TickClock kClock(TickClock::Clock::time_point{}, 60.0);
+
+struct Bench {
+  explicit Bench(int shard_count = 1, int max_queue = 8)
+      : world(MakeWorld()), shard(world, 0, shard_count, max_queue, kClock, budget, metrics) {}
+
+  static std::shared_ptr<World> MakeWorld() {
+    auto world = std::make_shared<World>();
+    world->id = 3;
+    world->name = "bench";
+    world->library = MakeToyLibrary();
+    return world;
+  }
+
+  template <typename Part>
+  CommandResult Do(Part part, SessionId session = 1) {
+    if constexpr (std::is_same_v<Part, SpawnPart>) {
+      for (std::size_t i = 0; i < part.items.size(); ++i) {
+        EXPECT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
+      }
+    }
+    return shard.Execute({.world = world, .session = session, .seq = 1, .part = std::move(part)},
+                         ++tick);
+  }
+  CommandResult Spawn(std::vector<AvatarNumber> numbers, SessionId session = 1) {
+    SpawnPart part;
+    for (const AvatarNumber number : numbers) {
+      part.items.push_back({static_cast<std::uint32_t>(part.items.size()), {.avatar = number}});
+    }
+    return Do(std::move(part), session);
+  }
+  CommandResult Walk(AvatarNumber avatar, int steps) {
+    RequestPart part;
+    for (int i = 0; i < steps; ++i) {
+      part.items.push_back({static_cast<std::uint32_t>(i),
+                            {.avatar = avatar,
+                             .request_id = static_cast<std::uint64_t>(i + 1),
+                             .movement = protocol::StepMovement{.length_m = 0.4}}});
+    }
+    return Do(std::move(part));
+  }
+  void Watch(std::uint16_t every_full, std::uint16_t every_quantised = 0, bool events = true) {
+    shard.SetInterest({.world = world,
+                       .shard = 0,
+                       .every_full = every_full,
+                       .every_quantised = every_quantised,
+                       .events = events});
+  }
+  std::vector<protocol::Event> Events() {
+    const auto events = shard.TakeEvents();
+    return events == nullptr ? std::vector<protocol::Event>() : *events;
+  }
+
+  AvatarBudget budget{100, 100};
+  ThreadMetrics metrics;
+  std::shared_ptr<World> world;
+  WorldShard shard;
+  std::uint64_t tick = 0;
+};
+
+// A frame on a multiple of 8 bytes, with what it says.
+struct Decoded {
+  explicit Decoded(const SharedFrame& frame) : bytes(*frame) {
+    const auto view = protocol::ParseFrame(bytes, protocol::Sender::kServer);
+    EXPECT_TRUE(view);
+    auto message = protocol::DecodeMessage(*view);
+    EXPECT_TRUE(message);
+    batch = std::get<protocol::PoseBatch>(*message);
+  }
+  std::vector<std::byte> bytes;
+  protocol::PoseBatch batch;
+};
+
+TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
+  Bench punctual;
+  Bench late;
+  for (Bench* bench : {&punctual, &late}) {
+    bench->Watch(1);
+    bench->Spawn({1});
+    bench->Walk(1, 3);
+  }
+  protocol::PoseBatchEncoder encoder;
+  for (std::uint64_t tick = 10; tick <= 100; ++tick) punctual.shard.Advance(tick, 1);
+  for (std::uint64_t tick = 16; tick <= 100; tick += 7) late.shard.Advance(tick, 7);
+  PoseDelivery a;
+  PoseDelivery b;
+  ASSERT_TRUE(punctual.shard.Encode(PoseMode::kFull, 100, encoder, a));
+  ASSERT_TRUE(late.shard.Encode(PoseMode::kFull, 100, encoder, b));
+  EXPECT_EQ(*a.parts[0], *b.parts[0]);
+  // Events say when they happened, not when the tick came.
+  const auto punctual_events = punctual.Events();
+  const auto late_events = late.Events();
+  EXPECT_GT(punctual_events.size(), 5u);
+  EXPECT_EQ(punctual_events, late_events);
+}
+
+TEST(WorldShard, EventsCarryTheServersTime) {
+  Bench bench;
+  bench.Watch(0);
+  bench.Spawn({1});
+  bench.Walk(1, 1);
+  for (std::uint64_t tick = 1000; tick < 1200; ++tick) {
+    bench.shard.Advance(tick, 1);
+    for (const protocol::Event& event : bench.Events()) {
+      if (event.type == EventType::kSpawned || event.type == EventType::kAccepted) continue;
+      EXPECT_EQ(event.tick, tick);
+      EXPECT_LE(event.time_s, kClock.TickTime(tick) + 1e-9);
+      EXPECT_GE(event.time_s, kClock.TickTime(tick - 1) - 1e-9);
+    }
+  }
+}
+
+TEST(WorldShard, ListsAvatarsInOrderAndFlagsTheNewOnes) {
+  Bench bench;
+  bench.Watch(1);
+  bench.Spawn({9, 2, 5});
+  protocol::PoseBatchEncoder encoder;
+  PoseDelivery delivery;
+  bench.shard.Advance(bench.tick, 1);
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kQuantised, bench.tick, encoder, delivery));
+  const Decoded decoded(delivery.parts.at(0));
+  EXPECT_EQ(decoded.batch.info.world, 3u);
+  EXPECT_EQ(decoded.batch.info.tick, bench.tick);
+  EXPECT_THAT(decoded.batch.avatars, ElementsAre(2u, 5u, 9u));
+  EXPECT_THAT(decoded.batch.flags, testing::Each(3));
+}
+
+TEST(WorldShard, KeepsTheFlagUntilTheRarestObserverHasSeenIt) {
+  Bench bench;
+  bench.Watch(1, 5);
+  bench.Spawn({1});
+  const std::uint64_t spawned = bench.tick;
+  protocol::PoseBatchEncoder encoder;
+  int flagged = 0;
+  for (std::uint64_t tick = spawned; tick < spawned + 20; ++tick) {
+    bench.shard.Advance(tick, 1);
+    PoseDelivery delivery;
+    ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, tick, encoder, delivery));
+    flagged += Decoded(delivery.parts[0]).batch.flags[0] & protocol::kPoseDiscontinuity;
+  }
+  EXPECT_EQ(flagged, 5);
+}
+
+TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
+  Bench bench;
+  bench.Watch(1);
+  std::vector<AvatarNumber> numbers(90);
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<AvatarNumber>(i + 1);
+  bench.Spawn(numbers);
+  bench.shard.Advance(bench.tick, 1);
+  protocol::PoseBatchEncoder encoder({1 << 20, 4096});  // 31 of these avatars a frame
+  PoseDelivery delivery;
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, encoder, delivery));
+  ASSERT_GT(delivery.parts.size(), 2u);
+  std::vector<AvatarNumber> seen;
+  for (std::size_t part = 0; part < delivery.parts.size(); ++part) {
+    EXPECT_LE(delivery.parts[part]->size(), 4096 + protocol::kFrameHeaderBytes);
+    const Decoded decoded(delivery.parts[part]);
+    EXPECT_EQ(decoded.batch.info.part, part);
+    EXPECT_EQ(decoded.batch.info.parts, delivery.parts.size());
+    std::ranges::copy(decoded.batch.avatars, std::back_inserter(seen));
+  }
+  EXPECT_EQ(seen, numbers);
+}
+
+TEST(WorldShard, SaysOnceThatItIsEmpty) {
+  Bench bench;
+  bench.Watch(1);
+  protocol::PoseBatchEncoder encoder;
+  PoseDelivery delivery;
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 1, encoder, delivery));
+  bench.Spawn({1});
+  EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, 2, encoder, delivery));
+  bench.Do(RemovePart{{{0, 1}}});
+  delivery = {};
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, 3, encoder, delivery));
+  EXPECT_TRUE(Decoded(delivery.parts[0]).batch.avatars.empty());
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 4, encoder, delivery));
+}
+
+TEST(WorldShard, ReleasesWhatASessionSpawnedUnlessTheWorldIsPersistent) {
+  for (const bool persistent : {false, true}) {
+    Bench bench;
+    bench.world->persistent = persistent;
+    bench.Watch(0);
+    bench.Spawn({1, 2}, 10);
+    bench.Spawn({3}, 20);
+    bench.Do(ReleasePart{}, 10);
+    EXPECT_EQ(bench.shard.avatar_count(), persistent ? 3u : 1u);
+    EXPECT_EQ(bench.budget.total(), persistent ? 3 : 1);
+    EXPECT_EQ(bench.world->avatar_count.load(), persistent ? 3 : 1);
+    EXPECT_EQ(std::ranges::count(bench.Events(), EventType::kRemoved, &protocol::Event::type),
+              persistent ? 0 : 2);
+  }
+}
+
+TEST(WorldShard, RefusedSpawnsCostNoPlace) {
+  Bench bench;
+  bench.Spawn({1});
+  const CommandResult result = bench.Spawn({1, 2});
+  EXPECT_EQ(result.accepted, 1u);
+  EXPECT_EQ(result.items[0].code, StatusCode::kAvatarExists);
+  EXPECT_EQ(bench.budget.total(), 2);
+}
+
+TEST(WorldShard, KeepsNoEventsForNobody) {
+  Bench bench;
+  bench.Spawn({1});
+  bench.Walk(1, 1);
+  bench.shard.Advance(1, 1);
+  EXPECT_EQ(bench.shard.TakeEvents(), nullptr);
+  EXPECT_FALSE(bench.shard.HasInterest());
+}
+
+TEST(WorldShard, BoundsAnAvatarsQueue) {
+  Bench bench(1, 4);
+  bench.Spawn({1});
+  const CommandResult result = bench.Walk(1, 10);
+  EXPECT_EQ(result.accepted, 4u);
+  ASSERT_EQ(result.items.size(), 6u);
+  EXPECT_EQ(result.items[0].index, 4u);
+  EXPECT_EQ(result.items[0].code, StatusCode::kQueueFull);
+  EXPECT_EQ(bench.metrics.requests_rejected.value(), 6u);
+}
+
+TEST(WorldShard, AnsweresOnlyTicksItsObserversWant) {
+  Bench bench(2);
+  bench.shard.SetInterest({.world = bench.world, .shard = 1, .every_quantised = 3});
+  EXPECT_TRUE(bench.shard.WantsPoses(1, PoseMode::kQuantised, 6));
+  EXPECT_FALSE(bench.shard.WantsPoses(1, PoseMode::kQuantised, 7));
+  EXPECT_FALSE(bench.shard.WantsPoses(1, PoseMode::kFull, 6));
+  EXPECT_FALSE(bench.shard.WantsPoses(0, PoseMode::kQuantised, 6));
+}
+
+TEST(World, NumbersNeverMeet) {
+  World world;
+  EXPECT_EQ(NextNumber(world), 1u);
+  NoteNumber(world, 10);
+  NoteNumber(world, 4);
+  EXPECT_EQ(NextNumber(world), 11u);
+  NoteNumber(world, ~AvatarNumber{0});
+  EXPECT_EQ(NextNumber(world), 0u);
+}
+
+TEST(TickClock, TicksAreDueWhenTheClockSaysSo) {
+  using std::chrono::nanoseconds;
+  for (const double hz : {1.0, 29.97, 60.0, 1000.0}) {
+    const auto epoch = TickClock::Clock::time_point(nanoseconds(123'456'789));
+    const TickClock clock(epoch, hz);
+    EXPECT_EQ(clock.TickAt(epoch - std::chrono::hours(1)), 0u);
+    // Years of them, without drift.
+    for (const std::uint64_t tick : {1ull, 2ull, 59ull, 1'000'003ull, 5'000'000'000ull}) {
+      EXPECT_EQ(clock.TickAt(clock.Due(tick)), tick);
+      EXPECT_EQ(clock.TickAt(clock.Due(tick) - nanoseconds(1)), tick - 1);
+      EXPECT_NEAR(clock.ServerTime(clock.Due(tick)), clock.TickTime(tick), 1e-6);
+    }
+  }
+}
+
+TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
+  Config config;
+  config.library = "toy";
+  config.limits.max_worlds = 2;
+  config.worlds["hall"] = {.library = "", .persistent = true};
+  Libraries libraries;
+  libraries.Add("toy", MakeToyLibrary());
+  WorldDirectory directory(config, libraries);
+  const auto hall = directory.Join("hall");
+  ASSERT_TRUE(hall);
+  EXPECT_TRUE((*hall)->persistent);
+  EXPECT_EQ(*directory.Join("hall"), *hall);
+  const auto other = directory.Join("other");
+  ASSERT_TRUE(other);
+  EXPECT_FALSE((*other)->persistent);
+  EXPECT_EQ(directory.Join("third").error().code, StatusCode::kLimitReached);
+  EXPECT_EQ(directory.Join("no/name").error().code, StatusCode::kInvalidArgument);
+  EXPECT_TRUE(directory.DropEmpty().empty());
+  directory.Leave((*hall)->id);
+  EXPECT_TRUE(directory.DropEmpty().empty());  // one is still in it
+  directory.Leave((*hall)->id);
+  (*hall)->avatar_count = 1;
+  EXPECT_TRUE(directory.DropEmpty().empty());  // nobody is, but an avatar lives
+  (*hall)->avatar_count = 0;
+  EXPECT_THAT(directory.DropEmpty(), ElementsAre((*hall)->id));
+  EXPECT_TRUE(directory.Join("third"));
+}
+
+TEST(AvatarBudget, KeepsBothLimits) {
+  AvatarBudget budget(2, 3);
+  World a;
+  World b;
+  using Verdict = AvatarBudget::Verdict;
+  EXPECT_EQ(budget.Reserve(a), Verdict::kOk);
+  EXPECT_EQ(budget.Reserve(a), Verdict::kOk);
+  EXPECT_EQ(budget.Reserve(a), Verdict::kWorldFull);
+  EXPECT_EQ(budget.Reserve(b), Verdict::kOk);
+  EXPECT_EQ(budget.Reserve(b), Verdict::kServerFull);
+  EXPECT_EQ(b.avatar_count.load(), 1);
+  budget.Release(a);
+  EXPECT_EQ(budget.Reserve(b), Verdict::kOk);
+}
+
+}  // namespace
+}  // namespace stridewire::server
