@@ -77,9 +77,9 @@ else
   for capture in 01_01 01_03; do
     [[ -r $captures/$capture.bvh ]] || fail "no $captures/$capture.bvh; it comes with the package assimp-testmodels"
   done
-  echo "Building a library from two captures (jumps; steps, a ladder, turns):"
+  echo "Building a library from two captures; $out/library.log tells what was left out and why:"
   "$bin/stridewire-library" build --out "$library" "$captures"/{01_01,01_03}.bvh 2>&1 |
-    tee "$out/library.log" | sed '/^ *note:/d; /^ *$/d; s/^/    /' || fail "building the library failed"
+    tee "$out/library.log" | sed -n '/^[^ ]/s/^/    /p' || fail "building the library failed"
 fi
 
 # ---- every process is ended, on every way out
@@ -132,7 +132,7 @@ TOML
 start server "$out/server.log" "$bin/stridewired" --config "$out/stridewired.toml"
 ready=
 for ((i = 0; i < 300; ++i)); do
-  ready=$(grep -m 1 '^ready ' "$out/server.log" || true)
+  ready=$(grep -sm 1 '^ready ' "$out/server.log" || true)
   [[ -z $ready ]] || break
   alive server || { tail -n 5 "$out/server.log" >&2; fail "the server did not start, see $out/server.log"; }
   sleep 0.1
