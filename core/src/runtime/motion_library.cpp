@@ -23,6 +23,22 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
+// What a person's movement stays far below; beyond it arithmetic in floats would suffer.
+constexpr double kMaxParameter = 100.0;  // metres, radians
+constexpr double kMaxRootM = 1000.0;     // from the base frame
+constexpr double kMaxYawRad = 100.0;
+constexpr double kMaxMovementS = 600.0;
+constexpr double kMinScale = 1e-7;
+
+// A parameter may lie this far outside the hull of the examples, in parts of its extent: what
+// requests are clamped to (10 %) and something over.
+constexpr double kReach = 0.5;
+// The most that |w| may sum to there, by a bound that grows with the examples: 230 for 70 captured
+// steps in five parameters, whose real sum stays below 3.
+constexpr double kMaxWeightSum = 1e6;
+// Sums of weights are 1 to this.
+constexpr double kSumTolerance = 1e-7;
+
 Vec3 ToVec3(const fb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 // A number that arithmetic can be done with: finite and of a size that cannot overflow later.
@@ -34,6 +50,10 @@ bool IsSane(T value) {
 template <typename T>
 bool AllSane(std::span<const T> values) {
   return std::all_of(values.begin(), values.end(), [](T v) { return IsSane(v); });
+}
+
+bool AllWithin(std::span<const double> values, double limit) {
+  return std::all_of(values.begin(), values.end(), [&](double v) { return std::fabs(v) <= limit; });
 }
 
 template <typename T>
@@ -94,14 +114,72 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
     if (group.FindParameter(name) >= 0) {
       return Fail(ErrorCode::kMalformed, "a parameter stands twice", parameter->name());
     }
-    if (!IsSane(parameter->min()) || !IsSane(parameter->max()) || !IsSane(parameter->centre()) ||
-        !IsSane(parameter->scale()) || !(parameter->scale() > 1e-9) ||
-        parameter->min() > parameter->max()) {
+    // Not "a > b", so that what is not a number fails as well.
+    if (!(parameter->min() >= -kMaxParameter && parameter->max() <= kMaxParameter &&
+          parameter->min() <= parameter->max() && parameter->scale() >= kMinScale &&
+          parameter->scale() <= kMaxParameter)) {
       return Fail(ErrorCode::kMalformed, "a parameter's range or scale makes no sense",
                   parameter->name());
     }
     group.parameters.push_back(
         {name, parameter->min(), parameter->max(), parameter->centre(), parameter->scale()});
+  }
+  return {};
+}
+
+// Sites lie where the parameters say, so that requests clamped to their hull stay within reach.
+Status CheckSites(const MotionGroup& group) {
+  const std::size_t d = group.parameters.size();
+  for (std::size_t l = 0; l < d; ++l) {
+    const Parameter& parameter = group.parameters[l];
+    const double slack = 1e-9 * kMaxParameter;
+    const auto outside = [&](double value) {
+      return !(value >= parameter.min - slack && value <= parameter.max + slack);
+    };
+    if (outside(parameter.centre)) {
+      return Fail(ErrorCode::kMalformed, "a parameter's centre is outside its range",
+                  static_cast<std::int64_t>(parameter.name));
+    }
+    for (std::size_t s = 0; s < group.sites.size() / d; ++s) {
+      if (outside(group.sites[s * d + l])) {
+        return Fail(ErrorCode::kMalformed, "a site is outside its parameters' range",
+                    static_cast<std::int64_t>(s));
+      }
+    }
+  }
+  return {};
+}
+
+// Every row of the weight tables sums to what makes all weights sum to 1 wherever they are taken,
+// and no weight can grow out of hand within reach of the examples.
+Status CheckWeightTables(const MotionGroup& group) {
+  const auto n = static_cast<std::size_t>(group.example_count);
+  double bound = 0.0;  // of the sum of |w|
+  const auto check = [&](std::span<const double> row, double wanted, double factor) {
+    double sum = 0.0;
+    double size = 0.0;
+    for (const double value : row) {
+      sum += value;
+      size += std::fabs(value);
+    }
+    bound += factor * size;
+    return std::fabs(sum - wanted) <= kSumTolerance * std::max(1.0, size);
+  };
+  bool sums_are_right = check(group.linear.first(n), 1.0, 1.0);
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    const Parameter& p = group.parameters[l];
+    const double extent = (1.0 + kReach) * (p.max - p.min) / p.scale;
+    sums_are_right &= check(group.linear.subspan((l + 1) * n, n), 0.0, extent);
+  }
+  for (std::size_t s = 0; s < group.dilations.size(); ++s) {
+    sums_are_right &= check(group.radial.subspan(s * n, n), 0.0, 2.0 / 3.0);  // B <= 2/3
+  }
+  for (std::size_t s = 0; s < group.site_weights.size(); s += n) {
+    sums_are_right &= check(group.site_weights.subspan(s, n), 1.0, 0.0);
+  }
+  if (!sums_are_right) return Fail(ErrorCode::kMalformed, "a group's weights do not sum to 1");
+  if (!(bound <= kMaxWeightSum)) {
+    return Fail(ErrorCode::kMalformed, "a group's weights are far too large");
   }
   return {};
 }
@@ -131,7 +209,8 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
   for (const double dilation : group.dilations) {
     if (!(dilation > 1e-9)) return Fail(ErrorCode::kMalformed, "a dilation is not positive");
   }
-  return {};
+  if (Status status = CheckSites(group); !status) return status;
+  return CheckWeightTables(group);
 }
 
 Status LoadTimes(const fb::Group& from, MotionGroup& group) {
@@ -158,7 +237,8 @@ Status LoadTimes(const fb::Group& from, MotionGroup& group) {
   if (group.keytimes_s.size() != n * (intervals + 1) || group.heading_change_rad.size() != n) {
     return Fail(ErrorCode::kMalformed, "a group's time tables have the wrong size");
   }
-  if (!AllSane(group.heading_change_rad) || !AllSane(group.keytimes_s)) {
+  if (!AllWithin(group.heading_change_rad, kMaxYawRad) ||
+      !AllWithin(group.keytimes_s, kMaxMovementS)) {
     return Fail(ErrorCode::kMalformed, "a group's time tables hold a number out of range");
   }
   for (std::size_t e = 0; e < n; ++e) {
@@ -187,6 +267,12 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
   }
   for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
     const float* x = &group.grid[row];
+    const float* root = x + layout.root();
+    if (!(std::fabs(root[0]) <= kMaxRootM && std::fabs(root[1]) <= kMaxRootM &&
+          std::fabs(root[2]) <= kMaxRootM && std::fabs(root[3]) <= kMaxYawRad)) {
+      return Fail(ErrorCode::kMalformed, "a stored root is out of range",
+                  static_cast<std::int64_t>(row / row_floats));
+    }
     for (std::size_t j = 0; j < joints; ++j) {
       const double norm = std::sqrt(double{x[j]} * x[j] + double{x[padded + j]} * x[padded + j] +
                                     double{x[2 * padded + j]} * x[2 * padded + j] +
@@ -375,8 +461,9 @@ Status MotionLibrary::Load() {
     }
   }
   const Vec3 stand = stand_pose_.root_position_m;
-  if (!IsSane(stand.x) || !IsSane(stand.y) || !IsSane(stand.z)) {
-    return Fail(ErrorCode::kMalformed, "the stand pose's root is not finite");
+  if (!(std::fabs(stand.x) <= kMaxRootM && std::fabs(stand.y) <= kMaxRootM &&
+        std::fabs(stand.z) <= kMaxRootM)) {
+    return Fail(ErrorCode::kMalformed, "the stand pose's root is out of range");
   }
 
   if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
