@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "example_clusters.h"
+#include "grid_cells.h"
 #include "grid_example.h"
 #include "library_file.h"
 #include "motion_library_generated.h"
@@ -16,8 +17,6 @@
 
 namespace stridewire {
 namespace {
-
-
 
 fb::Vec3 ToFb(const Vec3& v) { return {v.x, v.y, v.z}; }
 
@@ -60,21 +59,6 @@ Status ValidateExample(const RawGroup& group, const RawExample& example, int joi
     return failed(ErrorCode::kOutOfRange, "the heading change is not finite");
   }
   return {};
-}
-
-// About `fps` cells a second of the mean interval, so that keytimes fall on grid points.
-std::vector<int> ChooseCells(const RawGroup& group, double fps) {
-  const std::size_t intervals = group.examples.front().keytimes_s.size() - 1;
-  std::vector<int> cells(intervals);
-  for (std::size_t i = 0; i < intervals; ++i) {
-    double mean_s = 0.0;
-    for (const RawExample& example : group.examples) {
-      mean_s += (example.keytimes_s[i + 1] - example.keytimes_s[i]) /
-                static_cast<double>(group.examples.size());
-    }
-    cells[i] = std::clamp(static_cast<int>(std::lround(mean_s * fps)), 2, 400);
-  }
-  return cells;
 }
 
 struct ParameterRange {
@@ -124,7 +108,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
       }
     }
 
-    const std::vector<int> cells = ChooseCells(group, grid_fps);
+    const std::vector<int> cells = ChooseCells(group, grid_fps, layout);
     std::vector<GridExample> examples;
     examples.reserve(group.examples.size());
     for (const RawExample& example : group.examples) {

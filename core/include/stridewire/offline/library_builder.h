@@ -14,7 +14,8 @@ namespace stridewire {
 /// Turns a RawLibrary into library bytes: one generic-time grid a group, examples resampled on it,
 /// hemispheres aligned, near duplicates averaged, weights solved.
 struct LibraryBuilder {
-  double grid_fps = 30.0;  ///< About this many grid cells a second of mean duration.
+  double grid_fps = 30.0;  ///< About this many grid cells a second of mean duration, more where
+                           ///< an example would be stored worse than 0.45 degrees otherwise.
   /// Average examples whose parameters all lie within this of each other (complete linkage),
   /// metres (a radian counts 0.5 m). 0: none.
   double cluster_diameter = 0.0;
