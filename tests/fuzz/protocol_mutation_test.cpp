@@ -70,7 +70,7 @@ struct Mutator {
         break;
       }
       case 4: {
-        static const double kEdges[] = {NAN, -NAN, INFINITY, -INFINITY, -0.0, 5e-324, 1.7e308};
+        static constexpr double kEdges[] = {NAN, -NAN, INFINITY, -INFINITY, -0.0, 5e-324, 1.7e308};
         Store(bytes, at / 8 * 8, &kEdges[Below(std::size(kEdges))], 8);
         break;
       }
@@ -91,7 +91,7 @@ struct Mutator {
         std::memcpy(bytes.data() + at, other.data() + from, size);
         break;
       }
-      case 9: {  // the payload of one type under the number of another
+      default: {  // the payload of one type under the number of another
         static constexpr std::uint16_t kRanges[][2] = {{1, 10}, {32, 1}, {64, 8}};
         const auto& [first, types] = kRanges[Below(3)];
         const auto type = static_cast<std::uint16_t>(first + Below(types));
@@ -156,7 +156,8 @@ void ExpectMeaning(const Message& message, Sender sender) {
 TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
   const std::uint64_t count = FromEnvironment("STRIDEWIRE_FUZZ_COUNT", 5000);
   const std::uint64_t seed = FromEnvironment("STRIDEWIRE_FUZZ_SEED", std::random_device{}());
-  std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << " STRIDEWIRE_FUZZ_COUNT=" << count << std::endl;
+  std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << " STRIDEWIRE_FUZZ_COUNT=" << count << '\n'
+            << std::flush;
 
   std::vector<Bytes> frames;
   for (const SampleMessage& sample : SampleMessages()) {
@@ -218,7 +219,7 @@ TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
 TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
   const std::uint64_t count = FromEnvironment("STRIDEWIRE_FUZZ_COUNT", 5000);
   const std::uint64_t seed = FromEnvironment("STRIDEWIRE_FUZZ_SEED", std::random_device{}());
-  std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << std::endl;
+  std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << '\n' << std::flush;
   std::mt19937_64 random(seed);
   std::uint64_t decoded = 0;
   for (std::uint64_t i = 0; i < count; ++i) {

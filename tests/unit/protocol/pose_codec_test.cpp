@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -57,8 +58,11 @@ TEST(PoseCodec, FullGivesBackTheSameBits) {
   Vec3 root_back;
   std::vector<Quat> back(31);
   ASSERT_TRUE(DecodePose(PoseMode::kFull, bytes, root_back, back));
-  EXPECT_EQ(std::memcmp(&root, &root_back, sizeof(root)), 0);
-  EXPECT_EQ(std::memcmp(rotations.data(), back.data(), 31 * sizeof(Quat)), 0);
+  // Bytes, since a zero may have a sign.
+  EXPECT_TRUE(std::ranges::equal(std::as_bytes(std::span(&root, 1)),
+                                 std::as_bytes(std::span(&root_back, 1))));
+  EXPECT_TRUE(
+      std::ranges::equal(std::as_bytes(std::span(rotations)), std::as_bytes(std::span(back))));
 }
 
 TEST(PoseCodec, QuantisedRotationStaysWithinItsStatedError) {
