@@ -1,0 +1,282 @@
+// What movements, poses and messages cost on one core, on `builtin` and on every library named after
+// the options: stridewire-bench [--benchmark_…] [LIBRARY.swl …]
+//
+// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole length,
+// here 30 of them.
+#include <benchmark/benchmark.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "stridewire/base/version.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/protocol/pose_codec.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/movement.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+using protocol::PoseMode;
+
+constexpr int kFramesAStep = 30;
+constexpr int kVariations = 256;  ///< Different parameters, so that no branch is learnt by heart.
+constexpr int kCrowd = 1000;
+constexpr double kTickS = 1.0 / 60.0;
+
+/// Parameters inside the hull of a group's examples: random means of three sites.
+std::vector<std::vector<double>> Parameters(const MotionGroup& group) {
+  std::mt19937 random(1);
+  std::vector<std::vector<double>> all(kVariations);
+  for (std::vector<double>& parameters : all) {
+    parameters.assign(static_cast<std::size_t>(group.parameter_count()), 0.0);
+    double sum = 0.0;
+    for (int corner = 0; corner < 3; ++corner) {
+      const double share = 0.05 + static_cast<double>(random() % 1000) / 1000.0;
+      const auto site =
+          group.site(static_cast<int>(random() % static_cast<unsigned>(group.example_count)));
+      for (std::size_t i = 0; i < parameters.size(); ++i) parameters[i] += share * site[i];
+      sum += share;
+    }
+    for (double& value : parameters) value /= sum;
+  }
+  return all;
+}
+
+void AddGroupCounters(benchmark::State& state, const MotionGroup& group) {
+  state.counters["examples"] = group.example_count;
+  state.counters["parameters"] = group.parameter_count();
+}
+
+void StartMovementAlone(benchmark::State& state, const Library& library, int group_index) {
+  const MotionGroup& group = library->group(group_index);
+  const auto parameters = Parameters(group);
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  Movement movement;
+  std::size_t i = 0;
+  for (auto _ : state) {
+    StartMovement(group, group_index, parameters[i++ % kVariations], {}, scratch, movement);
+    benchmark::DoNotOptimize(movement.weights.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+  AddGroupCounters(state, group);
+}
+
+void SynthesizeStep(benchmark::State& state, const Library& library, int group_index) {
+  const MotionGroup& group = library->group(group_index);
+  const auto parameters = Parameters(group);
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  Movement movement;
+  movement.difference = Pose(library->skeleton().joint_count());
+  Pose pose(library->skeleton().joint_count());
+  GridCache cache(library->layout());
+  std::size_t i = 0;
+  for (auto _ : state) {
+    StartMovement(group, group_index, parameters[i++ % kVariations], {}, scratch, movement);
+    cache.Clear();
+    for (int frame = 0; frame < kFramesAStep; ++frame) {
+      const double time_s = movement.duration_s() * frame / (kFramesAStep - 1);
+      EvaluateMovement(group, library->layout(), movement, time_s, cache, pose);
+      benchmark::DoNotOptimize(pose.rotations.data());
+    }
+  }
+  state.SetItemsProcessed(state.iterations());
+  AddGroupCounters(state, group);
+}
+
+void EvaluatePose(benchmark::State& state, const Library& library, int group_index) {
+  const MotionGroup& group = library->group(group_index);
+  const auto parameters = Parameters(group);
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  Movement movement;
+  movement.difference = Pose(library->skeleton().joint_count());
+  Pose pose(library->skeleton().joint_count());
+  GridCache cache(library->layout());
+  StartMovement(group, group_index, parameters[0], {}, scratch, movement);
+  double time_s = 0.0;
+  for (auto _ : state) {
+    EvaluateMovement(group, library->layout(), movement, time_s, cache, pose);
+    benchmark::DoNotOptimize(pose.rotations.data());
+    time_s += kTickS;
+    if (time_s > movement.duration_s()) {
+      time_s = 0.0;
+      cache.Clear();
+    }
+  }
+  state.SetItemsProcessed(state.iterations());
+  AddGroupCounters(state, group);
+}
+
+/// A crowd that walks without an end; what is random is the same every time.
+class Crowd {
+ public:
+  Crowd(const Library& library, int size) {
+    for (int i = 0; i < size; ++i) {
+      avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)});
+      Refill(avatars_.back());
+      // Each at another place of its walk.
+      for (int tick = 0; tick < i % 120; ++tick) avatars_.back().Advance(kTickS);
+    }
+  }
+
+  void Advance() {
+    for (Avatar& avatar : avatars_) {
+      if (avatar.queue_size() < 2) Refill(avatar);
+      avatar.Advance(kTickS);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+
+ private:
+  void Refill(Avatar& avatar) {
+    for (int i = 0; i < 64; ++i) {
+      const double length_m = 0.45 + 0.2 * static_cast<double>(random_() % 1000) / 1000.0;
+      (void)avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = length_m}});
+    }
+  }
+
+  std::mt19937 random_{1};
+  std::vector<Avatar> avatars_;
+};
+
+void AdvanceCrowd(benchmark::State& state, const Library& library) {
+  Crowd crowd(library, kCrowd);
+  for (auto _ : state) crowd.Advance();
+  state.SetItemsProcessed(state.iterations() * kCrowd);
+}
+
+void EncodePose(benchmark::State& state, const Library& library, PoseMode mode) {
+  const Crowd crowd(library, 64);
+  std::vector<std::byte> bytes(
+      protocol::PoseBytes(mode, static_cast<std::size_t>(library->skeleton().joint_count())));
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const ConstPoseSpan pose = crowd.avatars()[i++ % 64].pose();
+    if (!protocol::EncodePose(mode, pose.root_position_m, pose.rotations, bytes)) {
+      return state.SkipWithError("a pose cannot be encoded");
+    }
+    benchmark::DoNotOptimize(bytes.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(bytes.size()));
+}
+
+void DecodePose(benchmark::State& state, const Library& library, PoseMode mode) {
+  const Crowd crowd(library, 64);
+  const auto joints = static_cast<std::size_t>(library->skeleton().joint_count());
+  std::vector<std::vector<std::byte>> bytes(64);
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    const ConstPoseSpan pose = crowd.avatars()[i].pose();
+    bytes[i].resize(protocol::PoseBytes(mode, joints));
+    if (!protocol::EncodePose(mode, pose.root_position_m, pose.rotations, bytes[i])) {
+      return state.SkipWithError("a pose cannot be encoded");
+    }
+  }
+  Pose pose(static_cast<int>(joints));
+  std::size_t i = 0;
+  for (auto _ : state) {
+    if (!protocol::DecodePose(mode, bytes[i++ % 64], pose.root_position_m, pose.rotations)) {
+      return state.SkipWithError("a pose cannot be decoded");
+    }
+    benchmark::DoNotOptimize(pose.rotations.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(bytes[0].size()));
+}
+
+/// What a tick encodes for a crowd: one frame, to be shared by all observers.
+void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
+  const Crowd crowd(library, kCrowd);
+  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchInfo info;
+  info.world = 1;
+  info.tick = 1;
+  info.mode = mode;
+  info.joint_count = static_cast<std::uint16_t>(library->skeleton().joint_count());
+  std::vector<std::byte> frame;
+  for (auto _ : state) {
+    frame.clear();
+    Status status = encoder.Begin(info);
+    protocol::AvatarNumber number = 0;
+    for (const Avatar& avatar : crowd.avatars()) {
+      if (!status) break;
+      status = encoder.Add(++number, 0, avatar.pose().root_position_m, avatar.pose().rotations);
+    }
+    if (status) status = encoder.Finish(frame);
+    if (!status) return state.SkipWithError(status.error().text);
+    benchmark::DoNotOptimize(frame.data());
+  }
+  state.SetItemsProcessed(state.iterations() * kCrowd);
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(frame.size()));
+}
+
+/// How large a library is: no time, only counters.
+void MeasureLibrary(benchmark::State& state, const Library& library) {
+  int examples = 0;
+  for (const MotionGroup& group : library->groups()) examples += group.example_count;
+  for (auto _ : state) benchmark::DoNotOptimize(examples);
+  state.counters["library_bytes"] = static_cast<double>(library->bytes().size());
+  state.counters["examples"] = examples;
+  state.counters["bytes_per_example"] =
+      static_cast<double>(library->bytes().size()) / static_cast<double>(examples);
+}
+
+void OpenLibraryAgain(benchmark::State& state, const std::string& name) {
+  for (auto _ : state) benchmark::DoNotOptimize(OpenLibrary(name));
+}
+
+template <typename... Arguments>
+void Register(const std::string& name, Arguments&&... arguments) {
+  benchmark::RegisterBenchmark(name.c_str(), std::forward<Arguments>(arguments)...)
+      ->Unit(benchmark::kMicrosecond);
+}
+
+/// `path`: how to open it again.
+void RegisterAll(const std::string& path, const Library& library) {
+  const std::string name = std::filesystem::path(path).stem().string();
+  Register(name + "/library", MeasureLibrary, library);
+  Register(name + "/open", OpenLibraryAgain, path);
+  for (int i = 0; i < static_cast<int>(library->groups().size()); ++i) {
+    const std::string kind =
+        std::string(MovementKindName(library->group(i).kind)) + "_" + std::to_string(i);
+    Register(name + "/start_movement/" + kind, StartMovementAlone, library, i);
+    Register(name + "/synthesize_step/" + kind, SynthesizeStep, library, i);
+    Register(name + "/evaluate_pose/" + kind, EvaluatePose, library, i);
+  }
+  Register(name + "/advance_avatar", AdvanceCrowd, library);
+  for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+    const std::string mode_name = mode == PoseMode::kFull ? "full" : "quantised";
+    Register(name + "/encode_pose/" + mode_name, EncodePose, library, mode);
+    Register(name + "/encode_batch/" + mode_name, EncodeBatch, library, mode);
+    Register(name + "/decode_pose/" + mode_name, DecodePose, library, mode);
+  }
+}
+
+int Run(int argc, char** argv) {
+  benchmark::AddCustomContext("stridewire", kVersion);
+  benchmark::Initialize(&argc, argv);
+  std::vector<std::string> names = {"builtin"};
+  for (int i = 1; i < argc; ++i) names.emplace_back(argv[i]);
+  for (const std::string& name : names) {
+    Expected<Library> library = OpenLibrary(name);
+    if (!library) {
+      std::fprintf(stderr, "stridewire-bench: %s\n", Describe(library.error()).c_str());
+      return 2;
+    }
+    RegisterAll(name, *library);
+  }
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}
+
+}  // namespace
+}  // namespace stridewire
+
+int main(int argc, char** argv) { return stridewire::Run(argc, argv); }
