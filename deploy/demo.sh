@@ -78,7 +78,7 @@ else
     [[ -r $captures/$capture.bvh ]] || fail "no $captures/$capture.bvh; it comes with the package assimp-testmodels"
   done
   echo "Building a library from two captures; $out/library.log tells what was left out and why:"
-  "$bin/stridewire-library" build --out "$library" "$captures"/{01_01,01_03}.bvh 2>&1 |
+  "$bin/stridewire-library" build --mirror --out "$library" "$captures"/{01_01,01_03}.bvh 2>&1 |
     tee "$out/library.log" | sed -n '/^[^ ]/s/^/    /p' || fail "building the library failed"
 fi
 

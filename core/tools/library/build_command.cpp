@@ -103,6 +103,7 @@ std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
 int RunBuild(const BuildCommand& command) {
   AssembleOptions options;
   options.mirror = command.mirror;
+  options.unsettled_jumps = command.all;
   if (const std::string wrong = ParseKinds(command.kinds, options); !wrong.empty()) {
     return Complain(wrong);
   }
