@@ -1,0 +1,189 @@
+// stridewire-record: watches one avatar and writes what it saw as BVH.
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <system_error>
+
+#include "recorder.h"
+#include "stridewire/base/version.h"
+#include "stridewire/offline/bvh_writer.h"
+
+namespace stridewire::record {
+namespace {
+
+constexpr int kExitFailure = 1;
+constexpr int kExitBadUsage = 2;
+
+int Complain(const std::string& sentence, int exit_code) {
+  std::fprintf(stderr, "stridewire-record: %s\n", sentence.c_str());
+  return exit_code;
+}
+
+/// HOST:PORT, [ADDRESS]:PORT; false: it is neither.
+bool ParseAddress(const std::string& text, Options& options) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string::npos || colon == 0) return false;
+  std::string host = text.substr(0, colon);
+  if (host.front() == '[' && host.back() == ']') {
+    host = host.substr(1, host.size() - 2);
+  } else if (host.find(':') != std::string::npos) {
+    return false;  // An IPv6 address without brackets: where does the port begin?
+  }
+  const char* first = text.data() + colon + 1;
+  const char* last = text.data() + text.size();
+  unsigned port = 0;
+  const auto [end, failed] = std::from_chars(first, last, port);
+  if (failed != std::errc() || end != last || port < 1 || port > 65535) return false;
+  if (host.empty() || host.size() > 255) return false;
+  options.host = host;
+  options.port = static_cast<std::uint16_t>(port);
+  return true;
+}
+
+/// Before anything is recorded: can the file be written? Empty: it seems so.
+std::string OutputError(const std::filesystem::path& path) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(path, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    return "is there already and no plain file";
+  }
+  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder, ignored)) return "its folder is not there";
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return "its folder cannot be written to";
+  return {};
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app{"Watches one avatar over the network and writes what it saw as BVH."};
+  app.name("stridewire-record");
+  app.set_version_flag("--version", std::string("stridewire-record ") + kVersion);
+  app.footer(
+      "Example: ten seconds of avatar 1 of world \"plaza\", just as the server has them\n"
+      "  stridewire-record --connect 127.0.0.1:7420 --world plaza --avatar 1 --seconds 10 "
+      "--out walk.bvh\n"
+      "Exit code: 0 recorded, 2 bad usage, 1 anything else; when the recording was cut short, "
+      "what\n"
+      "there is has been written.\n");
+
+  Options options;
+  std::string address;
+  std::string mode = "full";
+  std::string out;
+  bool json = false;
+  app.add_option("--connect", address, "The server, HOST:PORT")->required();
+  app.add_option("--world", options.world, "Name of the world")->required();
+  app.add_option("--avatar", options.avatar, "Number of the avatar in its world")->required();
+  app.add_option("--seconds", options.seconds, "How long, from its first pose on (up to 3600)")
+      ->required();
+  app.add_option("--out", out, "The BVH file to write")->required();
+  app.add_option("--mode", mode, "How poses travel: full, quantised or movement")
+      ->capture_default_str();
+  app.add_option("--timeout-s", options.timeout_s,
+                 "Longest wait for the server, the avatar and each pose (0.1 to 600)")
+      ->capture_default_str();
+  app.add_option("--token", options.token, "Token, where the server asks for one")
+      ->envname("STRIDEWIRE_TOKEN");
+  app.add_flag("--json", json, "Report as one JSON object on stdout");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::CallForVersion& version) {
+    return app.exit(version);
+  } catch (const CLI::ParseError& error) {
+    return Complain(std::string(error.what()) + " (see --help)", kExitBadUsage);
+  }
+
+  if (!ParseAddress(address, options)) {
+    return Complain("--connect: \"" + address + "\" is not HOST:PORT", kExitBadUsage);
+  }
+  if (options.world.empty() || options.world.size() > STRIDEWIRE_MAX_NAME_BYTES) {
+    return Complain("--world: a name has 1 to 64 bytes", kExitBadUsage);
+  }
+  if (options.avatar == 0) return Complain("--avatar: numbers begin at 1", kExitBadUsage);
+  if (!(options.seconds > 0.0 && options.seconds <= 3600.0)) {
+    return Complain("--seconds: is not a number above 0 and up to 3600", kExitBadUsage);
+  }
+  if (!(options.timeout_s >= 0.1 && options.timeout_s <= 600.0)) {
+    return Complain("--timeout-s: is not a number from 0.1 to 600", kExitBadUsage);
+  }
+  if (mode == "full") {
+    options.mode = STRIDEWIRE_FULL;
+  } else if (mode == "quantised") {
+    options.mode = STRIDEWIRE_QUANTISED;
+  } else if (mode == "movement") {
+    return Complain("--mode: movement is not supported yet", kExitBadUsage);
+  } else {
+    return Complain("--mode: \"" + mode + "\" is not full, quantised or movement", kExitBadUsage);
+  }
+  if (const std::string wrong = out.empty() ? "is empty" : OutputError(out); !wrong.empty()) {
+    return Complain("--out: " + out + ": " + wrong, kExitBadUsage);
+  }
+
+  const bool terminal = ::isatty(STDERR_FILENO) != 0;
+  const auto recording = Record(options, [&](double recorded_s) {
+    if (terminal) std::fprintf(stderr, "\rrecorded %.1f of %g s", recorded_s, options.seconds);
+  });
+  if (terminal) std::fputs("\r\033[K", stderr);
+  if (!recording) {
+    return Complain(Describe(recording.error()),
+                    recording.error().code == ErrorCode::kIo ? kExitFailure : kExitBadUsage);
+  }
+  if (Status written = WriteBvh(recording->skeleton, recording->clip, std::filesystem::path(out));
+      !written) {
+    return Complain(Describe(written.error()), kExitFailure);
+  }
+
+  const int frames = recording->clip.frame_count();
+  if (json) {
+    const nlohmann::ordered_json report = {
+        {"world", options.world},
+        {"avatar", options.avatar},
+        {"mode", mode},
+        {"out", out},
+        {"frames", frames},
+        {"fps", recording->clip.fps},
+        {"seconds", frames / recording->clip.fps},
+        {"joints", recording->clip.joint_count},
+        {"library_hash", recording->library_hash},
+        {"first_tick", recording->first_tick},
+        {"ticks_missing", recording->ticks_missing},
+        {"discontinuities", recording->discontinuities},
+        {"bytes_received", recording->bytes_received},
+        {"cut_short", recording->cut_short.empty() ? nlohmann::ordered_json()
+                                                   : nlohmann::ordered_json(recording->cut_short)}};
+    std::printf("%s\n",
+                report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  } else {
+    std::printf("%s: %d frames at %g a second, %d joints, mode %s, from tick %llu\n", out.c_str(),
+                frames, recording->clip.fps, recording->clip.joint_count, mode.c_str(),
+                static_cast<unsigned long long>(recording->first_tick));
+    if (recording->ticks_missing > 0) {
+      std::printf("%llu ticks did not arrive and were filled in from their neighbours\n",
+                  static_cast<unsigned long long>(recording->ticks_missing));
+    }
+  }
+  if (!recording->cut_short.empty()) {
+    return Complain("cut short: " + recording->cut_short, kExitFailure);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace stridewire::record
+
+int main(int argc, char** argv) {
+  try {
+    return stridewire::record::Run(argc, argv);
+  } catch (const std::exception& error) {
+    return stridewire::record::Complain(error.what(), stridewire::record::kExitFailure);
+  }
+}

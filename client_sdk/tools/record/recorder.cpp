@@ -1,0 +1,230 @@
+#include "recorder.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace stridewire::record {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto kPollInterval = std::chrono::milliseconds(10);
+
+Vec3 ToVec3(const float (&v)[3]) { return {v[0], v[1], v[2]}; }
+
+Skeleton ToSkeleton(const client::Skeleton& s) {
+  Skeleton skeleton;
+  for (const stridewire_joint& j : s.joints) {
+    skeleton.joints.push_back({j.name, j.parent, ToVec3(j.offset_m)});
+  }
+  for (const stridewire_end_site& e : s.end_sites) {
+    skeleton.end_sites.push_back({static_cast<int>(e.joint), ToVec3(e.offset_m)});
+  }
+  for (int side = 0; side < 2; ++side) {
+    const stridewire_leg& leg = s.legs[side];
+    skeleton.legs[side] = {leg.hip,
+                           leg.knee,
+                           leg.ankle,
+                           leg.ball,
+                           ToVec3(leg.ball_offset_m),
+                           ToVec3(leg.toe_tip_offset_m)};
+  }
+  return skeleton;
+}
+
+class Recorder {
+ public:
+  Recorder(const Options& options, client::Client client)
+      : options_(options), client_(std::move(client)) {}
+
+  Expected<Recording> Run(const std::function<void(double)>& progress) {
+    if (Status status = Subscribe(); !status) return std::unexpected(status.error());
+    heard_ = Clock::now();
+    while (!done_ && recording_.cut_short.empty()) {
+      if (Status status = HandleEvents(); !status) return std::unexpected(status.error());
+      if (Status status = TakePoses(); !status) return std::unexpected(status.error());
+      if (Clock::now() - heard_ > std::chrono::duration<double>(options_.timeout_s)) {
+        if (Status status = OnSilence(); !status) return std::unexpected(status.error());
+      }
+      if (progress && frame_count() > 0) progress(frame_count() / hz_);
+      if (!done_) std::this_thread::sleep_for(kPollInterval);
+    }
+    recording_.clip.fps = hz_;
+    recording_.bytes_received = client_.Statistics().bytes_received;
+    return std::move(recording_);
+  }
+
+ private:
+  [[nodiscard]] int frame_count() const { return recording_.clip.frame_count(); }
+
+  [[nodiscard]] std::string Where() const {
+    return options_.host + ":" + std::to_string(options_.port);
+  }
+
+  Status Subscribe() {
+    if (!client_.Connect(options_.host, options_.port)) {
+      return Fail(ErrorCode::kInvalidArgument, "is no place to connect to", Where());
+    }
+    stridewire_observation observation{};
+    observation.mode = options_.mode;
+    observation.every_n_ticks = 1;
+    observation.avatars = &options_.avatar;
+    observation.avatar_count = 1;
+    if (!client_.JoinWorld(options_.world, STRIDEWIRE_OBSERVER, world_) ||
+        !client_.Observe(world_, observation)) {
+      return Fail(ErrorCode::kInvalidArgument, "the world or the avatar has no possible name",
+                  client_.LastError());
+    }
+    return {};
+  }
+
+  Status HandleEvents() {
+    stridewire_event event;
+    while (client_.PollEvent(event)) {
+      const std::string text =
+          event.text[0] != '\0' ? event.text : stridewire_status_text(event.status);
+      switch (event.type) {
+        case STRIDEWIRE_EVENT_CONNECT_FAILED:
+          if (!was_ready_) return Fail(ErrorCode::kIo, "cannot connect", Where() + ": " + text);
+          break;
+        case STRIDEWIRE_EVENT_CONNECTED: was_ready_ = true; break;
+        case STRIDEWIRE_EVENT_CLOSED: return End("the server ended the connection: " + text);
+        case STRIDEWIRE_EVENT_REPLY:
+          if (event.status != STRIDEWIRE_OK) return End("the server refused: " + text);
+          break;
+        case STRIDEWIRE_EVENT_SESSION_LOST:
+          // Another life of the server: its ticks and avatars have nothing to do with ours.
+          if (frame_count() > 0) return End("the server was restarted or forgot us");
+          break;
+        default: break;
+      }
+    }
+    return {};
+  }
+
+  /// Ends with what there is, or fails if that is nothing.
+  Status End(std::string why) {
+    if (frame_count() == 0) return Fail(ErrorCode::kIo, "nothing was recorded", std::move(why));
+    recording_.cut_short = std::move(why);
+    return {};
+  }
+
+  Status OnSilence() {
+    const std::string avatar =
+        "avatar " + std::to_string(options_.avatar) + " of world \"" + options_.world + "\"";
+    char seconds[32];
+    std::snprintf(seconds, sizeof seconds, "%g s", options_.timeout_s);
+    if (!was_ready_) return End(Where() + " did not answer within " + seconds);
+    if (frame_count() == 0) return End(avatar + " did not show up within " + seconds);
+    return End("no pose of " + avatar + " came for " + seconds);
+  }
+
+  Status Describe() {
+    client::Skeleton skeleton;
+    if (!client_.GetSkeleton(world_, skeleton)) {
+      return Fail(ErrorCode::kIo, "the server did not describe the figure", Where());
+    }
+    recording_.skeleton = ToSkeleton(skeleton);
+    recording_.library_hash = skeleton.library_hash;
+    recording_.clip.joint_count = recording_.skeleton.joint_count();
+    hz_ = skeleton.tick_hz;
+    const double wanted = std::max(1.0, std::round(options_.seconds * hz_));
+    // What is kept has a limit, whatever rate a server claims.
+    if (wanted > kMaxFrames) {
+      return Fail(ErrorCode::kLimitExceeded, "that many frames are too many", "--seconds",
+                  static_cast<std::int64_t>(wanted));
+    }
+    wanted_frames_ = static_cast<int>(wanted);
+    return {};
+  }
+
+  Status TakePoses() {
+    for (;;) {
+      if (!client_.NextPose(world_, options_.avatar, last_tick_, pose_) || pose_.missing()) break;
+      if (frame_count() == 0) {
+        if (Status status = Describe(); !status) return status;
+        recording_.first_tick = pose_.tick;
+      } else {
+        Fill();
+      }
+      if (frame_count() < wanted_frames_) Append();
+      last_tick_ = pose_.tick;
+      heard_ = Clock::now();
+      if (frame_count() >= wanted_frames_) {
+        done_ = true;
+        break;
+      }
+    }
+    return {};
+  }
+
+  void Append() {
+    if (pose_.discontinuity != 0 && frame_count() > 0) ++recording_.discontinuities;
+    Clip& clip = recording_.clip;
+    clip.root_positions_m.push_back(ToVec3(pose_.root_position_m));
+    for (const client::Quaternion& q : pose_.rotations)
+      clip.rotations.emplace_back(q.w, q.x, q.y, q.z);
+  }
+
+  /// Frames for the ticks between the last pose and this one: on a straight line, or, where the
+  /// motion is not continuous, the last pose again.
+  void Fill() {
+    Clip& clip = recording_.clip;
+    const std::uint64_t ticks = pose_.tick - last_tick_;
+    const int from = frame_count() - 1;
+    for (std::uint64_t i = 1; i < ticks && frame_count() < wanted_frames_; ++i) {
+      ++recording_.ticks_missing;
+      const float u = pose_.discontinuity != 0
+                          ? 0.0f
+                          : static_cast<float>(static_cast<double>(i) / static_cast<double>(ticks));
+      const Vec3 root_m = clip.root_positions_m[static_cast<std::size_t>(from)];
+      clip.root_positions_m.push_back(root_m + u * (ToVec3(pose_.root_position_m) - root_m));
+      for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
+        const Quat a = clip.frame(from).rotations[j];
+        const client::Quaternion& q = pose_.rotations[j];
+        Quat b(q.w, q.x, q.y, q.z);
+        if (Dot(a, b) < 0.0f) b = -b;
+        clip.rotations.push_back(Normalise(a + (b - a) * u));
+      }
+    }
+  }
+
+  static constexpr double kMaxFrames = 1e6;
+
+  const Options& options_;
+  client::Client client_;
+  stridewire_world world_ = 0;
+  bool was_ready_ = false;
+  bool done_ = false;
+  double hz_ = 60.0;
+  int wanted_frames_ = 1;
+  std::uint64_t last_tick_ = UINT64_MAX;
+  Clock::time_point heard_;
+  client::Pose pose_;
+  Recording recording_;
+};
+
+}  // namespace
+
+Expected<Recording> Record(const Options& options, const std::function<void(double)>& progress) {
+  client::Options client_options;
+  client_options.client_name = "stridewire-record";
+  client_options.auth_token = options.token.empty() ? nullptr : options.token.c_str();
+  client_options.pose_history = 2048;
+  client_options.connect_timeout_s = options.timeout_s;
+  stridewire_status status = STRIDEWIRE_OK;
+  auto client = client::Client::Create(client_options, &status);
+  if (!client) {
+    return Fail(ErrorCode::kInvalidArgument, "no client can be made",
+                std::string(stridewire_status_text(status)));
+  }
+  return Recorder(options, std::move(*client)).Run(progress);
+}
+
+}  // namespace stridewire::record
