@@ -1,0 +1,484 @@
+// The client library, stridewire-record and the sample against the real server, process by process.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "child_process.h"
+#include "run_program.h"
+#include "scratch_folder.h"
+#include "stridewire/base/version.h"
+#include "stridewire/client.hpp"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire {
+namespace {
+
+using client::Client;
+using client::Options;
+using nlohmann::json;
+using test::ChildProcess;
+using test::RunProgram;
+using test::ScratchFolder;
+using testing::HasSubstr;
+
+constexpr double kPatience_s = 60.0;
+
+bool Eventually(const std::function<bool()>& holds) {
+  const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+  while (!holds()) {
+    if (std::chrono::steady_clock::now() > until) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+/// stridewired as a process of its own.
+class Daemon {
+ public:
+  explicit Daemon(std::uint16_t port = 0)
+      : process_(STRIDEWIRE_SERVER, {"--listen", "127.0.0.1:" + std::to_string(port), "--http",
+                                     "127.0.0.1:0", "--shards", "2", "--log-level", "warning"}) {
+    const auto line = process_.ReadLineThatBegins("ready ");
+    if (!line) return;
+    const std::size_t at = line->find("listen=127.0.0.1:");
+    if (at == std::string::npos) return;
+    port_ = static_cast<std::uint16_t>(std::stoi(line->substr(at + 17)));
+  }
+  [[nodiscard]] std::uint16_t port() const { return port_; }
+  [[nodiscard]] std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+  void KillHard() {
+    process_.Signal(SIGKILL);
+    (void)process_.Wait();
+  }
+  int Terminate() {
+    process_.Signal(SIGTERM);
+    return process_.Wait();
+  }
+
+ private:
+  ChildProcess process_;
+  std::uint16_t port_ = 0;
+};
+
+/// A client in world "plaza".
+class User {
+ public:
+  explicit User(std::uint16_t port, stridewire_role role = STRIDEWIRE_CONTROLLER,
+                const Options& options = {})
+      : client(Client::Create(options).value()) {
+    EXPECT_TRUE(client.Connect("127.0.0.1", port));
+    EXPECT_TRUE(client.JoinWorld("plaza", role, world));
+  }
+
+  std::optional<stridewire_event> Next(stridewire_event_type type) {
+    const auto until =
+        std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
+    stridewire_event event;
+    while (std::chrono::steady_clock::now() < until) {
+      while (client.PollEvent(event)) {
+        if (event.type == type) return event;
+      }
+      (void)client.WaitEvent(1.0);
+    }
+    return std::nullopt;
+  }
+
+  void Spawn(std::uint32_t count) {
+    std::vector<stridewire_spawn> spawns;
+    for (std::uint32_t a = 1; a <= count; ++a) spawns.push_back({a, {1.0 * a, 0.0, 0.0}, 0.0});
+    EXPECT_TRUE(client.Spawn(world, spawns));
+    const auto reply = Next(STRIDEWIRE_EVENT_REPLY);  // Of joining, then of this.
+    const auto second = Next(STRIDEWIRE_EVENT_REPLY);
+    ASSERT_TRUE(reply && second);
+    EXPECT_EQ(second->status, STRIDEWIRE_OK);
+    EXPECT_EQ(second->accepted, count);
+  }
+
+  /// Every pose of an avatar over so many ticks, from its first on.
+  std::vector<client::Pose> Collect(std::uint32_t avatar, std::size_t count) {
+    std::vector<client::Pose> poses;
+    std::uint64_t after = UINT64_MAX;
+    client::Pose pose;
+    EXPECT_TRUE(Eventually([&] {
+      while (poses.size() < count && client.NextPose(world, avatar, after, pose) &&
+             !pose.missing()) {
+        after = pose.tick;
+        poses.push_back(pose);
+      }
+      return poses.size() == count;
+    }));
+    return poses;
+  }
+
+  Client client;
+  stridewire_world world = 0;
+};
+
+Options LongHistory() {
+  Options options;
+  options.pose_history = 1024;
+  return options;
+}
+
+TEST(ClientAndServer, AStepAskedForComesBackAsAWalkingAvatar) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  User user(server.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_FULL));
+  std::vector<stridewire_movement> steps;
+  for (std::uint64_t r = 1; r <= 4; ++r) steps.push_back(client::Step(1, r, 0.6));
+  ASSERT_TRUE(user.client.Request(user.world, steps));
+  for (std::uint64_t r = 1; r <= 4; ++r) {
+    const auto started = user.Next(STRIDEWIRE_EVENT_STARTED);
+    ASSERT_TRUE(started);
+    EXPECT_EQ(started->request_id, r);
+    EXPECT_GT(started->applied.count, 0);
+    const auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+    ASSERT_TRUE(finished);
+    EXPECT_EQ(finished->request_id, r);
+  }
+  const auto idle = user.Next(STRIDEWIRE_EVENT_IDLE);
+  ASSERT_TRUE(idle);
+  EXPECT_GT(idle->base_position_m[2], 1.0);
+  client::Pose pose;
+  ASSERT_TRUE(Eventually([&] {
+    return user.client.LatestPose(user.world, 1, pose) && !pose.missing() && pose.standing != 0;
+  }));
+  EXPECT_GT(pose.root_position_m[2], 1.0f);
+  EXPECT_EQ(server.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AllObserversSeeTheSameAndQuantisedStaysWithinItsError) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  User user(server.port());
+  user.Spawn(1);
+  User first(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  User second(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  User coarse(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  ASSERT_TRUE(first.client.Observe(first.world, STRIDEWIRE_FULL));
+  ASSERT_TRUE(second.client.Observe(second.world, STRIDEWIRE_FULL));
+  ASSERT_TRUE(coarse.client.Observe(coarse.world, STRIDEWIRE_QUANTISED));
+  for (User* observer : {&first, &second, &coarse}) {
+    ASSERT_EQ(observer->Collect(1, 1).size(), 1u);
+  }
+  std::vector<stridewire_movement> steps;
+  for (std::uint64_t r = 1; r <= 4; ++r) steps.push_back(client::Step(1, r, 0.55, 0.1));
+  ASSERT_TRUE(user.client.Request(user.world, steps));
+  const auto a = first.Collect(1, 180);
+  const auto b = second.Collect(1, 180);
+  const auto c = coarse.Collect(1, 180);
+  ASSERT_EQ(a.size(), 180u);
+  int compared = 0;
+  double worst_rad = 0.0;
+  double worst_m = 0.0;
+  for (const auto& pose : a) {
+    for (const auto& same : b) {
+      if (same.tick != pose.tick) continue;
+      ++compared;
+      ASSERT_EQ(same.time_s, pose.time_s);
+      for (int i = 0; i < 3; ++i) ASSERT_EQ(same.root_position_m[i], pose.root_position_m[i]);
+      for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+        ASSERT_EQ(same.rotations[j].x, pose.rotations[j].x);
+        ASSERT_EQ(same.rotations[j].w, pose.rotations[j].w);
+      }
+    }
+    for (const auto& near : c) {
+      if (near.tick != pose.tick) continue;
+      for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+        const auto& p = pose.rotations[j];
+        const auto& q = near.rotations[j];
+        worst_rad = std::max(
+            worst_rad, AngleBetween(Normalise(Quat(p.w, p.x, p.y, p.z)), Quat(q.w, q.x, q.y, q.z)));
+      }
+      for (int i = 0; i < 3; ++i) {
+        worst_m = std::max(worst_m, std::abs(static_cast<double>(near.root_position_m[i]) -
+                                             static_cast<double>(pose.root_position_m[i])));
+      }
+    }
+  }
+  EXPECT_GT(compared, 60);
+  EXPECT_GT(worst_rad, 0.0);
+  EXPECT_LT(worst_rad, protocol::kMaxQuantisedAngleRad);
+  EXPECT_LE(worst_m, 0.5 / protocol::kRootStepsPerM + 1e-6);
+}
+
+TEST(ClientAndServer, RenderedPosesAreInterpolatedAllTheWay) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  Options options;
+  options.render_delay_s = 0.5;  // Machines that run tests are busy; nothing here is about speed.
+  User user(server.port(), STRIDEWIRE_CONTROLLER, options);
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_QUANTISED));
+  ASSERT_TRUE(user.client.Request(
+      user.world, {client::Step(1, 1, 0.6), client::Step(1, 2, 0.6), client::Step(1, 3, 0.6)}));
+  client::Pose pose;
+  int interpolated = 0;
+  double last_s = -1.0;
+  ASSERT_TRUE(Eventually([&] {
+    const auto time_s = user.client.RenderTime();
+    if (!time_s || !user.client.SamplePose(user.world, 1, *time_s, pose)) return false;
+    if (pose.kind == STRIDEWIRE_POSE_INTERPOLATED) {
+      ++interpolated;
+      EXPECT_GE(pose.time_s, last_s - 1e-9);
+      last_s = pose.time_s;
+    }
+    return pose.root_position_m[2] > 1.0f;
+  }));
+  EXPECT_GT(interpolated, 20);
+}
+
+TEST(ClientAndServer, AServerKilledAndRestartedIsFoundAgain) {
+  std::optional<Daemon> server(std::in_place);
+  const std::uint16_t port = server->port();
+  ASSERT_NE(port, 0);
+  Options options;
+  options.respawn = 1;
+  User user(port, STRIDEWIRE_CONTROLLER, options);
+  user.Spawn(2);
+  ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_FULL));
+  ASSERT_TRUE(user.client.Request(
+      user.world, {client::Step(1, 1, 0.6), client::Step(1, 2, 0.6), client::Step(1, 3, 0.6)}));
+  const auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+  ASSERT_TRUE(finished);
+
+  server->KillHard();
+  server.reset();
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST));
+  // Asked for while there is no server: it waits.
+  ASSERT_TRUE(user.client.Request(user.world, {client::Step(2, 9, 0.5)}));
+  server.emplace(port);
+  ASSERT_EQ(server->port(), port);
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_SESSION_LOST));
+  const auto spawned = user.Next(STRIDEWIRE_EVENT_SPAWNED);
+  ASSERT_TRUE(spawned);
+  EXPECT_EQ(spawned->avatar, 1u);
+  EXPECT_GE(spawned->base_position_m[2], finished->base_position_m[2] - 1e-9);
+  const auto started = user.Next(STRIDEWIRE_EVENT_STARTED);
+  ASSERT_TRUE(started);
+  EXPECT_EQ(started->request_id, 9u);
+  client::Pose pose;
+  EXPECT_TRUE(Eventually([&] {
+    return user.client.LatestPose(user.world, 1, pose) && !pose.missing() &&
+           user.client.ListAvatars(user.world).size() == 2;
+  }));
+  EXPECT_EQ(user.client.Statistics().connects, 2u);
+  EXPECT_EQ(user.client.Statistics().resumes, 0u);
+}
+
+TEST(ClientAndServer, AServerThatIsShutDownAndStartedAgainIsFoundAgain) {
+  std::optional<Daemon> server(std::in_place);
+  const std::uint16_t port = server->port();
+  ASSERT_NE(port, 0);
+  User user(port);
+  user.Spawn(1);
+  EXPECT_EQ(server->Terminate(), 0);
+  server.reset();
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST));
+  server.emplace(port);
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_SESSION_LOST));
+  EXPECT_TRUE(user.Next(STRIDEWIRE_EVENT_WORLD_JOINED));
+}
+
+// ---- stridewire-record
+
+test::ProgramResult RecordTool(const std::vector<std::string>& arguments) {
+  return RunProgram(STRIDEWIRE_RECORD, arguments, 200);
+}
+
+std::vector<std::string> RecordArguments(const std::string& address, const std::string& out) {
+  return {"--connect", address, "--world", "plaza", "--avatar",    "1",
+          "--seconds", "2",     "--out",   out,     "--timeout-s", "60"};
+}
+
+TEST(Record, WritesWhatTheServerShows) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  const ScratchFolder folder;
+  User user(server.port(), STRIDEWIRE_CONTROLLER, LongHistory());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_FULL));
+  std::vector<stridewire_movement> steps;
+  for (std::uint64_t r = 1; r <= 20; ++r) steps.push_back(client::Step(1, r, 0.6));
+  ASSERT_TRUE(user.client.Request(user.world, steps));
+  auto arguments = RecordArguments(server.address(), folder.File("walk.bvh"));
+  arguments.push_back("--json");
+  const auto result = RecordTool(arguments);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json report = json::parse(result.out);
+  EXPECT_EQ(report["frames"], 120);
+  EXPECT_EQ(report["fps"], 60.0);
+  EXPECT_LT(report["ticks_missing"], 60);  // Ticks that a busy machine missed.
+  EXPECT_TRUE(report["cut_short"].is_null());
+  const auto capture = ReadBvh(folder.File("walk.bvh"), {});
+  ASSERT_TRUE(capture) << Describe(capture.error());
+  ASSERT_EQ(capture->clip.frame_count(), 120);
+  // The file against what another observer received.
+  const std::uint64_t first_tick = report["first_tick"];
+  client::Pose pose;
+  int compared = 0;
+  for (int f = 0; f < 120; ++f) {
+    if (!user.client.NextPose(user.world, 1, first_tick + static_cast<std::uint64_t>(f) - 1,
+                              pose) ||
+        pose.missing() || pose.tick != first_tick + static_cast<std::uint64_t>(f)) {
+      continue;
+    }
+    ++compared;
+    const auto frame = capture->clip.frame(f);
+    EXPECT_NEAR(frame.root_position_m.z, pose.root_position_m[2], 1e-5) << f;
+    ASSERT_EQ(frame.rotations.size(), pose.rotations.size());
+    for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+      const auto& q = pose.rotations[j];
+      EXPECT_LT(AngleBetween(frame.rotations[j], Normalise(Quat(q.w, q.x, q.y, q.z))), 2e-3)
+          << "frame " << f << " joint " << j;
+    }
+  }
+  EXPECT_GT(compared, 60);
+}
+
+TEST(Record, GoesOnWhenItWasTooSlow) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  const ScratchFolder folder;
+  User user(server.port());
+  user.Spawn(800);  // About 300 kB a tick: more than any socket buffers for long.
+  auto arguments = RecordArguments(server.address(), folder.File("slow.bvh"));
+  arguments[7] = "6";
+  arguments.push_back("--json");
+  ChildProcess record(STRIDEWIRE_RECORD, arguments);
+  std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+  record.Signal(SIGSTOP);
+  std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+  record.Signal(SIGCONT);
+  const auto line = record.ReadLineThatBegins("{", 120.0);
+  ASSERT_TRUE(line);
+  EXPECT_EQ(record.Wait(), 0);
+  const json report = json::parse(*line);
+  EXPECT_EQ(report["frames"], 360);
+  EXPECT_GT(report["ticks_missing"], 0);  // Dropped by the server, and filled.
+  const auto capture = ReadBvh(folder.File("slow.bvh"), {});
+  ASSERT_TRUE(capture) << Describe(capture.error());
+  EXPECT_EQ(capture->clip.frame_count(), 360);
+}
+
+TEST(Record, ServerThatDiesCutsItShort) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  const ScratchFolder folder;
+  User user(server.port());
+  user.Spawn(1);
+  auto arguments = RecordArguments(server.address(), folder.File("short.bvh"));
+  arguments[7] = "3000";
+  arguments[11] = "2";
+  ChildProcess record(STRIDEWIRE_RECORD, arguments);
+  std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+  server.KillHard();
+  EXPECT_EQ(record.Wait(), 1);
+  const auto capture = ReadBvh(folder.File("short.bvh"), {});
+  ASSERT_TRUE(capture) << Describe(capture.error());
+  EXPECT_GT(capture->clip.frame_count(), 5);
+}
+
+TEST(Record, AnswersBadUsageWithTwoAndASentence) {
+  const ScratchFolder folder;
+  const std::string out = folder.File("a.bvh");
+  const auto expect = [&](std::size_t index, const std::string& value, const std::string& named) {
+    auto arguments = RecordArguments("127.0.0.1:1", out);
+    arguments[index] = value;
+    const auto result = RecordTool(arguments);
+    EXPECT_EQ(result.exit_code, 2) << named << ": " << result.err;
+    EXPECT_THAT(result.err, HasSubstr(named));
+    EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+    EXPECT_TRUE(result.out.empty());
+  };
+  for (const char* address : {"localhost", "localhost:", ":7420", "localhost:0", "localhost:70000",
+                              "localhost:7x", "::1:7420"}) {
+    expect(1, address, "--connect");
+  }
+  expect(3, "", "--world");
+  expect(3, std::string(65, 'w'), "--world");
+  expect(5, "0", "--avatar");
+  expect(5, "one", "--avatar");
+  expect(7, "0", "--seconds");
+  expect(7, "4000", "--seconds");
+  expect(7, "nan", "--seconds");
+  expect(9, folder.File("no/such/a.bvh"), "--out");
+  expect(9, folder.path().string(), "--out");
+  expect(11, "0", "--timeout-s");
+  for (const char* mode : {"movement", "wrong"}) {
+    auto arguments = RecordArguments("127.0.0.1:1", out);
+    arguments.insert(arguments.end(), {"--mode", mode});
+    const auto result = RecordTool(arguments);
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(mode));
+  }
+  EXPECT_EQ(RecordTool({}).exit_code, 2);
+  EXPECT_EQ(RecordTool({"--nonsense"}).exit_code, 2);
+  EXPECT_EQ(folder.Count(), 0);
+  const auto help = RecordTool({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, HasSubstr("Example"));
+  EXPECT_THAT(RecordTool({"--version"}).out, HasSubstr(kVersion));
+}
+
+TEST(Record, FailsClearlyWithoutServerOrAvatar) {
+  const ScratchFolder folder;
+  const std::string out = folder.File("a.bvh");
+  std::string address;
+  {
+    Daemon server;
+    ASSERT_NE(server.port(), 0);
+    address = server.address();
+    auto arguments = RecordArguments(address, out);
+    arguments[5] = "77";
+    arguments[11] = "1";
+    const auto nobody = RecordTool(arguments);
+    EXPECT_EQ(nobody.exit_code, 1);
+    EXPECT_THAT(nobody.err, HasSubstr("avatar 77 of world \"plaza\" did not show up"));
+  }
+  const auto refused = RecordTool(RecordArguments(address, out));
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("refused"));
+  EXPECT_THAT(refused.err, HasSubstr(address));
+  EXPECT_EQ(folder.Count(), 0);
+}
+
+#ifdef STRIDEWIRE_WALK_SAMPLE
+TEST(Sample, WalksOnAfterTheServerWasRestarted) {
+  std::optional<Daemon> server(std::in_place);
+  const std::uint16_t port = server->port();
+  ASSERT_NE(port, 0);
+  ChildProcess sample(STRIDEWIRE_WALK_SAMPLE, {"127.0.0.1", std::to_string(port), "120"});
+  const auto walks_to = [&](double wanted_m) {
+    double z = 0.0;
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (z < wanted_m && std::chrono::steady_clock::now() < until) {
+      const auto line = sample.ReadLineThatBegins("root ");
+      if (!line) return false;
+      z = std::stod(line->substr(line->rfind(' ') + 1));
+    }
+    return z >= wanted_m;
+  };
+  ASSERT_TRUE(walks_to(1.0));
+  server->KillHard();
+  server.reset();
+  ASSERT_TRUE(sample.ReadLineThatBegins("event 2"));  // Connection lost.
+  server.emplace(port);
+  ASSERT_TRUE(sample.ReadLineThatBegins("event 3"));  // Session lost.
+  EXPECT_TRUE(walks_to(3.0));
+}
+#endif
+
+}  // namespace
+}  // namespace stridewire
