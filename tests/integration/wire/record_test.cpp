@@ -1,0 +1,139 @@
+// What a watcher receives over the network is what synthesis gives without one: stridewired,
+// stridewire-record and a game server on real sockets, against offline/synthesis.h.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <regex>
+#include <string>
+#include <thread>
+
+#include "child_process.h"
+#include "raw_client.h"
+#include "scratch_folder.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/choreography.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/offline/synthesis.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kFps = 60.0;
+constexpr double kDegrees = 180.0 / M_PI;
+
+// A walk, a stop, a jump and a start.
+std::vector<MovementRequest> Choreography() {
+  return {
+      {1, StepRequest{.length_m = 0.5}}, {2, StepRequest{.length_m = 0.7}},
+      {3, StepRequest{.length_m = 0.4}}, {4, StandRequest{.seconds = 0.25}},
+      {5, JumpRequest{.length_m = 0.8}}, {6, StepRequest{.foot = Foot::kRight, .length_m = 0.6}},
+      {7, StepRequest{.length_m = 0.55}}};
+}
+
+std::vector<protocol::RequestItem> OnTheWire(protocol::AvatarNumber avatar) {
+  std::vector<protocol::RequestItem> items;
+  for (const MovementRequest& request : Choreography()) {
+    protocol::RequestItem item;
+    item.avatar = avatar;
+    item.request_id = request.id;
+    if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
+      protocol::StepMovement wire;
+      wire.length_m = step->length_m;
+      if (step->foot) {
+        wire.foot =
+            *step->foot == Foot::kLeft ? protocol::FootChoice::kLeft : protocol::FootChoice::kRight;
+      }
+      item.movement = wire;
+    } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+      protocol::JumpMovement wire;
+      wire.length_m = jump->length_m;
+      item.movement = wire;
+    } else {
+      protocol::StandMovement wire;
+      wire.seconds = std::get<StandRequest>(request.movement).seconds;
+      item.movement = wire;
+    }
+    items.push_back(item);
+  }
+  return items;
+}
+
+// Frames from the first one that moves on.
+int FirstMoving(const Clip& clip) {
+  for (int f = 1; f < clip.frame_count(); ++f) {
+    if (LargestJointAngle(clip.frame(0), clip.frame(f)) > 1e-4) return f;
+  }
+  return clip.frame_count();
+}
+
+class RecordTest : public testing::TestWithParam<int> {};
+
+TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
+  const auto library = OpenLibrary("builtin").value();
+  const auto truth = Synthesize(library, {}, Choreography(), kFps);
+  ASSERT_TRUE(truth.has_value()) << Describe(truth.error());
+
+  test::ChildProcess server(
+      STRIDEWIRE_STRIDEWIRED,
+      {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards", std::to_string(GetParam())});
+  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
+  std::smatch match;
+  ASSERT_TRUE(std::regex_search(ready, match, std::regex("listen=127\\.0\\.0\\.1:(\\d+)")))
+      << ready;
+  const auto port = static_cast<std::uint16_t>(std::stoi(match[1]));
+  RawClient game("127.0.0.1", port);
+  ASSERT_TRUE(game.SayHello());
+  const auto world = game.Join("w");
+  ASSERT_TRUE(world);
+  constexpr protocol::AvatarNumber kAvatar = 7;
+  ASSERT_TRUE(game.Spawn(world->world, {{.avatar = kAvatar}}));
+
+  const test::ScratchFolder folder;
+  const std::string out = folder.File("seen.bvh");
+  const double seconds = truth->clip.duration_s() + 3.0;
+  test::ChildProcess record(
+      STRIDEWIRE_RECORD, {"--connect", "127.0.0.1:" + std::to_string(port), "--world", "w",
+                          "--avatar", std::to_string(kAvatar), "--seconds", std::to_string(seconds),
+                          "--mode", "full", "--out", out});
+  std::this_thread::sleep_for(std::chrono::milliseconds(1500));  // it watches by now; else it tells
+  ASSERT_TRUE(game.Request(world->world, OnTheWire(kAvatar)));
+  ASSERT_EQ(record.Wait(), 0);
+
+  const auto seen = ReadBvh(out, {.unit_m = 1.0, .up = BvhAxis::kPlusY});
+  ASSERT_TRUE(seen.has_value()) << Describe(seen.error());
+  const Clip& clip = seen->clip;
+  const int shift = FirstMoving(clip) - FirstMoving(truth->clip);
+  ASSERT_GE(shift, 0) << "the recording began after the walk did";
+  ASSERT_GE(clip.frame_count() - shift, truth->clip.frame_count())
+      << "the recording ends too early";
+
+  const auto joints = static_cast<std::size_t>(library->skeleton().joint_count());
+  ASSERT_EQ(clip.joint_count, library->skeleton().joint_count());
+  std::vector<Vec3> seen_m(joints);
+  std::vector<Vec3> truth_m(joints);
+  std::vector<Quat> rotations(joints);
+  double largest_rad = 0.0;
+  float largest_m = 0.0f;
+  for (int f = 0; f < truth->clip.frame_count(); ++f) {
+    const ConstPoseSpan a = clip.frame(f + shift);
+    const ConstPoseSpan b = truth->clip.frame(f);
+    largest_rad = std::max(largest_rad, LargestJointAngle(a, b));
+    ForwardKinematics(library->skeleton(), a, seen_m, rotations);
+    ForwardKinematics(library->skeleton(), b, truth_m, rotations);
+    for (std::size_t j = 0; j < joints; ++j) {
+      largest_m = std::max(largest_m, glm::length(seen_m[j] - truth_m[j]));
+    }
+  }
+  std::printf("%d shards: %d frames, joints within %.5f deg and %.6f m\n", GetParam(),
+              truth->clip.frame_count(), largest_rad * kDegrees, static_cast<double>(largest_m));
+  EXPECT_LE(largest_rad * kDegrees, 0.05);
+  EXPECT_LE(largest_m, 0.001f);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shards, RecordTest, testing::Values(1, 2, 4));
+
+}  // namespace
+}  // namespace stridewire
