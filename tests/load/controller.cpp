@@ -112,8 +112,9 @@ protocol::Placement Controller::Place(protocol::AvatarNumber number) const {
       std::max(1.0, std::ceil(std::sqrt(static_cast<double>(walkers_.size())))));
   const double half = 0.5 * static_cast<double>(side - 1);
   protocol::Placement place;
+  const std::size_t row = index / side;
   place.position_m = DVec3(kSpacingM * (static_cast<double>(index % side) - half), 0.0,
-                           kSpacingM * (static_cast<double>(index / side) - half));
+                           kSpacingM * (static_cast<double>(row) - half));
   if (run_.choreography != nullptr) {
     place.position_m += run_.choreography->start.position_m;
     place.heading_rad = run_.choreography->start.heading_rad;
@@ -236,9 +237,9 @@ void Controller::AddOuting(const Due& due, std::int64_t now_ns, protocol::Reques
   if (probes_ != nullptr) {
     probes_->Schedule(number - 1, last_request_ + 1, due.at_ns, now_ns);
   }
-  for (Movement& movement : outing.movements) {
+  for (const Movement& movement : outing.movements) {
     request.items.push_back(
-        {.avatar = number, .request_id = ++last_request_, .movement = std::move(movement)});
+        {.avatar = number, .request_id = ++last_request_, .movement = movement});
   }
   Schedule(due.walker, due.at_ns + static_cast<std::int64_t>(1e9 * outing.period_s));
 }

@@ -437,7 +437,9 @@ LoadReport LoadRun::Report() {
   for (const auto& worker : workers_) late.Merge(worker->late());
   report.own_loop_late_ms = ToQuantiles(late);
   report.own_send_late_ms = ToQuantiles(send_late);
-  if (report.own_loop_late_ms.p99 > kOwnLateP99Ms || report.own_send_late_ms.p99 > kOwnLateP99Ms) {
+  const bool was_late =
+      report.own_loop_late_ms.p99 > kOwnLateP99Ms || report.own_send_late_ms.p99 > kOwnLateP99Ms;
+  if (opened_ns_ != 0 && was_late) {
     const auto text = [](double ms) {
       return std::to_string(ms).substr(0, std::to_string(ms).size() - 3);
     };

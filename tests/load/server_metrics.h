@@ -26,7 +26,7 @@ struct ServerMetrics {
 [[nodiscard]] Expected<ServerMetrics> ParseServerMetrics(std::string_view text);
 
 /// Asks the server; blocks for `timeout_s` at most. kIo: `where` tells whom and what the system said.
-[[nodiscard]] Expected<ServerMetrics> ScrapeServerMetrics(const Address& http, double timeout_s);
+[[nodiscard]] Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeout_s);
 
 /// Times of the ticks between two scrapes. Quantiles are interpolated within the server's bins (as
 /// Prometheus does) and not above the maximum. The maximum is that since the earlier scrape, if

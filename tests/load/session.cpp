@@ -39,9 +39,9 @@ void Session::Open() {
     if (id != connection_ || state_ != State::kConnecting) return;
     if (code) return Lose("cannot connect: " + code.message());
     boost::system::error_code ignored;
-    socket_->set_option(tcp::no_delay(true), ignored);
+    (void)socket_->set_option(tcp::no_delay(true), ignored);
     boost::system::error_code failed;
-    socket_->non_blocking(true, failed);
+    (void)socket_->non_blocking(true, failed);
     if (failed) return Lose(failed.message());
     state_ = State::kGreeting;
     protocol::Hello hello;
@@ -88,7 +88,7 @@ void Session::Close() {
   ++connection_;  // Whatever is still under way finds its connection gone.
   if (socket_) {
     boost::system::error_code ignored;
-    socket_->close(ignored);
+    (void)socket_->close(ignored);
   }
 }
 

@@ -104,7 +104,7 @@ class Session {
   void Read();
   void Handle(const protocol::FrameView& frame);
   void Write();
-  void OnWritten(const boost::system::error_code& code);
+  void OnWritten(const boost::system::error_code& failed);
 
   ThreadContext& context_;
   const boost::asio::ip::tcp::endpoint server_;

@@ -1,0 +1,308 @@
+// What an observer counts and complains about, told by a server that does what the test says.
+#include "observer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
+#include <chrono>
+#include <future>
+#include <thread>
+
+#include "fake_server.h"
+#include "toy_world.h"
+
+namespace stridewire::load {
+namespace {
+
+using boost::asio::ip::tcp;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr protocol::WorldId kWorld = 4;
+constexpr std::uint64_t kFirstTick = 100;
+constexpr std::uint64_t kLastTick = 109;
+
+LoadOptions Options() {
+  LoadOptions options;
+  options.avatars = 3;
+  options.observers = 1;
+  options.mode = protocol::PoseMode::kFull;
+  return options;
+}
+
+class ObserverTest : public ::testing::Test {
+ protected:
+  ObserverTest()
+      : observer_(context_, tcp::endpoint(boost::asio::ip::address_v4::loopback(), server_.port()),
+                  run_, 0, nullptr) {
+    run_.window.Set(kFirstTick, kLastTick);
+    observer_.Open();
+    thread_ = std::thread([this] { context_.io.run(); });
+  }
+  ~ObserverTest() override { Join(); }
+
+  /// Everything up to the reply to Observe.
+  void Greet() {
+    connection_ = server_.Accept();
+    ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
+    connection_.Send(toy::Welcome());
+    const auto join = connection_.Expect<protocol::JoinWorld>();
+    ASSERT_TRUE(join.has_value());
+    EXPECT_EQ(join->name, "load-0");
+    EXPECT_EQ(join->role, protocol::Role::kObserver);
+    connection_.Send(toy::WorldInfo(join->seq, kWorld, join->name));
+    connection_.Send(toy::Ok(join->seq));
+    const auto observe = connection_.Expect<protocol::Observe>();
+    ASSERT_TRUE(observe.has_value());
+    EXPECT_EQ(observe->world, kWorld);
+    EXPECT_EQ(observe->mode, protocol::PoseMode::kFull);
+    connection_.Send(toy::Ok(observe->seq));
+  }
+
+  void SendTick(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars = {{1}, {2}, {3}}) {
+    connection_.SendBytes(toy::PoseFrame(kWorld, tick, avatars));
+  }
+
+  /// A message more, and waits until the observer has handled it, and so all before it.
+  void Sync() {
+    synced_dropped_ += 1;
+    protocol::Lagging lagging;
+    lagging.world = kWorld;
+    lagging.dropped_batches = synced_dropped_;
+    connection_.Send(lagging);
+    const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    for (;;) {
+      std::uint64_t dropped = 0;
+      OnThread([&] { dropped = observer_.Counts().batches_dropped; });
+      if (dropped >= synced_dropped_) return;
+      ASSERT_LT(std::chrono::steady_clock::now(), until);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+  template <typename F>
+  void OnThread(F&& task) {
+    std::promise<void> done;
+    boost::asio::post(context_.io, [&] {
+      task();
+      done.set_value();
+    });
+    done.get_future().wait();
+  }
+
+  /// Ends the observer; from here on its counts may be read.
+  ObserverCounts Join() {
+    if (thread_.joinable()) {
+      context_.io.stop();
+      thread_.join();
+    }
+    return observer_.Counts();
+  }
+
+  const LoadOptions options_ = Options();
+  RunState run_{options_, nullptr};
+  FakeServer server_;
+  FakeConnection connection_;
+  ThreadContext context_;
+  boost::asio::executor_work_guard<boost::asio::io_context::executor_type> work_{
+      context_.io.get_executor()};
+  Observer observer_;
+  std::thread thread_;
+  std::uint64_t synced_dropped_ = 0;
+};
+
+TEST_F(ObserverTest, CountsThePosesOfTheWindow) {
+  Greet();
+  std::size_t bytes = 0;
+  for (std::uint64_t tick = kFirstTick - 2; tick <= kLastTick + 2; ++tick) {
+    SendTick(tick, {{1}, {2, protocol::kPoseStanding}, {3}});
+    bytes = toy::PoseFrame(kWorld, tick, {{1}, {2}, {3}}).size();
+  }
+  Sync();
+  EXPECT_TRUE(observer_.sees_all());
+  EXPECT_TRUE(observer_.saw_last_tick());
+  EXPECT_EQ(observer_.latest_tick(), kLastTick + 2);
+  EXPECT_EQ(observer_.avatar_count(), 3u);
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 30u);
+  EXPECT_EQ(counts.poses_moving, 20u);
+  EXPECT_EQ(counts.bytes_received, 10 * bytes);
+  EXPECT_EQ(counts.poses_invalid, 0u);
+  EXPECT_THAT(run_.errors.Texts(), IsEmpty());
+}
+
+TEST_F(ObserverTest, SeesNotAllWhileOneIsMissing) {
+  Greet();
+  SendTick(kFirstTick, {{1}, {3}});
+  Sync();
+  EXPECT_FALSE(observer_.sees_all());
+  EXPECT_FALSE(observer_.saw_last_tick());
+}
+
+TEST_F(ObserverTest, LeavesOutAvatarsThatAreNotOurs) {
+  Greet();
+  SendTick(kFirstTick, {{1}, {2}, {3}, {4}, {1000}});
+  Sync();
+  EXPECT_EQ(Join().poses_received, 3u);
+  EXPECT_THAT(run_.errors.Texts(), IsEmpty());
+}
+
+TEST_F(ObserverTest, ComplainsAboutABatchThatIsNotNewer) {
+  Greet();
+  SendTick(kFirstTick);
+  SendTick(kFirstTick);
+  SendTick(kFirstTick - 1);
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 3u);
+  EXPECT_EQ(counts.poses_invalid, 2u);
+  EXPECT_TRUE(run_.failed);
+  EXPECT_THAT(run_.errors.Texts(),
+              ElementsAre(HasSubstr("load-0 at tick 100: a batch that is not newer"),
+                          HasSubstr("load-0 at tick 99: a batch that is not newer")));
+}
+
+TEST_F(ObserverTest, ComplainsAboutAnAvatarThatComesTwice) {
+  Greet();
+  SendTick(kFirstTick, {{1}, {2}, {1}});
+  connection_.SendBytes(
+      toy::PoseFrame(kWorld, kFirstTick, {{2}}, protocol::PoseMode::kFull, /*shard=*/1));
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 2u);
+  EXPECT_EQ(counts.poses_invalid, 2u);
+  EXPECT_THAT(run_.errors.Texts(),
+              ElementsAre(HasSubstr("avatar 1 came twice"), HasSubstr("avatar 2 came twice")));
+}
+
+TEST_F(ObserverTest, ComplainsAboutAnAvatarThatLeapsUnlessItIsFlagged) {
+  Greet();
+  // The toy avatars walk at 1.5 m/s: 200 m in 133 s, which is all right; 1 m is not in one tick.
+  const auto frame_at = [](std::uint64_t tick, float x_m, std::uint8_t flags) {
+    protocol::PoseBatchEncoder encoder;
+    protocol::PoseBatchInfo info;
+    info.world = kWorld;
+    info.tick = tick;
+    info.joint_count = toy::kJoints;
+    std::vector<std::byte> frame;
+    EXPECT_TRUE(encoder.Begin(info).has_value());
+    EXPECT_TRUE(encoder.Add(1, flags, Vec3(x_m, 1.0f, 0.0f), toy::RotationsAt(0.0)).has_value());
+    EXPECT_TRUE(encoder.Finish(frame).has_value());
+    return frame;
+  };
+  connection_.SendBytes(frame_at(100, 0.0f, 0));
+  connection_.SendBytes(frame_at(101, 0.2f, 0));
+  connection_.SendBytes(frame_at(102, 9.0f, protocol::kPoseDiscontinuity));
+  connection_.SendBytes(frame_at(103, 10.0f, 0));
+  connection_.SendBytes(frame_at(109, 11.0f, 0));  // Six ticks: as slow as that.
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 5u);
+  EXPECT_EQ(counts.poses_invalid, 1u);
+  EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("at tick 103: avatar 1 moved 1.0")));
+}
+
+TEST_F(ObserverTest, ComplainsAboutAPoseThatDoesNotDecode) {
+  Greet();
+  std::vector<std::byte> frame = toy::PoseFrame(kWorld, kFirstTick, {{1}});
+  // Every 1.0f becomes 2.0f: then no joint's quaternion is a unit one.
+  constexpr std::array kOne = {std::byte{0}, std::byte{0}, std::byte{0x80}, std::byte{0x3f}};
+  constexpr std::array kTwo = {std::byte{0}, std::byte{0}, std::byte{0}, std::byte{0x40}};
+  int changed = 0;
+  for (auto at = frame.begin();
+       (at = std::search(at, frame.end(), kOne.begin(), kOne.end())) != frame.end(); ++changed) {
+    std::ranges::copy(kTwo, at);
+  }
+  ASSERT_GE(changed, 2);
+  connection_.SendBytes(frame);
+  Sync();
+  EXPECT_EQ(Join().poses_invalid, 1u);
+  EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("at tick 100: avatar 1: ")));
+}
+
+TEST_F(ObserverTest, ComplainsAboutAnotherModeOrSkeleton) {
+  Greet();
+  connection_.SendBytes(toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kQuantised));
+  connection_.SendBytes(
+      toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kFull, 0, toy::kJoints + 1));
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 0u);
+  EXPECT_EQ(counts.poses_invalid, 2u);
+}
+
+TEST_F(ObserverTest, AddsUpWhatTheServerSaysItDropped) {
+  Greet();
+  for (const std::uint64_t dropped : {5u, 5u, 12u}) {
+    protocol::Lagging lagging;
+    lagging.world = kWorld;
+    lagging.dropped_batches = dropped;
+    connection_.Send(lagging);
+  }
+  synced_dropped_ = 19;
+  Sync();
+  EXPECT_EQ(Join().batches_dropped, 20u);
+}
+
+TEST_F(ObserverTest, TellsThatItMayNotJoin) {
+  connection_ = server_.Accept();
+  ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
+  connection_.Send(toy::Welcome());
+  const auto join = connection_.Expect<protocol::JoinWorld>();
+  ASSERT_TRUE(join.has_value());
+  protocol::Reply reply;
+  reply.seq = join->seq;
+  reply.code = protocol::StatusCode::kNoSuchWorld;
+  reply.text = "there is none";
+  connection_.Send(reply);
+  while (!run_.failed) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  Join();
+  EXPECT_THAT(run_.errors.Texts(),
+              ElementsAre(HasSubstr("would not let it join: no_such_world there is none")));
+}
+
+TEST_F(ObserverTest, ExpectsNothingWhileItIsAwayByOurOwnDoing) {
+  Greet();
+  SendTick(100);
+  SendTick(101);
+  Sync();
+  OnThread([&] { observer_.Drop(0.0); });
+  EXPECT_TRUE(connection_.WaitForClose());
+  OnThread([&] { observer_.Poll(NowNs() + kSecondNs); });
+  Greet();
+  SendTick(106);
+  SendTick(107);
+  synced_dropped_ = 1;  // A new connection counts anew; the total goes on.
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 4 * 3u);
+  EXPECT_EQ(counts.poses_excused, 4 * 3u);  // 102 to 105
+  EXPECT_EQ(counts.poses_invalid, 0u);
+  EXPECT_EQ(observer_.reconnect_count(), 1u);
+  EXPECT_FALSE(run_.failed);
+}
+
+TEST_F(ObserverTest, TellsALostConnectionOnce) {
+  Greet();
+  SendTick(100);
+  Sync();
+  connection_.Close();
+  while (!run_.failed) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  // It comes back and is closed again before it is greeted: no news.
+  OnThread([&] { observer_.Poll(NowNs() + 10 * kSecondNs); });
+  connection_ = server_.Accept();
+  ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
+  connection_.Close();
+  OnThread([] {});
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_excused, 0u);
+  EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("load observer 0: connection lost")));
+}
+
+}  // namespace
+}  // namespace stridewire::load
