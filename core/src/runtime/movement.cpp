@@ -69,7 +69,7 @@ std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const 
   float* y = x + padded;
   float* z = y + padded;
   float* w = z + padded;
-  for (std::size_t j = 0; j < padded; ++j) {
+  for (std::size_t j = 0; j < static_cast<std::size_t>(layout_.joint_count); ++j) {
     const float norm = std::sqrt(x[j] * x[j] + y[j] * y[j] + z[j] * z[j] + w[j] * w[j]);
     if (norm >= kSmallestNorm) {
       x[j] /= norm;

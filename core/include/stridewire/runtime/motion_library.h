@@ -66,10 +66,13 @@ struct Parameter {
 /// its yaw taken off on the left (r = q_yaw * rest); the yaw is an unwrapped scalar, so examples
 /// may differ by more than half a turn. Positions and yaw are relative to the base frame.
 struct GridLayout {
+  int joint_count = 0;
   int padded_joints = 0;
   int row_floats = 0;
-  explicit constexpr GridLayout(int joint_count = 0)
-      : padded_joints((joint_count + 15) / 16 * 16), row_floats(padded_joints * 4 + 16) {}
+  explicit constexpr GridLayout(int joints = 0)
+      : joint_count(joints),
+        padded_joints((joints + 15) / 16 * 16),
+        row_floats(padded_joints * 4 + 16) {}
   [[nodiscard]] constexpr int root() const { return padded_joints * 4; }
 };
 
