@@ -27,7 +27,7 @@ struct CardinalBasis {
   std::vector<double> dilations;  ///< [site], scaled units
   std::vector<double> linear;     ///< [1 + d][n]
   std::vector<double> radial;     ///< [site][n]
-  double condition = 1.0;         ///< Condition number of R.
+  double condition = 1.0;         ///< Of R, estimated in the 1-norm.
 };
 
 /// A borrowed basis; what evaluation needs.
@@ -48,7 +48,8 @@ struct CardinalBasisFit {
   /// Centre of parameter l = its mean over the *examples*: under rank deficiency the weights sum to 1
   /// off the sites only if parameters are centred. Dilations come from the example sites alone (for
   /// an example: the nearest other example; for a pseudoexample: the nearest site), as
-  /// refinement would otherwise shrink every radius. Least squares by SVD, relative cut 1e-9.
+  /// refinement would otherwise shrink every radius. Least squares by complete orthogonal decomposition
+  /// (minimum norm), relative cut 1e-9.
   ///
   /// kShapeMismatch; kOutOfRange: a number not finite; kIllConditioned: two sites nearer than
   /// kMinSiteDistance (index: the site), or the condition of R above kMaxCondition.
