@@ -16,7 +16,7 @@ using asio::ip::tcp;
 constexpr double kFirstBackOffS = 0.1;
 constexpr double kMaxBackOffS = 2.0;
 /// Read from one socket before the others have their turn.
-constexpr std::size_t kMaxReadAtOnce = std::size_t{1} << 20;
+constexpr std::size_t kMaxReadAtOnce = std::size_t{128} << 10;
 
 std::int64_t ToNs(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
 
