@@ -60,7 +60,7 @@ if $build; then
   deploy/install_deps.sh
   export CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1
   { cmake --preset release &&
-    cmake --build --preset release --parallel --target "${programs[@]}"; } \
+    cmake --build --preset release --parallel "$(nproc)" --target "${programs[@]}"; } \
     >"$out/build.log" 2>&1 || { tail -n 30 "$out/build.log" >&2; fail "building failed, see $out/build.log"; }
 fi
 for program in "${programs[@]}"; do
