@@ -10,11 +10,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
-#include <regex>
 #include <string>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "raw_client.h"
@@ -95,9 +95,12 @@ class Program {
 };
 
 std::uint16_t PortIn(const std::string& ready, const std::string& key) {
-  std::smatch match;
-  if (!std::regex_search(ready, match, std::regex(key + "=127\\.0\\.0\\.1:(\\d+)"))) return 0;
-  return static_cast<std::uint16_t>(std::stoi(match[1]));
+  const std::string before = key + "=127.0.0.1:";
+  const auto at = ready.find(before);
+  EXPECT_NE(at, std::string::npos) << ready;
+  return at == std::string::npos
+             ? std::uint16_t{0}
+             : static_cast<std::uint16_t>(std::stoi(ready.substr(at + before.size())));
 }
 
 // One request, the whole answer.
