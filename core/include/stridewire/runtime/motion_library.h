@@ -103,8 +103,7 @@ struct MotionGroup {
   /// Index of a parameter in this group, -1 if the group does not have it.
   [[nodiscard]] int FindParameter(ParameterName name) const;
   [[nodiscard]] std::span<const double> site(int s) const {
-    return sites.subspan(static_cast<std::size_t>(s * parameter_count()),
-                         static_cast<std::size_t>(parameter_count()));
+    return sites.subspan(static_cast<std::size_t>(s) * parameters.size(), parameters.size());
   }
 };
 
