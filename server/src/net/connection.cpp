@@ -20,8 +20,9 @@ constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
 // A borrowed buffer sequence: Asio copies the sequence it is given, which for a vector is a heap
 // allocation a write.
 struct BufferList {
-  using value_type = asio::const_buffer;
-  using const_iterator = const asio::const_buffer*;
+  // Names that Asio asks for.
+  using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)
+  using const_iterator = const asio::const_buffer*;  // NOLINT(readability-identifier-naming)
   const_iterator first;
   const_iterator last;
   [[nodiscard]] const_iterator begin() const { return first; }

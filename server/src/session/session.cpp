@@ -248,8 +248,7 @@ void Session::OnMessage(protocol::Message&& message) {
   message_tokens_.AdvanceTime(host_.clock().ServerTime(Clock::now()));
   static_cast<void>(message_tokens_.Take(1.0));  // UpdatePause sees to it that there is one
   std::visit(
-      [&]<typename T>(T&& arrived) {
-        using Arrived = std::remove_cvref_t<T>;
+      [&]<typename Arrived>(Arrived& arrived) {
         if constexpr (requires { this->Execute(std::move(arrived)); }) {
           Handle(std::move(arrived));
         } else if constexpr (std::is_same_v<Arrived, protocol::Ping>) {
@@ -267,7 +266,7 @@ void Session::OnMessage(protocol::Message&& message) {
                    " is not expected in this state");
         }
       },
-      std::move(message));
+      message);
   if (connection_ == nullptr) return;
   if (message_tokens_.tokens() < 1.0) metrics.Reached(Limit::kMessagesPerSecond);
   if (pending_.size() >= static_cast<std::size_t>(host_.config().limits.max_pending_commands)) {
@@ -277,7 +276,7 @@ void Session::OnMessage(protocol::Message&& message) {
 }
 
 template <typename Command>
-void Session::Handle(Command&& command) {
+void Session::Handle(Command command) {
   const Seq seq = command.seq;
   switch (replies_.Judge(seq)) {
     case ReplyMemory::Verdict::kNew: break;

@@ -113,7 +113,7 @@ class Session : private ConnectionHandler {
   void OnClosed() override;
 
   template <typename Command>
-  void Handle(Command&& command);
+  void Handle(Command command);
   void Execute(protocol::JoinWorld&& command);
   void Execute(protocol::LeaveWorld&& command);
   void Execute(protocol::Spawn&& command);
@@ -131,7 +131,7 @@ class Session : private ConnectionHandler {
                    std::vector<Part>&& parts, Pending&& pending);
   template <typename Part>
   void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars);
-  void Leave(WorldId world);
+  void Leave(WorldId id);
 
   void Answer(protocol::Seq seq, protocol::StatusCode code, std::string text = {});
   void Answer(protocol::Reply&& reply, WorldId joined = 0);
