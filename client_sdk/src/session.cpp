@@ -34,7 +34,7 @@ void CopyText(std::string_view text, char* out, std::size_t out_bytes) {
   if (length < text.size()) {
     while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
   }
-  std::memcpy(out, text.data(), length);
+  if (length > 0) std::memcpy(out, text.data(), length);  // No text may be no pointer, too.
   out[length] = '\0';
 }
 
