@@ -380,6 +380,7 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
         case STRIDEWIRE_JUMP:
           item.movement = protocol::JumpMovement{m.length_m, m.height_m, m.turn_rad};
           break;
+        case STRIDEWIRE_MOVEMENT_TYPE_MAX: break;  // Refused above.
         case STRIDEWIRE_STAND: item.movement = protocol::StandMovement{m.seconds}; break;
       }
       message.items.push_back(item);

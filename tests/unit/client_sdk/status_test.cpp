@@ -51,7 +51,7 @@ TEST(Status, AnUnknownCodeIsExplainedByItsHundred) {
   }
   EXPECT_NE(std::string(stridewire_status_text(static_cast<stridewire_status>(349))),
             stridewire_status_text(static_cast<stridewire_status>(449)));
-  EXPECT_NE(stridewire_status_text(static_cast<stridewire_status>(-1)), nullptr);
+  EXPECT_NE(stridewire_status_text(STRIDEWIRE_STATUS_MAX), nullptr);
 }
 
 }  // namespace

@@ -56,6 +56,9 @@ extern "C" {
 /// data, 3xx the network, 4xx the server's operator. x00 to x49 come from the server too (they are
 /// the protocol's codes), x50 to x99 only from this library. Append only: treat a code you do not
 /// know by its hundred.
+///
+/// Here and below an enumerator _MAX only keeps the type wide, so that any number can be passed and is
+/// checked.
 typedef enum stridewire_status {
   STRIDEWIRE_OK = 0,
 
@@ -98,7 +101,8 @@ typedef enum stridewire_status {
   STRIDEWIRE_SHUTTING_DOWN = 402,
   STRIDEWIRE_INTERNAL = 403,
   STRIDEWIRE_REPLACED = 404,
-  STRIDEWIRE_OUT_OF_MEMORY = 450
+  STRIDEWIRE_OUT_OF_MEMORY = 450,
+  STRIDEWIRE_STATUS_MAX = 0x7fffffff
 } stridewire_status;
 
 /// Stable lower-case name, e.g. "no_such_avatar"; "unknown" for a code this library does not know.
@@ -181,7 +185,8 @@ stridewire_status stridewire_client_last_error(stridewire_client* client, char* 
 
 typedef enum stridewire_role {
   STRIDEWIRE_CONTROLLER = 0,  ///< May command avatars; hears all events of the world.
-  STRIDEWIRE_OBSERVER = 1     ///< Only watches.
+  STRIDEWIRE_OBSERVER = 1,    ///< Only watches.
+  STRIDEWIRE_ROLE_MAX = 0x7fffffff
 } stridewire_role;
 
 /// `world` gets the number to use at once; commands to it wait until the server has let us in.
@@ -211,13 +216,15 @@ stridewire_status stridewire_client_remove(stridewire_client* client, stridewire
 typedef enum stridewire_movement_type {
   STRIDEWIRE_STEP = 0,
   STRIDEWIRE_JUMP = 1,
-  STRIDEWIRE_STAND = 2
+  STRIDEWIRE_STAND = 2,
+  STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
 } stridewire_movement_type;
 
 typedef enum stridewire_foot {
   STRIDEWIRE_FOOT_AUTO = 0,  ///< The other foot than last time.
   STRIDEWIRE_FOOT_LEFT = 1,
-  STRIDEWIRE_FOOT_RIGHT = 2
+  STRIDEWIRE_FOOT_RIGHT = 2,
+  STRIDEWIRE_FOOT_MAX = 0x7fffffff
 } stridewire_foot;
 
 typedef struct stridewire_movement {
@@ -246,7 +253,8 @@ stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,       ///< float32: as the server has them.
   STRIDEWIRE_QUANTISED = 1,  ///< 48 bits a joint: off by at most 0.00016 rad and 0.03 mm.
-  STRIDEWIRE_MOVEMENT = 2    ///< Reserved; answered with UNSUPPORTED.
+  STRIDEWIRE_MOVEMENT = 2,   ///< Reserved; answered with UNSUPPORTED.
+  STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
 
 typedef struct stridewire_observation {
