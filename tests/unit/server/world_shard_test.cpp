@@ -42,7 +42,7 @@ struct Bench {
     return shard.Execute({.world = world, .session = session, .seq = 1, .part = std::move(part)},
                          ++tick);
   }
-  CommandResult Spawn(std::vector<AvatarNumber> numbers, SessionId session = 1) {
+  CommandResult Spawn(const std::vector<AvatarNumber>& numbers, SessionId session = 1) {
     SpawnPart part;
     for (const AvatarNumber number : numbers) {
       part.items.push_back({static_cast<std::uint32_t>(part.items.size()), {.avatar = number}});
