@@ -126,7 +126,7 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
     movement.heading_change_rad += weights[e] * group.heading_change_rad[e];
   }
   const std::span<double> keytimes =
-      std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count + 1));
+      std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count) + 1);
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
   movement.warp = TimeWarp(keytimes, group.cells);
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
