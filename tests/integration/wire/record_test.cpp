@@ -86,7 +86,8 @@ std::optional<Clip> RecordOnce(RawClient& game, std::uint16_t port, protocol::Wo
   EXPECT_TRUE(game.Request(world, OnTheWire(avatar)));
   const std::string report = record.ReadLine(seconds + 60.0).value_or("{}");
   if (record.Wait() != 0) return std::nullopt;
-  if (nlohmann::json::parse(report, nullptr, false).value("ticks_missing", -1) != 0) return std::nullopt;
+  if (nlohmann::json::parse(report, nullptr, false).value("ticks_missing", -1) != 0)
+    return std::nullopt;
   const auto seen = ReadBvh(out, {.unit_m = 1.0, .up = BvhAxis::kPlusY});
   if (!seen || FirstMoving(seen->clip) < FirstMoving(truth)) return std::nullopt;
   return seen->clip;
