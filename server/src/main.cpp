@@ -37,21 +37,13 @@ int Main(int argc, char** argv) {
   }
 
   std::signal(SIGPIPE, SIG_IGN);
-  StartLog(command->config.log_level);
-  int exit_code = 0;
-  {
-    Server server(command->config, *std::move(libraries));
-    server.WatchSignals();
-    if (const auto status = server.Start(); !status) {
-      exit_code = Complain(status.error(), kExitFailure);
-    } else {
-      std::printf("%s\n", server.ReadyLine().c_str());
-      std::fflush(stdout);
-      if (!server.Run()) exit_code = kExitFailure;
-    }
-  }
-  EndLog();
-  return exit_code;
+  const Log log(command->config.log_level);
+  Server server(command->config, *std::move(libraries));
+  server.WatchSignals();
+  if (const auto status = server.Start(); !status) return Complain(status.error(), kExitFailure);
+  std::printf("%s\n", server.ReadyLine().c_str());
+  std::fflush(stdout);
+  return server.Run() ? 0 : kExitFailure;
 }
 
 }  // namespace

@@ -6,17 +6,24 @@
 
 namespace stridewire::server {
 
-void StartLog(const std::string& level) {
+Log::Log(const std::string& level) {
   constexpr std::size_t kQueueLines = 8192;
-  spdlog::init_thread_pool(kQueueLines, 1);
+  constexpr std::size_t kThreads = 1;
+  writer_ = std::make_shared<spdlog::details::thread_pool>(kQueueLines, kThreads);
   auto logger = std::make_shared<spdlog::async_logger>(
-      "stridewired", std::make_shared<spdlog::sinks::stderr_color_sink_mt>(), spdlog::thread_pool(),
+      "stridewired", std::make_shared<spdlog::sinks::stderr_color_sink_mt>(), writer_,
       spdlog::async_overflow_policy::overrun_oldest);
   logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%l%$ %v");
   logger->set_level(spdlog::level::from_str(level));
   spdlog::set_default_logger(std::move(logger));
 }
 
-void EndLog() { spdlog::shutdown(); }
+Log::~Log() {
+  // The thread is joined before the sinks it writes to go. spdlog::shutdown() alone does it the
+  // other way round and leaves the order to reference counts inside its shared library, which a
+  // thread sanitizer cannot see.
+  writer_.reset();
+  spdlog::shutdown();
+}
 
 }  // namespace stridewire::server
