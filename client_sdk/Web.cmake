@@ -1,0 +1,21 @@
+# The web client and the viewer (npm workspace in this folder), for STRIDEWIRE_BUILD_VIEWER.
+# Target web_client builds web/dist, which the viewer's bundle needs.
+find_program(STRIDEWIRE_NODE NAMES node nodejs REQUIRED)
+find_program(STRIDEWIRE_NPM npm REQUIRED)
+
+# What the lock file says, from the registry; again only when the lock file changed.
+set(STRIDEWIRE_NODE_MODULES ${CMAKE_CURRENT_LIST_DIR}/node_modules/.stridewire-stamp)
+add_custom_command(OUTPUT ${STRIDEWIRE_NODE_MODULES}
+  COMMAND ${STRIDEWIRE_NPM} ci --no-progress --loglevel=error
+  COMMAND ${CMAKE_COMMAND} -E touch ${STRIDEWIRE_NODE_MODULES}
+  WORKING_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}
+  DEPENDS ${CMAKE_CURRENT_LIST_DIR}/package.json ${CMAKE_CURRENT_LIST_DIR}/package-lock.json
+          ${CMAKE_CURRENT_LIST_DIR}/web/package.json ${CMAKE_CURRENT_LIST_DIR}/viewer/package.json
+  COMMENT "Fetching what the web client is built with"
+  VERBATIM)
+add_custom_target(web_modules DEPENDS ${STRIDEWIRE_NODE_MODULES})
+
+add_subdirectory(web)
+if(EXISTS ${CMAKE_CURRENT_LIST_DIR}/viewer/CMakeLists.txt)
+  add_subdirectory(viewer)
+endif()

@@ -1,0 +1,3 @@
+import {protocolVersion} from '@stridewire/client';
+
+console.log(protocolVersion);

@@ -1,0 +1,2 @@
+/** Stridewire in a browser. */
+export const protocolVersion = 1;
