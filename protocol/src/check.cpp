@@ -117,6 +117,67 @@ void CheckParameters(Findings& found, const ParameterSet& set, const char* field
   }
 }
 
+void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t index) {
+  found.Id(item.avatar, "Request.avatar", index);
+  found.Id(item.request_id, "Request.request_id", index);
+  if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
+    found.Known(step->foot, FootChoice::kRight, "Request.foot", index);
+    found.Finite(step->length_m, "Request.length_m", index);
+    found.Finite(step->side_m.value_or(0.0), "Request.side_m", index);
+    found.Finite(step->height_m, "Request.height_m", index);
+    found.Finite(step->turn_rad, "Request.turn_rad", index);
+  } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+    found.Finite(jump->length_m, "Request.length_m", index);
+    found.Finite(jump->height_m, "Request.height_m", index);
+    found.Finite(jump->turn_rad, "Request.turn_rad", index);
+  } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
+    found.Finite(stand->seconds, "Request.seconds", index);
+  }
+}
+
+void CheckMovement(Findings& found, const CurrentMovement& m) {
+  found.Known(m.kind, MovementKind::kStand, "AvatarState.movement.kind");
+  found.That(m.group >= -1, ErrorCode::kOutOfRange, "group is below -1",
+             "AvatarState.movement.group", m.group);
+  found.Finite(m.started_s, "AvatarState.movement.started_s");
+  found.Count(m.keytimes_s.size(), 0, kMaxKeytimes, "AvatarState.movement.keytimes_s");
+  double before_s = 0.0;
+  for (std::size_t k = 0; k < m.keytimes_s.size(); ++k) {
+    const double keytime_s = m.keytimes_s[k];
+    found.That(std::isfinite(keytime_s) && (k == 0 ? keytime_s == 0.0 : keytime_s >= before_s),
+               ErrorCode::kOutOfRange, "keytimes do not go from 0 upwards",
+               "AvatarState.movement.keytimes_s", static_cast<std::int64_t>(k));
+    before_s = keytime_s;
+  }
+  const double last = m.keytimes_s.empty() ? 0.0 : static_cast<double>(m.keytimes_s.size() - 1);
+  found.That(m.generic_time >= 0.0 && m.generic_time <= last, ErrorCode::kOutOfRange,
+             "generic time is not between 0 and the last keytime",
+             "AvatarState.movement.generic_time");
+  found.NotNegative(m.ease_out_s, "AvatarState.movement.ease_out_s");
+  CheckParameters(found, m.requested, "AvatarState.movement.requested", -1);
+  CheckParameters(found, m.applied, "AvatarState.movement.applied", -1);
+  found.Count(m.weights.size(), 0, kMaxWeights, "AvatarState.movement.weights");
+  for (std::size_t w = 0; w < m.weights.size(); ++w) {
+    found.Finite(m.weights[w], "AvatarState.movement.weights", static_cast<std::int64_t>(w));
+  }
+  found.Count(m.parameter_names.size(), 0, kMaxParameters, "AvatarState.movement.parameter_names");
+  unsigned seen = 0;
+  for (const std::uint8_t name : m.parameter_names) {
+    found.That(name < kParameterNames, ErrorCode::kMalformed, "unknown parameter",
+               "AvatarState.movement.parameter_names", name);
+    if (name >= kParameterNames) return;
+    found.That((seen & (1u << name)) == 0, ErrorCode::kMalformed, "parameter stands twice",
+               "AvatarState.movement.parameter_names", name);
+    seen |= 1u << name;
+  }
+  found.That(m.sites.empty() || m.sites.size() == m.weights.size() * m.parameter_names.size(),
+             ErrorCode::kShapeMismatch, "not one site a weight", "AvatarState.movement.sites",
+             static_cast<std::int64_t>(m.sites.size()));
+  for (std::size_t s = 0; s < m.sites.size(); ++s) {
+    found.Finite(m.sites[s], "AvatarState.movement.sites", static_cast<std::int64_t>(s));
+  }
+}
+
 void CheckSkeleton(Findings& found, const SkeletonInfo& skeleton) {
   const auto joint_count = static_cast<std::int64_t>(skeleton.joints.size());
   found.Count(skeleton.joints.size(), 1, kMaxJoints, "WorldInfo.skeleton.joints");
@@ -204,23 +265,7 @@ Status Check(const Request& m) {
   found.Id(m.world, "Request.world");
   found.Count(m.items.size(), 1, kMaxItems, "Request.items");
   for (std::size_t i = 0; i < m.items.size(); ++i) {
-    const RequestItem& item = m.items[i];
-    const auto index = static_cast<std::int64_t>(i);
-    found.Id(item.avatar, "Request.avatar", index);
-    found.Id(item.request_id, "Request.request_id", index);
-    if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
-      found.Known(step->foot, FootChoice::kRight, "Request.foot", index);
-      found.Finite(step->length_m, "Request.length_m", index);
-      found.Finite(step->side_m.value_or(0.0), "Request.side_m", index);
-      found.Finite(step->height_m, "Request.height_m", index);
-      found.Finite(step->turn_rad, "Request.turn_rad", index);
-    } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
-      found.Finite(jump->length_m, "Request.length_m", index);
-      found.Finite(jump->height_m, "Request.height_m", index);
-      found.Finite(jump->turn_rad, "Request.turn_rad", index);
-    } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
-      found.Finite(stand->seconds, "Request.seconds", index);
-    }
+    CheckRequestItem(found, m.items[i], static_cast<std::int64_t>(i));
   }
   return found.Result();
 }
@@ -255,6 +300,13 @@ Status Check(const StopObserving& m) {
 Status Check(const Ping& m) {
   Findings found;
   found.Finite(m.time_s, "Ping.time_s");
+  return found.Result();
+}
+
+Status Check(const InspectAvatar& m) {
+  Findings found;
+  found.Id(m.world, "InspectAvatar.world");
+  found.Id(m.avatar, "InspectAvatar.avatar");
   return found.Result();
 }
 
@@ -364,6 +416,23 @@ Status Check(const Pong& m) {
   Findings found;
   found.Finite(m.time_s, "Pong.time_s");
   found.Finite(m.server_time_s, "Pong.server_time_s");
+  return found.Result();
+}
+
+Status Check(const AvatarState& m) {
+  Findings found;
+  found.Id(m.world, "AvatarState.world");
+  found.Id(m.avatar, "AvatarState.avatar");
+  found.Text(m.text, kMaxReasonBytes, "AvatarState.text");
+  found.Finite(m.server_time_s, "AvatarState.server_time_s");
+  found.Finite(m.base, "AvatarState.base");
+  if (m.movement) CheckMovement(found, *m.movement);
+  found.Count(m.queue.size(), 0, kMaxInspectedRequests, "AvatarState.queue");
+  found.That(m.queue.size() <= m.queue_size, ErrorCode::kShapeMismatch,
+             "more requests than the queue is long", "AvatarState.queue", m.queue_size);
+  for (std::size_t i = 0; i < m.queue.size(); ++i) {
+    CheckRequestItem(found, m.queue[i], static_cast<std::int64_t>(i));
+  }
   return found.Result();
 }
 

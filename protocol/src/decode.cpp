@@ -61,6 +61,14 @@ class Unpacker {
     }
   }
 
+  template <typename T>
+  void Numbers(const flatbuffers::Vector<T>* list, std::size_t max, const char* field,
+               std::vector<T>& out) {
+    if (const std::size_t count = Count(list, max, field); count > 0) {
+      out.assign(list->data(), list->data() + count);
+    }
+  }
+
   void Parameters(const flatbuffers::Vector<const wire::ParameterValue*>* list, const char* field,
                   ParameterSet& out) {
     const std::size_t count = Count(list, kMaxParameters, field);
@@ -122,31 +130,35 @@ void Unpack(Unpacker& u, const wire::Remove& w, Remove& m) {
   u.Avatars(w.avatars(), "Remove.avatars", m.avatars);
 }
 
+void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const char* type_field,
+            std::size_t index) {
+  item.avatar = w.avatar();
+  item.request_id = w.request_id();
+  switch (w.type()) {
+    case wire::MovementType::Step: {
+      StepMovement step{static_cast<FootChoice>(w.foot()), w.length_m(), std::nullopt, w.height_m(),
+                        w.turn_rad()};
+      if (const auto side = w.side_m()) step.side_m = *side;
+      item.movement = step;
+      break;
+    }
+    case wire::MovementType::Jump:
+      item.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad()};
+      break;
+    case wire::MovementType::Stand: item.movement = StandMovement{w.seconds()}; break;
+    default:
+      u.Wrong(ErrorCode::kMalformed, "unknown enumerator", type_field,
+              static_cast<std::int64_t>(index));
+  }
+}
+
 void Unpack(Unpacker& u, const wire::Request& w, Request& m) {
   m.seq = w.seq();
   m.world = w.world();
   m.items.resize(u.Count(w.items(), kMaxItems, "Request.items"));
   for (std::size_t i = 0; i < m.items.size(); ++i) {
-    const auto* from = w.items()->Get(static_cast<flatbuffers::uoffset_t>(i));
-    RequestItem& item = m.items[i];
-    item.avatar = from->avatar();
-    item.request_id = from->request_id();
-    switch (from->type()) {
-      case wire::MovementType::Step: {
-        StepMovement step{static_cast<FootChoice>(from->foot()), from->length_m(), std::nullopt,
-                          from->height_m(), from->turn_rad()};
-        if (const auto side = from->side_m()) step.side_m = *side;
-        item.movement = step;
-        break;
-      }
-      case wire::MovementType::Jump:
-        item.movement = JumpMovement{from->length_m(), from->height_m(), from->turn_rad()};
-        break;
-      case wire::MovementType::Stand: item.movement = StandMovement{from->seconds()}; break;
-      default:
-        u.Wrong(ErrorCode::kMalformed, "unknown enumerator", "Request.type",
-                static_cast<std::int64_t>(i));
-    }
+    Unpack(u, *w.items()->Get(static_cast<flatbuffers::uoffset_t>(i)), m.items[i], "Request.type",
+           i);
   }
 }
 
@@ -174,6 +186,12 @@ void Unpack(Unpacker&, const wire::StopObserving& w, StopObserving& m) {
 void Unpack(Unpacker&, const wire::Ping& w, Ping& m) {
   m.nonce = w.nonce();
   m.time_s = w.time_s();
+}
+
+void Unpack(Unpacker&, const wire::InspectAvatar& w, InspectAvatar& m) {
+  m.nonce = w.nonce();
+  m.world = w.world();
+  m.avatar = w.avatar();
 }
 
 void Unpack(Unpacker& u, const wire::Goodbye& w, Goodbye& m) {
@@ -318,6 +336,42 @@ void Unpack(Unpacker&, const wire::Pong& w, Pong& m) {
   m.tick = w.tick();
 }
 
+void Unpack(Unpacker& u, const wire::CurrentMovement& w, CurrentMovement& m) {
+  m.request_id = w.request_id();
+  m.kind = static_cast<MovementKind>(w.kind());
+  m.group = w.group();
+  m.started_s = w.started_s();
+  u.Numbers(w.keytimes_s(), kMaxKeytimes, "AvatarState.movement.keytimes_s", m.keytimes_s);
+  m.generic_time = w.generic_time();
+  m.ease_out_s = w.ease_out_s();
+  u.Parameters(w.requested(), "AvatarState.movement.requested", m.requested);
+  u.Parameters(w.applied(), "AvatarState.movement.applied", m.applied);
+  m.extrapolated = w.extrapolated();
+  m.clamped = w.clamped();
+  u.Numbers(w.weights(), kMaxWeights, "AvatarState.movement.weights", m.weights);
+  u.Numbers(w.parameter_names(), kMaxParameters, "AvatarState.movement.parameter_names",
+            m.parameter_names);
+  u.Numbers(w.sites(), kMaxWeights * kMaxParameters, "AvatarState.movement.sites", m.sites);
+}
+
+void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
+  m.nonce = w.nonce();
+  m.world = w.world();
+  m.avatar = w.avatar();
+  m.code = static_cast<StatusCode>(w.code());
+  u.Text(w.text(), kMaxReasonBytes, m.text, "AvatarState.text");
+  m.tick = w.tick();
+  m.server_time_s = w.server_time_s();
+  m.base = {FromWire(w.base_position_m()), w.base_heading_rad()};
+  if (w.movement() != nullptr) Unpack(u, *w.movement(), m.movement.emplace());
+  m.queue_size = w.queue_size();
+  m.queue.resize(u.Count(w.queue(), kMaxInspectedRequests, "AvatarState.queue"));
+  for (std::size_t i = 0; i < m.queue.size(); ++i) {
+    Unpack(u, *w.queue()->Get(static_cast<flatbuffers::uoffset_t>(i)), m.queue[i],
+           "AvatarState.queue.type", i);
+  }
+}
+
 template <typename Wire, typename T>
 Expected<Message> Decode(std::span<const std::byte> payload) {
   flatbuffers::Verifier::Options options;
@@ -361,6 +415,8 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     case MessageType::kStopObserving:
       return Decode<wire::StopObserving, StopObserving>(frame.payload);
     case MessageType::kPing: return Decode<wire::Ping, Ping>(frame.payload);
+    case MessageType::kInspectAvatar:
+      return Decode<wire::InspectAvatar, InspectAvatar>(frame.payload);
     case MessageType::kGoodbye: return Decode<wire::Goodbye, Goodbye>(frame.payload);
     case MessageType::kWelcome: return Decode<wire::Welcome, Welcome>(frame.payload);
     case MessageType::kWorldInfo: return Decode<wire::WorldInfo, WorldInfo>(frame.payload);
@@ -370,6 +426,7 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     case MessageType::kLagging: return Decode<wire::Lagging, Lagging>(frame.payload);
     case MessageType::kError: return Decode<wire::Error, ErrorNotice>(frame.payload);
     case MessageType::kPong: return Decode<wire::Pong, Pong>(frame.payload);
+    case MessageType::kAvatarState: return Decode<wire::AvatarState, AvatarState>(frame.payload);
   }
   return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",
               static_cast<std::int64_t>(frame.type));

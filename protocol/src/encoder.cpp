@@ -101,6 +101,10 @@ Offset<wire::Ping> Build(FlatBufferBuilder& b, const Ping& m) {
   return wire::CreatePing(b, m.nonce, m.time_s);
 }
 
+Offset<wire::InspectAvatar> Build(FlatBufferBuilder& b, const InspectAvatar& m) {
+  return wire::CreateInspectAvatar(b, m.nonce, m.world, m.avatar);
+}
+
 Offset<wire::Goodbye> Build(FlatBufferBuilder& b, const Goodbye& m) {
   return wire::CreateGoodbye(b, ToWire(m.code), Text(b, m.text));
 }
@@ -213,6 +217,33 @@ Offset<wire::Pong> Build(FlatBufferBuilder& b, const Pong& m) {
   return wire::CreatePong(b, m.nonce, m.time_s, m.server_time_s, m.tick);
 }
 
+Offset<wire::CurrentMovement> Build(FlatBufferBuilder& b, const CurrentMovement& m) {
+  const auto keytimes = b.CreateVector(m.keytimes_s);
+  const auto requested = Build(b, m.requested);
+  const auto applied = Build(b, m.applied);
+  const auto weights = b.CreateVector(m.weights);
+  const auto names = b.CreateVector(m.parameter_names);
+  const auto sites = b.CreateVector(m.sites);
+  return wire::CreateCurrentMovement(b, m.request_id, static_cast<wire::MovementKind>(m.kind),
+                                     m.group, m.started_s, keytimes, m.generic_time, m.ease_out_s,
+                                     requested, applied, m.extrapolated, m.clamped, weights, names,
+                                     sites);
+}
+
+Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
+  const auto text = Text(b, m.text);
+  const auto movement = m.movement ? Build(b, *m.movement) : Offset<wire::CurrentMovement>();
+  std::vector<Offset<wire::RequestItem>> queue;
+  queue.reserve(m.queue.size());
+  for (const RequestItem& item : m.queue) queue.push_back(Build(b, item));
+  const auto queue_offset = queue.empty() ? Offset<flatbuffers::Vector<Offset<wire::RequestItem>>>()
+                                          : b.CreateVector(queue);
+  const wire::Vec3 base = ToWire(m.base.position_m);
+  return wire::CreateAvatarState(b, m.nonce, m.world, m.avatar, ToWire(m.code), text, m.tick,
+                                 m.server_time_s, &base, m.base.heading_rad, movement, m.queue_size,
+                                 queue_offset);
+}
+
 }  // namespace
 
 struct Encoder::Impl {
@@ -248,6 +279,7 @@ Status Encoder::Encode(const CancelQueue& m, Frame& frame) { return impl_->Encod
 Status Encoder::Encode(const Observe& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const StopObserving& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Ping& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const InspectAvatar& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Goodbye& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Welcome& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const WorldInfo& m, Frame& frame) { return impl_->Encode(m, frame); }
@@ -257,6 +289,7 @@ Status Encoder::Encode(const Events& m, Frame& frame) { return impl_->Encode(m, 
 Status Encoder::Encode(const Lagging& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const ErrorNotice& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Pong& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const AvatarState& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Message& m, Frame& frame) {
   return std::visit([&](const auto& alternative) { return impl_->Encode(alternative, frame); }, m);
 }

@@ -31,6 +31,7 @@ std::string_view MessageTypeName(MessageType type) {
     case MessageType::kObserve: return "Observe";
     case MessageType::kStopObserving: return "StopObserving";
     case MessageType::kPing: return "Ping";
+    case MessageType::kInspectAvatar: return "InspectAvatar";
     case MessageType::kGoodbye: return "Goodbye";
     case MessageType::kWelcome: return "Welcome";
     case MessageType::kWorldInfo: return "WorldInfo";
@@ -40,6 +41,7 @@ std::string_view MessageTypeName(MessageType type) {
     case MessageType::kLagging: return "Lagging";
     case MessageType::kError: return "Error";
     case MessageType::kPong: return "Pong";
+    case MessageType::kAvatarState: return "AvatarState";
   }
   return "unknown";
 }

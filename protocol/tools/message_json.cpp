@@ -61,28 +61,34 @@ Json Fields(const Remove& m) {
   return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
 }
 
-Json Fields(const Request& m) {
-  Json items = Json::array();
-  for (const RequestItem& item : m.items) {
-    Json json = {{"avatar", item.avatar},
-                 {"request_id", Wide(item.request_id)},
-                 {"type", item.movement.index()}};
-    if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
-      json["foot"] = Number(step->foot);
-      json["length_m"] = step->length_m;
-      json["side_m"] = step->side_m ? Json(*step->side_m) : Json(nullptr);
-      json["height_m"] = step->height_m;
-      json["turn_rad"] = step->turn_rad;
-    } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
-      json["length_m"] = jump->length_m;
-      json["height_m"] = jump->height_m;
-      json["turn_rad"] = jump->turn_rad;
-    } else {
-      json["seconds"] = std::get<StandMovement>(item.movement).seconds;
-    }
-    items.push_back(json);
+Json Item(const RequestItem& item) {
+  Json json = {{"avatar", item.avatar},
+               {"request_id", Wide(item.request_id)},
+               {"type", item.movement.index()}};
+  if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
+    json["foot"] = Number(step->foot);
+    json["length_m"] = step->length_m;
+    json["side_m"] = step->side_m ? Json(*step->side_m) : Json(nullptr);
+    json["height_m"] = step->height_m;
+    json["turn_rad"] = step->turn_rad;
+  } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+    json["length_m"] = jump->length_m;
+    json["height_m"] = jump->height_m;
+    json["turn_rad"] = jump->turn_rad;
+  } else {
+    json["seconds"] = std::get<StandMovement>(item.movement).seconds;
   }
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+  return json;
+}
+
+Json Items(const std::vector<RequestItem>& items) {
+  Json json = Json::array();
+  for (const RequestItem& item : items) json.push_back(Item(item));
+  return json;
+}
+
+Json Fields(const Request& m) {
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", Items(m.items)}};
 }
 
 Json Fields(const CancelQueue& m) {
@@ -100,6 +106,10 @@ Json Fields(const StopObserving& m) {
 }
 
 Json Fields(const Ping& m) { return {{"nonce", Wide(m.nonce)}, {"time_s", m.time_s}}; }
+
+Json Fields(const InspectAvatar& m) {
+  return {{"nonce", Wide(m.nonce)}, {"world", m.world}, {"avatar", m.avatar}};
+}
 
 Json Fields(const Goodbye& m) { return {{"code", Number(m.code)}, {"text", m.text}}; }
 
@@ -244,6 +254,38 @@ Json Fields(const Pong& m) {
           {"time_s", m.time_s},
           {"server_time_s", m.server_time_s},
           {"tick", Wide(m.tick)}};
+}
+
+Json Movement(const CurrentMovement& m) {
+  return {{"request_id", Wide(m.request_id)},
+          {"kind", Number(m.kind)},
+          {"group", m.group},
+          {"started_s", m.started_s},
+          {"keytimes_s", m.keytimes_s},
+          {"generic_time", m.generic_time},
+          {"ease_out_s", m.ease_out_s},
+          {"requested", Parameters(m.requested)},
+          {"applied", Parameters(m.applied)},
+          {"extrapolated", m.extrapolated},
+          {"clamped", m.clamped},
+          {"weights", m.weights},
+          {"parameter_names", m.parameter_names},
+          {"sites", m.sites}};
+}
+
+Json Fields(const AvatarState& m) {
+  return {{"nonce", Wide(m.nonce)},
+          {"world", m.world},
+          {"avatar", m.avatar},
+          {"code", Number(m.code)},
+          {"text", m.text},
+          {"tick", Wide(m.tick)},
+          {"server_time_s", m.server_time_s},
+          {"base_position_m", Vector(m.base.position_m)},
+          {"base_heading_rad", m.base.heading_rad},
+          {"movement", m.movement ? Movement(*m.movement) : Json(nullptr)},
+          {"queue_size", m.queue_size},
+          {"queue", Items(m.queue)}};
 }
 
 }  // namespace

@@ -156,6 +156,7 @@ std::vector<SampleMessage> SampleMessages() {
   add("observe_some", Observe{7, 3, 2, PoseMode::kFull, {41, 42}, 6, false});
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});
+  add("inspect_avatar", InspectAvatar{0x0123456789abcdefu, 3, 41});
   add("goodbye", Goodbye{StatusCode::kShuttingDown, "the server is going down"});
   add("welcome",
       Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0, "stridewired",
@@ -177,6 +178,37 @@ std::vector<SampleMessage> SampleMessages() {
   add("lagging", Lagging{3, 1200, 4});
   add("error", ErrorNotice{StatusCode::kBadSequence, "seq 12 leaves a gap after 9", true, 12});
   add("pong", Pong{0x0123456789abcdefu, 12.5, 2057.625, 123'457});
+  {
+    AvatarState state{.nonce = 0x0123456789abcdefu,
+                      .world = 3,
+                      .avatar = 41,
+                      .tick = 123'457,
+                      .server_time_s = 2057.625,
+                      .base = {DVec3(1.0, 0.0, 3.25), -6.5},
+                      .queue_size = 20};
+    state.movement = {.request_id = 1001,
+                      .kind = MovementKind::kStepRight,
+                      .group = 1,
+                      .started_s = 2057.25,
+                      .keytimes_s = {0.0, 0.125, 0.5, 0.625},
+                      .generic_time = 1.75,
+                      .ease_out_s = 0.2,
+                      .requested = Parameters({{2, -0.5}, {5, 0.875}}),
+                      .applied = Parameters({{2, -0.5}, {5, 0.75}}),
+                      .extrapolated = true,
+                      .clamped = true,
+                      .weights = {0.625f, 0.5f, -0.125f},
+                      .parameter_names = {2, 5},
+                      .sites = {-0.5f, 0.5f, -0.25f, 0.25f, -0.75f, 0.75f}};
+    state.queue.push_back({41, 1002, StepMovement{FootChoice::kLeft, 0.5, 0.125, 0.15, -0.3}});
+    state.queue.push_back({41, 1003, StandMovement{1.5}});
+    add("avatar_state", state);
+    add("avatar_state_refused", AvatarState{.nonce = 2,
+                                            .world = 3,
+                                            .avatar = 99,
+                                            .code = StatusCode::kNoSuchAvatar,
+                                            .text = "no avatar of that number"});
+  }
   return samples;
 }
 

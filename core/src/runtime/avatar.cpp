@@ -85,6 +85,7 @@ void Avatar::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(event_count_ < events_.size());
   events_[event_count_] = event;
   events_[event_count_].time_s = time_s_;
+  if (event.type == AvatarEventType::kStarted) started_ = events_[event_count_];
   ++event_count_;
 }
 

@@ -256,6 +256,8 @@ void Session::OnMessage(protocol::Message&& message) {
                               .time_s = arrived.time_s,
                               .server_time_s = host_.clock().ServerTime(Clock::now()),
                               .tick = host_.tick()});
+        } else if constexpr (std::is_same_v<Arrived, protocol::InspectAvatar>) {
+          Inspect(arrived);
         } else if constexpr (std::is_same_v<Arrived, protocol::Goodbye>) {
           spdlog::info("session {:016x}: its client says goodbye", identity_.id);
           End();
@@ -493,6 +495,40 @@ void Session::Execute(protocol::Request&& command) {
   }
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = command.items.size(), .reply = {}});
+}
+
+void Session::Inspect(const protocol::InspectAvatar& question) {
+  if ((features_ & protocol::kFeatureInspect) == 0) {
+    host_.metrics().protocol_errors.Add();
+    Fail(StatusCode::kUnexpectedMessage, "InspectAvatar needs the feature 'inspect'");
+    return;
+  }
+  const auto refuse = [&](StatusCode code, const char* text) {
+    Send(protocol::AvatarState{.nonce = question.nonce,
+                               .world = question.world,
+                               .avatar = question.avatar,
+                               .code = code,
+                               .text = text});
+  };
+  const auto it = worlds_.find(question.world);
+  if (it == worlds_.end()) {
+    refuse(StatusCode::kNotJoined, "this session is not in that world");
+  } else if (pending_questions_ >= host_.config().limits.max_pending_commands) {
+    host_.metrics().Reached(Limit::kPendingCommands);
+    refuse(StatusCode::kLimitReached, "as many questions wait for their answer as may");
+  } else {
+    ++pending_questions_;
+    host_.Ask(ShardOf(question.avatar, host_.shard_count()), {.world = it->second.world,
+                                                              .from_shard = host_.shard_index(),
+                                                              .session = identity_.id,
+                                                              .nonce = question.nonce,
+                                                              .avatar = question.avatar});
+  }
+}
+
+void Session::OnInspected(const protocol::AvatarState& state) {
+  --pending_questions_;
+  Send(state);
 }
 
 template <typename Part>

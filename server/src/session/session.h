@@ -18,7 +18,8 @@ namespace stridewire::server {
 
 /// Features this server has.
 inline constexpr std::uint64_t kServerFeatures =
-    protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised;
+    protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
+    protocol::kFeatureInspect;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {
@@ -62,6 +63,7 @@ class Session : private ConnectionHandler {
 
   void OnResult(CommandResult&& result);
   void OnJoined(protocol::Seq seq, Outcome<std::shared_ptr<World>>&& outcome);
+  void OnInspected(const protocol::AvatarState& state);
   void OnPoses(const PoseDelivery& delivery);
   void OnEvents(SharedEvents& events);
 
@@ -123,6 +125,8 @@ class Session : private ConnectionHandler {
   void Execute(protocol::Observe&& command);
   void Execute(protocol::StopObserving&& command);
 
+  void Inspect(const protocol::InspectAvatar& question);
+
   /// The membership a controller's command needs; answers and returns null if there is none.
   Membership* Commanding(protocol::Seq seq, WorldId world);
   bool Affords(protocol::Seq seq, std::size_t item_count);
@@ -156,6 +160,7 @@ class Session : private ConnectionHandler {
   std::map<protocol::SubscriptionId, Subscription> subscriptions_;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t pending_items_ = 0;
+  int pending_questions_ = 0;
   ReplyMemory replies_;
   EventReplay event_replay_;
   std::uint64_t events_number_ = 0;

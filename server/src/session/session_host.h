@@ -30,6 +30,8 @@ class SessionHost {
 
   /// Passes a command to the shard its avatars live on; Session::OnResult hears of it.
   virtual void Submit(int shard, WorldCommand&& command) = 0;
+  /// Asks the shard an avatar lives on; Session::OnInspected hears of it.
+  virtual void Ask(int shard, Inspection&& question) = 0;
   /// Session::OnJoined hears of it.
   virtual void JoinWorld(SessionId session, protocol::Seq seq, std::string name) = 0;
   virtual void LeaveWorld(WorldId world) = 0;

@@ -90,6 +90,33 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
   return request;
 }
 
+protocol::RequestItem ToWire(const MovementRequest& request) {
+  protocol::RequestItem item;
+  item.request_id = request.id;
+  std::visit(
+      [&]<typename T>(const T& movement) {
+        if constexpr (std::is_same_v<T, StepRequest>) {
+          protocol::StepMovement step;
+          if (movement.foot) {
+            step.foot = *movement.foot == Foot::kLeft ? protocol::FootChoice::kLeft
+                                                      : protocol::FootChoice::kRight;
+          }
+          step.length_m = movement.length_m;
+          step.side_m = movement.side_m;
+          step.height_m = movement.height_m;
+          step.turn_rad = movement.turn_rad;
+          item.movement = step;
+        } else if constexpr (std::is_same_v<T, JumpRequest>) {
+          item.movement =
+              protocol::JumpMovement{movement.length_m, movement.height_m, movement.turn_rad};
+        } else {
+          item.movement = protocol::StandMovement{movement.seconds};
+        }
+      },
+      request.movement);
+  return item;
+}
+
 protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
   protocol::Event wire;
   wire.type = TypeToWire(event.type);

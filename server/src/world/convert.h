@@ -12,6 +12,8 @@ namespace stridewire::server {
 [[nodiscard]] protocol::Placement ToWire(const BaseFrame& base);
 [[nodiscard]] BaseFrame FromWire(const protocol::Placement& placement);
 [[nodiscard]] MovementRequest FromWire(const protocol::RequestItem& item);
+/// Without avatar number.
+[[nodiscard]] protocol::RequestItem ToWire(const MovementRequest& request);
 
 /// Without avatar, tick and time, which the runtime's event does not have.
 [[nodiscard]] protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library);

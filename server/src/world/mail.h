@@ -57,6 +57,19 @@ struct CommandResult {
   std::vector<protocol::ReplyItem> items;  ///< As in Reply, of this shard's items.
 };
 
+/// A session's question what an avatar is doing, answered after the next tick.
+struct Inspection {
+  std::shared_ptr<World> world;
+  int from_shard = 0;  ///< The session's shard.
+  SessionId session = 0;
+  std::uint64_t nonce = 0;
+  AvatarNumber avatar = 0;
+};
+struct InspectionResult {
+  SessionId session = 0;
+  protocol::AvatarState state;
+};
+
 /// What the sessions of a shard want of a world; replaces what that shard said before.
 struct Interest {
   std::shared_ptr<World> world;
@@ -88,8 +101,11 @@ struct TickMail {
   std::vector<CommandResult> results;
   std::vector<EventDelivery> events;
   std::vector<PoseDelivery> poses;
+  std::vector<InspectionResult> inspections;
 
-  [[nodiscard]] bool empty() const { return results.empty() && events.empty() && poses.empty(); }
+  [[nodiscard]] bool empty() const {
+    return results.empty() && events.empty() && poses.empty() && inspections.empty();
+  }
 };
 
 }  // namespace stridewire::server

@@ -92,11 +92,24 @@ void Shard::Tick() {
   }
   inbox_.clear();
   for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
+  AnswerQuestions();
   Publish();
 
   metrics_.ticks.Add();
   metrics_.tick.Observe(std::chrono::duration<double>(Clock::now() - begin).count());
   UpdateGauges();
+}
+
+void Shard::AnswerQuestions() {
+  for (const Inspection& question : questions_) {
+    protocol::AvatarState state =
+        WorldOf(question.world)
+            .Inspect(question.avatar, tick_, config_.limits.max_control_bytes / 2);
+    state.nonce = question.nonce;
+    outgoing_[static_cast<std::size_t>(question.from_shard)].inspections.push_back(
+        {question.session, std::move(state)});
+  }
+  questions_.clear();
 }
 
 void Shard::Publish() {
@@ -133,6 +146,10 @@ void Shard::Receive(TickMail&& mail) {
     const auto it = sessions_.find(result.session);
     if (it != sessions_.end()) it->second->OnResult(std::move(result));
   }
+  for (const InspectionResult& result : mail.inspections) {
+    const auto it = sessions_.find(result.session);
+    if (it != sessions_.end()) it->second->OnInspected(result.state);
+  }
   for (const EventDelivery& delivery : mail.events) {
     SharedEvents events(delivery, encoder_);
     for (Session* session : WatchersOf(delivery.world)) session->OnEvents(events);
@@ -166,6 +183,13 @@ void Shard::Submit(int shard, WorldCommand&& command) {
   Shard* receiver = shards_[static_cast<std::size_t>(shard)];
   asio::post(receiver->context_, [receiver, command = std::move(command)]() mutable {
     receiver->inbox_.push_back(std::move(command));
+  });
+}
+
+void Shard::Ask(int shard, Inspection&& question) {
+  Shard* receiver = shards_[static_cast<std::size_t>(shard)];
+  asio::post(receiver->context_, [receiver, question = std::move(question)]() mutable {
+    receiver->questions_.push_back(std::move(question));
   });
 }
 

@@ -78,6 +78,7 @@ class Shard : public SessionHost {
   ThreadMetrics& metrics() override { return metrics_; }
   protocol::Encoder& encoder() override { return encoder_; }
   void Submit(int shard, WorldCommand&& command) override;
+  void Ask(int shard, Inspection&& question) override;
   void JoinWorld(SessionId session, protocol::Seq seq, std::string name) override;
   void LeaveWorld(WorldId world) override;
   void SessionEnded(SessionId session) override;
@@ -85,6 +86,7 @@ class Shard : public SessionHost {
 
   void ScheduleTick();
   void Tick();
+  void AnswerQuestions();
   void Publish();
   void Receive(TickMail&& mail);
   void OnInterest(const Interest& interest);
@@ -110,6 +112,7 @@ class Shard : public SessionHost {
 
   std::uint64_t tick_ = 0;
   std::vector<WorldCommand> inbox_;
+  std::vector<Inspection> questions_;
   std::map<WorldId, std::unique_ptr<WorldShard>> worlds_;
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::map<WorldId, std::vector<Session*>> watchers_;  // sessions that want poses or events

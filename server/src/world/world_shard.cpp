@@ -6,6 +6,7 @@
 
 #include "stridewire/base/check.h"
 #include "world/convert.h"
+#include "world/inspect.h"
 
 namespace stridewire::server {
 
@@ -221,6 +222,28 @@ bool WorldShard::HasInterest() const {
 std::shared_ptr<const std::vector<protocol::Event>> WorldShard::TakeEvents() {
   if (events_.empty()) return nullptr;
   return std::make_shared<const std::vector<protocol::Event>>(std::exchange(events_, {}));
+}
+
+protocol::AvatarState WorldShard::Inspect(AvatarNumber avatar, std::uint64_t tick,
+                                          std::size_t max_site_bytes) const {
+  protocol::AvatarState state;
+  const auto it = avatars_.find(avatar);
+  if (it == avatars_.end()) {
+    state.code = StatusCode::kNoSuchAvatar;
+    state.text = "no avatar of that number";
+  } else {
+    const Entry& entry = it->second;
+    state = server::Inspect(entry.avatar, max_site_bytes);
+    if (state.movement) {
+      state.movement->started_s += clock_.TickTime(tick) - entry.time_s;
+    }
+    for (protocol::RequestItem& item : state.queue) item.avatar = avatar;
+  }
+  state.world = world_->id;
+  state.avatar = avatar;
+  state.tick = tick;
+  state.server_time_s = clock_.TickTime(tick);
+  return state;
 }
 
 bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, protocol::PoseBatchEncoder& encoder,

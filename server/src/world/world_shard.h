@@ -51,6 +51,10 @@ class WorldShard {
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick,
                             protocol::PoseBatchEncoder& encoder, PoseDelivery& delivery);
 
+  /// What an avatar is doing after `tick`, the answer to InspectAvatar.
+  [[nodiscard]] protocol::AvatarState Inspect(AvatarNumber avatar, std::uint64_t tick,
+                                              std::size_t max_site_bytes) const;
+
   [[nodiscard]] std::size_t avatar_count() const { return avatars_.size(); }
   [[nodiscard]] const World& world() const { return *world_; }
   [[nodiscard]] bool HasInterest() const;

@@ -154,6 +154,54 @@ TEST(ServerSession, AnswersPing) {
   EXPECT_GT(pong->server_time_s, 0.0);
 }
 
+TEST(ServerSession, AnswersWhatAnAvatarIsDoing) {
+  TestServer server(TestConfig(3));
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("plaza");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
+  ASSERT_TRUE(client.Request(world->world, Steps(2, 30, 0.4)));
+  const auto ask = [&](protocol::WorldId in, protocol::AvatarNumber avatar, std::uint64_t nonce) {
+    client.Send(protocol::InspectAvatar{nonce, in, avatar});
+    return client.Await<protocol::AvatarState>();
+  };
+  const auto walking = ask(world->world, 2, 7);
+  ASSERT_TRUE(walking);
+  EXPECT_EQ(walking->nonce, 7u);
+  EXPECT_EQ(walking->avatar, 2u);
+  ASSERT_TRUE(walking->movement);
+  EXPECT_EQ(walking->movement->request_id + walking->queue_size, 30u);
+  EXPECT_EQ(walking->queue.size(), protocol::kMaxInspectedRequests);
+  const auto standing = ask(world->world, 3, 8);
+  ASSERT_TRUE(standing);
+  EXPECT_FALSE(standing->movement);
+  EXPECT_EQ(ask(world->world, 99, 9)->code, StatusCode::kNoSuchAvatar);
+  EXPECT_EQ(ask(world->world + 1, 2, 10)->code, StatusCode::kNotJoined);
+
+  // Many at once: each is answered, those beyond the limit with a refusal.
+  constexpr std::uint64_t kQuestions = 1000;
+  for (std::uint64_t i = 1; i <= kQuestions; ++i) {
+    client.Send(protocol::InspectAvatar{i, world->world, 2});
+  }
+  std::uint64_t refused = 0;
+  for (std::uint64_t i = 1; i <= kQuestions; ++i) {
+    const auto state = client.Await<protocol::AvatarState>();
+    ASSERT_TRUE(state) << i;
+    EXPECT_TRUE(state->code == StatusCode::kOk || state->code == StatusCode::kLimitReached);
+    refused += state->code == StatusCode::kLimitReached ? 1 : 0;
+  }
+  EXPECT_LT(refused, kQuestions);
+
+  // Only those who said that they know the message may send it.
+  RawClient old = server.Connect();
+  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
+  old.Send(protocol::InspectAvatar{1, 1, 1});
+  const auto notice = old.Await<ErrorNotice>();
+  ASSERT_TRUE(notice);
+  EXPECT_EQ(notice->code, StatusCode::kUnexpectedMessage);
+}
+
 TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
   TestServer server;
   RawClient client = server.Connect();

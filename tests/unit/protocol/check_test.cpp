@@ -30,6 +30,18 @@ WorldInfo GoodWorldInfo() {
   return info;
 }
 Reply GoodReply() { return {1, StatusCode::kOk, "", 1, {{0, 1, 1, StatusCode::kOk, ""}}}; }
+AvatarState GoodState() {
+  AvatarState state{.nonce = 1, .world = 2, .avatar = 3, .queue_size = 2};
+  state.movement = {.kind = MovementKind::kStepLeft,
+                    .group = 0,
+                    .keytimes_s = {0.0, 0.1, 0.1, 0.5},
+                    .generic_time = 3.0,
+                    .weights = {0.5f, 0.5f},
+                    .parameter_names = {2, 5},
+                    .sites = {1.0f, 2.0f, 3.0f, 4.0f}};
+  state.queue = {{3, 1, StepMovement{}}, {3, 2, StandMovement{}}};
+  return state;
+}
 Events GoodEvents() {
   Events events{1, 1, 1, std::vector<Event>(2)};
   for (Event& event : events.events) event.avatar = 1;
@@ -396,6 +408,90 @@ TEST(Check, PoseBatch) {
   Refused<B>(
       good, [](B& m) { m.info.mode = PoseMode::kFull; }, ErrorCode::kShapeMismatch,
       "PoseBatch.poses");
+}
+
+TEST(Check, InspectAvatar) {
+  using I = InspectAvatar;
+  Refused<I>({1, 2, 3}, [](I& m) { m.world = 0; }, ErrorCode::kOutOfRange, "InspectAvatar.world");
+  Refused<I>({1, 2, 3}, [](I& m) { m.avatar = 0; }, ErrorCode::kOutOfRange, "InspectAvatar.avatar");
+}
+
+TEST(Check, AvatarState) {
+  using S = AvatarState;
+  const S good = GoodState();
+  Refused<S>(good, [](S& m) { m.world = 0; }, ErrorCode::kOutOfRange, "AvatarState.world");
+  Refused<S>(good, [](S& m) { m.avatar = 0; }, ErrorCode::kOutOfRange, "AvatarState.avatar");
+  RefusedTexts<S>(
+      good, [](S& m) -> std::string& { return m.text; }, kMaxReasonBytes, true, "AvatarState.text");
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.server_time_s; }, "AvatarState.server_time_s");
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.base.heading_rad; }, "AvatarState.base");
+  Refused<S>(
+      good, [](S& m) { m.queue_size = 1; }, ErrorCode::kShapeMismatch, "AvatarState.queue", 1);
+  Refused<S>(
+      good,
+      [](S& m) {
+        m.queue_size = 100;
+        m.queue.resize(kMaxInspectedRequests + 1, m.queue[0]);
+      },
+      ErrorCode::kLimitExceeded, "AvatarState.queue");
+  Refused<S>(
+      good, [](S& m) { m.queue[1].request_id = 0; }, ErrorCode::kOutOfRange, "Request.request_id",
+      1);
+}
+
+TEST(Check, AvatarStateMovement) {
+  using S = AvatarState;
+  const S good = GoodState();
+  Refused<S>(
+      good, [](S& m) { m.movement->kind = static_cast<MovementKind>(4); }, ErrorCode::kMalformed,
+      "AvatarState.movement.kind");
+  Refused<S>(
+      good, [](S& m) { m.movement->group = -2; }, ErrorCode::kOutOfRange,
+      "AvatarState.movement.group");
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.movement->started_s; },
+      "AvatarState.movement.started_s");
+  const std::vector<std::vector<double>> bad_keytimes = {
+      {0.1, 0.2, 0.3, 0.4}, {0.0, 0.2, 0.1, 0.4}, {0.0, 0.1, 0.2, kNaN}};
+  for (const auto& keytimes_s : bad_keytimes) {
+    Refused<S>(
+        good, [&](S& m) { m.movement->keytimes_s = keytimes_s; }, ErrorCode::kOutOfRange,
+        "AvatarState.movement.keytimes_s");
+  }
+  Refused<S>(
+      good, [](S& m) { m.movement->keytimes_s.assign(kMaxKeytimes + 1, 0.0); },
+      ErrorCode::kLimitExceeded, "AvatarState.movement.keytimes_s");
+  for (const double generic_time : {-0.1, 3.1, kNaN}) {
+    Refused<S>(
+        good, [&](S& m) { m.movement->generic_time = generic_time; }, ErrorCode::kOutOfRange,
+        "AvatarState.movement.generic_time");
+  }
+  for (const double ease_out_s : {-0.1, kInfinity}) {
+    Refused<S>(
+        good, [&](S& m) { m.movement->ease_out_s = ease_out_s; }, ErrorCode::kOutOfRange,
+        "AvatarState.movement.ease_out_s");
+  }
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Refused<S>(
+      good, [&](S& m) { m.movement->weights[1] = nan; }, ErrorCode::kOutOfRange,
+      "AvatarState.movement.weights", 1);
+  Refused<S>(
+      good, [&](S& m) { m.movement->weights.assign(kMaxWeights + 1, 0.0f); },
+      ErrorCode::kLimitExceeded, "AvatarState.movement.weights");
+  Refused<S>(
+      good, [](S& m) { m.movement->parameter_names = {2, 9}; }, ErrorCode::kMalformed,
+      "AvatarState.movement.parameter_names", 9);
+  Refused<S>(
+      good, [](S& m) { m.movement->parameter_names = {2, 2}; }, ErrorCode::kMalformed,
+      "AvatarState.movement.parameter_names", 2);
+  Refused<S>(
+      good, [](S& m) { m.movement->sites.pop_back(); }, ErrorCode::kShapeMismatch,
+      "AvatarState.movement.sites", 3);
+  Refused<S>(
+      good, [&](S& m) { m.movement->sites[2] = nan; }, ErrorCode::kOutOfRange,
+      "AvatarState.movement.sites", 2);
 }
 
 TEST(Check, Events) {

@@ -51,6 +51,7 @@ TEST(Decode, EveryTypeIsChecked) {
       {MessageType::kObserve, "Observe.seq"},
       {MessageType::kStopObserving, "StopObserving.seq"},
       {MessageType::kPing, ""},
+      {MessageType::kInspectAvatar, "InspectAvatar.world"},
       {MessageType::kGoodbye, ""},
       {MessageType::kWelcome, "Welcome.protocol"},
       {MessageType::kWorldInfo, "WorldInfo.world"},
@@ -59,7 +60,8 @@ TEST(Decode, EveryTypeIsChecked) {
       {MessageType::kEvents, "Events.world"},
       {MessageType::kLagging, "Lagging.world"},
       {MessageType::kError, ""},
-      {MessageType::kPong, ""}};
+      {MessageType::kPong, ""},
+      {MessageType::kAvatarState, "AvatarState.world"}};
   EXPECT_EQ(first_wrong.size(), std::variant_size_v<Message>);
   FlatBufferBuilder builder;
   const auto empty = Finished(builder, wire::CreatePing(builder));

@@ -91,6 +91,60 @@ struct Decoded {
   protocol::PoseBatch batch;
 };
 
+TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
+  Bench bench;
+  bench.Spawn({1});
+  constexpr std::size_t kPlenty = 100'000;
+  bench.shard.Advance(++bench.tick, 1);
+  const protocol::AvatarState standing = bench.shard.Inspect(1, bench.tick, kPlenty);
+  EXPECT_EQ(standing.code, StatusCode::kOk);
+  EXPECT_EQ(standing.world, 3u);
+  EXPECT_FALSE(standing.movement);
+  EXPECT_EQ(standing.queue_size, 0u);
+
+  bench.Walk(1, 3);
+  bench.shard.Advance(bench.tick, 1);
+  const double started_s = kClock.TickTime(bench.tick) - kClock.tick_s();
+  for (int i = 0; i < 5; ++i) bench.shard.Advance(++bench.tick, 1);
+  const protocol::AvatarState walking = bench.shard.Inspect(1, bench.tick, kPlenty);
+  EXPECT_EQ(walking.tick, bench.tick);
+  EXPECT_EQ(walking.queue_size, 2u);
+  ASSERT_EQ(walking.queue.size(), 2u);
+  EXPECT_EQ(walking.queue[0].request_id, 2u);
+  EXPECT_EQ(walking.queue[0].avatar, 1u);
+  EXPECT_EQ(std::get<protocol::StepMovement>(walking.queue[0].movement).length_m, 0.4);
+  ASSERT_TRUE(walking.movement);
+  const protocol::CurrentMovement& movement = *walking.movement;
+  EXPECT_EQ(movement.request_id, 1u);
+  EXPECT_NEAR(movement.started_s, started_s, 1e-9);
+  EXPECT_GT(movement.generic_time, 0.0);
+  EXPECT_LT(movement.generic_time, static_cast<double>(movement.keytimes_s.size() - 1));
+  EXPECT_LT(walking.server_time_s, movement.started_s + movement.keytimes_s.back());
+  // Weights at the applied parameters: sum 1, and the examples' sites come back as those parameters
+  // (true of the cardinal basis without pseudoexamples).
+  const std::size_t d = movement.parameter_names.size();
+  ASSERT_EQ(movement.applied.count, d);
+  ASSERT_EQ(movement.sites.size(), movement.weights.size() * d);
+  double sum = 0.0;
+  std::vector<double> mean(d);
+  for (std::size_t e = 0; e < movement.weights.size(); ++e) {
+    sum += movement.weights[e];
+    for (std::size_t p = 0; p < d; ++p) {
+      mean[p] += static_cast<double>(movement.weights[e]) * movement.sites[e * d + p];
+    }
+  }
+  EXPECT_NEAR(sum, 1.0, 1e-5);
+  for (std::size_t p = 0; p < d; ++p) {
+    EXPECT_EQ(movement.parameter_names[p], movement.applied.names[p]);
+    EXPECT_NEAR(mean[p], movement.applied.values[p], 1e-5);
+  }
+
+  EXPECT_TRUE(bench.shard.Inspect(1, bench.tick, 10).movement->sites.empty());
+  const protocol::AvatarState nobody = bench.shard.Inspect(9, bench.tick, kPlenty);
+  EXPECT_EQ(nobody.code, StatusCode::kNoSuchAvatar);
+  EXPECT_EQ(nobody.avatar, 9u);
+}
+
 TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
   Bench punctual;
   Bench late;

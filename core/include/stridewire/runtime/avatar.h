@@ -77,6 +77,14 @@ class Avatar {
   /// The movement under way, null while standing; valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &movement_ : nullptr; }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
+  /// The kStarted event of the movement or requested stand under way, null while just standing.
+  [[nodiscard]] const AvatarEvent* started() const {
+    return is_moving_ || is_in_stand_ ? &started_ : nullptr;
+  }
+  /// What has not started, in order.
+  [[nodiscard]] std::span<const MovementRequest> queue() const {
+    return std::span(queue_).subspan(queue_head_);
+  }
 
  private:
   void AddEvent(const AvatarEvent& event);
@@ -103,6 +111,7 @@ class Avatar {
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
   std::uint64_t request_id_ = 0;  // of the movement or stand under way
   double stand_left_s_ = 0.0;
+  AvatarEvent started_;
   Movement movement_;
   double movement_time_s_ = 0.0;
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement

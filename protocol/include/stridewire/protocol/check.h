@@ -19,6 +19,7 @@ namespace stridewire::protocol {
 [[nodiscard]] Status Check(const Observe& m);
 [[nodiscard]] Status Check(const StopObserving& m);
 [[nodiscard]] Status Check(const Ping& m);
+[[nodiscard]] Status Check(const InspectAvatar& m);
 [[nodiscard]] Status Check(const Goodbye& m);
 [[nodiscard]] Status Check(const Welcome& m);
 [[nodiscard]] Status Check(const WorldInfo& m);
@@ -28,5 +29,6 @@ namespace stridewire::protocol {
 [[nodiscard]] Status Check(const Lagging& m);
 [[nodiscard]] Status Check(const ErrorNotice& m);
 [[nodiscard]] Status Check(const Pong& m);
+[[nodiscard]] Status Check(const AvatarState& m);
 
 }  // namespace stridewire::protocol

@@ -34,6 +34,7 @@ class Encoder {
   [[nodiscard]] Status Encode(const Observe& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const StopObserving& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Ping& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const InspectAvatar& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Goodbye& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Welcome& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const WorldInfo& m, std::vector<std::byte>& frame);
@@ -43,6 +44,7 @@ class Encoder {
   [[nodiscard]] Status Encode(const Lagging& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const ErrorNotice& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Pong& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const AvatarState& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Message& m, std::vector<std::byte>& frame);
 
  private:

@@ -24,6 +24,7 @@ enum class MessageType : std::uint16_t {
   kObserve = 8,
   kStopObserving = 9,
   kPing = 10,
+  kInspectAvatar = 11,
   // Both ways.
   kGoodbye = 32,
   // Server to client.
@@ -35,6 +36,7 @@ enum class MessageType : std::uint16_t {
   kLagging = 69,
   kError = 70,
   kPong = 71,
+  kAvatarState = 72,
 };
 
 /// Who sent it.

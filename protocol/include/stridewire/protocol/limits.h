@@ -14,6 +14,7 @@ inline constexpr std::uint64_t kFeatureResume = 1;        ///< Sessions outlive 
 inline constexpr std::uint64_t kFeatureEventReplay = 2;   ///< Events missed are sent again.
 inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuantised.
 inline constexpr std::uint64_t kFeatureMovementMode = 8;  ///< PoseMode::kMovement; reserved.
+inline constexpr std::uint64_t kFeatureInspect = 16;      ///< InspectAvatar, AvatarState.
 
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
 inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;   ///< Payload of Hello.
@@ -28,8 +29,11 @@ inline constexpr std::size_t kMinResumeTokenBytes = 16;
 inline constexpr std::size_t kMaxResumeTokenBytes = 64;
 inline constexpr std::size_t kMaxJoints = 256;
 inline constexpr std::size_t kMaxEndSites = 256;
-inline constexpr std::size_t kMaxParameters = 7;    ///< Parameters of an event.
-inline constexpr std::uint8_t kParameterNames = 9;  ///< Parameter names are 0 to 8.
+inline constexpr std::size_t kMaxParameters = 7;          ///< Parameters of an event.
+inline constexpr std::uint8_t kParameterNames = 9;        ///< Parameter names are 0 to 8.
+inline constexpr std::size_t kMaxKeytimes = 9;            ///< Of a movement inspected.
+inline constexpr std::size_t kMaxWeights = 4096;          ///< The same.
+inline constexpr std::size_t kMaxInspectedRequests = 16;  ///< The same: of its queue.
 inline constexpr std::uint16_t kMaxEveryNTicks = 3600;
 inline constexpr std::uint16_t kMaxBatchParts = 1024;
 inline constexpr std::uint32_t kReplyMemory = 1024;  ///< Answers a server remembers a session.

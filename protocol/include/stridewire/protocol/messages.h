@@ -164,6 +164,16 @@ struct Ping {
   bool operator==(const Ping&) const = default;
 };
 
+/// Asks what an avatar is doing; AvatarState answers. A question, like Ping: it changes nothing, and
+/// what was under way when a connection broke is not answered. Needs kFeatureInspect.
+struct InspectAvatar {
+  static constexpr MessageType kType = MessageType::kInspectAvatar;
+  std::uint64_t nonce = 0;  ///< Comes back in AvatarState.
+  WorldId world = 0;
+  AvatarNumber avatar = 0;
+  bool operator==(const InspectAvatar&) const = default;
+};
+
 // ---- both ways
 
 /// Last message of a connection, and the end of the session: it cannot be resumed. A server that
@@ -380,8 +390,45 @@ struct Pong {
   bool operator==(const Pong&) const = default;
 };
 
-using Message = std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue,
-                             Observe, StopObserving, Ping, Goodbye, Welcome, WorldInfo, Reply,
-                             PoseBatch, Events, Lagging, ErrorNotice, Pong>;
+/// What an avatar does just now. A requested stand has no group, keytimes or weights.
+struct CurrentMovement {
+  RequestId request_id = 0;
+  MovementKind kind = MovementKind::kStand;
+  std::int16_t group = -1;
+  double started_s = 0.0;          ///< On the server's clock.
+  std::vector<double> keytimes_s;  ///< From its start, the first 0; at most kMaxKeytimes.
+  double generic_time = 0.0;       ///< 0 to keytimes - 1 (paper, Eq. (3)).
+  double ease_out_s = 0.0;         ///< How long the difference pose lasts.
+  ParameterSet requested;
+  ParameterSet applied;
+  bool extrapolated = false;
+  bool clamped = false;
+  std::vector<float> weights;                 ///< [example], at most kMaxWeights.
+  std::vector<std::uint8_t> parameter_names;  ///< As in ParameterSet.
+  std::vector<float> sites;  ///< [example][parameter]: where the examples lie; may be empty.
+  bool operator==(const CurrentMovement&) const = default;
+};
+
+/// The answer to InspectAvatar.
+struct AvatarState {
+  static constexpr MessageType kType = MessageType::kAvatarState;
+  std::uint64_t nonce = 0;
+  WorldId world = 0;
+  AvatarNumber avatar = 0;
+  StatusCode code = StatusCode::kOk;  ///< If not kOk, nothing below `text` is set.
+  std::string text;
+  std::uint64_t tick = 0;
+  double server_time_s = 0.0;
+  Placement base;
+  std::optional<CurrentMovement> movement;
+  std::uint32_t queue_size = 0;
+  std::vector<RequestItem> queue;  ///< The first kMaxInspectedRequests of it.
+  bool operator==(const AvatarState&) const = default;
+};
+
+using Message =
+    std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue, Observe,
+                 StopObserving, Ping, InspectAvatar, Goodbye, Welcome, WorldInfo, Reply, PoseBatch,
+                 Events, Lagging, ErrorNotice, Pong, AvatarState>;
 
 }  // namespace stridewire::protocol

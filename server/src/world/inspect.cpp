@@ -1,0 +1,64 @@
+#include "world/inspect.h"
+
+#include <algorithm>
+
+#include "world/convert.h"
+
+namespace stridewire::server {
+namespace {
+
+protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEvent& started,
+                                            std::size_t max_site_bytes) {
+  const protocol::Event event = ToWire(started, avatar.library());
+  protocol::CurrentMovement current{.request_id = event.request_id,
+                                    .kind = event.kind,
+                                    .group = event.group,
+                                    .started_s = started.time_s,
+                                    .requested = event.requested,
+                                    .applied = event.applied,
+                                    .extrapolated = event.extrapolated,
+                                    .clamped = event.clamped};
+  const Movement* movement = avatar.movement();
+  if (movement == nullptr) return current;  // a requested stand
+  const auto keytimes_s =
+      std::span(movement->keytimes_s).first(static_cast<std::size_t>(movement->interval_count) + 1);
+  current.keytimes_s.assign(keytimes_s.begin(), keytimes_s.end());
+  current.generic_time = std::clamp(movement->warp.GenericTimeAt(avatar.movement_time_s()), 0.0,
+                                    static_cast<double>(movement->interval_count));
+  current.ease_out_s = movement->ease_out_s;
+  const std::size_t weight_count = std::min(movement->weights.size(), protocol::kMaxWeights);
+  current.weights.assign(movement->weights.begin(),
+                         movement->weights.begin() + static_cast<std::ptrdiff_t>(weight_count));
+  const MotionGroup& group = avatar.library().group(movement->group);
+  const std::size_t parameter_count = std::min(group.parameters.size(), protocol::kMaxParameters);
+  for (std::size_t p = 0; p < parameter_count; ++p) {
+    current.parameter_names.push_back(static_cast<std::uint8_t>(group.parameters[p].name));
+  }
+  if (weight_count * parameter_count * sizeof(float) > max_site_bytes) return current;
+  current.sites.reserve(weight_count * parameter_count);
+  for (std::size_t example = 0; example < weight_count; ++example) {
+    for (const double value : group.site(static_cast<int>(example)).first(parameter_count)) {
+      current.sites.push_back(static_cast<float>(value));
+    }
+  }
+  return current;
+}
+
+}  // namespace
+
+protocol::AvatarState Inspect(const Avatar& avatar, std::size_t max_site_bytes) {
+  protocol::AvatarState state;
+  state.base = ToWire(avatar.base());
+  if (const AvatarEvent* started = avatar.started()) {
+    state.movement = CurrentMovementOf(avatar, *started, max_site_bytes);
+  }
+  const std::span<const MovementRequest> queue = avatar.queue();
+  state.queue_size = static_cast<std::uint32_t>(queue.size());
+  for (const MovementRequest& request :
+       queue.first(std::min(queue.size(), protocol::kMaxInspectedRequests))) {
+    state.queue.push_back(ToWire(request));
+  }
+  return state;
+}
+
+}  // namespace stridewire::server
