@@ -1,3 +1,1 @@
-import {protocolVersion} from '@stridewire/client';
-
-console.log(protocolVersion);
+console.log('viewer');

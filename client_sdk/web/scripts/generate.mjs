@@ -1,14 +1,20 @@
 // Messages from the schema: generated/. FLATC names another flatc.
 import {execFileSync} from 'node:child_process';
-import {existsSync, mkdirSync, rmSync, statSync} from 'node:fs';
+import {
+  existsSync, mkdirSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync
+} from 'node:fs';
 import {fileURLToPath} from 'node:url';
+import {layoutModule, parseSchema} from './schema.mjs';
 
-const schema = fileURLToPath(new URL('../../../protocol/schema/stridewire.fbs', import.meta.url));
-const out = fileURLToPath(new URL('../generated', import.meta.url));
+const path = (url) => fileURLToPath(new URL(url, import.meta.url));
+const schema = path('../../../protocol/schema/stridewire.fbs');
+const out = path('../generated');
+const last = `${out}/layout.ts`;
 const flatc = process.env.FLATC || 'flatc';
-const main = `${out}/stridewire_generated.ts`;
 
-if (!existsSync(main) || statSync(main).mtimeMs < statSync(schema).mtimeMs) {
+const newest = Math.max(
+    ...[schema, path('generate.mjs'), path('schema.mjs')].map((file) => statSync(file).mtimeMs));
+if (!existsSync(last) || statSync(last).mtimeMs < newest) {
   rmSync(out, {recursive: true, force: true});
   mkdirSync(out, {recursive: true});
   try {
@@ -18,4 +24,9 @@ if (!existsSync(main) || statSync(main).mtimeMs < statSync(schema).mtimeMs) {
                   'flatbuffers-compiler, FLATC names another');
     process.exit(1);
   }
+  // flatc 2.0.8's own list leaves out tables that nothing refers to, which messages are.
+  const modules = readdirSync(`${out}/stridewire/wire`).sort();
+  writeFileSync(`${out}/wire.ts`, modules.map((file) =>
+      `export * from './stridewire/wire/${file.replace(/\.ts$/, '')}';\n`).join(''));
+  writeFileSync(last, layoutModule(parseSchema(readFileSync(schema, 'utf8'))));
 }

@@ -1,2 +1,3 @@
-/** Stridewire in a browser. */
-export const protocolVersion = 1;
+/** Stridewire in a browser: spawn figures, command them, show their poses. */
+export * from './types';
+export {Status, statusName, statusText} from './status';

@@ -1,0 +1,514 @@
+import {ByteBuffer, Encoding} from 'flatbuffers';
+import {tableNumbers} from '../../generated/layout';
+import * as wire from '../../generated/wire';
+import type {
+  EndSite, FootChoice, Leg, MovementKind, MovementType, ParameterName, Parameters, PoseMode, Role,
+  Vec3, WorldEvent, WorldEventType
+} from '../types';
+import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
+import {
+  frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
+  maxFewTables, maxItems, maxJoints, maxNameBytes, maxParameters, maxReasonBytes,
+  maxResumeTokenBytes, maxTextBytes, minResumeTokenBytes
+} from './limits';
+import {Malformed} from './malformed';
+import type {Joint, Message, RequestEntry, ReplyEntry, SpawnEntry} from './messages';
+import {poseBytes} from './pose_codec';
+import {readName, readText} from './text';
+import {verify} from './verify';
+
+/** Texts are taken as bytes: they are counted and checked before they become strings. */
+const asBytes = Encoding.UTF8_BYTES;
+
+export const roles: readonly Role[] = ['controller', 'observer'];
+export const poseModes: readonly (PoseMode | 'movement')[] = ['full', 'quantised', 'movement'];
+export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand'];
+export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
+export const movementKinds: readonly MovementKind[] = ['stepLeft', 'stepRight', 'jump', 'stand'];
+export const eventTypes: readonly WorldEventType[] = [
+  'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned', 'removed'
+];
+export const parameterNames: readonly ParameterName[] = [
+  'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height'
+];
+
+/**
+ * One frame as a message that holds what protocol/STANDARD.md says: structure, then meaning. A
+ * batch's poses are checked when PoseReader reads them.
+ * @throws Malformed and nothing else
+ */
+export function decodeFrame(frame: ArrayBuffer, sender: Sender): Message {
+  const name = readFrameHeader(new DataView(frame), sender);
+  const payload = new DataView(frame, frameHeaderBytes);
+  if (!verify(payload, tableNumbers[name], isBulk(name) ? maxCrowdTables : maxFewTables)) {
+    throw new Malformed('is not a well-formed FlatBuffers message', name);
+  }
+  return decoders[name](new ByteBuffer(new Uint8Array(frame, frameHeaderBytes)));
+}
+
+// ---- what a field may hold
+
+function finite(value: number, field: string, index = -1): number {
+  if (!Number.isFinite(value)) throw new Malformed('is not finite', field, index);
+  return value;
+}
+
+function notNegative(value: number, field: string): number {
+  if (finite(value, field) < 0) throw new Malformed('is negative', field);
+  return value;
+}
+
+function id<T extends number | bigint>(value: T, field: string, index = -1): T {
+  if (value == 0) throw new Malformed('is zero', field, index);
+  return value;
+}
+
+function known<T>(values: readonly T[], value: number, field: string, index = -1): T {
+  const found = values[value];
+  if (found === undefined) throw new Malformed(`enumerator ${value} is unknown`, field, index);
+  return found;
+}
+
+function count(length: number, min: number, max: number, field: string): number {
+  if (length < min) throw new Malformed('list is empty', field);
+  if (length > max) throw new Malformed(`list of ${length} is too long`, field);
+  return length;
+}
+
+function avatarList(list: Uint32Array | null, min: number, field: string): Uint32Array {
+  const avatars = list ?? new Uint32Array(0);
+  count(avatars.length, min, maxItems, field);
+  for (let i = 0; i < avatars.length; ++i) id(avatars[i]!, field, i);
+  return avatars;
+}
+
+function resumeToken(bytes: Uint8Array | null, field: string): Uint8Array {
+  const length = bytes?.length ?? 0;
+  if (length !== 0 && (length < minResumeTokenBytes || length > maxResumeTokenBytes)) {
+    throw new Malformed('is not 16 to 64 bytes long', field);
+  }
+  return new Uint8Array(bytes ?? []);
+}
+
+function vector(v: wire.Vec3 | wire.Offset | null, field: string, index = -1): Vec3 {
+  if (v === null) return [0, 0, 0];
+  return [finite(v.x(), field, index), finite(v.y(), field, index), finite(v.z(), field, index)];
+}
+
+function parameters(length: number,
+                    get: (i: number, into: wire.ParameterValue) => wire.ParameterValue | null,
+                    field: string, index: number): Parameters {
+  count(length, 0, maxParameters, field);
+  const values: {[name in ParameterName]?: number} = {};
+  const value = new wire.ParameterValue();
+  for (let p = 0; p < length; ++p) {
+    get(p, value);
+    const name = known(parameterNames, value.name(), field, index);
+    if (name in values) throw new Malformed(`${name} stands twice`, field, index);
+    values[name] = finite(value.value(), field, index);
+  }
+  return values;
+}
+
+// ---- the messages
+
+const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message} = {
+  Hello(bytes) {
+    const m = wire.Hello.getRootAsHello(bytes);
+    const protocolMin = m.protocolMin();
+    const protocolMax = m.protocolMax();
+    if (protocolMin < 1 || protocolMin > protocolMax) {
+      throw new Malformed('versions are not 1 <= min <= max', 'Hello.protocolMin');
+    }
+    return {
+      type: 'Hello',
+      protocolMin,
+      protocolMax,
+      clientName: name(m.clientName(asBytes), 'Hello.clientName'),
+      features: m.features(),
+      authToken: text(m.authToken(asBytes), maxAuthTokenBytes, 'Hello.authToken'),
+      resumeToken: resumeToken(m.resumeTokenArray(), 'Hello.resumeToken'),
+      lastEventsNumber: m.lastEventsNumber(),
+    };
+  },
+
+  JoinWorld(bytes) {
+    const m = wire.JoinWorld.getRootAsJoinWorld(bytes);
+    return {
+      type: 'JoinWorld',
+      seq: id(m.seq(), 'JoinWorld.seq'),
+      name: name(m.name(asBytes), 'JoinWorld.name'),
+      role: known(roles, m.role(), 'JoinWorld.role'),
+    };
+  },
+
+  LeaveWorld(bytes) {
+    const m = wire.LeaveWorld.getRootAsLeaveWorld(bytes);
+    return {
+      type: 'LeaveWorld',
+      seq: id(m.seq(), 'LeaveWorld.seq'),
+      world: id(m.world(), 'LeaveWorld.world'),
+    };
+  },
+
+  Spawn(bytes) {
+    const m = wire.Spawn.getRootAsSpawn(bytes);
+    const items: SpawnEntry[] = [];
+    const length = count(m.itemsLength(), 1, maxItems, 'Spawn.items');
+    const item = new wire.SpawnItem();
+    for (let i = 0; i < length; ++i) {
+      m.items(i, item);
+      items.push({
+        avatar: item.avatar(),
+        positionM: vector(item.positionM(), 'Spawn.positionM', i),
+        headingRad: finite(item.headingRad(), 'Spawn.headingRad', i),
+      });
+    }
+    return {
+      type: 'Spawn', seq: id(m.seq(), 'Spawn.seq'), world: id(m.world(), 'Spawn.world'), items
+    };
+  },
+
+  Remove(bytes) {
+    const m = wire.Remove.getRootAsRemove(bytes);
+    return {
+      type: 'Remove',
+      seq: id(m.seq(), 'Remove.seq'),
+      world: id(m.world(), 'Remove.world'),
+      avatars: avatarList(m.avatarsArray(), 1, 'Remove.avatars'),
+    };
+  },
+
+  Request(bytes) {
+    const m = wire.Request.getRootAsRequest(bytes);
+    const items: RequestEntry[] = [];
+    const length = count(m.itemsLength(), 1, maxItems, 'Request.items');
+    const item = new wire.RequestItem();
+    for (let i = 0; i < length; ++i) {
+      m.items(i, item);
+      const type = known(movementTypes, item.type(), 'Request.type', i);
+      const step = type === 'step';
+      const moves = type !== 'stand';
+      // Fields that a type does not have are ignored, whatever they hold.
+      items.push({
+        avatar: id(item.avatar(), 'Request.avatar', i),
+        requestId: id(item.requestId(), 'Request.requestId', i),
+        type,
+        foot: step ? known(footChoices, item.foot(), 'Request.foot', i) : 'auto',
+        lengthM: moves ? finite(item.lengthM(), 'Request.lengthM', i) : 0,
+        sideM: step ? finiteOrNull(item.sideM(), 'Request.sideM', i) : null,
+        heightM: moves ? finite(item.heightM(), 'Request.heightM', i) : 0,
+        turnRad: moves ? finite(item.turnRad(), 'Request.turnRad', i) : 0,
+        seconds: moves ? 0 : finite(item.seconds(), 'Request.seconds', i),
+      });
+    }
+    return {
+      type: 'Request',
+      seq: id(m.seq(), 'Request.seq'),
+      world: id(m.world(), 'Request.world'),
+      items,
+    };
+  },
+
+  CancelQueue(bytes) {
+    const m = wire.CancelQueue.getRootAsCancelQueue(bytes);
+    return {
+      type: 'CancelQueue',
+      seq: id(m.seq(), 'CancelQueue.seq'),
+      world: id(m.world(), 'CancelQueue.world'),
+      avatars: avatarList(m.avatarsArray(), 1, 'CancelQueue.avatars'),
+    };
+  },
+
+  Observe(bytes) {
+    const m = wire.Observe.getRootAsObserve(bytes);
+    const everyNTicks = m.everyNTicks();
+    if (everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
+      throw new Malformed('is not 1 to 3600', 'Observe.everyNTicks');
+    }
+    return {
+      type: 'Observe',
+      seq: id(m.seq(), 'Observe.seq'),
+      world: id(m.world(), 'Observe.world'),
+      subscription: id(m.subscription(), 'Observe.subscription'),
+      mode: known(poseModes, m.mode(), 'Observe.mode'),
+      avatars: avatarList(m.avatarsArray(), 0, 'Observe.avatars'),
+      everyNTicks,
+      withEvents: m.withEvents(),
+    };
+  },
+
+  StopObserving(bytes) {
+    const m = wire.StopObserving.getRootAsStopObserving(bytes);
+    return {
+      type: 'StopObserving',
+      seq: id(m.seq(), 'StopObserving.seq'),
+      subscription: id(m.subscription(), 'StopObserving.subscription'),
+    };
+  },
+
+  Ping(bytes) {
+    const m = wire.Ping.getRootAsPing(bytes);
+    return {type: 'Ping', nonce: m.nonce(), timeS: finite(m.timeS(), 'Ping.timeS')};
+  },
+
+  Goodbye(bytes) {
+    const m = wire.Goodbye.getRootAsGoodbye(bytes);
+    return {
+      type: 'Goodbye', code: m.code(), text: text(m.text(asBytes), maxTextBytes, 'Goodbye.text')
+    };
+  },
+
+  Welcome(bytes) {
+    const m = wire.Welcome.getRootAsWelcome(bytes);
+    const limits = m.limits();
+    const tickHz = m.tickHz();
+    if (!(finite(tickHz, 'Welcome.tickHz') > 0)) {
+      throw new Malformed('is not above 0', 'Welcome.tickHz');
+    }
+    return {
+      type: 'Welcome',
+      protocol: id(m.protocol(), 'Welcome.protocol'),
+      features: m.features(),
+      session: id(m.session(), 'Welcome.session'),
+      resumeToken: resumeToken(m.resumeTokenArray(), 'Welcome.resumeToken'),
+      resumed: m.resumed(),
+      lastSeq: m.lastSeq(),
+      tickHz,
+      serverName: text(m.serverName(asBytes), maxNameBytes, 'Welcome.serverName'),
+      serverVersion: text(m.serverVersion(asBytes), maxNameBytes, 'Welcome.serverVersion'),
+      limits: {
+        maxControlBytes: limits?.maxControlBytes() ?? 0,
+        maxBulkBytes: limits?.maxBulkBytes() ?? 0,
+        maxItems: limits?.maxItems() ?? 0,
+        maxAvatarsPerWorld: limits?.maxAvatarsPerWorld() ?? 0,
+        maxQueue: limits?.maxQueue() ?? 0,
+        replyMemory: limits?.replyMemory() ?? 0,
+        idleTimeoutS: notNegative(limits?.idleTimeoutS() ?? 0, 'Welcome.limits.idleTimeoutS'),
+        resumeWindowS: notNegative(limits?.resumeWindowS() ?? 0, 'Welcome.limits.resumeWindowS'),
+      },
+    };
+  },
+
+  WorldInfo(bytes) {
+    const m = wire.WorldInfo.getRootAsWorldInfo(bytes);
+    const skeleton = m.skeleton();
+    const jointCount =
+        count(skeleton?.jointsLength() ?? 0, 1, maxJoints, 'WorldInfo.skeleton.joints');
+    const joints: Joint[] = [];
+    const names = new Set<string>();
+    const joint = new wire.Joint();
+    for (let j = 0; j < jointCount; ++j) {
+      skeleton!.joints(j, joint);
+      const jointName = name(joint.name(asBytes), 'WorldInfo.joint.name', j);
+      if (names.has(jointName)) {
+        throw new Malformed('name stands twice', 'WorldInfo.joint.name', j);
+      }
+      names.add(jointName);
+      const parent = joint.parent();
+      if (j === 0 ? parent !== -1 : parent < 0 || parent >= j) {
+        throw new Malformed('does not come before its child', 'WorldInfo.joint.parent', j);
+      }
+      const offsetM = vector(joint.offsetM(), 'WorldInfo.joint.offsetM', j);
+      joints.push({name: jointName, parent, offsetM});
+    }
+    const endSites: EndSite[] = [];
+    const endSite = new wire.EndSite();
+    const endSiteCount =
+        count(skeleton!.endSitesLength(), 0, maxEndSites, 'WorldInfo.skeleton.endSites');
+    for (let e = 0; e < endSiteCount; ++e) {
+      skeleton!.endSites(e, endSite);
+      if (endSite.joint() >= jointCount) {
+        throw new Malformed('no such joint', 'WorldInfo.endSite.joint', e);
+      }
+      endSites.push({
+        joint: endSite.joint(),
+        offsetM: vector(endSite.offsetM(), 'WorldInfo.endSite.offsetM', e),
+      });
+    }
+    return {
+      type: 'WorldInfo',
+      seq: m.seq(),
+      world: id(m.world(), 'WorldInfo.world'),
+      name: name(m.name(asBytes), 'WorldInfo.name'),
+      role: known(roles, m.role(), 'WorldInfo.role'),
+      tick: m.tick(),
+      libraryHash: text(m.libraryHash(asBytes), maxNameBytes, 'WorldInfo.libraryHash'),
+      joints,
+      endSites,
+      leftLeg: leg(skeleton!.leftLeg(), jointCount),
+      rightLeg: leg(skeleton!.rightLeg(), jointCount),
+    };
+  },
+
+  Reply(bytes) {
+    const m = wire.Reply.getRootAsReply(bytes);
+    const items: ReplyEntry[] = [];
+    const length = count(m.itemsLength(), 0, maxItems, 'Reply.items');
+    const item = new wire.ReplyItem();
+    for (let i = 0; i < length; ++i) {
+      m.items(i, item);
+      if (item.index() >= maxItems) {
+        throw new Malformed('no command has so many items', 'Reply.item.index', i);
+      }
+      items.push({
+        index: item.index(),
+        avatar: item.avatar(),
+        requestId: item.requestId(),
+        code: item.code(),
+        text: text(item.text(asBytes), maxReasonBytes, 'Reply.item.text', i),
+      });
+    }
+    return {
+      type: 'Reply',
+      seq: id(m.seq(), 'Reply.seq'),
+      code: m.code(),
+      text: text(m.text(asBytes), maxTextBytes, 'Reply.text'),
+      accepted: m.accepted(),
+      items,
+    };
+  },
+
+  PoseBatch(bytes) {
+    const m = wire.PoseBatch.getRootAsPoseBatch(bytes);
+    const part = m.part();
+    const parts = m.parts();
+    if (parts < 1 || parts > maxBatchParts || part >= parts) {
+      throw new Malformed('is not 0 to parts - 1 of 1 to 1024', 'PoseBatch.part');
+    }
+    const mode = known(poseModes, m.mode(), 'PoseBatch.mode');
+    if (mode === 'movement') throw new Malformed('no pose is sent in this mode', 'PoseBatch.mode');
+    const jointCount = m.jointCount();
+    if (jointCount < 1 || jointCount > maxJoints) {
+      throw new Malformed('is not 1 to 256', 'PoseBatch.jointCount');
+    }
+    const avatars = avatarList(m.avatarsArray(), 0, 'PoseBatch.avatars');
+    const flags = m.flagsArray() ?? new Uint8Array(0);
+    if (flags.length !== avatars.length) {
+      throw new Malformed('is not one an avatar', 'PoseBatch.flags');
+    }
+    const poses = m.posesArray() ?? new Uint8Array(0);
+    if (poses.length !== avatars.length * poseBytes(mode, jointCount)) {
+      throw new Malformed('is not one an avatar', 'PoseBatch.poses');
+    }
+    return {
+      type: 'PoseBatch',
+      world: id(m.world(), 'PoseBatch.world'),
+      shard: m.shard(),
+      part,
+      parts,
+      tick: Number(m.tick()),
+      serverTimeS: finite(m.serverTimeS(), 'PoseBatch.serverTimeS'),
+      mode,
+      jointCount,
+      avatars,
+      flags,
+      poses,
+    };
+  },
+
+  Events(bytes) {
+    const m = wire.Events.getRootAsEvents(bytes);
+    const events: WorldEvent[] = [];
+    const length = count(m.eventsLength(), 1, maxItems, 'Events.events');
+    const event = new wire.Event();
+    for (let i = 0; i < length; ++i) {
+      m.events(i, event);
+      const type = known(eventTypes, event.type(), 'Event.type', i);
+      const group = event.group();
+      if (group < -1) throw new Malformed('is below -1', 'Event.group', i);
+      const foot = event.foot();
+      if (foot > 1) throw new Malformed(`enumerator ${foot} is unknown`, 'Event.foot', i);
+      events.push({
+        type,
+        avatar: id(event.avatar(), 'Event.avatar', i),
+        requestId: event.requestId(),
+        tick: Number(event.tick()),
+        timeS: finite(event.timeS(), 'Event.timeS', i),
+        kind: known(movementKinds, event.kind(), 'Event.kind', i),
+        group,
+        requested: parameters(event.requestedLength(), (p, into) => event.requested(p, into),
+                              'Event.requested', i),
+        applied: parameters(event.appliedLength(), (p, into) => event.applied(p, into),
+                            'Event.applied', i),
+        extrapolated: event.extrapolated(),
+        clamped: event.clamped(),
+        foot: type !== 'footStrike' ? null : foot === 0 ? 'left' : 'right',
+        positionM: vector(event.positionM(), 'Event.positionM', i),
+        basePositionM: vector(event.basePositionM(), 'Event.basePositionM', i),
+        baseHeadingRad: finite(event.baseHeadingRad(), 'Event.baseHeadingRad', i),
+        code: event.code(),
+        reason: text(event.reason(asBytes), maxReasonBytes, 'Event.reason', i),
+      });
+    }
+    return {
+      type: 'Events',
+      world: id(m.world(), 'Events.world'),
+      number: m.number(),
+      tick: m.tick(),
+      events,
+    };
+  },
+
+  Lagging(bytes) {
+    const m = wire.Lagging.getRootAsLagging(bytes);
+    return {
+      type: 'Lagging',
+      world: id(m.world(), 'Lagging.world'),
+      droppedBatches: Number(m.droppedBatches()),
+      droppedEvents: Number(m.droppedEvents()),
+    };
+  },
+
+  Error(bytes) {
+    const m = wire.Error.getRootAsError(bytes);
+    return {
+      type: 'Error',
+      code: m.code(),
+      text: text(m.text(asBytes), maxTextBytes, 'Error.text'),
+      fatal: m.fatal(),
+      seq: m.seq(),
+    };
+  },
+
+  Pong(bytes) {
+    const m = wire.Pong.getRootAsPong(bytes);
+    return {
+      type: 'Pong',
+      nonce: m.nonce(),
+      timeS: finite(m.timeS(), 'Pong.timeS'),
+      serverTimeS: finite(m.serverTimeS(), 'Pong.serverTimeS'),
+      tick: m.tick(),
+    };
+  },
+};
+
+/** What the generated readers give for a text asked for as bytes. */
+type WireText = string | Uint8Array | null;
+
+function text(bytes: WireText, maxBytes: number, field: string, index = -1): string {
+  return readText(bytes as Uint8Array | null, maxBytes, field, index);
+}
+
+function name(bytes: WireText, field: string, index = -1): string {
+  return readName(bytes as Uint8Array | null, maxNameBytes, field, index);
+}
+
+function finiteOrNull(value: number | null, field: string, index: number): number | null {
+  return value === null ? null : finite(value, field, index);
+}
+
+function leg(from: wire.Leg | null, jointCount: number): Leg {
+  const joint = (index: number): number => {
+    if (index < -1 || index >= jointCount) throw new Malformed('no such joint', 'WorldInfo.leg');
+    return index;
+  };
+  return {
+    hip: joint(from?.hip() ?? -1),
+    knee: joint(from?.knee() ?? -1),
+    ankle: joint(from?.ankle() ?? -1),
+    ball: joint(from?.ball() ?? -1),
+    ballOffsetM: vector(from?.ballOffsetM() ?? null, 'WorldInfo.leg.ballOffsetM'),
+    toeTipOffsetM: vector(from?.toeTipOffsetM() ?? null, 'WorldInfo.leg.toeTipOffsetM'),
+  };
+}

@@ -1,0 +1,96 @@
+import {frameHeaderBytes, maxBulkBytes, maxControlBytes, maxHelloBytes} from './limits';
+import {Malformed} from './malformed';
+
+/** Numbers of the message types. */
+export const MessageType = {
+  Hello: 1,
+  JoinWorld: 2,
+  LeaveWorld: 3,
+  Spawn: 4,
+  Remove: 5,
+  Request: 6,
+  CancelQueue: 7,
+  Observe: 8,
+  StopObserving: 9,
+  Ping: 10,
+  Goodbye: 32,
+  Welcome: 64,
+  WorldInfo: 65,
+  Reply: 66,
+  PoseBatch: 67,
+  Events: 68,
+  Lagging: 69,
+  Error: 70,
+  Pong: 71,
+} as const;
+export type MessageName = keyof typeof MessageType;
+export type Sender = 'client' | 'server';
+
+const magic = 0x1a505753;  // "SWP", 0x1a
+const frameVersion = 1;
+
+const names = new Map<number, MessageName>(
+    Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
+const bulk = new Set<MessageName>([
+  'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events'
+]);
+
+export function isBulk(name: MessageName): boolean {
+  return bulk.has(name);
+}
+
+function maySend(sender: Sender, name: MessageName): boolean {
+  return name === 'Goodbye' || (sender === 'client') === (MessageType[name] < MessageType.Goodbye);
+}
+
+/** Most bytes of a payload, with what the server says it takes. */
+export function maxPayloadBytes(name: MessageName, controlBytes = maxControlBytes,
+                                bulkBytes = maxBulkBytes): number {
+  if (isBulk(name)) return Math.min(bulkBytes, maxBulkBytes);
+  const control = Math.min(controlBytes, maxControlBytes);
+  return name === 'Hello' ? Math.min(control, maxHelloBytes) : control;
+}
+
+/**
+ * Looks at the header of one whole frame, in the order of the standard.
+ * @throws Malformed
+ */
+export function readFrameHeader(view: DataView, sender: Sender): MessageName {
+  if (view.byteLength < frameHeaderBytes) {
+    throw new Malformed('is shorter than its header', 'frame', view.byteLength);
+  }
+  if (view.getUint32(0, true) !== magic) {
+    throw new Malformed('does not begin with the magic bytes', 'frame');
+  }
+  const version = view.getUint16(4, true);
+  if (version !== frameVersion) throw new Malformed(`version ${version} is unknown`, 'frame');
+  const type = view.getUint16(6, true);
+  const name = names.get(type);
+  if (name === undefined) throw new Malformed(`message type ${type} is unknown`, 'frame');
+  if (!maySend(sender, name)) throw new Malformed(`${name} goes the other way`, 'frame');
+  if (view.getUint32(12, true) !== 0) throw new Malformed('flags are not zero', 'frame');
+  const bytes = view.getUint32(8, true);
+  if (bytes > maxPayloadBytes(name)) {
+    throw new Malformed(`a payload of ${bytes} bytes is longer than ${name} may be`, 'frame');
+  }
+  if (bytes === 0 || bytes % 8 !== 0) {
+    throw new Malformed('payload length is not a multiple of 8 above 0', 'frame');
+  }
+  if (view.byteLength !== frameHeaderBytes + bytes) {
+    throw new Malformed('is not as long as its header says', 'frame');
+  }
+  return name;
+}
+
+/** A frame around a finished FlatBuffers message. */
+export function makeFrame(name: MessageName, message: Uint8Array): ArrayBuffer {
+  const bytes = Math.ceil(message.byteLength / 8) * 8;
+  const frame = new ArrayBuffer(frameHeaderBytes + bytes);
+  const view = new DataView(frame);
+  view.setUint32(0, magic, true);
+  view.setUint16(4, frameVersion, true);
+  view.setUint16(6, MessageType[name], true);
+  view.setUint32(8, bytes, true);
+  new Uint8Array(frame, frameHeaderBytes).set(message);
+  return frame;
+}

@@ -1,0 +1,196 @@
+/** Messages as plain objects, checked. 64-bit numbers are bigint where all their bits matter. */
+import type {
+  EndSite, FootChoice, Leg, MovementType, PoseMode, Role, Vec3, WorldEvent
+} from '../types';
+
+export interface Hello {
+  type: 'Hello';
+  protocolMin: number;
+  protocolMax: number;
+  clientName: string;
+  features: bigint;
+  authToken: string;
+  resumeToken: Uint8Array;
+  lastEventsNumber: bigint;
+}
+export interface JoinWorld {
+  type: 'JoinWorld';
+  seq: bigint;
+  name: string;
+  role: Role;
+}
+export interface LeaveWorld {
+  type: 'LeaveWorld';
+  seq: bigint;
+  world: number;
+}
+export interface SpawnEntry {
+  avatar: number;
+  positionM: Vec3;
+  headingRad: number;
+}
+export interface Spawn {
+  type: 'Spawn';
+  seq: bigint;
+  world: number;
+  items: SpawnEntry[];
+}
+export interface Remove {
+  type: 'Remove';
+  seq: bigint;
+  world: number;
+  avatars: Uint32Array;
+}
+export interface RequestEntry {
+  avatar: number;
+  requestId: bigint;
+  type: MovementType;
+  foot: FootChoice;
+  lengthM: number;
+  sideM: number | null;
+  heightM: number;
+  turnRad: number;
+  seconds: number;
+}
+export interface Request {
+  type: 'Request';
+  seq: bigint;
+  world: number;
+  items: RequestEntry[];
+}
+export interface CancelQueue {
+  type: 'CancelQueue';
+  seq: bigint;
+  world: number;
+  avatars: Uint32Array;
+}
+export interface Observe {
+  type: 'Observe';
+  seq: bigint;
+  world: number;
+  subscription: number;
+  mode: PoseMode | 'movement';
+  avatars: Uint32Array;
+  everyNTicks: number;
+  withEvents: boolean;
+}
+export interface StopObserving {
+  type: 'StopObserving';
+  seq: bigint;
+  subscription: number;
+}
+export interface Ping {
+  type: 'Ping';
+  nonce: bigint;
+  timeS: number;
+}
+export interface Goodbye {
+  type: 'Goodbye';
+  code: number;
+  text: string;
+}
+export interface ServerLimits {
+  maxControlBytes: number;
+  maxBulkBytes: number;
+  maxItems: number;
+  maxAvatarsPerWorld: number;
+  maxQueue: number;
+  replyMemory: number;
+  idleTimeoutS: number;
+  resumeWindowS: number;
+}
+export interface Welcome {
+  type: 'Welcome';
+  protocol: number;
+  features: bigint;
+  session: bigint;
+  resumeToken: Uint8Array;
+  resumed: boolean;
+  lastSeq: bigint;
+  tickHz: number;
+  serverName: string;
+  serverVersion: string;
+  limits: ServerLimits;
+}
+export interface Joint {
+  name: string;
+  parent: number;
+  offsetM: Vec3;
+}
+export interface WorldInfo {
+  type: 'WorldInfo';
+  seq: bigint;
+  world: number;
+  name: string;
+  role: Role;
+  tick: bigint;
+  libraryHash: string;
+  joints: Joint[];
+  endSites: EndSite[];
+  leftLeg: Leg;
+  rightLeg: Leg;
+}
+export interface ReplyEntry {
+  index: number;
+  avatar: number;
+  requestId: bigint;
+  code: number;
+  text: string;
+}
+export interface ReplyMessage {
+  type: 'Reply';
+  seq: bigint;
+  code: number;
+  text: string;
+  accepted: number;
+  items: ReplyEntry[];
+}
+/** Arrays are views of the frame. Poses are not looked at yet: PoseReader does. */
+export interface PoseBatch {
+  type: 'PoseBatch';
+  world: number;
+  shard: number;
+  part: number;
+  parts: number;
+  tick: number;
+  serverTimeS: number;
+  mode: PoseMode;
+  jointCount: number;
+  avatars: Uint32Array;
+  flags: Uint8Array;
+  poses: Uint8Array;
+}
+export interface Events {
+  type: 'Events';
+  world: number;
+  number: bigint;
+  tick: bigint;
+  events: WorldEvent[];
+}
+export interface Lagging {
+  type: 'Lagging';
+  world: number;
+  droppedBatches: number;
+  droppedEvents: number;
+}
+export interface ErrorNotice {
+  type: 'Error';
+  code: number;
+  text: string;
+  fatal: boolean;
+  seq: bigint;
+}
+export interface Pong {
+  type: 'Pong';
+  nonce: bigint;
+  timeS: number;
+  serverTimeS: number;
+  tick: bigint;
+}
+
+export type CommandMessage =
+    JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving;
+export type ClientMessage = Hello | CommandMessage | Ping | Goodbye;
+export type ServerMessage =
+    Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong | Goodbye;
+export type Message = ClientMessage | ServerMessage;

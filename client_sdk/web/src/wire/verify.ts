@@ -1,0 +1,96 @@
+import {tableLayouts} from '../../generated/layout';
+import {maxDepth} from './limits';
+
+/**
+ * Whether everything a reader of this table can reach lies inside the payload, aligned, with strings
+ * ended by a zero, not nested deeper than the standard says, and with at most `maxTables` tables.
+ * npm's flatbuffers reads without such checks, and neither can it tell afterwards.
+ *
+ * @param payload begins on a multiple of 8 of its message
+ * @param table number of the root's table in `tableNumbers`
+ */
+export function verify(payload: DataView, table: number, maxTables: number): boolean {
+  return new Verifier(payload, maxTables).root(table);
+}
+
+class Verifier {
+  private readonly size: number;
+  private tables = 0;
+
+  constructor(private readonly view: DataView, private readonly maxTables: number) {
+    this.size = view.byteLength;
+  }
+
+  root(table: number): boolean {
+    const at = this.follow(0);
+    return at > 0 && this.table(at, table, 1);
+  }
+
+  private inside(at: number, bytes: number, align: number): boolean {
+    return at % align === 0 && at >= 0 && bytes <= this.size && at <= this.size - bytes;
+  }
+
+  /** Where the offset at `at` leads; 0: nowhere good. */
+  private follow(at: number): number {
+    if (!this.inside(at, 4, 4)) return 0;
+    const offset = this.view.getUint32(at, true);
+    const target = at + offset;
+    return offset > 0 && target < this.size ? target : 0;
+  }
+
+  /** Number of entries of the vector there, whose bytes are inside; -1: they are not. */
+  private vector(at: number, size: number, align: number): number {
+    if (!this.inside(at, 4, 4)) return -1;
+    const count = this.view.getUint32(at, true);
+    const bytes = count * size;  // Below 2^53: both are below 2^32.
+    return this.inside(at + 4, bytes, 1) && (count === 0 || (at + 4) % align === 0) ? count : -1;
+  }
+
+  private string(at: number): boolean {
+    const length = this.vector(at, 1, 1);
+    return length >= 0 && this.inside(at + 4 + length, 1, 1) &&
+        this.view.getUint8(at + 4 + length) === 0;
+  }
+
+  private table(at: number, number: number, depth: number): boolean {
+    if (depth > maxDepth || ++this.tables > this.maxTables) return false;
+    if (!this.inside(at, 4, 4)) return false;
+    const vtable = at - this.view.getInt32(at, true);
+    if (!this.inside(vtable, 4, 2)) return false;
+    const vtableBytes = this.view.getUint16(vtable, true);
+    // Readers take sizes and offsets for signed, so the upper half of them would lead astray.
+    if (vtableBytes < 4 || vtableBytes % 2 !== 0 || vtableBytes > 0x7fff ||
+        !this.inside(vtable, vtableBytes, 2)) {
+      return false;
+    }
+    const fields = tableLayouts[number]!;
+    const known = Math.min(fields.length, (vtableBytes - 4) >> 1);
+    for (let i = 0; i < known; ++i) {
+      const offset = this.view.getUint16(vtable + 4 + 2 * i, true);
+      if (offset === 0) continue;
+      if (offset > 0x7fff || !this.field(at + offset, fields[i]!, depth)) return false;
+    }
+    return true;
+  }
+
+  private field(at: number, [kind, size, align]: readonly [number, number, number],
+                depth: number): boolean {
+    if (kind === 0) return this.inside(at, size, align);
+    const target = this.follow(at);
+    if (target === 0) return false;
+    switch (kind) {
+      case 1: return this.string(target);
+      case 2: return this.vector(target, size, align) >= 0;
+      case 3: return this.table(target, size, depth + 1);
+      default: {
+        const count = this.vector(target, 4, 4);
+        if (count < 0 || count > this.maxTables) return false;
+        for (let i = 0; i < count; ++i) {
+          const entry = this.follow(target + 4 + 4 * i);
+          if (entry === 0 || !this.table(entry, size, depth + 1)) return false;
+        }
+        return true;
+      }
+    }
+  }
+}
