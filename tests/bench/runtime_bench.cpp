@@ -5,6 +5,7 @@
 // here 30 of them.
 #include <benchmark/benchmark.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/movement.h"
 
 namespace stridewire {
@@ -65,6 +67,33 @@ void StartMovementAlone(benchmark::State& state, const Library& library, int gro
     benchmark::DoNotOptimize(movement.weights.data());
   }
   state.SetItemsProcessed(state.iterations());
+  AddGroupCounters(state, group);
+}
+
+/// The same with run-time correction: what an avatar pays when a movement starts.
+void StartCorrected(benchmark::State& state, const Library& library, int group_index) {
+  const MotionGroup& group = library->group(group_index);
+  const auto parameters = Parameters(group);
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  Movement movement;
+  Pose pose(library->skeleton().joint_count());
+  GridCache cache(library->layout());
+  std::size_t i = 0;
+  double iterations = 0.0;
+  for (auto _ : state) {
+    const std::vector<double>& wanted = parameters[i++ % kVariations];
+    ParameterValues values{.count = group.parameter_count()};
+    std::copy(wanted.begin(), wanted.end(), values.values.begin());
+    const Correction correction =
+        CorrectParameters(*library, group_index, values, DefaultCorrectionLimits(group), scratch,
+                          cache, pose, movement);
+    StartMovement(group, group_index, std::span(correction.parameters.values).first(wanted.size()),
+                  {}, scratch, movement);
+    iterations += correction.iterations;
+    benchmark::DoNotOptimize(movement.weights.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.counters["iterations"] = benchmark::Counter(iterations, benchmark::Counter::kAvgIterations);
   AddGroupCounters(state, group);
 }
 
@@ -247,6 +276,7 @@ void RegisterAll(const std::string& path, const Library& library) {
     const std::string kind =
         std::string(MovementKindName(library->group(i).kind)) + "_" + std::to_string(i);
     Register(name + "/start_movement/" + kind, StartMovementAlone, library, i);
+    Register(name + "/start_corrected/" + kind, StartCorrected, library, i);
     Register(name + "/synthesize_step/" + kind, SynthesizeStep, library, i);
     Register(name + "/evaluate_pose/" + kind, EvaluatePose, library, i);
   }

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -579,6 +580,33 @@ TEST_F(LibraryTool, SynthesizesWhatItReports) {
       Tool({"synthesize", "builtin", "--choreography", choreography, "--out", Out("o.bvh")});
   EXPECT_EQ(text.exit_code, 0);
   EXPECT_THAT(text.out, HasSubstr("movements"));
+}
+
+TEST_F(LibraryTool, CorrectsParametersUnlessToldNotTo) {
+  const std::string choreography = folder_.Write("c.json", kWalk);
+  const Arguments arguments = {"synthesize", "builtin", "--choreography", choreography,
+                               "--json",     "--out",   Out("o.bvh")};
+  for (const bool corrected : {true, false}) {
+    const ProgramResult result = Tool(corrected ? arguments : Join(arguments, {"--no-correction"}));
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json report = ParseOutput(result.out);
+    double largest_miss = 0.0;
+    bool all_as_applied = true;
+    for (const json& movement : report["movements"]) {
+      if (movement["kind"] == "stand") continue;
+      all_as_applied = all_as_applied && movement["corrected"] == movement["applied"];
+      for (const auto& [name, value] : movement["applied"].items()) {
+        largest_miss = std::max(largest_miss, std::fabs(value.get<double>() -
+                                                        movement["measured"][name].get<double>()));
+      }
+    }
+    EXPECT_EQ(all_as_applied, !corrected);
+    if (corrected) {
+      EXPECT_LT(largest_miss, 1e-4);
+    } else {
+      EXPECT_GT(largest_miss, 1e-4);
+    }
+  }
 }
 
 TEST_F(LibraryTool, ExportsExamplesThatCanBeReadBack) {

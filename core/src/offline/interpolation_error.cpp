@@ -5,12 +5,10 @@
 #include <random>
 #include <vector>
 
-#include "stridewire/runtime/measure.h"
+#include "stridewire/runtime/correction.h"
 
 namespace stridewire {
 namespace {
-
-constexpr int kIterations = 3;
 
 // Uniform in (0, 1): the standard distributions may differ between C++ libraries.
 double Uniform(std::mt19937& random) {
@@ -29,14 +27,9 @@ InterpolationError MeasureInterpolationError(const MotionLibrary& library, int g
   Pose pose(library.skeleton().joint_count());
   Movement movement;
   std::vector<double> scratch(n);
-  const auto measure = [&](const ParameterValues& p) {
-    StartMovement(group, group_index, std::span(p.values).first(d), {}, scratch, movement);
-    cache.Clear();
-    return MeasureMovement(library, movement, cache, pose);
-  };
-
+  const CorrectionLimits limits = DefaultCorrectionLimits(group);
   InterpolationError error;
-  error.iterations = kIterations;
+  error.iterations = limits.max_iterations;
   std::vector<double> share(n);
   for (int s = 0; s < samples + group.example_count; ++s) {
     // Few examples carry most of a sample (Dirichlet, alpha = 1/2), so that edges are met as well.
@@ -55,20 +48,16 @@ InterpolationError MeasureInterpolationError(const MotionLibrary& library, int g
         wanted.values[l] += share[e] / sum * group.sites[e * d + l];
       }
     }
-    ParameterValues asked = wanted;
-    ParameterValues measured = measure(asked);
-    const double miss = LargestDifference(group, wanted, measured);
-    error.max_m = std::max(error.max_m, miss);
-    error.mean_m += miss;
-    for (int i = 0; i < kIterations; ++i) {
-      for (std::size_t l = 0; l < d; ++l) asked.values[l] += wanted.values[l] - measured.values[l];
-      measured = measure(asked);
-    }
-    error.corrected_max_m =
-        std::max(error.corrected_max_m, LargestDifference(group, wanted, measured));
+    const Correction correction =
+        CorrectParameters(library, group_index, wanted, limits, scratch, cache, pose, movement);
+    error.max_m = std::max(error.max_m, correction.initial_error_m);
+    error.mean_m += correction.initial_error_m;
+    error.corrected_max_m = std::max(error.corrected_max_m, correction.error_m);
+    error.corrected_mean_m += correction.error_m;
     ++error.samples;
   }
   error.mean_m /= error.samples;
+  error.corrected_mean_m /= error.samples;
   return error;
 }
 

@@ -68,7 +68,8 @@ void MeasureLanding(const MotionGroup& group, MovementRecord& record) {
 }  // namespace
 
 Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
-                               std::span<const MovementRequest> requests, double fps) {
+                               std::span<const MovementRequest> requests, double fps,
+                               const AvatarOptions& options) {
   if (!(fps >= 10.0 && fps <= 1000.0)) {
     return Fail(ErrorCode::kOutOfRange, "frames a second must be from 10 to 1000");
   }
@@ -82,7 +83,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
   }
 
   const int joint_count = library->skeleton().joint_count();
-  Avatar avatar(library, start);
+  Avatar avatar(library, start, options);
   Synthesis result;
   result.clip.fps = fps;
   result.clip.joint_count = joint_count;
@@ -123,6 +124,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
         record.extrapolated = event.extrapolated;
         record.clamped = event.clamped;
         if (const Movement* movement = avatar.movement(); movement != nullptr && event.group >= 0) {
+          record.corrected = movement->parameters;
           record.weights = movement->weights;
           for (int i = 0; i <= movement->interval_count; ++i) {
             record.keytimes_s.push_back(event.time_s +

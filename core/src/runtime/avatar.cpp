@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
+#include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/foot_vector.h"
 
 namespace stridewire {
@@ -35,8 +36,9 @@ int LandingKeytime(const MotionGroup& group) {
 
 }  // namespace
 
-Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start)
-    : library_(std::move(library)), cache_(library_->layout()) {
+Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+               const AvatarOptions& options)
+    : library_(std::move(library)), options_(options), cache_(library_->layout()) {
   const int joint_count = library_->skeleton().joint_count();
   pose_ = Pose(joint_count);
   movement_.difference = Pose(joint_count);
@@ -184,9 +186,17 @@ bool Avatar::StartNext() {
 void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = library_->group(plan.group);
   const Pose& displayed = pose_;
+  ParameterValues parameters = plan.applied;
+  if (options_.run_time_correction) {
+    // The difference pose is made below: until then it is room to measure in.
+    parameters =
+        CorrectParameters(*library_, plan.group, plan.applied, DefaultCorrectionLimits(next),
+                          weight_scratch_, cache_, movement_.difference, movement_)
+            .parameters;
+  }
   cache_.Clear();
   StartMovement(next, plan.group,
-                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
+                std::span(parameters.values).first(static_cast<std::size_t>(parameters.count)),
                 base_, weight_scratch_, movement_);
   // D = P - M(0), with P what is displayed.
   EvaluateBlend(next, library_->layout(), movement_, 0.0, cache_, movement_.difference);

@@ -24,6 +24,27 @@ bool AllFinite(std::span<const double> values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
 }
 
+// R_kj = B(|p_k - p_j| / d_j).
+Matrix RadialMatrix(std::span<const double> sites, std::span<const double> dilations,
+                    std::span<const double> scales) {
+  const std::size_t d = scales.size();
+  const std::size_t m = dilations.size();
+  Matrix matrix(m, m);
+  for (std::size_t k = 0; k < m; ++k) {
+    for (std::size_t j = 0; j < m; ++j) {
+      const double distance = Distance(sites.subspan(k * d, d), sites.subspan(j * d, d), scales);
+      matrix(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(j)) =
+          CubicBSpline(distance / dilations[j]);
+    }
+  }
+  return matrix;
+}
+
+double ConditionOf(const Eigen::PartialPivLU<Eigen::MatrixXd>& decomposition) {
+  const double reciprocal = decomposition.rcond();
+  return reciprocal > 0.0 ? 1.0 / reciprocal : HUGE_VAL;
+}
+
 }  // namespace
 
 double CubicBSpline(double u) {
@@ -42,6 +63,14 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
   const std::size_t m = sites.size() / d;
   if (m < n || pseudo_weights.size() != (m - n) * n) {
     return Fail(ErrorCode::kShapeMismatch, "pseudoexample weights do not fit the sites");
+  }
+  if (!radius_factors.empty() && radius_factors.size() != m) {
+    return Fail(ErrorCode::kShapeMismatch, "radius factors do not fit the sites");
+  }
+  for (const double factor : radius_factors) {
+    if (!(factor > 0.0) || !std::isfinite(factor)) {
+      return Fail(ErrorCode::kOutOfRange, "a radius factor is not positive");
+    }
   }
   if (!AllFinite(sites) || !AllFinite(pseudo_weights)) {
     return Fail(ErrorCode::kOutOfRange, "a parameter or weight is not finite");
@@ -72,19 +101,19 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
       if (k == j) continue;
       const double distance = Distance(site(j), site(k), scales);
       nearest_any = std::min(nearest_any, distance);
-      if (k < n || j >= n) nearest = std::min(nearest, distance);
+      if (k < n || j >= n || radii_from_all_sites) nearest = std::min(nearest, distance);
     }
     if (nearest_any < kMinSiteDistance) {
       return Fail(ErrorCode::kIllConditioned, "two examples have the same parameters",
                   static_cast<std::int64_t>(j));
     }
     if (std::isfinite(nearest)) basis.dilations[j] = nearest;
+    if (!radius_factors.empty()) basis.dilations[j] *= radius_factors[j];
   }
 
   // A a = D in the least-squares sense, then R r = D - A a.
   Matrix a_matrix(m, d + 1);
   Matrix wanted = Matrix::Zero(static_cast<Eigen::Index>(m), static_cast<Eigen::Index>(n));
-  Matrix r_matrix(m, m);
   for (std::size_t k = 0; k < m; ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     a_matrix(row, 0) = 1.0;
@@ -95,11 +124,8 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
       wanted(row, static_cast<Eigen::Index>(e)) =
           k < n ? (k == e ? 1.0 : 0.0) : pseudo_weights[(k - n) * n + e];
     }
-    for (std::size_t j = 0; j < m; ++j) {
-      r_matrix(row, static_cast<Eigen::Index>(j)) =
-          CubicBSpline(Distance(site(k), site(j), scales) / basis.dilations[j]);
-    }
   }
+  const Matrix r_matrix = RadialMatrix(sites, basis.dilations, scales);
   // Minimum norm where no example spans a direction. A complete orthogonal decomposition gives the
   // pseudo-inverse's solution as an SVD does and compiles in a fraction of the time.
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> a_decomposition;
@@ -109,8 +135,7 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
   const Eigen::PartialPivLU<Eigen::MatrixXd> r_decomposition(r_matrix);
   const Matrix radial = r_decomposition.solve(wanted - a_matrix * linear);
 
-  const double reciprocal = r_decomposition.rcond();
-  basis.condition = reciprocal > 0.0 ? 1.0 / reciprocal : HUGE_VAL;
+  basis.condition = ConditionOf(r_decomposition);
   if (!(basis.condition <= kMaxCondition)) {
     return Fail(ErrorCode::kIllConditioned, "the radial basis is nearly singular");
   }
@@ -120,6 +145,11 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
     return Fail(ErrorCode::kIllConditioned, "the weights have no finite solution");
   }
   return basis;
+}
+
+double RadialCondition(std::span<const double> sites, std::span<const double> dilations,
+                       std::span<const double> scales) {
+  return ConditionOf(Eigen::PartialPivLU<Eigen::MatrixXd>(RadialMatrix(sites, dilations, scales)));
 }
 
 void EvaluateWeights(const ConstBasisSpan& basis, std::span<const double> parameters,

@@ -24,9 +24,9 @@ Feet FeetOf(const Skeleton& skeleton, ConstPoseSpan pose) {
 ParameterValues MeasureMovement(const MotionLibrary& library, const Movement& movement,
                                 GridCache& cache, PoseSpan pose) {
   const MotionGroup& group = library.group(movement.group);
-  EvaluateBlend(group, library.layout(), movement, 0.0, cache, pose);
+  EvaluateGridPoint(group, library.layout(), movement, 0, cache, pose);
   const Feet before = FeetOf(library.skeleton(), pose);
-  EvaluateBlend(group, library.layout(), movement, movement.duration_s(), cache, pose);
+  EvaluateGridPoint(group, library.layout(), movement, group.grid_point_count - 1, cache, pose);
   const Feet after = FeetOf(library.skeleton(), pose);
 
   const double sign = group.kind == MovementKind::kStepRight ? -1.0 : 1.0;

@@ -98,12 +98,12 @@ double EaseOut(double s) {
   return r * r * (3.0 - 2.0 * r);
 }
 
-void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
-                   const BaseFrame& base, std::span<double> weight_scratch, Movement& movement) {
+void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
+                std::span<double> weight_scratch, Movement& movement) {
   const auto n = static_cast<std::size_t>(group.example_count);
   movement.group = group_index;
-  movement.base = base;
-  movement.interval_count = group.interval_count();
+  movement.parameters.count = static_cast<int>(parameters.size());
+  std::copy(parameters.begin(), parameters.end(), movement.parameters.values.begin());
   const std::span<double> weights = weight_scratch.first(n);
   if (n == 1) {
     weights[0] = 1.0;
@@ -125,11 +125,32 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
     movement.weights[e] = static_cast<float>(weights[e]);
     movement.heading_change_rad += weights[e] * group.heading_change_rad[e];
   }
+}
+
+void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
+                   const BaseFrame& base, std::span<double> weight_scratch, Movement& movement) {
+  SetWeights(group, group_index, parameters, weight_scratch, movement);
+  movement.base = base;
+  movement.interval_count = group.interval_count();
   const std::span<double> keytimes =
       std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count) + 1);
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
   movement.warp = TimeWarp(keytimes, group.cells);
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
+}
+
+void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                       int point, GridCache& cache, PoseSpan out) {
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  const std::span<const float> row = cache.Row(group, movement.weights, point);
+  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
+    out.rotations[j] = Quat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
+  }
+  const float* root = &row[static_cast<std::size_t>(layout.root())];
+  out.root_position_m =
+      Vec3(movement.base.position_m +
+           RotateYaw(movement.base.heading_rad, DVec3(root[0], root[1], root[2])));
+  out.rotations[0] = YawRotation(movement.base.heading_rad + root[3]) * out.rotations[0];
 }
 
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,

@@ -34,6 +34,7 @@ struct SynthesizeCommand {
   std::string choreography;
   std::string out;
   double fps = 60.0;
+  bool no_correction = false;
   bool json = false;
 };
 int RunSynthesize(const SynthesizeCommand& command);

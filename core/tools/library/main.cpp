@@ -114,6 +114,8 @@ int Run(int argc, char** argv) {
   synthesize_app->add_option("--fps", synthesize.fps, "Frames a second")
       ->capture_default_str()
       ->check(Number(10.0, 1000.0, false));
+  synthesize_app->add_flag("--no-correction", synthesize.no_correction,
+                           "Start movements with the parameters asked for, uncorrected");
   synthesize_app->add_flag("--json", synthesize.json, "Report as one JSON object on stdout");
   synthesize_app->footer(
       "Example:\n  echo '{\"movements\":[{\"step\":{\"length_m\":0.6}}]}' > c.json\n"

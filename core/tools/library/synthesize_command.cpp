@@ -23,8 +23,7 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
     json["keytimes_s"] = record.keytimes_s;
     json["requested"] = ParametersToJson(group, record.requested);
     json["applied"] = ParametersToJson(group, record.applied);
-    // Nothing corrects parameters at run time yet: the weights are those of the applied ones.
-    json["corrected"] = ParametersToJson(group, record.applied);
+    json["corrected"] = ParametersToJson(group, record.corrected);
     json["measured"] = ParametersToJson(group, record.measured);
     json["extrapolated"] = record.extrapolated;
     json["clamped"] = record.clamped;
@@ -62,7 +61,8 @@ int RunSynthesize(const SynthesizeCommand& command) {
   if (!library) return ComplainOfInput(library.error());
   const auto choreography = ReadChoreography(command.choreography);
   if (!choreography) return ComplainOfInput(choreography.error());
-  auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps);
+  auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps,
+                              {.run_time_correction = !command.no_correction});
   if (!synthesis) {
     Error error = synthesis.error();
     std::string where = command.choreography;

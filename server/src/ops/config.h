@@ -42,6 +42,7 @@ struct Config {
   double tick_hz = 60.0;
   int shards = 0;  ///< 0: one a processor.
   int max_catch_up_ticks = 10;
+  bool run_time_correction = true;  ///< Movements start with corrected parameters.
   bool allow_insecure = false;
   bool open_worlds = true;  ///< Worlds the file does not name come into being when joined.
   bool persistent = false;  ///< Of worlds the file does not name.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "stridewire/protocol/messages.h"
+#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire::server {
@@ -20,6 +21,7 @@ struct World {
   std::string name;
   std::shared_ptr<const MotionLibrary> library;
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
+  AvatarOptions avatar_options;
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
   std::atomic<AvatarNumber> last_number{0};   ///< Largest avatar number ever asked for.

@@ -26,6 +26,7 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   auto world = std::make_shared<World>();
   world->id = ++last_id_;
   world->name = std::string(name);
+  world->avatar_options.run_time_correction = config_.run_time_correction;
   world->persistent = is_configured ? configured->second.persistent : config_.persistent;
   const bool has_library = is_configured && !configured->second.library.empty();
   world->library = libraries_.Find(has_library ? configured->second.library : config_.library);

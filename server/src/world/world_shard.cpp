@@ -92,7 +92,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
       continue;
     }
     const BaseFrame start = FromWire(item.spawn.start);
-    avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start),
+    avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start, world_->avatar_options),
                                    .owner = command.session,
                                    .spawn_tick = tick});
     if (events_wanted_) {

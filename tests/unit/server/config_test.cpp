@@ -74,6 +74,7 @@ TEST(Config, PrintsWhatItReads) {
   config.library = "a \"strange\" \\ name\n";
   config.tick_hz = 29.97;
   config.allow_insecure = true;
+  config.run_time_correction = false;
   config.limits.max_sessions = 3;
   config.limits.idle_timeout_s = 0.0;
   config.worlds["hall"] = {.library = "hall.swl", .persistent = true};
@@ -86,6 +87,7 @@ TEST(Config, PrintsWhatItReads) {
   EXPECT_EQ(read.listen, config.listen);
   EXPECT_EQ(read.library, config.library);
   EXPECT_EQ(read.tick_hz, 29.97);
+  EXPECT_FALSE(read.run_time_correction);
   EXPECT_EQ(read.worlds, config.worlds);
   EXPECT_EQ(read.limits.idle_timeout_s, 0.0);
 }

@@ -342,6 +342,7 @@ TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
   const auto hall = directory.Join("hall");
   ASSERT_TRUE(hall);
   EXPECT_TRUE((*hall)->persistent);
+  EXPECT_TRUE((*hall)->avatar_options.run_time_correction);
   EXPECT_EQ(*directory.Join("hall"), *hall);
   const auto other = directory.Join("other");
   ASSERT_TRUE(other);

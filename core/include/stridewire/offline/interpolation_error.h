@@ -10,9 +10,10 @@ namespace stridewire {
 struct InterpolationError {
   double max_m = 0.0;
   double mean_m = 0.0;
-  double corrected_max_m = 0.0;  ///< after `iterations` rounds of p <- p + (p^ - a(p))
+  double corrected_max_m = 0.0;  ///< After CorrectParameters, as when a movement starts.
+  double corrected_mean_m = 0.0;
   int samples = 0;
-  int iterations = 0;
+  int iterations = 0;  ///< The most a correction takes.
 };
 
 /// Samples the hull of a group's examples by seeded convex combinations (Dirichlet weighted, so that

@@ -28,8 +28,9 @@ struct MovementRecord {
   double end_s = 0.0;
   std::vector<double> keytimes_s;
   ParameterValues requested;
-  ParameterValues applied;   ///< After clamping to what the examples span
-  ParameterValues measured;  ///< a(p) of the synthesized movement
+  ParameterValues applied;    ///< After clamping to what the examples span
+  ParameterValues corrected;  ///< What the weights were taken at, so that `measured` is `applied`
+  ParameterValues measured;   ///< a(p) of the synthesized movement
   bool extrapolated = false;
   bool clamped = false;
   std::vector<float> weights;
@@ -51,6 +52,7 @@ inline constexpr int kMaxSynthesisFrames = 1 << 20;
 /// more than kMaxSynthesisFrames.
 [[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
                                              const BaseFrame& start,
-                                             std::span<const MovementRequest> requests, double fps);
+                                             std::span<const MovementRequest> requests, double fps,
+                                             const AvatarOptions& options = {});
 
 }  // namespace stridewire

@@ -36,6 +36,11 @@ struct AvatarEvent {
   BaseFrame base;                ///< kFinished: base frame after the movement
 };
 
+struct AvatarOptions {
+  /// Movements start with corrected parameters (CorrectParameters), so that they have those applied.
+  bool run_time_correction = true;
+};
+
 /// An avatar: base frame, queue of requests, current movement, displayed pose.
 ///
 /// Time is an argument; `Advance` is the only thing that moves it. Given library, start, requests
@@ -48,7 +53,8 @@ class Avatar {
   static constexpr int kMaxEventsPerAdvance = 16;
 
   /// Stands at `start` in the library's stand pose.
-  Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start);
+  Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+         const AvatarOptions& options = {});
 
   /// Checks and queues a request. kOutOfRange: a number not finite or over its limit;
   /// kUnsupported: the library has no group for it; kLimitExceeded: queue full.
@@ -99,6 +105,7 @@ class Avatar {
   void ReportFootStrikes(double before_s, double after_s);
 
   std::shared_ptr<const MotionLibrary> library_;
+  AvatarOptions options_;
   BaseFrame base_;
   Pose pose_;
   double time_s_ = 0.0;  // avatar time

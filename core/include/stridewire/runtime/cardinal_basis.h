@@ -44,6 +44,9 @@ struct CardinalBasisFit {
   std::span<const double> sites;           ///< [site][d]: examples, then pseudoexamples
   std::span<const double> pseudo_weights;  ///< [site - n][n]
   std::span<const double> scales;          ///< [d], > 0
+  std::span<const double> radius_factors;  ///< [site], > 0: of dilations; empty: all 1
+  /// Every dilation from the nearest other site of either sort, as the paper has it.
+  bool radii_from_all_sites = false;
 
   /// Centre of parameter l = its mean over the *examples*: under rank deficiency the weights sum to 1
   /// off the sites only if parameters are centred. Dilations come from the example sites alone (for
@@ -55,6 +58,11 @@ struct CardinalBasisFit {
   /// kMinSiteDistance (index: the site), or the condition of R above kMaxCondition.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };
+
+/// Condition of R, R_kj = B(|p_k - p_j| / d_j), estimated in the 1-norm; HUGE_VAL if singular.
+[[nodiscard]] double RadialCondition(std::span<const double> sites,
+                                     std::span<const double> dilations,
+                                     std::span<const double> scales);
 
 /// Weights at `parameters` [d] into `weights` [n]. Double throughout; never allocates.
 void EvaluateWeights(const ConstBasisSpan& basis, std::span<const double> parameters,

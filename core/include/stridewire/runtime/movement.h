@@ -7,6 +7,7 @@
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/keytimes.h"
 #include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -25,7 +26,8 @@ inline constexpr double kEaseOutS = 0.2;
 /// this value, its group and the time.
 struct Movement {
   int group = -1;
-  std::vector<float> weights;                          ///< [example], sum 1
+  ParameterValues parameters;  ///< What the weights were taken at: corrected ones, if they were.
+  std::vector<float> weights;  ///< [example], sum 1
   std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
   int interval_count = 0;
   TimeWarp warp;
@@ -68,6 +70,14 @@ class GridCache {
 /// weights (Section 3), keytimes (Eq. (4)), ease-out time; no difference pose.
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement);
+
+/// The part of StartMovement that decides the poses at both ends: group, weights and heading change.
+void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
+                std::span<double> weight_scratch, Movement& movement);
+
+/// The blended pose at a grid point, which EvaluateBlend interpolates between. Never allocates.
+void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                       int point, GridCache& cache, PoseSpan out);
 
 /// The blended pose M(t) in the world, without the difference pose (Eq. (2)). `time_s` is clamped
 /// to the movement. Between grid points C1 (Catmull-Rom). Never allocates.

@@ -1,0 +1,197 @@
+#include "stridewire/runtime/correction.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "counted_memory.h"
+#include "distorted_library.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/measure.h"
+#include "toy_library.h"
+
+namespace stridewire {
+namespace {
+
+// Everything a correction needs besides a library.
+struct Scratch {
+  explicit Scratch(const MotionLibrary& library)
+      : weights(static_cast<std::size_t>(library.max_example_count())),
+        cache(library.layout()),
+        pose(library.skeleton().joint_count()) {
+    movement.weights.reserve(weights.size());
+  }
+  Correction Correct(const MotionLibrary& library, const ParameterValues& wanted,
+                     const CorrectionLimits& limits) {
+    return CorrectParameters(library, 0, wanted, limits, weights, cache, pose, movement);
+  }
+  // A movement of these parameters, measured as anybody would.
+  ParameterValues Measure(const MotionLibrary& library, const ParameterValues& parameters,
+                          const BaseFrame& base = {}) {
+    StartMovement(library.group(0), 0,
+                  std::span(parameters.values).first(static_cast<std::size_t>(parameters.count)),
+                  base, weights, movement);
+    cache.Clear();
+    return MeasureMovement(library, movement, cache, pose);
+  }
+  double WeightSum() const {
+    double sum = 0.0;
+    for (const float weight : movement.weights) sum += std::fabs(static_cast<double>(weight));
+    return sum;
+  }
+
+  std::vector<double> weights;
+  GridCache cache;
+  Pose pose;
+  Movement movement;
+};
+
+std::uint32_t Seed() { return std::random_device{}(); }
+
+class InDimensions : public testing::TestWithParam<int> {};
+
+TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
+  const int d = GetParam();
+  const std::uint32_t seed = Seed();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  const auto library = MakeDistortedLibrary(d, d == 1 ? 5 : 6 * d + 4, 0.6, seed);
+  const MotionGroup& group = library->group(0);
+  std::mt19937 random(seed);
+  Scratch scratch(*library);
+  double largest_m = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    const ParameterValues wanted = PointInHull(group, random);
+    const double miss_m = LargestDifference(group, wanted, scratch.Measure(*library, wanted));
+    largest_m = std::max(largest_m, miss_m);
+    const Correction correction = scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
+    EXPECT_NEAR(correction.initial_error_m, miss_m, 1e-6);
+    EXPECT_LE(correction.iterations, d <= 2 ? 3 : 8);
+    EXPECT_LT(correction.error_m, 1e-4) << "point " << i;
+    EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
+    // What it says is what is measured.
+    const ParameterValues measured = scratch.Measure(*library, correction.parameters);
+    EXPECT_NEAR(LargestDifference(group, wanted, measured), correction.error_m, 1e-6);
+  }
+  // Else nothing was there to correct.
+  EXPECT_GT(largest_m, 4e-4);
+}
+
+TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
+  const int d = GetParam();
+  const std::uint32_t seed = Seed();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  // Too few examples for the parameters, so that much cannot be reached.
+  const auto library = MakeDistortedLibrary(d, d + 1, 0.7, seed);
+  const MotionGroup& group = library->group(0);
+  std::mt19937 random(seed);
+  Scratch scratch(*library);
+  for (int i = 0; i < 200; ++i) {
+    // Outside the hull as well, far beyond what requests are clamped to.
+    ParameterValues wanted = PointInHull(group, random);
+    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+      const Parameter& parameter = group.parameters[l];
+      wanted.values[l] +=
+          (static_cast<double>(random()) / 4294967296.0 - 0.5) * (parameter.max - parameter.min);
+    }
+    static_cast<void>(scratch.Measure(*library, wanted));
+    const double weight_sum = scratch.WeightSum();
+    const Correction correction =
+        scratch.Correct(*library, wanted, {.max_iterations = static_cast<int>(random() % 12)});
+    EXPECT_LE(correction.error_m, correction.initial_error_m);
+    EXPECT_LE(LargestDifference(group, wanted, correction.parameters), kMaxCorrectionM + 1e-9);
+    static_cast<void>(scratch.Measure(*library, correction.parameters));
+    EXPECT_LE(scratch.WeightSum(), std::max(kMaxCorrectedWeightSum, weight_sum) + 1e-6);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Correction, InDimensions, testing::Range(1, 8));
+
+TEST(Correction, WithoutIterationsChangesNothing) {
+  const auto library = MakeDistortedLibrary(3, 20, 0.6, 5);
+  std::mt19937 random(1);
+  Scratch scratch(*library);
+  const ParameterValues wanted = PointInHull(library->group(0), random);
+  const Correction correction = scratch.Correct(*library, wanted, {.max_iterations = 0});
+  EXPECT_EQ(correction.parameters.values, wanted.values);
+  EXPECT_EQ(correction.error_m, correction.initial_error_m);
+  EXPECT_EQ(correction.iterations, 0);
+}
+
+TEST(Correction, LeavesAnExampleAlone) {
+  const auto library = MakeDistortedLibrary(4, 30, 0.6, 6);
+  Scratch scratch(*library);
+  const MotionGroup& group = library->group(0);
+  for (int e = 0; e < group.example_count; ++e) {
+    ParameterValues wanted{.count = 4};
+    std::copy_n(group.site(e).begin(), 4, wanted.values.begin());
+    const Correction correction = scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
+    EXPECT_LT(LargestDifference(group, correction.parameters, wanted), 1e-5) << e;
+  }
+}
+
+TEST(Correction, NeverAllocates) {
+  const auto library = MakeDistortedLibrary(7, 46, 0.6, 7);
+  std::mt19937 random(1);
+  Scratch scratch(*library);
+  const ParameterValues wanted = PointInHull(library->group(0), random);
+  const std::size_t before = counted_memory::LiveBytes();
+  counted_memory::ResetPeak();
+  const Correction correction = scratch.Correct(*library, wanted, {.max_iterations = 20});
+  EXPECT_EQ(counted_memory::PeakBytes(), before);
+  EXPECT_GT(correction.iterations, 1);
+}
+
+// Where a movement starts has no part in its weights: a client that evaluates it far away gets the same.
+TEST(Correction, IsTheSameWhereverAnAvatarStands) {
+  const auto library = MakeToyLibrary();
+  const auto weights = [&](const BaseFrame& start) {
+    Avatar avatar(library, start);
+    EXPECT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.47}}));
+    avatar.Advance(1.0 / 60.0);
+    EXPECT_NE(avatar.movement(), nullptr);
+    return avatar.movement()->weights;
+  };
+  EXPECT_EQ(weights({}), weights({{1.0, 2.0, 3.0}, 0.0}));
+}
+
+TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
+  const auto library = MakeToyLibrary();
+  for (const bool corrected : {true, false}) {
+    Avatar avatar(library, {}, {.run_time_correction = corrected});
+    for (const double length_m : {0.33, 0.51, 0.13, 0.47}) {
+      ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = length_m}}));
+    }
+    double largest_m = 0.0;
+    double moved_m = 0.0;
+    Scratch scratch(*library);
+    int steps = 0;
+    while (!avatar.idle()) {
+      avatar.Advance(1.0 / 60.0);
+      for (const AvatarEvent& event : avatar.events()) {
+        if (event.type != AvatarEventType::kStarted) continue;
+        const Movement& movement = *avatar.movement();
+        scratch.cache.Clear();
+        const ParameterValues measured =
+            MeasureMovement(*library, movement, scratch.cache, scratch.pose);
+        const MotionGroup& group = library->group(movement.group);
+        largest_m = std::max(largest_m, LargestDifference(group, event.applied, measured));
+        moved_m = std::max(moved_m, LargestDifference(group, event.applied, movement.parameters));
+        ++steps;
+      }
+    }
+    EXPECT_EQ(steps, 5);
+    if (corrected) {
+      EXPECT_LT(largest_m, 1e-4);
+      EXPECT_GT(moved_m, 1e-4);
+    } else {
+      EXPECT_GT(largest_m, 1e-3);
+      EXPECT_EQ(moved_m, 0.0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stridewire
