@@ -24,11 +24,11 @@ class RawClient {
   RawClient() = default;
   /// Connects; aborts the program if that fails.
   RawClient(const std::string& host, std::uint16_t port, int receive_buffer_bytes = 0);
-  ~RawClient();
+  virtual ~RawClient();
   RawClient(RawClient&& other) noexcept;
   RawClient& operator=(RawClient&& other) noexcept;
 
-  void SendBytes(std::span<const std::byte> bytes);
+  virtual void SendBytes(std::span<const std::byte> bytes);
   template <typename Message>
   void Send(const Message& message) {
     std::vector<std::byte> frame;
@@ -38,7 +38,7 @@ class RawClient {
 
   /// The next message, nothing when the server has closed or `patience` is over. A PoseBatch is
   /// valid until the next call.
-  [[nodiscard]] std::optional<protocol::Message> Receive(
+  [[nodiscard]] virtual std::optional<protocol::Message> Receive(
       std::chrono::milliseconds patience = kPatience);
 
   /// The next message of a kind; what comes before it goes to `on_other` or is dropped.
@@ -56,7 +56,7 @@ class RawClient {
   [[nodiscard]] bool AwaitClose(std::chrono::milliseconds patience = kPatience);
 
   /// As a network that fails: no goodbye.
-  void Abort();
+  virtual void Abort();
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
   // The usual ways through the protocol, each one command and its answer.
@@ -74,6 +74,9 @@ class RawClient {
                                          std::uint16_t every_n_ticks = 1);
   protocol::Seq NextSeq() { return ++last_seq_; }
   void set_last_seq(protocol::Seq seq) { last_seq_ = seq; }
+
+ protected:
+  void set_closed() { is_closed_ = true; }
 
  private:
   static void RequireEncoded(const Status& status);

@@ -1,7 +1,6 @@
 #include "net/connection.h"
 
 #include <algorithm>
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/post.hpp>
 #include <utility>
 
@@ -17,40 +16,23 @@ using boost::system::error_code;
 constexpr std::size_t kReadBufferBytes = std::size_t{32} << 10;
 constexpr std::size_t kWriteBytes = std::size_t{256} << 10;
 
-// A borrowed buffer sequence: Asio copies the sequence it is given, which for a vector is a heap
-// allocation a write.
-struct BufferList {
-  // Names that Asio asks for.
-  using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)
-  using const_iterator = const asio::const_buffer*;  // NOLINT(readability-identifier-naming)
-  const_iterator first;
-  const_iterator last;
-  [[nodiscard]] const_iterator begin() const { return first; }
-  [[nodiscard]] const_iterator end() const { return last; }
-};
-
 }  // namespace
 
-Connection::Connection(Socket socket, const Limits& limits, ThreadMetrics& metrics)
-    : socket_(std::move(socket)),
-      timer_(socket_.get_executor()),
+Connection::Connection(std::unique_ptr<Transport> transport, const Limits& limits,
+                       ThreadMetrics& metrics)
+    : transport_(std::move(transport)),
+      kind_(transport_->kind()),
+      timer_(transport_->executor()),
       limits_(limits),
       metrics_(metrics),
       reader_(protocol::Sender::kClient, {limits.max_control_bytes, limits.max_bulk_bytes}),
       read_buffer_(kReadBufferBytes),
       queue_(limits.control_buffer_bytes, limits.observer_backlog_ticks),
-      last_received_(Clock::now()),
-      last_written_(last_received_) {}
+      traffic_(metrics) {}
 
 void Connection::Start(ConnectionHandler* handler, std::span<const std::byte> received) {
   handler_ = handler;
-  error_code ignored;  // a socket that fails here fails when it is read, too
-  socket_.set_option(asio::ip::tcp::no_delay(true), ignored);
-  if (limits_.socket_send_buffer_bytes > 0) {
-    socket_.set_option(
-        asio::socket_base::send_buffer_size(static_cast<int>(limits_.socket_send_buffer_bytes)),
-        ignored);
-  }
+  transport_->Prepare(traffic_, limits_.socket_send_buffer_bytes);
   handed_over_.assign(received.begin(), received.end());
   unread_ = handed_over_;
   Watch();
@@ -65,9 +47,9 @@ void Connection::Process() {
   is_processing_ = true;
   const auto self = shared_from_this();
   while (handler_ != nullptr && !is_closed_ && !is_paused_) {
-    auto next = reader_.Next(unread_);
+    const auto next = transport_->has_messages() ? NextFrameOfMessages() : NextFrame();
     if (!next) {
-      handler_->OnBadFrame(next.error());
+      Refuse(next.error());
       break;
     }
     if (!next->has_value()) {
@@ -77,12 +59,47 @@ void Connection::Process() {
     metrics_.messages_received.Add();
     auto message = protocol::DecodeMessage(**next);
     if (!message) {
-      handler_->OnBadFrame(message.error());
+      Refuse(message.error());
       break;
     }
     handler_->OnMessage(*std::move(message));
   }
   is_processing_ = false;
+}
+
+Expected<std::optional<protocol::FrameView>> Connection::NextFrame() {
+  return reader_.Next(unread_);
+}
+
+// A message is one frame, no less and no more, however many fragments it comes in.
+Expected<std::optional<protocol::FrameView>> Connection::NextFrameOfMessages() {
+  if (is_text_) {
+    close_code_ = CloseCode::kNotBinary;
+    return Fail(ErrorCode::kUnsupported,
+                "a text message, though every message is one frame in binary");
+  }
+  if (!whole_) {
+    auto next = reader_.Next(unread_);
+    if (!next) return next;
+    whole_ = *next;
+    if (!whole_ && is_message_over_) {
+      return Fail(ErrorCode::kMalformed, "a message that ends before its frame does");
+    }
+  }
+  if (whole_ && !unread_.empty()) {
+    return Fail(ErrorCode::kMalformed, "a message that goes on behind its frame");
+  }
+  if (!is_message_over_) return std::nullopt;
+  is_message_over_ = false;
+  return std::exchange(whole_, std::nullopt);
+}
+
+void Connection::Refuse(const Error& error) {
+  if (close_code_ == CloseCode::kNormal) {
+    close_code_ =
+        error.code == ErrorCode::kLimitExceeded ? CloseCode::kTooBig : CloseCode::kProtocolError;
+  }
+  handler_->OnBadFrame(error);
 }
 
 void Connection::ResumeReading() {
@@ -94,37 +111,34 @@ void Connection::ResumeReading() {
 void Connection::Read() {
   if (is_reading_ || is_closed_) return;
   is_reading_ = true;
-  socket_.async_read_some(asio::buffer(read_buffer_),
-                          [self = shared_from_this()](const error_code& error, std::size_t bytes) {
-                            self->OnRead(error, bytes);
-                          });
+  transport_->Receive(shared_from_this(), read_buffer_);
 }
 
-void Connection::OnRead(const error_code& error, std::size_t bytes) {
+void Connection::OnReceived(const error_code& error, const Transport::Chunk& chunk) {
   is_reading_ = false;
   if (is_closed_) return;
   if (error) {
     Close();
     return;
   }
-  last_received_ = Clock::now();
-  metrics_.bytes_received.Add(bytes);
   if (is_closing_) {
     Read();  // whatever still comes is thrown away
     return;
   }
-  unread_ = std::span(read_buffer_).first(bytes);
+  unread_ = chunk.bytes;
+  is_text_ = chunk.is_text;
+  is_message_over_ = chunk.ends_message;
   Process();
 }
 
-Connection::Socket::native_handle_type Connection::Release(std::vector<std::byte>& received) {
+std::unique_ptr<Transport> Connection::Release(std::vector<std::byte>& received) {
   STRIDEWIRE_CHECK(!is_writing_ && !is_reading_ && queue_.empty());
   received.assign(unread_.begin(), unread_.end());
   handler_ = nullptr;
   is_closed_ = true;
   timer_.cancel();
-  error_code ignored;
-  return socket_.release(ignored);
+  transport_->Detach();
+  return std::move(transport_);
 }
 
 // ---- writing
@@ -152,7 +166,7 @@ void Connection::ScheduleFlush() {
   // Later in the same round, so that what a tick brings goes out in one write.
   if (is_writing_ || is_flush_scheduled_) return;
   is_flush_scheduled_ = true;
-  asio::post(socket_.get_executor(), [self = shared_from_this()] {
+  asio::post(transport_->executor(), [self = shared_from_this()] {
     self->is_flush_scheduled_ = false;
     self->Flush();
   });
@@ -167,42 +181,16 @@ void Connection::Flush() {
   }
   metrics_.poses_sent.Add(in_flight_.poses);
   metrics_.batches_sent.Add(in_flight_.batches);
-  buffers_.clear();
-  for (const SharedFrame& frame : in_flight_.frames) {
-    buffers_.emplace_back(frame->data(), frame->size());
-  }
-  first_buffer_ = 0;
-  last_written_ = Clock::now();
-  Write();
-}
-
-void Connection::Write() {
+  traffic_.BeginToSend();
   is_writing_ = true;
-  const BufferList buffers{buffers_.data() + first_buffer_, buffers_.data() + buffers_.size()};
-  socket_.async_write_some(buffers,
-                           [self = shared_from_this()](const error_code& error, std::size_t bytes) {
-                             self->OnWritten(error, bytes);
-                           });
+  transport_->Send(shared_from_this(), in_flight_.frames);
 }
 
-void Connection::OnWritten(const error_code& error, std::size_t bytes) {
+void Connection::OnSent(const error_code& error) {
   is_writing_ = false;
   if (is_closed_) return;
   if (error) {
     Close();
-    return;
-  }
-  metrics_.bytes_sent.Add(bytes);
-  last_written_ = Clock::now();
-  while (bytes > 0) {
-    asio::const_buffer& buffer = buffers_[first_buffer_];
-    const std::size_t taken = std::min(bytes, buffer.size());
-    buffer += taken;
-    bytes -= taken;
-    if (buffer.size() == 0) ++first_buffer_;
-  }
-  if (first_buffer_ < buffers_.size()) {
-    Write();
     return;
   }
   in_flight_.clear();
@@ -232,18 +220,19 @@ void Connection::Watch() {
         return;
       }
     } else if (self->is_writing_ &&
-               seconds_since(self->last_written_) > self->limits_.write_timeout_s) {
+               seconds_since(self->traffic_.last_sent()) > self->limits_.write_timeout_s) {
       if (self->handler_ != nullptr) self->handler_->OnStuck();
     } else if (self->limits_.idle_timeout_s > 0.0 && !self->is_paused_ &&
-               seconds_since(self->last_received_) > self->limits_.idle_timeout_s) {
+               seconds_since(self->traffic_.last_received()) > self->limits_.idle_timeout_s) {
       if (self->handler_ != nullptr) self->handler_->OnIdle();
     }
     if (!self->is_closed_) self->Watch();
   });
 }
 
-void Connection::CloseGently() {
+void Connection::CloseGently(CloseCode code) {
   if (is_closed_ || is_closing_) return;
+  if (close_code_ == CloseCode::kNormal) close_code_ = code;
   is_closing_ = true;
   handler_ = nullptr;
   closing_since_ = Clock::now();
@@ -252,23 +241,20 @@ void Connection::CloseGently() {
   if (!is_processing_)
     Read();
   else
-    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->Read(); });
+    asio::post(transport_->executor(), [self = shared_from_this()] { self->Read(); });
   Flush();
 }
 
 void Connection::BeginLinger() {
   is_lingering_ = true;
-  error_code error;
-  socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
-  if (error) Close();
+  if (!transport_->End(shared_from_this(), close_code_)) Close();
 }
 
 void Connection::Close() {
   if (is_closed_) return;
   is_closed_ = true;
   timer_.cancel();
-  error_code ignored;
-  socket_.close(ignored);
+  transport_->Close();
   if (handler_ != nullptr) std::exchange(handler_, nullptr)->OnClosed();
 }
 

@@ -1,14 +1,15 @@
 #pragma once
 
-#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "net/send_queue.h"
+#include "net/transport.h"
 #include "ops/limits.h"
 #include "ops/metrics.h"
 #include "stridewire/protocol/frame_reader.h"
@@ -32,16 +33,16 @@ class ConnectionHandler {
   virtual void OnClosed() = 0;
 };
 
-/// One TCP connection on one thread: cuts frames out of what comes, sends what waits.
+/// One connection on one thread: cuts frames out of what comes, sends what waits, and keeps the
+/// time. The same over TCP and WebSocket, whose difference is Transport's.
 ///
 /// Lives as long as something is under way on it. Memory is bounded by a read buffer, one frame
 /// and the SendQueue. Not thread-safe.
-class Connection : public std::enable_shared_from_this<Connection> {
+class Connection : public Transport::User, public std::enable_shared_from_this<Connection> {
  public:
-  using Socket = boost::asio::ip::tcp::socket;
-  using Clock = std::chrono::steady_clock;
+  using Clock = Traffic::Clock;
 
-  Connection(Socket socket, const Limits& limits, ThreadMetrics& metrics);
+  Connection(std::unique_ptr<Transport> transport, const Limits& limits, ThreadMetrics& metrics);
 
   /// Begins to read. `handler` is told until it is taken away; `received` came before.
   void Start(ConnectionHandler* handler, std::span<const std::byte> received = {});
@@ -54,6 +55,7 @@ class Connection : public std::enable_shared_from_this<Connection> {
   void DropPoses(WorldId world, protocol::PoseMode mode) { queue_.DropPoses(world, mode); }
 
   [[nodiscard]] const SendQueue& queue() const { return queue_; }
+  [[nodiscard]] TransportKind kind() const { return kind_; }
 
   /// Stops taking messages until `ResumeReading`; the peer feels it.
   void PauseReading() { is_paused_ = true; }
@@ -61,30 +63,34 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   /// Sends what waits (poses apart), then says it is the end, and closes when the peer has, at the
   /// latest after `kLinger`. So a last message arrives: closing with unread bytes would cut it off.
-  /// The handler is not called any more.
-  void CloseGently();
+  /// The handler is not called any more. `code` is for a WebSocket; bad frames have their own.
+  void CloseGently(CloseCode code = CloseCode::kNormal);
   /// At once.
   void Close();
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
-  /// Takes the socket out, with what was received behind the last message. Only from OnMessage,
-  /// when nothing was sent. The connection is over.
-  [[nodiscard]] Socket::native_handle_type Release(std::vector<std::byte>& received);
+  /// Takes the transport out, detached, with what was received behind the last message. Only from
+  /// OnMessage, when nothing was sent. The connection is over.
+  [[nodiscard]] std::unique_ptr<Transport> Release(std::vector<std::byte>& received);
 
  private:
   static constexpr std::chrono::seconds kLinger{2};
 
+  void OnReceived(const boost::system::error_code& error, const Transport::Chunk& chunk) override;
+  void OnSent(const boost::system::error_code& error) override;
+
   void Process();
+  [[nodiscard]] Expected<std::optional<protocol::FrameView>> NextFrame();
+  [[nodiscard]] Expected<std::optional<protocol::FrameView>> NextFrameOfMessages();
+  void Refuse(const Error& error);
   void Read();
-  void OnRead(const boost::system::error_code& error, std::size_t bytes);
   void ScheduleFlush();
   void Flush();
-  void Write();
-  void OnWritten(const boost::system::error_code& error, std::size_t bytes);
   void Watch();
   void BeginLinger();
 
-  Socket socket_;
+  std::unique_ptr<Transport> transport_;  // none after Release
+  const TransportKind kind_;
   boost::asio::steady_timer timer_;
   const Limits limits_;
   ThreadMetrics& metrics_;
@@ -93,22 +99,23 @@ class Connection : public std::enable_shared_from_this<Connection> {
   protocol::FrameReader reader_;
   std::vector<std::byte> read_buffer_;
   std::span<const std::byte> unread_;
-  std::vector<std::byte> handed_over_;  // bytes that came before Start
+  bool is_text_ = false;                      // with messages: the one being received
+  bool is_message_over_ = false;              // the same: its last bytes are in unread_
+  std::optional<protocol::FrameView> whole_;  // the same: all there, but the message goes on
+  std::vector<std::byte> handed_over_;        // bytes that came before Start
   bool is_reading_ = false;
   bool is_processing_ = false;
   bool is_paused_ = false;
 
   SendQueue queue_;
   SendQueue::Gathered in_flight_;
-  std::vector<boost::asio::const_buffer> buffers_;
-  std::size_t first_buffer_ = 0;
   bool is_writing_ = false;
   bool is_flush_scheduled_ = false;
   bool is_closing_ = false;
   bool is_lingering_ = false;
   bool is_closed_ = false;
-  Clock::time_point last_received_;
-  Clock::time_point last_written_;
+  Traffic traffic_;
+  CloseCode close_code_ = CloseCode::kNormal;
   Clock::time_point closing_since_;
 };
 

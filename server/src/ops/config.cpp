@@ -9,6 +9,7 @@
 #include <limits>
 #include <thread>
 
+#include "net/origin_policy.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
 
@@ -60,6 +61,33 @@ ConfigKey Address(const char* name, const char* help, Endpoint Config::* member)
             return {};
           },
           .get = [member](const Config& config) { return ToText(config.*member); }};
+}
+
+// Texts with commas between them; none has one inside.
+ConfigKey List(const char* name, const char* help, std::vector<std::string> Config::* member,
+               Status (*check)(std::string_view)) {
+  return {.name = name,
+          .section = "",
+          .help = help,
+          .is_list = true,
+          .set = [member, check](Config& config, std::string_view text) -> Status {
+            std::vector<std::string> items;
+            while (!text.empty()) {
+              const auto comma = std::min(text.find(','), text.size());
+              std::string_view item = text.substr(0, comma);
+              while (item.starts_with(' ')) item.remove_prefix(1);
+              while (item.ends_with(' ')) item.remove_suffix(1);
+              if (Status status = check(item); !status) return status;
+              items.emplace_back(item);
+              text.remove_prefix(std::min(comma + 1, text.size()));
+            }
+            config.*member = std::move(items);
+            return {};
+          },
+          .get =
+              [member](const Config& config) {
+                return fmt::format("{}", fmt::join(config.*member, ","));
+              }};
 }
 
 ConfigKey Flag(const char* name, const char* help, bool Config::* member) {
@@ -133,8 +161,12 @@ std::vector<ConfigKey> MakeKeys() {
   constexpr std::size_t kMiB = std::size_t{1} << 20;
   std::vector<ConfigKey> keys = {
       Address("listen", "Where clients connect, HOST:PORT; port 0: any", &Config::listen),
-      Address("http", "Where metrics and health are, HOST:PORT", &Config::http),
+      Address("http", "Where the viewer, /stream, metrics and health are, HOST:PORT",
+              &Config::http),
       Flag("http_enabled", "Serve HTTP at all", &Config::http_enabled),
+      List("allowed_origins",
+           "Other pages that may stream: https://HOST[:PORT],...; * is not taken",
+           &Config::allowed_origins, CheckOrigin),
       Text("library", "Library of worlds that name none: a .swl file or builtin", &Config::library,
            CheckNotEmpty),
       Text("data_dir", "Reserved for stored worlds; nothing is written yet", &Config::data_dir),
@@ -222,6 +254,18 @@ std::string Quoted(std::string_view text) {
   return quoted + '"';
 }
 
+// Of a list as it stands in an option.
+std::string QuotedList(std::string_view list) {
+  std::string quoted = "[";
+  while (!list.empty()) {
+    const auto comma = std::min(list.find(','), list.size());
+    if (quoted.size() > 1) quoted += ", ";
+    quoted += Quoted(list.substr(0, comma));
+    list.remove_prefix(std::min(comma + 1, list.size()));
+  }
+  return quoted + "]";
+}
+
 }  // namespace
 
 int Config::shard_count() const {
@@ -292,11 +336,10 @@ Status CheckConfig(const Config& config) {
                 "avatars; say allow_insecure to do it all the same",
                 "listen: " + ToText(config.listen));
   }
-  // Metrics tell little and nothing can be commanded over HTTP, but the same caution holds.
   if (config.http_enabled && !IsLoopback(config.http) && !config.allow_insecure) {
     return Fail(ErrorCode::kInvalidArgument,
-                "an address beyond this machine without TLS; say allow_insecure to do it all the "
-                "same",
+                "an address beyond this machine, without tokens or TLS anyone could command "
+                "avatars over /stream; say allow_insecure to do it all the same",
                 "http: " + ToText(config.http));
   }
   return {};
@@ -310,8 +353,10 @@ std::string PrintConfig(const Config& config) {
       section = key.section;
       text += fmt::format("\n[{}]\n", section);
     }
-    const std::string value = key.get(config);
-    text += fmt::format("{} = {}\n", key.name, key.is_text ? Quoted(value) : value);
+    std::string value = key.get(config);
+    if (key.is_text) value = Quoted(value);
+    if (key.is_list) value = QuotedList(value);
+    text += fmt::format("{} = {}\n", key.name, value);
   }
   for (const auto& [name, world] : config.worlds) {
     text += fmt::format("\n[worlds.{}]\n", Quoted(name));

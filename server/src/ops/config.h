@@ -37,6 +37,7 @@ struct Config {
   Endpoint listen = {"127.0.0.1", 7420};
   Endpoint http = {"127.0.0.1", 7421};
   bool http_enabled = true;
+  std::vector<std::string> allowed_origins;  ///< Pages of elsewhere that may open a stream.
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for the world store; nothing is written yet.
   double tick_hz = 60.0;
@@ -61,6 +62,7 @@ struct ConfigKey {
   std::string help;
   bool is_text = false;  ///< The file has it in quotes.
   bool is_flag = false;
+  bool is_list = false;  ///< The file has texts in brackets, options have commas between them.
   std::function<Status(Config&, std::string_view)> set;
   std::function<std::string(const Config&)> get;
 

@@ -16,6 +16,19 @@ std::string Where(const std::string& file, const toml::source_region& source,
 
 // A scalar as text for ConfigKey::set, if it is of a kind that key takes.
 std::optional<std::string> ScalarText(const toml::node& node, const ConfigKey& key) {
+  if (key.is_list) {
+    const toml::array* items = node.as_array();
+    if (items == nullptr) return std::nullopt;
+    std::string list;
+    for (const toml::node& item : *items) {
+      const auto text = item.value_exact<std::string>();
+      // An empty one would vanish between the commas.
+      if (!text || text->empty()) return std::nullopt;
+      if (!list.empty()) list += ',';
+      list += *text;
+    }
+    return list;
+  }
   if (key.is_text) return node.value_exact<std::string>();
   if (key.is_flag) {
     const auto flag = node.value_exact<bool>();
@@ -38,7 +51,8 @@ Status SetKey(const ConfigKey& key, const toml::node& node, const std::string& w
   const auto text = ScalarText(node, key);
   if (!text) {
     return Fail(ErrorCode::kInvalidArgument,
-                key.is_text   ? "expected a text in quotes"
+                key.is_list   ? "expected texts in brackets, such as [\"https://example.org\"]"
+                : key.is_text ? "expected a text in quotes"
                 : key.is_flag ? "expected true or false"
                               : "expected a number",
                 where);

@@ -1,12 +1,14 @@
 #include "ops/http_server.h"
 
+#include <spdlog/spdlog.h>
+
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
 #include <chrono>
-#include <memory>
 #include <optional>
-#include <utility>
 
+#include "net/websocket_transport.h"
 #include "stridewire/base/version.h"
 
 namespace stridewire::server {
@@ -16,7 +18,10 @@ namespace beast = boost::beast;
 namespace http = boost::beast::http;
 
 constexpr std::size_t kMaxRequestBytes = std::size_t{8} << 10;
-constexpr std::chrono::seconds kTimeout{10};
+constexpr std::chrono::seconds kReadTimeout{10};
+constexpr std::chrono::seconds kWriteTimeout{60};
+
+std::string_view View(beast::string_view text) { return {text.data(), text.size()}; }
 
 }  // namespace
 
@@ -33,7 +38,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     parser_.emplace();
     parser_->header_limit(kMaxRequestBytes);
     parser_->body_limit(kMaxRequestBytes);
-    stream_.expires_after(kTimeout);
+    stream_.expires_after(kReadTimeout);
     http::async_read(
         stream_, buffer_, *parser_,
         [self = shared_from_this()](beast::error_code error, std::size_t) { self->OnRead(error); });
@@ -44,34 +49,85 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     if (error == http::error::end_of_stream || error == beast::error::timeout) return Close();
     if (error) {
       if (error.category() != http::make_error_code(http::error::bad_method).category()) return;
-      Answer({400, "text/plain; charset=utf-8", error.message() + "\n"}, false, false);
+      Answer({.status = 400, .body = error.message() + "\n"}, false, false);
       return;
     }
     const auto& request = parser_->get();
-    const bool is_head = request.method() == http::verb::head;
-    const auto target = request.target();
-    const auto method = request.method_string();
-    Answer(server_.AnswerTo({method.data(), method.size()}, {target.data(), target.size()}),
-           is_head, request.keep_alive());
+    const std::string_view target = View(request.target());
+    const HttpQuery query{.path = target.substr(0, target.find('?')),
+                          .if_none_match = View(request[http::field::if_none_match])};
+    if (server_.stream_ != nullptr && query.path == server_.stream_->path) {
+      if (auto refusal = RefusalOfStream()) {
+        Answer(*std::move(refusal), request.method() == http::verb::head, false);
+      } else {
+        BecomeStream();
+      }
+      return;
+    }
+    Answer(server_.AnswerTo(View(request.method_string()), query),
+           request.method() == http::verb::head, request.keep_alive());
+  }
+
+  // Why the request is no way to a stream; nothing if it is one.
+  std::optional<HttpAnswer> RefusalOfStream() {
+    const auto& request = parser_->get();
+    if (!beast::websocket::is_upgrade(request)) {
+      return HttpAnswer{.status = 426,
+                        .body = "here is a WebSocket, one frame of the protocol a message\n",
+                        .headers = {{"Upgrade", "websocket"}, {"Sec-WebSocket-Version", "13"}}};
+    }
+    std::optional<std::string_view> origin;
+    if (request.count(http::field::origin) > 0) origin = View(request[http::field::origin]);
+    if (!server_.stream_->policy.Allows(origin, View(request[http::field::host]))) {
+      server_.metrics_.origins_refused.Add();
+      spdlog::info("a page of {:.200} may not open a stream", *origin);
+      return HttpAnswer{.status = 403,
+                        .body =
+                            "pages of this origin may not connect here; the server's "
+                            "allowed_origins does not list it\n"};
+    }
+    if (!server_.stream_->is_open()) {
+      return HttpAnswer{.status = 503, .body = "the server is shutting down\n"};
+    }
+    if (buffer_.size() > 0) {
+      return HttpAnswer{.status = 400, .body = "something came before the WebSocket was open\n"};
+    }
+    return std::nullopt;
+  }
+
+  void BecomeStream() {
+    server_.metrics_.http_requests.Add();
+    auto socket = stream_.release_socket();
+    beast::error_code error;
+    const auto remote = socket.remote_endpoint(error);
+    if (error) return;  // gone already
+    server_.stream_->on_stream(MakeWebSocketTransport(std::move(socket), parser_->release()),
+                               remote.address());
   }
 
   void Answer(HttpAnswer answer, bool is_head, bool keep_alive) {
     server_.metrics_.http_requests.Add();
+    answer_ = std::move(answer);
     response_ = {};
     response_.version(11);
-    response_.result(answer.status);
+    response_.result(answer_.status);
     response_.set(http::field::server, std::string("stridewired/") + kVersion);
-    response_.set(http::field::content_type, answer.content_type);
-    response_.set(http::field::cache_control, "no-store");
-    if (answer.status == 405) response_.set(http::field::allow, "GET, HEAD");
+    if (answer_.status != 304) response_.set(http::field::content_type, answer_.content_type);
+    response_.set(http::field::cache_control, answer_.cache_control);
+    // A body is what its type says, whatever it looks like.
+    response_.set("X-Content-Type-Options", "nosniff");
+    if (answer_.status == 405) response_.set(http::field::allow, "GET, HEAD");
+    for (const auto& [name, value] : answer_.headers) response_.set(name, value);
     response_.keep_alive(keep_alive);
-    response_.content_length(answer.body.size());
-    if (!is_head) response_.body() = std::move(answer.body);
-    stream_.expires_after(kTimeout);
+    const std::string_view bytes = answer_.bytes();
+    if (answer_.status != 304) response_.content_length(bytes.size());
+    if (!is_head) response_.body() = {bytes.data(), bytes.size()};
+    stream_.expires_after(kWriteTimeout);
     http::async_write(
         stream_, response_,
         [self = shared_from_this(), keep_alive](beast::error_code error, std::size_t) {
           if (error) return;
+          self->answer_ = {};
           if (keep_alive) return self->Read();
           self->Close();
         });
@@ -86,13 +142,20 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
-  http::response<http::string_body> response_;
+  HttpAnswer answer_;
+  http::response<http::span_body<const char>> response_;  // of answer_'s bytes
 };
 
 HttpServer::HttpServer(int max_connections, ThreadMetrics& metrics)
     : max_connections_(max_connections), metrics_(metrics) {}
 
 HttpServer::~HttpServer() = default;
+
+void HttpServer::ServeStream(std::string path, OriginPolicy policy, std::function<bool()> is_open,
+                             OnStream on_stream) {
+  stream_ = std::make_unique<Stream>(std::move(path), std::move(policy), std::move(is_open),
+                                     std::move(on_stream));
+}
 
 void HttpServer::Accept(boost::asio::ip::tcp::socket socket) {
   if (connections_ >= max_connections_) {
@@ -102,13 +165,14 @@ void HttpServer::Accept(boost::asio::ip::tcp::socket socket) {
   std::make_shared<Visit>(*this, std::move(socket))->Read();
 }
 
-HttpAnswer HttpServer::AnswerTo(std::string_view method, std::string_view target) const {
+HttpAnswer HttpServer::AnswerTo(std::string_view method, const HttpQuery& query) const {
   if (method != "GET" && method != "HEAD") {
-    return {405, "text/plain; charset=utf-8", "only GET and HEAD\n"};
+    return {.status = 405, .body = "only GET and HEAD\n"};
   }
-  const auto page = pages_.find(target.substr(0, target.find('?')));
-  if (page == pages_.end()) return {404, "text/plain; charset=utf-8", "no such page\n"};
-  return page->second();
+  const auto page = pages_.find(query.path);
+  if (page != pages_.end()) return page->second(query);
+  if (fallback_) return fallback_(query);
+  return {.status = 404, .body = "no such page\n"};
 }
 
 }  // namespace stridewire::server

@@ -111,6 +111,20 @@ std::string Metrics::Text() {
   gauge("stridewire_sessions_detached", "Sessions waiting for their client to come back.",
         detached);
 
+  const auto websockets = static_cast<double>(Sum(&ThreadMetrics::sessions_websocket));
+  MetricFamily attached_sessions{"stridewire_sessions_attached",
+                                 "Sessions that are connected, by transport.",
+                                 MetricType::Gauge,
+                                 {}};
+  for (const auto& [name, count] : {std::pair("tcp", std::max(attached - websockets, 0.0)),
+                                    std::pair("websocket", websockets)}) {
+    ClientMetric metric;
+    metric.label.push_back({"transport", name});
+    metric.gauge.value = count;
+    attached_sessions.metric.push_back(std::move(metric));
+  }
+  families.push_back(std::move(attached_sessions));
+
   counter("stridewire_ticks_total", "Ticks done, over all shards.", &ThreadMetrics::ticks);
   counter("stridewire_ticks_missed_total", "Ticks whose time passed without one, over all shards.",
           &ThreadMetrics::ticks_missed);
@@ -154,6 +168,8 @@ std::string Metrics::Text() {
   counter("stridewire_sessions_ended_total", "Sessions ended.", &ThreadMetrics::sessions_ended);
   counter("stridewire_http_requests_total", "HTTP requests answered.",
           &ThreadMetrics::http_requests);
+  counter("stridewire_origins_refused_total", "Streams refused for the page that wanted them.",
+          &ThreadMetrics::origins_refused);
 
   MetricFamily limits{
       "stridewire_limit_reached_total", "How often a limit was reached.", MetricType::Counter, {}};

@@ -49,6 +49,7 @@ class TimeHistogram {
 struct ThreadMetrics {
   Count avatars;
   Count sessions_attached;
+  Count sessions_websocket;  ///< Of the attached ones.
   Count sessions_detached;
   Count ticks;
   Count ticks_missed;
@@ -73,6 +74,7 @@ struct ThreadMetrics {
   Count sessions_resumed;
   Count sessions_ended;
   Count http_requests;
+  Count origins_refused;
   std::array<Count, static_cast<std::size_t>(Limit::kCount)> limits;
 
   void Reached(Limit limit, std::uint64_t n = 1) { limits[static_cast<std::size_t>(limit)].Add(n); }

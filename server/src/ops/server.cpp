@@ -7,6 +7,7 @@
 #include <csignal>
 #include <utility>
 
+#include "net/tcp_transport.h"
 #include "stridewire/base/version.h"
 
 namespace stridewire::server {
@@ -53,12 +54,21 @@ Status Server::Start() {
         "listening on {} WITHOUT tokens and TLS: whoever can reach it can command every avatar",
         ToText(config_.listen));
   }
+  if (config_.http_enabled && !IsLoopback(config_.http)) {
+    spdlog::warn("streaming on {} WITHOUT tokens and TLS: the same holds there",
+                 ToText(config_.http));
+  }
   const TickClock clock(TickClock::Clock::now(), config_.tick_hz);
   std::vector<Shard*> peers;
   for (const auto& shard : shards_) peers.push_back(shard.get());
   for (const auto& shard : shards_) shard->Prepare(clock, peers);
   for (const auto& shard : shards_) shard->Start();
-  listener_.Start([this](auto socket) { gate_.Accept(std::move(socket)); });
+  listener_.Start([this](auto socket) {
+    boost::system::error_code error;
+    const auto remote = socket.remote_endpoint(error);
+    if (error) return;  // gone already
+    gate_.Accept(MakeTcpTransport(std::move(socket)), remote.address());
+  });
   ScheduleHousekeeping();
   spdlog::info("stridewired {} ready: {} shards, {} Hz, library {} ({})", kVersion, shards_.size(),
                config_.tick_hz, config_.library, libraries_.Find(config_.library)->hash());
@@ -168,16 +178,22 @@ void Server::SessionBegan(int shard, SessionIdentity identity) {
 // ---- HTTP
 
 void Server::AddPages() {
-  http_.AddPage("/healthz", [] { return HttpAnswer{.body = "ok\n"}; });
-  http_.AddPage("/readyz", [this] {
+  http_.ServeStream(
+      "/stream", OriginPolicy(config_.allowed_origins, IsLoopback(config_.http)),
+      [this] { return !is_draining_; },
+      [this](std::unique_ptr<Transport> transport, const asio::ip::address& remote) {
+        gate_.Accept(std::move(transport), remote);
+      });
+  http_.AddPage("/healthz", [](const HttpQuery&) { return HttpAnswer{.body = "ok\n"}; });
+  http_.AddPage("/readyz", [this](const HttpQuery&) {
     return is_draining_ ? HttpAnswer{.status = 503, .body = "draining\n"}
                         : HttpAnswer{.body = "ready\n"};
   });
-  http_.AddPage("/metrics", [this] {
+  http_.AddPage("/metrics", [this](const HttpQuery&) {
     return HttpAnswer{.content_type = "text/plain; version=0.0.4; charset=utf-8",
                       .body = metrics_.Text()};
   });
-  http_.AddPage("/", [this] {
+  http_.AddPage("/", [this](const HttpQuery&) {
     return HttpAnswer{
         .content_type = "text/html; charset=utf-8",
         .body = fmt::format(

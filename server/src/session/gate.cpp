@@ -16,12 +16,11 @@ using protocol::StatusCode;
 /// A connection that has not said Hello yet.
 class Gate::Handshake : public ConnectionHandler, public std::enable_shared_from_this<Handshake> {
  public:
-  Handshake(Gate& gate, Connection::Socket socket, std::string address, bool is_v6)
+  Handshake(Gate& gate, std::unique_ptr<Transport> transport, std::string address)
       : gate_(gate),
         timer_(gate.context_),
         address_(std::move(address)),
-        is_v6_(is_v6),
-        connection_(std::make_shared<Connection>(std::move(socket), gate.handshake_limits_,
+        connection_(std::make_shared<Connection>(std::move(transport), gate.handshake_limits_,
                                                  gate.metrics_)) {}
   ~Handshake() override { connection_->set_handler(nullptr); }
 
@@ -45,7 +44,7 @@ class Gate::Handshake : public ConnectionHandler, public std::enable_shared_from
                                    *frame)) {
       connection_->SendControl(std::move(frame));
     }
-    connection_->CloseGently();
+    connection_->CloseGently(CloseCodeOf(code));
     gate_.Forget(*this);
   }
 
@@ -67,14 +66,12 @@ class Gate::Handshake : public ConnectionHandler, public std::enable_shared_from
   void OnClosed() override { gate_.Forget(*this); }
 
   [[nodiscard]] const std::string& address() const { return address_; }
-  [[nodiscard]] bool is_v6() const { return is_v6_; }
   [[nodiscard]] Connection& connection() { return *connection_; }
 
  private:
   Gate& gate_;
   boost::asio::steady_timer timer_;
   std::string address_;
-  bool is_v6_;
   std::shared_ptr<Connection> connection_;
 };
 
@@ -95,13 +92,10 @@ Gate::Gate(boost::asio::io_context& context, const Limits& limits, ThreadMetrics
 
 Gate::~Gate() = default;
 
-void Gate::Accept(Connection::Socket socket) {
+void Gate::Accept(std::unique_ptr<Transport> transport, const boost::asio::ip::address& remote) {
   if (is_closed_) return;
   metrics_.connections_accepted.Add();
-  boost::system::error_code error;
-  const auto remote = socket.remote_endpoint(error);
-  if (error) return;  // gone already
-  const std::string address = remote.address().to_string();
+  const std::string address = remote.to_string();
   if (handshakes_.size() >= static_cast<std::size_t>(limits_.max_handshakes)) {
     metrics_.Reached(Limit::kHandshakes);
     return;  // closes it; a word to each would only help a flood
@@ -112,8 +106,7 @@ void Gate::Accept(Connection::Socket socket) {
     return;
   }
   ++count;
-  auto handshake =
-      std::make_shared<Handshake>(*this, std::move(socket), address, remote.address().is_v6());
+  auto handshake = std::make_shared<Handshake>(*this, std::move(transport), address);
   handshakes_.emplace(handshake.get(), handshake);
   handshake->Start();
 }
@@ -145,8 +138,7 @@ void Gate::OnHello(Handshake& handshake, const protocol::Hello& hello) {
     shard = opened->shard;
   }
   arrival.hello = hello;
-  arrival.is_v6 = handshake.is_v6();
-  arrival.socket = handshake.connection().Release(arrival.received);
+  arrival.transport = handshake.connection().Release(arrival.received);
   Forget(handshake);
   adopt_(shard, std::move(arrival));
 }

@@ -1,20 +1,20 @@
 #pragma once
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
 #include <functional>
 #include <map>
 #include <memory>
 #include <string>
 
 #include "net/connection.h"
-#include "net/listener.h"
 #include "session/session_directory.h"
 #include "world/shard.h"
 
 namespace stridewire::server {
 
 /// Where clients come in: greets a connection, hears its Hello, finds or makes its session and
-/// hands the socket to the session's shard. One thread's, and not a shard's: a flood of
+/// hands its transport to the session's shard. One thread's, and not a shard's: a flood of
 /// connections costs no tick.
 class Gate {
  public:
@@ -23,7 +23,8 @@ class Gate {
        SessionDirectory& directory, std::function<void(int, Shard::Arrival)> adopt);
   ~Gate();
 
-  void Accept(Connection::Socket socket);
+  /// `remote`: who it is.
+  void Accept(std::unique_ptr<Transport> transport, const boost::asio::ip::address& remote);
 
   /// Greets nobody any more.
   void Close();

@@ -123,7 +123,8 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
     SendLagging(membership);
   }
   for (auto& [id, membership] : worlds_) host_.InterestChanged(membership.world);
-  spdlog::info("session {:016x} of '{}' ({}) {}", identity_.id, client_name_, identity_.address,
+  spdlog::info("session {:016x} of '{}' ({}{}) {}", identity_.id, client_name_, identity_.address,
+               connection_->kind() == TransportKind::kWebSocket ? ", WebSocket" : "",
                resumed ? "goes on" : "begins");
   connection_->Start(this, received);
 }
@@ -159,7 +160,7 @@ void Session::Fail(StatusCode code, std::string text, Seq seq) {
   } else {
     Detach();
   }
-  connection->CloseGently();
+  connection->CloseGently(CloseCodeOf(code));
 }
 
 void Session::OnBadFrame(const Error& error) {

@@ -80,6 +80,9 @@ class Session : private ConnectionHandler {
   [[nodiscard]] const SessionIdentity& identity() const { return identity_; }
   [[nodiscard]] bool is_ended() const { return is_ended_; }
   [[nodiscard]] bool is_attached() const { return connection_ != nullptr; }
+  [[nodiscard]] bool is_attached(TransportKind kind) const {
+    return connection_ != nullptr && connection_->kind() == kind;
+  }
 
   // What this session wants of a world, for the shard to sum up.
   [[nodiscard]] bool WantsEvents(WorldId world) const;

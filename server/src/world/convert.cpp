@@ -157,4 +157,13 @@ protocol::StatusCode FrameStatusCode(ErrorCode code) {
   }
 }
 
+CloseCode CloseCodeOf(protocol::StatusCode code) {
+  using protocol::StatusCode;
+  switch (code) {
+    case StatusCode::kShuttingDown: return CloseCode::kGoingAway;
+    case StatusCode::kLimitReached: return CloseCode::kTryAgainLater;
+    default: return CloseCode::kPolicy;
+  }
+}
+
 }  // namespace stridewire::server

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "net/transport.h"
 #include "stridewire/base/error.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/avatar.h"
@@ -23,5 +24,8 @@ namespace stridewire::server {
 
 /// What a frame's error is called on the wire.
 [[nodiscard]] protocol::StatusCode FrameStatusCode(ErrorCode code);
+
+/// How a WebSocket ends after an Error of that code.
+[[nodiscard]] CloseCode CloseCodeOf(protocol::StatusCode code);
 
 }  // namespace stridewire::server

@@ -2,7 +2,6 @@
 
 #include <pthread.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <boost/asio/post.hpp>
@@ -258,16 +257,13 @@ void Shard::Adopt(Arrival arrival) {
 }
 
 void Shard::DoAdopt(Arrival&& arrival) {
-  Connection::Socket socket(context_);
-  boost::system::error_code error;
-  socket.assign(arrival.is_v6 ? asio::ip::tcp::v6() : asio::ip::tcp::v4(), arrival.socket, error);
-  if (error) {
-    spdlog::error("a connection could not be taken over: {}", error.message());
-    ::close(arrival.socket);
+  if (!arrival.transport->Attach(context_)) {
+    spdlog::error("a connection could not be taken over");
     if (!arrival.is_resuming) peers_.SessionEnded(arrival.identity.id);
     return;
   }
-  auto connection = std::make_shared<Connection>(std::move(socket), config_.limits, metrics_);
+  auto connection =
+      std::make_shared<Connection>(std::move(arrival.transport), config_.limits, metrics_);
   connections_.push_back(connection);
   std::unique_ptr<Session>& session = sessions_[arrival.identity.id];
   const bool is_resumed = arrival.is_resuming && session != nullptr && !session->is_ended();
@@ -312,9 +308,14 @@ void Shard::UpdateGauges() {
   std::size_t avatars = 0;
   for (const auto& [id, world] : worlds_) avatars += world->avatar_count();
   std::size_t attached = 0;
-  for (const auto& [id, session] : sessions_) attached += session->is_attached() ? 1 : 0;
+  std::size_t websockets = 0;
+  for (const auto& [id, session] : sessions_) {
+    attached += session->is_attached() ? 1 : 0;
+    websockets += session->is_attached(TransportKind::kWebSocket) ? 1 : 0;
+  }
   metrics_.avatars.Set(avatars);
   metrics_.sessions_attached.Set(attached);
+  metrics_.sessions_websocket.Set(websockets);
   metrics_.sessions_detached.Set(sessions_.size() - attached);
 }
 

@@ -56,8 +56,7 @@ class Shard : public SessionHost {
   struct Arrival {
     SessionIdentity identity;
     bool is_resuming = false;
-    bool is_v6 = false;
-    int socket = -1;  ///< Native handle; the shard owns it.
+    std::unique_ptr<Transport> transport;  ///< Detached.
     protocol::Hello hello;
     std::vector<std::byte> received;
   };

@@ -64,7 +64,7 @@ TEST(CommandLine, EveryKeyIsAnOptionAndAVariable) {
     const std::string value = key.get(defaults);
     if (key.name == "data_dir") continue;  // its default is empty
     const std::string option = key.option() + "=" + value;
-    EXPECT_TRUE(Read({option.c_str()}));
+    if (!value.empty()) EXPECT_TRUE(Read({option.c_str()}));
     EXPECT_TRUE(Read({}, {{key.environment(), value}}));
     if (key.is_text && key.name == "library") continue;
     const std::string bad = key.option() + "=\x01";

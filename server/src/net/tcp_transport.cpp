@@ -1,0 +1,94 @@
+#include "net/tcp_transport.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "net/portable_socket.h"
+
+namespace stridewire::server {
+namespace {
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+// A borrowed buffer sequence: Asio copies the sequence it is given, which for a vector is a heap
+// allocation a write.
+struct BufferList {
+  // Names that Asio asks for.
+  using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)
+  using const_iterator = const asio::const_buffer*;  // NOLINT(readability-identifier-naming)
+  const_iterator first;
+  const_iterator last;
+  [[nodiscard]] const_iterator begin() const { return first; }
+  [[nodiscard]] const_iterator end() const { return last; }
+};
+
+class TcpTransport final : public Transport {
+ public:
+  explicit TcpTransport(PortableSocket::Socket socket) : socket_(std::move(socket)) {}
+
+  TransportKind kind() const override { return TransportKind::kTcp; }
+  asio::any_io_executor executor() override { return socket_.get_executor(); }
+
+  void Prepare(Traffic& traffic, std::size_t send_buffer_bytes) override {
+    socket_.Prepare(traffic, send_buffer_bytes);
+  }
+
+  void Receive(std::shared_ptr<User> user, std::span<std::byte> buffer) override {
+    socket_.async_read_some(
+        asio::buffer(buffer.data(), buffer.size()),
+        [user = std::move(user), buffer](const error_code& error, std::size_t bytes) {
+          user->OnReceived(error, {.bytes = buffer.first(bytes)});
+        });
+  }
+
+  void Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+    buffers_.clear();
+    for (const SharedFrame& frame : frames) buffers_.emplace_back(frame->data(), frame->size());
+    first_buffer_ = 0;
+    Write(std::move(user));
+  }
+
+  bool End(std::shared_ptr<User> /*user*/, CloseCode /*code*/) override {
+    return socket_.ShutDownSending();
+  }
+  void Close() override { socket_.Close(); }
+  void Detach() override { socket_.Detach(); }
+  bool Attach(asio::io_context& context) override { return socket_.Attach(context); }
+
+ private:
+  void Write(std::shared_ptr<User> user) {
+    const BufferList buffers{buffers_.data() + first_buffer_, buffers_.data() + buffers_.size()};
+    socket_.async_write_some(buffers, [this, user = std::move(user)](const error_code& error,
+                                                                     std::size_t bytes) mutable {
+      if (error) {
+        user->OnSent(error);
+        return;
+      }
+      while (bytes > 0) {
+        asio::const_buffer& buffer = buffers_[first_buffer_];
+        const std::size_t taken = std::min(bytes, buffer.size());
+        buffer += taken;
+        bytes -= taken;
+        if (buffer.size() == 0) ++first_buffer_;
+      }
+      if (first_buffer_ < buffers_.size()) {
+        Write(std::move(user));
+      } else {
+        user->OnSent({});
+      }
+    });
+  }
+
+  PortableSocket socket_;
+  std::vector<asio::const_buffer> buffers_;
+  std::size_t first_buffer_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Transport> MakeTcpTransport(asio::ip::tcp::socket socket) {
+  return std::make_unique<TcpTransport>(std::move(socket));
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,114 @@
+#include "net/websocket_transport.h"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/websocket.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "net/portable_socket.h"
+#include "stridewire/base/version.h"
+
+namespace stridewire::server {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace websocket = boost::beast::websocket;
+using boost::system::error_code;
+
+class WebSocketTransport final : public Transport {
+ public:
+  WebSocketTransport(PortableSocket::Socket socket, UpgradeRequest request)
+      : stream_(std::move(socket)), request_(std::move(request)) {
+    // Poses do not get smaller by deflating them, and a little message can inflate without bound.
+    websocket::permessage_deflate no_compression;
+    no_compression.server_enable = false;
+    stream_.set_option(no_compression);
+    // Connection keeps the time.
+    stream_.set_option(websocket::stream_base::timeout{websocket::stream_base::none(),
+                                                       websocket::stream_base::none(), false});
+    stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
+      response.set(beast::http::field::server, std::string("stridewired/") + kVersion);
+    }));
+    stream_.auto_fragment(false);
+    stream_.binary(true);
+    // Nothing is gathered here; FrameReader holds every frame to its limit.
+    stream_.read_message_max(0);
+  }
+
+  TransportKind kind() const override { return TransportKind::kWebSocket; }
+  asio::any_io_executor executor() override { return stream_.get_executor(); }
+
+  void Prepare(Traffic& traffic, std::size_t send_buffer_bytes) override {
+    stream_.next_layer().Prepare(traffic, send_buffer_bytes);
+  }
+
+  void Receive(std::shared_ptr<User> user, std::span<std::byte> buffer) override {
+    if (request_) {
+      stream_.async_accept(*request_,
+                           [this, user = std::move(user), buffer](const error_code& error) mutable {
+                             request_.reset();
+                             if (error) {
+                               user->OnReceived(error, {});
+                             } else {
+                               Receive(std::move(user), buffer);
+                             }
+                           });
+      return;
+    }
+    stream_.async_read_some(
+        asio::buffer(buffer.data(), buffer.size()),
+        [this, user = std::move(user), buffer](const error_code& error, std::size_t bytes) {
+          if (error == websocket::condition::protocol_violation) {
+            stream_.next_layer().traffic().ProtocolError();
+          }
+          user->OnReceived(error, {.bytes = buffer.first(bytes),
+                                   .ends_message = !error && stream_.is_message_done(),
+                                   .is_text = !error && stream_.got_text()});
+        });
+  }
+
+  void Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+    unsent_ = frames;
+    Write(std::move(user));
+  }
+
+  bool End(std::shared_ptr<User> user, CloseCode code) override {
+    // Whoever reads on hears of the peer's answer.
+    stream_.async_close(websocket::close_reason(static_cast<std::uint16_t>(code)),
+                        [user = std::move(user)](const error_code&) {});
+    return true;
+  }
+  void Close() override { stream_.next_layer().Close(); }
+  void Detach() override { stream_.next_layer().Detach(); }
+  bool Attach(asio::io_context& context) override { return stream_.next_layer().Attach(context); }
+
+ private:
+  void Write(std::shared_ptr<User> user) {
+    const SharedFrame& frame = unsent_.front();
+    unsent_ = unsent_.subspan(1);
+    stream_.async_write(
+        asio::buffer(frame->data(), frame->size()),
+        [this, user = std::move(user)](const error_code& error, std::size_t) mutable {
+          if (error || unsent_.empty()) {
+            user->OnSent(error);
+          } else {
+            Write(std::move(user));
+          }
+        });
+  }
+
+  websocket::stream<PortableSocket> stream_;
+  std::optional<UpgradeRequest> request_;  // not answered yet
+  std::span<const SharedFrame> unsent_;
+};
+
+}  // namespace
+
+std::unique_ptr<Transport> MakeWebSocketTransport(asio::ip::tcp::socket socket,
+                                                  UpgradeRequest request) {
+  return std::make_unique<WebSocketTransport>(std::move(socket), std::move(request));
+}
+
+}  // namespace stridewire::server
