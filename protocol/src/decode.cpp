@@ -3,6 +3,7 @@
 #include <bit>
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 
 #include "stridewire/protocol/check.h"
 #include "stridewire_generated.h"
@@ -27,10 +28,16 @@ class Unpacker {
     if (!error_) error_ = stridewire::Error{code, text, index, field};
   }
 
-  /// Number of entries to read: 0 if there is no list or it is too long, which is an error.
-  template <typename V>
-  std::size_t Count(const V* list, std::size_t max, const char* field) {
+  /// Number of entries to read: 0 if there is no list, or if it is too long or lies crooked, which
+  /// are errors.
+  template <typename T>
+  std::size_t Count(const flatbuffers::Vector<T>* list, std::size_t max, const char* field) {
     if (list == nullptr) return 0;
+    // The verifier looks only at where the length stands, which is aligned to 4 bytes.
+    if (reinterpret_cast<std::uintptr_t>(list->Data()) % alignof(std::remove_pointer_t<T>) != 0) {
+      Wrong(ErrorCode::kMalformed, "list is not aligned", field);
+      return 0;
+    }
     if (list->size() <= max) return list->size();
     Wrong(ErrorCode::kLimitExceeded, "list is too long", field, list->size());
     return 0;

@@ -142,6 +142,30 @@ TEST(Decode, NumbersAreChecked) {
               ErrorCode::kOutOfRange, "Spawn.start", 0);
 }
 
+TEST(Decode, AListThatLiesCrookedIsRefused) {
+  // A list of doubles that begins where one of 32-bit numbers may: for one of two lengths of what
+  // lies behind it, between two multiples of 8.
+  int refused = 0;
+  for (const std::size_t behind : {32u, 36u}) {
+    FlatBufferBuilder builder;
+    const auto filler = builder.CreateVector(std::vector<std::uint8_t>(behind, 0));
+    const auto crooked = builder.CreateVector(std::vector<std::uint32_t>{0});
+    const auto movement = wire::CreateCurrentMovement(
+        builder, 1, wire::MovementKind::Jump, 0, 0.0,
+        Offset<flatbuffers::Vector<double>>(crooked.o), 0.0, 0.0, 0, 0, false, false, 0, filler);
+    const auto payload = Finished(
+        builder, wire::CreateAvatarState(builder, 1, 1, 1, 0, 0, 1, 0.0, nullptr, 0.0, movement));
+    const auto* state = flatbuffers::GetRoot<wire::AvatarState>(payload.data());
+    const auto at =
+        reinterpret_cast<std::uintptr_t>(state->movement()->keytimes_s()->Data()) % alignof(double);
+    if (at == 0) continue;
+    ++refused;
+    ExpectError(MessageType::kAvatarState, payload, ErrorCode::kMalformed,
+                "AvatarState.movement.keytimes_s");
+  }
+  EXPECT_GT(refused, 0);
+}
+
 TEST(Decode, UnknownEnumeratorsAreRefused) {
   FlatBufferBuilder builder;
   const auto item = [&](int type, int foot) {
