@@ -1,0 +1,350 @@
+// What one avatar does and why: movement, parameters, weights, examples, time line, base, queue.
+
+import {degrees, h, setText, svg} from '../dom.js';
+import type {AvatarState, MovementState, World} from '../sdk.js';
+import {genericTime, stateAt} from '../time_line.js';
+
+const everyMs = 200;
+const keptS = 22;
+
+const movementNames: Readonly<Record<string, string>> = {
+  stepLeft: 'Step, left foot', stepRight: 'Step, right foot', jump: 'Jump', stand: 'Stand',
+  step: 'Step',
+};
+const parameterNames: Readonly<Record<string, string>> = {
+  startX: 'start, sideways', startY: 'start, height', startZ: 'start, ahead',
+  endX: 'end, sideways', endY: 'end, height', endZ: 'end, ahead', turn: 'turn',
+  length: 'length', height: 'height',
+};
+
+export function movementName(kind: string): string {
+  return movementNames[kind] ?? kind;
+}
+
+function parameterText(name: string, value: number): string {
+  return name === 'turn' ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(3)} m`;
+}
+
+export class Inspector {
+  readonly element: HTMLElement;
+  state: AvatarState | null = null;
+  /** Whether names are drawn at the joints. */
+  labels = false;
+
+  private world: World | null = null;
+  private avatar = 0;
+  private states: AvatarState[] = [];
+  private askedMs = -1e9;
+  private asking = false;
+  private note = '';
+  private shape = '';
+
+  private readonly title = h('h3', {});
+  private readonly movement = h('p', {class: 'movement'});
+  private readonly line = svg('svg', {
+    class: 'time-line', viewBox: '0 0 280 46', role: 'img', 'aria-label': 'Time line of the movement'});
+  private readonly parameters = h('table', {class: 'parameters'});
+  private readonly scatter = svg('svg', {class: 'scatter', viewBox: '0 0 280 150', role: 'img'});
+  private readonly axes = h('div', {class: 'axes'});
+  private readonly bars = svg('svg', {class: 'bars', viewBox: '0 0 280 60', role: 'img'});
+  private readonly barsText = h('p', {class: 'hint'});
+  private readonly base = h('p', {});
+  private readonly queue = h('ol', {class: 'queue'});
+  private readonly queueTitle = h('h4', {}, 'Queue');
+  private readonly joints = h('ul', {class: 'joints'});
+  private readonly jointsTitle = h('summary', {}, 'Joints');
+  private readonly empty = h('p', {class: 'hint'},
+    'Click a figure, or press Tab on the scene and then N for the next one.');
+  private readonly content: HTMLElement;
+  private readonly moving: HTMLElement;
+  private axisX = 0;
+  private axisY = 1;
+  private playhead: SVGElement | null = null;
+  private playheadText: SVGElement | null = null;
+
+  constructor(actions: {onLabels: (on: boolean) => void; onFollow: () => void; onClose: () => void}) {
+    const labels = h('input', {type: 'checkbox', id: 'joint-labels'});
+    labels.addEventListener('change', () => {
+      this.labels = labels.checked;
+      actions.onLabels(labels.checked);
+    });
+    const follow = h('button', {type: 'button', class: 'small'}, 'Follow');
+    follow.addEventListener('click', actions.onFollow);
+    const close = h('button', {type: 'button', class: 'small'}, 'Deselect');
+    close.addEventListener('click', actions.onClose);
+    this.moving = h('div', {},
+      this.line, h('h4', {}, 'Parameters'), this.parameters,
+      h('h4', {}, 'Examples in parameter space'), this.axes, this.scatter,
+      h('h4', {}, 'Weights'), this.bars, this.barsText);
+    this.content = h('div', {class: 'inspector'},
+      h('div', {class: 'row'}, this.title, follow, close), this.movement, this.moving,
+      h('h4', {}, 'Base frame'), this.base, this.queueTitle, this.queue,
+      h('label', {class: 'check', for: 'joint-labels'}, labels, 'Names at the joints'),
+      h('details', {}, this.jointsTitle, this.joints));
+    this.element = h('div', {class: 'panel-body'}, this.empty, this.content);
+    this.content.hidden = true;
+  }
+
+  choose(world: World | null, avatar: number): void {
+    if (world === this.world && avatar === this.avatar) return;
+    this.world = world;
+    this.avatar = avatar;
+    this.states = [];
+    this.state = null;
+    this.shape = '';
+    this.note = '';
+    this.askedMs = -1e9;
+    this.content.hidden = avatar === 0;
+    this.empty.hidden = avatar !== 0;
+    if (!world || avatar === 0) return;
+    setText(this.title, `Avatar ${avatar} · ${world.name}`);
+    const skeleton = world.skeleton;
+    this.joints.replaceChildren(
+      ...(skeleton ? skeleton.names.map((name) => h('li', {}, name)) : []));
+    setText(this.jointsTitle, `${skeleton?.jointCount ?? 0} joints`);
+  }
+
+  /** Asks the server now and then, and shows what was so at `timeS`. */
+  update(nowMs: number, timeS: number, live: boolean, ready: boolean, visible: boolean): void {
+    const world = this.world;
+    if (!world || this.avatar === 0) return;
+    if (ready && !this.asking && nowMs - this.askedMs > everyMs && typeof world.inspect === 'function') {
+      this.asking = true;
+      this.askedMs = nowMs;
+      const avatar = this.avatar;
+      void world.inspect(avatar).then((state) => {
+        if (avatar !== this.avatar || world !== this.world) return;
+        if (state) {
+          this.states.push(state);
+          while (this.states[0]!.timeS < state.timeS - keptS) this.states.shift();
+        }
+      }, () => {
+        this.note = 'The server told nothing about it.';
+      }).finally(() => {
+        this.asking = false;
+      });
+    }
+    if (!visible) return;
+    const state = live ? this.states[this.states.length - 1] ?? null : stateAt(this.states, timeS);
+    if (state !== this.state) {
+      this.state = state;
+      this.show(state);
+    } else if (!state && this.movement.textContent === '') {
+      setText(this.movement, this.note || 'Asking…');
+    }
+    this.moveHead(timeS);
+  }
+
+  private show(state: AvatarState | null): void {
+    if (!state) {
+      setText(this.movement, this.note);
+      this.moving.hidden = true;
+      return;
+    }
+    const p = state.basePositionM;
+    setText(this.base, `x ${p[0]!.toFixed(2)} m, z ${p[2]!.toFixed(2)} m` +
+      (Math.abs(p[1]!) > 0.005 ? `, height ${p[1]!.toFixed(2)} m` : '') +
+      `, heading ${degrees(state.baseHeadingRad)}`);
+    setText(this.queueTitle, `Queue: ${state.queueSize === 0 ? 'empty' :
+      `${state.queueSize} waiting`}`);
+    const items = state.queue.map((item) => h('li', {}, queueText(item as unknown as QueueItem)));
+    if (state.queueSize > items.length) items.push(h('li', {}, `and ${state.queueSize - items.length} more`));
+    this.queue.replaceChildren(...items);
+    const movement = state.movement;
+    this.moving.hidden = movement === null;
+    if (!movement) {
+      setText(this.movement, 'Stands and waits.');
+      return;
+    }
+    setText(this.movement, `${movementName(movement.kind)}, ` +
+      `${(movement.endTimeS - movement.startTimeS).toFixed(2)} s` +
+      (movement.extrapolated ? '; beyond its examples' : '') +
+      (movement.clamped ? '; limited to what they reach' : ''));
+    const shape = `${movement.kind}/${movement.group}/${movement.startTimeS}`;
+    if (shape === this.shape) return;
+    this.shape = shape;
+    this.showParameters(movement);
+    this.showLine(movement);
+    this.showAxes(movement);
+    this.showScatter(movement);
+    this.showBars(movement);
+  }
+
+  private showParameters(movement: MovementState): void {
+    const requested = movement.requested as Readonly<Record<string, number>>;
+    const applied = movement.applied as Readonly<Record<string, number>>;
+    const rows = [...new Set([...Object.keys(requested), ...Object.keys(applied)])].map((name) =>
+      h('tr', {}, h('th', {scope: 'row'}, parameterNames[name] ?? name),
+        h('td', {}, requested[name] === undefined ? '–' : parameterText(name, requested[name]!)),
+        h('td', {}, applied[name] === undefined ? '–' : parameterText(name, applied[name]!))));
+    this.parameters.replaceChildren(
+      h('thead', {}, h('tr', {}, h('th', {}), h('th', {scope: 'col'}, 'asked'),
+        h('th', {scope: 'col'}, 'applied'))),
+      h('tbody', {}, ...rows));
+    this.parameters.hidden = rows.length === 0;
+  }
+
+  private showLine(movement: MovementState): void {
+    const keys = movement.keytimesS;
+    const span = Math.max(movement.endTimeS - movement.startTimeS, 1e-6);
+    const x = (t: number): number => 8 + Math.min(1, Math.max(0, t / span)) * 264;
+    const parts: SVGElement[] = [svg('line', {class: 'axis', x1: 8, y1: 20, x2: 272, y2: 20})];
+    if (movement.easeS > 0) {
+      parts.push(svg('rect', {class: 'ease', x: 8, y: 16, width: x(movement.easeS) - 8, height: 8}));
+    }
+    let right = -100;
+    for (let i = 0; i < keys.length; ++i) {
+      parts.push(svg('line', {class: 'key', x1: x(keys[i]!), y1: 12, x2: x(keys[i]!), y2: 28}));
+      if (x(keys[i]!) - right > 13) {
+        parts.push(svg('text', {class: 'key-text', x: x(keys[i]!), y: 42}, String(i)));
+        right = x(keys[i]!);
+      }
+    }
+    this.playhead = svg('path', {class: 'playhead', d: 'M0 3v28M-4 3h8l-4 6z'});
+    this.playheadText = svg('text', {class: 'playhead-text', x: 0, y: 9});
+    this.line.replaceChildren(...parts, this.playhead, this.playheadText);
+  }
+
+  private moveHead(timeS: number): void {
+    const movement = this.state?.movement;
+    if (!movement || !this.playhead || !this.playheadText) return;
+    const t = timeS - movement.startTimeS;
+    const span = Math.max(movement.endTimeS - movement.startTimeS, 1e-6);
+    const x = 8 + Math.min(1, Math.max(0, t / span)) * 264;
+    this.playhead.setAttribute('transform', `translate(${x.toFixed(1)} 0)`);
+    const text = genericTime(movement.keytimesS, t).toFixed(2);
+    const left = x > 220;
+    this.playheadText.setAttribute('x', (x + (left ? -7 : 7)).toFixed(1));
+    this.playheadText.setAttribute('text-anchor', left ? 'end' : 'start');
+    setText(this.playheadText, `generic time ${text}`);
+  }
+
+  /** Lets one choose which two parameters are drawn; the two that vary most to begin with. */
+  private showAxes(movement: MovementState): void {
+    const names = movement.parameterNames as readonly string[];
+    const n = names.length;
+    const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
+    const spread = names.map((name, k) => {
+      let low = Infinity;
+      let high = -Infinity;
+      for (let i = 0; i < count; ++i) {
+        low = Math.min(low, movement.sites[i * n + k]!);
+        high = Math.max(high, movement.sites[i * n + k]!);
+      }
+      return {k, spread: high - low, main: name === 'endZ' || name === 'length' ? 1 : 0};
+    }).sort((a, b) => b.main - a.main || b.spread - a.spread);
+    this.axisX = spread[0]?.k ?? 0;
+    this.axisY = spread[1]?.k ?? this.axisX;
+    this.axes.replaceChildren();
+    if (n < 2) return;
+    const select = (label: string, value: number, set: (k: number) => void): HTMLElement => {
+      const element = h('select', {'aria-label': label});
+      names.forEach((name, k) => {
+        const option = h('option', {value: k}, parameterNames[name] ?? name);
+        option.selected = k === value;
+        element.append(option);
+      });
+      element.addEventListener('change', () => {
+        set(Number(element.value));
+        if (this.state?.movement) this.showScatter(this.state.movement);
+      });
+      return element;
+    };
+    this.axes.append('→ ', select('Parameter to the right', this.axisX, (k) => (this.axisX = k)),
+      ' ↑ ', select('Parameter upwards', this.axisY, (k) => (this.axisY = k)));
+  }
+
+  private showScatter(movement: MovementState): void {
+    const names = movement.parameterNames as readonly string[];
+    const n = names.length;
+    const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
+    this.scatter.replaceChildren();
+    if (count === 0) return;
+    const applied = movement.applied as Readonly<Record<string, number>>;
+    const at = names.map((name) => applied[name] ?? 0);
+    const flat = this.axisX === this.axisY;
+    const xs: number[] = [];
+    const ys: number[] = [];
+    for (let i = 0; i < count; ++i) {
+      xs.push(movement.sites[i * n + this.axisX]!);
+      ys.push(flat ? 0 : movement.sites[i * n + this.axisY]!);
+    }
+    const px = at[this.axisX]!;
+    const py = flat ? 0 : at[this.axisY]!;
+    const scale = (values: number[], p: number, from: number, to: number) => {
+      const low = Math.min(p, ...values);
+      const high = Math.max(p, ...values);
+      const span = Math.max(high - low, 1e-6);
+      return (v: number): number => high - low < 1e-9 ? (from + to) / 2 :
+        from + ((v - low) / span) * (to - from);
+    };
+    const x = scale(xs, px, 18, 262);
+    const y = scale(ys, py, 122, 18);
+    const parts: SVGElement[] = [svg('rect', {class: 'frame', x: 4, y: 4, width: 272, height: 132})];
+    for (let i = 0; i < count; ++i) {
+      const w = movement.weights[i] ?? 0;
+      const r = 2 + Math.sqrt(Math.min(1, Math.abs(w))) * 10;
+      const dot = svg('circle', {
+        class: w < 0 ? 'site negative' : Math.abs(w) < 0.01 ? 'site idle' : 'site',
+        cx: x(xs[i]!).toFixed(1), cy: y(ys[i]!).toFixed(1), r: r.toFixed(1)});
+      dot.append(svg('title', {}, `example ${i}: weight ${w.toFixed(3)}`));
+      parts.push(dot);
+    }
+    const cx = x(px);
+    const cy = y(py);
+    parts.push(svg('path', {class: 'wanted', d:
+      `M${cx - 7} ${cy}h14M${cx} ${cy - 7}v14`}));
+    const range = (values: number[], k: number): string =>
+      `${parameterText(names[k]!, Math.min(...values))} … ${parameterText(names[k]!, Math.max(...values))}`;
+    parts.push(svg('text', {class: 'axis-text', x: 140, y: 147}, range(xs, this.axisX)));
+    this.scatter.replaceChildren(...parts);
+    this.scatter.setAttribute('aria-label',
+      `${count} examples; the cross is what is applied, larger dots weigh more`);
+  }
+
+  private showBars(movement: MovementState): void {
+    const n = movement.weights.length;
+    const parts: SVGElement[] = [];
+    let low = 0;
+    let high = 1e-6;
+    for (let i = 0; i < n; ++i) {
+      low = Math.min(low, movement.weights[i]!);
+      high = Math.max(high, movement.weights[i]!);
+    }
+    const span = high - low;
+    const zero = 4 + (high / span) * 52;
+    const width = 272 / Math.max(1, n);
+    const order: number[] = [];
+    for (let i = 0; i < n; ++i) {
+      const w = movement.weights[i]!;
+      order.push(i);
+      const tall = Math.max(Math.abs(w) / span * 52, 0.75);
+      const bar = svg('rect', {
+        class: w < 0 ? 'bar negative' : 'bar', x: (4 + i * width).toFixed(2),
+        y: (w < 0 ? zero : zero - tall).toFixed(2), width: Math.max(1, width * 0.78).toFixed(2),
+        height: tall.toFixed(2)});
+      bar.append(svg('title', {}, `example ${i}: ${w.toFixed(3)}`));
+      parts.push(bar);
+    }
+    parts.push(svg('line', {class: 'axis', x1: 4, y1: zero, x2: 276, y2: zero}));
+    this.bars.replaceChildren(...parts);
+    order.sort((a, b) => Math.abs(movement.weights[b]!) - Math.abs(movement.weights[a]!));
+    const text = order.slice(0, 4).map((i) => `#${i} ${movement.weights[i]!.toFixed(2)}`).join(', ');
+    setText(this.barsText, n === 0 ? 'It has no examples.' : `${n} examples; most: ${text}`);
+    this.bars.setAttribute('aria-label', `Weights of ${n} examples; most: ${text}`);
+  }
+}
+
+interface QueueItem {
+  type: string;
+  foot?: string;
+  lengthM?: number;
+  turnRad?: number;
+  seconds?: number;
+}
+function queueText(item: QueueItem): string {
+  if (item.type === 'stand') return `stand ${(item.seconds ?? 0).toFixed(1)} s`;
+  const foot = item.foot && item.foot !== 'auto' ? ` ${item.foot}` : '';
+  const turn = item.turnRad ? `, ${degrees(item.turnRad)}` : '';
+  return `${item.type}${foot} ${(item.lengthM ?? 0).toFixed(2)} m${turn}`;
+}

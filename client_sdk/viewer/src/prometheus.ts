@@ -1,0 +1,22 @@
+// The server's figures, out of Prometheus' text format.
+
+/** Values by name, samples of one name summed, as shards and labels are one server. */
+export function parseMetrics(text: string): Map<string, number> {
+  const values = new Map<string, number>();
+  for (const line of text.split('\n')) {
+    if (line === '' || line[0] === '#') continue;
+    const match = /^([a-zA-Z_:][a-zA-Z0-9_:]*)(\{[^}]*\})?\s+(\S+)/.exec(line);
+    if (!match || match[2]?.includes('le="')) continue;
+    const value = Number(match[3]);
+    if (Number.isFinite(value)) values.set(match[1]!, (values.get(match[1]!) ?? 0) + value);
+  }
+  return values;
+}
+
+/** Mean of a histogram's new observations since an older scrape; null when there were none. */
+export function meanSince(
+  now: ReadonlyMap<string, number>, before: ReadonlyMap<string, number>, name: string): number | null {
+  const count = (now.get(`${name}_count`) ?? 0) - (before.get(`${name}_count`) ?? 0);
+  const sum = (now.get(`${name}_sum`) ?? 0) - (before.get(`${name}_sum`) ?? 0);
+  return count > 0 && sum >= 0 ? sum / count : null;
+}

@@ -1,0 +1,152 @@
+// The camera: orbits a target, pans, zooms, follows. Views side by side share angle and distance and
+// keep a target each, so that two worlds are seen the same way.
+
+import * as THREE from 'three';
+
+const minDistanceM = 1.2;
+const maxDistanceM = 160;
+
+export class Orbit {
+  azimuthRad = 0.65;
+  elevationRad = 0.3;
+  distanceM = 8;
+  private wantAzimuth = 0.65;
+  private wantElevation = 0.3;
+  private wantDistance = 8;
+
+  turn(azimuthRad: number, elevationRad: number): void {
+    this.wantAzimuth += azimuthRad;
+    this.wantElevation = Math.min(1.5, Math.max(0.03, this.wantElevation + elevationRad));
+  }
+
+  zoom(factor: number): void {
+    this.wantDistance = Math.min(maxDistanceM, Math.max(minDistanceM, this.wantDistance * factor));
+  }
+
+  setDistance(distanceM: number): void {
+    this.wantDistance = Math.min(maxDistanceM, Math.max(minDistanceM, distanceM));
+  }
+
+  /** Goes where it was told, softly; at once with `dtS` Infinity. */
+  advance(dtS: number): void {
+    const k = Number.isFinite(dtS) ? 1 - Math.exp(-dtS * 12) : 1;
+    this.azimuthRad += (this.wantAzimuth - this.azimuthRad) * k;
+    this.elevationRad += (this.wantElevation - this.elevationRad) * k;
+    this.distanceM += (this.wantDistance - this.distanceM) * k;
+  }
+}
+
+export interface Box {
+  x: number;
+  y: number;
+  width: number;
+  height: number;
+}
+
+export class ViewCamera {
+  readonly camera = new THREE.PerspectiveCamera(42, 1, 0.1, 400);
+  readonly target = new THREE.Vector3(0, 0.9, 0);
+  private readonly want = new THREE.Vector3(0, 0.9, 0);
+
+  moveTo(x: number, y: number, z: number, atOnce = false): void {
+    this.want.set(x, y, z);
+    if (atOnce) this.target.copy(this.want);
+  }
+
+  /** Moves the target in the ground plane, by shares of the view's height. */
+  pan(orbit: Orbit, right: number, forward: number): void {
+    const scale = orbit.distanceM * 0.8;
+    const s = Math.sin(orbit.azimuthRad);
+    const c = Math.cos(orbit.azimuthRad);
+    this.want.x += (c * right - s * forward) * scale;
+    this.want.z += (-s * right - c * forward) * scale;
+  }
+
+  /**
+   * `free` is what panels leave of the page: its middle is where the target is seen. `box` is what
+   * is drawn, panels or not. Both in CSS pixels.
+   */
+  advance(orbit: Orbit, dtS: number, free: Box, box: Box): void {
+    const aspect = free.width / Math.max(1, free.height);
+    this.target.lerp(this.want, 1 - Math.exp(-dtS * 7));
+    const flat = Math.cos(orbit.elevationRad) * orbit.distanceM;
+    this.camera.position.set(
+      this.target.x + Math.sin(orbit.azimuthRad) * flat,
+      Math.max(0.15, this.target.y + Math.sin(orbit.elevationRad) * orbit.distanceM),
+      this.target.z + Math.cos(orbit.azimuthRad) * flat);
+    this.camera.aspect = aspect;
+    // A narrow view keeps the width of a square one.
+    this.camera.fov = aspect >= 1 ? 42 :
+      2 * THREE.MathUtils.radToDeg(Math.atan(Math.tan(THREE.MathUtils.degToRad(21)) / Math.max(aspect, 0.55)));
+    this.camera.near = Math.max(0.05, orbit.distanceM * 0.02);
+    this.camera.setViewOffset(free.width, free.height, box.x - free.x, box.y - free.y, box.width,
+      box.height);
+    this.camera.lookAt(this.target);
+    this.camera.updateMatrixWorld();
+  }
+}
+
+export interface PointerActions {
+  orbit(dx: number, dy: number): void;
+  pan(dx: number, dy: number, x: number, y: number): void;
+  zoom(factor: number): void;
+  click(x: number, y: number, twice: boolean): void;
+}
+
+/** Mouse and touch on `element`; positions in CSS pixels within it. */
+export function listenToPointers(element: HTMLElement, actions: PointerActions): void {
+  const pointers = new Map<number, {x: number; y: number}>();
+  let moved = 0;
+  let downAt = 0;
+  let lastClick = -1e9;
+  const where = (e: PointerEvent | WheelEvent): [number, number] => {
+    const box = element.getBoundingClientRect();
+    return [e.clientX - box.left, e.clientY - box.top];
+  };
+  element.addEventListener('pointerdown', (e) => {
+    element.setPointerCapture(e.pointerId);
+    if (pointers.size === 0) {
+      moved = 0;
+      downAt = performance.now();
+    }
+    pointers.set(e.pointerId, {x: e.clientX, y: e.clientY});
+  });
+  element.addEventListener('pointermove', (e) => {
+    const p = pointers.get(e.pointerId);
+    if (!p) return;
+    const dx = e.clientX - p.x;
+    const dy = e.clientY - p.y;
+    const [x, y] = where(e);
+    if (pointers.size === 1) {
+      if (e.buttons & 6 || e.shiftKey) actions.pan(dx, dy, x, y);
+      else if (moved > 4) actions.orbit(dx, dy);
+    } else if (pointers.size === 2) {
+      const other = [...pointers.entries()].find(([id]) => id !== e.pointerId)![1];
+      const before = Math.hypot(p.x - other.x, p.y - other.y);
+      const after = Math.hypot(e.clientX - other.x, e.clientY - other.y);
+      if (before > 10 && after > 10) actions.zoom(before / after);
+      actions.pan(dx / 2, dy / 2, x, y);
+    }
+    moved += Math.abs(dx) + Math.abs(dy);
+    p.x = e.clientX;
+    p.y = e.clientY;
+  });
+  const up = (e: PointerEvent): void => {
+    const known = pointers.delete(e.pointerId);
+    if (!known || e.type === 'pointercancel' || pointers.size > 0) return;
+    const now = performance.now();
+    if (moved <= 6 && now - downAt < 600 && e.button === 0) {
+      const [x, y] = where(e);
+      actions.click(x, y, now - lastClick < 350);
+      lastClick = now;
+    }
+  };
+  element.addEventListener('pointerup', up);
+  element.addEventListener('pointercancel', up);
+  element.addEventListener('contextmenu', (e) => e.preventDefault());
+  element.addEventListener('wheel', (e) => {
+    e.preventDefault();
+    const lines = e.deltaMode === 1 ? 16 : 1;
+    actions.zoom(Math.exp(Math.max(-120, Math.min(120, e.deltaY * lines)) * 0.0016));
+  }, {passive: false});
+}

@@ -1,0 +1,107 @@
+// Text over the scene: names of worlds side by side, the chosen avatar's number, names of joints.
+
+import type {WorldView} from './world_view.js';
+import {projected} from './world_view.js';
+
+export class Overlay {
+  private readonly context: CanvasRenderingContext2D;
+  private width = 0;
+  private height = 0;
+  private scale = 1;
+  private colours = {text: '', halo: '', accent: '', line: ''};
+  private dirty = true;
+
+  constructor(private readonly canvas: HTMLCanvasElement) {
+    this.context = canvas.getContext('2d')!;
+  }
+
+  resize(width: number, height: number): void {
+    this.width = width;
+    this.height = height;
+    this.scale = Math.min(devicePixelRatio || 1, 2);
+    this.canvas.width = Math.round(width * this.scale);
+    this.canvas.height = Math.round(height * this.scale);
+  }
+
+  restyle(): void {
+    const style = getComputedStyle(document.documentElement);
+    this.colours = {
+      text: style.getPropertyValue('--text'), halo: style.getPropertyValue('--halo'),
+      accent: style.getPropertyValue('--accent'), line: style.getPropertyValue('--border'),
+    };
+  }
+
+  draw(views: readonly WorldView[], jointNames: boolean): void {
+    const chosen = views.find((view) => view.chosen !== 0 && view.indexOf(view.chosen) >= 0);
+    const several = views.length > 1;
+    if (!chosen && !several && !this.dirty) return;
+    const {context} = this;
+    context.setTransform(this.scale, 0, 0, this.scale, 0, 0);
+    context.clearRect(0, 0, this.width, this.height);
+    this.dirty = false;
+    if (several) {
+      this.dirty = true;
+      views.forEach((view, i) => {
+        if (i > 0) {
+          context.strokeStyle = this.colours.line;
+          context.lineWidth = 2;
+          context.beginPath();
+          if (view.box.x > 0) {
+            context.moveTo(view.box.x, 0);
+            context.lineTo(view.box.x, this.height);
+          } else {
+            context.moveTo(0, view.box.y);
+            context.lineTo(this.width, view.box.y);
+          }
+          context.stroke();
+        }
+        this.text(view.name, view.free.x + view.free.width / 2, view.free.y + 20, '600 14px', 'center',
+          this.colours.text);
+      });
+    }
+    if (!chosen?.crowd) return;
+    this.dirty = true;
+    const crowd = chosen.crowd;
+    const i = chosen.indexOf(chosen.chosen);
+    const n = crowd.skeleton.jointCount;
+    let top = Infinity;
+    let topX = 0;
+    const taken: [number, number][] = [];
+    for (let j = 0; j < n; ++j) {
+      if (!chosen.project(crowd.positions, (i * n + j) * 3)) continue;
+      const {x, y} = projected;
+      if (y < top) {
+        top = y;
+        topX = x;
+      }
+      if (!jointNames) continue;
+      context.fillStyle = this.colours.accent;
+      context.beginPath();
+      context.arc(x, y, 3, 0, 7);
+      context.fill();
+      let line = y + 4;
+      for (let tries = 0; tries < 8 && taken.some(([a, b]) => Math.abs(a - x) < 90 && Math.abs(b - line) < 11); ++tries) {
+        line += 11;
+      }
+      taken.push([x, line]);
+      this.text(crowd.skeleton.names[j] ?? '', x + 7, line, '11px', 'left', this.colours.text);
+    }
+    if (top < Infinity) {
+      const lift = Math.max(10, (crowd.heightM * 0.13 * chosen.box.height) / (projected.z || 5) * 0.9);
+      this.text(`${chosen.chosen}`, topX, top - lift, '600 13px', 'center', this.colours.accent);
+    }
+  }
+
+  private text(
+    text: string, x: number, y: number, font: string, align: CanvasTextAlign, colour: string): void {
+    const {context} = this;
+    context.font = `${font} system-ui, sans-serif`;
+    context.textAlign = align;
+    context.lineWidth = 3;
+    context.lineJoin = 'round';
+    context.strokeStyle = this.colours.halo;
+    context.strokeText(text, x, y);
+    context.fillStyle = colour;
+    context.fillText(text, x, y);
+  }
+}

@@ -1,0 +1,270 @@
+// One world as it is seen: its crowd, the marks on its ground, and a camera's target.
+
+import * as THREE from 'three';
+
+import type {World, WorldEvent} from '../sdk.js';
+import {createCrowdPose} from '../sdk.js';
+import type {Orbit} from './camera.js';
+import {ViewCamera} from './camera.js';
+import {CrowdMesh} from './crowd_mesh.js';
+import type {FigureStyle, Lights} from './crowd_mesh.js';
+import {matrixFloats} from './kinematics.js';
+import {Footprints, Grid, blobs, rings} from './ground.js';
+import type {GroundColours} from './ground.js';
+
+const markCapacity = 8192;
+/** A ball of the foot slower and lower than this carries the figure. */
+const plantedSpeedMs = 0.22;
+const plantedHeightM = 0.14;
+
+export interface ViewColours {
+  lights: Lights;
+  ground: GroundColours;
+  shade: THREE.Color;
+  left: THREE.Color;
+  right: THREE.Color;
+  accent: THREE.Color;
+}
+
+export interface ViewOptions {
+  style: FigureStyle;
+  shadows: boolean;
+  prints: boolean;
+  plants: boolean;
+  /** A ground that is quick to draw without a graphics card. */
+  readonly plainGround: boolean;
+}
+
+export class WorldView {
+  readonly scene = new THREE.Scene();
+  readonly view = new ViewCamera();
+  readonly pose = createCrowdPose();
+  crowd: CrowdMesh | null = null;
+  readonly footprints: Footprints;
+  /** What is drawn, in CSS pixels from the top left; `free` is the part no panel covers. */
+  readonly box = {x: 0, y: 0, width: 1, height: 1};
+  readonly free = {x: 0, y: 0, width: 1, height: 1};
+  framed = false;
+  chosen = 0;
+  following = 0;
+
+  private readonly grid: Grid;
+  private readonly blobs = blobs(markCapacity);
+  private readonly rings = rings(markCapacity);
+  private readonly options: ViewOptions;
+  private readonly colours: ViewColours;
+  private previous = new Float32Array(0);
+  private previousAvatars = new Uint32Array(0);
+  private planted = new Uint8Array(0);
+  private previousS = 0;
+  private readonly unsubscribe: () => void;
+
+  constructor(readonly world: World, colours: ViewColours, options: ViewOptions) {
+    this.colours = colours;
+    this.options = options;
+    this.grid = new Grid(colours.ground, options.plainGround);
+    this.footprints = new Footprints(6000, colours.left, colours.right);
+    this.scene.add(this.grid.object, this.blobs.mesh, this.rings.mesh, this.footprints.marks.mesh);
+    this.unsubscribe = world.on('event', (event) => this.onEvent(event));
+  }
+
+  get name(): string {
+    return this.world.name;
+  }
+
+  dispose(): void {
+    this.unsubscribe();
+    this.crowd?.dispose();
+    this.blobs.dispose();
+    this.rings.dispose();
+    this.footprints.marks.dispose();
+  }
+
+  /** Poses, matrices and marks for time `timeS`; how many avatars there are. */
+  update(timeS: number, live: boolean): number {
+    const skeleton = this.world.skeleton;
+    if (!skeleton) return 0;
+    if (!this.crowd || this.crowd.skeleton !== skeleton) {
+      this.crowd?.dispose();
+      if (this.crowd) this.scene.remove(this.crowd.group);
+      this.crowd = new CrowdMesh(skeleton, this.options.style, this.colours.lights);
+      this.scene.add(this.crowd.group);
+    }
+    const crowd = this.crowd;
+    crowd.setStyle(this.options.style);
+    crowd.setShadows(this.options.shadows);
+    crowd.choose(this.chosen);
+    if (live) this.world.sampleAll(timeS, this.pose);
+    else this.world.recording.sampleAll(timeS, this.pose);
+    crowd.update(this.pose);
+    this.mark(timeS);
+    this.footprints.at(timeS);
+    this.footprints.marks.mesh.visible = this.options.prints;
+    this.rings.mesh.visible = this.options.plants;
+    return crowd.count;
+  }
+
+  indexOf(avatar: number): number {
+    const crowd = this.crowd;
+    if (!crowd || avatar === 0) return -1;
+    for (let i = 0; i < crowd.count; ++i) if (crowd.avatars[i] === avatar) return i;
+    return -1;
+  }
+
+  /** Where an avatar stands and looks; null when it is not seen. */
+  place(avatar: number): {x: number; z: number; headingRad: number} | null {
+    const i = this.indexOf(avatar);
+    if (i < 0 || !this.crowd) return null;
+    const n = this.crowd.skeleton.jointCount;
+    const m = i * n * matrixFloats;
+    const {matrices, positions} = this.crowd;
+    return {
+      x: positions[i * n * 3]!, z: positions[i * n * 3 + 2]!,
+      headingRad: Math.atan2(matrices[m + 2]!, matrices[m + 10]!)};
+  }
+
+  /** Aims at the avatar followed. */
+  follow(): void {
+    const i = this.indexOf(this.following);
+    if (i < 0 || !this.crowd) return;
+    const at = i * this.crowd.skeleton.jointCount * 3;
+    this.view.moveTo(this.crowd.positions[at]!, this.crowd.heightM * 0.5, this.crowd.positions[at + 2]!);
+  }
+
+  /** Centre and radius of all that lives here, on the ground; null when nothing does. */
+  extent(): {x: number; z: number; radius: number} | null {
+    const crowd = this.crowd;
+    if (!crowd || crowd.count === 0) return null;
+    const stride = crowd.skeleton.jointCount * 3;
+    let [x0, x1, z0, z1] = [Infinity, -Infinity, Infinity, -Infinity];
+    for (let i = 0; i < crowd.count; ++i) {
+      const x = crowd.positions[i * stride]!;
+      const z = crowd.positions[i * stride + 2]!;
+      x0 = Math.min(x0, x);
+      x1 = Math.max(x1, x);
+      z0 = Math.min(z0, z);
+      z1 = Math.max(z1, z);
+    }
+    return {x: (x0 + x1) / 2, z: (z0 + z1) / 2, radius: Math.hypot(x1 - x0, z1 - z0) / 2};
+  }
+
+  /** Aims the grid and the camera; call after `follow`. */
+  aim(orbit: Orbit, dtS: number): void {
+    this.view.advance(orbit, dtS, this.free, this.box);
+    this.grid.follow(this.view.target.x, this.view.target.z);
+  }
+
+  /** The avatar whose joints come nearest to a point of the screen, within `reachPx`; 0: none. */
+  pick(x: number, y: number, reachPx: number): number {
+    const crowd = this.crowd;
+    if (!crowd) return 0;
+    const n = crowd.skeleton.jointCount;
+    let best = 0;
+    let bestCost = Infinity;
+    for (let i = 0; i < crowd.count; ++i) {
+      let near = Infinity;
+      let depth = 0;
+      for (let j = 0; j < n; ++j) {
+        if (!this.project(crowd.positions, (i * n + j) * 3)) continue;
+        const d = Math.hypot(projected.x - x, projected.y - y);
+        if (d < near) {
+          near = d;
+          depth = projected.z;
+        }
+      }
+      // The nearer of two that overlap.
+      const cost = near + depth * 4;
+      if (near <= reachPx && cost < bestCost) {
+        bestCost = cost;
+        best = crowd.avatars[i]!;
+      }
+    }
+    return best;
+  }
+
+  /** Where a point of the world is on the screen: `projected`; false behind the camera. */
+  project(points: ArrayLike<number>, at: number): boolean {
+    point.set(points[at]!, points[at + 1]!, points[at + 2]!);
+    const depth = -point.applyMatrix4(this.view.camera.matrixWorldInverse).z;
+    if (depth < 0.05) return false;
+    point.applyMatrix4(this.view.camera.projectionMatrix);
+    projected.x = this.box.x + (point.x * 0.5 + 0.5) * this.box.width;
+    projected.y = this.box.y + (0.5 - point.y * 0.5) * this.box.height;
+    projected.z = depth;
+    return true;
+  }
+
+  private onEvent(event: WorldEvent): void {
+    if (event.type !== 'footStrike') return;
+    this.footprints.add(event.timeS, event.positionM[0]!, event.positionM[2]!,
+      event.baseHeadingRad, event.foot === 'left' ? 0 : 1);
+  }
+
+  private mark(timeS: number): void {
+    const crowd = this.crowd!;
+    const n = crowd.count;
+    if (this.planted.length < n * 2) {
+      this.planted = new Uint8Array(n * 4);
+      this.previous = new Float32Array(n * 12);
+      this.previousAvatars = new Uint32Array(n * 2);
+    }
+    const dt = timeS - this.previousS;
+    const measure = Math.abs(dt) > 0.004;
+    const soon = Math.abs(dt) < 0.25;
+    const stride = crowd.skeleton.jointCount * 3;
+    const {shade, accent, left, right} = this.colours;
+    let blob = 0;
+    let ring = 0;
+    for (let i = 0; i < n; ++i) {
+      const avatar = crowd.avatars[i]!;
+      const known = this.previousAvatars[i] === avatar;
+      const chosen = avatar === this.chosen;
+      const rootAt = i * stride;
+      if (blob < markCapacity) {
+        this.blobs.set(blob++, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
+          crowd.heightM * 0.28, shade.r, shade.g, shade.b, 0.5);
+      }
+      if (chosen && ring < markCapacity) {
+        this.rings.set(ring++, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
+          crowd.heightM * 0.3, accent.r, accent.g, accent.b, 0.8);
+      }
+      for (let f = 0; f < 2; ++f) {
+        const at = i * 6 + f * 3;
+        const x = crowd.balls[at]!;
+        const y = crowd.balls[at + 1]!;
+        const z = crowd.balls[at + 2]!;
+        const p = i * 2 + f;
+        if (measure) {
+          const moved = Math.hypot(
+            x - this.previous[at]!, y - this.previous[at + 1]!, z - this.previous[at + 2]!);
+          this.planted[p] = known && soon && y < plantedHeightM &&
+            moved / Math.abs(dt) < plantedSpeedMs ? 1 : 0;
+          this.previous[at] = x;
+          this.previous[at + 1] = y;
+          this.previous[at + 2] = z;
+        }
+        if (blob < markCapacity) {
+          const near = Math.max(0, 1 - y / 0.5);
+          this.blobs.set(blob++, x, z, 0, crowd.heightM * 0.085, shade.r, shade.g, shade.b, 0.75 * near);
+        }
+        if (this.planted[p] && ring < markCapacity) {
+          const c = f === 0 ? left : right;
+          this.rings.set(ring++, x, z, 0, crowd.heightM * 0.066, c.r, c.g, c.b, 0.95);
+        }
+      }
+      if (measure) this.previousAvatars[i] = avatar;
+    }
+    if (measure) this.previousS = timeS;
+    this.blobs.show(blob);
+    this.rings.show(ring);
+  }
+
+  /** Whether the left and right foot of the avatar at `index` carry it. */
+  feetPlanted(index: number): [boolean, boolean] {
+    return [this.planted[index * 2] === 1, this.planted[index * 2 + 1] === 1];
+  }
+}
+
+const point = new THREE.Vector3();
+/** The last point projected: CSS pixels, and metres from the camera. */
+export const projected = {x: 0, y: 0, z: 0};

@@ -1,0 +1,13 @@
+// What the viewer uses of `@stridewire/client`, in one place.
+
+export {Client, createCrowdPose} from '@stridewire/client';
+export type {
+  CrowdPose, MovementRequest, Parameters, PoseMode, Reply, Skeleton, Statistics, Subscription, World,
+  WorldEvent,
+} from '@stridewire/client';
+
+import type {World} from '@stridewire/client';
+
+/** What an avatar does now and why, as the server tells when asked. */
+export type AvatarState = NonNullable<Awaited<ReturnType<World['inspect']>>>;
+export type MovementState = NonNullable<AvatarState['movement']>;

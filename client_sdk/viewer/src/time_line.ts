@@ -1,0 +1,25 @@
+// Generic time: the index of the last keytime passed plus the share of the way to the next.
+
+/** Generic time at `timeS` after the movement's start; within 0 and the last index. */
+export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number {
+  const last = keytimesS.length - 1;
+  if (last < 1 || timeS <= keytimesS[0]!) return 0;
+  for (let i = 0; i < last; ++i) {
+    if (timeS < keytimesS[i + 1]!) {
+      const span = keytimesS[i + 1]! - keytimesS[i]!;
+      return i + (span > 0 ? (timeS - keytimesS[i]!) / span : 0);
+    }
+  }
+  return last;
+}
+
+/** The state asked for that was valid nearest to a time: the last one not after it, else the first. */
+export function stateAt<T extends {readonly timeS: number}>(
+  states: readonly T[], timeS: number): T | null {
+  let best: T | null = null;
+  for (const state of states) {
+    if (best === null || state.timeS <= timeS) best = state;
+    else break;
+  }
+  return best;
+}
