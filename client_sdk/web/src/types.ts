@@ -79,6 +79,62 @@ export interface MovementRequest {
   seconds?: number;
 }
 
+/** A movement that waits in an avatar's queue. */
+export interface QueuedRequest {
+  readonly avatar: number;
+  readonly requestId: bigint;
+  readonly type: MovementType;
+  readonly foot: FootChoice;
+  readonly lengthM: number;
+  /** Null: as the library has it. */
+  readonly sideM: number | null;
+  readonly heightM: number;
+  readonly turnRad: number;
+  readonly seconds: number;
+}
+
+/** What an avatar does: the answer to `World.inspect`. */
+export interface AvatarState {
+  readonly avatar: number;
+  readonly tick: number;
+  /** On the server's clock. */
+  readonly timeS: number;
+  readonly basePositionM: Vec3;
+  readonly baseHeadingRad: number;
+  /** Null: just standing. */
+  readonly movement: CurrentMovement | null;
+  /** How many requests wait ... */
+  readonly queueSize: number;
+  /** ... and the first 16 of them. */
+  readonly queue: readonly QueuedRequest[];
+}
+
+/** A requested stand has no group, keytimes or weights. */
+export interface CurrentMovement {
+  /** 0n: the avatar's own doing. */
+  readonly requestId: bigint;
+  readonly kind: MovementKind;
+  readonly group: number;
+  /** On the server's clock. */
+  readonly startTimeS: number;
+  /** `startTimeS` and the last keytime. */
+  readonly endTimeS: number;
+  /** From the movement's start: 0, and growing. */
+  readonly keytimesS: Float64Array;
+  /** 0 to the number of keytimes less 1. */
+  readonly genericTime: number;
+  readonly easeS: number;
+  readonly requested: Parameters;
+  readonly applied: Parameters;
+  readonly extrapolated: boolean;
+  readonly clamped: boolean;
+  /** One an example of the group; they sum to 1. */
+  readonly weights: Float32Array;
+  readonly parameterNames: readonly ParameterName[];
+  /** Parameters of the examples: a row of `parameterNames.length` for each weight, or empty. */
+  readonly sites: Float32Array;
+}
+
 export interface Observation {
   mode: PoseMode;
   /** Absent or empty: all. Poses of others are not kept. */
@@ -227,6 +283,9 @@ export interface World {
   /** Queues movements; an avatar may stand in the list several times. */
   request(items: readonly MovementRequest[]): Promise<Reply>;
   observe(observation: Observation): Subscription;
+  /** What an avatar does right now, about a tick later. Rejected with a StridewireError when there is
+   * no such avatar, no connection, or a server that does not tell. */
+  inspect(avatar: number): Promise<AvatarState>;
   leave(): Promise<Reply>;
 
   on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void;

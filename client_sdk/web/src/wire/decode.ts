@@ -2,17 +2,17 @@ import {ByteBuffer, Encoding} from 'flatbuffers';
 import {tableNumbers} from '../../generated/layout';
 import * as wire from '../../generated/wire';
 import type {
-  EndSite, FootChoice, Leg, MovementKind, MovementType, ParameterName, Parameters, PoseMode, Role,
-  Vec3, WorldEvent, WorldEventType
+  CurrentMovement, EndSite, FootChoice, Leg, MovementKind, MovementType, ParameterName, Parameters,
+  PoseMode, QueuedRequest, Role, Vec3, WorldEvent, WorldEventType
 } from '../types';
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
-  maxFewTables, maxItems, maxJoints, maxNameBytes, maxParameters, maxReasonBytes,
-  maxResumeTokenBytes, maxTextBytes, minResumeTokenBytes
+  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxNameBytes, maxParameters,
+  maxReasonBytes, maxResumeTokenBytes, maxTextBytes, maxWeights, minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
-import type {Joint, Message, RequestEntry, ReplyEntry, SpawnEntry} from './messages';
+import type {Joint, Message, ReplyEntry, SpawnEntry} from './messages';
 import {poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
@@ -181,26 +181,12 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
 
   Request(bytes) {
     const m = wire.Request.getRootAsRequest(bytes);
-    const items: RequestEntry[] = [];
+    const items: QueuedRequest[] = [];
     const length = count(m.itemsLength(), 1, maxItems, 'Request.items');
     const item = new wire.RequestItem();
     for (let i = 0; i < length; ++i) {
       m.items(i, item);
-      const type = known(movementTypes, item.type(), 'Request.type', i);
-      const step = type === 'step';
-      const moves = type !== 'stand';
-      // Fields that a type does not have are ignored, whatever they hold.
-      items.push({
-        avatar: id(item.avatar(), 'Request.avatar', i),
-        requestId: id(item.requestId(), 'Request.requestId', i),
-        type,
-        foot: step ? known(footChoices, item.foot(), 'Request.foot', i) : 'auto',
-        lengthM: moves ? finite(item.lengthM(), 'Request.lengthM', i) : 0,
-        sideM: step ? finiteOrNull(item.sideM(), 'Request.sideM', i) : null,
-        heightM: moves ? finite(item.heightM(), 'Request.heightM', i) : 0,
-        turnRad: moves ? finite(item.turnRad(), 'Request.turnRad', i) : 0,
-        seconds: moves ? 0 : finite(item.seconds(), 'Request.seconds', i),
-      });
+      items.push(request(item, i));
     }
     return {
       type: 'Request',
@@ -250,6 +236,16 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
   Ping(bytes) {
     const m = wire.Ping.getRootAsPing(bytes);
     return {type: 'Ping', nonce: m.nonce(), timeS: finite(m.timeS(), 'Ping.timeS')};
+  },
+
+  InspectAvatar(bytes) {
+    const m = wire.InspectAvatar.getRootAsInspectAvatar(bytes);
+    return {
+      type: 'InspectAvatar',
+      nonce: m.nonce(),
+      world: id(m.world(), 'InspectAvatar.world'),
+      avatar: id(m.avatar(), 'InspectAvatar.avatar'),
+    };
   },
 
   Goodbye(bytes) {
@@ -481,6 +477,39 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       tick: m.tick(),
     };
   },
+
+  AvatarState(bytes) {
+    const m = wire.AvatarState.getRootAsAvatarState(bytes);
+    const queueSize = m.queueSize();
+    const length = count(m.queueLength(), 0, maxInspectedRequests, 'AvatarState.queue');
+    if (length > queueSize) {
+      throw new Malformed('has more requests than the queue is long', 'AvatarState.queue');
+    }
+    const queue: QueuedRequest[] = [];
+    const item = new wire.RequestItem();
+    for (let i = 0; i < length; ++i) {
+      m.queue(i, item);
+      queue.push(request(item, i));
+    }
+    const current = m.movement();
+    return {
+      type: 'AvatarState',
+      nonce: m.nonce(),
+      world: id(m.world(), 'AvatarState.world'),
+      code: m.code(),
+      text: text(m.text(asBytes), maxReasonBytes, 'AvatarState.text'),
+      state: {
+        avatar: id(m.avatar(), 'AvatarState.avatar'),
+        tick: Number(m.tick()),
+        timeS: finite(m.serverTimeS(), 'AvatarState.serverTimeS'),
+        basePositionM: vector(m.basePositionM(), 'AvatarState.basePositionM'),
+        baseHeadingRad: finite(m.baseHeadingRad(), 'AvatarState.baseHeadingRad'),
+        movement: current === null ? null : movement(current),
+        queueSize,
+        queue,
+      },
+    };
+  },
 };
 
 /** What the generated readers give for a text asked for as bytes. */
@@ -496,6 +525,81 @@ function name(bytes: WireText, field: string, index = -1): string {
 
 function finiteOrNull(value: number | null, field: string, index: number): number | null {
   return value === null ? null : finite(value, field, index);
+}
+
+/** Fields that a type does not have are ignored, whatever they hold. */
+function request(item: wire.RequestItem, i: number): QueuedRequest {
+  const type = known(movementTypes, item.type(), 'Request.type', i);
+  const step = type === 'step';
+  const moves = type !== 'stand';
+  return {
+    avatar: id(item.avatar(), 'Request.avatar', i),
+    requestId: id(item.requestId(), 'Request.requestId', i),
+    type,
+    foot: step ? known(footChoices, item.foot(), 'Request.foot', i) : 'auto',
+    lengthM: moves ? finite(item.lengthM(), 'Request.lengthM', i) : 0,
+    sideM: step ? finiteOrNull(item.sideM(), 'Request.sideM', i) : null,
+    heightM: moves ? finite(item.heightM(), 'Request.heightM', i) : 0,
+    turnRad: moves ? finite(item.turnRad(), 'Request.turnRad', i) : 0,
+    seconds: moves ? 0 : finite(item.seconds(), 'Request.seconds', i),
+  };
+}
+
+function movement(m: wire.CurrentMovement): CurrentMovement {
+  const field = 'AvatarState.movement';
+  const group = m.group();
+  if (group < -1) throw new Malformed('is below -1', `${field}.group`);
+  const keytimesS = (m.keytimesSArray() ?? new Float64Array(0)).slice(0, maxKeytimes + 1);
+  count(keytimesS.length, 0, maxKeytimes, `${field}.keytimesS`);
+  for (let k = 0; k < keytimesS.length; ++k) {
+    const keytimeS = finite(keytimesS[k]!, `${field}.keytimesS`, k);
+    if (k === 0 ? keytimeS !== 0 : keytimeS < keytimesS[k - 1]!) {
+      throw new Malformed('does not go from 0 upwards', `${field}.keytimesS`, k);
+    }
+  }
+  const genericTime = m.genericTime();
+  if (!(genericTime >= 0 && genericTime <= Math.max(0, keytimesS.length - 1))) {
+    throw new Malformed('is not between 0 and the last keytime', `${field}.genericTime`);
+  }
+  const names: ParameterName[] = [];
+  const length = count(m.parameterNamesLength(), 0, maxParameters, `${field}.parameterNames`);
+  for (let p = 0; p < length; ++p) {
+    const name = known(parameterNames, m.parameterNames(p)!, `${field}.parameterNames`, p);
+    if (names.includes(name)) throw new Malformed('stands twice', `${field}.parameterNames`, p);
+    names.push(name);
+  }
+  const weights = numbers(m.weightsArray(), maxWeights, `${field}.weights`);
+  const sites = numbers(m.sitesArray(), maxWeights * maxParameters, `${field}.sites`);
+  if (sites.length !== 0 && sites.length !== weights.length * names.length) {
+    throw new Malformed('is not one row a weight', `${field}.sites`);
+  }
+  const startTimeS = finite(m.startedS(), `${field}.startedS`);
+  return {
+    requestId: m.requestId(),
+    kind: known(movementKinds, m.kind(), `${field}.kind`),
+    group,
+    startTimeS,
+    endTimeS: finite(startTimeS + (keytimesS[keytimesS.length - 1] ?? 0), `${field}.keytimesS`),
+    keytimesS,
+    genericTime,
+    easeS: notNegative(m.easeOutS(), `${field}.easeOutS`),
+    requested: parameters(m.requestedLength(), (p, into) => m.requested(p, into),
+                          `${field}.requested`, -1),
+    applied: parameters(m.appliedLength(), (p, into) => m.applied(p, into), `${field}.applied`, -1),
+    extrapolated: m.extrapolated(),
+    clamped: m.clamped(),
+    weights,
+    parameterNames: names,
+    sites,
+  };
+}
+
+/** A copy, for the frame it came in is not kept. */
+function numbers(list: Float32Array | null, max: number, field: string): Float32Array {
+  if (list === null) return new Float32Array(0);
+  count(list.length, 0, max, field);
+  for (let i = 0; i < list.length; ++i) finite(list[i]!, field, i);
+  return list.slice();
 }
 
 function leg(from: wire.Leg | null, jointCount: number): Leg {

@@ -86,6 +86,8 @@ function build(b: Builder, m: ClientMessage): number {
     case 'StopObserving':
       return wire.StopObserving.createStopObserving(b, m.seq, m.subscription);
     case 'Ping': return wire.Ping.createPing(b, m.nonce, m.timeS);
+    case 'InspectAvatar':
+      return wire.InspectAvatar.createInspectAvatar(b, m.nonce, m.world, m.avatar);
     case 'Goodbye': return wire.Goodbye.createGoodbye(b, m.code, b.createString(m.text));
   }
 }

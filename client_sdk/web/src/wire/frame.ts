@@ -13,6 +13,7 @@ export const MessageType = {
   Observe: 8,
   StopObserving: 9,
   Ping: 10,
+  InspectAvatar: 11,
   Goodbye: 32,
   Welcome: 64,
   WorldInfo: 65,
@@ -22,6 +23,7 @@ export const MessageType = {
   Lagging: 69,
   Error: 70,
   Pong: 71,
+  AvatarState: 72,
 } as const;
 export type MessageName = keyof typeof MessageType;
 export type Sender = 'client' | 'server';

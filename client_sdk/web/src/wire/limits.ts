@@ -5,6 +5,7 @@ export const protocolVersion = 1;
 export const featureResume = 1n;
 export const featureEventReplay = 2n;
 export const featureQuantised = 4n;
+export const featureInspect = 16n;
 
 export const maxHelloBytes = 16 << 10;
 export const maxControlBytes = 1 << 20;
@@ -19,6 +20,9 @@ export const maxResumeTokenBytes = 64;
 export const maxJoints = 256;
 export const maxEndSites = 256;
 export const maxParameters = 7;
+export const maxKeytimes = 9;
+export const maxWeights = 4096;
+export const maxInspectedRequests = 16;
 export const maxEveryNTicks = 3600;
 export const maxBatchParts = 1024;
 export const maxReplyMemory = 1024;

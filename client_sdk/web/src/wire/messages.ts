@@ -1,6 +1,6 @@
 /** Messages as plain objects, checked. 64-bit numbers are bigint where all their bits matter. */
 import type {
-  EndSite, FootChoice, Leg, MovementType, PoseMode, Role, Vec3, WorldEvent
+  AvatarState, EndSite, Leg, PoseMode, QueuedRequest, Role, Vec3, WorldEvent
 } from '../types';
 
 export interface Hello {
@@ -41,22 +41,11 @@ export interface Remove {
   world: number;
   avatars: Uint32Array;
 }
-export interface RequestEntry {
-  avatar: number;
-  requestId: bigint;
-  type: MovementType;
-  foot: FootChoice;
-  lengthM: number;
-  sideM: number | null;
-  heightM: number;
-  turnRad: number;
-  seconds: number;
-}
 export interface Request {
   type: 'Request';
   seq: bigint;
   world: number;
-  items: RequestEntry[];
+  items: QueuedRequest[];
 }
 export interface CancelQueue {
   type: 'CancelQueue';
@@ -83,6 +72,12 @@ export interface Ping {
   type: 'Ping';
   nonce: bigint;
   timeS: number;
+}
+export interface InspectAvatar {
+  type: 'InspectAvatar';
+  nonce: bigint;
+  world: number;
+  avatar: number;
 }
 export interface Goodbye {
   type: 'Goodbye';
@@ -188,9 +183,19 @@ export interface Pong {
   tick: bigint;
 }
 
+export interface AvatarStateMessage {
+  type: 'AvatarState';
+  nonce: bigint;
+  world: number;
+  code: number;
+  text: string;
+  state: AvatarState;
+}
+
 export type CommandMessage =
     JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving;
-export type ClientMessage = Hello | CommandMessage | Ping | Goodbye;
+export type ClientMessage = Hello | CommandMessage | Ping | InspectAvatar | Goodbye;
 export type ServerMessage =
-    Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong | Goodbye;
+    Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong |
+    AvatarStateMessage | Goodbye;
 export type Message = ClientMessage | ServerMessage;

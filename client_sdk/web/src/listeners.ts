@@ -1,0 +1,29 @@
+/** Who listens to what. What a listener throws is its own affair: it is reported as uncaught, and
+ * neither other listeners nor the caller see it. */
+export class Listeners<L extends {[K in keyof L]: (...args: never[]) => void}> {
+  private readonly lists = new Map<keyof L, Set<L[keyof L]>>();
+
+  /** Returns what ends it. */
+  on<K extends keyof L>(name: K, listener: L[K]): () => void {
+    let list = this.lists.get(name);
+    if (list === undefined) this.lists.set(name, list = new Set());
+    list.add(listener);
+    return () => void list.delete(listener);
+  }
+
+  has(name: keyof L): boolean {
+    return (this.lists.get(name)?.size ?? 0) > 0;
+  }
+
+  emit<K extends keyof L>(name: K, ...args: Parameters<L[K]>): void {
+    for (const listener of this.lists.get(name) ?? []) {
+      try {
+        listener(...args);
+      } catch (error) {
+        queueMicrotask(() => {
+          throw error;
+        });
+      }
+    }
+  }
+}

@@ -1,0 +1,158 @@
+import {Listeners} from './listeners';
+import type {WorldRecording} from './recording';
+import type {Command, Session} from './session';
+import type {
+  AvatarState, CrowdPose, MovementRequest, Observation, Pose, PoseKind, Recording, Reply, Role,
+  Skeleton, SpawnItem, Subscription, World, WorldListeners, WorldState
+} from './types';
+import * as check from './wire/check';
+import type {Observe, SpawnEntry, WorldInfo} from './wire/messages';
+import type {WorldView} from './world_view';
+
+/** A subscription as it is wanted. */
+export interface Wanted {
+  readonly message: Observe;
+  /** Its command waits to be sent. */
+  unsent: boolean;
+}
+
+/** A world as its callers see it, and what its session knows of it. */
+export class WorldHandle implements World {
+  state: WorldState = 'wanted';
+  skeleton: Skeleton | null = null;
+  libraryHash = '';
+  readonly joined: Promise<Reply>;
+
+  // The session's part.
+  readonly listeners = new Listeners<WorldListeners>();
+  /** The server's number of it; 0: not known. */
+  serverId = 0;
+  answerJoin: ((reply: Reply) => void) | null = null;
+  unsent: Command[] = [];
+  readonly subscriptions = new Map<number, Wanted>();
+  /** Ours, and where they are. */
+  readonly spawned = new Map<number, SpawnEntry>();
+  toldDroppedBatches = 0;
+  toldDroppedEvents = 0;
+  /** Of the view, whose avatars listeners know. */
+  toldVersion = 0;
+
+  constructor(private readonly session: Session, readonly name: string, readonly role: Role,
+              readonly view: WorldView, readonly record: WorldRecording) {
+    this.joined = new Promise((resolve) => this.answerJoin = resolve);
+  }
+
+  get recording(): Recording {
+    return this.record;
+  }
+
+  spawn(items: readonly SpawnItem[]): Promise<Reply> {
+    return this.session.command(this, () => check.spawn(items));
+  }
+
+  remove(avatars: readonly number[]): Promise<Reply> {
+    return this.session.command(this, () => check.remove(avatars));
+  }
+
+  cancel(avatars: readonly number[]): Promise<Reply> {
+    return this.session.command(this, () => check.cancelQueue(avatars));
+  }
+
+  request(items: readonly MovementRequest[]): Promise<Reply> {
+    return this.session.command(this, () => check.request(items, () => this.session.nextRequest()));
+  }
+
+  observe(observation: Observation): Subscription {
+    return this.session.observe(this, observation);
+  }
+
+  inspect(avatar: number): Promise<AvatarState> {
+    return this.session.inspect(this, avatar);
+  }
+
+  leave(): Promise<Reply> {
+    return this.session.leave(this);
+  }
+
+  on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void {
+    return this.listeners.on(name, listener);
+  }
+
+  avatars(): Uint32Array {
+    return this.view.avatars();
+  }
+
+  sample(avatar: number, timeS: number, out: Pose): PoseKind {
+    this.session.noteSampled(this, timeS);
+    return this.view.sample(avatar, timeS, out);
+  }
+
+  sampleAll(timeS: number, out: CrowdPose): number {
+    this.session.noteSampled(this, timeS);
+    return this.view.sampleAll(timeS, out);
+  }
+
+  /** What the server says of it. Another figure than before clears the poses. */
+  describe(info: WorldInfo): void {
+    const skeleton = toSkeleton(info);
+    if (this.skeleton === null || !sameFigure(this.skeleton, skeleton)) {
+      this.view.reset(skeleton.jointCount);
+      this.record.clear();
+      this.skeleton = skeleton;
+    }
+    this.libraryHash = info.libraryHash;
+  }
+
+  /** Nothing of it is known any more. */
+  forget(): void {
+    this.serverId = 0;
+    this.toldDroppedBatches = 0;
+    this.toldDroppedEvents = 0;
+    this.view.reset(0);
+    this.view.breakOff();
+    this.record.clear();
+    this.skeleton = null;
+    this.libraryHash = '';
+  }
+
+  /** Poses of whom are kept follows from what is observed. */
+  updateFilter(): void {
+    const wanted = new Set<number>();
+    for (const {message} of this.subscriptions.values()) {
+      if (message.avatars.length === 0) return this.view.setFilter(null);
+      for (const avatar of message.avatars) wanted.add(avatar);
+    }
+    this.view.setFilter(wanted.size === 0 ? null : wanted);
+  }
+
+  /** The rate asked for; 0: none of this mode. */
+  everyNTicks(mode: string): number {
+    let every = 0;
+    for (const {message} of this.subscriptions.values()) {
+      if (message.mode !== mode) continue;
+      every = every === 0 ? message.everyNTicks : Math.min(every, message.everyNTicks);
+    }
+    return every;
+  }
+}
+
+function toSkeleton(info: WorldInfo): Skeleton {
+  const jointCount = info.joints.length;
+  const offsetsM = new Float32Array(3 * jointCount);
+  info.joints.forEach((joint, j) => offsetsM.set(joint.offsetM, 3 * j));
+  return {
+    jointCount,
+    names: info.joints.map((joint) => joint.name),
+    parents: Int16Array.from(info.joints, (joint) => joint.parent),
+    offsetsM,
+    endSites: info.endSites,
+    leftLeg: info.leftLeg,
+    rightLeg: info.rightLeg,
+  };
+}
+
+function sameFigure(a: Skeleton, b: Skeleton): boolean {
+  const plain = (s: Skeleton): string =>
+      JSON.stringify([s.names, [...s.parents], [...s.offsetsM], s.endSites, s.leftLeg, s.rightLeg]);
+  return plain(a) === plain(b);
+}
