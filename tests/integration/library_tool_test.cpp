@@ -487,7 +487,7 @@ TEST_F(LibraryTool, InspectsAsOneJsonObject) {
       EXPECT_THAT(report["skeleton"]["names"].get<std::vector<std::string>>(),
                   Contains(report["skeleton"][foot].get<std::string>()));
     }
-    ASSERT_EQ(report["groups"].size(), 3u);
+    ASSERT_EQ(report["groups"].size(), 11u);
     for (const json& group : report["groups"]) {
       for (const char* key : {"kind", "examples", "pseudoexamples", "parameters", "duration_s",
                               "error_m", "corrected_error_m"}) {

@@ -19,6 +19,12 @@ constexpr double kFootPreferenceM = 0.01;
 // A step asked for without turn, side or height stays in a straight group unless that misses it by
 // this much more: parameters nobody asked for would bend the walk.
 constexpr double kPlainPreferenceM = 0.15;
+// Inside the hull beats its edge grown by 10 %: a metre outside counts for this much more.
+constexpr double kOutsideWeight = 0.25;
+// A group without a parameter for where feet stand aside or in height takes them to be about as the
+// stand pose has them (people stand wider than they walk); beyond this, they are missed.
+constexpr double kStartSlackM = 0.12;
+constexpr double kLevelSlackM = 0.05;  // balls roll up and down on level ground
 // Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
 constexpr double kStraightMetresPerRadian = 2.0;
 // Landing higher or lower than asked puts a foot into the air or the ground: worse than falling short.
@@ -30,10 +36,21 @@ struct Wish {
   double value = 0.0;
   bool given = false;
   double weight = 1.0;
+  bool natural = false;  // not given, but as the stand pose has it
 };
 using Wishes = std::array<Wish, kParameterNameCount>;
 
 Wish& At(Wishes& wishes, ParameterName name) { return wishes[static_cast<std::size_t>(name)]; }
+
+// Whether a group is for more than steps straight ahead.
+bool IsGeneral(const MotionGroup& group) {
+  for (const ParameterName name :
+       {ParameterName::kTurn, ParameterName::kStartX, ParameterName::kEndX, ParameterName::kStartY,
+        ParameterName::kEndY, ParameterName::kHeight}) {
+    if (group.FindParameter(name) >= 0) return true;
+  }
+  return false;
+}
 
 RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wishes& wishes,
                         double natural_side_m) {
@@ -50,14 +67,19 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
     is_spanned[name] = true;
     metric[l] = wish.given ? wish.weight : kFreeWeight;
     plan.requested.values[l] = wish.given ? wish.value : group.parameters[l].centre;
+    if (wish.natural) {
+      plan.requested.values[l] =
+          std::clamp(natural_side_m, group.parameters[l].min, group.parameters[l].max);
+    }
   }
 
   const std::span<const double> examples =
       group.sites.first(static_cast<std::size_t>(group.example_count) * d);
   const std::span<const double> target = std::span(plan.requested.values).first(d);
   std::array<double, kMaxParameters> inside{};
-  plan.extrapolated = ProjectOntoHull(examples, std::span(metric).first(d), 0.0, target,
-                                      std::span(inside).first(d)) > kChangeM;
+  const double outside_m = ProjectOntoHull(examples, std::span(metric).first(d), 0.0, target,
+                                           std::span(inside).first(d));
+  plan.extrapolated = outside_m > kChangeM;
   plan.distance_m = ProjectOntoHull(examples, std::span(metric).first(d), kHullGrowth, target,
                                     std::span(plan.applied.values).first(d));
   for (std::size_t l = 0; l < d; ++l) {
@@ -78,6 +100,16 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
     if (missed > kChangeM) plan.clamped = true;
     plan.distance_m += missed;
   }
+  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m;
+  for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kStartX ? natural_side_m : 0.0;
+    plan.cost_m +=
+        wishes[i].weight *
+        std::max(0.0, std::fabs(wishes[i].value - natural) -
+                          (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
+  }
   return plan;
 }
 
@@ -89,8 +121,8 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
     const RequestPlan plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m);
-    double cost = plan.distance_m + kPerParameterM * group.parameter_count();
-    if (is_plain && group.FindParameter(ParameterName::kTurn) >= 0) cost += kPlainPreferenceM;
+    double cost = plan.cost_m + kPerParameterM * group.parameter_count();
+    if (is_plain && IsGeneral(group)) cost += kPlainPreferenceM;
     if (cost < best_cost) {
       best_cost = cost;
       best = plan;
@@ -107,12 +139,14 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
   const auto plan_foot = [&](Foot foot) {
     const DVec3 start = feet.Vector(foot);
     const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+    const bool is_wide = std::fabs(start.x - stand.Vector(foot).x) > kStartSlackM;
     Wishes wishes;
     At(wishes, ParameterName::kStartX) = {start.x, true, kStartWeight};
     At(wishes, ParameterName::kStartY) = {start.y, true, kStartWeight};
     At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
     At(wishes, ParameterName::kEndX) = {outward * request.side_m.value_or(0.0),
-                                        request.side_m.has_value(), 1.0};
+                                        request.side_m.has_value(), 1.0,
+                                        !request.side_m && is_wide};
     At(wishes, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
     At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
     At(wishes, ParameterName::kTurn) = {
@@ -127,7 +161,7 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
   if (expected && !standing) return expected;
   const std::optional<RequestPlan> other = plan_foot(last_moved);
   if (!expected) return other;
-  if (!other || other->distance_m > expected->distance_m - kFootPreferenceM) return expected;
+  if (!other || other->cost_m > expected->cost_m - kFootPreferenceM) return expected;
   return other;
 }
 

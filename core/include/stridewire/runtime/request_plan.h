@@ -26,6 +26,7 @@ struct RequestPlan {
   bool extrapolated = false;  ///< `applied` lies outside the hull itself
   bool clamped = false;       ///< `applied` differs from `requested` (by more than 1e-6)
   double distance_m = 0.0;    ///< How far the group is from what was asked; radians count 0.5 m
+  double cost_m = 0.0;  ///< The same and how far outside the examples, and from the feet as are
 };
 
 /// Requests may reach this far beyond the examples (method: extrapolating 0.2 m costs 80 mm).

@@ -13,8 +13,21 @@ constexpr double kLiftStepM = 0.004;
 constexpr double kLeastLiftM = -0.08;
 constexpr double kMostLiftM = 0.30;
 
-DVec3 Forward(Foot foot) {
-  const double yaw = SideSign(foot) * kToeOutRad;
+// Landing on a lower step: toes first.
+constexpr double kToesFirstDropM = 0.1;
+constexpr double kToesFirstRad = -18.0 * kDegree;
+// A tread begins this far behind the ball of the foot that lands on it from below, and ends this far
+// ahead of the ball of a foot that leaves it downward.
+constexpr double kEdgeBehindBallM = 0.15;
+constexpr double kEdgeAheadOfBallM = 0.01;
+constexpr double kEdgeClearanceM = 0.02;
+
+constexpr double kFootWidthM = 0.085;  // feet that pass each other stay this far apart
+constexpr double kBowStepM = 0.005;
+constexpr double kMostBowM = 0.40;
+
+DVec3 Forward(Foot foot, double yaw_rad = 0.0) {
+  const double yaw = yaw_rad + SideSign(foot) * kToeOutRad;
   return {Sin(yaw), 0.0, Cos(yaw)};
 }
 
@@ -37,10 +50,14 @@ Curve MakeFixedPitch(const StepTiming& timing) {
                 {timing.end_s, end.rear_pitch_rad(), end.rear_pitch_rate()}});
 }
 
+double StrikePitch(const StepTiming& timing) {
+  return timing.shape.end_m.y < -kToesFirstDropM ? kToesFirstRad : timing.end.strike_pitch_rad;
+}
+
 Curve MakeMovingPitch(const StepTiming& timing) {
   const GaitState& start = timing.start;
   const double b = ToeOffPitch(timing);
-  const double a = timing.end.strike_pitch_rad;
+  const double a = StrikePitch(timing);
   const double swing = timing.swing_s();
   std::vector<Curve::Knot> knots;
   if (start.standing()) {
@@ -68,29 +85,38 @@ Curve MakeToeRock(const StepTiming& timing) {
 // Angle of the toe joint in swing: what it has at toe-off fades to straight.
 Curve MakeToeBend(const StepTiming& timing) {
   const double bend = ToeOffPitch(timing) - timing.start.toe_rock_rad;
-  return Curve(
-      {{timing.toe_off_s, bend, 0.0}, {timing.toe_off_s + 0.45 * timing.swing_s(), 0.0, 0.0}});
+  const double straight_s = timing.toe_off_s + 0.45 * timing.swing_s();
+  const double strike = StrikePitch(timing);
+  if (strike >= 0.0) return Curve({{timing.toe_off_s, bend, 0.0}, {straight_s, 0.0, 0.0}});
+  // Toes that land first lie flat then.
+  return Curve({{timing.toe_off_s, bend, 0.0},
+                {straight_s, 0.0, 0.0},
+                {timing.toe_off_s + 0.7 * timing.swing_s(), 0.0, 0.0},
+                {timing.heel_strike_s, -0.97 * strike, 0.0}});
 }
 
 }  // namespace
 
-DQuat FootRotation(Foot foot, double pitch_rad) {
-  return RotateY(SideSign(foot) * kToeOutRad) * RotateX(-pitch_rad);
+DQuat FootRotation(Foot foot, double pitch_rad, double yaw_rad) {
+  return RotateY(yaw_rad + SideSign(foot) * kToeOutRad) * RotateX(-pitch_rad);
 }
 
-FootPlace FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad, double toe_rock_rad) {
+FootPlace FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad, double toe_rock_rad,
+                       double yaw_rad) {
   FootPlace place;
   place.pitch_rad = pitch_rad;
-  const DQuat rotation = FootRotation(foot, pitch_rad);
+  place.yaw_rad = yaw_rad;
+  const DQuat rotation = FootRotation(foot, pitch_rad, yaw_rad);
   if (pitch_rad > 0.0) {
-    const DVec3 heel = flat_ball_m - (kHeelBehindAnkleM + kBallAheadOfAnkleM) * Forward(foot);
+    const DVec3 heel =
+        flat_ball_m - (kHeelBehindAnkleM + kBallAheadOfAnkleM) * Forward(foot, yaw_rad);
     place.toe_pitch_rad = pitch_rad;
     place.ankle_m = heel + rotation * DVec3(0.0, kAnkleHeightM, kHeelBehindAnkleM);
     return place;
   }
   place.toe_pitch_rad = -toe_rock_rad;
-  const DVec3 tip = flat_ball_m + kToeM * Forward(foot);
-  const DVec3 ball = tip - FootRotation(foot, -toe_rock_rad) * DVec3(0.0, 0.0, kToeM);
+  const DVec3 tip = flat_ball_m + kToeM * Forward(foot, yaw_rad);
+  const DVec3 ball = tip - FootRotation(foot, -toe_rock_rad, yaw_rad) * DVec3(0.0, 0.0, kToeM);
   place.ankle_m = ball + rotation * DVec3(0.0, kAnkleHeightM, -kBallAheadOfAnkleM);
   return place;
 }
@@ -108,19 +134,22 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
       toe_bend_(MakeToeBend(timing)) {
   fixed_ball_m_ = DVec3(StandingBall(OtherFoot(moving)).x, 0.0, 0.0);
   // Lengths are measured at the balls as they are in the states, the front one raised.
-  const double x = StandingBall(moving).x;
-  start_ball_m_ = DVec3(x, 0.0, -timing.start.length_m - timing.start.front_ball_back_m());
-  end_ball_m_ = DVec3(x, 0.0, timing.end.length_m + timing.end.front_ball_back_m());
+  const StepShape& shape = timing.shape;
+  start_ball_m_ = fixed_ball_m_ + shape.start_m - DVec3(0.0, 0.0, timing.start.front_ball_back_m());
+  end_ball_m_ = fixed_ball_m_ + RotateY(shape.turn_rad) *
+                                    (shape.end_m + DVec3(0.0, 0.0, timing.end.front_ball_back_m()));
 
   const double h = 1e-5;
   const FootPlace toe_off = MovingBeforeToeOff(timing.toe_off_s);
   toe_off_m_ = toe_off.ankle_m;
   toe_off_velocity_ = (toe_off_m_ - MovingBeforeToeOff(timing.toe_off_s - h).ankle_m) / h;
   const auto striking = [&](double time_s) {
-    return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0).ankle_m;
+    return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0, shape.turn_rad)
+        .ankle_m;
   };
   strike_m_ = striking(timing.heel_strike_s);
   strike_velocity_ = (striking(timing.heel_strike_s + h) - strike_m_) / h;
+  if (shape.turn_rad != 0.0) BowSwingAroundFixedFoot();
   RaiseSwingUntilClear();
 }
 
@@ -135,34 +164,93 @@ FootPlace FootPaths::MovingBeforeToeOff(double time_s) const {
 FootPlace FootPaths::MovingInSwing(double time_s) const {
   const double swing = timing_.swing_s();
   const double u = (time_s - timing_.toe_off_s) / swing;
-  const double u2 = u * u, u3 = u2 * u;
+  const double y0 = start_ball_m_.y, y1 = end_ball_m_.y, climb = y1 - y0;
+  // Downward the foot first goes out over the edge; upward it first rises.
+  const double w = climb < 0.0   ? u + 0.6 * u * u * (1.0 - u)
+                   : climb > 0.0 ? u - 0.6 * u * (1.0 - u) * (1.0 - u)
+                                 : u;
+  const double climbed = climb < 0.0 ? Ease((u - 0.45) / 0.55) : Ease(u / 0.6);
+  const double u2 = w * w, u3 = u2 * w;
   FootPlace place;
   place.pitch_rad = moving_pitch_.At(time_s);
+  place.yaw_rad = timing_.shape.turn_rad * Ease((u - 0.1) / 0.8);
   place.toe_pitch_rad = place.pitch_rad + toe_bend_.At(time_s);
-  place.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * toe_off_m_ +
-                  (u3 - 2.0 * u2 + u) * swing * toe_off_velocity_ +
-                  (3.0 * u2 - 2.0 * u3) * strike_m_ + (u3 - u2) * swing * strike_velocity_;
-  place.ankle_m.y += lift_m_ * 16.0 * u2 * (1.0 - u) * (1.0 - u);
+  const DVec3 from = toe_off_m_ - DVec3(0.0, y0, 0.0), to = strike_m_ - DVec3(0.0, y1, 0.0);
+  place.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * from +
+                  (u3 - 2.0 * u2 + w) * swing * toe_off_velocity_ + (3.0 * u2 - 2.0 * u3) * to +
+                  (u3 - u2) * swing * strike_velocity_;
+  const double middle = 16.0 * u * u * (1.0 - u) * (1.0 - u);
+  place.ankle_m.y += y0 + climb * climbed + lift_m_ * middle;
+  place.ankle_m += bow_m_ * middle * SideSign(moving_) *
+                   (RotateY(0.5 * timing_.shape.turn_rad) * DVec3(1, 0, 0));
   return place;
 }
 
 FootPlace FootPaths::Moving(double time_s) const {
   if (time_s <= timing_.toe_off_s) return MovingBeforeToeOff(time_s);
   if (time_s < timing_.heel_strike_s) return MovingInSwing(time_s);
-  return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0);
+  return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0, timing_.shape.turn_rad);
+}
+
+// Height of the ground along the way: where the moving foot comes from, the fixed foot's tread, where
+// it goes to.
+double FootPaths::GroundAt(double z_m) const {
+  const auto edge = [](const DVec3& behind, const DVec3& ahead) {
+    return behind.y < ahead.y ? ahead.z - kEdgeBehindBallM : behind.z + kEdgeAheadOfBallM;
+  };
+  if (end_ball_m_.y != 0.0 && z_m > edge(fixed_ball_m_, end_ball_m_)) return end_ball_m_.y;
+  if (start_ball_m_.y != 0.0 && z_m < edge(start_ball_m_, fixed_ball_m_)) return start_ball_m_.y;
+  return 0.0;
+}
+
+// How near the swinging foot comes to the fixed one, seen from above, heel to toe tip each.
+double FootPaths::NearestApproach() const {
+  const Foot fixed = OtherFoot(moving_);
+  const auto points = [](Foot foot, const FootPlace& place, DVec3(&out)[5]) {
+    const DVec3 ahead = Forward(foot, place.yaw_rad);
+    for (int k = 0; k < 5; ++k) {
+      out[k] = place.ankle_m + (-kHeelBehindAnkleM + 0.065 * k) * ahead;
+      out[k].y = 0.0;
+    }
+  };
+  DVec3 still[5], swinging[5];
+  points(fixed, FootOnGround(fixed, fixed_ball_m_, 0.0, 0.0), still);
+  double nearest = kMostBowM;
+  for (int i = 1; i < 20; ++i) {
+    points(moving_, MovingInSwing(timing_.toe_off_s + 0.05 * i * timing_.swing_s()), swinging);
+    for (const DVec3& a : still) {
+      for (const DVec3& b : swinging) nearest = std::min(nearest, glm::length(a - b));
+    }
+  }
+  return nearest;
+}
+
+void FootPaths::BowSwingAroundFixedFoot() {
+  double best_m = 0.0, widest_m = 0.0;
+  for (bow_m_ = 0.0; bow_m_ < kMostBowM; bow_m_ += kBowStepM) {
+    const double nearest_m = NearestApproach();
+    if (nearest_m <= widest_m + 1e-3) continue;  // where the foot lands may be what is near
+    widest_m = nearest_m;
+    best_m = bow_m_;
+    if (widest_m >= kFootWidthM) break;
+  }
+  bow_m_ = best_m;
 }
 
 void FootPaths::RaiseSwingUntilClear() {
+  const bool level = start_ball_m_.y == 0.0 && end_ball_m_.y == 0.0;
+  const double clearance = level ? kClearanceM : kEdgeClearanceM;
   const auto clear = [&] {
     for (int i = 5; i <= 85; ++i) {
       const FootPlace place = MovingInSwing(timing_.toe_off_s + 0.01 * i * timing_.swing_s());
-      const DQuat foot = FootRotation(moving_, place.pitch_rad);
-      const DQuat toes = FootRotation(moving_, place.toe_pitch_rad);
-      const double heel = (place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, -kHeelBehindAnkleM)).y;
+      const DQuat foot = FootRotation(moving_, place.pitch_rad, place.yaw_rad);
+      const DQuat toes = FootRotation(moving_, place.toe_pitch_rad, place.yaw_rad);
+      const DVec3 heel = place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, -kHeelBehindAnkleM);
       const DVec3 ball = place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, kBallAheadOfAnkleM);
-      const double tip = (ball + toes * DVec3(0.0, 0.0, kToeM)).y;
-      if (i >= 30 && (heel < kClearanceM || ball.y < kClearanceM)) return false;
-      if (tip < (i >= 50 ? kClearanceM : i >= 30 ? 0.012 : 0.0)) return false;
+      const DVec3 tip = ball + toes * DVec3(0.0, 0.0, kToeM);
+      const auto above = [&](const DVec3& point) { return point.y - GroundAt(point.z); };
+      if (i >= 30 && (above(heel) < clearance || above(ball) < clearance)) return false;
+      if (above(tip) < (i >= 50 ? clearance : i >= 30 ? 0.012 : 0.0)) return false;
     }
     return true;
   };

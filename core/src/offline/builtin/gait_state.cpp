@@ -9,6 +9,12 @@
 #include "stridewire/base/trig.h"
 
 namespace stridewire::builtin {
+namespace {
+
+// On stairs heels rise further, so that the ankle below a bent knee need not.
+constexpr double kRiseHeel_deg_m = 60.0;
+
+}  // namespace
 
 double ToWholeFrames(double time_s) { return std::floor(time_s * kClipFps + 0.5) / kClipFps; }
 
@@ -31,20 +37,20 @@ double GaitState::front_ball_back_m() const {
   return foot * (1.0 - Cos(front_pitch_rad())) * Cos(kToeOutRad);
 }
 
-GaitState MakeGaitState(double length_m) {
+GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
   GaitState state;
   state.length_m = length_m;
   state.pelvis_ahead_m = 0.02;
   if (state.standing()) return state;
-  const double step_s = SteadyStepTime(length_m);
+  const double step_s = SteadyStepTime(length_m) + kRiseTime_s_m * rise_m;
   const double mean_speed = length_m / step_s;
   state.half_support_s = ToWholeFrames(0.12 * step_s);
   state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
-  state.strike_pitch_rad = 22.0 * kDegree * Tanh(length_m / 0.5);
+  state.strike_pitch_rad = flat ? 0.0 : 22.0 * kDegree * Tanh(length_m / 0.5);
   // Between 68 tanh(L / 0.5) and what keeps the poses of blended lengths nearest to their own.
   const Curve toe_off_deg({{0.0, 0.0}, {0.35, 30.0}, {0.55, 54.0}, {0.75, 61.5}, {0.9, 64.5}});
-  state.toe_off_pitch_rad = toe_off_deg.At(length_m) * kDegree;
+  state.toe_off_pitch_rad = (toe_off_deg.At(length_m) + kRiseHeel_deg_m * rise_m) * kDegree;
   state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
   // Legs reach less high when the feet are apart; knees bend a little more than they must.
   const Curve drop({{0.0, 0.0}, {0.35, 0.003}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});

@@ -40,6 +40,10 @@ struct GaitState {
   [[nodiscard]] double front_ball_back_m() const;
 };
 
-[[nodiscard]] GaitState MakeGaitState(double length_m);
+/// `rise_m`: how much higher one foot stands than the other; takes time (0.6 s a metre). `flat`: as in
+/// StepShape.
+[[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0, bool flat = false);
+
+inline constexpr double kRiseTime_s_m = 0.6;
 
 }  // namespace stridewire::builtin

@@ -20,7 +20,7 @@ double ReachAtKnee(double knee_rad) {
   return std::sqrt(kThighM * kThighM + kShankM * kShankM + 2.0 * kThighM * kShankM * Cos(knee_rad));
 }
 
-void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose) {
+void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose, double heading_rad) {
   const std::size_t hip = foot == Foot::kLeft ? kLeftUpLeg : kRightUpLeg;
   const double side = SideSign(foot);
   const DQuat pelvis = pose.rotations[kHips];
@@ -30,7 +30,8 @@ void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose) {
   const double distance =
       std::clamp(std::sqrt(glm::dot(to_hip, to_hip)), least, ReachAtKnee(1.0 * kDegree));
   const DVec3 up = to_hip / std::sqrt(glm::dot(to_hip, to_hip));
-  const DVec3 ahead(Sin(side * kToeOutRad), 0.0, Cos(side * kToeOutRad));
+  const double knee_yaw = 0.5 * (place.yaw_rad + heading_rad) + side * kToeOutRad;
+  const DVec3 ahead(Sin(knee_yaw), 0.0, Cos(knee_yaw));
   DVec3 left = glm::cross(up, ahead);
   left /= std::sqrt(glm::dot(left, left));
   const DVec3 forward = glm::cross(left, up);
@@ -44,7 +45,7 @@ void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose) {
   const DVec3 shank_up = Cos(at_ankle) * up + Sin(at_ankle) * forward;
   const DQuat thigh = FromAxes(left, thigh_up);
   const DQuat shank = FromAxes(left, shank_up);
-  const DQuat sole = FootRotation(foot, place.pitch_rad);
+  const DQuat sole = FootRotation(foot, place.pitch_rad, place.yaw_rad);
   pose.rotations[hip] = glm::conjugate(pelvis) * thigh;
   pose.rotations[hip + 1] = glm::conjugate(thigh) * shank;
   pose.rotations[hip + 2] = glm::conjugate(shank) * sole;

@@ -1,5 +1,7 @@
 #include "mirror.h"
 
+#include <algorithm>
+
 #include "figure.h"
 
 namespace stridewire::builtin {
@@ -15,10 +17,17 @@ int OtherSide(int joint) {
 
 }  // namespace
 
-RawExample Mirrored(const RawExample& example) {
+RawExample Mirrored(const RawExample& example, std::span<const ParameterName> names) {
   RawExample mirrored = example;
   mirrored.mirrored = !example.mirrored;
   mirrored.heading_change_rad = -example.heading_change_rad;
+  for (std::size_t l = 0; l < names.size(); ++l) {
+    const ParameterName name = names[l];
+    if (name == ParameterName::kStartX || name == ParameterName::kEndX ||
+        name == ParameterName::kTurn) {
+      mirrored.parameters[l] = -example.parameters[l];
+    }
+  }
   for (int f = 0; f < example.clip.frame_count(); ++f) {
     const ConstPoseSpan from = example.clip.frame(f);
     PoseSpan to = mirrored.clip.frame(f);
@@ -29,6 +38,25 @@ RawExample Mirrored(const RawExample& example) {
     }
   }
   return mirrored;
+}
+
+RawExample Reversed(const RawExample& example) {
+  RawExample reversed = example;
+  const double end_s = example.keytimes_s.back();
+  const std::size_t keys = example.keytimes_s.size();
+  for (std::size_t k = 0; k < keys; ++k) {
+    reversed.keytimes_s[k] = end_s - example.keytimes_s[keys - 1 - k];
+  }
+  const int last = example.clip.frame_count() - 1;
+  const Vec3 start = example.clip.frame(last).root_position_m;
+  for (int f = 0; f <= last; ++f) {
+    const ConstPoseSpan from = example.clip.frame(last - f);
+    const PoseSpan to = reversed.clip.frame(f);
+    to.root_position_m = from.root_position_m - Vec3(start.x, 0.0f, start.z);
+    std::copy(from.rotations.begin(), from.rotations.end(), to.rotations.begin());
+  }
+  reversed.parameters = {example.parameters[1], example.parameters[0]};
+  return reversed;
 }
 
 }  // namespace stridewire::builtin

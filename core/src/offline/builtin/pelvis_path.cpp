@@ -17,23 +17,49 @@ constexpr double kYawRad = 5.0 * kDegree;
 constexpr double kRollRad = 4.0 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
 
-Curve MakeForward(const StepTiming& timing) {
-  // Flat ankles: the fixed foot's at -ball_ahead, the others a length and the raised ball's
-  // shortfall behind or ahead of it.
-  const double fixed_ankle = -kBallAheadOfAnkleM * Cos(kToeOutRad);
-  const double rear_at_start =
-      fixed_ankle - timing.start.length_m - timing.start.front_ball_back_m();
-  return Curve({{0.0, rear_at_start + timing.start.pelvis_ahead_m, timing.start.speed_mps},
-                {timing.end_s, fixed_ankle + timing.end.pelvis_ahead_m, timing.end.speed_mps}});
+// In the states pelvis and feet must be as anybody who passes through the state expects them, so only
+// the balls' places count: midway between the feet, and ahead of where the rear ankle is when flat.
+constexpr double kMiddleShare = 0.5;
+
+struct Ends {
+  DVec3 start;  // pelvis, y not used
+  DVec3 end;
+  DVec3 end_velocity;
+};
+
+Ends EndsOf(const StepTiming& timing, const FootPaths& feet) {
+  const double ankle = -kBallAheadOfAnkleM * Cos(kToeOutRad);
+  const DVec3& fixed = feet.fixed_ball_m();
+  const DVec3& from = feet.start_ball_m();
+  const DQuat turn = RotateY(timing.shape.turn_rad);
+  Ends ends;
+  ends.start =
+      DVec3(kMiddleShare * (fixed.x + from.x), 0.0, from.z + ankle + timing.start.pelvis_ahead_m);
+  ends.end = fixed + turn * DVec3(kMiddleShare * timing.shape.end_m.x, 0.0,
+                                  ankle + timing.end.pelvis_ahead_m);
+  ends.end_velocity = turn * DVec3(0.0, 0.0, timing.end.speed_mps);
+  return ends;
 }
 
-Curve MakeSide(Foot moving, const StepTiming& timing) {
+Curve MakeForward(const StepTiming& timing, const Ends& ends) {
+  return Curve({{0.0, ends.start.z, timing.start.speed_mps},
+                {timing.end_s, ends.end.z, ends.end_velocity.z}});
+}
+
+Curve MakeAcross(const StepTiming& timing, const Ends& ends) {
+  return Curve({{0.0, ends.start.x, 0.0}, {timing.end_s, ends.end.x, ends.end_velocity.x}});
+}
+
+Curve MakeSway(Foot moving, const StepTiming& timing) {
   const GaitState& start = timing.start;
   const GaitState& end = timing.end;
   const double toward_fixed = SideSign(OtherFoot(moving));
   double sway = 0.5 * (start.sway_m + end.sway_m);
   if (start.standing() || end.standing())
     sway = 0.036;  // the weight has to come over one foot without any swing
+  // A foot that goes far aside needs a body that leans the other way first.
+  const double natural = 2.0 * StandingBall(Foot::kLeft).x;
+  sway += 0.2 * std::max(0.0, std::fabs(timing.shape.end_m.x) - natural);
   const double middle_s = timing.toe_off_s + (start.standing() ? 0.3 : 0.5) * timing.swing_s();
   const auto rate = [](const GaitState& state) {
     return state.standing() ? 0.0 : state.sway_m * 0.12 * std::numbers::pi / state.half_support_s;
@@ -70,14 +96,48 @@ Curve MakeTilt(const StepTiming& timing) {
                 {timing.end_s, end, 0.0}});
 }
 
-Curve MakeHeight(const StepTiming& timing) {
+// Height of the pelvis in a state with the moving foot `moved_m` from the fixed one: that of walking
+// above the lower foot, or what the legs reach with knees bent by 12 degrees if that is less.
+double StateHeight(const GaitState& state, const DVec3& moved_m) {
+  const double low = std::min(0.0, moved_m.y);
+  const double height = low + kStandingHipHeightM - state.pelvis_drop_m;
+  const double natural = 2.0 * StandingBall(Foot::kLeft).x;
+  const bool rolls = state.standing() || state.strike_pitch_rad > 0.0;
+  if (moved_m.y == 0.0 && rolls && std::fabs(moved_m.x - natural) < 1e-9) return height;
+  const bool fixed_is_rear = moved_m.z >= 0.0;
+  const DVec3 rear_ball = fixed_is_rear ? DVec3(0.0) : moved_m;
+  const DVec3 front_ball = fixed_is_rear ? moved_m : DVec3(0.0);
+  const double side = fixed_is_rear ? -1.0 : 1.0;  // of the rear foot; the left one moves
+  const Foot rear = fixed_is_rear ? Foot::kRight : Foot::kLeft;
+  const DVec3 rear_ankle = FootOnGround(rear, rear_ball, state.rear_pitch_rad(), 0.0).ankle_m;
+  const DVec3 front_ankle =
+      FootOnGround(OtherFoot(rear), front_ball, state.front_pitch_rad(), 0.0).ankle_m;
+  const DVec3 pelvis(kMiddleShare * moved_m.x, 0.0,
+                     rear_ball.z - kBallAheadOfAnkleM * Cos(kToeOutRad) + state.pelvis_ahead_m);
+  const double reach = ReachAtKnee(12.0 * kDegree);
+  const auto ceiling = [&](const DVec3& ankle, double out) {
+    const double dx = pelvis.x + out * kHipHalfWidthM - ankle.x, dz = pelvis.z - ankle.z;
+    return ankle.y + std::sqrt(std::max(0.0, reach * reach - dx * dx - dz * dz));
+  };
+  return std::min({height, ceiling(rear_ankle, side), ceiling(front_ankle, -side)});
+}
+
+// The left foot's step; a right one has its x taken to the other side first.
+DVec3 AsLeft(Foot moving, const DVec3& d) { return {SideSign(moving) * d.x, d.y, d.z}; }
+
+Curve MakeHeight(Foot moving, const StepTiming& timing) {
   const double vigour = 0.5 * (timing.start.vigour + timing.end.vigour);
   const double top = kStandingHipHeightM - 0.003 - 0.0095 * vigour;
-  const double middle_s = 0.42 * timing.end_s;
-  std::vector<Curve::Knot> knots = {{0.0, kStandingHipHeightM - timing.start.pelvis_drop_m, 0.0}};
-  knots.push_back({middle_s, top, 0.0});
-  knots.push_back({timing.end_s, kStandingHipHeightM - timing.end.pelvis_drop_m, 0.0});
-  return Curve(knots);
+  const double start = StateHeight(timing.start, AsLeft(moving, timing.shape.start_m));
+  const double end = StateHeight(timing.end, AsLeft(moving, timing.shape.end_m));
+  const bool level = timing.shape.start_m.y == 0.0 && timing.shape.end_m.y == 0.0;
+  if (level) {
+    return Curve({{0.0, start, 0.0}, {0.42 * timing.end_s, top, 0.0}, {timing.end_s, end, 0.0}});
+  }
+  // Climbing, most of the rise comes early, as soon as the upper leg bears; descending, most of the
+  // fall comes late.
+  const double middle = top - 0.2 * std::max(0.0, top - start) - 0.25 * std::max(0.0, top - end);
+  return Curve({{0.0, start, 0.0}, {0.45 * timing.end_s, middle}, {timing.end_s, end, 0.0}});
 }
 
 }  // namespace
@@ -85,12 +145,13 @@ Curve MakeHeight(const StepTiming& timing) {
 PelvisPath::PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& feet)
     : moving_(moving),
       timing_(timing),
-      forward_(MakeForward(timing)),
-      side_(MakeSide(moving, timing)),
+      across_(MakeAcross(timing, EndsOf(timing, feet))),
+      forward_(MakeForward(timing, EndsOf(timing, feet))),
+      sway_(MakeSway(moving, timing)),
       yaw_(MakeYaw(moving, timing)),
       roll_(MakeRoll(moving, timing)),
       tilt_(MakeTilt(timing)),
-      height_(MakeHeight(timing)),
+      height_(MakeHeight(moving, timing)),
       lowered_m_(kSamples, 0.0) {
   StayWithinReach(feet);
 }
@@ -104,11 +165,19 @@ DVec3 PelvisPath::Position(double time_s) const {
   const double m0 = 0.5 * (y(i + 1) - y(i - 1)), m1 = 0.5 * (y(i + 2) - y(i));
   const double lowered = y(i) + s * (m0 + s * (3.0 * (y(i + 1) - y(i)) - 2.0 * m0 - m1 +
                                                s * (m0 + m1 - 2.0 * (y(i + 1) - y(i)))));
-  return {side_.At(time_s), height_.At(time_s) - lowered, forward_.At(time_s)};
+  return DVec3(across_.At(time_s), height_.At(time_s) - lowered, forward_.At(time_s)) +
+         RotateY(Heading(time_s)) * DVec3(sway_.At(time_s), 0.0, 0.0);
+}
+
+double PelvisPath::Heading(double time_s) const {
+  if (timing_.shape.turn_rad == 0.0) return 0.0;
+  const double s = std::clamp(time_s / timing_.end_s, 0.0, 1.0);
+  return timing_.shape.turn_rad * s * s * s * (10.0 + s * (6.0 * s - 15.0));
 }
 
 DQuat PelvisPath::Rotation(double time_s) const {
-  return RotateY(yaw_.At(time_s)) * RotateZ(roll_.At(time_s)) * RotateX(tilt_.At(time_s));
+  return RotateY(Heading(time_s) + yaw_.At(time_s)) * RotateZ(roll_.At(time_s)) *
+         RotateX(tilt_.At(time_s));
 }
 
 void PelvisPath::StayWithinReach(const FootPaths& feet) {
@@ -146,8 +215,10 @@ void PelvisPath::StayWithinReach(const FootPaths& feet) {
         sum += weight * highest[static_cast<std::size_t>(std::clamp(i + k, 0, kSamples - 1))];
         weights += weight;
       }
-      const double from_end = std::min(i, kSamples - 1 - i) / (0.06 * (kSamples - 1));
-      lowered_m_[static_cast<std::size_t>(i)] += sum / weights * Ease(from_end);
+      // The states stay as they are; after a turn the rear foot no longer points as in the state.
+      const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
+      lowered_m_[static_cast<std::size_t>(i)] +=
+          sum / weights * Ease(to_state / (0.06 * (kSamples - 1)));
     }
   }
 }

@@ -17,6 +17,8 @@ class PelvisPath {
 
   [[nodiscard]] DVec3 Position(double time_s) const;
   [[nodiscard]] DQuat Rotation(double time_s) const;
+  /// Where the body is heading; turns from one end of the step to the other. Yaw is relative to it.
+  [[nodiscard]] double Heading(double time_s) const;
   [[nodiscard]] double Yaw(double time_s) const { return yaw_.At(time_s); }
   [[nodiscard]] double Roll(double time_s) const { return roll_.At(time_s); }
   [[nodiscard]] double Tilt(double time_s) const { return tilt_.At(time_s); }
@@ -26,7 +28,7 @@ class PelvisPath {
 
   Foot moving_;
   StepTiming timing_;
-  Curve forward_, side_, yaw_, roll_, tilt_, height_;
+  Curve across_, forward_, sway_, yaw_, roll_, tilt_, height_;
   std::vector<double> lowered_m_;  // at equal times over the step
 };
 

@@ -2,8 +2,10 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "curve.h"
+#include "elementary.h"
 #include "foot_path.h"
 #include "leg_ik.h"
 #include "pelvis_path.h"
@@ -68,9 +70,21 @@ struct UpperBodyPath {
   }
 };
 
-std::string LengthText(double length_m) {
-  const int centimetres = static_cast<int>(std::floor(length_m * 100.0 + 0.5));
-  return "0." + std::string(centimetres < 10 ? "0" : "") + std::to_string(centimetres);
+constexpr double kHeadLeadS = 0.25;
+
+double ParameterOf(const StepShape& shape, ParameterName name) {
+  switch (name) {
+    case ParameterName::kStartX: return shape.start_m.x;
+    case ParameterName::kStartY: return shape.start_m.y;
+    case ParameterName::kStartZ: return shape.start_m.z;
+    case ParameterName::kEndX: return shape.end_m.x;
+    case ParameterName::kEndY: return shape.end_m.y;
+    case ParameterName::kEndZ: return shape.end_m.z;
+    case ParameterName::kTurn: return shape.turn_rad;
+    case ParameterName::kLength:
+    case ParameterName::kHeight: break;
+  }
+  return 0.0;
 }
 
 }  // namespace
@@ -99,31 +113,43 @@ FigurePose StandingPose() {
   return pose;
 }
 
-RawExample MakeStep(const Skeleton& figure, Foot moving, double start_length_m,
-                    double end_length_m) {
-  const StepTiming timing = MakeStepTiming(start_length_m, end_length_m);
+double NaturalSide() { return 2.0 * StandingBall(Foot::kLeft).x; }
+
+StepShape StraightShape(Foot moving, double start_length_m, double end_length_m) {
+  StepShape shape;
+  shape.start_m = DVec3(SideSign(moving) * NaturalSide(), 0.0, -start_length_m);
+  shape.end_m = DVec3(SideSign(moving) * NaturalSide(), 0.0, end_length_m);
+  return shape;
+}
+
+RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
+                    std::span<const ParameterName> names, std::string source) {
+  const StepTiming timing = MakeStepTiming(shape);
   const FootPaths feet(moving, timing);
   const PelvisPath pelvis(moving, timing, feet);
   const UpperBodyPath upper(moving, timing);
 
   RawExample example;
   example.keytimes_s = timing.keytimes_s();
-  example.parameters = {-start_length_m, end_length_m};
-  example.source =
-      "generated step " + LengthText(start_length_m) + " to " + LengthText(end_length_m) + " m";
+  for (const ParameterName name : names) example.parameters.push_back(ParameterOf(shape, name));
+  example.heading_change_rad = shape.turn_rad;
+  example.source = std::move(source);
   example.clip.fps = kClipFps;
   const int frames = static_cast<int>(std::floor(timing.end_s * kClipFps + 0.5)) + 1;
   example.clip.Resize(frames, figure.joint_count());
   const DVec3 start = pelvis.Position(0.0);
   for (int f = 0; f < frames; ++f) {
     const double time_s = f / kClipFps;
+    const double heading = pelvis.Heading(time_s);
     FigurePose pose;
     pose.root_m = pelvis.Position(time_s);
     pose.rotations[kHips] = pelvis.Rotation(time_s);
-    SetUpperBody(upper.At(moving, time_s), pelvis.Yaw(time_s), pelvis.Roll(time_s),
-                 pelvis.Tilt(time_s), pose);
-    SolveLeg(moving, feet.Moving(time_s), pose);
-    SolveLeg(OtherFoot(moving), feet.Fixed(time_s), pose);
+    UpperBody body = upper.At(moving, time_s);
+    // People look where they are about to go.
+    body.head_yaw = (pelvis.Heading(time_s + kHeadLeadS) - heading) * Ease(time_s / 0.2);
+    SetUpperBody(body, pelvis.Yaw(time_s), pelvis.Roll(time_s), pelvis.Tilt(time_s), pose);
+    SolveLeg(moving, feet.Moving(time_s), pose, heading);
+    SolveLeg(OtherFoot(moving), feet.Fixed(time_s), pose, heading);
     pose.root_m -= DVec3(start.x, 0.0, start.z);
     StorePose(pose, example.clip.frame(f));
   }

@@ -1,18 +1,27 @@
 #include "step_timing.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace stridewire::builtin {
 
-StepTiming MakeStepTiming(double start_length_m, double end_length_m) {
+StepTiming MakeStepTiming(const StepShape& shape) {
+  const double start_length_m = -shape.start_m.z, end_length_m = shape.end_m.z;
+  const double start_rise_m = std::fabs(shape.start_m.y), end_rise_m = std::fabs(shape.end_m.y);
   StepTiming timing;
-  timing.start = MakeGaitState(start_length_m);
-  timing.end = MakeGaitState(end_length_m);
+  timing.shape = shape;
+  timing.start = MakeGaitState(start_length_m, start_rise_m, shape.flat);
+  timing.end = MakeGaitState(end_length_m, end_rise_m, shape.flat);
   const bool partial = timing.start.standing() || timing.end.standing();
-  const double step_s = SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
-                                               : 0.5 * (start_length_m + end_length_m));
+  // Aside and on the spot nothing swings through: such a step has its own pace.
+  const bool aside = timing.start.standing() && timing.end.standing();
+  const double level_s = aside ? 0.62
+                               : SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
+                                                        : 0.5 * (start_length_m + end_length_m));
+  const double step_s = level_s + kRiseTime_s_m * 0.5 * (start_rise_m + end_rise_m);
   // From standing the weight first moves over the foot that stays; to standing the body settles.
-  const double weight_shift_s = 0.30, settle_s = 0.12 * step_s + 0.15;
+  const double weight_shift_s = aside ? 0.24 : 0.30;
+  const double settle_s = 0.12 * step_s + (aside ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
   timing.heel_strike_s = timing.toe_off_s + ToWholeFrames(0.76 * step_s);
   timing.end_s = timing.heel_strike_s +

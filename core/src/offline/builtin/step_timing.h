@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "gait_state.h"
+#include "step_shape.h"
 
 namespace stridewire::builtin {
 
@@ -10,6 +11,7 @@ namespace stridewire::builtin {
 /// support around a state lasts as long on both sides of it whatever the step, so that velocities
 /// agree where steps join.
 struct StepTiming {
+  StepShape shape;
   GaitState start;
   GaitState end;
   double toe_off_s = 0.0;
@@ -22,7 +24,6 @@ struct StepTiming {
   }
 };
 
-/// From feet `start_length_m` apart to `end_length_m`; not both 0.
-[[nodiscard]] StepTiming MakeStepTiming(double start_length_m, double end_length_m);
+[[nodiscard]] StepTiming MakeStepTiming(const StepShape& shape);
 
 }  // namespace stridewire::builtin

@@ -20,7 +20,7 @@ void SetUpperBody(const UpperBody& body, double pelvis_yaw, double pelvis_roll, 
   pose.rotations[kLowerBack] = third;
   pose.rotations[kSpine] = third;
   pose.rotations[kSpine1] = third;
-  const DQuat neck = Small(-body.thorax_yaw / 3.0, -body.thorax_roll / 3.0,
+  const DQuat neck = Small((body.head_yaw - body.thorax_yaw) / 3.0, -body.thorax_roll / 3.0,
                            (body.head_nod - body.thorax_lean) / 3.0);
   pose.rotations[kNeck] = neck;
   pose.rotations[kNeck1] = neck;

@@ -9,6 +9,7 @@ struct UpperBody {
   double thorax_yaw = 0.0;             ///< in the example's frame, left positive
   double thorax_roll = 0.0;            ///< likewise; positive lifts the left side
   double thorax_lean = 0.0;            ///< likewise; forward positive
+  double head_yaw = 0.0;               ///< likewise; left positive
   double head_nod = 0.0;               ///< likewise; forward positive
   double arm_flexion[2] = {0.0, 0.0};  ///< indexed by Foot; forward positive
   double arm_abduction = 0.0;

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -112,14 +113,14 @@ double Drift(const RawExample& example, int from, int to, PointOf point_of) {
 TEST(BuiltinLibrary, HasTheExamplesItPromises) {
   const RawLibrary& library = Library();
   ASSERT_TRUE(library.skeleton.Validate());
-  ASSERT_EQ(library.groups.size(), 3u);
+  ASSERT_GE(library.groups.size(), 3u);  // general_steps_test.cpp has the others
   EXPECT_EQ(library.groups[0].kind, MovementKind::kStepLeft);
   EXPECT_EQ(library.groups[1].kind, MovementKind::kStepRight);
   EXPECT_EQ(library.groups[2].kind, MovementKind::kJump);
   EXPECT_EQ(library.groups[0].examples.size(), 15u);
   EXPECT_EQ(library.groups[1].examples.size(), 15u);
   EXPECT_EQ(library.groups[2].examples.size(), 4u);
-  for (const RawGroup& group : library.groups) {
+  for (const RawGroup& group : std::span(library.groups).first(3)) {
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
       EXPECT_TRUE(example.clip.Validate());
@@ -193,7 +194,7 @@ TEST(BuiltinLibrary, WhatTouchesTheGroundStaysThere) {
 }
 
 TEST(BuiltinLibrary, JointsStayWithinAHumanRange) {
-  for (const RawGroup& group : Library().groups) {
+  for (const RawGroup& group : std::span(Library().groups).first(3)) {
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
       double least_knee = 180.0, most_knee = 0.0, least_ankle = 180.0, most_ankle = -180.0;
@@ -215,7 +216,7 @@ TEST(BuiltinLibrary, JointsStayWithinAHumanRange) {
 }
 
 TEST(BuiltinLibrary, FeetNeverEnterTheGroundAndClearItInSwing) {
-  for (const RawGroup& group : Library().groups) {
+  for (const RawGroup& group : std::span(Library().groups).first(3)) {
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
       for (int f = 0; f < example.clip.frame_count(); ++f) {

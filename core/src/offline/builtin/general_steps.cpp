@@ -1,0 +1,190 @@
+#include "general_steps.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "mirror.h"
+#include "step.h"
+
+namespace stridewire::builtin {
+namespace {
+
+using Names = std::vector<ParameterName>;
+
+std::string Centimetres(double length_m) {
+  const int centimetres = static_cast<int>(std::floor(std::fabs(length_m) * 100.0 + 0.5));
+  const std::string digits = std::to_string(centimetres);
+  return std::string(length_m < 0.0 ? "-0." : "0.") + (centimetres < 10 ? "0" : "") + digits;
+}
+
+std::string Degrees(double angle_rad) {
+  return std::to_string(static_cast<int>(std::floor(angle_rad / kDegree + 0.5)));
+}
+
+// "generated step 0.35 to 0.55 m", and what else is not that of walking straight ahead.
+std::string Describe(const StepShape& shape) {
+  std::string text = "generated step " + Centimetres(std::fabs(shape.start_m.z)) + " to " +
+                     Centimetres(shape.end_m.z) + " m";
+  if (shape.start_m.x != NaturalSide() || shape.end_m.x != NaturalSide()) {
+    text += ", side " + Centimetres(shape.start_m.x) + " to " + Centimetres(shape.end_m.x) + " m";
+  }
+  if (shape.start_m.y != 0.0 || shape.end_m.y != 0.0) {
+    text += ", height " + Centimetres(shape.start_m.y) + " to " + Centimetres(shape.end_m.y) + " m";
+  }
+  if (shape.turn_rad != 0.0) text += ", turn " + Degrees(shape.turn_rad) + " degrees";
+  return text;
+}
+
+constexpr double kWalkTurnRad = 40.0 * kDegree;
+constexpr double kSpotTurnRad = 60.0 * kDegree;
+
+// How far aside the ball of a foot is that has turned outward on the spot.
+double OpenSide(double turn_rad) {
+  return NaturalSide() + (0.26 - NaturalSide()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
+}
+
+// A group of left steps and its mirror image.
+class Groups {
+ public:
+  explicit Groups(Names names)
+      : left_{MovementKind::kStepLeft, names, {}}, right_{MovementKind::kStepRight, names, {}} {}
+
+  void Add(const Skeleton& figure, const StepShape& shape) {
+    Add(MakeStep(figure, Foot::kLeft, shape, left_.parameters, Describe(shape)));
+  }
+
+  void Add(RawExample example) {
+    right_.examples.push_back(Mirrored(example, left_.parameters));
+    left_.examples.push_back(std::move(example));
+  }
+
+  void MoveTo(RawLibrary& library) {
+    library.groups.push_back(std::move(left_));
+    library.groups.push_back(std::move(right_));
+  }
+
+ private:
+  RawGroup left_, right_;
+};
+
+}  // namespace
+
+void AddStraightSteps(RawLibrary& library) {
+  constexpr std::array kLengthsM = {0.0, 0.35, 0.55, 0.75};
+  Groups groups({ParameterName::kStartZ, ParameterName::kEndZ});
+  for (const double start_m : kLengthsM) {
+    for (const double end_m : kLengthsM) {
+      if (start_m == 0.0 && end_m == 0.0) continue;
+      groups.Add(library.skeleton, StraightShape(Foot::kLeft, start_m, end_m));
+    }
+  }
+  groups.MoveTo(library);
+}
+
+void AddBackwardSteps(RawLibrary& library) {
+  constexpr std::array kLengthsM = {0.0, 0.2, 0.4};
+  const Names names = {ParameterName::kStartZ, ParameterName::kEndZ};
+  Groups groups(names);
+  for (const double start_m : kLengthsM) {
+    for (const double end_m : kLengthsM) {
+      if (start_m == 0.0 && end_m == 0.0) continue;
+      RawExample example = Reversed(MakeStep(
+          library.skeleton, Foot::kLeft, StraightShape(Foot::kLeft, end_m, start_m), names, {}));
+      example.source =
+          "generated step backward " + Centimetres(start_m) + " to " + Centimetres(end_m) + " m";
+      groups.Add(std::move(example));
+    }
+  }
+  groups.MoveTo(library);
+}
+
+void AddTurningSteps(RawLibrary& library) {
+  constexpr std::array kLengthsM = {0.0, 0.4, 0.75};
+  Groups groups(
+      {ParameterName::kStartX, ParameterName::kStartZ, ParameterName::kEndZ, ParameterName::kTurn});
+  const auto add = [&](double start_x, double start_z, double end_z, double turn_rad) {
+    StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
+    shape.start_m.x = start_x;
+    shape.turn_rad = turn_rad;
+    // A foot that turns out and lands beside the other must stay clear of that one's heel.
+    if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = OpenSide(turn_rad);
+    groups.Add(library.skeleton, shape);
+  };
+  for (const double start_m : kLengthsM) {
+    for (const double end_m : kLengthsM) {
+      const bool on_the_spot = start_m == 0.0 && end_m == 0.0;
+      for (const double way : {0.0, 1.0, -1.0}) {
+        add(NaturalSide(), start_m, end_m, way * (on_the_spot ? kSpotTurnRad : kWalkTurnRad));
+      }
+    }
+  }
+  // On from there.
+  const double open_m = OpenSide(kSpotTurnRad);
+  add(open_m, 0.0, 0.0, 0.0);
+  add(open_m, 0.0, 0.0, kSpotTurnRad);
+  add(open_m, 0.0, 0.0, -kSpotTurnRad);
+  add(open_m, 0.0, 0.4, 0.0);
+  groups.MoveTo(library);
+}
+
+void AddSideSteps(RawLibrary& library) {
+  const double near_m = NaturalSide();
+  const std::array kSidesM = {near_m, near_m + 0.3};
+  constexpr std::array kLengthsM = {0.0, 0.4};
+  Groups groups(
+      {ParameterName::kStartX, ParameterName::kStartZ, ParameterName::kEndX, ParameterName::kEndZ});
+  for (const double start_x : kSidesM) {
+    for (const double end_x : kSidesM) {
+      for (const double start_z : kLengthsM) {
+        for (const double end_z : kLengthsM) {
+          StepShape shape;
+          shape.start_m = DVec3(start_x, 0.0, -start_z);
+          shape.end_m = DVec3(end_x, 0.0, end_z);
+          groups.Add(library.skeleton, shape);
+        }
+      }
+    }
+  }
+  groups.MoveTo(library);
+}
+
+void AddClimbingSteps(RawLibrary& library) {
+  constexpr double kRiseM = 0.25;
+  constexpr double kTurnRad = 35.0 * kDegree;
+  // Height of the moving above the fixed foot, before and after, in parts of kRiseM.
+  struct Climb {
+    double start, end;
+  };
+  constexpr std::array kClimbs = {Climb{0.0, 0.0},  Climb{0.0, 1.0},  Climb{-1.0, 1.0},
+                                  Climb{-1.0, 0.0}, Climb{0.0, -1.0}, Climb{1.0, -1.0},
+                                  Climb{1.0, 0.0}};
+  Groups groups({ParameterName::kStartY, ParameterName::kStartZ, ParameterName::kEndY,
+                 ParameterName::kEndZ, ParameterName::kTurn});
+  const auto add = [&](const Climb& climb, double start_z, double end_z, double turn_rad) {
+    StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
+    shape.start_m.y = climb.start * kRiseM;
+    shape.end_m.y = climb.end * kRiseM;
+    shape.turn_rad = turn_rad;
+    shape.flat = true;
+    groups.Add(library.skeleton, shape);
+  };
+  // On stairs the other foot is a tread behind or ahead; on level ground it may be anywhere.
+  const auto lengths = [](double height) {
+    return height == 0.0 ? std::array{0.0, 0.5} : std::array{0.28, 0.42};
+  };
+  for (const Climb& climb : kClimbs) {
+    for (const double start_z : lengths(climb.start)) {
+      for (const double end_z : lengths(climb.end)) add(climb, start_z, end_z, 0.0);
+    }
+    for (const double turn_rad : {kTurnRad, -kTurnRad}) add(climb, 0.3, 0.3, turn_rad);
+    if (climb.start != 0.0 || climb.end != 0.0) {
+      add({0.5 * climb.start, 0.5 * climb.end}, 0.3, 0.3, 0.0);
+    }
+  }
+  groups.MoveTo(library);
+}
+
+}  // namespace stridewire::builtin

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "figure.h"
+#include "stridewire/offline/raw_library.h"
+
+namespace stridewire::builtin {
+
+/// The groups of general steps: `AddStraightSteps` first, which walks ahead, the others beside it.
+/// Each adds a group of left steps and one of their mirror images to `library`.
+void AddStraightSteps(RawLibrary& library);
+void AddBackwardSteps(RawLibrary& library);  ///< start_z, end_z
+void AddTurningSteps(RawLibrary& library);   ///< start_x, start_z, end_z, turn
+void AddSideSteps(RawLibrary& library);      ///< start_x, start_z, end_x, end_z
+void AddClimbingSteps(RawLibrary& library);  ///< start_y, start_z, end_y, end_z, turn
+
+}  // namespace stridewire::builtin
