@@ -1,0 +1,173 @@
+import {
+  eventTypes, footChoices, movementKinds, movementTypes, parameterNames, poseModes, roles
+} from '../../src/wire/decode';
+import type {Message} from '../../src/wire/messages';
+import {PoseReader} from '../../src/wire/pose_codec';
+import type {
+  CurrentMovement, Leg, Parameters, QueuedRequest, Vec3
+} from '../../src/types';
+
+type Json = unknown;
+
+const u64 = (value: bigint | number): Json => String(value);
+const token = (bytes: Uint8Array): Json => Buffer.from(bytes).toString('hex');
+const vec3 = (v: Vec3): Json => [...v];
+
+function parameters(set: Parameters): Json {
+  return Object.entries(set).map(([name, value]) => ({
+    name: parameterNames.indexOf(name as never), value
+  }));
+}
+
+function request(item: QueuedRequest): Json {
+  const type = movementTypes.indexOf(item.type);
+  const common = {avatar: item.avatar, request_id: u64(item.requestId), type};
+  switch (item.type) {
+    case 'step':
+      return {
+        ...common, foot: footChoices.indexOf(item.foot), length_m: item.lengthM,
+        side_m: item.sideM, height_m: item.heightM, turn_rad: item.turnRad,
+      };
+    case 'jump':
+      return {
+        ...common, length_m: item.lengthM, height_m: item.heightM, turn_rad: item.turnRad
+      };
+    case 'stand': return {...common, seconds: item.seconds};
+  }
+}
+
+function leg(from: Leg): Json {
+  return {
+    hip: from.hip, knee: from.knee, ankle: from.ankle, ball: from.ball,
+    ball_offset_m: vec3(from.ballOffsetM), toe_tip_offset_m: vec3(from.toeTipOffsetM),
+  };
+}
+
+function movement(m: CurrentMovement): Json {
+  return {
+    request_id: u64(m.requestId), kind: movementKinds.indexOf(m.kind), group: m.group,
+    started_s: m.startTimeS, keytimes_s: [...m.keytimesS], generic_time: m.genericTime,
+    ease_out_s: m.easeS, requested: parameters(m.requested), applied: parameters(m.applied),
+    extrapolated: m.extrapolated, clamped: m.clamped, weights: [...m.weights],
+    parameter_names: m.parameterNames.map((name) => parameterNames.indexOf(name)),
+    sites: [...m.sites],
+  };
+}
+
+/** A message with the schema's names, as protocol/vectors has it. */
+export function toJson(m: Message): {[name: string]: Json} {
+  switch (m.type) {
+    case 'Hello':
+      return {
+        protocol_min: m.protocolMin, protocol_max: m.protocolMax, client_name: m.clientName,
+        features: u64(m.features), auth_token: m.authToken, resume_token: token(m.resumeToken),
+        last_events_number: u64(m.lastEventsNumber),
+      };
+    case 'JoinWorld': return {seq: u64(m.seq), name: m.name, role: roles.indexOf(m.role)};
+    case 'LeaveWorld': return {seq: u64(m.seq), world: m.world};
+    case 'Spawn':
+      return {
+        seq: u64(m.seq), world: m.world,
+        items: m.items.map((item) => ({
+          avatar: item.avatar, position_m: vec3(item.positionM), heading_rad: item.headingRad
+        })),
+      };
+    case 'Remove':
+    case 'CancelQueue': return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars]};
+    case 'Request': return {seq: u64(m.seq), world: m.world, items: m.items.map(request)};
+    case 'Observe':
+      return {
+        seq: u64(m.seq), world: m.world, subscription: m.subscription,
+        mode: poseModes.indexOf(m.mode), avatars: [...m.avatars], every_n_ticks: m.everyNTicks,
+        with_events: m.withEvents,
+      };
+    case 'StopObserving': return {seq: u64(m.seq), subscription: m.subscription};
+    case 'Ping': return {nonce: u64(m.nonce), time_s: m.timeS};
+    case 'InspectAvatar': return {nonce: u64(m.nonce), world: m.world, avatar: m.avatar};
+    case 'Goodbye': return {code: m.code, text: m.text};
+    case 'Welcome':
+      return {
+        protocol: m.protocol, features: u64(m.features), session: u64(m.session),
+        resume_token: token(m.resumeToken), resumed: m.resumed, last_seq: u64(m.lastSeq),
+        tick_hz: m.tickHz, server_name: m.serverName, server_version: m.serverVersion,
+        limits: {
+          max_control_bytes: m.limits.maxControlBytes, max_bulk_bytes: m.limits.maxBulkBytes,
+          max_items: m.limits.maxItems, max_avatars_per_world: m.limits.maxAvatarsPerWorld,
+          max_queue: m.limits.maxQueue, reply_memory: m.limits.replyMemory,
+          idle_timeout_s: m.limits.idleTimeoutS, resume_window_s: m.limits.resumeWindowS,
+        },
+      };
+    case 'WorldInfo':
+      return {
+        seq: u64(m.seq), world: m.world, name: m.name, role: roles.indexOf(m.role),
+        tick: u64(m.tick), library_hash: m.libraryHash,
+        skeleton: {
+          joints: m.joints.map((joint) => ({
+            name: joint.name, parent: joint.parent, offset_m: vec3(joint.offsetM)
+          })),
+          end_sites: m.endSites.map((site) => ({
+            joint: site.joint, offset_m: vec3(site.offsetM)
+          })),
+          left_leg: leg(m.leftLeg), right_leg: leg(m.rightLeg),
+        },
+      };
+    case 'Reply':
+      return {
+        seq: u64(m.seq), code: m.code, text: m.text, accepted: m.accepted,
+        items: m.items.map((item) => ({
+          index: item.index, avatar: item.avatar, request_id: u64(item.requestId),
+          code: item.code, text: item.text,
+        })),
+      };
+    case 'PoseBatch': {
+      const reader = new PoseReader(m.poses, m.mode, m.jointCount);
+      return {
+        world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
+        server_time_s: m.serverTimeS, mode: poseModes.indexOf(m.mode),
+        joint_count: m.jointCount,
+        poses: [...m.avatars].map((avatar, i) => {
+          const rootM = new Float32Array(3);
+          const rotations = new Float32Array(4 * m.jointCount);
+          if (!reader.read(i, rootM, 0, rotations, 0)) throw new Error(`pose ${i} is none`);
+          return {
+            avatar, flags: m.flags[i], root_position_m: [...rootM],
+            rotations: Array.from({length: m.jointCount}, (_, j) =>
+                [...rotations.subarray(4 * j, 4 * j + 4)]),
+          };
+        }),
+      };
+    }
+    case 'Events':
+      return {
+        world: m.world, number: u64(m.number), tick: u64(m.tick),
+        events: m.events.map((e) => ({
+          type: eventTypes.indexOf(e.type), avatar: e.avatar, request_id: u64(e.requestId),
+          kind: movementKinds.indexOf(e.kind), group: e.group, tick: u64(e.tick),
+          time_s: e.timeS, requested: parameters(e.requested), applied: parameters(e.applied),
+          extrapolated: e.extrapolated, clamped: e.clamped, foot: e.foot === 'right' ? 1 : 0,
+          position_m: vec3(e.positionM), base_position_m: vec3(e.basePositionM),
+          base_heading_rad: e.baseHeadingRad, code: e.code, reason: e.reason,
+        })),
+      };
+    case 'Lagging':
+      return {
+        world: m.world, dropped_batches: u64(m.droppedBatches),
+        dropped_events: u64(m.droppedEvents),
+      };
+    case 'Error': return {code: m.code, text: m.text, fatal: m.fatal, seq: u64(m.seq)};
+    case 'Pong':
+      return {
+        nonce: u64(m.nonce), time_s: m.timeS, server_time_s: m.serverTimeS, tick: u64(m.tick)
+      };
+    case 'AvatarState': {
+      const {state} = m;
+      return {
+        nonce: u64(m.nonce), world: m.world, avatar: state.avatar, code: m.code, text: m.text,
+        tick: u64(state.tick), server_time_s: state.timeS,
+        base_position_m: vec3(state.basePositionM), base_heading_rad: state.baseHeadingRad,
+        movement: state.movement === null ? null : movement(state.movement),
+        queue_size: state.queueSize, queue: state.queue.map(request),
+      };
+    }
+  }
+}

@@ -1,0 +1,70 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import {decodeFrame} from '../src/wire/decode';
+import {Encoder} from '../src/wire/encode';
+import {MessageType} from '../src/wire/frame';
+import type {ClientMessage} from '../src/wire/messages';
+import {toJson} from './support/to_json';
+import {readVectors} from './support/vectors';
+
+const tolerance = 1e-6;  // Of quantised rotations; all else is exact.
+
+function sameValues(actual: unknown, expected: unknown, where: string): void {
+  if (Array.isArray(expected)) {
+    assert.ok(Array.isArray(actual), where);
+    assert.equal(actual.length, expected.length, `${where}: length`);
+    expected.forEach((value, i) => sameValues(actual[i], value, `${where}[${i}]`));
+  } else if (expected !== null && typeof expected === 'object') {
+    assert.ok(actual !== null && typeof actual === 'object', where);
+    assert.deepEqual(Object.keys(actual).sort(), Object.keys(expected).sort(), where);
+    for (const [name, value] of Object.entries(expected)) {
+      sameValues((actual as never)[name], value, `${where}.${name}`);
+    }
+  } else if (typeof expected === 'number' && where.includes('rotations')) {
+    assert.equal(typeof actual, 'number', where);
+    assert.ok(Math.abs(actual as number - expected) <= tolerance, `${where}: ${actual}`);
+  } else if (typeof expected === 'number' && !Number.isInteger(expected)) {
+    // float32 fields stand in the JSON with as many digits as they need.
+    assert.ok(actual === expected || Math.fround(expected) === actual, `${where}: ${actual}`);
+  } else {
+    assert.equal(actual, expected, where);
+  }
+}
+
+const vectors = readVectors();
+const fromServer = (typeNumber: number): boolean => typeNumber >= MessageType.Goodbye;
+
+test('there are vectors of every message type', () => {
+  assert.deepEqual([...new Set(vectors.map((vector) => vector.typeNumber))].sort((a, b) => a - b),
+                   Object.values(MessageType).sort((a, b) => a - b));
+});
+
+for (const vector of vectors) {
+  const sender = fromServer(vector.typeNumber) ? 'server' : 'client';
+  test(`decodes ${vector.name}`, () => {
+    const message = decodeFrame(vector.frame, sender);
+    assert.equal(message.type, vector.type);
+    sameValues(toJson(message), vector.fields, vector.name);
+  });
+
+  if (sender === 'client' || vector.type === 'Goodbye') {
+    test(`encodes ${vector.name}`, () => {
+      const message = decodeFrame(vector.frame, 'client') as ClientMessage;
+      const frame = new Encoder().encode(message);
+      sameValues(toJson(decodeFrame(frame, 'client')), vector.fields, vector.name);
+    });
+  }
+}
+
+test('a side of 0 is not an absent one', () => {
+  const vector = vectors.find(({name}) => name === 'request')!;
+  const message = decodeFrame(vector.frame, 'client');
+  assert.ok(message.type === 'Request');
+  const step = message.items.find((item) => item.type === 'step')!;
+  for (const sideM of [0, -0, null]) {
+    const frame = new Encoder().encode({...message, items: [{...step, sideM}]});
+    const back = decodeFrame(frame, 'client');
+    assert.ok(back.type === 'Request');
+    assert.equal(back.items[0]!.sideM, sideM);
+  }
+});

@@ -1,0 +1,152 @@
+import assert from 'node:assert/strict';
+import {readFileSync, readdirSync} from 'node:fs';
+import {test} from 'node:test';
+import {Builder} from 'flatbuffers';
+import {tableLayouts, tableNumbers} from '../generated/layout';
+import * as wire from '../generated/wire';
+import {decodeFrame} from '../src/wire/decode';
+import {makeFrame, type MessageName, type Sender} from '../src/wire/frame';
+import {Malformed} from '../src/wire/malformed';
+import {verify} from '../src/wire/verify';
+import {root} from './support/environment';
+import {readVectors} from './support/vectors';
+
+/** What flatc's own readers say of a table: number of each field and the bytes read for it. */
+function readersOf(table: string): {reads: string}[] {
+  const folder = `${root}client_sdk/web/generated/stridewire/wire`;
+  const file = readdirSync(folder).find((name) =>
+      name.replace(/\.ts$/, '').replace(/-/g, '') === table.toLowerCase())!;
+  const source = readFileSync(`${folder}/${file}`, 'utf8');
+  const fields: {reads: string}[] = [];
+  for (const [, number, reads] of
+       source.matchAll(/__offset\(this\.bb_pos, (\d+)\);\n\s*return offset \? (.*?) :/g)) {
+    const field = (Number(number) - 4) / 2;
+    fields[field] = {reads: (fields[field]?.reads ?? '') + '\n' + reads!};
+  }
+  return fields;
+}
+
+test('the layout of each table agrees with what flatc reads', () => {
+  const bytes: {[read: string]: number} = {
+    readInt8: 1, readUint8: 1, readInt16: 2, readUint16: 2, readInt32: 4, readUint32: 4,
+    readFloat32: 4, readInt64: 8, readUint64: 8, readFloat64: 8,
+  };
+  for (const [table, number] of Object.entries(tableNumbers)) {
+    const fields = readersOf(table);
+    const layouts = tableLayouts[number]!;
+    assert.equal(layouts.length, fields.length, table);
+    layouts.forEach(([kind, size, align], i) => {
+      const {reads} = fields[i]!;
+      const where = `${table}, field ${i}: ${reads.trim()}`;
+      const single = /read\w+(?=\(this\.bb_pos \+ offset\))/.exec(reads)?.[0];
+      const element = /read\w+(?=\(this\.bb!\.__vector)/.exec(reads)?.[0];
+      const stride = /index \* (\d+)/.exec(reads)?.[1];
+      if (reads.includes('__string')) {
+        assert.deepEqual([kind, size, align], [1, 1, 1], where);
+      } else if (reads.includes('__vector') && reads.includes('__indirect')) {
+        assert.equal(kind, 4, where);
+        assert.ok(reads.includes(`new ${Object.keys(tableNumbers)[size]}())`), where);
+      } else if (reads.includes('__vector')) {
+        assert.equal(kind, 2, where);
+        assert.equal(size, stride === undefined ? bytes[element!] : Number(stride), where);
+      } else if (reads.includes('__indirect')) {
+        assert.equal(kind, 3, where);
+        assert.ok(reads.includes(`new ${Object.keys(tableNumbers)[size]}())`), where);
+      } else {
+        assert.equal(kind, 0, where);
+        if (single !== undefined) {
+          assert.deepEqual([size, align], [bytes[single], bytes[single]], where);
+        } else {
+          const struct = /new (\w+)\(\)/.exec(reads)![1];
+          assert.deepEqual([size, align], struct === 'Vec3' ? [24, 8] : [12, 4], where);
+        }
+      }
+    });
+  }
+});
+
+test('every vector is well-formed, and no part of one is', () => {
+  for (const {name, frame, type} of readVectors()) {
+    const table = tableNumbers[type as MessageName];
+    assert.ok(verify(new DataView(frame, 16), table, 1 << 20), name);
+    if (frame.byteLength > 4096) continue;
+    // What the last bytes hold must be missed, up to the padding.
+    for (const bytes of [0, 4, 8, (frame.byteLength - 16) >> 1]) {
+      assert.ok(!verify(new DataView(frame, 16, bytes), table, 1 << 20), `${name}, ${bytes}`);
+    }
+  }
+});
+
+function refused(frame: ArrayBuffer, sender: Sender, why: RegExp): void {
+  assert.throws(() => decodeFrame(frame, sender),
+                (error) => error instanceof Malformed && why.test(error.message), `${why}`);
+}
+
+function withHeader(change: (view: DataView) => void): ArrayBuffer {
+  const frame = readVectors().find(({name}) => name === 'pong')!.frame;
+  change(new DataView(frame));
+  return frame;
+}
+
+test('headers are refused in the order of the standard', () => {
+  const spoilAfter = [
+    (view: DataView) => view.setUint32(0, 0), (view: DataView) => view.setUint16(4, 2, true),
+    (view: DataView) => view.setUint16(6, 999, true), (view: DataView) => view.setUint16(6, 1, true),
+    (view: DataView) => view.setUint32(12, 1, true),
+    (view: DataView) => view.setUint32(8, (1 << 20) + 8, true),
+    (view: DataView) => view.setUint32(8, 12, true), (view: DataView) => view.setUint32(8, 8, true),
+  ];
+  const why = [
+    /magic/, /version 2/, /type 999/, /other way/, /flags/, /longer than/, /multiple of 8/,
+    /not as long as/
+  ];
+  why.forEach((sentence, i) => {
+    // What comes later in the order is wrong, too, and is not what is told.
+    refused(withHeader((view) => {
+      for (let k = spoilAfter.length - 1; k >= i; --k) spoilAfter[k]!(view);
+    }), 'server', sentence);
+  });
+  refused(new ArrayBuffer(0), 'server', /shorter/);
+  refused(new ArrayBuffer(15), 'server', /shorter/);
+});
+
+function message(name: MessageName, build: (b: Builder) => number): ArrayBuffer {
+  const b = new Builder(1024);
+  b.finish(build(b));
+  return makeFrame(name, b.asUint8Array());
+}
+
+test('lists and texts that are too long are refused before they are copied', () => {
+  refused(message('Goodbye', (b) => wire.Goodbye.createGoodbye(
+      b, 0, b.createString('x'.repeat(1025)))), 'server', /too long/);
+  // 65,537 events, all the same one: small on the wire.
+  refused(message('Events', (b) => {
+    wire.Event.startEvent(b);
+    wire.Event.addAvatar(b, 1);
+    const event = wire.Event.endEvent(b);
+    const list = wire.Events.createEventsVector(b, new Array(65_537).fill(event));
+    return wire.Events.createEvents(b, 1, 1n, 1n, list);
+  }), 'server', /too long/);
+  refused(message('Reply', (b) => {
+    wire.ReplyItem.startReplyItem(b);
+    const item = wire.ReplyItem.endReplyItem(b);
+    const list = wire.Reply.createItemsVector(b, new Array(70_000).fill(item));
+    return wire.Reply.createReply(b, 1n, 0, b.createString(''), 0, list);
+  }), 'server', /well-formed/);
+});
+
+test('texts are UTF-8 without control characters', () => {
+  const goodbye = (bytes: number[]): ArrayBuffer =>
+      message('Goodbye', (b) => wire.Goodbye.createGoodbye(
+          b, 0, b.createString(Uint8Array.from(bytes))));
+  for (const bytes of [
+    [0xc0, 0x80], [0xed, 0xa0, 0x80], [0xf4, 0x90, 0x80, 0x80], [0xe2, 0x82], [0x80], [0xff]
+  ]) {
+    refused(goodbye(bytes), 'server', /UTF-8/);
+  }
+  for (const bytes of [[10], [0x7f], [0xc2, 0x85], [0]]) {
+    refused(goodbye(bytes), 'server', /control/);
+  }
+  const marked = decodeFrame(goodbye([0xef, 0xbb, 0xbf, 0x61]), 'server');
+  assert.ok(marked.type === 'Goodbye' && marked.text === '\ufeffa');
+});
