@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Shows Stridewire on a bare Debian 12: installs, builds, starts a server with two worlds, lets a
-# simulated game server move avatars in both, and records one avatar of each to BVH.
+# simulated game server move avatars in both, and records one avatar of each to BVH. Ends with the
+# link of the page that shows them.
 #
 #   deploy/demo.sh                  # until Ctrl-C
 #   deploy/demo.sh --seconds 30     # ends by itself
@@ -57,11 +58,18 @@ rm -f "$out"/*.{bvh,log,toml}
 
 if $build; then
   echo "Installing what is missing and building; the first time takes some minutes."
-  deploy/install_deps.sh
+  deploy/install_deps.sh --no-browser
+  viewer=OFF
+  if command -v npm >/dev/null; then viewer=ON; fi
   export CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1
-  { cmake --preset release &&
+  { cmake --preset release -DSTRIDEWIRE_BUILD_VIEWER=$viewer &&
     cmake --build --preset release --parallel "$(nproc)" --target "${programs[@]}"; } \
     >"$out/build.log" 2>&1 || { tail -n 30 "$out/build.log" >&2; fail "building failed, see $out/build.log"; }
+  if [[ $viewer == OFF ]]; then
+    echo "There is no npm: going on without the viewer."
+  elif ! cmake --build --preset release --target viewer >"$out/viewer.log" 2>&1; then
+    echo "The viewer was not built (see $out/viewer.log; is the npm registry reachable?): going on without it."
+  fi
 fi
 for program in "${programs[@]}"; do
   [[ -x $bin/$program ]] || fail "there is no $bin/$program"
@@ -118,10 +126,13 @@ trap 'ended=true' INT TERM HUP
 
 quoted_library=${library//\\/\\\\}
 quoted_library=${quoted_library//\"/\\\"}
+# The page keeps its address from one demonstration to the next, unless somebody else is there.
+http_port=7421
+if (exec 3<>"/dev/tcp/127.0.0.1/$http_port") 2>/dev/null; then http_port=0; fi
 cat >"$out/stridewired.toml" <<TOML
 # Made by deploy/demo.sh. Port 0 is any free port; the server tells which it took.
 listen = "127.0.0.1:0"
-http = "127.0.0.1:0"
+http = "127.0.0.1:$http_port"
 
 [worlds.generated]
 library = "builtin"
@@ -175,6 +186,12 @@ Where to look:
 To watch another:
     $bin/stridewire-record --connect $listen --world generated --avatar 2 --seconds 10 --out my.bvh
 $([[ -n $seconds ]] && echo "Ends by itself after $seconds s." || echo "Ctrl-C ends it.")
+
+$(if [[ -f build/release/share/stridewire/viewer/index.html ]]; then
+  echo "See them walk:   http://$http/"
+else
+  echo "No viewer was built; http://$http/ says how."
+fi)
 
 TEXT
 

@@ -4,6 +4,7 @@
 #
 #   deploy/install_deps.sh          # to build, test and run the demonstration
 #   deploy/install_deps.sh --lint   # also clang-format and clang-tidy, as .ci/run needs them
+#   deploy/install_deps.sh --no-browser  # not the browser that the viewer is tested in
 #   deploy/install_deps.sh --list   # only print the package names, one a line
 set -euo pipefail
 
@@ -34,6 +35,12 @@ tests=(
   libgtest-dev
   librapidcheck-dev
 )
+# The web client and the viewer are built with npm. Debian's clashes with one installed from elsewhere,
+# so it is only asked for where there is none.
+command -v npm >/dev/null || build+=(nodejs npm)
+browser=(
+  chromium  # What the viewer is tested in.
+)
 lint=(
   clang-format-19
   clang-tidy-19
@@ -44,14 +51,17 @@ fail() { echo "install_deps.sh: $*" >&2; exit "${status:-1}"; }
 
 packages=("${build[@]}" "${tests[@]}")
 list=false
+with_browser=true
 for option in "$@"; do
   case "$option" in
     --lint) packages+=("${lint[@]}") ;;
+    --no-browser) with_browser=false ;;
     --list) list=true ;;
     -h | --help) usage; exit 0 ;;
     *) status=2 fail "unknown option '$option' (see --help)" ;;
   esac
 done
+if $with_browser; then packages+=("${browser[@]}"); fi
 if $list; then printf '%s\n' "${packages[@]}"; exit 0; fi
 
 command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||

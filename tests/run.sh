@@ -47,6 +47,12 @@ if $install; then deploy/install_deps.sh; fi
 # Results may be shared between clones of the project: compilations see paths relative to its root.
 export CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1
 
+# The web client and the viewer are the same however C++ is compiled: with one preset is enough.
+if [[ $preset == release ]]; then
+  if command -v npm >/dev/null; then configure+=(-DSTRIDEWIRE_BUILD_VIEWER=ON)
+  else echo "run.sh: no npm here: the web client and the viewer are not tested" >&2; fi
+fi
+
 started=$SECONDS
 cmake --preset "$preset" -DSTRIDEWIRE_BUILD_TESTS=ON "${configure[@]}"
 cmake --build --preset "$preset" --parallel "$jobs"
