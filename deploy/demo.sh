@@ -166,9 +166,9 @@ watch() {
   start "recorder of $1" "$out/record_$1.log" "$bin/stridewire-record" --connect "$listen" \
     --world "$1" --avatar 1 --seconds "$record_s" --out "$out/$1.bvh"
 }
-play generated --step-m 0.3 0.7 --jump-m 0.4 1.3 --seed 1
+play generated --step-m 0.3 0.7 --jump-m 0.4 1.3 --turn-rad 0.3 --home-m 3 --seed 1
 # Asked for no more than those two captures span: its walks are short and its jumps long.
-play "$world" --step-m 0.35 0.55 --jump-m 0.8 1.05 --turn-rad 0.15 --seed 2
+play "$world" --step-m 0.35 0.55 --jump-m 0.8 1.05 --turn-rad 0.15 --home-m 3 --seed 2
 sleep 1  # The avatars are there within a few ticks.
 watch generated
 watch "$world"

@@ -8,10 +8,12 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
@@ -36,6 +38,7 @@ struct Settings {
   std::array<double, 2> step_m = {0.35, 0.7};
   std::array<double, 2> jump_m = {0.4, 1.2};
   double turn_rad = 0.0;
+  double home_m = 0.0;  // 0: wherever their steps lead
 };
 
 volatile std::sig_atomic_t stop_requested = 0;
@@ -72,7 +75,7 @@ class GameServer {
         if (event.status == STRIDEWIRE_NO_MOVEMENT) can_jump_ = false;
         refused_ += event.status != STRIDEWIRE_OK;
         break;
-      case STRIDEWIRE_EVENT_SPAWNED: KeepBusy(event.avatar); break;
+      case STRIDEWIRE_EVENT_SPAWNED: KeepBusy(event); break;
       case STRIDEWIRE_EVENT_ACCEPTED:
         if (IsOurs(event.avatar) && last_requests_[event.avatar] == event.request_id) {
           last_requests_[event.avatar] = 0;
@@ -80,7 +83,7 @@ class GameServer {
         break;
       case STRIDEWIRE_EVENT_IDLE:
         // Idle from before our last request arrived does not count.
-        if (IsOurs(event.avatar) && last_requests_[event.avatar] == 0) KeepBusy(event.avatar);
+        if (IsOurs(event.avatar) && last_requests_[event.avatar] == 0) KeepBusy(event);
         break;
       case STRIDEWIRE_EVENT_STARTED:
         jumps_ += event.kind == STRIDEWIRE_KIND_JUMP;
@@ -126,12 +129,26 @@ class GameServer {
     spawned_ = static_cast<bool>(client_.Spawn(world_, spawns));
   }
 
-  void KeepBusy(std::uint32_t avatar) {
+  // By how much each of `steps` steps turns: anyhow, or back towards the middle of where they began.
+  double Turn(const stridewire_event& event, int steps) {
+    const double x = 0.75 * (settings_.avatars - 1) - event.base_position_m[0];
+    const double z = -event.base_position_m[2];
+    if (settings_.home_m <= 0.0 || std::hypot(x, z) < settings_.home_m) {
+      return Random(-settings_.turn_rad, settings_.turn_rad);
+    }
+    const double turn_rad =
+        std::remainder(std::atan2(x, z) - event.base_heading_rad, 2.0 * std::numbers::pi);
+    return std::clamp(turn_rad / steps, -settings_.turn_rad, settings_.turn_rad);
+  }
+
+  // `event` tells who has nothing to do, where it stands and looks.
+  void KeepBusy(const stridewire_event& event) {
+    const std::uint32_t avatar = event.avatar;
     if (!IsOurs(avatar)) return;
     std::vector<stridewire_movement> movements;
     const int steps = static_cast<int>(Random(4.0, 10.0));
     const double length_m = Random(settings_.step_m[0], settings_.step_m[1]);
-    const double turn_rad = Random(-settings_.turn_rad, settings_.turn_rad);
+    const double turn_rad = Turn(event, steps);
     for (int i = 0; i < steps; ++i) {
       const double varied_m = length_m * Random(0.9, 1.1);
       movements.push_back(Step(avatar, ++request_id_,
@@ -236,6 +253,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.0, 5.0));
   app.add_option("--turn-rad", settings.turn_rad, "A step turns at most this much")
       ->check(CLI::Range(0.0, 1.6));
+  app.add_option("--home-m", settings.home_m, "They turn back when further than this; 0: never")
+      ->check(CLI::Range(0.0, 1e4));
   try {
     app.parse(argc, argv);
     const auto colon = connect.rfind(':');

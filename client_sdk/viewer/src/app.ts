@@ -62,6 +62,7 @@ export class App {
   private theme: ThemeName;
   private readonly orbit = new Orbit();
   private framing = true;
+  private figuresMadeRoom = false;
   private readonly options: ViewOptions;
   private figureChoice: 'auto' | 'bodies' | 'lines' = 'auto';
   private slow = 0;
@@ -162,9 +163,8 @@ export class App {
       this.emptyCard, this.notice, this.bottom, this.helpDialog);
 
     this.setTheme(this.theme, false);
-    const roomy = innerWidth >= 900;
-    this.setPanel('drive', roomy);
-    this.setPanel('figures', roomy && innerHeight >= 600);
+    this.setPanel('drive', innerWidth >= 900);
+    this.setPanel('figures', innerWidth >= 1400);
     this.setPanel('view', false);
     this.setPanel('inspect', false);
     this.listen();
@@ -285,13 +285,17 @@ export class App {
     if (this.chosen) {
       if (innerWidth >= 900) {
         this.setPanel('inspect', true);
-        if (innerHeight < 1000) this.setPanel('figures', false);
+        if (innerHeight < 1000 && this.open('figures')) {
+          this.figuresMadeRoom = true;
+          this.setPanel('figures', false);
+        }
       }
     } else {
       for (const each of this.shown) each.view.following = 0;
       if (innerWidth >= 900) {
         this.setPanel('inspect', false);
-        this.setPanel('figures', true);
+        if (this.figuresMadeRoom) this.setPanel('figures', true);
+        this.figuresMadeRoom = false;
       }
     }
   }
@@ -428,21 +432,24 @@ export class App {
   }
 
   private aim(dtS: number): void {
-    let radius = 0;
+    let nearest = Infinity;
     for (const {view} of this.shown) {
       view.follow();
+      view.view.wantScale = 1;
       if (view.following) continue;
       const extent = view.extent();
       if (!extent) continue;
       if (this.framing || !view.framed) {
-        view.view.moveTo(extent.x, 0.75, extent.z, !view.framed);
+        view.view.moveTo(extent.x, 0.7, extent.z, !view.framed);
         view.framed = true;
+        // Views that are higher than wide see as much sideways, see ViewCamera.
+        view.wantDistanceM = Math.min(110, Math.max(4.4, (extent.radius + 0.75) / 0.42));
+        nearest = Math.min(nearest, view.wantDistanceM);
       }
-      radius = Math.max(radius, extent.radius);
     }
-    if (this.framing && radius > 0 && this.shown.length > 0) {
-      // Views that are higher than wide see as much sideways, see ViewCamera.
-      this.orbit.setDistance(Math.min(110, Math.max(4.6, (radius + 0.9) / 0.4)));
+    if (this.framing && nearest < Infinity) {
+      this.orbit.setDistance(nearest);
+      for (const {view} of this.shown) view.view.wantScale = view.wantDistanceM / nearest;
     }
     this.orbit.advance(dtS);
     for (const {view} of this.shown) view.aim(this.orbit, dtS);

@@ -46,6 +46,9 @@ export interface Box {
 export class ViewCamera {
   readonly camera = new THREE.PerspectiveCamera(42, 1, 0.1, 400);
   readonly target = new THREE.Vector3(0, 0.9, 0);
+  /** How much further than the shared distance this view looks from. */
+  scale = 1;
+  wantScale = 1;
   private readonly want = new THREE.Vector3(0, 0.9, 0);
 
   moveTo(x: number, y: number, z: number, atOnce = false): void {
@@ -55,7 +58,7 @@ export class ViewCamera {
 
   /** Moves the target in the ground plane, by shares of the view's height. */
   pan(orbit: Orbit, right: number, forward: number): void {
-    const scale = orbit.distanceM * 0.8;
+    const scale = orbit.distanceM * this.scale * 0.8;
     const s = Math.sin(orbit.azimuthRad);
     const c = Math.cos(orbit.azimuthRad);
     this.want.x += (c * right - s * forward) * scale;
@@ -69,10 +72,12 @@ export class ViewCamera {
   advance(orbit: Orbit, dtS: number, free: Box, box: Box): void {
     const aspect = free.width / Math.max(1, free.height);
     this.target.lerp(this.want, 1 - Math.exp(-dtS * 7));
-    const flat = Math.cos(orbit.elevationRad) * orbit.distanceM;
+    this.scale += (this.wantScale - this.scale) * (1 - Math.exp(-dtS * 5));
+    const distance = orbit.distanceM * this.scale;
+    const flat = Math.cos(orbit.elevationRad) * distance;
     this.camera.position.set(
       this.target.x + Math.sin(orbit.azimuthRad) * flat,
-      Math.max(0.15, this.target.y + Math.sin(orbit.elevationRad) * orbit.distanceM),
+      Math.max(0.15, this.target.y + Math.sin(orbit.elevationRad) * distance),
       this.target.z + Math.cos(orbit.azimuthRad) * flat);
     this.camera.aspect = aspect;
     // A narrow view keeps the width of a square one.

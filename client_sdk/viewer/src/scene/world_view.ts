@@ -45,6 +45,7 @@ export class WorldView {
   readonly box = {x: 0, y: 0, width: 1, height: 1};
   readonly free = {x: 0, y: 0, width: 1, height: 1};
   framed = false;
+  wantDistanceM = 8;
   chosen = 0;
   following = 0;
 
