@@ -31,6 +31,8 @@ int Main(int argc, char** argv) {
 
   auto libraries = Libraries::Load(command->config);
   if (!libraries) return Complain(libraries.error(), kExitBadInput);
+  auto viewer = ViewerFiles::Find(command->config.viewer_dir);
+  if (!viewer) return Complain(viewer.error(), kExitBadInput);
   if (command->action == Action::kCheckConfig) {
     std::puts("the configuration is good");
     return 0;
@@ -38,7 +40,7 @@ int Main(int argc, char** argv) {
 
   std::signal(SIGPIPE, SIG_IGN);
   const Log log(command->config.log_level);
-  Server server(command->config, *std::move(libraries));
+  Server server(command->config, *std::move(libraries), *std::move(viewer));
   server.WatchSignals();
   if (const auto status = server.Start(); !status) return Complain(status.error(), kExitFailure);
   std::printf("%s\n", server.ReadyLine().c_str());

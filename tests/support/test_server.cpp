@@ -18,10 +18,11 @@ server::Config TestConfig(int shards) {
   return config;
 }
 
-TestServer::TestServer(server::Config config) {
+TestServer::TestServer(server::Config config, server::ViewerFiles viewer) {
   server::Libraries libraries;
   libraries.Add(config.library, MakeToyLibrary());
-  server_ = std::make_unique<server::Server>(std::move(config), std::move(libraries));
+  server_ =
+      std::make_unique<server::Server>(std::move(config), std::move(libraries), std::move(viewer));
   if (const Status status = server_->Start(); !status) {
     std::fprintf(stderr, "the test's server did not start: %s\n", Describe(status.error()).c_str());
     std::abort();

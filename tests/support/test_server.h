@@ -15,7 +15,7 @@ namespace stridewire {
 /// A server in this process, on the toy library, with real sockets.
 class TestServer {
  public:
-  explicit TestServer(server::Config config = TestConfig());
+  explicit TestServer(server::Config config = TestConfig(), server::ViewerFiles viewer = {});
   ~TestServer();
   TestServer(const TestServer&) = delete;
   TestServer& operator=(const TestServer&) = delete;

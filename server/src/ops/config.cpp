@@ -167,6 +167,8 @@ std::vector<ConfigKey> MakeKeys() {
       List("allowed_origins",
            "Other pages that may stream: https://HOST[:PORT],...; * is not taken",
            &Config::allowed_origins, CheckOrigin),
+      Text("viewer_dir", "Folder of the page at /; empty: the one that came with the program",
+           &Config::viewer_dir),
       Text("library", "Library of worlds that name none: a .swl file or builtin", &Config::library,
            CheckNotEmpty),
       Text("data_dir", "Reserved for stored worlds; nothing is written yet", &Config::data_dir),
@@ -256,14 +258,13 @@ std::string Quoted(std::string_view text) {
 
 // Of a list as it stands in an option.
 std::string QuotedList(std::string_view list) {
-  std::string quoted = "[";
+  std::vector<std::string> items;
   while (!list.empty()) {
     const auto comma = std::min(list.find(','), list.size());
-    if (quoted.size() > 1) quoted += ", ";
-    quoted += Quoted(list.substr(0, comma));
+    items.push_back(Quoted(list.substr(0, comma)));
     list.remove_prefix(std::min(comma + 1, list.size()));
   }
-  return quoted + "]";
+  return fmt::format("[{}]", fmt::join(items, ", "));
 }
 
 }  // namespace

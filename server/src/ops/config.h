@@ -38,6 +38,7 @@ struct Config {
   Endpoint http = {"127.0.0.1", 7421};
   bool http_enabled = true;
   std::vector<std::string> allowed_origins;  ///< Pages of elsewhere that may open a stream.
+  std::string viewer_dir;  ///< Empty: the one built or installed with the program.
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for the world store; nothing is written yet.
   double tick_hz = 60.0;

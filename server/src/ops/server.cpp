@@ -5,6 +5,8 @@
 
 #include <boost/asio/post.hpp>
 #include <csignal>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "net/tcp_transport.h"
@@ -14,9 +16,27 @@ namespace stridewire::server {
 
 namespace asio = boost::asio;
 
-Server::Server(Config config, Libraries libraries)
+namespace {
+
+constexpr const char* kNoViewerPage = R"(<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><title>Stridewire</title></head><body>
+<h1>Stridewire</h1>
+<p>This server runs, but it has no viewer. To have one here, in the project's folder (needs npm):</p>
+<pre>cmake --preset release -DSTRIDEWIRE_BUILD_VIEWER=ON
+cmake --build --preset release --target viewer</pre>
+<p>and start build/release/bin/stridewired again, or name the folder of a viewer by
+<code>--viewer-dir</code>.</p>
+<p>Worlds: <a href="/info.json">info.json</a>. Health: <a href="/healthz">healthz</a>,
+<a href="/readyz">readyz</a>, <a href="/metrics">metrics</a>. Streams: /stream, a WebSocket.</p>
+</body></html>
+)";
+
+}  // namespace
+
+Server::Server(Config config, Libraries libraries, ViewerFiles viewer)
     : config_(std::move(config)),
       libraries_(std::move(libraries)),
+      viewer_(std::move(viewer)),
       metrics_(config_.shard_count()),
       avatar_budget_(config_.limits.max_avatars_per_world, config_.limits.max_avatars),
       worlds_(config_, libraries_),
@@ -47,6 +67,9 @@ Status Server::Start() {
   if (config_.http_enabled) {
     if (Status status = http_listener_.Open(config_.http, "http"); !status) return status;
     AddPages();
+    if (!viewer_.empty()) {
+      spdlog::info("the viewer at / has {} files, {} bytes", viewer_.count(), viewer_.bytes());
+    }
     http_listener_.Start([this](auto socket) { http_.Accept(std::move(socket)); });
   }
   if (!IsLoopback(config_.listen)) {
@@ -193,18 +216,44 @@ void Server::AddPages() {
     return HttpAnswer{.content_type = "text/plain; version=0.0.4; charset=utf-8",
                       .body = metrics_.Text()};
   });
-  http_.AddPage("/", [this](const HttpQuery&) {
-    return HttpAnswer{
-        .content_type = "text/html; charset=utf-8",
-        .body = fmt::format(
-            "<!doctype html><html lang=\"en\"><title>Stridewire</title>"
-            "<h1>Stridewire {}</h1><p>{}. {} avatars in {} worlds, {} sessions, {} shards at {} "
-            "Hz. Clients connect to {}.</p>"
-            "<p><a href=\"/metrics\">metrics</a> <a href=\"/healthz\">healthz</a> "
-            "<a href=\"/readyz\">readyz</a></p></html>\n",
-            kVersion, is_draining_ ? "Draining" : "Ready", avatar_budget_.total(), worlds_.size(),
-            sessions_.size(), shards_.size(), config_.tick_hz, ToText(listen_endpoint()))};
+  http_.AddPage("/info.json", [this](const HttpQuery&) {
+    return HttpAnswer{.content_type = "application/json", .body = InfoText()};
   });
+  if (viewer_.empty()) {
+    http_.AddPage("/", [](const HttpQuery&) {
+      return HttpAnswer{.content_type = "text/html; charset=utf-8",
+                        .body = kNoViewerPage,
+                        .headers = PageHeaders()};
+    });
+  }
+  http_.SetFallback([this](const HttpQuery& query) {
+    auto file = viewer_.Answer(query);
+    return file ? *std::move(file) : HttpAnswer{.status = 404, .body = "no such page\n"};
+  });
+}
+
+std::string Server::InfoText() const {
+  // What a library's file is called, not where it lies.
+  const auto library_name = [this](const std::string& world) {
+    const auto it = config_.worlds.find(world);
+    const bool has_own = it != config_.worlds.end() && !it->second.library.empty();
+    const std::string& path = has_own ? it->second.library : config_.library;
+    return path.substr(path.rfind('/') + 1);
+  };
+  std::map<std::string, std::int64_t> avatars;
+  for (const auto& [name, world] : config_.worlds) avatars[name] = 0;
+  worlds_.ForEach([&](const World& world) { avatars[world.name] = world.avatar_count.load(); });
+  nlohmann::ordered_json worlds = nlohmann::ordered_json::array();
+  for (const auto& [name, count] : avatars) {
+    worlds.push_back({{"name", name}, {"library", library_name(name)}, {"avatars", count}});
+  }
+  const nlohmann::ordered_json info = {{"version", kVersion},
+                                       {"tick_hz", config_.tick_hz},
+                                       {"shards", shards_.size()},
+                                       {"listen", ToText(listen_endpoint())},
+                                       {"open_worlds", config_.open_worlds},
+                                       {"worlds", worlds}};
+  return info.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace stridewire::server

@@ -13,6 +13,7 @@
 #include "ops/http_server.h"
 #include "ops/libraries.h"
 #include "ops/metrics.h"
+#include "ops/viewer_files.h"
 #include "session/gate.h"
 #include "session/session_directory.h"
 #include "world/shard.h"
@@ -24,7 +25,7 @@ namespace stridewire::server {
 /// and worlds (the one that calls Run), and one thread a shard.
 class Server : public ShardPeers {
  public:
-  Server(Config config, Libraries libraries);
+  Server(Config config, Libraries libraries, ViewerFiles viewer = {});
   ~Server() override;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -58,12 +59,14 @@ class Server : public ShardPeers {
   void SessionBegan(int shard, SessionIdentity identity) override;
 
   void AddPages();
+  [[nodiscard]] std::string InfoText() const;
   void ScheduleHousekeeping();
   void DoDrain();
   void Finish(bool is_drained);
 
   const Config config_;
   const Libraries libraries_;
+  const ViewerFiles viewer_;
   Metrics metrics_;
   AvatarBudget avatar_budget_;
   boost::asio::io_context context_{1};

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "ops/config.h"
@@ -30,6 +31,12 @@ class WorldDirectory {
 
   /// Forgets empty worlds and says which.
   [[nodiscard]] std::vector<WorldId> DropEmpty();
+
+  /// Calls function(const World&) for each, in order of names.
+  template <typename Function>
+  void ForEach(Function&& function) const {
+    for (const auto& [name, entry] : worlds_) function(std::as_const(*entry.world));
+  }
 
   [[nodiscard]] std::size_t size() const { return worlds_.size(); }
 
