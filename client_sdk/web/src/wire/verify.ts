@@ -43,7 +43,7 @@ class Verifier {
     if (!this.inside(at, 4, 4)) return -1;
     const count = this.view.getUint32(at, true);
     const bytes = count * size;  // Below 2^53: both are below 2^32.
-    return this.inside(at + 4, bytes, 1) && (count === 0 || (at + 4) % align === 0) ? count : -1;
+    return this.inside(at + 4, bytes, 1) && (at + 4) % align === 0 ? count : -1;
   }
 
   private string(at: number): boolean {

@@ -1,0 +1,197 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+import WebSocket from 'ws';
+import {Client} from '../src/client';
+import {createCrowdPose} from '../src/room';
+import type {ClientOptions, PoseMode, WorldEvent} from '../src/types';
+import {ServerProcess, programs, run, until} from './support/server_process';
+
+const skip = programs === undefined ? 'STRIDEWIRE_BIN names no folder of programs' : false;
+
+function makeClient(server: ServerProcess, options: Partial<ClientOptions> = {}): Client {
+  return new Client({
+    url: server.url, webSocket: WebSocket as never, clientName: 'web-test', seed: 1, ...options
+  });
+}
+
+const steps = (avatar: number, count: number) => Array.from({length: count}, (_, i) => ({
+  avatar, requestId: 100 + i, type: 'step' as const, lengthM: 0.5, turnRad: 0.1
+}));
+
+for (const mode of ['full', 'quantised'] as PoseMode[]) {
+  test(`poses of a tick are those that the C++ library has, ${mode}`, {skip}, async () => {
+    const server = await ServerProcess.start();
+    const client = makeClient(server);
+    try {
+      client.connect();
+      const world = client.joinWorld('plaza');
+      const spawned = await world.spawn(
+          [{avatar: 7, positionM: [3, 0, -2], headingRad: 1}, {positionM: [0, 0, 0], headingRad: 0}]);
+      assert.deepEqual(spawned.items.map((item) => item.code), [0, 0]);
+      assert.ok((await world.observe({mode}).reply).ok);
+      assert.ok((await world.request(steps(7, 8))).ok);
+      const lines = (await run('web_pose_dump', [
+        '127.0.0.1', `${server.port}`, 'plaza', '7', '120', mode
+      ])).trim().split('\n').map((line) => line.split(' ').map(Number));
+      await until('the last of them is here', () => world.recording.lastTimeS >= lines.at(-1)![1]!);
+      const crowd = createCrowdPose();
+      const joints = world.skeleton!.jointCount;
+      let compared = 0;
+      let moved = 0;
+      for (const [, timeS, ...numbers] of lines) {
+        assert.equal(world.recording.sampleAll(timeS!, crowd), 2);
+        const place = crowd.avatars.indexOf(7);
+        const ours = [
+          ...crowd.rootsM.subarray(3 * place, 3 * place + 3),
+          ...crowd.rotations.subarray(4 * joints * place, 4 * joints * (place + 1))
+        ];
+        assert.equal(ours.length, numbers.length);
+        assert.equal(crowd.flags[place]! & 4, 0, 'a pose of exactly this tick');
+        ours.forEach((number, i) => {
+          const theirs = Math.fround(numbers[i]!);
+          assert.ok(mode === 'full' ? number === theirs : Math.abs(number - theirs) < 1e-6,
+                    `number ${i} at ${timeS}: ${number}, ${theirs}`);
+        });
+        ++compared;
+        moved = Math.max(moved, Math.hypot(ours[0]! - 3, ours[2]! + 2));
+      }
+      assert.equal(compared, 120);
+      assert.ok(moved > 0.5, `moved ${moved} m`);
+      console.log(`${mode}: ${compared} poses of ${joints} joints the same`);
+    } finally {
+      client.close();
+      await server.kill();
+    }
+  });
+}
+
+test('steps asked for are started, land and finish, and can be looked into', {skip}, async () => {
+  const server = await ServerProcess.start();
+  const client = makeClient(server);
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    const heard: WorldEvent[] = [];
+    world.on('event', (event) => heard.push(event));
+    await world.spawn([{avatar: 1, positionM: [0, 0, 0], headingRad: 0}]);
+    void world.observe({mode: 'quantised'});
+    const reply = await world.request(steps(1, 3));
+    assert.equal(reply.accepted, 3);
+    await until('a step is under way', () => heard.some(({type}) => type === 'started'));
+    const state = await world.inspect(1);
+    assert.ok(state.movement !== null);
+    assert.equal(state.queueSize, 2);
+    assert.equal(state.queue[0]!.requestId, 101n);
+    assert.equal(state.queue[0]!.lengthM, 0.5);
+    const {movement} = state;
+    assert.ok(Math.abs(movement.weights.reduce((sum, w) => sum + w, 0) - 1) < 1e-3);
+    assert.equal(movement.sites.length, movement.weights.length * movement.parameterNames.length);
+    assert.ok(state.timeS >= movement.startTimeS && state.timeS <= movement.endTimeS + 0.1);
+    assert.ok(movement.keytimesS.length > 2);
+    await assert.rejects(world.inspect(999), {status: 'no_such_avatar'});
+    await until('all is done', () => heard.some(
+        ({type, requestId}) => type === 'finished' && requestId === 102n));
+    const finished = heard.filter(({type, requestId}) => type === 'finished' && requestId !== 0n);
+    assert.deepEqual(finished.map(({requestId}) => requestId), [100n, 101n, 102n]);
+    assert.ok(heard.some(({type, foot}) => type === 'footStrike' && foot !== null));
+    const started = heard.find(({type, requestId}) => type === 'started' && requestId === 100n)!;
+    assert.ok(Math.abs(started.applied.turn! - 0.1) < 0.05, JSON.stringify(started.applied));
+    // The render time goes on evenly, behind the server's.
+    const renderS = client.renderTimeS()!;
+    assert.ok(Math.abs(client.serverTimeS()! - renderS - 0.1) < 1e-2);
+    const crowd = createCrowdPose();
+    assert.equal(world.sampleAll(renderS, crowd), 1);
+    assert.equal((await world.spawn([{avatar: 1, positionM: [0, 0, 0], headingRad: 0}]))
+                     .items[0]!.status, 'avatar_exists');
+    assert.equal((await world.remove([1])).accepted, 1);
+    await until('nobody is there', () => world.avatars().length === 0);
+    assert.equal(client.statistics.invalidFrames, 0);
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
+
+test('a connection that is cut is resumed, and every command done once', {skip}, async () => {
+  const server = await ServerProcess.start();
+  const sockets: WebSocket[] = [];
+  class Cut extends WebSocket {
+    constructor(url: string) {
+      super(url);
+      sockets.push(this);
+    }
+  }
+  const client = makeClient(server, {webSocket: Cut as never});
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    const spawned: number[] = [];
+    world.on('event', (event) => {
+      if (event.type === 'spawned') spawned.push(event.avatar);
+    });
+    void world.observe({mode: 'quantised'});
+    await world.joined;
+    const replies = [];
+    for (let avatar = 1; avatar <= 60; ++avatar) {
+      replies.push(world.spawn([{avatar, positionM: [avatar, 0, 0], headingRad: 0}]));
+      if (avatar % 20 === 10) sockets.at(-1)!.terminate();
+      await new Promise((resolve) => setTimeout(resolve, 5));
+    }
+    for (const reply of await Promise.all(replies)) {
+      assert.deepEqual(reply.items.map((item) => item.status), ['ok']);
+    }
+    await until('all have been told', () => spawned.length >= 60);
+    assert.deepEqual([...spawned].sort((a, b) => a - b), Array.from({length: 60}, (_, i) => i + 1));
+    await until('all are seen', () => world.avatars().length === 60);
+    const {resumes, reconnects} = client.statistics;
+    assert.ok(resumes >= 1 && resumes === reconnects, `${resumes} of ${reconnects}`);
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
+
+test('a server that is killed and started again has the crowd back', {skip}, async () => {
+  let server = await ServerProcess.start();
+  const client = makeClient(server, {respawn: true});
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    let lost = 0;
+    client.on('sessionLost', () => ++lost);
+    await world.spawn([1, 2, 3].map(
+        (avatar) => ({avatar, positionM: [avatar, 0, 0], headingRad: 0})));
+    void world.observe({mode: 'quantised'});
+    await until('they are seen', () => world.avatars().length === 3);
+    const {port, httpPort} = server;
+    await server.kill('SIGKILL');
+    await until('the loss is noticed', () => client.state !== 'ready');
+    assert.notEqual(client.lastError, '');
+    server = await ServerProcess.start(port, httpPort);
+    await until('they are back', () => client.state === 'ready' && lost === 1 &&
+        world.avatars().length === 3);
+    const crowd = createCrowdPose();
+    await until('they are shown',
+                () => world.sampleAll(client.renderTimeS() ?? 0, crowd) === 3);
+    assert.deepEqual([...crowd.rootsM].filter((_, i) => i % 3 === 0 && i < 9).map(Math.round),
+                     [1, 2, 3]);
+    assert.ok((await world.request(steps(2, 1))).ok);
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
+
+test('says in a sentence that there is no server', {skip}, async () => {
+  const server = await ServerProcess.start();
+  await server.kill();
+  const client = makeClient(server);
+  const told: string[] = [];
+  client.on('error', (code, text) => told.push(`${code} ${text}`));
+  client.connect();
+  await until('two attempts have failed', () => told.length >= 2);
+  assert.match(told[0]!, /^351 No connection could be made/);
+  assert.equal(client.lastError, 'No connection could be made.');
+  client.close();
+  assert.equal(client.state, 'idle');
+});
