@@ -14,7 +14,7 @@ import {makeRenderer} from './renderer.js';
 import type {RendererInfo} from './renderer.js';
 import {Orbit, listenToPointers} from './scene/camera.js';
 import {Overlay} from './scene/overlay.js';
-import {WorldView} from './scene/world_view.js';
+import {WorldView, projected} from './scene/world_view.js';
 import type {ViewOptions} from './scene/world_view.js';
 import {Client} from './sdk.js';
 import type {MovementRequest, PoseMode, Subscription, World} from './sdk.js';
@@ -440,10 +440,12 @@ export class App {
       const extent = view.extent();
       if (!extent) continue;
       if (this.framing || !view.framed) {
-        view.view.moveTo(extent.x, 0.7, extent.z, !view.framed);
+        view.view.moveTo(extent.x, 0.8, extent.z, !view.framed);
         view.framed = true;
-        // Views that are higher than wide see as much sideways, see ViewCamera.
-        view.wantDistanceM = Math.min(110, Math.max(4.4, (extent.radius + 0.75) / 0.42));
+        // Views that are higher than wide see as much sideways as square ones, see ViewCamera.
+        const aspect = Math.min(1.7, Math.max(1, view.free.width / Math.max(1, view.free.height)));
+        view.wantDistanceM = Math.min(
+          110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.2 * extent.radius));
         nearest = Math.min(nearest, view.wantDistanceM);
       }
     }
@@ -796,6 +798,14 @@ export class App {
   }
   get inspected(): Inspector['state'] {
     return this.inspector.state;
+  }
+  onPage(world: string, avatar: number): {x: number; y: number} | null {
+    const view = this.shown.find((shown) => shown.world.name === world)?.view;
+    const i = view?.indexOf(avatar) ?? -1;
+    if (!view?.crowd || i < 0) return null;
+    if (!view.project(view.crowd.positions, i * view.crowd.skeleton.jointCount * 3)) return null;
+    const {x, y} = projected;
+    return x >= 0 && y >= 0 && x < this.canvas.clientWidth && y < this.canvas.clientHeight ? {x, y} : null;
   }
   get selection(): {world: string; avatar: number} | null {
     return this.chosen ? {world: this.chosen.shown.world.name, avatar: this.chosen.avatar} : null;

@@ -42,6 +42,10 @@ if (!info) {
       get inspected() {
         return app.inspected;
       },
+      /** Where an avatar's root is on the page, to click it; null when it is not seen. */
+      place(world: string, avatar: number) {
+        return app.onPage(world, avatar);
+      },
       /** Poses as drawn in the last frame: a copy, by world. */
       sampled() {
         return app.shown.map(({world, view}) => ({

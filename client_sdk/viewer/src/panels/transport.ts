@@ -72,7 +72,7 @@ export class Transport {
     if (span) this.scrub.min = (-Math.min(20, Math.max(0.1, span.lastS - span.firstS))).toFixed(2);
     this.scrub.value = back.toFixed(2);
     const text = playback.live ? 'live' : `−${Math.max(0, -back).toFixed(1)} s`;
-    setText(this.behind, text);
+    setText(this.behind, playback.live ? '' : text);
     this.scrub.setAttribute('aria-valuetext', text);
     this.liveButton.disabled = playback.live;
   }

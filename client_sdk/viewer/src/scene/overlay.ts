@@ -3,6 +3,12 @@
 import type {WorldView} from './world_view.js';
 import {projected} from './world_view.js';
 
+interface Joint {
+  name: string;
+  x: number;
+  y: number;
+}
+
 export class Overlay {
   private readonly context: CanvasRenderingContext2D;
   private width = 0;
@@ -66,7 +72,9 @@ export class Overlay {
     const n = crowd.skeleton.jointCount;
     let top = Infinity;
     let topX = 0;
-    const taken: [number, number][] = [];
+    let low = Infinity;
+    let high = -Infinity;
+    const joints: Joint[] = [];
     for (let j = 0; j < n; ++j) {
       if (!chosen.project(crowd.positions, (i * n + j) * 3)) continue;
       const {x, y} = projected;
@@ -74,21 +82,44 @@ export class Overlay {
         top = y;
         topX = x;
       }
-      if (!jointNames) continue;
-      context.fillStyle = this.colours.accent;
-      context.beginPath();
-      context.arc(x, y, 3, 0, 7);
-      context.fill();
-      let line = y + 4;
-      for (let tries = 0; tries < 8 && taken.some(([a, b]) => Math.abs(a - x) < 90 && Math.abs(b - line) < 11); ++tries) {
-        line += 11;
-      }
-      taken.push([x, line]);
-      this.text(crowd.skeleton.names[j] ?? '', x + 7, line, '11px', 'left', this.colours.text);
+      low = Math.min(low, x);
+      high = Math.max(high, x);
+      if (jointNames) joints.push({name: crowd.skeleton.names[j] ?? '', x, y});
     }
+    if (jointNames) this.nameJoints(joints, low - 26, high + 26);
     if (top < Infinity) {
       const lift = Math.max(10, (crowd.heightM * 0.13 * chosen.box.height) / (projected.z || 5) * 0.9);
       this.text(`${chosen.chosen}`, topX, top - lift, '600 13px', 'center', this.colours.accent);
+    }
+  }
+
+  /** Names in a column on either side of the figure, each with a line to its joint. */
+  private nameJoints(joints: readonly Joint[], left: number, right: number): void {
+    const {context} = this;
+    const byX = [...joints].sort((a, b) => a.x - b.x);
+    const half = Math.floor(byX.length / 2);
+    for (const [column, at, align] of [
+      [byX.slice(0, half), left, 'right'], [byX.slice(half), right, 'left']] as const) {
+      column.sort((a, b) => a.y - b.y);
+      const space = 14;
+      const middle = column.reduce((sum, joint) => sum + joint.y, 0) / Math.max(1, column.length);
+      let y = middle - (column.length - 1) * space / 2;
+      for (const joint of column) {
+        context.strokeStyle = this.colours.accent;
+        context.globalAlpha = 0.55;
+        context.lineWidth = 1;
+        context.beginPath();
+        context.moveTo(at + (align === 'right' ? 3 : -3), y);
+        context.lineTo(joint.x, joint.y);
+        context.stroke();
+        context.globalAlpha = 1;
+        context.fillStyle = this.colours.accent;
+        context.beginPath();
+        context.arc(joint.x, joint.y, 3, 0, 7);
+        context.fill();
+        this.text(joint.name, at, y + 4, '12px', align, this.colours.text);
+        y += space;
+      }
     }
   }
 

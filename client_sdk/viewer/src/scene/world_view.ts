@@ -146,7 +146,14 @@ export class WorldView {
       z0 = Math.min(z0, z);
       z1 = Math.max(z1, z);
     }
-    return {x: (x0 + x1) / 2, z: (z0 + z1) / 2, radius: Math.hypot(x1 - x0, z1 - z0) / 2};
+    const x = (x0 + x1) / 2;
+    const z = (z0 + z1) / 2;
+    let radius = 0;
+    for (let i = 0; i < crowd.count; ++i) {
+      radius = Math.max(radius,
+        Math.hypot(crowd.positions[i * stride]! - x, crowd.positions[i * stride + 2]! - z));
+    }
+    return {x, z, radius};
   }
 
   /** Aims the grid and the camera; call after `follow`. */
