@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "child_process.h"
 #include "run_program.h"
 #include "scratch_folder.h"
 #include "stridewire/base/version.h"
@@ -102,7 +104,7 @@ TEST_F(LibraryTool, TellsItsVersion) {
 TEST_F(LibraryTool, HelpsEveryCommandWithAnExample) {
   const ProgramResult all = Tool({"--help"});
   EXPECT_EQ(all.exit_code, 0);
-  for (const char* command : {"build", "inspect", "synthesize", "export-capture"}) {
+  for (const char* command : {"build", "inspect", "refine", "synthesize", "export-capture"}) {
     EXPECT_THAT(all.out, HasSubstr(std::string("\n  stridewire-library ") + command));
   }
   for (const char* command :
@@ -371,7 +373,6 @@ TEST_F(LibraryTool, SaysWhatIsNotSupportedYet) {
     ExpectFailure(arguments, 2, named);
     ExpectFailure(arguments, 2, "not supported yet");
   }
-  ExpectFailure({"refine", "builtin", "--out", Out()}, 2, "refine is not supported yet");
   ExpectFailure({"report", "builtin", "--out", Out()}, 2, "report is not supported yet");
   EXPECT_EQ(folder_.Count(), 1);
 }
@@ -495,9 +496,12 @@ TEST_F(LibraryTool, InspectsAsOneJsonObject) {
       }
       EXPECT_THAT(Keys(group["parameters"][0]),
                   testing::UnorderedElementsAre("name", "min", "max", "scale"));
-      EXPECT_THAT(Keys(group["error_m"]), testing::UnorderedElementsAre("max", "mean", "samples"));
+      EXPECT_THAT(Keys(group["error_m"]),
+                  testing::UnorderedElementsAre("max", "mean", "min", "samples"));
       EXPECT_THAT(Keys(group["corrected_error_m"]),
-                  testing::UnorderedElementsAre("max", "iterations"));
+                  testing::UnorderedElementsAre("max", "mean", "iterations"));
+      EXPECT_THAT(Keys(group["weights"]), testing::UnorderedElementsAre("sum_max", "condition"));
+      EXPECT_FALSE(group.contains("unrefined_error_m"));
       EXPECT_EQ(group.contains("sites"), examples);
       if (!examples) continue;
       EXPECT_EQ(group["sites"].size(), group["examples"].get<std::size_t>());
@@ -517,6 +521,9 @@ TEST_F(LibraryTool, InspectsAsText) {
                                 HasSubstr("jump, 4 examples")));
   EXPECT_THAT(Tool({"inspect", "builtin"}).out, Not(HasSubstr("(mirrored)")));
 }
+
+constexpr const char* kStepsOnly =
+    R"({"movements":[{"step":{"length_m":0.5}},{"step":{"length_m":0.4}}]})";
 
 constexpr const char* kWalk =
     R"({"start":{"position_m":[1,0,2],"heading_rad":0.5},
@@ -580,6 +587,107 @@ TEST_F(LibraryTool, SynthesizesWhatItReports) {
       Tool({"synthesize", "builtin", "--choreography", choreography, "--out", Out("o.bvh")});
   EXPECT_EQ(text.exit_code, 0);
   EXPECT_THAT(text.out, HasSubstr("movements"));
+}
+
+TEST_F(LibraryTool, RefinesAndReportsAsOneJsonObject) {
+  ASSERT_EQ(Tool({"build", "--out", Out("in.swl"), kSteps}).exit_code, 0);
+  const Arguments arguments = {"refine", Out("in.swl"), "--json", "--max-pseudoexamples",
+                               "5",      "--out"};
+  const ProgramResult result = Tool(Join(arguments, {Out()}));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, IsEmpty());
+  const json report = ParseOutput(result.out);
+  EXPECT_THAT(Keys(report),
+              testing::UnorderedElementsAre("rule", "max_error_m", "groups", "library"));
+  int pseudoexamples = 0;
+  for (std::size_t g = 0; g < report["groups"].size(); ++g) {
+    const json& group = report["groups"][g];
+    for (const char* when : {"before", "after"}) {
+      EXPECT_THAT(Keys(group[when]),
+                  testing::UnorderedElementsAre("error_m", "weight_sum_max", "condition"));
+      EXPECT_THAT(Keys(group[when]["error_m"]),
+                  testing::UnorderedElementsAre("min", "mean", "max"));
+    }
+    EXPECT_LE(group["max_error_curve_m"].back(), group["max_error_curve_m"].front());
+    EXPECT_EQ(group["max_error_curve_m"].size(), group["pseudoexamples"].get<std::size_t>() + 1);
+    pseudoexamples += group["pseudoexamples"].get<int>();
+  }
+  EXPECT_GT(pseudoexamples, 0);
+
+  // The same bytes again, also from a library that has been refined.
+  EXPECT_EQ(Tool(Join(arguments, {Out("again.swl")})).out, result.out);
+  EXPECT_EQ(ReadWhole(Out("again.swl")), ReadWhole(Out()));
+  EXPECT_EQ(folder_.Count(), 3);
+
+  // inspect shows them.
+  const ProgramResult inspected = Tool({"inspect", Out(), "--json"});
+  EXPECT_EQ(report["library"], ParseOutput(inspected.out));
+  const json shown = ParseOutput(Tool({"inspect", Out(), "--json", "--examples"}).out);
+  int sites = 0;
+  for (const json& group : shown["groups"]) {
+    EXPECT_EQ(group.contains("unrefined_error_m"), group["pseudoexamples"] > 0);
+    for (const json& site : group["sites"]) {
+      if (!site["pseudoexample"]) continue;
+      ++sites;
+      double sum = 0.0;
+      for (const json& weight : site["weights"]) sum += weight.get<double>();
+      EXPECT_NEAR(sum, 1.0, 1e-9);
+      EXPECT_TRUE(site["source"].is_null());
+    }
+  }
+  EXPECT_EQ(sites, pseudoexamples);
+  EXPECT_THAT(Tool({"inspect", Out(), "--examples"}).out,
+              AllOf(HasSubstr("pseudoexamples; without them"), HasSubstr("  pseudoexample\n")));
+  const std::string choreography = folder_.Write("c.json", kStepsOnly);
+  EXPECT_EQ(
+      Tool({"synthesize", Out(), "--choreography", choreography, "--out", Out("o.bvh")}).exit_code,
+      0);
+}
+
+TEST_F(LibraryTool, RefinesByTheRuleAskedFor) {
+  ASSERT_EQ(Tool({"build", "--out", Out("in.swl"), kSteps}).exit_code, 0);
+  for (const char* rule : {"amended", "bare"}) {
+    const ProgramResult result = Tool(
+        {"refine", Out("in.swl"), "--out", Out(rule), "--rule", rule, "--max-error-m", "0.02"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, AllOf(HasSubstr("before  misses by"), HasSubstr("after   misses by")));
+  }
+  EXPECT_NE(ReadWhole(Out("amended")), ReadWhole(Out("bare")));
+}
+
+TEST_F(LibraryTool, RefusesWhatCannotBeRefined) {
+  const std::string damaged = folder_.Write("damaged.swl", "STRDWSWL and no more");
+  ExpectFailure({"refine", damaged, "--out", Out()}, 2, "damaged.swl");
+  ExpectFailure({"refine", "missing.swl", "--out", Out()}, 2, "missing.swl");
+  ExpectFailure({"refine", damaged, "--out", damaged}, 2, "--out");
+  ExpectFailure({"refine", "builtin"}, 2, "--out");
+  ExpectFailure({"refine", "builtin", "--out", Out(), "--rule", "other"}, 2, "--rule");
+  ExpectFailure({"refine", "builtin", "--out", Out(), "--max-error-m", "-1"}, 2, "--max-error-m");
+  ExpectFailure({"refine", "builtin", "--out", Out(), "--max-pseudoexamples", "1025"}, 2,
+                "--max-pseudoexamples");
+  ExpectFailure({"refine", "builtin", "--out", folder_.File("no/where.swl")}, 1, "folder");
+  EXPECT_EQ(folder_.Count(), 1);
+}
+
+TEST_F(LibraryTool, LeavesNoHalfFileWhenInterrupted) {
+  test::ChildProcess refining(
+      STRIDEWIRE_LIBRARY_TOOL,
+      {"refine", "builtin", "--out", Out(), "--max-error-m", "0", "--max-pseudoexamples", "1024"});
+  // Interrupted when it is about to catch that, well before it could be done.
+  const std::string status = "/proc/" + std::to_string(refining.pid()) + "/status";
+  const auto catches = [&] {
+    std::ifstream file(status);
+    for (std::string line; std::getline(file, line);) {
+      if (!line.starts_with("SigCgt:")) continue;
+      return (std::stoull(line.substr(7), nullptr, 16) >> (SIGINT - 1) & 1) != 0;
+    }
+    return false;
+  };
+  for (int i = 0; i < 3000 && !catches(); ++i) usleep(10'000);
+  ASSERT_TRUE(catches());
+  refining.Signal(SIGINT);
+  EXPECT_EQ(refining.Wait(), 1);
+  EXPECT_EQ(folder_.Count(), 0);
 }
 
 TEST_F(LibraryTool, CorrectsParametersUnlessToldNotTo) {

@@ -45,6 +45,8 @@ class ChildProcess {
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
+  [[nodiscard]] pid_t pid() const { return child_; }
+
   void Signal(int signal) const {
     if (child_ > 0) kill(child_, signal);
   }

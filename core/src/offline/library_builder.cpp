@@ -1,7 +1,5 @@
 #include "stridewire/offline/library_builder.h"
 
-#include <flatbuffers/flatbuffers.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,20 +8,12 @@
 #include "example_clusters.h"
 #include "grid_cells.h"
 #include "grid_example.h"
-#include "library_file.h"
-#include "motion_library_generated.h"
+#include "stridewire/offline/library_writer.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/measure.h"
 
 namespace stridewire {
 namespace {
-
-fb::Vec3 ToFb(const Vec3& v) { return {v.x, v.y, v.z}; }
-
-fb::Leg ToFb(const Leg& leg) {
-  return {
-      leg.hip, leg.knee, leg.ankle, leg.ball, ToFb(leg.ball_offset_m), ToFb(leg.toe_tip_offset_m)};
-}
 
 std::string Where(const RawGroup& group, const RawExample& example) {
   return std::string(MovementKindName(group.kind)) + " example " + example.source;
@@ -83,6 +73,34 @@ ParameterRange RangeOf(const std::vector<GridExample>& examples, std::size_t l) 
   return range;
 }
 
+// A group's numbers, in the order a library has them.
+struct StoredGroup {
+  CardinalBasis basis;
+  std::vector<int> cells;
+  std::vector<double> keytimes_s;
+  std::vector<double> heading_changes_rad;
+  std::vector<float> grid;
+  std::vector<std::string> sources;
+  std::vector<std::uint8_t> mirrored;
+
+  // Without kind, parameters and grid point count.
+  [[nodiscard]] MotionGroup View() const {
+    MotionGroup view;
+    view.example_count = view.site_count = basis.example_count;
+    view.sites = basis.sites;
+    view.dilations = basis.dilations;
+    view.linear = basis.linear;
+    view.radial = basis.radial;
+    view.cells = cells;
+    view.keytimes_s = keytimes_s;
+    view.heading_change_rad = heading_changes_rad;
+    view.grid = grid;
+    view.sources.assign(sources.begin(), sources.end());
+    view.mirrored = mirrored;
+    return view;
+  }
+};
+
 }  // namespace
 
 Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLibrary& raw) {
@@ -94,8 +112,8 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
   }
   const GridLayout layout(joint_count);
 
-  flatbuffers::FlatBufferBuilder builder(1 << 20);
-  std::vector<flatbuffers::Offset<fb::Group>> groups;
+  std::vector<std::unique_ptr<StoredGroup>> groups;  // what the views are of
+  std::vector<MotionGroup> views;
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
     const RawGroup& group = raw.groups[g];
     if (group.examples.empty()) continue;
@@ -145,17 +163,15 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
              " is the same in every example: asking for another value has no effect");
       }
     }
+    StoredGroup& stored = *groups.emplace_back(std::make_unique<StoredGroup>());
     std::vector<double> sites;
-    std::vector<double> keytimes;
-    std::vector<double> heading_changes;
-    std::vector<std::uint8_t> mirrored;
-    std::vector<flatbuffers::Offset<flatbuffers::String>> sources;
     for (const GridExample& example : examples) {
       sites.insert(sites.end(), example.parameters.begin(), example.parameters.end());
-      keytimes.insert(keytimes.end(), example.keytimes_s.begin(), example.keytimes_s.end());
-      heading_changes.push_back(example.heading_change_rad);
-      mirrored.push_back(example.mirrored ? 1 : 0);
-      sources.push_back(builder.CreateString(example.source));
+      stored.keytimes_s.insert(stored.keytimes_s.end(), example.keytimes_s.begin(),
+                               example.keytimes_s.end());
+      stored.heading_changes_rad.push_back(example.heading_change_rad);
+      stored.mirrored.push_back(example.mirrored ? 1 : 0);
+      stored.sources.push_back(example.source);
     }
     Expected<CardinalBasis> basis =
         CardinalBasisFit{static_cast<int>(d), static_cast<int>(n), sites, {}, scales}.Run();
@@ -164,70 +180,28 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
       error.where = "group " + std::string(MovementKindName(group.kind));
       return std::unexpected(error);
     }
+    stored.basis = *std::move(basis);
+    stored.cells = cells;
 
     const std::size_t row_floats = static_cast<std::size_t>(layout.row_floats);
     const std::size_t points = examples.front().rows.size() / row_floats;
-    builder.ForceVectorAlignment(points * n * row_floats, sizeof(float), 64);
-    float* grid = nullptr;
-    const auto grid_offset = builder.CreateUninitializedVector(points * n * row_floats, &grid);
+    stored.grid.resize(points * n * row_floats);
     for (std::size_t p = 0; p < points; ++p) {
       for (std::size_t e = 0; e < n; ++e) {
-        std::memcpy(grid + (p * n + e) * row_floats, &examples[e].rows[p * row_floats],
+        std::memcpy(&stored.grid[(p * n + e) * row_floats], &examples[e].rows[p * row_floats],
                     row_floats * sizeof(float));
       }
     }
-
-    std::vector<fb::Parameter> parameters;
+    MotionGroup view = stored.View();
+    view.kind = group.kind;
+    view.grid_point_count = static_cast<int>(points);
     for (std::size_t l = 0; l < d; ++l) {
-      parameters.emplace_back(ranges[l].min, ranges[l].max, basis->centres[l], scales[l],
-                              static_cast<std::uint8_t>(group.parameters[l]));
+      view.parameters.push_back(
+          {group.parameters[l], ranges[l].min, ranges[l].max, stored.basis.centres[l], scales[l]});
     }
-    const auto parameters_offset = builder.CreateVectorOfStructs(parameters);
-    const auto sites_offset = builder.CreateVector(basis->sites);
-    const auto dilations_offset = builder.CreateVector(basis->dilations);
-    const auto linear_offset = builder.CreateVector(basis->linear);
-    const auto radial_offset = builder.CreateVector(basis->radial);
-    const auto cells_offset = builder.CreateVector(cells);
-    const auto keytimes_offset = builder.CreateVector(keytimes);
-    const auto heading_offset = builder.CreateVector(heading_changes);
-    const auto sources_offset = builder.CreateVector(sources);
-    const auto mirrored_offset = builder.CreateVector(mirrored);
-    groups.push_back(fb::CreateGroup(
-        builder, static_cast<std::uint8_t>(group.kind), parameters_offset, static_cast<int>(n),
-        sites_offset, 0, dilations_offset, linear_offset, radial_offset, cells_offset,
-        keytimes_offset, heading_offset, grid_offset, sources_offset, mirrored_offset));
+    views.push_back(std::move(view));
   }
-  if (groups.empty()) return Fail(ErrorCode::kOutOfRange, "there is no example to build from");
-
-  std::vector<flatbuffers::Offset<fb::Joint>> joints;
-  for (const Joint& joint : raw.skeleton.joints) {
-    const fb::Vec3 offset = ToFb(joint.offset_m);
-    joints.push_back(
-        fb::CreateJoint(builder, builder.CreateString(joint.name), joint.parent, &offset));
-  }
-  std::vector<fb::EndSite> end_sites;
-  for (const EndSite& site : raw.skeleton.end_sites) {
-    end_sites.emplace_back(site.joint, ToFb(site.offset_m));
-  }
-  const auto joints_offset = builder.CreateVector(joints);
-  const auto end_sites_offset = builder.CreateVectorOfStructs(end_sites);
-  const fb::Leg left = ToFb(raw.skeleton.leg(Foot::kLeft));
-  const fb::Leg right = ToFb(raw.skeleton.leg(Foot::kRight));
-  const auto skeleton = fb::CreateSkeleton(builder, joints_offset, end_sites_offset, &left, &right);
-  std::vector<fb::Quat> stand;
-  for (const Quat& q : raw.stand_pose.rotations) stand.emplace_back(q.x, q.y, q.z, q.w);
-  const fb::Vec3 stand_root = ToFb(raw.stand_pose.root_position_m);
-  const auto stand_offset = builder.CreateVectorOfStructs(stand);
-  const auto groups_offset = builder.CreateVector(groups);
-  fb::FinishMotionLibraryBuffer(builder, fb::CreateMotionLibrary(builder, skeleton, &stand_root,
-                                                                 stand_offset, groups_offset));
-
-  const std::span payload(reinterpret_cast<const std::byte*>(builder.GetBufferPointer()),
-                          builder.GetSize());
-  const auto header = MakeLibraryHeader(payload);
-  std::vector<std::byte> bytes(header.begin(), header.end());
-  bytes.insert(bytes.end(), payload.begin(), payload.end());
-  return MotionLibrary::FromBytes(bytes);
+  return WriteLibrary({raw.skeleton, raw.stand_pose, views});
 }
 
 }  // namespace stridewire

@@ -85,7 +85,17 @@ Correction CorrectParameters(const MotionLibrary& library, int group_index,
                              const ParameterValues& wanted, const CorrectionLimits& limits,
                              std::span<double> weight_scratch, GridCache& cache, PoseSpan pose,
                              Movement& movement) {
-  const MotionGroup& group = library.group(group_index);
+  const Correction correction =
+      CorrectParameters(library.skeleton(), library.layout(), library.group(group_index), wanted,
+                        limits, weight_scratch, cache, pose, movement);
+  movement.group = group_index;
+  return correction;
+}
+
+Correction CorrectParameters(const Skeleton& skeleton, const GridLayout& layout,
+                             const MotionGroup& group, const ParameterValues& wanted,
+                             const CorrectionLimits& limits, std::span<double> weight_scratch,
+                             GridCache& cache, PoseSpan pose, Movement& movement) {
   const std::size_t d = group.parameters.size();
   Vector unit{};
   for (std::size_t l = 0; l < d; ++l) {
@@ -109,12 +119,13 @@ Correction CorrectParameters(const MotionLibrary& library, int group_index,
     Point point;
     point.shift = shift;
     const ParameterValues p = parameters_at(shift);
-    SetWeights(group, group_index, std::span(p.values).first(d), weight_scratch, movement);
+    SetWeights(group, -1, std::span(p.values).first(d), weight_scratch, movement);
     for (const float weight : movement.weights) {
       point.weight_sum += std::fabs(static_cast<double>(weight));
     }
     cache.Clear();
-    const ParameterValues measured = MeasureMovement(library, movement, cache, pose);
+    const ParameterValues measured =
+        MeasureMovement(skeleton, layout, group, movement, cache, pose);
     for (std::size_t l = 0; l < d; ++l) {
       point.r[l] = unit[l] * (wanted.values[l] - measured.values[l]);
       point.error_m = std::max(point.error_m, std::fabs(point.r[l]));

@@ -23,11 +23,17 @@ Feet FeetOf(const Skeleton& skeleton, ConstPoseSpan pose) {
 
 ParameterValues MeasureMovement(const MotionLibrary& library, const Movement& movement,
                                 GridCache& cache, PoseSpan pose) {
-  const MotionGroup& group = library.group(movement.group);
-  EvaluateGridPoint(group, library.layout(), movement, 0, cache, pose);
-  const Feet before = FeetOf(library.skeleton(), pose);
-  EvaluateGridPoint(group, library.layout(), movement, group.grid_point_count - 1, cache, pose);
-  const Feet after = FeetOf(library.skeleton(), pose);
+  return MeasureMovement(library.skeleton(), library.layout(), library.group(movement.group),
+                         movement, cache, pose);
+}
+
+ParameterValues MeasureMovement(const Skeleton& skeleton, const GridLayout& layout,
+                                const MotionGroup& group, const Movement& movement,
+                                GridCache& cache, PoseSpan pose) {
+  EvaluateGridPoint(group, layout, movement, 0, cache, pose);
+  const Feet before = FeetOf(skeleton, pose);
+  EvaluateGridPoint(group, layout, movement, group.grid_point_count - 1, cache, pose);
+  const Feet after = FeetOf(skeleton, pose);
 
   const double sign = group.kind == MovementKind::kStepRight ? -1.0 : 1.0;
   const double start_heading = movement.base.heading_rad;

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <future>
 #include <optional>
 #include <sstream>
 
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
+#include "patience.h"
 #include "stridewire/offline/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
@@ -133,10 +135,26 @@ int RunBuild(const BuildCommand& command) {
     return Complain("--left-ankle and --right-ankle belong together: give both or none");
   }
 
+  const Interrupt interrupt;
+  Progress progress("building");
+  const char* const stopped = "stopped; nothing was written";
   LibraryAssembler assembler(options);
   Json files = Json::array();
-  for (const std::string& path : command.files) {
-    const auto capture = ReadBvh(path, read);
+  // The next file is read while movements are sought in this one.
+  const auto start_reading = [&](std::size_t i) {
+    return i < command.files.size()
+               ? std::async(
+                     std::launch::async,
+                     [&read, &path = command.files[i]] { return ReadBvh(path, read); })
+               : std::future<Expected<Capture>>();
+  };
+  std::future<Expected<Capture>> reading = start_reading(0);
+  for (std::size_t i = 0; i < command.files.size(); ++i) {
+    const std::string& path = command.files[i];
+    progress.Show(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
+    const auto capture = reading.get();
+    reading = start_reading(i + 1);
+    if (Interrupt::IsAsked()) return Complain(stopped, kExitFailure);
     Extraction unreadable;
     if (!capture) {
       unreadable.path = path;
@@ -144,18 +162,23 @@ int RunBuild(const BuildCommand& command) {
     }
     const Extraction& extraction = capture ? assembler.Add(*capture) : unreadable;
     files.push_back(FileToJson(extraction));
+    progress.Hide();
     if (!command.json) PrintFile(extraction);
     if (!extraction.error.empty()) {
       Complain(WithPath(extraction));
     }
   }
 
+  progress.Show(static_cast<double>(command.files.size()) /
+                static_cast<double>(command.files.size() + 1));
   const auto raw = assembler.Assemble();
   if (!raw) return ComplainOfInput(raw.error());
   LibraryBuilder builder;
   builder.cluster_diameter = command.all ? 0.0 : kClusterDiameterM;
   const auto library = builder.Build(*raw);
+  progress.Hide();
   if (!library) return ComplainOfInput(library.error());
+  if (Interrupt::IsAsked()) return Complain(stopped, kExitFailure);
   if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
     return ComplainOfOutput(status.error());
   }

@@ -39,6 +39,16 @@ struct SynthesizeCommand {
 };
 int RunSynthesize(const SynthesizeCommand& command);
 
+struct RefineCommand {
+  std::string library;
+  std::string out;
+  double max_error_m = 0.01;
+  int max_pseudoexamples = 32;
+  std::string rule = "amended";
+  bool json = false;
+};
+int RunRefine(const RefineCommand& command);
+
 struct ExportCommand {
   std::string library;
   std::string out;

@@ -37,10 +37,23 @@ int RunInspect(const InspectCommand& command) {
         1000.0 * entry["error_m"]["max"].get<double>(),
         1000.0 * entry["error_m"]["mean"].get<double>(), entry["error_m"]["samples"].get<int>(),
         1000.0 * entry["corrected_error_m"]["max"].get<double>());
+    std::printf("  |w| sum to %.2f at most; condition %.1f\n",
+                entry["weights"]["sum_max"].get<double>(),
+                entry["weights"]["condition"].get<double>());
+    if (entry.contains("unrefined_error_m")) {
+      std::printf("  %d pseudoexamples; without them %.1f mm at most, %.1f mm in the mean\n",
+                  group.site_count - group.example_count,
+                  1000.0 * entry["unrefined_error_m"]["max"].get<double>(),
+                  1000.0 * entry["unrefined_error_m"]["mean"].get<double>());
+    }
     if (!command.examples) continue;
-    for (int e = 0; e < group.example_count; ++e) {
+    for (int e = 0; e < group.site_count; ++e) {
       std::printf("  %3d ", e);
       for (const double value : group.site(e)) std::printf(" %7.3f", value);
+      if (e >= group.example_count) {
+        std::printf("  pseudoexample\n");
+        continue;
+      }
       std::printf("  %s%s\n", std::string(group.sources[static_cast<std::size_t>(e)]).c_str(),
                   group.mirrored[static_cast<std::size_t>(e)] != 0 ? " (mirrored)" : "");
     }

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "stridewire/offline/interpolation_error.h"
+#include "stridewire/offline/refine.h"
 
 namespace stridewire {
 namespace {
@@ -101,8 +102,22 @@ Json LibraryToJson(const MotionLibrary& library, bool examples) {
     const DurationRange durations = DurationsOf(group);
     entry["duration_s"] = {{"min", durations.min}, {"max", durations.max}};
     const InterpolationError error = MeasureInterpolationError(library, static_cast<int>(g));
-    entry["error_m"] = {{"max", error.max_m}, {"mean", error.mean_m}, {"samples", error.samples}};
-    entry["corrected_error_m"] = {{"max", error.corrected_max_m}, {"iterations", error.iterations}};
+    entry["error_m"] = {{"max", error.max_m},
+                        {"mean", error.mean_m},
+                        {"min", error.min_m},
+                        {"samples", error.samples}};
+    entry["corrected_error_m"] = {{"max", error.corrected_max_m},
+                                  {"mean", error.corrected_mean_m},
+                                  {"iterations", error.iterations}};
+    const GroupQuality plain = MeasureGroupQuality(library, static_cast<int>(g), false);
+    const bool is_refined = group.site_count > group.example_count;
+    const GroupQuality quality =
+        is_refined ? MeasureGroupQuality(library, static_cast<int>(g), true) : plain;
+    entry["weights"] = {{"sum_max", quality.weight_sum_max}, {"condition", quality.condition}};
+    if (is_refined) {
+      entry["unrefined_error_m"] = {
+          {"max", plain.max_error_m}, {"mean", plain.mean_error_m}, {"min", plain.min_error_m}};
+    }
     if (examples) AddSites(group, entry);
     groups.push_back(std::move(entry));
   }

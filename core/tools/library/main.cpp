@@ -12,6 +12,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "stridewire/base/version.h"
+#include "stridewire/offline/refine.h"
 
 namespace stridewire {
 namespace {
@@ -19,6 +20,7 @@ namespace {
 constexpr const char kExamples[] = R"(Examples:
   stridewire-library build --out walk.swl captures/16_*.bvh
   stridewire-library inspect walk.swl
+  stridewire-library refine walk.swl --out better.swl
   stridewire-library synthesize builtin --choreography walk.json --out walk.bvh
   stridewire-library export-capture builtin --out examples/
 )";
@@ -132,16 +134,34 @@ int Run(int argc, char** argv) {
       ->check(NotEmpty());
   export_app->footer("Example:\n  stridewire-library export-capture builtin --out examples/\n");
 
-  for (const char* name : {"refine", "report"}) {
-    CLI::App* later = app.add_subcommand(name, "Not supported yet");
-    later->allow_extras();
-    later->footer("Example:\n  stridewire-library " + std::string(name) + " walk.swl --out " +
-                  (std::string_view(name) == "refine" ? "better.swl\n" : "pictures/\n"));
-  }
+  RefineCommand refine;
+  CLI::App* refine_app =
+      app.add_subcommand("refine", "Adds pseudoexamples where movements miss most what is asked");
+  refine_app->add_option("library", refine.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
+  refine_app->add_option("--out", refine.out, "The library to write (.swl)")
+      ->required()
+      ->check(NotEmpty());
+  refine_app->add_option("--max-error-m", refine.max_error_m, "Stop below this error")
+      ->capture_default_str()
+      ->check(Number(0.0, 1000.0, false));
+  refine_app->add_option("--max-pseudoexamples", refine.max_pseudoexamples, "The most a group gets")
+      ->capture_default_str()
+      ->check(CLI::Range(0, RefineOptions::kMostPseudoexamples));
+  refine_app->add_option("--rule", refine.rule, "amended, or bare: as the paper has it")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"amended", "bare"}));
+  refine_app->add_flag("--json", refine.json, "Report as one JSON object on stdout");
+  refine_app->footer("Example:\n  stridewire-library refine walk.swl --out better.swl\n");
+
+  CLI::App* later = app.add_subcommand("report", "Not supported yet");
+  later->allow_extras();
+  later->footer("Example:\n  stridewire-library report walk.swl --out pictures/\n");
 
   const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
   if (!wrong.empty()) {
-    return Complain(wrong + "; there are build, inspect, synthesize and export-capture");
+    return Complain(wrong + "; there are build, inspect, refine, synthesize and export-capture");
   }
 
   try {
@@ -159,6 +179,7 @@ int Run(int argc, char** argv) {
   }
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);
+  if (*refine_app) return RunRefine(refine);
   if (*synthesize_app) return RunSynthesize(synthesize);
   if (*export_app) return RunExport(export_command);
   return Complain(app.get_subcommands().front()->get_name() + " is not supported yet");

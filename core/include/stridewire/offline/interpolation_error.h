@@ -6,18 +6,22 @@
 
 namespace stridewire {
 
-/// How far synthesized movements miss what was asked: e(p) = |p - a(p)| (paper, Section 4).
+/// How far synthesized movements miss what was asked: e(p) = |p - a(p)| (paper, Section 4), over the
+/// hull of a group's examples.
 struct InterpolationError {
-  double max_m = 0.0;
+  double min_m = 0.0;
   double mean_m = 0.0;
-  double corrected_max_m = 0.0;  ///< After CorrectParameters, as when a movement starts.
+  double max_m = 0.0;
   double corrected_mean_m = 0.0;
-  int samples = 0;
-  int iterations = 0;  ///< The most a correction takes.
+  double corrected_max_m = 0.0;  ///< After CorrectParameters, as when a movement starts.
+  double weight_sum_max = 0.0;   ///< Of |w|, uncorrected
+  int samples = 0;               ///< What the means are over.
+  int iterations = 0;            ///< The most a correction takes.
 };
 
-/// Samples the hull of a group's examples by seeded convex combinations (Dirichlet weighted, so that
-/// faces and corners are met too) plus the examples themselves.
+/// Samples the hull by seeded convex combinations (Dirichlet weighted, so that faces and corners are
+/// met too) plus the examples themselves, and climbs from the worst samples to the largest errors. Uses
+/// all processors; the result is the same with any number of them.
 [[nodiscard]] InterpolationError MeasureInterpolationError(const MotionLibrary& library,
                                                            int group_index, int samples = 1000,
                                                            std::uint32_t seed = 1);

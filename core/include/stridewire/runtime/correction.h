@@ -50,4 +50,11 @@ struct Correction {
                                            std::span<double> weight_scratch, GridCache& cache,
                                            PoseSpan pose, Movement& movement);
 
+/// The same in a group that is in no library yet.
+[[nodiscard]] Correction CorrectParameters(const Skeleton& skeleton, const GridLayout& layout,
+                                           const MotionGroup& group, const ParameterValues& wanted,
+                                           const CorrectionLimits& limits,
+                                           std::span<double> weight_scratch, GridCache& cache,
+                                           PoseSpan pose, Movement& movement);
+
 }  // namespace stridewire

@@ -15,6 +15,11 @@ namespace stridewire {
                                               const Movement& movement, GridCache& cache,
                                               PoseSpan pose);
 
+/// The same of a group that is in no library yet.
+[[nodiscard]] ParameterValues MeasureMovement(const Skeleton& skeleton, const GridLayout& layout,
+                                              const MotionGroup& group, const Movement& movement,
+                                              GridCache& cache, PoseSpan pose);
+
 /// Largest difference of two parameter vectors of a group, metres; a radian counts
 /// kMetresPerRadian. The norm of the paper's interpolation error e(p) = |p - a(p)|.
 [[nodiscard]] double LargestDifference(const MotionGroup& group, const ParameterValues& a,

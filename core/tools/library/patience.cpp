@@ -1,0 +1,66 @@
+#include "patience.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <cstdio>
+#include <utility>
+
+namespace stridewire {
+namespace {
+
+volatile std::sig_atomic_t g_is_asked = 0;
+
+void Ask(int) { g_is_asked = 1; }
+
+constexpr auto kEvery = std::chrono::milliseconds(200);
+// Before this the time left is a guess at best.
+constexpr auto kSilence = std::chrono::milliseconds(500);
+
+}  // namespace
+
+Interrupt::Interrupt() {
+  g_is_asked = 0;
+  struct sigaction action{};
+  action.sa_handler = Ask;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second one is not caught
+  sigemptyset(&action.sa_mask);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+Interrupt::~Interrupt() {
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
+}
+
+bool Interrupt::IsAsked() { return g_is_asked != 0; }
+
+Progress::Progress(std::string what)
+    : what_(std::move(what)),
+      is_terminal_(::isatty(STDERR_FILENO) != 0),
+      start_(Clock::now()),
+      last_(start_) {}
+
+Progress::~Progress() { Hide(); }
+
+void Progress::Show(double done) {
+  const Clock::time_point now = Clock::now();
+  if (!is_terminal_ || now - last_ < kEvery || now - start_ < kSilence) return;
+  last_ = now;
+  is_shown_ = true;
+  const double elapsed_s = std::chrono::duration<double>(now - start_).count();
+  done = std::clamp(done, 0.0, 1.0);
+  std::fprintf(stderr, "\r\033[K%s: %.0f %%", what_.c_str(), 100.0 * done);
+  if (done > 0.02) std::fprintf(stderr, ", %.0f s left", elapsed_s * (1.0 - done) / done);
+  std::fflush(stderr);
+}
+
+void Progress::Hide() {
+  if (!std::exchange(is_shown_, false)) return;
+  std::fprintf(stderr, "\r\033[K");
+  std::fflush(stderr);
+}
+
+}  // namespace stridewire
