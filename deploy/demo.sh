@@ -160,15 +160,15 @@ play() {
   local name=$1
   shift
   start "game server of $name" "$out/game_server_$name.log" "$bin/sample_game_server" \
-    --connect "$listen" --world "$name" --avatars "$avatars" --report-s 5 "$@"
+    --connect "$listen" --world "$name" --avatars "$avatars" --report-s 60 "$@"
 }
 watch() {
   start "recorder of $1" "$out/record_$1.log" "$bin/stridewire-record" --connect "$listen" \
     --world "$1" --avatar 1 --seconds "$record_s" --out "$out/$1.bvh"
 }
-play generated --step-m 0.3 0.7 --jump-m 0.4 1.3 --turn-rad 0.3 --home-m 3 --seed 1
+play generated --step-m 0.3 0.7 --jump-m 0.4 1.3 --turn-rad 0.3 --home-m 1.5 --seed 1
 # Asked for no more than those two captures span: its walks are short and its jumps long.
-play "$world" --step-m 0.35 0.55 --jump-m 0.8 1.05 --turn-rad 0.15 --home-m 3 --seed 2
+play "$world" --step-m 0.35 0.55 --jump-m 0.8 1.05 --turn-rad 0.15 --home-m 1.5 --seed 2
 sleep 1  # The avatars are there within a few ticks.
 watch generated
 watch "$world"

@@ -54,9 +54,10 @@ export class Inspector {
   private readonly joints = h('ul', {class: 'joints'});
   private readonly jointsTitle = h('summary', {}, 'Joints');
   private readonly empty = h('p', {class: 'hint'},
-    'Click a figure, or press Tab on the scene and then N for the next one.');
+    'Click a figure, or press N for the next one.');
   private readonly content: HTMLElement;
   private readonly moving: HTMLElement;
+  private readonly blended: HTMLElement;
   private axisX = 0;
   private axisY = 1;
   private playhead: SVGElement | null = null;
@@ -72,10 +73,10 @@ export class Inspector {
     follow.addEventListener('click', actions.onFollow);
     const close = h('button', {type: 'button', class: 'small'}, 'Deselect');
     close.addEventListener('click', actions.onClose);
-    this.moving = h('div', {},
-      this.line, h('h4', {}, 'Parameters'), this.parameters,
+    this.blended = h('div', {}, h('h4', {}, 'Parameters'), this.parameters,
       h('h4', {}, 'Examples in parameter space'), this.axes, this.scatter,
       h('h4', {}, 'Weights'), this.bars, this.barsText);
+    this.moving = h('div', {}, this.line, this.blended);
     this.content = h('div', {class: 'inspector'},
       h('div', {class: 'row'}, this.title, follow, close), this.movement, this.moving,
       h('h4', {}, 'Base frame'), this.base, this.queueTitle, this.queue,
@@ -124,7 +125,6 @@ export class Inspector {
         this.asking = false;
       });
     }
-    if (!visible) return;
     const state = live ? this.states[this.states.length - 1] ?? null : stateAt(this.states, timeS);
     if (state !== this.state) {
       this.state = state;
@@ -132,7 +132,7 @@ export class Inspector {
     } else if (!state && this.movement.textContent === '') {
       setText(this.movement, this.note || 'Asking…');
     }
-    this.moveHead(timeS);
+    if (visible) this.moveHead(timeS);
   }
 
   private show(state: AvatarState | null): void {
@@ -144,7 +144,8 @@ export class Inspector {
     const p = state.basePositionM;
     setText(this.base, `x ${p[0]!.toFixed(2)} m, z ${p[2]!.toFixed(2)} m` +
       (Math.abs(p[1]!) > 0.005 ? `, height ${p[1]!.toFixed(2)} m` : '') +
-      `, heading ${degrees(state.baseHeadingRad)}`);
+      `, heading ${degrees(Math.atan2(
+        Math.sin(state.baseHeadingRad), Math.cos(state.baseHeadingRad)))}`);
     setText(this.queueTitle, `Queue: ${state.queueSize === 0 ? 'empty' :
       `${state.queueSize} waiting`}`);
     const items = state.queue.map((item) => h('li', {}, queueText(item as unknown as QueueItem)));
@@ -163,6 +164,7 @@ export class Inspector {
     const shape = `${movement.kind}/${movement.group}/${movement.startTimeS}`;
     if (shape === this.shape) return;
     this.shape = shape;
+    this.blended.hidden = movement.weights.length === 0;  // Nothing is blended to stand.
     this.showParameters(movement);
     this.showLine(movement);
     this.showAxes(movement);
