@@ -109,6 +109,9 @@ export class App {
       url: `${appOptions.secure ? 'wss' : 'ws'}://${appOptions.host}/stream`,
       clientName: 'stridewire-viewer',
     });
+    // The network is slow to begin with: let it work while the scene is made.
+    this.client.connect();
+    void this.learn();
     this.canvas = h('canvas', {
       class: 'scene', tabindex: 0, role: 'application',
       'aria-label': 'The worlds. Arrow keys orbit, plus and minus zoom, N chooses the next figure, ' +
@@ -176,9 +179,7 @@ export class App {
   start(): void {
     const asked = new URLSearchParams(location.search).getAll('world').filter((name) => name !== '');
     for (const name of asked.slice(0, mostViews)) this.show(name);
-    this.client.connect();
     this.showConnection();
-    void this.learn();
     this.infoTimer = window.setInterval(() => void this.learn(), 4000);
     requestAnimationFrame((ms) => this.frame(ms));
   }

@@ -1,8 +1,8 @@
 // Frames a second and memory with 1, 100 and 1,000 walking avatars, bodies and lines, and the time from load
 // to figures:
 //   node test/measure.mjs http://127.0.0.1:7421/
+// Processor time is that of all the browser's processes: it hardly depends on what else runs.
 // Each crowd lives in a world of its own, spawned and walked by the page itself.
-
 import {launch} from './browser.mjs';
 
 const link = process.argv[2];
@@ -11,6 +11,12 @@ if (!link) {
   process.exit(2);
 }
 const browser = await launch();
+
+const system = await browser.newBrowserCDPSession();
+async function processorS() {
+  const {processInfo} = await system.send('SystemInfo.getProcessInfo');
+  return processInfo.reduce((sum, {cpuTime}) => sum + cpuTime, 0);
+}
 
 const loads = [];
 for (let i = 0; i < 5; ++i) {
@@ -40,13 +46,17 @@ for (const count of [1, 100, 1000]) {
     await page.waitForFunction((n) => window.stridewire.sampled()[0].avatars.length === n, count);
     await page.waitForTimeout(22000);  // Till the recording is full.
     const before = await page.evaluate(() => ({...window.stridewire.stats, ms: performance.now()}));
+    const usedBefore = await processorS();
     await page.waitForTimeout(10000);
+    const used = await processorS() - usedBefore;
     const after = await page.evaluate(() => ({...window.stridewire.stats, ms: performance.now(),
       recorded: window.stridewire.worlds[0].world.recording.bytes, draw: window.stridewire.draw}));
     await session.send('HeapProfiler.collectGarbage');
     const heap = await page.evaluate(() => performance.memory.usedJSHeapSize);
     const seconds = (after.ms - before.ms) / 1000;
-    console.log(`${count} ${style}: ${((after.framesDrawn - before.framesDrawn) / seconds).toFixed(1)} frames/s, ` +
+    const frames = after.framesDrawn - before.framesDrawn;
+    console.log(`${count} ${style}: ${(frames / seconds).toFixed(1)} frames/s, ` +
+      `${(used * 1000 / frames).toFixed(1)} ms of processor time a frame, ` +
       `heap ${(heap / 1e6).toFixed(1)} MB, buffered ${(after.bufferedBytes / 1e6).toFixed(1)} MB, ` +
       `${((after.bytesReceived - before.bytesReceived) / seconds / 1e3).toFixed(0)} KB/s, ` +
       `${(after.decodeNsPerPose / 1e3).toFixed(2)} us/pose, ${after.draw.calls} calls, ` +

@@ -35,10 +35,11 @@ for (const [width, height] of sizes) {
 const inspect = async (page) => {
   await page.keyboard.press('n');
   await page.keyboard.press('c');
-  await page.waitForTimeout(1500);
-  // Slowly, until a step is on its way.
+  await page.waitForTimeout(2500);
+  // Till a step is on its way, then hold it.
   await page.waitForFunction(() => (window.stridewire.inspected?.movement?.weights.length ?? 0) > 0);
-  await page.waitForTimeout(1200);
+  await page.keyboard.press('Space');
+  await page.waitForTimeout(800);
 };
 await picture('viewer_inspect', 1280, 720, 'dark', 'world=captured&figures=bodies', inspect);
 await picture('viewer_inspect_phone', 390, 844, 'light', 'world=generated&figures=bodies', async (page) => {
