@@ -3,6 +3,7 @@
 //   node test/measure.mjs http://127.0.0.1:7421/
 // Processor time is that of all the browser's processes: it hardly depends on what else runs.
 // Each crowd lives in a world of its own, spawned and walked by the page itself.
+
 import {launch} from './browser.mjs';
 
 const link = process.argv[2];
