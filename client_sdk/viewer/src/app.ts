@@ -69,6 +69,7 @@ export class App {
   private mode: PoseMode = 'quantised';
   private worldNames: string[] = [];
   private chosen: {shown: Shown; avatar: number} | null = null;
+  private chosenMs = 0;
   private active: Shown | null = null;
   private everybody = false;
   private lastMs = 0;
@@ -174,6 +175,12 @@ export class App {
     this.client.on('state', () => this.showConnection());
     this.client.on('notice', (_code: number, text: string) => this.drive.say(text));
     this.client.on('error', () => this.showConnection());
+    this.client.on('sessionLost', () => {
+      for (const shown of this.shown) {
+        shown.wander?.stop();
+        shown.ours.clear();
+      }
+    });
   }
 
   start(): void {
@@ -281,8 +288,10 @@ export class App {
       if (each.view.following && each.view.chosen) each.view.following = each.view.chosen;
     }
     this.chosen = shown && avatar !== 0 ? {shown, avatar} : null;
+    this.chosenMs = performance.now();
     if (shown) this.active = shown;
     this.inspector.choose(this.chosen ? shown!.world : null, avatar);
+    this.showDriven();
     if (this.chosen) {
       if (innerWidth >= 900) {
         this.setPanel('inspect', true);
@@ -632,7 +641,7 @@ export class App {
   private frame(ms: number): void {
     requestAnimationFrame((next) => this.frame(next));
     const dtS = Math.min(0.1, Math.max(0, (ms - this.lastMs) / 1000));
-    if (this.lastMs > 0) this.frameMs += (ms - this.lastMs - this.frameMs) * 0.1;
+    if (this.lastMs > 0) this.frameMs += (Math.min(200, ms - this.lastMs) - this.frameMs) * 0.1;
     this.lastMs = ms;
     this.layOut();
 
@@ -653,13 +662,22 @@ export class App {
     this.adapt(this.frameMs, avatars);
     this.figures.update(ms, this.framesDrawn, this.open('figures'));
     this.showEmpty(avatars);
-    const drivenNow = this.drivenAvatars();
+    if (this.framesDrawn % 8 === 1) this.showDriven();
+  }
+
+  private showDriven(): void {
+    if (this.chosen && this.playback.live && performance.now() - this.chosenMs > 3000 &&
+        this.chosen.shown.view.indexOf(this.chosen.avatar) < 0) {
+      this.choose(null, 0);  // It has left.
+      return;
+    }
+    const avatars = this.drivenAvatars();
     const where = this.driven();
     this.drive.show(
-      drivenNow.length === 0 ? 'Nobody chosen: click a figure.' :
-        drivenNow.length === 1 ? `Avatar ${drivenNow[0]} of ${where!.world.name}` :
-          `All ${drivenNow.length} avatars of ${where!.world.name}`,
-      drivenNow.length > 0, where?.wander?.size ?? 0);
+      avatars.length === 0 ? 'Nobody chosen: click a figure.' :
+        avatars.length === 1 ? `Avatar ${avatars[0]} of ${where!.world.name}` :
+          `All ${avatars.length} avatars of ${where!.world.name}`,
+      avatars.length > 0, where?.wander?.size ?? 0);
     press(this.frameButton, this.framing);
     press(this.followButton, this.shown.some((shown) => shown.view.following !== 0));
   }

@@ -3,7 +3,7 @@
 
 import type {MovementRequest, World, WorldEvent} from './sdk.js';
 
-const homeRadiusM = 6;
+const homeRadiusM = 4;
 const stepsAtOnce = 4;
 const rewalkAfterMs = 400;
 

@@ -58,6 +58,8 @@ export class WorldView {
   private previousAvatars = new Uint32Array(0);
   private planted = new Uint8Array(0);
   private previousS = 0;
+  private live = true;
+  private readonly headings = new Map<number, number>();
   private readonly unsubscribe: () => void;
 
   constructor(readonly world: World, colours: ViewColours, options: ViewOptions) {
@@ -91,6 +93,7 @@ export class WorldView {
       this.crowd = new CrowdMesh(skeleton, this.options.style, this.colours.lights);
       this.scene.add(this.crowd.group);
     }
+    this.live = live;
     const crowd = this.crowd;
     crowd.setStyle(this.options.style);
     crowd.setShadows(this.options.shadows);
@@ -203,9 +206,24 @@ export class WorldView {
   }
 
   private onEvent(event: WorldEvent): void {
-    if (event.type !== 'footStrike') return;
-    this.footprints.add(event.timeS, event.positionM[0]!, event.positionM[2]!,
-      event.baseHeadingRad, event.foot === 'left' ? 0 : 1);
+    if (event.type === 'removed') this.headings.delete(event.avatar);
+    if (event.type !== 'footStrike' || !event.foot) return;
+    // The event says where, the figure which way the foot points: a tenth of a second before it
+    // lands, when live; else as it did last.
+    if (this.live) this.headings.set(event.avatar, this.footHeading(event.avatar, event.foot));
+    this.footprints.add(event.timeS, event.positionM[0], event.positionM[2],
+      this.headings.get(event.avatar) ?? 0, event.foot === 'left' ? 0 : 1);
+  }
+
+  private footHeading(avatar: number, foot: 'left' | 'right'): number {
+    const crowd = this.crowd;
+    const i = this.indexOf(avatar);
+    if (!crowd || i < 0) return this.headings.get(avatar) ?? 0;
+    const leg = foot === 'left' ? crowd.skeleton.leftLeg : crowd.skeleton.rightLeg;
+    const ankle = (i * crowd.skeleton.jointCount + Math.max(leg.ankle, 0)) * 3;
+    const ball = i * 6 + (foot === 'left' ? 0 : 3);
+    return Math.atan2(crowd.balls[ball]! - crowd.positions[ankle]!,
+      crowd.balls[ball + 2]! - crowd.positions[ankle + 2]!);
   }
 
   private mark(timeS: number): void {
