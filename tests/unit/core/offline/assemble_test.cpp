@@ -272,7 +272,8 @@ TEST(LibraryAssembler, LevelWalksOfALibraryOfBlocksDoNotClimb) {
       finished += event.type == AvatarEventType::kFinished;
     }
     ASSERT_NEAR(avatar.base().position_m.y, 0.0, 1e-9) << "after " << finished << " steps";
-    ASSERT_NEAR(avatar.pose().root_position_m.y, 0.98, 0.06) << "after " << finished << " steps";
+    // From 0.92 m, in the first step after standing, to 0.99 m.
+    ASSERT_NEAR(avatar.pose().root_position_m.y, 0.96, 0.06) << "after " << finished << " steps";
   }
   EXPECT_EQ(finished, kSteps);
 }
