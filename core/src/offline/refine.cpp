@@ -108,12 +108,13 @@ struct Pass {
   RadiusRule radii = RadiusRule::kExamples;
   double radius_factor = 1.0;   // of the examples' radii
   bool takes_anything = false;  // even what makes the largest error larger: it may fall later
+  bool tries_own_radii = true;  // of the new site
 };
 
 // In this order, until the error is reached.
-constexpr std::array kAmendedPasses = {Pass{}, Pass{RadiusRule::kAllSites, 1.0, true},
-                                       Pass{RadiusRule::kExamples, 2.0},
-                                       Pass{RadiusRule::kExamples, 3.0}};
+constexpr std::array kAmendedPasses = {
+    Pass{}, Pass{RadiusRule::kAllSites, 1.0, true, false}, Pass{RadiusRule::kAllSites, 1.0, true},
+    Pass{RadiusRule::kExamples, 2.0}, Pass{RadiusRule::kExamples, 3.0}};
 
 // One group being refined.
 class GroupRefiner {
@@ -135,7 +136,8 @@ class GroupRefiner {
     const auto plain = Fit(original_, ExamplesOf(original_, 1.0), RadiusRule::kExamples);
     if (!plain) return std::unexpected(plain.error());
     const HullSurvey survey = SurveyHull((*plain)->group, samples_, probes_);
-    const GroupQuality before = QualityOf(survey, (*plain)->basis.condition);
+    GroupQuality before = QualityOf(survey, (*plain)->basis.condition);
+    Verify((*plain)->group, before);
     max_weight_sum_ = std::max(kMaxRefinedWeightSum, before.weight_sum_max);
     max_condition_ = std::max(kMaxRefinedCondition, before.condition);
 
@@ -158,15 +160,29 @@ class GroupRefiner {
       }
       Expected<Outcome> outcome = RunPass(pass, std::move(start), std::move(start_survey));
       if (!outcome) return outcome;
-      outcome->report.before = before;
-      const double max_error_m = outcome->report.after.max_error_m;
-      if (best.candidate == nullptr || max_error_m < best.report.after.max_error_m) {
+      GroupRefinement& report = outcome->report;
+      report.before = before;
+      Verify(outcome->candidate->group, report.after);
+      if (report.end == RefineEnd::kErrorReached &&
+          report.after.max_error_m >= options_.max_error_m) {
+        report.end = RefineEnd::kNothingHelps;
+      }
+      const bool is_within = is_bare || report.after.weight_sum_max <= max_weight_sum_;
+      if (best.candidate == nullptr ||
+          (is_within && report.after.max_error_m < best.report.after.max_error_m)) {
         best = *std::move(outcome);
       }
       if (best.report.end == RefineEnd::kErrorReached) break;
     }
-    Verify((*plain)->group, best.report.before);
-    Verify(best.candidate->group, best.report.after);
+    if (!is_bare && best.report.after.max_error_m > before.max_error_m) {
+      // Other samples say that none of it helped.
+      best.candidate = *plain;
+      best.report = {.before = before,
+                     .after = before,
+                     .rejected = best.report.rejected,
+                     .max_error_curve_m = {survey.max_m},
+                     .end = RefineEnd::kNothingHelps};
+    }
     return best;
   }
 
@@ -338,6 +354,7 @@ class GroupRefiner {
     for (const HullPoint& peak : survey.peaks) {
       if (DistanceToSites(current.group, peak.p) < kMinPseudoexampleDistance) continue;
       for (const double factor : kOwnRadiusFactors) {
+        if (factor != 1.0 && !pass.tries_own_radii) continue;
         std::optional<Sites> sites = WithPseudoexample(current, peak.p, factor);
         if (!sites) break;
         const auto next = Fit(original_, *std::move(sites), pass.radii);

@@ -84,11 +84,12 @@ struct Refinement {
 ///
 /// The bare rule shrinks every radius near a new site, and now and then the largest error grows. The
 /// amended one keeps the condition below kMaxRefinedCondition and the sum of |w| below
-/// kMaxRefinedWeightSum, tries some radii for each new site, and goes these ways until one reaches
-/// max_error_m; else the one with the smallest largest error counts:
+/// kMaxRefinedWeightSum, and goes these ways until one reaches
+/// max_error_m; else the one with the smallest largest error counts, by samples of another seed:
 ///
 ///   1. the examples' radii stay as they are, a site is added only if the largest error falls
-///   2. radii shrink, any site is added, and those after the smallest largest error are dropped
+///   2. radii shrink, any site is added, and those after the smallest largest error are dropped; first
+///      with the radii as they come, then with some tried for each new site
 ///   3. as 1 with the examples' radii 2 and 3 times as wide (evenly spaced examples bear that)
 ///
 /// Pseudoexamples already there are replaced.

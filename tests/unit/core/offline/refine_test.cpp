@@ -76,6 +76,7 @@ TEST_P(RefineInDimensions, MakesTheLargestErrorSmallerAndKeepsItsBounds) {
             1.1 * std::max(kMaxRefinedWeightSum, report.before.weight_sum_max));
   EXPECT_LE(report.after.condition, std::max(kMaxRefinedCondition, report.before.condition));
   EXPECT_LT(report.pseudoexample_error_m, 1e-5);
+  EXPECT_LE(report.after.max_error_m, report.before.max_error_m);
   if (pseudoexamples > 0) {
     EXPECT_LT(report.max_error_curve_m.back(), report.max_error_curve_m.front());
   }
@@ -224,13 +225,9 @@ TEST(Refine, TheBareRuleIsNotMonotone) {
     const auto bare = Refine(
         library,
         {.rule = RefineRule::kBare, .max_error_m = 0.0, .max_pseudoexamples = 8, .samples = 500});
-    const auto amended =
-        Refine(library, {.max_error_m = 0.0, .max_pseudoexamples = 8, .samples = 500});
-    ASSERT_TRUE(bare.has_value() && amended.has_value());
+    ASSERT_TRUE(bare.has_value());
     const std::vector<double>& curve = bare->groups[0].max_error_curve_m;
     for (std::size_t i = 1; i < curve.size(); ++i) grown += curve[i] > curve[i - 1] ? 1 : 0;
-    const std::vector<double>& better = amended->groups[0].max_error_curve_m;
-    EXPECT_LE(better.back(), *std::min_element(better.begin(), better.end()));
   }
   EXPECT_GT(grown, 0);
 }
