@@ -98,7 +98,8 @@ class Assembler {
   Expected<RawLibrary> Run() {
     if (options_.mirror && !partners_) {
       return Fail(ErrorCode::kUnsupported,
-                  "cannot mirror: the joints' names do not tell left from right", "--mirror");
+                  "cannot mirror: neither the joints' names nor their places pair left with right",
+                  "--mirror");
     }
     RawLibrary library;
     library.skeleton = skeleton_;

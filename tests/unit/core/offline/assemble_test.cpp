@@ -3,7 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
 #include "capture_files.h"
+#include "stridewire/offline/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/mirror.h"
 #include "stridewire/runtime/avatar.h"
@@ -200,14 +205,97 @@ TEST(LibraryAssembler, MirroringFillsBothFeetEqually) {
   }
 }
 
-TEST(LibraryAssembler, MirroringNeedsNamesThatTellSides) {
+TEST(LibraryAssembler, MirroringNeedsSidesThatPair) {
   AssembleOptions options;
   options.mirror = true;
   LibraryAssembler assembler(options);
   Capture capture = PlainWalk();
   capture.skeleton.joints[1].name = "LeftThing";
+  capture.skeleton.joints[1].offset_m.x *= 1.5f;
   assembler.Add(capture);
   EXPECT_EQ(assembler.Assemble().error().code, ErrorCode::kUnsupported);
+}
+
+// A skeleton whose names say nothing is paired by where its joints are, just as by names.
+TEST(FindMirrorJoints, PairsByShapeWhatNamesDoNot) {
+  std::vector<Skeleton> skeletons = {PlainWalk().skeleton, GenerateBuiltinLibrary().skeleton};
+  for (const char* folder : {"cmu/01", "cmu/03", "cmu/16"}) {
+    const std::vector<std::filesystem::path> captures = MocapFiles(folder);
+    if (!captures.empty()) skeletons.push_back(ReadBvh(captures.front())->skeleton);
+  }
+  for (Skeleton& skeleton : skeletons) {
+    const std::optional<std::vector<int>> by_name = FindMirrorJoints(skeleton);
+    ASSERT_TRUE(by_name.has_value());
+    for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+      skeleton.joints[j].name = "joint " + std::to_string(j);
+    }
+    EXPECT_EQ(FindMirrorJoints(skeleton), by_name) << skeleton.joints.size() << " joints";
+    // Not a mirror image of itself any more.
+    skeleton.joints[static_cast<std::size_t>(skeleton.leg(Foot::kLeft).knee)].offset_m.y *= 1.3f;
+    EXPECT_EQ(FindMirrorJoints(skeleton), std::nullopt);
+  }
+}
+
+// Subject 16 starts with the left foot only and stops with either; mirrored, both feet do both. What is
+// mirrored passes the checks of what was captured: parameters where the balls are, feet planted as
+// well as in the capture, and the same order of contacts.
+TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
+  const std::vector<std::filesystem::path> captures = MocapFiles("cmu/16");
+  STRIDEWIRE_SKIP_WITHOUT(captures);
+  AssembleOptions options;
+  options.mirror = true;
+  LibraryAssembler assembler(options);
+  for (const std::filesystem::path& file : captures) assembler.Add(*ReadBvh(file));
+  const Expected<RawLibrary> library = assembler.Assemble();
+  ASSERT_TRUE(library.has_value()) << Describe(library.error());
+  ExpectWellFormed(*library);
+  for (const RawGroup& group : library->groups) {
+    if (!IsStep(group.kind)) continue;
+    const Foot moving = MovingFoot(group.kind), fixed = OtherFoot(moving);
+    const auto index = [&](ParameterName name) {
+      return static_cast<std::size_t>(std::ranges::find(group.parameters, name) -
+                                      group.parameters.begin());
+    };
+    int mirrored = 0, starts = 0, stops = 0;
+    double slide_m[2] = {0.0, 0.0};  // of the fixed ball in single support: captured, mirrored
+    for (const RawExample& example : group.examples) {
+      SCOPED_TRACE(example.source);
+      mirrored += example.mirrored;
+      starts += std::fabs(example.parameters[index(ParameterName::kStartZ)]) < 0.1;
+      stops += std::fabs(example.parameters[index(ParameterName::kEndZ)]) < 0.1;
+      const int last = example.clip.frame_count() - 1;
+      const DVec3 start = FootVector(library->skeleton, example.clip.frame(0), moving, 0.0);
+      const DVec3 end = FootVector(library->skeleton, example.clip.frame(last), moving,
+                                   example.heading_change_rad);
+      EXPECT_NEAR(example.parameters[index(ParameterName::kStartZ)], start.z, 1e-4);
+      EXPECT_NEAR(example.parameters[index(ParameterName::kEndZ)], end.z, 1e-4);
+      if (index(ParameterName::kEndX) < group.parameters.size()) {
+        EXPECT_NEAR(example.parameters[index(ParameterName::kEndX)], end.x, 1e-4);
+      }
+      if (index(ParameterName::kTurn) < group.parameters.size()) {
+        EXPECT_EQ(example.parameters[index(ParameterName::kTurn)], example.heading_change_rad);
+      }
+      const auto frame_at = [&](std::size_t key) {
+        return static_cast<int>(std::lround(example.keytimes_s[key] * example.clip.fps));
+      };
+      const DVec3 planted(BallPosition(library->skeleton, example.clip.frame(frame_at(1)), fixed));
+      double slide = 0.0;
+      for (int f = frame_at(1); f <= frame_at(2); ++f) {
+        const DVec3 ball(BallPosition(library->skeleton, example.clip.frame(f), fixed));
+        slide = std::max(slide, std::hypot(ball.x - planted.x, ball.z - planted.z));
+      }
+      EXPECT_LE(slide, 0.12);  // what segmentation lets pass
+      slide_m[example.mirrored ? 1 : 0] = std::max(slide_m[example.mirrored ? 1 : 0], slide);
+    }
+    EXPECT_GE(mirrored, 20);
+    EXPECT_GE(starts, 2) << MovementKindName(group.kind);
+    EXPECT_GE(stops, 2) << MovementKindName(group.kind);
+    std::printf(
+        "%s, %zu parameters: %zu examples, %d mirrored, %d starts, %d stops, slide %.3f m "
+        "captured, %.3f m mirrored\n",
+        std::string(MovementKindName(group.kind)).c_str(), group.parameters.size(),
+        group.examples.size(), mirrored, starts, stops, slide_m[0], slide_m[1]);
+  }
 }
 
 TEST(MirrorExample, TwiceIsTheSame) {
