@@ -17,8 +17,8 @@ int main(int argc, char** argv) {
   stridewire_world world = 0;
   if (!client || !client->Connect(argv[1], static_cast<std::uint16_t>(std::atoi(argv[2]))) ||
       !client->JoinWorld(argv[3], STRIDEWIRE_OBSERVER, world) ||
-      !client->Observe(world,
-                       std::strcmp(argv[6], "full") == 0 ? STRIDEWIRE_FULL : STRIDEWIRE_QUANTISED)) {
+      !client->Observe(
+          world, std::strcmp(argv[6], "full") == 0 ? STRIDEWIRE_FULL : STRIDEWIRE_QUANTISED)) {
     return 2;
   }
   Pose pose;
@@ -35,7 +35,8 @@ int main(int argc, char** argv) {
     std::printf("%llu %.17g %.9g %.9g %.9g", static_cast<unsigned long long>(pose.tick),
                 pose.time_s, pose.root_position_m[0], pose.root_position_m[1],
                 pose.root_position_m[2]);
-    for (const Quaternion& q : pose.rotations) std::printf(" %.9g %.9g %.9g %.9g", q.x, q.y, q.z, q.w);
+    for (const Quaternion& q : pose.rotations)
+      std::printf(" %.9g %.9g %.9g %.9g", q.x, q.y, q.z, q.w);
     std::printf("\n");
   }
   return 0;

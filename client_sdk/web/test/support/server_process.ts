@@ -16,12 +16,16 @@ export class ServerProcess {
     ], {stdio: ['ignore', 'pipe', 'inherit']});
     let out = '';
     child.stdout!.setEncoding('utf8');
-    for await (const text of child.stdout!) {
-      out += text;
-      const ready = /ready listen=\S+:(\d+) http=\S+:(\d+)/.exec(out);
-      if (ready !== null) return new ServerProcess(child, Number(ready[1]), Number(ready[2]));
-    }
-    throw new Error(`stridewired ended: ${out}`);
+    const ready = await new Promise<RegExpExecArray>((resolve, reject) => {
+      child.on('error', reject);
+      child.stdout!.on('data', (text: string) => {
+        out += text;
+        const found = /ready listen=\S+:(\d+) http=\S+:(\d+)/.exec(out);
+        if (found !== null) resolve(found);
+      });
+      child.on('close', () => reject(new Error(`stridewired ended: ${out}`)));
+    });
+    return new ServerProcess(child, Number(ready[1]), Number(ready[2]));
   }
 
   get url(): string {
