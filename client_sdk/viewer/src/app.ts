@@ -55,6 +55,8 @@ export class App {
   framesDrawn = 0;
   frameMs = 0;
   firstFigureMs = 0;
+  /** The time that the last frame shows; a seek shows in the next one. */
+  drawnTimeS = 0;
 
   private readonly canvas: HTMLCanvasElement;
   private readonly renderer: THREE.WebGLRenderer;
@@ -650,6 +652,7 @@ export class App {
     if (renderS !== null) {
       const span = this.span(renderS);
       const timeS = this.playback.advance(dtS, renderS, span);
+      this.drawnTimeS = timeS;
       for (const {view} of this.shown) avatars += view.update(timeS, this.playback.live);
       this.transport.show(span);
       this.inspector.update(ms, timeS, this.playback.live, this.client.state === 'ready',

@@ -50,7 +50,7 @@ if (!info) {
       sampled() {
         return app.shown.map(({world, view}) => ({
           world: world.name,
-          timeS: app.playback.timeS,
+          timeS: app.drawnTimeS,
           avatars: [...view.pose.avatars.subarray(0, view.pose.count)],
           rootsM: [...view.pose.rootsM.subarray(0, view.pose.count * 3)],
           jointsM: view.crowd ? [...view.crowd.positions.subarray(

@@ -4,10 +4,14 @@ import {existsSync} from 'node:fs';
 
 import {chromium} from 'playwright-core';
 
-/** `CHROMIUM` names another one. */
+/** `CHROMIUM` names another one; undefined: there is none. */
+export function findChromium() {
+  return [process.env.CHROMIUM || '/usr/bin/chromium', '/usr/bin/chromium-browser',
+    '/usr/bin/google-chrome'].find(existsSync);
+}
+
 export function launch() {
-  const executablePath = process.env.CHROMIUM ??
-    ['/usr/bin/chromium', '/usr/bin/chromium-browser', '/usr/bin/google-chrome'].find(existsSync);
+  const executablePath = findChromium();
   if (!executablePath) throw new Error('there is no Chromium; on Debian: apt-get install chromium');
   return chromium.launch({executablePath, args: [
     '--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
