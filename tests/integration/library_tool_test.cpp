@@ -488,7 +488,7 @@ TEST_F(LibraryTool, InspectsAsOneJsonObject) {
       EXPECT_THAT(report["skeleton"]["names"].get<std::vector<std::string>>(),
                   Contains(report["skeleton"][foot].get<std::string>()));
     }
-    ASSERT_EQ(report["groups"].size(), 11u);
+    ASSERT_EQ(report["groups"].size(), 13u);
     for (const json& group : report["groups"]) {
       for (const char* key : {"kind", "examples", "pseudoexamples", "parameters", "duration_s",
                               "error_m", "corrected_error_m"}) {

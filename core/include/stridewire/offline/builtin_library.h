@@ -25,8 +25,8 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 ///              way, 60 on the spot; after an open turn the feet stand wider, hence start_x
 ///   aside     16 (start_x, start_z, end_x, end_z): 0 and 0.3 m further aside than standing, 0 and
 ///              0.4 m ahead, at either end
-///   climbing  48 (start_y, start_z, end_y, end_z, turn): up and down by 0.125 and 0.25 m a foot, from
-///              and to level ground and on stairs, 35 degrees either way
+///   up, down  30 each (start_y, start_z, end_y, end_z, turn): by 0.125 and 0.25 m a foot, from and to
+///              level ground and on stairs, 35 degrees either way
 ///
 /// A state is the pose in the middle of double support with the feet a length apart, and one
 /// velocity; every example that ends in a state ends in exactly that pose, and every one that

@@ -19,7 +19,7 @@ constexpr double kToesFirstRad = -18.0 * kDegree;
 // A tread begins this far behind the ball of the foot that lands on it from below, and ends this far
 // ahead of the ball of a foot that leaves it downward.
 constexpr double kEdgeBehindBallM = 0.15;
-constexpr double kEdgeAheadOfBallM = 0.01;
+constexpr double kEdgeAheadOfBallM = 0.03;
 constexpr double kEdgeClearanceM = 0.02;
 
 constexpr double kFootWidthM = 0.085;  // feet that pass each other stay this far apart

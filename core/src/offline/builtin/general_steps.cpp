@@ -70,6 +70,49 @@ class Groups {
   RawGroup left_, right_;
 };
 
+// `way` 1: up, -1: down. Two groups, since knees bend the more the further a foot is from level either
+// way, which no linear part follows through both.
+void AddClimbingSteps(double way, RawLibrary& library) {
+  constexpr double kRiseM = 0.25;
+  constexpr double kTurnRad = 35.0 * kDegree;
+  // Height of the moving above the fixed foot, before and after, in parts of kRiseM.
+  struct Climb {
+    double start, end;
+  };
+  constexpr std::array kClimbs = {Climb{0.0, 0.0}, Climb{0.0, 1.0}, Climb{-1.0, 1.0},
+                                  Climb{-1.0, 0.0}};
+  Groups groups({ParameterName::kStartY, ParameterName::kStartZ, ParameterName::kEndY,
+                 ParameterName::kEndZ, ParameterName::kTurn});
+  const auto add = [&](const Climb& climb, double start_z, double end_z, double turn_rad) {
+    StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
+    shape.start_m.y = way * climb.start * kRiseM;
+    shape.end_m.y = way * climb.end * kRiseM;
+    shape.turn_rad = turn_rad;
+    shape.flat = true;
+    groups.Add(library.skeleton, shape);
+  };
+  // On stairs the other foot is a tread behind or ahead; on level ground it may be anywhere.
+  const auto lengths = [](double height) {
+    return height == 0.0 ? std::array{0.0, 0.5} : std::array{0.28, 0.42};
+  };
+  for (const Climb& climb : kClimbs) {
+    for (const double start_z : lengths(climb.start)) {
+      for (const double end_z : lengths(climb.end)) add(climb, start_z, end_z, 0.0);
+    }
+    for (const double turn_rad : {kTurnRad, -kTurnRad}) add(climb, 0.3, 0.3, turn_rad);
+    // Knees bend with the square root of a height: between level and high the blend needs a middle.
+    const Climb half{0.5 * climb.start, 0.5 * climb.end};
+    if ((climb.start == 0.0) == (climb.end == 0.0)) {
+      add(half, 0.3, 0.3, 0.0);
+    } else {
+      for (const double level_m : lengths(0.0)) {
+        add(half, climb.start == 0.0 ? level_m : 0.34, climb.end == 0.0 ? level_m : 0.34, 0.0);
+      }
+    }
+  }
+  groups.MoveTo(library);
+}
+
 }  // namespace
 
 void AddStraightSteps(RawLibrary& library) {
@@ -152,39 +195,8 @@ void AddSideSteps(RawLibrary& library) {
 }
 
 void AddClimbingSteps(RawLibrary& library) {
-  constexpr double kRiseM = 0.25;
-  constexpr double kTurnRad = 35.0 * kDegree;
-  // Height of the moving above the fixed foot, before and after, in parts of kRiseM.
-  struct Climb {
-    double start, end;
-  };
-  constexpr std::array kClimbs = {Climb{0.0, 0.0},  Climb{0.0, 1.0},  Climb{-1.0, 1.0},
-                                  Climb{-1.0, 0.0}, Climb{0.0, -1.0}, Climb{1.0, -1.0},
-                                  Climb{1.0, 0.0}};
-  Groups groups({ParameterName::kStartY, ParameterName::kStartZ, ParameterName::kEndY,
-                 ParameterName::kEndZ, ParameterName::kTurn});
-  const auto add = [&](const Climb& climb, double start_z, double end_z, double turn_rad) {
-    StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
-    shape.start_m.y = climb.start * kRiseM;
-    shape.end_m.y = climb.end * kRiseM;
-    shape.turn_rad = turn_rad;
-    shape.flat = true;
-    groups.Add(library.skeleton, shape);
-  };
-  // On stairs the other foot is a tread behind or ahead; on level ground it may be anywhere.
-  const auto lengths = [](double height) {
-    return height == 0.0 ? std::array{0.0, 0.5} : std::array{0.28, 0.42};
-  };
-  for (const Climb& climb : kClimbs) {
-    for (const double start_z : lengths(climb.start)) {
-      for (const double end_z : lengths(climb.end)) add(climb, start_z, end_z, 0.0);
-    }
-    for (const double turn_rad : {kTurnRad, -kTurnRad}) add(climb, 0.3, 0.3, turn_rad);
-    if (climb.start != 0.0 || climb.end != 0.0) {
-      add({0.5 * climb.start, 0.5 * climb.end}, 0.3, 0.3, 0.0);
-    }
-  }
-  groups.MoveTo(library);
+  AddClimbingSteps(1.0, library);
+  AddClimbingSteps(-1.0, library);
 }
 
 }  // namespace stridewire::builtin

@@ -11,6 +11,7 @@ void AddStraightSteps(RawLibrary& library);
 void AddBackwardSteps(RawLibrary& library);  ///< start_z, end_z
 void AddTurningSteps(RawLibrary& library);   ///< start_x, start_z, end_z, turn
 void AddSideSteps(RawLibrary& library);      ///< start_x, start_z, end_x, end_z
-void AddClimbingSteps(RawLibrary& library);  ///< start_y, start_z, end_y, end_z, turn
+/// start_y, start_z, end_y, end_z, turn; a pair of groups up, another down.
+void AddClimbingSteps(RawLibrary& library);
 
 }  // namespace stridewire::builtin

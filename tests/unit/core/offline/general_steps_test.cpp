@@ -47,11 +47,12 @@ int FrameAt(const RawExample& example, std::size_t keytime) {
 }
 
 TEST(GeneralSteps, StandBesideTheStraightOnes) {
-  ASSERT_EQ(Library().groups.size(), 11u);
+  ASSERT_EQ(Library().groups.size(), 13u);
   const std::vector<std::vector<ParameterName>> expected = {
       {kStartZ, kEndZ},
       {kStartX, kStartZ, kEndZ, kTurn},
       {kStartX, kStartZ, kEndX, kEndZ},
+      {kStartY, kStartZ, kEndY, kEndZ, kTurn},
       {kStartY, kStartZ, kEndY, kEndZ, kTurn}};
   const auto groups = GeneralGroups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
