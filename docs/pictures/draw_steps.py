@@ -4,7 +4,7 @@ right side, poses spread out where it moves on the spot; the view from above sho
 to toe tip, left orange, right blue), the way of each ankle and of the pelvis. Writes SVG with gnuplot.
 
     draw_steps.py STEPS.bvh OUT.svg [--every 0.25] [--from 0] [--to 60] [--front] [--gap 0.35]
-                  [--ground Z,Y,Z,Y,...] [--title TEXT]
+                  [--ground Z,Y,Z,Y,...|feet] [--title TEXT]
 """
 import argparse
 import math
@@ -25,7 +25,8 @@ def main():
     parser.add_argument("--to", dest="end", type=float, default=1e9)
     parser.add_argument("--front", action="store_true", help="look from the front instead")
     parser.add_argument("--gap", type=float, default=0.0, help="metres that each pose is moved on")
-    parser.add_argument("--ground", default="", help="profile of the ground: Z,Y,Z,Y,...")
+    parser.add_argument("--ground", default="", help="profile of the ground: Z,Y,Z,Y,...; "
+                        "'feet': treads 14 cm behind the balls that climb onto them, to 1 cm ahead of those that leave them")
     parser.add_argument("--title", default="")
     options = parser.parse_args()
     joints, rows, step_s = read_bvh(options.bvh)
@@ -54,7 +55,7 @@ def main():
               for n, block in zip(("left", "right", "middle"), blocks)]
 
     # Where a foot stands: its ball slower than 0.1 m/s for some frames.
-    stands, ways = [[], []], [[], []]
+    stands, ways, holds = [[], []], [[], []], []
     for foot, name in enumerate(("Left", "Right")):
         ankle, ball = index[name + "Foot"], index[name + "ToeBase"]
         tip = next(k for k, joint in enumerate(joints) if joint[1] == ball)
@@ -69,11 +70,23 @@ def main():
             if still == max(2, round(0.12 / step_s)):
                 dx, dz = at[ball][0] - at[ankle][0], at[ball][2] - at[ankle][2]
                 heel = (at[ankle][0] - 0.45 * dx, at[ankle][2] - 0.45 * dz)
+                holds.append((at[ball][2], at[ball][1]))
                 stands[foot].append(f"{-heel[0]:.4f} {heel[1]:.4f}\n{-at[tip][0]:.4f} {at[tip][2]:.4f}\n")
     for foot, name in enumerate(("left", "right")):
         script.append(f"${name}_stands << EOD\n" + "\n".join(stands[foot]) + "\nEOD")
         script.append(f"${name}_way << EOD\n" + "\n".join(ways[foot]) + "\nEOD")
     script.append("$pelvis << EOD\n" + "\n".join(f"{-p[0][0]:.4f} {p[0][2]:.4f}" for p in frames) + "\nEOD")
+    holds.sort()
+    if options.ground == "feet":
+        lowest = min(y for _, y in holds)
+        sole = [(holds[0][0] - 0.5, 0.0)]
+        for (z0, y0), (z1, y1) in zip(holds, holds[1:]):
+            if abs(y1 - y0) < 0.05:
+                continue
+            edge = max(z1 - 0.14, z0 + 0.09) if y1 > y0 else z0 + 0.01
+            sole += [(edge, sole[-1][1]), (edge, y1 - lowest)]
+        sole.append((holds[-1][0] + 0.5, sole[-1][1]))
+        options.ground = ",".join(f"{z:.3f},{y:.3f}" for z, y in sole)
     numbers = [float(v) for v in options.ground.split(",")] if options.ground else []
     profile = list(zip(numbers[::2], numbers[1::2])) or [(min(across) - 1, 0), (max(across) + 1, 0)]
     script.append("$ground << EOD\n" + "\n".join(f"{z} {y}" for z, y in profile) + "\nEOD")
@@ -94,7 +107,7 @@ set size 1,{strip_px / total:.4f}; set origin 0,{above_px / total:.4f}; set size
 set xrange [{min(across) - 0.2:.2f}:{max(across) + 0.2:.2f}]; set yrange [{min(heights) - 0.1:.2f}:{max(heights) + 0.1:.2f}]
 set title "{options.title}"; unset key; set border 3; set tics nomirror
 plot $ground w l lc rgb '#000000' lw 1, $right w l lc rgb '{RIGHT}' lw 1.2, $middle w l lc rgb '{MIDDLE}' lw 1, $left w l lc rgb '{LEFT}' lw 1.2
-unset title; set size 1,{above_px / total:.4f}; set origin 0,0
+set xtics 0.5; unset title; set size 1,{above_px / total:.4f}; set origin 0,0
 set xrange [{min(zs) - 0.3:.2f}:{max(zs) + 0.3:.2f}]; set yrange [{min(xs) - 0.3:.2f}:{max(xs) + 0.3:.2f}]
 set xlabel 'from above, m (ahead to the right, left side up)'
 set yrange [{-max(xs) - 0.3:.2f}:{-min(xs) + 0.3:.2f}]

@@ -1,0 +1,26 @@
+#!/bin/sh
+# Draws stairs, slalom and shuffle, on the generated library and on captured ones:
+#   docs/pictures/draw_general_steps.sh build/release/bin/stridewire-library ../shared/mocap/cmu
+set -eu
+tool=$1
+captures=$2
+here=$(dirname "$0")
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+draw() {  # choreography, folders of captures, title, how to draw
+  name=$1 folders=$2 title=$3
+  shift 3
+  files=
+  for folder in $folders; do files="$files $captures/$folder/*.bvh"; done
+  # shellcheck disable=SC2086
+  "$tool" build --all --mirror --out "$work/captured.swl" $files >/dev/null
+  for library in builtin captured; do
+    from=$library shown="generated library"
+    [ $library = builtin ] || { from=$work/captured.swl shown="captures of CMU $folders"; }
+    "$tool" synthesize "$from" --choreography "$here/$name.json" --out "$work/steps.bvh" >/dev/null
+    "$here/draw_steps.py" "$work/steps.bvh" "$here/${name}_$library.svg" --title "$title, $shown" "$@"
+  done
+}
+draw stairs "03 14" "stairs of 0.2 m" --every 0.35 --ground feet
+draw slalom "16" "slalom, 0.4 rad a step" --every 0.25
+draw shuffle "09" "sideways shuffle" --front --every 0.3 --gap -0.55
