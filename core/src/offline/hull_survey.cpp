@@ -87,13 +87,21 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   }
   std::vector<double> share(n);
   for (int s = 0; s < samples; ++s) {
-    // Few examples carry most of a sample (Dirichlet, alpha = 1/2), so that edges are met as well.
+    // Few examples carry most of a sample (Dirichlet, alpha = 1/2). Every other sample mixes but two to
+    // d + 1 of them: else edges, where errors are often largest, would hardly be met among many.
+    std::fill(share.begin(), share.end(), 0.0);
+    const bool takes_all = s % 2 == 0;
+    const std::size_t count = takes_all ? n : 2 + static_cast<std::size_t>(s / 2) % d;
     double sum = 0.0;
-    for (double& value : share) {
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::size_t e =
+          takes_all
+              ? k
+              : std::min(n - 1, static_cast<std::size_t>(Uniform(random) * static_cast<double>(n)));
       const double normal = std::sqrt(-2.0 * std::log(Uniform(random))) *
                             std::cos(6.283185307179586 * Uniform(random));
-      value = normal * normal;
-      sum += value;
+      share[e] += normal * normal;
+      sum += normal * normal;
     }
     ParameterValues& point = points.emplace_back();
     point.count = static_cast<int>(d);

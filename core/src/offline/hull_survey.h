@@ -11,8 +11,8 @@
 
 namespace stridewire {
 
-// Points in the hull of a group's examples: convex combinations of them, a few with most of the weight,
-// so that faces and corners are met as well; the examples themselves come first.
+// Points in the hull of a group's examples: convex combinations of them, half of all and half of but a
+// few, so that faces and corners are met as well; the examples themselves come first.
 [[nodiscard]] std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples,
                                                       std::uint32_t seed);
 
