@@ -15,6 +15,7 @@ build=(
   flatbuffers-compiler
   g++
   git
+  gnuplot-nox  # Draws the pictures of `stridewire-library report`.
   libboost1.81-dev  # Asio and Beast. Debian's default 1.74 and this one exclude each other.
   libcli11-dev
   libeigen3-dev

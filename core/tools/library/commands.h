@@ -49,6 +49,16 @@ struct RefineCommand {
 };
 int RunRefine(const RefineCommand& command);
 
+struct ReportCommand {
+  std::string library;
+  std::string out;
+  std::vector<std::string> axes;
+  double max_error_m = 0.001;
+  int max_pseudoexamples = 16;
+  bool json = false;
+};
+int RunReport(const ReportCommand& command);
+
 struct ExportCommand {
   std::string library;
   std::string out;

@@ -155,13 +155,34 @@ int Run(int argc, char** argv) {
   refine_app->add_flag("--json", refine.json, "Report as one JSON object on stdout");
   refine_app->footer("Example:\n  stridewire-library refine walk.swl --out better.swl\n");
 
-  CLI::App* later = app.add_subcommand("report", "Not supported yet");
-  later->allow_extras();
-  later->footer("Example:\n  stridewire-library report walk.swl --out pictures/\n");
+  ReportCommand report;
+  CLI::App* report_app =
+      app.add_subcommand("report", "Draws the paper's figures of a library, one page (HTML, SVG)");
+  report_app->add_option("library", report.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
+  report_app->add_option("--out", report.out, "The folder to write into: index.html, pictures")
+      ->required()
+      ->check(NotEmpty());
+  report_app->add_option("--axes", report.axes, "One or two parameters the error maps show")
+      ->delimiter(',')
+      ->expected(1, 2);
+  report_app->add_option("--max-error-m", report.max_error_m, "Refinement stops below this error")
+      ->capture_default_str()
+      ->check(Number(0.0, 1000.0, false));
+  report_app->add_option("--max-pseudoexamples", report.max_pseudoexamples, "The most a group gets")
+      ->capture_default_str()
+      ->check(CLI::Range(0, RefineOptions::kMostPseudoexamples));
+  report_app->add_flag("--json", report.json, "What the tables say as one JSON object on stdout");
+  report_app->footer(
+      "Example:\n  stridewire-library report walk.swl --out pictures/\n"
+      "  stridewire-library report builtin --out pictures/ --axes end_z_m,turn_rad --json\n");
 
   const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
   if (!wrong.empty()) {
-    return Complain(wrong + "; there are build, inspect, refine, synthesize and export-capture");
+    return Complain(wrong +
+                    "; there are build, inspect, refine, report, synthesize and "
+                    "export-capture");
   }
 
   try {
@@ -180,9 +201,9 @@ int Run(int argc, char** argv) {
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);
   if (*refine_app) return RunRefine(refine);
+  if (*report_app) return RunReport(report);
   if (*synthesize_app) return RunSynthesize(synthesize);
-  if (*export_app) return RunExport(export_command);
-  return Complain(app.get_subcommands().front()->get_name() + " is not supported yet");
+  return RunExport(export_command);
 }
 
 }  // namespace

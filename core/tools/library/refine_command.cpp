@@ -4,44 +4,12 @@
 #include "commands.h"
 #include "library_json.h"
 #include "patience.h"
+#include "refinement_json.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/offline/refine.h"
 
 namespace stridewire {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-Json QualityToJson(const GroupQuality& quality) {
-  return {{"error_m",
-           {{"min", quality.min_error_m},
-            {"mean", quality.mean_error_m},
-            {"max", quality.max_error_m}}},
-          {"weight_sum_max", quality.weight_sum_max},
-          {"condition", quality.condition}};
-}
-
-Json GroupToJson(const MotionGroup& group, const GroupRefinement& refined, int samples) {
-  Json json;
-  json["kind"] = MovementKindName(group.kind);
-  json["examples"] = group.example_count;
-  json["pseudoexamples"] = group.site_count - group.example_count;
-  Json parameters = Json::array();
-  for (const Parameter& parameter : group.parameters) {
-    parameters.push_back(ParameterText(parameter.name));
-  }
-  json["parameters"] = std::move(parameters);
-  json["samples"] = samples + group.example_count;
-  json["before"] = QualityToJson(refined.before);
-  json["after"] = QualityToJson(refined.after);
-  json["pseudoexample_error_m"] = refined.pseudoexample_error_m;
-  json["max_error_curve_m"] = refined.max_error_curve_m;
-  json["radii"] = refined.radii == RadiusRule::kAllSites ? "all_sites" : "examples";
-  json["radius_factor"] = refined.radius_factor;
-  json["rejected"] = refined.rejected;
-  json["end"] = RefineEndText(refined.end);
-  return json;
-}
 
 void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefinement& refined) {
   std::printf("group %zu: %s, %d examples, %d parameters, %d pseudoexamples (%s)\n", index,
@@ -95,13 +63,13 @@ int RunRefine(const RefineCommand& command) {
   }
 
   if (command.json) {
-    Json json;
+    nlohmann::ordered_json json;
     json["rule"] = command.rule;
     json["max_error_m"] = command.max_error_m;
-    json["groups"] = Json::array();
+    json["groups"] = nlohmann::ordered_json::array();
     for (std::size_t g = 0; g < refined->groups.size(); ++g) {
       json["groups"].push_back(
-          GroupToJson(refined->library->groups()[g], refined->groups[g], options.samples));
+          RefinementToJson(refined->library->groups()[g], refined->groups[g], options.samples));
     }
     json["library"] = LibraryToJson(*refined->library, false);
     std::printf("%s\n", Dump(json).c_str());

@@ -1,0 +1,193 @@
+#include "report.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+
+#include "gnuplot.h"
+#include "html.h"
+
+namespace stridewire {
+namespace {
+
+// Shares of the work, at a guess.
+constexpr double kRefined = 0.6;
+constexpr double kPlanned = 0.7;
+
+std::string Text(const char* format, double value) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+std::string Mm(double m) { return Text("%.2f", 1000.0 * m); }
+
+std::string ParameterList(const MotionGroup& group) {
+  std::string text;
+  for (const Parameter& parameter : group.parameters) {
+    text += (text.empty() ? "" : ", ") + std::string(ParameterText(parameter.name)) + " " +
+            Text("%.2f", parameter.min) + " to " + Text("%.2f", parameter.max);
+  }
+  return text;
+}
+
+std::string GroupTable(const Report& report) {
+  HtmlTable rows = {{"Group", "Kind", "Examples", "Parameters"}};
+  HtmlTable errors = {{"Group", "Kind", "Examples", "Pseudoexamples", "Before, max mm",
+                       "Before, mean mm", "Refined, max mm", "Refined, mean mm",
+                       "At pseudoexamples, mm", "Corrected, max mm", "Iterations", "Sum |w|",
+                       "Condition"}};
+  const auto groups = report.refinement.library->groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const MotionGroup& group = groups[g];
+    const GroupRefinement& refined = report.refinement.groups[g];
+    const InterpolationError& plain = report.plain[g];
+    const std::string kind(MovementKindName(group.kind));
+    rows.push_back(
+        {std::to_string(g), kind, std::to_string(group.example_count), ParameterList(group)});
+    errors.push_back(
+        {std::to_string(g), kind, std::to_string(group.example_count),
+         std::to_string(group.site_count - group.example_count), Mm(refined.before.max_error_m),
+         Mm(refined.before.mean_error_m), Mm(refined.after.max_error_m),
+         Mm(refined.after.mean_error_m), Text("%.5f", 1000.0 * refined.pseudoexample_error_m),
+         Text("%.4f", 1000.0 * plain.corrected_max_m), std::to_string(plain.iterations),
+         Text("%.2f", refined.after.weight_sum_max), Text("%.1f", refined.after.condition)});
+  }
+  return TableHtml(rows) +
+         "<p>How far synthesized movements miss what is asked, anywhere inside the hull of the "
+         "examples; a radian counts half a metre. Corrected: parameters are corrected when a "
+         "movement starts, without any refinement, in so many iterations at most.</p>\n" +
+         TableHtml(errors);
+}
+
+bool IsMirrored(const MotionGroup& group) {
+  return std::all_of(group.mirrored.begin(), group.mirrored.end(),
+                     [](std::uint8_t mirrored) { return mirrored != 0; });
+}
+
+// A part of the page: a heading, a sentence, pictures.
+struct Part {
+  std::string heading;
+  std::string text;
+  std::vector<Figure> figures;
+};
+
+}  // namespace
+
+FigureAxes AxesOf(const MotionGroup& group, const std::vector<std::string>& names) {
+  std::vector<int> found;
+  const auto take = [&](int l) {
+    if (l >= 0 && std::find(found.begin(), found.end(), l) == found.end()) found.push_back(l);
+  };
+  for (const std::string& name : names) {
+    for (int l = 0; l < group.parameter_count(); ++l) {
+      if (ParameterText(group.parameters[static_cast<std::size_t>(l)].name) == name) take(l);
+    }
+  }
+  take(group.FindParameter(ParameterName::kStartZ));
+  take(group.FindParameter(ParameterName::kEndZ));
+  for (int l = 0; l < group.parameter_count(); ++l) take(l);
+  return {.x = found[0], .y = found.size() > 1 ? found[1] : -1};
+}
+
+Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
+                            const ReportOptions& options) {
+  for (const std::string& axis : options.axes) {
+    const bool is_there = std::any_of(
+        library->groups().begin(), library->groups().end(), [&](const MotionGroup& group) {
+          return std::any_of(group.parameters.begin(), group.parameters.end(),
+                             [&](const Parameter& p) { return ParameterText(p.name) == axis; });
+        });
+    if (!is_there) return Fail(ErrorCode::kOutOfRange, "no group has such a parameter", axis);
+  }
+  const auto tell = [&](double done) { return !options.progress || options.progress(done); };
+  // First a picture without anything in it: gnuplot may be missing.
+  if (auto drawn = DrawSvg("plot 0 notitle\n", 10, 10); !drawn)
+    return std::unexpected(drawn.error());
+
+  Report report;
+  RefineOptions refine = {.max_error_m = options.max_error_m,
+                          .max_pseudoexamples = options.max_pseudoexamples};
+  refine.progress = [&](double done) { return tell(kRefined * done); };
+  auto amended = Refine(library, refine);
+  if (!amended) return std::unexpected(amended.error());
+  refine.progress = nullptr;
+  refine.rule = RefineRule::kBare;
+  const auto bare = Refine(library, refine);
+  if (!bare) return std::unexpected(bare.error());
+  // The library as if it had no pseudoexamples.
+  refine.max_pseudoexamples = 0;
+  refine.samples = 1;
+  const auto plain = Refine(library, refine);
+  if (!plain) return std::unexpected(plain.error());
+  report.refinement = *std::move(amended);
+
+  std::vector<Part> parts;
+  for (int g = 0; g < static_cast<int>(library->groups().size()); ++g) {
+    if (!tell(kRefined +
+              (kPlanned - kRefined) * g / static_cast<double>(library->groups().size()))) {
+      return Fail(ErrorCode::kUnsupported, "stopped");
+    }
+    report.plain.push_back(MeasureInterpolationError(*plain->library, g));
+    const MotionGroup& group = library->group(g);
+    Part part{"Group " + std::to_string(g) + ": " + std::string(MovementKindName(group.kind)),
+              std::to_string(group.example_count) + " examples; " + ParameterList(group) + ".",
+              {}};
+    if (group.kind == MovementKind::kStepRight && IsMirrored(group)) {
+      part.text += " All of them are left steps mirrored; see those.";
+    } else {
+      const FigureAxes axes = AxesOf(group, options.axes);
+      const auto index = static_cast<std::size_t>(g);
+      const auto before = MeasureErrorMap(*plain->library, g, MapOptions(axes));
+      if (!before) return std::unexpected(before.error());
+      const auto after = MeasureErrorMap(*report.refinement.library, g, MapOptions(axes));
+      if (!after) return std::unexpected(after.error());
+      // A grid may hit a narrow peak that samples missed.
+      GroupRefinement& refined = report.refinement.groups[index];
+      refined.before.max_error_m = std::max(refined.before.max_error_m, before->max_error_m);
+      refined.after.max_error_m = std::max(refined.after.max_error_m, after->max_error_m);
+      part.figures = {
+          ErrorFigure(*plain->library, *report.refinement.library, g, axes, *before, *after),
+          CurveFigure(*library, g, report.refinement.groups[index], bare->groups[index]),
+          ExamplesFigure(*library, g, axes),
+          SitesFigure(*report.refinement.library, g),
+          JointFigure(*library, g),
+          TimingFigure(*library, g, axes)};
+    }
+    parts.push_back(std::move(part));
+  }
+  Part walks{"Walks", "Synthesized from the library, as an avatar shows them.", {}};
+  for (const Walk& walk : ShownWalks(*library)) {
+    auto figure = WalkFigure(library, walk.name, walk.caption, walk.requests);
+    if (!figure) return std::unexpected(figure.error());
+    walks.figures.push_back(*std::move(figure));
+  }
+  if (!walks.figures.empty()) parts.insert(parts.begin(), std::move(walks));
+
+  std::string body = "<p>" + std::to_string(library->skeleton().joint_count()) + " joints, " +
+                     std::to_string(library->bytes().size()) + " bytes, hash " +
+                     EscapeHtml(library->hash()) + ".</p>\n" + GroupTable(report);
+  std::size_t count = 0;
+  for (const Part& part : parts) count += part.figures.size();
+  for (const Part& part : parts) {
+    body += "<h2>" + EscapeHtml(part.heading) + "</h2>\n<p>" + EscapeHtml(part.text) + "</p>\n";
+    for (const Figure& figure : part.figures) {
+      const double drawn = static_cast<double>(report.pictures.size()) / static_cast<double>(count);
+      if (!tell(kPlanned + (1.0 - kPlanned) * drawn)) {
+        return Fail(ErrorCode::kUnsupported, "stopped");
+      }
+      auto svg = DrawSvg(figure.script, figure.width, figure.height);
+      if (!svg) {
+        Error error = svg.error();
+        error.where = figure.file + ": " + error.where;
+        return std::unexpected(error);
+      }
+      body += PictureHtml(*svg, figure.caption, figure.file);
+      report.pictures.push_back({figure.file, *std::move(svg)});
+    }
+  }
+  report.html = PageHtml("Stridewire library report: " + options.name, body);
+  return report;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,86 @@
+#include <cstdio>
+#include <filesystem>
+#include <span>
+
+#include "command_line.h"
+#include "commands.h"
+#include "library_json.h"
+#include "patience.h"
+#include "refinement_json.h"
+#include "report/report.h"
+#include "stridewire/offline/open_library.h"
+
+namespace stridewire {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ReportToJson(const Report& report, const ReportCommand& command) {
+  Json json;
+  json["library"] = command.library;
+  json["max_error_m"] = command.max_error_m;
+  json["groups"] = Json::array();
+  for (std::size_t g = 0; g < report.plain.size(); ++g) {
+    Json group = RefinementToJson(report.refinement.library->groups()[g],
+                                  report.refinement.groups[g], RefineOptions{}.samples);
+    group["corrected_error_m"] = {{"max", report.plain[g].corrected_max_m},
+                                  {"mean", report.plain[g].corrected_mean_m},
+                                  {"iterations", report.plain[g].iterations}};
+    json["groups"].push_back(std::move(group));
+  }
+  json["files"] = {"index.html"};
+  for (const ReportPicture& picture : report.pictures) json["files"].push_back(picture.file);
+  return json;
+}
+
+// The page comes last: where it is, its pictures are as well.
+Status WriteReport(const Report& report, const std::filesystem::path& folder) {
+  for (const ReportPicture& picture : report.pictures) {
+    const auto bytes = std::as_bytes(std::span(picture.svg));
+    if (Status status = WriteFile(folder / picture.file, bytes); !status) return status;
+  }
+  return WriteFile(folder / "index.html", std::as_bytes(std::span(report.html)));
+}
+
+}  // namespace
+
+int RunReport(const ReportCommand& command) {
+  const Interrupt interrupt;
+  std::error_code failed;
+  const std::filesystem::path folder = command.out;
+  if (std::filesystem::exists(folder, failed) && !std::filesystem::is_directory(folder, failed)) {
+    return Complain(command.out + ": is there already and no folder", kExitFailure);
+  }
+  const auto library = OpenLibrary(command.library);
+  if (!library) return ComplainOfInput(library.error());
+
+  Progress progress("drawing");
+  const auto report =
+      MakeReport(*library, {.name = std::filesystem::path(command.library).filename().string(),
+                            .axes = command.axes,
+                            .max_error_m = command.max_error_m,
+                            .max_pseudoexamples = command.max_pseudoexamples,
+                            .progress = [&](double done) {
+                              progress.Show(done);
+                              return !Interrupt::IsAsked();
+                            }});
+  progress.Hide();
+  if (Interrupt::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+  if (!report) {
+    return report.error().code == ErrorCode::kOutOfRange ? ComplainOfInput(report.error())
+                                                         : ComplainOfOutput(report.error());
+  }
+  std::filesystem::create_directories(folder, failed);
+  if (failed) return Complain(command.out + ": the folder cannot be made", kExitFailure);
+  if (Status status = WriteReport(*report, folder); !status) {
+    return ComplainOfOutput(status.error());
+  }
+  if (command.json) {
+    std::printf("%s\n", Dump(ReportToJson(*report, command)).c_str());
+  } else {
+    std::printf("%s: index.html and %zu pictures\n", command.out.c_str(), report->pictures.size());
+  }
+  return kExitDone;
+}
+
+}  // namespace stridewire
