@@ -66,13 +66,14 @@ Figure LineFigure(const MotionLibrary& after, int group_index, const FigureAxes&
   Figure figure{.file = FilePrefix(after, group_index) + "error.svg", .height = 360};
   figure.script = MapBlock("before", map_before) + MapBlock("after", map_after) +
                   SiteBlocks(group, axes, "after");
-  figure.script +=
-      "set xlabel " + Quoted(AxisLabel(group.parameters[static_cast<std::size_t>(axes.x)])) +
-      " noenhanced\nset ylabel 'error, mm'\nset border 3\nset tics nomirror\nset yrange [0:0.01<*]\n"
-      "plot $before u 1:3 w l lw 2 dt 2 lc rgb '#d55e00' t 'before', "
-      "$after u 1:3 w l lw 2 lc rgb '#0072b2' t 'after', "
-      "$examples_after u 1:2 w p pt 7 ps 0.8 lc rgb '#000000' t 'examples', "
-      "$pseudo_after u 1:2 w p pt 4 ps 1 lc rgb '#000000' t 'pseudoexamples'\n";
+  figure.script += "set xlabel " +
+                   Quoted(AxisLabel(group.parameters[static_cast<std::size_t>(axes.x)])) +
+                   " noenhanced\nset ylabel 'error, mm'\nset border 3\nset tics nomirror\nset "
+                   "yrange [0:0.01<*]\n"
+                   "plot $before u 1:3 w l lw 2 dt 2 lc rgb '#d55e00' t 'before', "
+                   "$after u 1:3 w l lw 2 lc rgb '#0072b2' t 'after', "
+                   "$examples_after u 1:2 w p pt 7 ps 0.8 lc rgb '#000000' t 'examples', "
+                   "$pseudo_after u 1:2 w p pt 4 ps 1 lc rgb '#000000' t 'pseudoexamples'\n";
   return figure;
 }
 

@@ -148,9 +148,10 @@ Figure SitesFigure(const MotionLibrary& library, int group_index) {
   };
   block("examples", 0, group.example_count);
   block("pseudo", group.example_count, group.site_count);
-  figure.script += "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) +
-                   "\nunset key\nset border 3\nset tics nomirror font ',10'\nset offsets graph 0.06, graph "
-                   "0.06, graph 0.06, graph 0.06\n";
+  figure.script +=
+      "set multiplot layout " + std::to_string(rows) + "," + std::to_string(columns) +
+      "\nunset key\nset border 3\nset tics nomirror font ',10'\nset offsets graph 0.06, graph "
+      "0.06, graph 0.06, graph 0.06\n";
   if (d == 1) figure.script += "unset ytics\nset border 1\nset yrange [-1:1]\n";
   for (int l = 0; l < panels; ++l) {
     const auto at = static_cast<std::size_t>(l);
