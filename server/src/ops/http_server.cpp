@@ -2,6 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <boost/asio/post.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -29,10 +31,13 @@ std::string_view View(beast::string_view text) { return {text.data(), text.size(
 class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
  public:
   Visit(HttpServer& server, boost::asio::ip::tcp::socket socket)
-      : server_(server), stream_(std::move(socket)), buffer_(kMaxRequestBytes) {
-    ++server_.connections_;
+      : server_(server),
+        connections_(server.connections_),
+        stream_(std::move(socket)),
+        buffer_(kMaxRequestBytes) {
+    ++*connections_;
   }
-  ~Visit() { --server_.connections_; }
+  ~Visit() { --*connections_; }
 
   void Read() {
     parser_.emplace();
@@ -54,7 +59,9 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     }
     const auto& request = parser_->get();
     const std::string_view target = View(request.target());
-    const HttpQuery query{.path = target.substr(0, target.find('?')),
+    const std::size_t mark = std::min(target.find('?'), target.size());
+    const HttpQuery query{.path = target.substr(0, mark),
+                          .fields = target.substr(std::min(mark + 1, target.size())),
                           .if_none_match = View(request[http::field::if_none_match])};
     if (server_.stream_ != nullptr && query.path == server_.stream_->path) {
       if (auto refusal = RefusalOfStream()) {
@@ -64,8 +71,35 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
       }
       return;
     }
-    Answer(server_.AnswerTo(View(request.method_string()), query),
-           request.method() == http::verb::head, request.keep_alive());
+    const bool is_head = request.method() == http::verb::head;
+    if (server_.IsWork(View(request.method_string()), query)) {
+      return AnswerLater(query, is_head, request.keep_alive());
+    }
+    Answer(server_.AnswerTo(View(request.method_string()), query), is_head, request.keep_alive());
+  }
+
+  // `query` lies in the parser, which waits for the answer, too.
+  void AnswerLater(const HttpQuery& query, bool is_head, bool keep_alive) {
+    if (server_.waiting_for_work_ >= kMaxWaitingForWork) {
+      server_.metrics_.Reached(Limit::kHttpWork);
+      Answer({.status = 503,
+              .body = "too much is being worked out at once: ask again\n",
+              .headers = {{"Retry-After", "1"}}},
+             is_head, keep_alive);
+      return;
+    }
+    ++server_.waiting_for_work_;
+    boost::asio::post(
+        server_.worker_, [self = shared_from_this(), query, is_head, keep_alive]() mutable {
+          HttpAnswer answer = self->server_.work_.page(query);
+          const auto executor = self->stream_.get_executor();
+          // The visit ends on its own thread.
+          boost::asio::post(executor, [self = std::move(self), answer = std::move(answer), is_head,
+                                       keep_alive]() mutable {
+            --self->server_.waiting_for_work_;
+            self->Answer(std::move(answer), is_head, keep_alive);
+          });
+        });
   }
 
   // Why the request is no way to a stream; nothing if it is one.
@@ -139,6 +173,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
   }
 
   HttpServer& server_;
+  std::shared_ptr<int> connections_;  // the server may be gone when the last visit goes
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
@@ -149,7 +184,19 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
 HttpServer::HttpServer(int max_connections, ThreadMetrics& metrics)
     : max_connections_(max_connections), metrics_(metrics) {}
 
-HttpServer::~HttpServer() = default;
+HttpServer::~HttpServer() {
+  worker_.stop();
+  worker_.join();
+}
+
+void HttpServer::SetWork(std::string prefix, Page page) {
+  work_ = {std::move(prefix), std::move(page)};
+}
+
+bool HttpServer::IsWork(std::string_view method, const HttpQuery& query) const {
+  return work_.page && (method == "GET" || method == "HEAD") &&
+         query.path.starts_with(work_.prefix) && pages_.find(query.path) == pages_.end();
+}
 
 void HttpServer::ServeStream(std::string path, OriginPolicy policy, std::function<bool()> is_open,
                              OnStream on_stream) {
@@ -158,7 +205,7 @@ void HttpServer::ServeStream(std::string path, OriginPolicy policy, std::functio
 }
 
 void HttpServer::Accept(boost::asio::ip::tcp::socket socket) {
-  if (connections_ >= max_connections_) {
+  if (*connections_ >= max_connections_) {
     metrics_.Reached(Limit::kHttpConnections);
     return;  // closes it
   }

@@ -2,6 +2,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/thread_pool.hpp>
 #include <functional>
 #include <map>
 #include <memory>
@@ -19,6 +20,7 @@ namespace stridewire::server {
 /// What is asked for.
 struct HttpQuery {
   std::string_view path;           ///< As it came, without what follows a '?'.
+  std::string_view fields;         ///< What follows it: "a=1&b=2".
   std::string_view if_none_match;  ///< Empty if it was not there.
 };
 
@@ -35,8 +37,9 @@ struct HttpAnswer {
 };
 
 /// A small HTTP/1.1 server: GET and HEAD of what it was given, and one path that becomes a
-/// WebSocket. Requests are read up to 8 KiB, each within 10 s; answers are written within 60 s; one
-/// thread's.
+/// WebSocket. Requests are read up to 8 KiB, each within 10 s; answers are written within 60 s. One
+/// thread's, but for work that takes longer: that has a thread of its own, and 16 requests may wait
+/// for it.
 class HttpServer {
  public:
   using Page = std::function<HttpAnswer(const HttpQuery&)>;
@@ -48,6 +51,8 @@ class HttpServer {
   ~HttpServer();
 
   void AddPage(std::string path, Page page) { pages_[std::move(path)] = std::move(page); }
+  /// Asked, on a thread of its own, for paths that start with `prefix` and have no page.
+  void SetWork(std::string prefix, Page page);
   /// Asked for paths that have no page.
   void SetFallback(Page page) { fallback_ = std::move(page); }
   /// Takes WebSockets at `path`, as long as `is_open` says so.
@@ -64,6 +69,12 @@ class HttpServer {
     std::function<bool()> is_open;
     OnStream on_stream;
   };
+  static constexpr int kMaxWaitingForWork = 16;
+  struct Work {
+    std::string prefix;
+    Page page;
+  };
+  [[nodiscard]] bool IsWork(std::string_view method, const HttpQuery& query) const;
   [[nodiscard]] HttpAnswer AnswerTo(std::string_view method, const HttpQuery& query) const;
 
   int max_connections_;
@@ -71,7 +82,10 @@ class HttpServer {
   std::map<std::string, Page, std::less<>> pages_;
   Page fallback_;
   std::unique_ptr<const Stream> stream_;
-  int connections_ = 0;
+  std::shared_ptr<int> connections_ = std::make_shared<int>(0);
+  Work work_;
+  int waiting_for_work_ = 0;
+  boost::asio::thread_pool worker_{1};  // last: joined before anything it uses goes
 };
 
 }  // namespace stridewire::server

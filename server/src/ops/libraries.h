@@ -25,6 +25,9 @@ class Libraries {
   }
   /// Null for a name no configuration had.
   [[nodiscard]] std::shared_ptr<const MotionLibrary> Find(const std::string& name) const;
+  [[nodiscard]] const std::map<std::string, std::shared_ptr<const MotionLibrary>>& All() const {
+    return libraries_;
+  }
 
  private:
   std::map<std::string, std::shared_ptr<const MotionLibrary>> libraries_;

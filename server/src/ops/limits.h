@@ -73,6 +73,7 @@ enum class Limit : std::uint8_t {
   kReplyMemory,
   kEventReplay,
   kHttpConnections,
+  kHttpWork,
   kCount,
 };
 
@@ -98,6 +99,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Limit::kC
      "observer_backlog",
      "reply_memory",
      "event_replay",
-     "max_http_connections"};
+     "max_http_connections",
+     "http_work"};
 
 }  // namespace stridewire::server

@@ -219,6 +219,14 @@ void Server::AddPages() {
   http_.AddPage("/info.json", [this](const HttpQuery&) {
     return HttpAnswer{.content_type = "application/json", .body = InfoText()};
   });
+  for (const auto& [name, library] : libraries_.All()) {
+    // What a library's file is called, not where it lies.
+    library_pages_.Add(name.substr(name.rfind('/') + 1), library);
+  }
+  http_.SetWork("/libraries", [this](const HttpQuery& query) {
+    auto answer = library_pages_.Answer(query);
+    return answer ? *std::move(answer) : HttpAnswer{.status = 404, .body = "no such page\n"};
+  });
   if (viewer_.empty()) {
     http_.AddPage("/", [](const HttpQuery&) {
       return HttpAnswer{.content_type = "text/html; charset=utf-8",

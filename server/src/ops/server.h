@@ -12,6 +12,7 @@
 #include "ops/config.h"
 #include "ops/http_server.h"
 #include "ops/libraries.h"
+#include "ops/library_pages.h"
 #include "ops/metrics.h"
 #include "ops/viewer_files.h"
 #include "session/gate.h"
@@ -67,6 +68,7 @@ class Server : public ShardPeers {
   const Config config_;
   const Libraries libraries_;
   const ViewerFiles viewer_;
+  LibraryPages library_pages_;
   Metrics metrics_;
   AvatarBudget avatar_budget_;
   boost::asio::io_context context_{1};

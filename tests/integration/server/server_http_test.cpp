@@ -2,12 +2,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <boost/asio.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <thread>
+#include <tuple>
 
 #include "scratch_folder.h"
 #include "test_server.h"
@@ -224,6 +227,134 @@ TEST_F(ServerHttp, TellsWhoWantsNoWebSocketWhatIsThere) {
   const auto answer = client.Ask("/stream");
   EXPECT_EQ(answer.result_int(), 426u);
   EXPECT_EQ(answer[http::field::upgrade], "websocket");
+}
+
+// What the animator's page asks.
+class ServerLibraries : public testing::Test {
+ protected:
+  nlohmann::json Get(const std::string& target) {
+    const auto response = client.Ask(target);
+    EXPECT_EQ(response.result_int(), 200u) << target << ": " << response.body();
+    return nlohmann::json::parse(response.body(), nullptr, false);
+  }
+
+  TestServer server;
+  HttpClient client{server.http_port()};
+  nlohmann::json list = Get("/libraries.json");
+  std::string folder = "/libraries/" + list[0]["hash"].get<std::string>();
+};
+
+TEST_F(ServerLibraries, TellWhatTheySpan) {
+  ASSERT_EQ(list.size(), 1u);
+  EXPECT_EQ(list[0]["name"], "toy");
+  const nlohmann::json skeleton = Get(folder + "/skeleton.json");
+  EXPECT_EQ(skeleton["names"].size(), skeleton["parents"].size());
+  EXPECT_EQ(skeleton["offsets_m"].size(), 3 * skeleton["names"].size());
+  EXPECT_EQ(skeleton["legs"].size(), 2u);
+  const nlohmann::json& groups = list[0]["groups"];
+  ASSERT_GE(groups.size(), 3u);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const nlohmann::json sites = Get(folder + "/" + std::to_string(g) + "/sites.json");
+    EXPECT_EQ(sites["kind"], groups[g]["kind"]);
+    EXPECT_EQ(sites["parameters"].size(), groups[g]["parameters"].size());
+    EXPECT_EQ(sites["sites"].size(), groups[g]["examples"].get<std::size_t>() +
+                                         groups[g]["pseudoexamples"].get<std::size_t>());
+  }
+}
+
+TEST_F(ServerLibraries, SynthesizeWhatIsAskedFor) {
+  const std::size_t joints = Get(folder + "/skeleton.json")["names"].size();
+  const nlohmann::json step = Get(folder + "/0/step.json?p=-0.31,0.62");
+  const std::size_t frames = step["times_s"].size();
+  EXPECT_GE(frames, 10u);
+  EXPECT_EQ(step["roots_m"].size(), 3 * frames);
+  EXPECT_EQ(step["rotations"].size(), 4 * joints * frames);
+  EXPECT_NEAR(step["measured"][0].get<double>(), -0.31, 2e-5);
+  EXPECT_NEAR(step["measured"][1].get<double>(), 0.62, 2e-5);
+  EXPECT_LT(step["error_m"].get<double>(), step["uncorrected_error_m"].get<double>());
+  const nlohmann::json plain = Get(folder + "/0/step.json?correction=0&p=-0.31,0.62");
+  EXPECT_EQ(plain["iterations"], 0);
+  EXPECT_EQ(plain["error_m"], plain["uncorrected_error_m"]);
+  EXPECT_EQ(plain["error_m"], step["uncorrected_error_m"]);
+  // Far outside: as near as a request would get.
+  const nlohmann::json far = Get(folder + "/0/step.json?p=-0.31,3");
+  EXPECT_TRUE(far["extrapolated"].get<bool>());
+  EXPECT_LT(far["applied"][1].get<double>(), 0.9);
+  EXPECT_EQ(far["requested"][1], 3.0);
+  // An example is the step of its own parameters.
+  const nlohmann::json sites = Get(folder + "/0/sites.json")["sites"];
+  const nlohmann::json example = Get(folder + "/0/example.json?index=7");
+  EXPECT_EQ(example["applied"], sites[7]["p"]);
+  EXPECT_NEAR(example["weights"][7].get<double>(), 1.0, 1e-5);
+}
+
+TEST_F(ServerLibraries, MapErrorsOverASlice) {
+  const auto map = [&](int correction) {
+    return Get(folder +
+               "/0/errors.json?x=0&y=1&p=0,0&cells=24&correction=" + std::to_string(correction));
+  };
+  const nlohmann::json plain = map(0);
+  const nlohmann::json corrected = map(1);
+  ASSERT_EQ(plain["errors_mm"].size(), 24u * 24u);
+  int inside = 0;
+  double largest_mm = 0.0;
+  for (std::size_t i = 0; i < plain["errors_mm"].size(); ++i) {
+    EXPECT_EQ(plain["errors_mm"][i].is_null(), corrected["errors_mm"][i].is_null());
+    if (plain["errors_mm"][i].is_null()) continue;
+    ++inside;
+    largest_mm = std::max(largest_mm, plain["errors_mm"][i].get<double>());
+    EXPECT_LE(corrected["errors_mm"][i].get<double>(), plain["errors_mm"][i].get<double>() + 1e-4);
+  }
+  EXPECT_GT(inside, 24 * 24 / 2);
+  EXPECT_LT(inside, 24 * 24);  // the corner that no example is near
+  EXPECT_NEAR(plain["largest_m"].get<double>() * 1e3, largest_mm, 1e-4);
+  EXPECT_LT(corrected["largest_m"].get<double>(), plain["largest_m"].get<double>() / 10);
+}
+
+TEST_F(ServerLibraries, RefuseWhatMakesNoSense) {
+  for (const auto& [page, status, why] :
+       {std::tuple("/0/step.json", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=1", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=1,2,3", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=1,", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=nan,1", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=inf,1", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=1e300,1", 400u, "p: a number for each parameter"),
+        std::tuple("/0/step.json?p=0,0&correction=2", 400u, "correction: 0 or 1"),
+        std::tuple("/0/example.json?index=-1", 400u, "index: "),
+        std::tuple("/0/example.json?index=9999999999", 400u, "index: "),
+        std::tuple("/0/errors.json?x=0&y=2&p=0,0&cells=8", 400u, "y: "),
+        std::tuple("/0/errors.json?x=0&y=1&p=0,0&cells=65", 400u, "cells: a number from 2 to 64"),
+        std::tuple("/0/errors.json?x=0&y=1&p=0,0", 400u, "cells: a number from 2 to 64"),
+        std::tuple("/0/other.json", 404u, "no such page"),
+        std::tuple("/99/sites.json", 404u, "no such page or group"),
+        std::tuple("/-1/sites.json", 404u, "no such page or group"),
+        std::tuple("/", 404u, "no such"), std::tuple("", 404u, "no such")}) {
+    const auto response = client.Ask(folder + page);
+    EXPECT_EQ(response.result_int(), status) << page;
+    EXPECT_THAT(response.body(), HasSubstr(why)) << page;
+  }
+  EXPECT_EQ(client.Ask("/libraries/00/0/sites.json").result_int(), 404u);
+  EXPECT_EQ(client.Ask("/libraries").result_int(), 404u);
+  EXPECT_EQ(client.Ask("/libraries.json", http::verb::post).result_int(), 405u);
+}
+
+TEST_F(ServerLibraries, AnswerABoundedNumberAtOnce) {
+  const std::string target = folder + "/0/errors.json?x=0&y=1&p=0,0&cells=64";
+  std::atomic<int> answered = 0;
+  std::atomic<int> refused = 0;
+  std::vector<std::jthread> visitors;
+  for (int i = 0; i < 48; ++i) {
+    visitors.emplace_back([&] {
+      const auto status = HttpClient(server.http_port()).Ask(target).result_int();
+      if (status == 200) ++answered;
+      if (status == 503) ++refused;
+    });
+  }
+  visitors.clear();
+  EXPECT_EQ(answered + refused, 48);
+  EXPECT_GE(answered, 16);
+  EXPECT_EQ(server.metrics().Sum(server::Limit::kHttpWork), static_cast<std::uint64_t>(refused));
 }
 
 }  // namespace
