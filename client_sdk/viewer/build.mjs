@@ -1,4 +1,5 @@
-// Bundles the viewer: node build.mjs --out DIR  writes index.html and assets/NAME-HASH.{js,css,svg}.
+// Bundles the viewer: node build.mjs --out DIR  writes index.html, library.html and
+// assets/NAME-HASH.{js,css,svg}.
 
 import {createHash} from 'node:crypto';
 import {mkdir, readFile, readdir, rm, writeFile} from 'node:fs/promises';
@@ -13,7 +14,7 @@ const out = resolve(outAt > 0 ? process.argv[outAt + 1] : join(here, 'dist'));
 const assets = join(out, 'assets');
 
 const result = await esbuild.build({
-  entryPoints: {viewer: join(here, 'src/main.ts')},
+  entryPoints: {viewer: join(here, 'src/main.ts'), library: join(here, 'src/library/main.ts')},
   bundle: true,
   format: 'esm',
   target: ['es2022'],
@@ -23,25 +24,29 @@ const result = await esbuild.build({
   outdir: assets,
   logLevel: 'warning',
 });
+const bundle = (name) =>
+  result.outputFiles.find(({path}) => path === join(assets, `${name}.js`)).contents;
 const style = await esbuild.transform(
   await readFile(join(here, 'src/style.css'), 'utf8'), {loader: 'css', minify: true});
 
 const files = {
-  SCRIPT: ['viewer', 'js', result.outputFiles[0].contents],
+  SCRIPT: ['viewer', 'js', bundle('viewer')],
+  LIBRARY: ['library', 'js', bundle('library')],
   STYLE: ['viewer', 'css', Buffer.from(style.code)],
   ICON: ['icon', 'svg', await readFile(join(here, 'src/icon.svg'))],
 };
 await mkdir(assets, {recursive: true});
-let page = await readFile(join(here, 'index.html'), 'utf8');
+const names = ['index.html', 'library.html'];
+const pages = await Promise.all(names.map((name) => readFile(join(here, name), 'utf8')));
 const written = new Set();
 for (const [placeholder, [name, extension, contents]] of Object.entries(files)) {
   const hash = createHash('sha256').update(contents).digest('hex').slice(0, 12);
   const file = `${name}-${hash}.${extension}`;
   await writeFile(join(assets, file), contents);
   written.add(file);
-  page = page.replaceAll(`%${placeholder}%`, `/assets/${file}`);
+  pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `/assets/${file}`)));
 }
 for (const file of await readdir(assets)) {
   if (!written.has(file)) await rm(join(assets, file));  // Of an earlier build.
 }
-await writeFile(join(out, 'index.html'), page);
+await Promise.all(names.map((name, i) => writeFile(join(out, name), pages[i])));

@@ -159,7 +159,9 @@ export class App {
     this.addPanel('figures', 'Figures', 'plots', this.right, this.figures.element);
     this.top = h('header', {class: 'top'},
       h('h1', {}, 'Stridewire'), this.chips, this.status, this.tools,
-      h('div', {class: 'corner'}, this.frameButton, this.followButton, this.themeButton, help));
+      h('div', {class: 'corner'},
+        h('a', {class: 'link', href: '/library.html', title: 'What the libraries span'}, 'Library'),
+        this.frameButton, this.followButton, this.themeButton, help));
     this.bottom = h('footer', {class: 'bottom'}, this.transport.element);
     this.notice.append(this.noticeText);
     this.notice.hidden = true;

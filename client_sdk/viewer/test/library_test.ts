@@ -1,0 +1,87 @@
+import assert from 'node:assert/strict';
+import {test} from 'node:test';
+
+import {matchingTime, samplePose, timeOf} from '../src/library/clip_pose.js';
+import {niceTop, widest} from '../src/library/library_page.js';
+import {Latest} from '../src/library/library_source.js';
+import type {Clip} from '../src/library/library_source.js';
+import {scaleColour} from '../src/library/parameter_plane.js';
+
+function clip(keytimesS: number[], timesS: number[], roots: number[], rotations: number[]): Clip {
+  return {
+    times_s: timesS, roots_m: roots, rotations, keytimes_s: keytimesS, heading_change_rad: 0,
+    weights: [1], weight_sum: 1, applied: [0], measured: [0],
+  };
+}
+
+test('times of two movements belong together by generic time', () => {
+  const a = clip([0, 0.2, 1], [0, 1], [0, 0, 0, 0, 0, 1], [0, 0, 0, 1, 0, 0, 0, 1]);
+  const b = clip([0, 0.6, 0.8], [0, 0.8], [0, 0, 0, 0, 0, 1], [0, 0, 0, 1, 0, 0, 0, 1]);
+  assert.equal(timeOf(b.keytimes_s, 1.5), 0.7);
+  assert.ok(Math.abs(matchingTime(a, b, 0.1) - 0.3) < 1e-12);
+  assert.ok(Math.abs(matchingTime(a, b, 0.6) - 0.7) < 1e-12);
+  assert.equal(matchingTime(a, b, 1), 0.8);
+  assert.equal(matchingTime(a, b, 9), 0.8);
+});
+
+test('poses between frames go the short way and stay of unit length', () => {
+  const s = Math.SQRT1_2;
+  // The second frame has the other sign of a quarter turn.
+  const it = clip([0, 1], [0, 0.5, 1], [0, 1, 0, 0, 1, 1, 0, 1, 2],
+    [0, 0, 0, 1, 0, -s, 0, -s, 0, 1, 0, 0]);
+  const roots = new Float32Array(6);
+  const rotations = new Float32Array(8);
+  samplePose(it, 1, 0.25, 0.5, roots, rotations, 1);
+  assert.deepEqual([...roots.subarray(3)], [0.5, 1, 0.5]);
+  const [x, y, z, w] = rotations.subarray(4);
+  assert.ok(Math.abs(Math.hypot(x!, y!, z!, w!) - 1) < 1e-6);
+  assert.ok(Math.abs(2 * Math.atan2(y!, w!) - Math.PI / 4) < 1e-6);
+  samplePose(it, 1, 7, 0, roots, rotations, 0);
+  assert.equal(roots[2], 2);
+});
+
+test('colours go from dark to light, tops are round', () => {
+  let last = -1;
+  for (let i = 0; i <= 20; ++i) {
+    const [r, g, b] = scaleColour(i / 20);
+    const light = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+    assert.ok(light > last, `${i}`);
+    last = light;
+  }
+  assert.deepEqual(scaleColour(-3), scaleColour(0));
+  assert.deepEqual(scaleColour(3), scaleColour(1));
+  assert.equal(niceTop(2.8), 3);
+  assert.equal(niceTop(0.013), 0.015);
+  assert.ok(niceTop(0) > 0);
+});
+
+test('the axes are the parameters that are spread most', () => {
+  const parameter = (name: string, min: number, max: number) => ({name, min, max});
+  const group = (parameters: ReturnType<typeof parameter>[]) => ({kind: 'jump', parameters, sites: []});
+  assert.deepEqual(widest(group([parameter('length_m', 0, 1)])), [0, 0]);
+  assert.deepEqual(widest(group([
+    parameter('start_x_m', 0, 0.1), parameter('end_z_m', 0, 0.7), parameter('turn_rad', -1, 1)])), [1, 2]);
+});
+
+test('only the newest wish is worked at after the present one', async () => {
+  const done: number[] = [];
+  const failed: string[] = [];
+  let release = (): void => {};
+  const latest = new Latest<number>(async (wish) => {
+    await new Promise<void>((resolve) => (release = resolve));
+    if (wish === 3) throw new Error('three');
+    done.push(wish);
+  }, (error) => failed.push(error.message));
+  latest.want(1);
+  latest.want(2);
+  latest.want(3);
+  release();
+  await new Promise((resolve) => setTimeout(resolve));
+  release();
+  await new Promise((resolve) => setTimeout(resolve));
+  latest.want(4);
+  release();
+  await new Promise((resolve) => setTimeout(resolve));
+  assert.deepEqual(done, [1, 4]);
+  assert.deepEqual(failed, ['three']);
+});
