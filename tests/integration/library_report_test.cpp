@@ -124,6 +124,28 @@ TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
   }
 }
 
+TEST_F(LibraryReport, MeasuresRealismOnCaptures) {
+  const ProgramResult result =
+      Report({"builtin", "--out", folder_.File("report"), "--max-pseudoexamples", "0", "--captures",
+              "/usr/share/assimp/models/BVH/01_01.bvh", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json told = json::parse(result.out);
+  bool has_jumps = false;
+  for (const json& group : told["realism"]) {
+    if (group["kind"] != "jump") continue;
+    has_jumps = true;
+    EXPECT_GT(group["movements"], 5);
+    EXPECT_LT(group["cardinal"]["parameter_m"], group["nearest"]["parameter_m"]);
+    for (const char* method : {"cardinal", "nearest", "inverse_distance"}) {
+      EXPECT_GT(group[method]["pose_m"], 0.0);
+      EXPECT_EQ(group[method]["parts_m"].size(), 4u);
+    }
+    EXPECT_EQ(group["cardinal"]["won_by_cardinal"], 0.0);
+  }
+  EXPECT_TRUE(has_jumps);
+  EXPECT_THAT(ReadWhole(folder_.path() / "report" / "index.html"), HasSubstr("Realism"));
+}
+
 TEST_F(LibraryReport, SaysThatGnuplotIsMissing) {
   const std::string path = std::getenv("PATH");
   ASSERT_EQ(setenv("PATH", folder_.path().c_str(), 1), 0);
@@ -151,6 +173,7 @@ TEST_F(LibraryReport, RefusesBadOptionsAndWritesNothing) {
   fails({library_, "--out", out, "--axes", "no_such_m"}, 2, "no_such_m");
   fails({library_, "--out", out, "--max-error-m", "-1"}, 2, "--max-error-m");
   fails({library_, "--out", out, "--max-pseudoexamples", "1025"}, 2, "--max-pseudoexamples");
+  fails({library_, "--out", out, "--captures", "missing.bvh"}, 2, "missing.bvh");
   fails({library_, "--out", library_}, 1, "no folder");
   EXPECT_FALSE(std::filesystem::exists(out));
 }

@@ -51,6 +51,7 @@ int RunRefine(const RefineCommand& command);
 
 struct ReportCommand {
   std::string library;
+  std::vector<std::string> captures;
   std::string out;
   std::vector<std::string> axes;
   double max_error_m = 0.001;

@@ -173,10 +173,16 @@ int Run(int argc, char** argv) {
   report_app->add_option("--max-pseudoexamples", report.max_pseudoexamples, "The most a group gets")
       ->capture_default_str()
       ->check(CLI::Range(0, RefineOptions::kMostPseudoexamples));
+  report_app
+      ->add_option(
+          "--captures", report.captures,
+          "BVH files to measure realism on: each movement left out and made from the others")
+      ->check(NotEmpty());
   report_app->add_flag("--json", report.json, "What the tables say as one JSON object on stdout");
   report_app->footer(
       "Example:\n  stridewire-library report walk.swl --out pictures/\n"
-      "  stridewire-library report builtin --out pictures/ --axes end_z_m,turn_rad --json\n");
+      "  stridewire-library report builtin --out pictures/ --axes end_z_m,turn_rad --json\n"
+      "  stridewire-library report walk.swl --out pictures/ --captures 16_*.bvh\n");
 
   const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
   if (!wrong.empty()) {

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <span>
 
 #include "command_line.h"
@@ -8,6 +9,9 @@
 #include "patience.h"
 #include "refinement_json.h"
 #include "report/report.h"
+#include "stridewire/offline/assemble.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
 
 namespace stridewire {
@@ -33,6 +37,59 @@ Json ReportToJson(const Report& report, const ReportCommand& command) {
   return json;
 }
 
+Json RealismToJson(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
+  Json json = Json::array();
+  for (std::size_t g = 0; g < realism.size(); ++g) {
+    const MotionGroup& group = captured.groups()[g];
+    Json entry = {{"kind", MovementKindName(group.kind)},
+                  {"parameters", group.parameter_count()},
+                  {"movements", realism[g].movements}};
+    for (std::size_t m = 0; m < realism[g].means.size(); ++m) {
+      const LeftOutMean& mean = realism[g].means[m];
+      Json parts = Json::object();
+      for (std::size_t p = 0; p < mean.part_m.size(); ++p) {
+        parts[std::string(BodyPartName(static_cast<BodyPart>(p)))] = mean.part_m[p];
+      }
+      entry[std::string(BlendMethodName(static_cast<BlendMethod>(m)))] = {
+          {"pose_m", mean.pose_m},           {"parts_m", std::move(parts)},
+          {"foot_m", mean.foot_m},           {"keytime_s", mean.keytime_s},
+          {"parameter_m", mean.parameter_m}, {"won_by_cardinal", realism[g].wins[m]}};
+    }
+    json.push_back(std::move(entry));
+  }
+  return json;
+}
+
+// Every usable movement of the captures. Null: one of them or all could not be used, which has been
+// said; or it was interrupted.
+std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>& paths) {
+  LibraryAssembler assembler;
+  for (const std::string& path : paths) {
+    if (Interrupt::IsAsked()) return nullptr;
+    const auto capture = ReadBvh(path);
+    if (!capture) {
+      ComplainOfInput(capture.error());
+      return nullptr;
+    }
+    const Extraction& extraction = assembler.Add(*capture);
+    if (!extraction.error.empty()) {
+      Complain(path + ": " + extraction.error);
+      return nullptr;
+    }
+  }
+  const auto raw = assembler.Assemble();
+  if (!raw) {
+    ComplainOfInput(raw.error());
+    return nullptr;
+  }
+  const auto library = LibraryBuilder().Build(*raw);
+  if (!library) {
+    ComplainOfInput(library.error());
+    return nullptr;
+  }
+  return *library;
+}
+
 // The page comes last: where it is, its pictures are as well.
 Status WriteReport(const Report& report, const std::filesystem::path& folder) {
   for (const ReportPicture& picture : report.pictures) {
@@ -54,12 +111,20 @@ int RunReport(const ReportCommand& command) {
   const auto library = OpenLibrary(command.library);
   if (!library) return ComplainOfInput(library.error());
 
+  std::shared_ptr<const MotionLibrary> captured;
+  if (!command.captures.empty()) {
+    captured = ReadCaptures(command.captures);
+    if (Interrupt::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+    if (captured == nullptr) return kExitBadInput;
+  }
+
   Progress progress("drawing");
   const auto report =
       MakeReport(*library, {.name = std::filesystem::path(command.library).filename().string(),
                             .axes = command.axes,
                             .max_error_m = command.max_error_m,
                             .max_pseudoexamples = command.max_pseudoexamples,
+                            .captured = captured,
                             .progress = [&](double done) {
                               progress.Show(done);
                               return !Interrupt::IsAsked();
@@ -76,7 +141,9 @@ int RunReport(const ReportCommand& command) {
     return ComplainOfOutput(status.error());
   }
   if (command.json) {
-    std::printf("%s\n", Dump(ReportToJson(*report, command)).c_str());
+    Json json = ReportToJson(*report, command);
+    if (captured != nullptr) json["realism"] = RealismToJson(*captured, report->realism);
+    std::printf("%s\n", Dump(json).c_str());
   } else {
     std::printf("%s: index.html and %zu pictures\n", command.out.c_str(), report->pictures.size());
   }

@@ -60,6 +60,44 @@ std::string GroupTable(const Report& report) {
          TableHtml(errors);
 }
 
+std::string Cm(double m) { return Text("%.2f", 100.0 * m); }
+
+// How near made movements are to captured ones.
+std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
+  HtmlTable rows = {{"Group", "Parameters", "Movements", "Made by", "Joints, cm", "Trunk", "Head",
+                     "Arms", "Legs", "Foot, cm", "Keytimes, ms", "Parameters, cm",
+                     "Ours is nearer"}};
+  for (std::size_t g = 0; g < realism.size(); ++g) {
+    const MotionGroup& group = captured.groups()[g];
+    const LeaveOneOut& left_out = realism[g];
+    if (left_out.movements == 0) continue;
+    for (std::size_t m = 0; m < left_out.means.size(); ++m) {
+      const LeftOutMean& mean = left_out.means[m];
+      std::string method(BlendMethodName(static_cast<BlendMethod>(m)));
+      std::replace(method.begin(), method.end(), '_', ' ');
+      const double gain = 1.0 - left_out.means[0].pose_m / mean.pose_m;
+      std::vector<std::string> row = {
+          m == 0 ? std::to_string(g) + " " + std::string(MovementKindName(group.kind)) : "",
+          m == 0 ? std::to_string(group.parameter_count()) : "",
+          m == 0 ? std::to_string(left_out.movements) : "", method, Cm(mean.pose_m)};
+      for (const double part_m : mean.part_m) row.push_back(Cm(part_m));
+      row.push_back(Cm(mean.foot_m));
+      row.push_back(Text("%.0f", 1000.0 * mean.keytime_s));
+      row.push_back(Cm(mean.parameter_m));
+      row.push_back(m == 0 ? ""
+                           : Text("%.0f %%", 100.0 * gain) + " in the mean, for " +
+                                 Text("%.0f %%", 100.0 * left_out.wins[m]));
+      rows.push_back(std::move(row));
+    }
+  }
+  return "<h2>Realism</h2>\n<p>Every captured movement is left out once, made from the others for "
+         "its "
+         "own parameters and compared with what was captured: mean distance of joints at equal "
+         "generic times. Beside it the nearest captured movement as it is, and the nearest d + 1 "
+         "blended by inverse distance, as blend spaces do; both miss the parameters.</p>\n" +
+         TableHtml(rows);
+}
+
 bool IsMirrored(const MotionGroup& group) {
   return std::all_of(group.mirrored.begin(), group.mirrored.end(),
                      [](std::uint8_t mirrored) { return mirrored != 0; });
@@ -167,6 +205,12 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
   std::string body = "<p>" + std::to_string(library->skeleton().joint_count()) + " joints, " +
                      std::to_string(library->bytes().size()) + " bytes, hash " +
                      EscapeHtml(library->hash()) + ".</p>\n" + GroupTable(report);
+  if (options.captured != nullptr) {
+    for (int g = 0; g < static_cast<int>(options.captured->groups().size()); ++g) {
+      report.realism.push_back(MeasureLeaveOneOut(*options.captured, g));
+    }
+    body += RealismHtml(*options.captured, report.realism);
+  }
   std::size_t count = 0;
   for (const Part& part : parts) count += part.figures.size();
   for (const Part& part : parts) {

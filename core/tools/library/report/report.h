@@ -8,6 +8,7 @@
 #include "figures.h"
 #include "stridewire/base/error.h"
 #include "stridewire/offline/interpolation_error.h"
+#include "stridewire/offline/leave_one_out.h"
 #include "stridewire/offline/refine.h"
 
 namespace stridewire {
@@ -17,6 +18,8 @@ struct ReportOptions {
   std::vector<std::string> axes;  // none, or the names of the one or two parameters the maps show
   double max_error_m = 0.001;     // refinement, see RefineOptions
   int max_pseudoexamples = 16;
+  // Every usable movement of some captures, none averaged: what realism is measured on. May be null.
+  std::shared_ptr<const MotionLibrary> captured;
   // Told from time to time how much is done, 0 to 1; false ends it.
   std::function<bool(double)> progress;
 };
@@ -32,6 +35,7 @@ struct Report {
   std::vector<ReportPicture> pictures;
   Refinement refinement;                  // by the amended rule
   std::vector<InterpolationError> plain;  // of the groups without pseudoexamples
+  std::vector<LeaveOneOut> realism;       // of the groups of `captured`
 };
 
 // The axes of a group's pictures: those named, as far as the group has them, else start_z and end_z, else

@@ -1,0 +1,36 @@
+#include "stridewire/offline/leave_one_out.h"
+
+#include <gtest/gtest.h>
+
+#include "stridewire/offline/open_library.h"
+
+namespace stridewire {
+namespace {
+
+TEST(LeaveOneOut, OfGeneratedStepsIsNearestByCardinalWeights) {
+  const auto library = OpenLibrary("builtin");
+  ASSERT_TRUE(library.has_value());
+  const LeaveOneOut left_out = MeasureLeaveOneOut(**library, 0);
+  EXPECT_EQ(left_out.movements, (*library)->group(0).example_count);
+  const auto& [cardinal, nearest, inverse] = left_out.means;
+  EXPECT_LT(cardinal.pose_m, nearest.pose_m);
+  EXPECT_LT(cardinal.parameter_m, nearest.parameter_m);
+  EXPECT_GT(cardinal.pose_m, 0.0);
+  EXPECT_GT(inverse.pose_m, 0.0);
+  EXPECT_EQ(left_out.wins[0], 0.0);
+  EXPECT_GT(left_out.wins[1], 0.5);
+}
+
+TEST(LeaveOneOut, DoesNotUseWhatIsLeftOut) {
+  const auto library = OpenLibrary("builtin");
+  ASSERT_TRUE(library.has_value());
+  // The nearest example is another one: at 4 m of cluster diameter all others are one average.
+  const LeaveOneOut apart = MeasureLeaveOneOut(**library, 0, 0.0);
+  const LeaveOneOut averaged = MeasureLeaveOneOut(**library, 0, 4.0);
+  EXPECT_GT(apart.means[1].pose_m, 0.01);
+  EXPECT_EQ(apart.means[1].pose_m, averaged.means[1].pose_m);
+  EXPECT_GT(averaged.means[0].pose_m, apart.means[0].pose_m);
+}
+
+}  // namespace
+}  // namespace stridewire
