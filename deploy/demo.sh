@@ -188,7 +188,8 @@ To watch another:
 $([[ -n $seconds ]] && echo "Ends by itself after $seconds s." || echo "Ctrl-C ends it.")
 
 $(if [[ -f build/release/share/stridewire/viewer/index.html ]]; then
-  echo "See them walk:   http://$http/"
+  echo "What the libraries span:   http://$http/library.html"
+  echo "See them walk:             http://$http/"
 else
   echo "No viewer was built; http://$http/ says how."
 fi)
