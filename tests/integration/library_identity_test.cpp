@@ -24,7 +24,6 @@ namespace stridewire {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-constexpr double kClusterDiameterM = 0.05;  // as `stridewire-library build` without --all
 
 struct Source {
   const char* name;
@@ -69,8 +68,7 @@ Library Make(const Source& source) {
     }
     library.raw = std::move(*raw);
   }
-  LibraryBuilder builder;
-  builder.cluster_diameter = source.all ? 0.0 : kClusterDiameterM;
+  LibraryBuilder builder = source.all ? LibraryBuilder() : LibraryBuilder::Selecting();
   auto built = builder.Build(library.raw);
   if (!built) {
     ADD_FAILURE() << Describe(built.error());

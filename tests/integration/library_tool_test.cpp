@@ -458,7 +458,7 @@ TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
   ASSERT_EQ(result.exit_code, 0);
   EXPECT_THAT(result.err, IsEmpty());
   const json report = ParseOutput(result.out);
-  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("files", "library"));
+  EXPECT_THAT(Keys(report), testing::UnorderedElementsAre("files", "selection", "library"));
   for (const char* key : {"path", "frames", "fps", "unit_m", "steps_left", "steps_right", "jumps",
                           "rejected", "error"}) {
     EXPECT_THAT(Keys(report["files"][0]), Contains(key));
@@ -469,6 +469,49 @@ TEST_F(LibraryTool, BuildReportsAsOneJsonObject) {
   }
   const ProgramResult inspected = Tool({"inspect", Out(), "--json"});
   EXPECT_EQ(report["library"], ParseOutput(inspected.out));
+}
+
+TEST_F(LibraryTool, BuildTellsWhatBecameOfEveryExample) {
+  const auto build = [&](const Arguments& options) {
+    const ProgramResult result =
+        Tool(Join(Join({"build", "--out", Out(), "--json"}, options), {kJumps, kSteps}));
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return ParseOutput(result.out);
+  };
+  const auto stored = [](const json& report) {
+    int count = 0;
+    for (const json& group : report["library"]["groups"]) count += group["examples"].get<int>();
+    return count;
+  };
+  const json report = build({});
+  ASSERT_EQ(report["selection"].size(), report["library"]["groups"].size());
+  for (std::size_t g = 0; g < report["selection"].size(); ++g) {
+    const json& selection = report["selection"][g];
+    EXPECT_EQ(selection["kind"], report["library"]["groups"][g]["kind"]);
+    EXPECT_EQ(selection["found"].get<std::size_t>(), selection["examples"].size());
+    std::map<std::string, int> fates;
+    std::set<int> examples;
+    for (const json& example : selection["examples"]) {
+      const std::string fate = example["fate"];
+      ++fates[fate];
+      EXPECT_FALSE(example["source"].get<std::string>().empty());
+      EXPECT_FALSE(example["reason"].get<std::string>().empty());
+      EXPECT_EQ(example["example"].is_null(), fate == "redundant" || fate == "outlier");
+      EXPECT_NE(example["example"].is_null(), example["error_m"].is_null());
+      if (!example["example"].is_null()) examples.insert(example["example"].get<int>());
+    }
+    for (const char* fate : {"kept", "averaged", "redundant", "outlier"}) {
+      EXPECT_EQ(selection[fate], fates[fate]);
+    }
+    EXPECT_EQ(report["library"]["groups"][g]["examples"].get<std::size_t>(), examples.size());
+  }
+  EXPECT_LT(stored(build({"--max-pose-error-m", "0.1"})), stored(report));
+  EXPECT_GT(stored(build({"--max-pose-error-m", "0"})),
+            stored(build({"--max-pose-error-m", "0.1"})));
+  ExpectFailure({"build", "--out", Out(), "--max-pose-error-m", "-1", kSteps}, 2,
+                "--max-pose-error-m");
+  ExpectFailure({"build", "--out", Out(), "--max-pose-error-m", "0.02", "--all", kSteps}, 2,
+                "--all");
 }
 
 TEST_F(LibraryTool, InspectsAsOneJsonObject) {

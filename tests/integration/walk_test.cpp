@@ -38,8 +38,7 @@ Library Captured16(bool all) {
   std::sort(paths.begin(), paths.end());
   LibraryAssembler assembler;
   for (const auto& path : paths) assembler.Add(ReadBvh(path).value());
-  LibraryBuilder builder;
-  builder.cluster_diameter = all ? 0.0 : 0.05;
+  LibraryBuilder builder = all ? LibraryBuilder() : LibraryBuilder::Selecting();
   return builder.Build(assembler.Assemble().value()).value();
 }
 

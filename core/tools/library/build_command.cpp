@@ -19,10 +19,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Steps whose parameters lie within this of each other are averaged unless --all: captured steps of
-// equal parameters differ by centimetres and would make the weights jump.
-constexpr double kClusterDiameterM = 0.05;
-
 std::optional<BvhAxis> ParseAxis(const std::string& text) {
   const std::pair<const char*, BvhAxis> axes[] = {
       {"x", BvhAxis::kPlusX}, {"+x", BvhAxis::kPlusX}, {"-x", BvhAxis::kMinusX},
@@ -49,6 +45,32 @@ Json FileToJson(const Extraction& extraction) {
           {"rejected", std::move(rejected)},
           {"notes", extraction.notes},
           {"error", extraction.error.empty() ? Json(nullptr) : Json(extraction.error)}};
+}
+
+Json SelectionToJson(const std::vector<GroupSelection>& selections) {
+  Json groups = Json::array();
+  for (const GroupSelection& selection : selections) {
+    Json group = {{"group", selection.group},
+                  {"kind", std::string(MovementKindName(selection.kind))},
+                  {"found", selection.examples.size()}};
+    for (const ExampleFate fate : {ExampleFate::kKept, ExampleFate::kAveraged,
+                                   ExampleFate::kRedundant, ExampleFate::kOutlier}) {
+      group[std::string(ExampleFateName(fate))] = selection.Count(fate);
+    }
+    Json examples = Json::array();
+    for (const SelectedExample& example : selection.examples) {
+      const bool is_out = example.example < 0;
+      examples.push_back({{"source", example.source},
+                          {"mirrored", example.mirrored},
+                          {"fate", std::string(ExampleFateName(example.fate))},
+                          {"example", is_out ? Json(nullptr) : Json(example.example)},
+                          {"error_m", is_out ? Json(example.error_m) : Json(nullptr)},
+                          {"reason", example.reason}});
+    }
+    group["examples"] = std::move(examples);
+    groups.push_back(std::move(group));
+  }
+  return groups;
 }
 
 void PrintFile(const Extraction& extraction) {
@@ -173,8 +195,8 @@ int RunBuild(const BuildCommand& command) {
                 static_cast<double>(command.files.size() + 1));
   const auto raw = assembler.Assemble();
   if (!raw) return ComplainOfInput(raw.error());
-  LibraryBuilder builder;
-  builder.cluster_diameter = command.all ? 0.0 : kClusterDiameterM;
+  LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
+  if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;
   const auto library = builder.Build(*raw);
   progress.Hide();
   if (!library) return ComplainOfInput(library.error());
@@ -185,6 +207,7 @@ int RunBuild(const BuildCommand& command) {
   if (command.json) {
     Json json;
     json["files"] = std::move(files);
+    json["selection"] = SelectionToJson(builder.selections);
     json["library"] = LibraryToJson(**library, false);
     std::printf("%s\n", Dump(json).c_str());
     return kExitDone;

@@ -14,6 +14,7 @@ struct BuildCommand {
   std::string kinds = "step,jump";
   bool mirror = false;
   bool all = false;
+  double max_pose_error_m = 0.025;
   bool json = false;
   std::optional<double> unit_m;  // else found
   std::string left_ankle, right_ankle, left_ball, right_ball;

@@ -88,6 +88,12 @@ int Run(int argc, char** argv) {
   build_app->add_option("--right-ball", build.right_ball, "Joint name; else found")
       ->check(NotEmpty());
   build_app->add_flag("--all", build.all, "Keep every usable movement: average none");
+  build_app
+      ->add_option("--max-pose-error-m", build.max_pose_error_m,
+                   "Leave out movements that the others make within this; 0 averages only")
+      ->check(Number(0.0, 10.0, false))
+      ->capture_default_str()
+      ->excludes("--all");
   build_app->add_flag("--json", build.json, "Report as one JSON object on stdout");
   build_app->add_option("files", build.files, "Captures, BVH")->required()->check(NotEmpty());
   build_app->footer("Example:\n  stridewire-library build --out walk.swl --all 16_*.bvh\n");
