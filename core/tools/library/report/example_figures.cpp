@@ -156,6 +156,13 @@ Figure SitesFigure(const MotionLibrary& library, int group_index) {
   for (int l = 0; l < panels; ++l) {
     const auto at = static_cast<std::size_t>(l);
     figure.script += "set xlabel " + Quoted(AxisLabel(group.parameters[at])) + " noenhanced\n";
+    // Of examples that are all alike gnuplot would make no axis.
+    const auto range = [](const Parameter& p) {
+      return p.max - p.min > 1e-6 ? std::string("[*:*]\n")
+                                  : "[" + Number(p.min - 0.1) + ":" + Number(p.max + 0.1) + "]\n";
+    };
+    figure.script += "set xrange " + range(group.parameters[at]);
+    if (d > 1) figure.script += "set yrange " + range(group.parameters.back());
     if (d > 1) {
       figure.script += "set ylabel " + Quoted(AxisLabel(group.parameters.back())) + " noenhanced\n";
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "gnuplot.h"
@@ -103,6 +104,16 @@ bool IsMirrored(const MotionGroup& group) {
                      [](std::uint8_t mirrored) { return mirrored != 0; });
 }
 
+// Whether there is something to see: a single example, or a slice that hardly meets the hull, is no map.
+bool IsMap(const ErrorMap& map) {
+  const auto spans = [](const std::vector<double>& axis) {
+    return axis.size() == 1 || axis.back() - axis.front() > 1e-6;
+  };
+  const auto inside = std::count_if(map.error_m.begin(), map.error_m.end(),
+                                    [](double error_m) { return !std::isnan(error_m); });
+  return spans(map.x) && spans(map.y) && inside > 8;
+}
+
 // A part of the page: a heading, a sentence, pictures.
 struct Part {
   std::string heading;
@@ -184,13 +195,15 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
       GroupRefinement& refined = report.refinement.groups[index];
       refined.before.max_error_m = std::max(refined.before.max_error_m, before->max_error_m);
       refined.after.max_error_m = std::max(refined.after.max_error_m, after->max_error_m);
-      part.figures = {
-          ErrorFigure(*plain->library, *report.refinement.library, g, axes, *before, *after),
-          CurveFigure(*library, g, report.refinement.groups[index], bare->groups[index]),
-          ExamplesFigure(*library, g, axes),
-          SitesFigure(*report.refinement.library, g),
-          JointFigure(*library, g),
-          TimingFigure(*library, g, axes)};
+      if (IsMap(*before)) {
+        part.figures = {
+            ErrorFigure(*plain->library, *report.refinement.library, g, axes, *before, *after),
+            CurveFigure(*library, g, refined, bare->groups[index])};
+      }
+      part.figures.push_back(ExamplesFigure(*library, g, axes));
+      part.figures.push_back(SitesFigure(*report.refinement.library, g));
+      part.figures.push_back(JointFigure(*library, g));
+      part.figures.push_back(TimingFigure(*library, g, axes));
     }
     parts.push_back(std::move(part));
   }
