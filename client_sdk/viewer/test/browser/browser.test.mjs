@@ -217,7 +217,16 @@ test('a browser that stops costs little, and goes on with what is now', async ()
   await devtools.send('Debugger.pause');
   await paused;
   const stoppedS = walkers.client.renderTimeS();
-  await sleep(1000 * pauseS);
+  const droppedBefore = await server.metric('stridewire_batches_dropped_total');
+  const beforeKiB = server.residentKiB();
+  let mostKiB = beforeKiB;
+  for (let tenths = 0; tenths < 10 * pauseS; ++tenths) {
+    await sleep(100);
+    mostKiB = Math.max(mostKiB, server.residentKiB());
+  }
+  const dropped = await server.metric('stridewire_batches_dropped_total') - droppedBefore;
+  // Four batches a world and mode, and what events wait; far less than it would have sent.
+  assert.ok(mostKiB - beforeKiB < 16 * 1024, `${beforeKiB} KiB, then ${mostKiB}`);
   // Others notice nothing.
   assert.ok(walkers.client.renderTimeS() - stoppedS > pauseS - 1);
   await devtools.send('Debugger.resume');
@@ -228,8 +237,8 @@ test('a browser that stops costs little, and goes on with what is now', async ()
   });
   const stats = await page.evaluate(() => window.stridewire.stats);
   assert.equal(stats.invalidFrames, 0);
-  console.log(`stopped for ${pauseS} s: ${stats.batchesDropped} batches dropped, ` +
-    `${stats.reconnects} reconnects, ${stats.resumes} resumed`);
+  console.log(`stopped for ${pauseS} s: server ${beforeKiB} KiB, at most ${mostKiB}; ${dropped} batches ` +
+    `dropped; ${stats.reconnects} reconnects, ${stats.resumes} resumed`);
   assert.deepEqual(errors, []);
   await context.close();
 });

@@ -2,7 +2,7 @@
 
 import {spawn} from 'node:child_process';
 import {once} from 'node:events';
-import {mkdirSync} from 'node:fs';
+import {mkdirSync, readFileSync} from 'node:fs';
 import net from 'node:net';
 
 import {Client} from '@stridewire/client';
@@ -57,6 +57,11 @@ export class Server {
     const ended = once(this.child, 'exit');
     this.child.kill('SIGKILL');
     await ended;
+  }
+
+  /** What it keeps in memory. */
+  residentKiB() {
+    return Number(/^VmRSS:\s+(\d+)/m.exec(readFileSync(`/proc/${this.child.pid}/status`, 'utf8'))[1]);
   }
 
   /** A line of /metrics; the sum where it has labels. */
