@@ -58,6 +58,7 @@ export class Inspector {
   private readonly content: HTMLElement;
   private readonly moving: HTMLElement;
   private readonly blended: HTMLElement;
+  private axisNames = '';
   private axisX = 0;
   private axisY = 1;
   private playhead: SVGElement | null = null;
@@ -225,6 +226,9 @@ export class Inspector {
   private showAxes(movement: MovementState): void {
     const names = movement.parameterNames as readonly string[];
     const n = names.length;
+    // What was chosen stays for as long as there is the same to choose from.
+    if (names.join() === this.axisNames) return;
+    this.axisNames = names.join();
     const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
     const spread = names.map((name, k) => {
       let low = Infinity;
