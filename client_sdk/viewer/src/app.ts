@@ -482,6 +482,7 @@ export class App {
 
   /** Lines where bodies would be slow. */
   private adapt(frameMs: number, avatars: number): void {
+    this.viewPanel.setAuto(this.options.style);
     if (this.figureChoice !== 'auto') return;
     if (this.rendererInfo.software && avatars > softwareBodies) this.options.style = 'lines';
     this.slow = frameMs > slowFrameMs ? this.slow + 1 : Math.max(0, this.slow - 2);
@@ -494,7 +495,6 @@ export class App {
       }
       this.slow = 0;
     }
-    this.viewPanel.setAuto(this.options.style);
   }
 
   private setTheme(name: ThemeName, remember: boolean): void {
