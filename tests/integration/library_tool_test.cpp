@@ -689,8 +689,8 @@ TEST_F(LibraryTool, RefinesAndReportsAsOneJsonObject) {
 TEST_F(LibraryTool, RefinesByTheRuleAskedFor) {
   ASSERT_EQ(Tool({"build", "--out", Out("in.swl"), kSteps}).exit_code, 0);
   for (const char* rule : {"amended", "bare"}) {
-    const ProgramResult result = Tool(
-        {"refine", Out("in.swl"), "--out", Out(rule), "--rule", rule, "--max-error-m", "0.02"});
+    const ProgramResult result = Tool({"refine", Out("in.swl"), "--out", Out(rule), "--rule", rule,
+                                       "--max-error-m", "0.02", "--max-pseudoexamples", "4"});
     EXPECT_EQ(result.exit_code, 0) << result.err;
     EXPECT_THAT(result.out, AllOf(HasSubstr("before  misses by"), HasSubstr("after   misses by")));
   }
