@@ -237,6 +237,7 @@ export class App {
       if (event.type === 'removed') shown.ours.delete(event.avatar);
       if (event.type === 'rejected') this.drive.say(`Avatar ${event.avatar}: ${event.reason}`);
     });
+    world.on('state', () => this.showConnection());
     this.shown.push(shown);
     this.active ??= shown;
     if (!this.worldNames.includes(name)) this.worldNames.push(name);

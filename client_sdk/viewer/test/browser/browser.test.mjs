@@ -276,6 +276,29 @@ test('works on a phone, in the dark', async () => {
   await context.close();
 });
 
+test('says in a sentence what to do where nothing can be drawn or joined', async () => {
+  const context = await browser.newContext();
+  await context.addInitScript(() => {
+    const {getContext} = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function(kind, ...rest) {
+      return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...rest);
+    };
+  });
+  const page = await context.newPage();
+  await page.goto(`http://127.0.0.1:${server.httpPort}/`);
+  await until('it says so', async () => /no WebGL 2/.test(await page.locator('.fatal').textContent()));
+  await context.close();
+
+  const refused = await openPage(browser, server.httpPort, 'world=not%20a%20name&world=plaza');
+  await until('it says so', () => refused.page.evaluate(() =>
+    document.querySelector('.notice:not([hidden])')?.textContent.includes('cannot be joined')));
+  await until('the other is shown', () => refused.page.evaluate((count) =>
+    window.stridewire.sampled().some(({world, avatars}) => world === 'plaza' && avatars.length >= count),
+  walkerCount + 1));
+  assert.deepEqual(refused.errors, []);
+  await refused.context.close();
+});
+
 // The last: what comes after it would have another server.
 test('a server that is killed and started again is found again', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza');
