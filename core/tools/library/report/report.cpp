@@ -95,7 +95,9 @@ std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOn
          "its "
          "own parameters and compared with what was captured: mean distance of joints at equal "
          "generic times. Beside it the nearest captured movement as it is, and the nearest d + 1 "
-         "blended by inverse distance, as blend spaces do; both miss the parameters.</p>\n" +
+         "blended by inverse distance, as blend spaces do. Ours brings what lies outside the hull "
+         "of "
+         "the others to its edge first.</p>\n" +
          TableHtml(rows);
 }
 
