@@ -82,7 +82,8 @@ class LibraryReport : public testing::Test {
 
 TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
   const std::string out = folder_.File("report");
-  const ProgramResult result = Report({library_, "--out", out, "--json"});
+  const ProgramResult result =
+      Report({library_, "--out", out, "--max-pseudoexamples", "3", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
   const json told = json::parse(result.out);
@@ -115,7 +116,7 @@ TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
   }
 
   const std::string again = folder_.File("again");
-  ASSERT_EQ(Report({library_, "--out", again}).exit_code, 0);
+  ASSERT_EQ(Report({library_, "--out", again, "--max-pseudoexamples", "3"}).exit_code, 0);
   ASSERT_EQ(FilesIn(again), files);
   for (const std::string& file : files) {
     EXPECT_EQ(ReadWhole(std::filesystem::path(out) / file),
@@ -126,7 +127,7 @@ TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
 
 TEST_F(LibraryReport, MeasuresRealismOnCaptures) {
   const ProgramResult result =
-      Report({"builtin", "--out", folder_.File("report"), "--max-pseudoexamples", "0", "--captures",
+      Report({library_, "--out", folder_.File("report"), "--max-pseudoexamples", "0", "--captures",
               "/usr/share/assimp/models/BVH/01_01.bvh", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const json told = json::parse(result.out);
