@@ -219,18 +219,27 @@ bool SameOffsets(const Skeleton& a, const Skeleton& b) {
   return true;
 }
 
-// How the second tree departs from the first.
-std::string TreeDifference(const Skeleton& first, const Skeleton& other) {
+// How the second tree departs from the first, which is of the capture named.
+std::string TreeDifference(const Skeleton& first, const std::string& first_path,
+                           const Skeleton& other) {
+  const auto parent = [](const Skeleton& skeleton, std::size_t j) {
+    const int index = skeleton.joints[j].parent;
+    return index < 0 ? std::string("no joint")
+                     : skeleton.joints[static_cast<std::size_t>(index)].name;
+  };
   for (std::size_t j = 0; j < std::min(first.joints.size(), other.joints.size()); ++j) {
     const Joint& a = first.joints[j];
     const Joint& b = other.joints[j];
     if (a.name != b.name) {
-      return "its joint " + std::to_string(j) + " is " + b.name + " where the first capture has " +
+      return "its joint " + std::to_string(j) + " is " + b.name + " where " + first_path + " has " +
              a.name;
     }
-    if (a.parent != b.parent) return "its joint " + b.name + " hangs on another joint";
+    if (a.parent != b.parent) {
+      return "its joint " + b.name + " hangs on " + parent(other, j) + " where in " + first_path +
+             " it hangs on " + parent(first, j);
+    }
   }
-  return "it has " + std::to_string(other.joints.size()) + " joints, the first capture " +
+  return "it has " + std::to_string(other.joints.size()) + " joints, " + first_path + " has " +
          std::to_string(first.joints.size());
 }
 
@@ -248,13 +257,16 @@ const Extraction& LibraryAssembler::Add(const Capture& capture) {
     file.unit_m = capture.unit_m;
     file.notes = capture.notes;
     file.skeleton = capture.skeleton;
-    file.error = TreeDifference(skeleton_, capture.skeleton);
+    file.error = TreeDifference(skeleton_, skeleton_path_, capture.skeleton);
     return file;
   }
   ExtractOptions extract = options_.extract;
   extract.target = first || SameOffsets(skeleton_, capture.skeleton) ? nullptr : &skeleton_;
   Extraction& file = files_.emplace_back(Extract(capture, extract));
-  if (first && file.error.empty()) skeleton_ = capture.skeleton;
+  if (first && file.error.empty()) {
+    skeleton_ = capture.skeleton;
+    skeleton_path_ = capture.path;
+  }
   return file;
 }
 

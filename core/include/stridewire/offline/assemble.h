@@ -32,7 +32,7 @@ struct AssembleOptions {
 ///
 /// A group that would hold nothing another does not hold is left out. The first capture gives the
 /// skeleton; those with other bone lengths are fitted to it, those with another joint tree are left
-/// out and say so in `Extraction::error`. Recordings differ by centimetres in where their floor
+/// out and say so in `Extraction::error`, which names both captures' joints. Recordings differ by centimetres in where their floor
 /// is: each is shifted so that balls rest at the same height all over the library.
 class LibraryAssembler {
  public:
@@ -49,7 +49,8 @@ class LibraryAssembler {
 
  private:
   AssembleOptions options_;
-  Skeleton skeleton_;  // of the first usable capture
+  Skeleton skeleton_;          // of the first usable capture
+  std::string skeleton_path_;  // that capture's
   std::vector<Extraction> files_;
 };
 
