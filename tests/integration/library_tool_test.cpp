@@ -631,6 +631,66 @@ TEST_F(LibraryTool, SynthesizesWhatItReports) {
   EXPECT_THAT(text.out, HasSubstr("movements"));
 }
 
+// A request goes to the group that spans it best; the report names it, tells whether it extrapolates and,
+// outside the hull grown by 10 %, what was applied instead.
+TEST_F(LibraryTool, TellsTheGroupOfEachStepAndWhetherItExtrapolates) {
+  const json groups =
+      ParseOutput(Tool({"inspect", "builtin", "--json", "--examples"}).out)["groups"];
+  const auto play = [&](const std::string& step) {
+    const std::string choreography =
+        folder_.Write("c.json", "{\"movements\":[{\"step\":" + step + "}]}");
+    const ProgramResult result = Tool(
+        {"synthesize", "builtin", "--choreography", choreography, "--out", Out("o.bvh"), "--json"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    const json report = ParseOutput(result.out);
+    for (const json& movement : report["movements"]) {
+      if (!movement["request"].is_null()) return movement;
+    }
+    return json();
+  };
+  const auto has = [&](const json& movement, const char* name) {
+    return std::ranges::any_of(groups[movement["group"].get<std::size_t>()]["parameters"],
+                               [&](const json& parameter) { return parameter["name"] == name; });
+  };
+
+  const json inside = play(R"({"foot":"left","length_m":0.5})");
+  EXPECT_FALSE(inside["extrapolated"]);
+  EXPECT_FALSE(inside["clamped"]);
+  EXPECT_FALSE(has(inside, "turn_rad"));
+  EXPECT_EQ(inside["requested"], inside["applied"]);
+
+  const json turned = play(R"({"foot":"left","length_m":0.4,"turn_rad":0.4})");
+  EXPECT_TRUE(has(turned, "turn_rad"));
+  EXPECT_FALSE(turned["clamped"]);
+  EXPECT_NEAR(turned["applied"]["turn_rad"], 0.4, 1e-9);
+
+  const json up = play(R"({"foot":"left","length_m":0.4,"height_m":0.2})");
+  EXPECT_TRUE(has(up, "end_y_m"));
+  EXPECT_NEAR(up["applied"]["end_y_m"], 0.2, 1e-6);
+
+  const json aside = play(R"({"foot":"left","length_m":0,"side_m":0.3})");
+  EXPECT_TRUE(has(aside, "end_x_m"));
+  EXPECT_FALSE(has(aside, "end_y_m"));
+
+  const json far = play(R"({"foot":"left","length_m":3})");
+  EXPECT_TRUE(far["extrapolated"]);
+  EXPECT_TRUE(far["clamped"]);
+  EXPECT_NEAR(far["requested"]["end_z_m"], 3.0, 1e-9);
+  double longest = 0.0;
+  double mean = 0.0;
+  const json& sites = groups[far["group"].get<std::size_t>()]["sites"];
+  const json& names = groups[far["group"].get<std::size_t>()]["parameters"];
+  std::size_t end_z = 0;
+  while (names[end_z]["name"] != "end_z_m") ++end_z;
+  for (const json& site : sites) {
+    const double value = site["parameters"][end_z];
+    longest = std::max(longest, value);
+    mean += value / static_cast<double>(sites.size());
+  }
+  EXPECT_GT(far["applied"]["end_z_m"], 0.8 * longest);
+  EXPECT_LE(far["applied"]["end_z_m"], longest + 0.1 * (longest - mean) + 1e-6);
+}
+
 TEST_F(LibraryTool, RefinesAndReportsAsOneJsonObject) {
   ASSERT_EQ(Tool({"build", "--out", Out("in.swl"), kSteps}).exit_code, 0);
   const Arguments arguments = {"refine", Out("in.swl"), "--json", "--max-pseudoexamples",

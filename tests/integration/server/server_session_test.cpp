@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
 #include <random>
 #include <set>
 
@@ -264,6 +265,46 @@ TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
   const auto finished = std::ranges::find(events, EventType::kFinished, &protocol::Event::type);
   EXPECT_NE(finished->base.position_m, DVec3(1, 0, 2));
   EXPECT_TRUE(std::ranges::is_sorted(events, {}, &protocol::Event::tick));
+}
+
+// What a game server hears of requests inside and beyond what the examples span.
+TEST(ServerSession, TellsTheGroupAndWhetherItExtrapolates) {
+  TestServer server;
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("plaza");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
+  // The first may start before the reply comes; the others do later.
+  std::vector<protocol::RequestItem> items = Steps(1, 3, 0.3);
+  std::get<protocol::StepMovement>(items[2].movement).length_m = 5.0;
+  ASSERT_EQ(client.Request(world->world, items)->accepted, 3u);
+
+  std::map<protocol::RequestId, protocol::Event> started;
+  while (!started.contains(2) || !started.contains(3)) {
+    auto message = client.Receive();
+    ASSERT_TRUE(message);
+    const auto* told = std::get_if<protocol::Events>(&*message);
+    if (told == nullptr) continue;
+    for (const protocol::Event& event : told->events) {
+      if (event.type == EventType::kStarted) started.emplace(event.request_id, event);
+    }
+  }
+  const protocol::Event& inside = started.at(2);
+  EXPECT_GE(inside.group, 0);
+  EXPECT_FALSE(inside.extrapolated);
+  EXPECT_FALSE(inside.clamped);
+  EXPECT_EQ(inside.requested, inside.applied);
+  const protocol::Event& beyond = started.at(3);
+  EXPECT_GE(beyond.group, 0);
+  EXPECT_NE(beyond.group, inside.group);  // the other foot
+  EXPECT_TRUE(beyond.extrapolated);
+  EXPECT_TRUE(beyond.clamped);
+  ASSERT_EQ(beyond.requested.count, 2);
+  EXPECT_NEAR(beyond.requested.values[1], 5.0, 1e-9);
+  EXPECT_GT(beyond.applied.values[1], 0.5);  // the toy library steps 0.6 m, grown by 10 %
+  EXPECT_LT(beyond.applied.values[1], 0.66);
 }
 
 TEST(ServerSession, ChoosesAvatarNumbersNobodyHas) {
