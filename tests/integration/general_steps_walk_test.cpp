@@ -27,7 +27,7 @@ using Steps = std::vector<StepRequest>;
 Library Builtin() { return OpenLibrary("builtin").value(); }
 
 // Null where the captures are absent.
-Library Captured(std::initializer_list<const char*> folders) {
+Library Captured(std::initializer_list<const char*> folders, LibraryBuilder builder) {
   AssembleOptions options;
   options.mirror = true;
   LibraryAssembler assembler(options);
@@ -40,7 +40,7 @@ Library Captured(std::initializer_list<const char*> folders) {
     }
     for (const auto& file : files) assembler.Add(ReadBvh(file).value());
   }
-  return LibraryBuilder().Build(assembler.Assemble().value()).value();
+  return builder.Build(assembler.Assemble().value()).value();
 }
 
 StepRequest Ahead(double length_m, double turn_rad = 0.0, double height_m = 0.0) {
@@ -247,14 +247,24 @@ TEST(GeneralStepsBuiltin, TurnsOnTheSpot) {
   }
 }
 
+struct Selection {
+  const char* name;
+  LibraryBuilder builder;
+};
+class GeneralStepsCaptured : public testing::TestWithParam<Selection> {};
+INSTANTIATE_TEST_SUITE_P(Steps, GeneralStepsCaptured,
+                         testing::Values(Selection{"All", LibraryBuilder()},
+                                         Selection{"Selected", LibraryBuilder::Selecting()}),
+                         [](const auto& selection) { return selection.param.name; });
+
 // Captured people pass their feet more closely, and their markers slide.
 constexpr double kCapturedApartM = 0.02;
 
 // Both subjects climb blocks of about 0.2 m, 0.43 m foot over foot. Stairs of 0.25 m are beyond what they
 // did: clamped to the grown hull, knees come out bent backward by up to 3 degrees foot by foot and 11
 // foot over foot. The generated library has those.
-TEST(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
-  const Library library = Captured({"03", "14"});
+TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
+  const Library library = Captured({"03", "14"}, GetParam().builder);
   if (library == nullptr) GTEST_SKIP() << "no captures";
   for (const double rise_m : {0.15, 0.20}) {
     for (const double tread_m : {0.34, 0.38}) {
@@ -267,14 +277,14 @@ TEST(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
   }
 }
 
-TEST(GeneralStepsCaptured, WalkASlalomAs16Does) {
-  const Library library = Captured({"16"});
+TEST_P(GeneralStepsCaptured, WalkASlalomAs16Does) {
+  const Library library = Captured({"16"}, GetParam().builder);
   if (library == nullptr) GTEST_SKIP() << "no captures";
   ExpectGoodLooks(LookAt("16 slalom", library, Slalom(0.6, 0.4)), kCapturedApartM);
 }
 
-TEST(GeneralStepsCaptured, GoAsideAndBackwardAs09Does) {
-  const Library library = Captured({"09"});
+TEST_P(GeneralStepsCaptured, GoAsideAndBackwardAs09Does) {
+  const Library library = Captured({"09"}, GetParam().builder);
   if (library == nullptr) GTEST_SKIP() << "no captures";
   for (const Foot lead : {Foot::kLeft, Foot::kRight}) {
     ExpectGoodLooks(LookAt("09 shuffle", library, Shuffle(lead, 0.30, 0.13)), kCapturedApartM);
