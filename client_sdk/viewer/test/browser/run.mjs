@@ -1,4 +1,4 @@
-// Runs the tests beside it. 77: there is no browser to run them in.
+// Runs NAME.test.mjs beside it for each NAME given, or all. 77: there is no browser to run them in.
 
 import {spawnSync} from 'node:child_process';
 import {readdirSync} from 'node:fs';
@@ -16,7 +16,9 @@ if (!process.env.STRIDEWIRE_BIN) {
   process.exit(2);
 }
 const here = dirname(fileURLToPath(import.meta.url));
-const tests = readdirSync(here).filter((name) => name.endsWith('.test.mjs')).sort();
+const names = process.argv.slice(2);
+const tests = names.length > 0 ? names.map((name) => `${name}.test.mjs`) :
+  readdirSync(here).filter((name) => name.endsWith('.test.mjs')).sort();
 // One after the other: each has a server and a browser of its own.
 for (const test of tests) {
   const {status} = spawnSync(process.execPath, ['--test', join(here, test)], {stdio: 'inherit'});

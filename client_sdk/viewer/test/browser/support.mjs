@@ -193,7 +193,11 @@ export async function keep(page, name) {
 export async function movingShare(page, clip, apartMs) {
   const first = await page.screenshot({clip});
   await sleep(apartMs);
-  const second = await page.screenshot({clip});
+  return differing(page, first, await page.screenshot({clip}));
+}
+
+/** Share of pixels that differ between two pictures of one size. */
+export function differing(page, first, second) {
   return page.evaluate(async (pictures) => {
     const pixels = await Promise.all(pictures.map(async (text) => {
       const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));

@@ -1,0 +1,660 @@
+// Every control of the page does what its label says. What there is comes from the page itself: one without a
+// check here fails, and so does a check of one that is gone.
+
+import assert from 'node:assert/strict';
+import {after, before, test} from 'node:test';
+
+import {Client} from '@stridewire/client';
+import WebSocket from 'ws';
+
+import {launch} from '../browser.mjs';
+import {Server, differing, openPage, until} from './support.mjs';
+
+let server;
+let client;
+let alpha;
+let browser;
+
+before(async () => {
+  server = await Server.start();
+  // Looks over the page's shoulder, and makes a second world.
+  client = new Client({url: `ws://127.0.0.1:${server.httpPort}/stream`, webSocket: WebSocket});
+  client.connect();
+  alpha = client.joinWorld('alpha');
+  const beta = client.joinWorld('beta');
+  assert.ok((await beta.spawn([{avatar: 1, positionM: [0, 0, 0], headingRad: 0}])).ok);
+  browser = await launch();
+});
+
+after(async () => {
+  await browser?.close();
+  client?.close();
+  await server?.kill();
+});
+
+/** Names of all controls there are now: where, and what they are called. */
+const controlsOf = (page) => page.evaluate(() => [...document.querySelectorAll(
+  'button, input, select, summary, a[href], textarea, [role=application]')].map((element) => {
+  const where = element.closest('section')?.id.replace('panel-', '') ??
+    (element.closest('dialog') ? 'help' : element.closest('.card') ? 'card' :
+      element.closest('.transport') ? 'playback' : 'page');
+  if (element.classList.contains('chip')) return 'page: a world';
+  const label = element.tagName === 'CANVAS' ? 'the scene' : element.id ||
+    element.getAttribute('aria-label') || element.textContent;
+  return `${where}: ${label.replace(/^Stop wandering.*/, 'Let them wander').replace(/^Play$/, 'Pause')
+    .replace(/^(Dark|Light)$/, 'Dark or light').replace(/^\d+ joints$/, 'Joints')}`;
+}));
+
+test('every control does what its label says', async () => {
+  const {page, context, errors} = await openPage(browser, server.httpPort, 'world=alpha&figures=bodies');
+  await until('the page is there', () => page.evaluate(
+    () => window.stridewire?.worlds[0]?.world.skeleton));
+  const look = (f, argument) => page.evaluate(f, argument);
+  const eventually = (what, f, argument) => until(what, () => page.evaluate(f, argument));
+  const press = (name, where = 'body') =>
+    page.locator(where).getByRole('button', {name, exact: true}).click();
+  const inDrive = (name) => press(name, '#panel-drive');
+  const key = (name) => page.locator('canvas.scene').press(name);
+  const slide = (id, value) => page.locator(`#${id}`).fill(String(value));
+  const avatars = () => look(() => [...window.stridewire.worlds[0].world.avatars()]);
+  const frames = async (count) => {
+    const from = await look(() => window.stridewire.stats.framesDrawn);
+    await eventually('frames are drawn', (n) => window.stridewire.stats.framesDrawn >= n, from + count);
+  };
+  const live = () => eventually('it is live', () => window.stridewire.playback.live);
+  const cameraRests = async () => {
+    const where = () => look(() => {
+      const {view} = window.stridewire.worlds[0];
+      return [...view.view.camera.position.toArray(), ...view.view.target.toArray()];
+    });
+    let last = await where();
+    await until('the camera rests', async () => {
+      await frames(2);
+      const now = await where();
+      const rests = now.every((x, i) => Math.abs(x - last[i]) < 1e-4);
+      last = now;
+      return rests;
+    });
+  };
+  const picture = async () => {
+    await frames(2);
+    return page.screenshot({clip: await look(() => {
+      const {x, y, width, height} = window.stridewire.worlds[0].view.free;
+      return {x: Math.ceil(x), y: Math.ceil(y), width: Math.floor(width), height: Math.floor(height)};
+    })});
+  };
+  const orbit = () => look(() => {
+    const {wantAzimuth, wantElevation, wantDistance} = window.stridewire.app.orbit;
+    return {wantAzimuth, wantElevation, wantDistance};
+  });
+  const target = () => look(() => window.stridewire.worlds[0].view.view.want.toArray());
+  const following = () => look(() => window.stridewire.worlds[0].view.following);
+  const wandering = (n) => eventually(`${n} wander`, (count) =>
+    (window.stridewire.worlds[0] && window.stridewire.app.shown[0].wander?.size) === count, n);
+
+  let driven = 0;
+  /** What the server has queued last for the driven avatar, once there are `size`. */
+  const queued = async (size) => {
+    const state = await until(`${size} are queued`, async () => {
+      const now = await alpha.inspect(driven);
+      return now.queueSize === size ? now : null;
+    });
+    return state.queue[size - 1];
+  };
+  /** Alone and busy, so that what follows stays in its queue. */
+  const busy = async () => {
+    await alpha.cancel([driven]);
+    await alpha.request(Array.from({length: 10}, () => ({avatar: driven, type: 'stand', seconds: 5})));
+    await until('it is busy', async () => {
+      const {movement, queueSize} = await alpha.inspect(driven);
+      return movement !== null && queueSize <= 9;
+    });
+  };
+  /** `act` adds one item to the queue. */
+  const adds = async (act) => {
+    await busy();
+    const {queueSize} = await alpha.inspect(driven);
+    await act();
+    // One of those before it may have begun meanwhile.
+    return until('it is queued', async () => {
+      const {queue} = await alpha.inspect(driven);
+      const last = queue.at(-1);
+      return last && !(last.type === 'stand' && last.seconds === 5) && queue.length <= queueSize + 1 ?
+        last : null;
+    });
+  };
+  const near = (a, b) => assert.ok(Math.abs(a - b) < 1e-4, `${a}, not ${b}`);
+  const queueIsEmpty = async (act) => {
+    await busy();
+    await act();
+    await until('the queue is empty', async () => (await alpha.inspect(driven)).queueSize === 0);
+  };
+  const spawns = async (act) => {
+    const before = await avatars();
+    await act();
+    await eventually('there is one more', (n) =>
+      window.stridewire.worlds[0].world.avatars().length === n, before.length + 1);
+    driven = (await avatars()).find((avatar) => !before.includes(avatar));
+    await eventually('it is chosen and drawn', (n) => window.stridewire.selection?.avatar === n &&
+      window.stridewire.sampled()[0].avatars.includes(n), driven);
+  };
+  const removes = async (act) => {
+    await act();
+    await eventually('it is gone', (n) =>
+      !window.stridewire.worlds[0].world.avatars().includes(n), driven);
+  };
+  const follows = async (act) => {
+    await act();
+    assert.equal(await following(), driven);
+    await act();
+    assert.equal(await following(), 0);
+  };
+  const wanders = async (act, count) => {
+    await act();
+    await wandering(count);
+    await until('one walks', async () => (await alpha.inspect(driven)).movement?.requestId);
+    await act();
+    await wandering(0);
+    await alpha.cancel([driven]);
+  };
+  const frameAll = async (act) => {
+    await key('+');
+    await act();
+    await until('the button shows it', async () =>
+      await page.getByRole('button', {name: 'Frame all'}).getAttribute('aria-pressed') === 'true');
+    await frames(1);
+    const framed = (await orbit()).wantDistance;
+    await page.mouse.move(640, 300);
+    await page.mouse.wheel(0, 600);
+    await until('it is out', async () => (await orbit()).wantDistance > framed);
+    await act();
+    await until('all are framed', async () => Math.abs((await orbit()).wantDistance - framed) < 0.5);
+  };
+  const pauses = async (act) => {
+    await act();
+    await eventually('it is paused', () => window.stridewire.playback.paused);
+    const at = (await look(() => window.stridewire.sampled()))[0].timeS;
+    await frames(3);
+    assert.ok((await look(() => window.stridewire.sampled()))[0].timeS - at < 1e-6);
+    await act();
+    await until('it goes on', async () => (await look(() => window.stridewire.sampled()))[0].timeS > at);
+  };
+  const goesLive = async (act) => {
+    await look(() => window.stridewire.playback.pause());
+    await act();
+    await live();
+  };
+  const steps = () => alpha.request(
+    Array.from({length: 12}, () => ({avatar: driven, type: 'step', lengthM: 0.6})));
+  /** Held in the middle of a step with parameters to look at. */
+  const stepping = () => until('a step is held', async () => {
+    await look(() => window.stridewire.playback.goLive());
+    if ((await alpha.inspect(driven)).queueSize < 4) await steps();
+    await eventually('a step is inspected', () =>
+      window.stridewire.inspected?.movement?.sites.length > 0);
+    await look(() => window.stridewire.playback.pause());
+    await frames(3);
+    return look(() => window.stridewire.inspected?.movement?.parameterNames.length >= 2 &&
+      document.querySelectorAll('.scatter .site').length > 1);
+  });
+  const toggles = async (name) => {
+    const shown = () => page.locator(`#panel-${name.toLowerCase()}`).isVisible();
+    const button = page.locator('nav.tools').getByRole('button', {name, exact: true});
+    const was = await shown();
+    for (const open of [!was, was]) {
+      await button.click();
+      assert.equal(await shown(), open, `${name} ${open}`);
+      assert.equal(await button.getAttribute('aria-expanded'), String(open));
+    }
+    return shown;
+  };
+  const opened = async (name) => {
+    if (await page.locator(`#panel-${name.toLowerCase()}`).isVisible()) return;
+    await page.locator('nav.tools').getByRole('button', {name, exact: true}).click();
+  };
+  const closes = async (name) => {
+    await opened(name);
+    await press(`Close ${name}`);
+    assert.equal(await page.locator(`#panel-${name.toLowerCase()}`).isVisible(), false);
+  };
+  /** A box that shows something which the picture then has. */
+  const shows = async (id) => {
+    await opened('View');
+    const box = page.locator(`#${id}`);
+    assert.ok(await box.isChecked());
+    await until(`the picture tells ${id}`, async () => {
+      await cameraRests();
+      const on = await picture();
+      await box.uncheck();
+      const shown = await differing(page, on, await picture());
+      await box.check();
+      return shown > 2e-5 && await differing(page, on, await picture()) < shown / 2;
+    });
+  };
+  const bytesAPose = async () => {
+    const count = () => look(() => {
+      const {bytesReceived, posesReceived} = window.stridewire.client.statistics;
+      return {bytes: bytesReceived, poses: posesReceived};
+    });
+    const from = await count();
+    const to = await until('poses came', async () => {
+      const now = await count();
+      return now.poses >= from.poses + 120 ? now : null;
+    });
+    return (to.bytes - from.bytes) / (to.poses - from.poses);
+  };
+  const figureAt = () => until('it can be clicked', () => look((number) => {
+    const {view} = window.stridewire.worlds[0];
+    const {x, y, width, height} = view.free;
+    for (let row = y + 4; row < y + height; row += 6) {
+      for (let column = x + 4; column < x + width; column += 6) {
+        if (view.pick(column, row, 4) === number) return {x: column, y: row};
+      }
+    }
+    return null;
+  }, driven));
+  const chosen = () => look(() => window.stridewire.selection?.avatar ?? 0);
+  const drawsOthers = async (label) => {
+    const select = page.getByLabel(label);
+    const drawn = new Set();
+    for (let k = 0; k < await select.locator('option').count(); ++k) {
+      await select.selectOption(String(k));
+      drawn.add(await look(() => document.querySelector('.scatter').innerHTML));
+    }
+    assert.ok(drawn.size > 1, [...drawn].join(' '));
+  };
+
+  const everyone = 8;
+  const checks = [
+    ['card: Let them wander', async () => {
+      await press('Let them wander', '.card');
+      await eventually('all are there', (n) =>
+        window.stridewire.worlds[0].world.avatars().length === n, everyone);
+      await wandering(everyone);
+      driven = (await avatars())[0];
+      await until('one walks', async () => (await alpha.inspect(driven)).movement?.requestId);
+      await until('the card is gone', async () => !await page.locator('.card').isVisible());
+    }],
+    ['drive: Let them wander', async () => {
+      await page.locator('#panel-drive button.wide').click();
+      await wandering(0);
+      await wanders(() => page.locator('#panel-drive button.wide').click(), everyone);
+    }],
+    ['drive: drive-all', async () => {
+      await page.locator('#drive-all').check();
+      await eventually('all are addressed', (n) =>
+        document.querySelector('.target').textContent === `All ${n} avatars of alpha`, everyone);
+    }],
+    ['drive: Remove', async () => {
+      await inDrive('Remove');
+      await eventually('all are gone', () => window.stridewire.worlds[0].world.avatars().length === 0);
+      await page.locator('#drive-all').uncheck();
+    }],
+    ['drive: Spawn', () => spawns(() => inDrive('Spawn'))],
+    ['drive: step-length', async () => {
+      await slide('step-length', 0.5);
+      near((await adds(() => inDrive('Step'))).lengthM, 0.5);
+    }],
+    ['drive: turn', async () => {
+      await slide('turn', 20);
+      near((await adds(() => inDrive('Step'))).turnRad, 20 * Math.PI / 180);
+      await slide('turn', 0);
+    }],
+    ['drive: Step', async () => {
+      const {type, foot} = await adds(() => inDrive('Step'));
+      assert.deepEqual([type, foot], ['step', 'auto']);
+    }],
+    ['drive: Left foot', async () => {
+      const {type, foot} = await adds(() => inDrive('Left foot'));
+      assert.deepEqual([type, foot], ['step', 'left']);
+    }],
+    ['drive: Right foot', async () => {
+      const {type, foot} = await adds(() => inDrive('Right foot'));
+      assert.deepEqual([type, foot], ['step', 'right']);
+    }],
+    ['drive: jump-length', async () => {
+      await slide('jump-length', 1.2);
+      near((await adds(() => inDrive('Jump'))).lengthM, 1.2);
+    }],
+    ['drive: Jump', async () => assert.equal((await adds(() => inDrive('Jump'))).type, 'jump')],
+    ['drive: stand-seconds', async () => {
+      await slide('stand-seconds', 2.5);
+      near((await adds(() => inDrive('Stand'))).seconds, 2.5);
+    }],
+    ['drive: Stand', async () => assert.equal((await adds(() => inDrive('Stand'))).type, 'stand')],
+    ['drive: Clear queue', () => queueIsEmpty(() => inDrive('Clear queue'))],
+    ['inspect: Follow', () => follows(() => press('Follow', '#panel-inspect'))],
+    ['page: Follow the chosen one', () => follows(() => press('Follow the chosen one'))],
+    ['page: Frame all', () => frameAll(() => press('Frame all'))],
+    ['playback: Pause', () => pauses(() => page.locator('.transport button.round').click())],
+    ['playback: Speed', async () => {
+      await page.getByLabel('Speed').selectOption('0.25');
+      const from = await look(() => window.stridewire.playback.rate);
+      near(from, 0.25);
+      const behind = () => look(() => window.stridewire.client.renderTimeS() -
+        window.stridewire.sampled()[0].timeS);
+      await until('it falls behind', async () => await behind() > 0.5);
+      await look(() => window.stridewire.playback.goLive());
+      await live();
+    }],
+    ['playback: scrub', async () => {
+      await eventually('there is something to go back to', () =>
+        Number(document.getElementById('scrub').min) <= -2);
+      await slide('scrub', -1.5);
+      await frames(2);
+      const back = await look(() => {
+        const {recording} = window.stridewire.worlds[0].world;
+        return recording.lastTimeS - window.stridewire.sampled()[0].timeS;
+      });
+      assert.ok(back > 1.3 && await look(() => window.stridewire.playback.paused), `${back} s back`);
+      await slide('scrub', 0);
+      await live();
+    }],
+    ['playback: Live', () => goesLive(() => press('Live'))],
+    ['inspect: Parameter to the right', async () => {
+      await stepping();
+      await drawsOthers('Parameter to the right');
+    }],
+    ['inspect: Parameter upwards', async () => {
+      await stepping();
+      await drawsOthers('Parameter upwards');
+      // What was chosen stays from one step to the next.
+      const select = page.getByLabel('Parameter upwards');
+      await select.selectOption('0');
+      const start = await look(() => window.stridewire.inspected.movement.startTimeS);
+      await look(() => window.stridewire.playback.goLive());
+      await steps();
+      await eventually('the next step', (t) =>
+        window.stridewire.inspected?.movement?.parameterNames.length >= 2 &&
+        window.stridewire.inspected.movement.startTimeS > t, start);
+      assert.equal(await select.inputValue(), '0');
+      await look(() => window.stridewire.playback.pause());
+    }],
+    ['inspect: joint-labels', async () => {
+      const inked = async () => {
+        await frames(2);
+        return look(() => {
+          const overlay = document.querySelector('canvas.overlay');
+          const {data} = overlay.getContext('2d').getImageData(0, 0, overlay.width, overlay.height);
+          let count = 0;
+          for (let i = 3; i < data.length; i += 4) if (data[i] > 0) ++count;
+          return count;
+        });
+      };
+      const without = await inked();
+      await page.locator('#joint-labels').check();
+      assert.ok(await inked() > without + 500);
+      await page.locator('#joint-labels').uncheck();
+      assert.ok(await inked() < without + 100);
+    }],
+    ['inspect: Joints', async () => {
+      await page.locator('#panel-inspect summary').click();
+      const names = await page.locator('#panel-inspect .joints li').allInnerTexts();
+      assert.deepEqual(names, await look(() => [...window.stridewire.worlds[0].world.skeleton.names]));
+    }],
+    ['view: view-shadows', () => shows('view-shadows')],
+    ['view: view-prints', async () => {
+      await look(() => window.stridewire.playback.goLive());
+      const laid = await look(() => window.stridewire.sampled()[0].footprints);
+      await steps();
+      await eventually('prints are there', (n) => window.stridewire.sampled()[0].footprints >= n, laid + 8);
+      await look(() => window.stridewire.playback.pause());
+      await shows('view-prints');
+    }],
+    ['view: view-plants', async () => {
+      // While it stands: both feet are planted.
+      await look(() => window.stridewire.playback.goLive());
+      await alpha.cancel([driven]);
+      await until('it stands', async () => (await alpha.inspect(driven)).movement === null);
+      const {timeS} = await alpha.inspect(driven);
+      await eventually('that is seen', (t) => window.stridewire.sampled()[0].timeS > t + 0.5, timeS);
+      await look(() => window.stridewire.playback.pause());
+      await shows('view-plants');
+      await look(() => window.stridewire.playback.goLive());
+    }],
+    ['view: figures-lines', async () => {
+      await page.locator('label[for=figures-lines]').click();
+      await eventually('lines', () => window.stridewire.draw.style === 'lines' &&
+        document.querySelector('#panel-view .hint').textContent === 'Drawn as lines now.');
+    }],
+    ['view: figures-auto', async () => {
+      await page.locator('label[for=figures-auto]').click();
+      await eventually('it chooses', () => window.stridewire.app.figureChoice === 'auto' &&
+        document.querySelector('#panel-view .hint').textContent.includes(window.stridewire.draw.style));
+    }],
+    ['view: figures-bodies', async () => {
+      await page.locator('label[for=figures-lines]').click();
+      await frames(2);
+      const lines = await look(() => window.stridewire.draw.triangles);
+      await page.locator('label[for=figures-bodies]').click();
+      await eventually('bodies', (n) => window.stridewire.draw.style === 'bodies' &&
+        window.stridewire.draw.triangles > n, lines);
+    }],
+    ['view: mode-full', async () => {
+      const quantised = await bytesAPose();
+      await page.locator('label[for=mode-full]').click();
+      await until('poses are larger', async () => await bytesAPose() > quantised + 150);
+    }],
+    ['view: mode-quantised', async () => {
+      const full = await bytesAPose();
+      await page.locator('label[for=mode-quantised]').click();
+      await until('poses are smaller', async () => await bytesAPose() < full - 150);
+    }],
+    ['inspect: Deselect', async () => {
+      await opened('Inspect');
+      await press('Deselect', '#panel-inspect');
+      assert.equal(await chosen(), 0);
+    }],
+    ['page: the scene', async () => {
+      await press('Frame all');
+      await cameraRests();
+      const at = await figureAt();
+      await page.mouse.click(at.x, at.y);
+      assert.equal(await chosen(), driven);
+    }],
+    ...['Drive', 'View', 'Inspect', 'Figures'].flatMap((name) => [
+      [`page: ${name}`, () => toggles(name)],
+      [`${name.toLowerCase()}: Close ${name}`, () => closes(name)],
+    ]),
+    ['page: Library', async () => {
+      const link = await page.getByRole('link', {name: 'Library'}).getAttribute('href');
+      const answer = await page.request.get(new URL(link, page.url()).href);
+      assert.ok(answer.ok() && /<title>[^<]+</.test(await answer.text()), link);
+    }],
+    ['page: Dark or light', async () => {
+      const theme = () => look(() => document.documentElement.dataset.theme);
+      const clear = () => look(() => getComputedStyle(document.body).backgroundColor);
+      const [was, colour] = [await theme(), await clear()];
+      await page.locator('.corner button').nth(2).click();
+      assert.notEqual(await theme(), was);
+      assert.notEqual(await clear(), colour);
+      await page.locator('.corner button').nth(2).click();
+      assert.equal(await theme(), was);
+    }],
+    ['page: Keys and help', async () => {
+      await press('Keys and help');
+      assert.ok(await page.locator('dialog').isVisible());
+    }],
+    ['help: Close', async () => {
+      await press('Close', 'dialog');
+      assert.equal(await page.locator('dialog').isVisible(), false);
+    }],
+    ['page: a world', async () => {
+      const names = () => look(() => window.stridewire.worlds.map(({name}) => name).join());
+      const beta = page.locator('.chip', {hasText: 'beta'});
+      await beta.click();
+      assert.equal(await names(), 'alpha,beta');
+      assert.deepEqual(new URL(page.url()).searchParams.getAll('world').sort(), ['alpha', 'beta']);
+      await eventually('its avatar is seen', () => window.stridewire.sampled()[1].avatars.length === 1);
+      await beta.click();
+      assert.equal(await names(), 'alpha');
+    }],
+  ];
+
+  // By what the help says; each of these is pressed or moved on the scene.
+  const turned = async (act, changed) => {
+    const was = await orbit();
+    await act();
+    const now = await orbit();
+    assert.ok(changed(was, now), `${JSON.stringify(was)} ${JSON.stringify(now)}`);
+  };
+  const drag = async (dx, dy, options = {}) => {
+    await page.mouse.move(700, 200);
+    await page.mouse.down(options);
+    await page.mouse.move(700 + dx / 2, 200 + dy / 2);
+    await page.mouse.move(700 + dx, 200 + dy);
+    await page.mouse.up(options);
+  };
+  const choose = async () => {
+    await key('Escape');
+    for (let i = 0; await chosen() !== driven; ++i) {
+      assert.ok(i < 3);
+      await key('n');
+    }
+  };
+  const keys = {
+    'Drag, arrow keys': async () => {
+      await turned(() => drag(80, 0), (a, b) => b.wantAzimuth < a.wantAzimuth);
+      await turned(() => drag(0, 40), (a, b) => b.wantElevation > a.wantElevation);
+      await turned(() => key('ArrowLeft'), (a, b) => b.wantAzimuth > a.wantAzimuth);
+      await turned(() => key('ArrowRight'), (a, b) => b.wantAzimuth < a.wantAzimuth);
+      await turned(() => key('ArrowDown'), (a, b) => b.wantElevation < a.wantElevation);
+      await turned(() => key('ArrowUp'), (a, b) => b.wantElevation > a.wantElevation);
+    },
+    'Wheel, pinch, + −': async () => {
+      await turned(() => key('+'), (a, b) => b.wantDistance < a.wantDistance);
+      await turned(() => key('-'), (a, b) => b.wantDistance > a.wantDistance);
+    },
+    'Shift or right drag, two fingers': async () => {
+      for (const right of [false, true]) {
+        const was = await target();
+        if (right) {
+          await drag(60, 30, {button: 'right'});
+        } else {
+          await page.keyboard.down('Shift');
+          await drag(60, 30);
+          await page.keyboard.up('Shift');
+        }
+        assert.notDeepEqual(await target(), was);
+      }
+    },
+    'F': () => frameAll(() => key('f')),
+    'C, double click': async () => {
+      await choose();
+      await follows(() => key('c'));
+      await key('f');
+      await cameraRests();
+      const at = await figureAt();
+      await page.mouse.dblclick(at.x, at.y);
+      // The first click may open a panel, which moves the figure from under the second.
+      await until('it is followed', async () => {
+        if (await following() === driven) return true;
+        await cameraRests();
+        const {x, y} = await figureAt();
+        await page.mouse.dblclick(x, y);
+        return false;
+      });
+      await key('f');
+    },
+    'Click, N, P': async () => {
+      await key('Escape');
+      await key('n');
+      assert.equal(await chosen(), driven);
+      await spawns(() => key('b'));
+      const newest = driven;
+      await key('p');
+      assert.notEqual(await chosen(), newest);
+      await key('n');
+      assert.equal(await chosen(), newest);
+      await removes(() => key('Delete'));
+      [driven] = await avatars();
+      await choose();
+    },
+    'Esc': async () => {
+      await choose();
+      await key('Escape');
+      assert.equal(await chosen(), 0);
+      await choose();
+    },
+    'Space': () => pauses(() => key(' ')),
+    '[ ]': async () => {
+      const rate = () => look(() => window.stridewire.playback.rate);
+      await key('[');
+      near(await rate(), 0.5);
+      await key('[');
+      near(await rate(), 0.25);
+      await key(']');
+      near(await rate(), 0.5);
+      await key('l');
+    },
+    ', .': async () => {
+      await key(' ');
+      await frames(2);
+      const at = () => look(() => window.stridewire.playback.timeS);
+      const was = await at();
+      await key(',');
+      assert.ok(Math.abs(await at() - was + 1 / 30) < 1e-6);
+      await key('.');
+      assert.ok(Math.abs(await at() - was) < 1e-6);
+    },
+    'L': () => goesLive(() => key('l')),
+    'W, A, D': async () => {
+      for (const [letter, foot] of [['w', 'auto'], ['a', 'left'], ['d', 'right']]) {
+        const item = await adds(() => key(letter));
+        assert.deepEqual([item.type, item.foot], ['step', foot]);
+      }
+    },
+    'Q, E': async () => {
+      for (const [letter, degrees] of [['q', 5], ['e', 0], ['e', -5], ['q', 0]]) {
+        await key(letter);
+        assert.equal(await page.locator('#turn').inputValue(), String(degrees));
+      }
+    },
+    'R, V': async () => {
+      const length = async () => Number(await page.locator('#step-length').inputValue());
+      const was = await length();
+      await key('r');
+      near(await length(), was + 0.05);
+      await key('v');
+      near(await length(), was);
+    },
+    'J': async () => assert.equal((await adds(() => key('j'))).type, 'jump'),
+    'S': async () => assert.equal((await adds(() => key('s'))).type, 'stand'),
+    'X': () => queueIsEmpty(() => key('x')),
+    'B, Delete': async () => {
+      const was = driven;
+      await spawns(() => key('b'));
+      await removes(() => key('Delete'));
+      driven = was;
+      await choose();
+    },
+    'G': () => wanders(() => key('g'), 1),
+  };
+
+  const seen = new Set(await controlsOf(page));
+  for (const [name, check] of checks) {
+    try {
+      await check();
+    } catch (error) {
+      error.message = `${name}: ${error.message}`;
+      throw error;
+    }
+    for (const control of await controlsOf(page)) seen.add(control);
+  }
+  assert.deepEqual([...seen].sort(), checks.map(([name]) => name).sort());
+
+  await opened('Drive');
+  const told = await page.locator('dialog dt').allTextContents();
+  assert.deepEqual(told.sort(), Object.keys(keys).sort());
+  for (const [name, check] of Object.entries(keys)) {
+    try {
+      await check();
+    } catch (error) {
+      error.message = `keys ${name}: ${error.message}`;
+      throw error;
+    }
+  }
+  console.log(`${seen.size} controls and ${told.length} lines of the help do as they say`);
+  assert.deepEqual(errors, []);
+  await context.close();
+});
