@@ -10,10 +10,7 @@ function(stridewire_test name)
     STRIDEWIRE_MOCAP_DIR="${PROJECT_SOURCE_DIR}/../shared/mocap")
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
   stridewire_target(${name})
-  # A test's own code is compiled once and run once: -O3 would only take longer. At -O1 gcc 12 warns of
-  # overflows in the standard library's own vectors.
-  target_compile_options(${name} PRIVATE
-                         $<$<CONFIG:Release>:-O1 -Wno-stringop-overflow -Wno-array-bounds>)
+  stridewire_cold(${name})
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST
                        PROPERTIES LABELS ${ARG_LABEL} TIMEOUT 300 RUN_SERIAL ${ARG_ALONE})
 endfunction()
