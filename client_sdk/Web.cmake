@@ -15,6 +15,14 @@ add_custom_command(OUTPUT ${STRIDEWIRE_NODE_MODULES}
   VERBATIM)
 add_custom_target(web_modules DEPENDS ${STRIDEWIRE_NODE_MODULES})
 
+# stridewire_node_test(NAME LABEL SECONDS ARGUMENTS…): a script of tests for node, run in the caller's folder.
+# Whatever it skips counts as failed: ctest hands it all that it needs.
+function(stridewire_node_test name label seconds)
+  add_test(NAME ${name} COMMAND ${STRIDEWIRE_NODE} ${ARGN} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  set_tests_properties(${name} PROPERTIES LABELS ${label} TIMEOUT ${seconds}
+    FAIL_REGULAR_EXPRESSION " skipped [1-9]")
+endfunction()
+
 add_subdirectory(web)
 if(EXISTS ${CMAKE_CURRENT_LIST_DIR}/viewer/CMakeLists.txt)
   add_subdirectory(viewer)

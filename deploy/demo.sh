@@ -126,9 +126,22 @@ trap 'ended=true' INT TERM HUP
 
 quoted_library=${library//\\/\\\\}
 quoted_library=${quoted_library//\"/\\\"}
+slabs=$root/$out/slabs.json
+quoted_slabs=${slabs//\\/\\\\}
+quoted_slabs=${quoted_slabs//\"/\\\"}
 # The page keeps its address from one demonstration to the next, unless somebody else is there.
 http_port=7421
 if (exec 3<>"/dev/tcp/127.0.0.1/$http_port") 2>/dev/null; then http_port=0; fi
+# Slabs of a metre, none where avatars are put.
+LC_ALL=C awk 'BEGIN {
+  printf "{\"boxes\":["
+  for (i = -5; i <= 5; ++i) for (k = -5; k <= 5; ++k) {
+    if (i * i + k * k < 3) continue
+    printf "%s{\"min_m\":[%.2f,%.2f],\"max_m\":[%.2f,%.2f],\"height_m\":%.3f}", comma, i - 0.46, k - 0.46,
+           i + 0.46, k + 0.46, 0.08 + 0.05 * sin(3.1 * i + 1.7 * k)
+    comma = ","
+  }
+  print "]}" }' >"$out/slabs.json"
 cat >"$out/stridewired.toml" <<TOML
 # Made by deploy/demo.sh. Port 0 is any free port; the server tells which it took.
 listen = "127.0.0.1:0"
@@ -139,6 +152,10 @@ library = "builtin"
 
 [worlds.$world]
 library = "$quoted_library"
+
+[worlds.slabs]
+library = "builtin"
+terrain = "$quoted_slabs"
 TOML
 start server "$out/server.log" "$bin/stridewired" --config "$out/stridewired.toml"
 ready=
@@ -179,6 +196,7 @@ Stridewire is up. Two worlds of $avatars avatars each walk, stop, stand, jump an
 server asks them to:
     generated   moves by the library that Stridewire generates itself
     $(printf '%-9s' "$world")   moves by ${library#"$root"/}
+A third, slabs, has uneven ground and nobody on it yet: spawn somebody there in the page, choose "Send there" and click on a slab.
 Where to look:
     $out/generated.bvh, $out/$world.bvh   avatar 1 of each for $record_s s; opens in Blender and most 3D tools
     http://$http/metrics   the server's figures (and /healthz, /readyz)

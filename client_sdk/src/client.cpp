@@ -356,8 +356,10 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
                                             uint64_t* command) {
   if (!IsList(movements, count)) return STRIDEWIRE_INVALID_ARGUMENT;
   for (const stridewire_movement& m : std::span(movements, count)) {
-    if (m.type < STRIDEWIRE_STEP || m.type > STRIDEWIRE_STAND || m.foot < STRIDEWIRE_FOOT_AUTO ||
-        m.foot > STRIDEWIRE_FOOT_RIGHT) {
+    if (m.type < STRIDEWIRE_STEP || m.type > STRIDEWIRE_WALK || m.foot < STRIDEWIRE_FOOT_AUTO ||
+        m.foot > STRIDEWIRE_FOOT_RIGHT || m.takeover < STRIDEWIRE_QUEUED ||
+        m.takeover > STRIDEWIRE_NOW || m.waypoint_count > STRIDEWIRE_MAX_WAYPOINTS ||
+        (m.type == STRIDEWIRE_WALK && m.waypoint_count != 0 && m.waypoints_m == nullptr)) {
       return STRIDEWIRE_INVALID_ARGUMENT;
     }
   }
@@ -365,11 +367,18 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
     protocol::Request message;
     message.items.reserve(count);
     for (const stridewire_movement& m : std::span(movements, count)) {
-      protocol::RequestItem item{m.avatar, m.request_id, {}};
+      protocol::RequestItem item{
+          m.avatar, m.request_id, {}, static_cast<protocol::Takeover>(m.takeover)};
       switch (m.type) {
         case STRIDEWIRE_STEP: {
           protocol::StepMovement step;
           step.foot = static_cast<protocol::FootChoice>(m.foot);
+          if (m.has_at != 0) {
+            step.at.emplace().position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
+            if (m.has_heading != 0) step.at->heading_rad = m.heading_rad;
+            item.movement = step;
+            break;
+          }
           step.length_m = m.length_m;
           if (m.has_side != 0) step.side_m = m.side_m;
           step.height_m = m.height_m;
@@ -382,6 +391,18 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
           break;
         case STRIDEWIRE_MOVEMENT_TYPE_MAX: break;  // Refused above.
         case STRIDEWIRE_STAND: item.movement = protocol::StandMovement{m.seconds}; break;
+        case STRIDEWIRE_WALK: {
+          protocol::WalkMovement walk;
+          walk.position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
+          walk.heading_rad = m.heading_rad;
+          for (std::size_t w = 0; w < m.waypoint_count; ++w) {
+            const double* place = m.waypoints_m + 3 * w;
+            walk.waypoints_m.emplace_back(place[0], place[1], place[2]);
+          }
+          if (m.has_speed != 0) walk.speed_m_s = m.speed_m_s;
+          item.movement = std::move(walk);
+          break;
+        }
       }
       message.items.push_back(item);
     }
@@ -399,6 +420,71 @@ stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire
   return Command(client, [&](Session& session) {
     std::uint64_t id = 0;
     const auto status = session.Cancel(world, {0, 0, {avatars, avatars + count}}, id);
+    StoreCommand(command, id);
+    return status;
+  });
+}
+
+stridewire_status stridewire_client_set_terrain(stridewire_client* client, stridewire_world world,
+                                                const stridewire_height_field* height_field,
+                                                const stridewire_terrain_box* boxes,
+                                                size_t box_count, uint64_t* command) {
+  if ((boxes == nullptr && box_count > 0) || box_count > STRIDEWIRE_MAX_TERRAIN_BOXES) {
+    return STRIDEWIRE_INVALID_ARGUMENT;
+  }
+  if (height_field != nullptr &&
+      (height_field->heights_m == nullptr ||
+       !InRange(height_field->columns, 2u, std::uint32_t{STRIDEWIRE_MAX_TERRAIN_COLUMNS}) ||
+       !InRange(height_field->rows, 2u, std::uint32_t{STRIDEWIRE_MAX_TERRAIN_COLUMNS}))) {
+    return STRIDEWIRE_INVALID_ARGUMENT;
+  }
+  return Command(client, [&](Session& session) {
+    protocol::SetTerrain message;
+    if (height_field != nullptr) {
+      const std::size_t count = std::size_t{height_field->columns} * height_field->rows;
+      message.terrain.emplace().height_field =
+          protocol::HeightFieldInfo{{height_field->origin_m[0], height_field->origin_m[1]},
+                                    height_field->cell_m,
+                                    static_cast<std::uint16_t>(height_field->columns),
+                                    static_cast<std::uint16_t>(height_field->rows),
+                                    {height_field->heights_m, height_field->heights_m + count}};
+    }
+    if (box_count > 0) {
+      if (!message.terrain) message.terrain.emplace();
+      message.terrain->boxes.reserve(box_count);
+      for (const stridewire_terrain_box& box : std::span(boxes, box_count)) {
+        message.terrain->boxes.push_back(
+            {{box.min_m[0], box.min_m[1]}, {box.max_m[0], box.max_m[1]}, box.height_m});
+      }
+    }
+    std::uint64_t id = 0;
+    const auto status = session.SetTerrain(world, std::move(message), id);
+    StoreCommand(command, id);
+    return status;
+  });
+}
+
+stridewire_status stridewire_client_set_layers(stridewire_client* client, stridewire_world world,
+                                               const stridewire_layer* layers, size_t count,
+                                               uint64_t* command) {
+  if (!IsList(layers, count)) return STRIDEWIRE_INVALID_ARGUMENT;
+  for (const stridewire_layer& layer : std::span(layers, count)) {
+    if (layer.name == nullptr) return STRIDEWIRE_INVALID_ARGUMENT;
+  }
+  return Command(client, [&](Session& session) {
+    protocol::SetLayers message;
+    message.items.reserve(count);
+    for (const stridewire_layer& l : std::span(layers, count)) {
+      // One byte more than a name may have: a longer one is refused without being copied.
+      message.items.push_back({.avatar = l.avatar,
+                               .layer = {l.name, strnlen(l.name, protocol::kMaxNameBytes + 1)},
+                               .is_off = l.off != 0,
+                               .weight = l.weight,
+                               .blend_s = l.blend_s,
+                               .speed = l.speed});
+    }
+    std::uint64_t id = 0;
+    const auto status = session.SetLayers(world, std::move(message), id);
     StoreCommand(command, id);
     return status;
   });
@@ -493,6 +579,40 @@ stridewire_status stridewire_client_get_skeleton(stridewire_client* client, stri
     }
     const bool all =
         info.joints.size() <= joint_capacity && info.end_sites.size() <= end_site_capacity;
+    return all ? STRIDEWIRE_OK : STRIDEWIRE_BUFFER_TOO_SMALL;
+  });
+}
+
+stridewire_status stridewire_client_get_terrain(stridewire_client* client, stridewire_world world,
+                                                stridewire_terrain* terrain, float* heights_m,
+                                                size_t height_capacity,
+                                                stridewire_terrain_box* boxes,
+                                                size_t box_capacity) {
+  if (terrain == nullptr || (heights_m == nullptr && height_capacity > 0) ||
+      (boxes == nullptr && box_capacity > 0)) {
+    return STRIDEWIRE_INVALID_ARGUMENT;
+  }
+  *terrain = stridewire_terrain{};
+  return Query(client, [&](Session& session) {
+    if (session.FindWorld(world) == nullptr) return STRIDEWIRE_NO_SUCH_WORLD;
+    const std::optional<protocol::TerrainInfo>& info = session.TerrainOf(world);
+    if (!info) return STRIDEWIRE_OK;
+    bool all = info->boxes.size() <= box_capacity;
+    if (const auto& field = info->height_field) {
+      terrain->origin_m[0] = field->origin_m.x;
+      terrain->origin_m[1] = field->origin_m.z;
+      terrain->cell_m = field->cell_m;
+      terrain->columns = field->columns;
+      terrain->rows = field->rows;
+      std::copy_n(field->heights_m.begin(), std::min(height_capacity, field->heights_m.size()),
+                  heights_m);
+      all = all && field->heights_m.size() <= height_capacity;
+    }
+    terrain->box_count = static_cast<std::uint32_t>(info->boxes.size());
+    for (std::size_t i = 0; i < std::min(box_capacity, info->boxes.size()); ++i) {
+      const protocol::TerrainBoxInfo& box = info->boxes[i];
+      boxes[i] = {{box.min_m.x, box.min_m.z}, {box.max_m.x, box.max_m.z}, box.height_m};
+    }
     return all ? STRIDEWIRE_OK : STRIDEWIRE_BUFFER_TOO_SMALL;
   });
 }

@@ -60,6 +60,13 @@ stridewire_event_type ToEventType(protocol::EventType type) {
 static_assert(STRIDEWIRE_EVENT_REMOVED - STRIDEWIRE_EVENT_ACCEPTED ==
               static_cast<int>(protocol::EventType::kRemoved));
 
+std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain) {
+  if (!terrain) return 0;
+  std::size_t bytes = terrain->boxes.size() * sizeof(protocol::TerrainBoxInfo);
+  if (terrain->height_field) bytes += terrain->height_field->heights_m.size() * sizeof(float);
+  return bytes;
+}
+
 }  // namespace
 
 Session::Session(const SessionOptions& options)
@@ -232,6 +239,23 @@ stridewire_status Session::Cancel(stridewire_world world, protocol::CancelQueue 
   return status;
 }
 
+stridewire_status Session::SetTerrain(stridewire_world world, protocol::SetTerrain message,
+                                      std::uint64_t& command) {
+  const std::size_t bytes = TerrainBytes(message.terrain);
+  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
+  Pump();
+  return status;
+}
+
+stridewire_status Session::SetLayers(stridewire_world world, protocol::SetLayers message,
+                                     std::uint64_t& command) {
+  const std::size_t bytes =
+      message.items.size() * (sizeof(protocol::LayerItem) + protocol::kMaxNameBytes);
+  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
+  Pump();
+  return status;
+}
+
 stridewire_status Session::Observe(stridewire_world world, protocol::Observe message,
                                    std::uint32_t& subscription, std::uint64_t& command) {
   if (message.mode == protocol::PoseMode::kMovement) {
@@ -338,6 +362,7 @@ stridewire_statistics Session::Statistics() const {
   s.buffered_bytes = pose_budget_.used_bytes + events_.size() * sizeof(stridewire_event) +
                      command_bytes_ + output_.capacity() +
                      (reader_ ? reader_->capacity_bytes() : 0);
+  for (const auto& [handle, world] : worlds_) s.buffered_bytes += TerrainBytes(world.terrain);
   if (!rtts_s_.empty()) s.rtt_s = *std::ranges::min_element(rtts_s_);
   return s;
 }
@@ -365,8 +390,10 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features =
-      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised;
+  hello.features = protocol::kFeatureResume | protocol::kFeatureEventReplay |
+                   protocol::kFeatureQuantised | protocol::kFeatureTerrain |
+                   protocol::kFeatureFootprints | protocol::kFeatureWalks |
+                   protocol::kFeatureTakeovers | protocol::kFeatureLayers;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -502,7 +529,31 @@ void Session::Pump() {
   }
 }
 
+bool Session::Understands(const CommandMessage& message) const {
+  if (std::holds_alternative<protocol::SetTerrain>(message)) {
+    return (features_ & protocol::kFeatureTerrain) != 0;
+  }
+  if (std::holds_alternative<protocol::SetLayers>(message)) {
+    return (features_ & protocol::kFeatureLayers) != 0;
+  }
+  const auto* request = std::get_if<protocol::Request>(&message);
+  if (request == nullptr) return true;
+  const bool knows_footprints = (features_ & protocol::kFeatureFootprints) != 0;
+  const bool knows_walks = (features_ & protocol::kFeatureWalks) != 0;
+  const bool knows_takeovers = (features_ & protocol::kFeatureTakeovers) != 0;
+  return std::ranges::none_of(request->items, [&](const protocol::RequestItem& item) {
+    if (item.takeover != protocol::Takeover::kNone && !knows_takeovers) return true;
+    if (std::holds_alternative<protocol::WalkMovement>(item.movement)) return !knows_walks;
+    const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
+    return step != nullptr && step->at.has_value() && !knows_footprints;
+  });
+}
+
 void Session::Send(Command command) {
+  if (!Understands(command.message)) {
+    Answer(command, STRIDEWIRE_UNSUPPORTED, "this server does not know of it");
+    return;
+  }
   const World& world = worlds_.at(command.world);
   const Status status = std::visit(
       [&](auto& message) {
@@ -580,6 +631,7 @@ void Session::Handle(const protocol::Welcome& message, double now_s) {
   state_ = State::kReady;
   ready_s_ = now_s;
   ++connects_;
+  features_ = message.features;
   limits_ = message.limits;
   tick_hz_ = message.tick_hz;
   resume_token_ = message.resume_token;
@@ -649,6 +701,7 @@ void Session::StartAnew() {
     world.told_dropped_batches = 0;
     world.view->Clear();
     world.view->Break();
+    TakeTerrain(handle, std::nullopt);
 
     std::deque<Command> first;
     for (auto& [id, subscription] : world.subscriptions) {
@@ -771,7 +824,24 @@ void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now
     FailUnsent(world, STRIDEWIRE_NOT_JOINED, reply.text);
     world.subscriptions.clear();
     world.view->Clear();
+    TakeTerrain(handle, std::nullopt);
   }
+}
+
+void Session::TakeTerrain(stridewire_world handle,
+                          const std::optional<protocol::TerrainInfo>& terrain) {
+  World& world = worlds_.at(handle);
+  if (world.terrain == terrain) return;
+  world.terrain = terrain;
+  events_.Push(MakeEvent(STRIDEWIRE_EVENT_TERRAIN, handle));
+}
+
+void Session::Handle(const protocol::WorldTerrain& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a ground before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  if (FindByServerId(message.world, handle) != nullptr) TakeTerrain(handle, message.terrain);
 }
 
 void Session::OnSpawnReply(World& world, const protocol::Spawn& spawn,
@@ -847,6 +917,7 @@ void Session::Handle(const protocol::Events& message, double now_s) {
     event.applied = ToParameters(e.applied);
     event.extrapolated = e.extrapolated ? 1 : 0;
     event.clamped = e.clamped ? 1 : 0;
+    event.cut_short = e.cut_short ? 1 : 0;
     if (e.type == protocol::EventType::kFootStrike) {
       event.foot =
           e.foot == protocol::FootSide::kLeft ? STRIDEWIRE_FOOT_LEFT : STRIDEWIRE_FOOT_RIGHT;

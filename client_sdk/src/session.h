@@ -91,6 +91,10 @@ class Session {
                             std::uint64_t& command);
   stridewire_status Cancel(stridewire_world world, protocol::CancelQueue message,
                            std::uint64_t& command);
+  stridewire_status SetTerrain(stridewire_world world, protocol::SetTerrain message,
+                               std::uint64_t& command);
+  stridewire_status SetLayers(stridewire_world world, protocol::SetLayers message,
+                              std::uint64_t& command);
   stridewire_status Observe(stridewire_world world, protocol::Observe message,
                             std::uint32_t& subscription, std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
@@ -99,6 +103,11 @@ class Session {
   [[nodiscard]] EventQueue& events() { return events_; }
   /// Nullptr: no such world.
   [[nodiscard]] const WorldView* FindWorld(stridewire_world world) const;
+  /// The ground of a world that there is, as the server last told.
+  [[nodiscard]] const std::optional<protocol::TerrainInfo>& TerrainOf(
+      stridewire_world world) const {
+    return worlds_.at(world).terrain;
+  }
   [[nodiscard]] const ClockMap& clock() const { return clock_; }
   [[nodiscard]] double render_delay_s() const { return options_.render_delay_s; }
   [[nodiscard]] double tick_hz() const { return tick_hz_; }
@@ -125,9 +134,10 @@ class Session {
   void OnOutputWritten();
 
  private:
-  using CommandMessage = std::variant<protocol::JoinWorld, protocol::LeaveWorld, protocol::Spawn,
-                                      protocol::Remove, protocol::Request, protocol::CancelQueue,
-                                      protocol::Observe, protocol::StopObserving>;
+  using CommandMessage =
+      std::variant<protocol::JoinWorld, protocol::LeaveWorld, protocol::Spawn, protocol::Remove,
+                   protocol::Request, protocol::CancelQueue, protocol::SetTerrain,
+                   protocol::SetLayers, protocol::Observe, protocol::StopObserving>;
 
   struct Command {
     std::uint64_t id = 0;
@@ -155,6 +165,7 @@ class Session {
     std::map<protocol::AvatarNumber, protocol::Placement> spawned;  ///< Ours, and where they are.
     std::uint64_t told_dropped_batches = 0;                         ///< By the last Lagging.
     std::unique_ptr<WorldView> view;
+    std::optional<protocol::TerrainInfo> terrain;
   };
 
   /// Refuses a call, remembering why.
@@ -171,6 +182,9 @@ class Session {
   void Pump();
   [[nodiscard]] bool MaySend() const;
   void Send(Command command);
+  /// Whether this server knows what it is asked.
+  [[nodiscard]] bool Understands(const CommandMessage& message) const;
+  void TakeTerrain(stridewire_world handle, const std::optional<protocol::TerrainInfo>& terrain);
   void FailAll(stridewire_status status, std::string_view text);
   void FailUnsent(World& world, stridewire_status status, std::string_view text);
   /// Ends a command: its REPLY (a NOTICE if it was our own and failed), and its place is free.
@@ -185,6 +199,7 @@ class Session {
   void Handle(const protocol::Lagging& message, double now_s);
   void Handle(const protocol::ErrorNotice& message, double now_s);
   void Handle(const protocol::Pong& message, double now_s);
+  void Handle(const protocol::WorldTerrain& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
   template <typename Message>
   void Handle(const Message& message, double now_s);  ///< What a server may not send.
@@ -227,6 +242,7 @@ class Session {
   std::vector<std::byte> resume_token_;  ///< Empty once the server has ended the session.
   protocol::Seq next_seq_ = 1;
   std::uint64_t last_events_number_ = 0;
+  std::uint64_t features_ = 0;
   protocol::ServerLimits limits_;
   double tick_hz_ = 60.0;
 

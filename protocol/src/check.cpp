@@ -120,18 +120,62 @@ void CheckParameters(Findings& found, const ParameterSet& set, const char* field
 void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t index) {
   found.Id(item.avatar, "Request.avatar", index);
   found.Id(item.request_id, "Request.request_id", index);
+  found.Known(item.takeover, Takeover::kNow, "Request.takeover", index);
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
     found.Known(step->foot, FootChoice::kRight, "Request.foot", index);
     found.Finite(step->length_m, "Request.length_m", index);
     found.Finite(step->side_m.value_or(0.0), "Request.side_m", index);
     found.Finite(step->height_m, "Request.height_m", index);
     found.Finite(step->turn_rad, "Request.turn_rad", index);
+    if (step->at) {
+      found.FiniteVector(step->at->position_m, "Request.at_m", index);
+      found.Finite(step->at->heading_rad.value_or(0.0), "Request.heading_rad", index);
+    }
   } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     found.Finite(jump->length_m, "Request.length_m", index);
     found.Finite(jump->height_m, "Request.height_m", index);
     found.Finite(jump->turn_rad, "Request.turn_rad", index);
   } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
     found.Finite(stand->seconds, "Request.seconds", index);
+  } else if (const auto* walk = std::get_if<WalkMovement>(&item.movement)) {
+    found.FiniteVector(walk->position_m, "Request.at_m", index);
+    found.Finite(walk->heading_rad, "Request.heading_rad", index);
+    found.Count(walk->waypoints_m.size(), 0, kMaxWaypoints, "Request.waypoints_m");
+    for (const DVec3& place : walk->waypoints_m) {
+      found.FiniteVector(place, "Request.waypoints_m", index);
+    }
+    found.Finite(walk->speed_m_s.value_or(0.0), "Request.speed_m_s", index);
+  }
+}
+
+void CheckTerrain(Findings& found, const std::optional<TerrainInfo>& terrain) {
+  if (!terrain) return;
+  if (const auto& field = terrain->height_field) {
+    found.Finite(field->origin_m.x, "Terrain.origin_m");
+    found.Finite(field->origin_m.z, "Terrain.origin_m");
+    found.That(std::isfinite(field->cell_m) && field->cell_m > 0.0, ErrorCode::kOutOfRange,
+               "cell is not above 0", "Terrain.cell_m");
+    const auto is_count = [](std::uint16_t n) { return n >= 2 && n <= kMaxTerrainColumns; };
+    found.That(is_count(field->columns), ErrorCode::kOutOfRange, "not 2 to 1024", "Terrain.columns",
+               field->columns);
+    found.That(is_count(field->rows), ErrorCode::kOutOfRange, "not 2 to 1024", "Terrain.rows",
+               field->rows);
+    found.That(field->heights_m.size() == std::size_t{field->columns} * field->rows,
+               ErrorCode::kShapeMismatch, "not one height a sample", "Terrain.heights_m",
+               static_cast<std::int64_t>(field->heights_m.size()));
+    for (std::size_t h = 0; h < field->heights_m.size(); ++h) {
+      found.Finite(field->heights_m[h], "Terrain.heights_m", static_cast<std::int64_t>(h));
+    }
+  }
+  found.Count(terrain->boxes.size(), 0, kMaxTerrainBoxes, "Terrain.boxes");
+  for (std::size_t b = 0; b < terrain->boxes.size(); ++b) {
+    const TerrainBoxInfo& box = terrain->boxes[b];
+    const auto index = static_cast<std::int64_t>(b);
+    for (const double number : {box.min_m.x, box.min_m.z, box.max_m.x, box.max_m.z, box.height_m}) {
+      found.Finite(number, "Terrain.boxes", index);
+    }
+    found.That(box.min_m.x < box.max_m.x && box.min_m.z < box.max_m.z, ErrorCode::kOutOfRange,
+               "max is not above min", "Terrain.boxes", index);
   }
 }
 
@@ -337,6 +381,10 @@ Status Check(const WorldInfo& m) {
   found.Known(m.role, Role::kObserver, "WorldInfo.role");
   found.Text(m.library_hash, kMaxNameBytes, "WorldInfo.library_hash");
   CheckSkeleton(found, m.skeleton);
+  found.Count(m.layers.size(), 0, kMaxLayerNames, "WorldInfo.layers");
+  for (std::size_t l = 0; l < m.layers.size(); ++l) {
+    found.Name(m.layers[l], "WorldInfo.layers", static_cast<std::int64_t>(l));
+  }
   return found.Result();
 }
 
@@ -433,6 +481,38 @@ Status Check(const AvatarState& m) {
   for (std::size_t i = 0; i < m.queue.size(); ++i) {
     CheckRequestItem(found, m.queue[i], static_cast<std::int64_t>(i));
   }
+  return found.Result();
+}
+
+Status Check(const SetTerrain& m) {
+  Findings found;
+  found.Id(m.seq, "SetTerrain.seq");
+  found.Id(m.world, "SetTerrain.world");
+  CheckTerrain(found, m.terrain);
+  return found.Result();
+}
+
+Status Check(const SetLayers& m) {
+  Findings found;
+  found.Id(m.seq, "SetLayers.seq");
+  found.Id(m.world, "SetLayers.world");
+  found.Count(m.items.size(), 1, kMaxItems, "SetLayers.items");
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const LayerItem& item = m.items[i];
+    const auto index = static_cast<std::int64_t>(i);
+    found.Id(item.avatar, "SetLayers.avatar", index);
+    found.Name(item.layer, "SetLayers.layer", index);
+    found.Finite(item.weight, "SetLayers.weight", index);
+    found.Finite(item.blend_s, "SetLayers.blend_s", index);
+    found.Finite(item.speed, "SetLayers.speed", index);
+  }
+  return found.Result();
+}
+
+Status Check(const WorldTerrain& m) {
+  Findings found;
+  found.Id(m.world, "WorldTerrain.world");
+  CheckTerrain(found, m.terrain);
   return found.Result();
 }
 

@@ -141,11 +141,16 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
             std::size_t index) {
   item.avatar = w.avatar();
   item.request_id = w.request_id();
+  item.takeover = static_cast<Takeover>(w.takeover());
   switch (w.type()) {
     case wire::MovementType::Step: {
       StepMovement step{static_cast<FootChoice>(w.foot()), w.length_m(), std::nullopt, w.height_m(),
                         w.turn_rad()};
       if (const auto side = w.side_m()) step.side_m = *side;
+      if (w.at_m() != nullptr) {
+        step = {.foot = step.foot, .at = Footprint{FromWire(w.at_m()), std::nullopt}};
+        if (const auto heading = w.heading_rad()) step.at->heading_rad = *heading;
+      }
       item.movement = step;
       break;
     }
@@ -153,6 +158,24 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
       item.movement = JumpMovement{w.length_m(), w.height_m(), w.turn_rad()};
       break;
     case wire::MovementType::Stand: item.movement = StandMovement{w.seconds()}; break;
+    case wire::MovementType::Walk: {
+      WalkMovement walk;
+      if (w.at_m() == nullptr || !w.heading_rad()) {
+        u.Wrong(ErrorCode::kMalformed, "a walk without a goal", type_field,
+                static_cast<std::int64_t>(index));
+        break;
+      }
+      walk.position_m = FromWire(w.at_m());
+      walk.heading_rad = *w.heading_rad();
+      walk.waypoints_m.resize(u.Count(w.waypoints_m(), kMaxWaypoints, "Request.waypoints_m"));
+      for (std::size_t i = 0; i < walk.waypoints_m.size(); ++i) {
+        walk.waypoints_m[i] =
+            FromWire(w.waypoints_m()->Get(static_cast<flatbuffers::uoffset_t>(i)));
+      }
+      if (const auto speed = w.speed_m_s()) walk.speed_m_s = *speed;
+      item.movement = std::move(walk);
+      break;
+    }
     default:
       u.Wrong(ErrorCode::kMalformed, "unknown enumerator", type_field,
               static_cast<std::int64_t>(index));
@@ -259,6 +282,11 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
   }
   Unpack(skeleton->left_leg(), m.skeleton.legs[0]);
   Unpack(skeleton->right_leg(), m.skeleton.legs[1]);
+  m.layers.resize(u.Count(w.layers(), kMaxLayerNames, "WorldInfo.layers"));
+  for (std::size_t l = 0; l < m.layers.size(); ++l) {
+    u.Text(w.layers()->Get(static_cast<flatbuffers::uoffset_t>(l))->name(), kMaxNameBytes,
+           m.layers[l], "WorldInfo.layers", static_cast<std::int64_t>(l));
+  }
 }
 
 void Unpack(Unpacker& u, const wire::Reply& w, Reply& m) {
@@ -314,6 +342,7 @@ void Unpack(Unpacker& u, const wire::Events& w, Events& m) {
     u.Parameters(from->applied(), "Event.applied", event.applied);
     event.extrapolated = from->extrapolated();
     event.clamped = from->clamped();
+    event.cut_short = from->cut_short();
     event.foot = static_cast<FootSide>(from->foot());
     event.position_m = FromWire(from->position_m());
     event.base = {FromWire(from->base_position_m()), from->base_heading_rad()};
@@ -379,6 +408,53 @@ void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
   }
 }
 
+void Unpack(Unpacker& u, const wire::Terrain* w, std::optional<TerrainInfo>& terrain) {
+  if (w == nullptr) return;
+  TerrainInfo& info = terrain.emplace();
+  if (const auto* from = w->height_field()) {
+    HeightFieldInfo& field = info.height_field.emplace();
+    if (const auto* origin = from->origin_m()) field.origin_m = {origin->x(), origin->z()};
+    field.cell_m = from->cell_m();
+    field.columns = from->columns();
+    field.rows = from->rows();
+    u.Numbers(from->heights_m(), std::size_t{kMaxTerrainColumns} * kMaxTerrainColumns,
+              "Terrain.heights_m", field.heights_m);
+  }
+  info.boxes.resize(u.Count(w->boxes(), kMaxTerrainBoxes, "Terrain.boxes"));
+  for (std::size_t b = 0; b < info.boxes.size(); ++b) {
+    const auto* box = w->boxes()->Get(static_cast<flatbuffers::uoffset_t>(b));
+    info.boxes[b] = {{box->min_x(), box->min_z()}, {box->max_x(), box->max_z()}, box->height_m()};
+  }
+}
+
+void Unpack(Unpacker& u, const wire::SetTerrain& w, SetTerrain& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  Unpack(u, w.terrain(), m.terrain);
+}
+
+void Unpack(Unpacker& u, const wire::SetLayers& w, SetLayers& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  m.items.resize(u.Count(w.items(), kMaxItems, "SetLayers.items"));
+  for (std::size_t i = 0; i < m.items.size(); ++i) {
+    const auto* from = w.items()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    LayerItem& item = m.items[i];
+    item.avatar = from->avatar();
+    u.Text(from->layer(), kMaxNameBytes, item.layer, "SetLayers.layer",
+           static_cast<std::int64_t>(i));
+    item.is_off = from->off();
+    item.weight = from->weight();
+    item.blend_s = from->blend_s();
+    item.speed = from->speed();
+  }
+}
+
+void Unpack(Unpacker& u, const wire::WorldTerrain& w, WorldTerrain& m) {
+  m.world = w.world();
+  Unpack(u, w.terrain(), m.terrain);
+}
+
 template <typename Wire, typename T>
 Expected<Message> Decode(std::span<const std::byte> payload) {
   flatbuffers::Verifier::Options options;
@@ -434,6 +510,9 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     case MessageType::kError: return Decode<wire::Error, ErrorNotice>(frame.payload);
     case MessageType::kPong: return Decode<wire::Pong, Pong>(frame.payload);
     case MessageType::kAvatarState: return Decode<wire::AvatarState, AvatarState>(frame.payload);
+    case MessageType::kSetTerrain: return Decode<wire::SetTerrain, SetTerrain>(frame.payload);
+    case MessageType::kSetLayers: return Decode<wire::SetLayers, SetLayers>(frame.payload);
+    case MessageType::kWorldTerrain: return Decode<wire::WorldTerrain, WorldTerrain>(frame.payload);
   }
   return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",
               static_cast<std::int64_t>(frame.type));

@@ -10,7 +10,7 @@ using flatbuffers::FlatBufferBuilder;
 using flatbuffers::Offset;
 
 // A builder that grew beyond this for one message gives its memory back.
-constexpr std::size_t kKeptBytes = std::size_t{1} << 20;
+constexpr std::size_t kKeptBuilderBytes = std::size_t{1} << 20;
 
 wire::Vec3 ToWire(const DVec3& v) { return {v.x, v.y, v.z}; }
 wire::Offset ToWire(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -57,22 +57,46 @@ Offset<wire::Remove> Build(FlatBufferBuilder& b, const Remove& m) {
   return wire::CreateRemove(b, m.seq, m.world, b.CreateVector(m.avatars));
 }
 
+// Every type of movement uses some of the fields. flatbuffers::Optional is std::optional.
 Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
+  auto type = wire::MovementType::Stand;
+  auto foot = wire::FootChoice::Auto;
+  double length_m = 0.0, height_m = 0.0, turn_rad = 0.0, seconds = 0.0;
+  flatbuffers::Optional<double> side_m, heading_rad, speed_m_s;
+  std::optional<wire::Vec3> at;
+  Offset<flatbuffers::Vector<const wire::Vec3*>> waypoints;
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
-    const auto side = step->side_m ? flatbuffers::Optional<double>(*step->side_m)
-                                   : flatbuffers::Optional<double>(flatbuffers::nullopt);
-    return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Step,
-                                   static_cast<wire::FootChoice>(step->foot), step->length_m, side,
-                                   step->height_m, step->turn_rad, 0.0);
+    type = wire::MovementType::Step;
+    foot = static_cast<wire::FootChoice>(step->foot);
+    if (step->at) {
+      at = ToWire(step->at->position_m);
+      heading_rad = step->at->heading_rad;
+    } else {
+      length_m = step->length_m;
+      side_m = step->side_m;
+      height_m = step->height_m;
+      turn_rad = step->turn_rad;
+    }
+  } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
+    type = wire::MovementType::Jump;
+    length_m = jump->length_m;
+    height_m = jump->height_m;
+    turn_rad = jump->turn_rad;
+  } else if (const auto* walk = std::get_if<WalkMovement>(&item.movement)) {
+    type = wire::MovementType::Walk;
+    std::vector<wire::Vec3> places;
+    places.reserve(walk->waypoints_m.size());
+    for (const DVec3& place : walk->waypoints_m) places.push_back(ToWire(place));
+    if (!places.empty()) waypoints = b.CreateVectorOfStructs(places);
+    at = ToWire(walk->position_m);
+    heading_rad = walk->heading_rad;
+    speed_m_s = walk->speed_m_s;
+  } else {
+    seconds = std::get<StandMovement>(item.movement).seconds;
   }
-  if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
-    return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Jump,
-                                   wire::FootChoice::Auto, jump->length_m, flatbuffers::nullopt,
-                                   jump->height_m, jump->turn_rad, 0.0);
-  }
-  return wire::CreateRequestItem(b, item.avatar, item.request_id, wire::MovementType::Stand,
-                                 wire::FootChoice::Auto, 0.0, flatbuffers::nullopt, 0.0, 0.0,
-                                 std::get<StandMovement>(item.movement).seconds);
+  return wire::CreateRequestItem(b, item.avatar, item.request_id, type, foot, length_m, side_m,
+                                 height_m, turn_rad, seconds, at ? &*at : nullptr, heading_rad,
+                                 waypoints, speed_m_s, static_cast<wire::Takeover>(item.takeover));
 }
 
 Offset<wire::Request> Build(FlatBufferBuilder& b, const Request& m) {
@@ -148,8 +172,15 @@ Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
   const auto skeleton = wire::CreateSkeleton(b, joints_offset, sites_offset, left, right);
   const auto name = b.CreateString(m.name);
   const auto hash = Text(b, m.library_hash);
+  std::vector<Offset<wire::Layer>> layer_list;
+  layer_list.reserve(m.layers.size());
+  for (const std::string& layer : m.layers) {
+    layer_list.push_back(wire::CreateLayer(b, b.CreateString(layer)));
+  }
+  const auto layers = layer_list.empty() ? Offset<flatbuffers::Vector<Offset<wire::Layer>>>()
+                                         : b.CreateVector(layer_list);
   return wire::CreateWorldInfo(b, m.seq, m.world, name, static_cast<wire::Role>(m.role), m.tick,
-                               hash, skeleton);
+                               hash, skeleton, layers);
 }
 
 Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {
@@ -195,7 +226,7 @@ Offset<wire::Event> Build(FlatBufferBuilder& b, const Event& event) {
                            event.extrapolated, event.clamped, static_cast<wire::Foot>(event.foot),
                            event.position_m == DVec3(0.0) ? nullptr : &position,
                            event.base.position_m == DVec3(0.0) ? nullptr : &base,
-                           event.base.heading_rad, ToWire(event.code), reason);
+                           event.base.heading_rad, ToWire(event.code), reason, event.cut_short);
 }
 
 Offset<wire::Events> Build(FlatBufferBuilder& b, const Events& m) {
@@ -244,6 +275,45 @@ Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
                                  queue_offset);
 }
 
+Offset<wire::Terrain> Build(FlatBufferBuilder& b, const std::optional<TerrainInfo>& terrain) {
+  if (!terrain) return {};
+  Offset<wire::HeightField> field;
+  if (const auto& from = terrain->height_field) {
+    const auto heights = b.CreateVector(from->heights_m);
+    const wire::GroundPoint origin(from->origin_m.x, from->origin_m.z);
+    field = wire::CreateHeightField(b, &origin, from->cell_m, from->columns, from->rows, heights);
+  }
+  Offset<flatbuffers::Vector<const wire::TerrainBox*>> boxes;
+  if (!terrain->boxes.empty()) {
+    std::vector<wire::TerrainBox> list;
+    list.reserve(terrain->boxes.size());
+    for (const TerrainBoxInfo& box : terrain->boxes) {
+      list.emplace_back(box.min_m.x, box.min_m.z, box.max_m.x, box.max_m.z, box.height_m);
+    }
+    boxes = b.CreateVectorOfStructs(list);
+  }
+  return wire::CreateTerrain(b, field, boxes);
+}
+
+Offset<wire::SetTerrain> Build(FlatBufferBuilder& b, const SetTerrain& m) {
+  return wire::CreateSetTerrain(b, m.seq, m.world, Build(b, m.terrain));
+}
+
+Offset<wire::SetLayers> Build(FlatBufferBuilder& b, const SetLayers& m) {
+  std::vector<Offset<wire::LayerItem>> items;
+  items.reserve(m.items.size());
+  for (const LayerItem& item : m.items) {
+    // A crowd waves by one name.
+    items.push_back(wire::CreateLayerItem(b, item.avatar, b.CreateSharedString(item.layer),
+                                          item.is_off, item.weight, item.blend_s, item.speed));
+  }
+  return wire::CreateSetLayers(b, m.seq, m.world, b.CreateVector(items));
+}
+
+Offset<wire::WorldTerrain> Build(FlatBufferBuilder& b, const WorldTerrain& m) {
+  return wire::CreateWorldTerrain(b, m.world, Build(b, m.terrain));
+}
+
 }  // namespace
 
 struct Encoder::Impl {
@@ -256,7 +326,7 @@ struct Encoder::Impl {
     builder.Clear();
     builder.Finish(Build(builder, message));
     const Status status = AppendFrame(builder, T::kType, limits, frame);
-    if (builder.GetSize() > kKeptBytes) builder.Reset();
+    if (builder.GetSize() > kKeptBuilderBytes) builder.Reset();
     return status;
   }
 };
@@ -290,6 +360,9 @@ Status Encoder::Encode(const Lagging& m, Frame& frame) { return impl_->Encode(m,
 Status Encoder::Encode(const ErrorNotice& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Pong& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const AvatarState& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const SetTerrain& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const SetLayers& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const WorldTerrain& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Message& m, Frame& frame) {
   return std::visit([&](const auto& alternative) { return impl_->Encode(alternative, frame); }, m);
 }

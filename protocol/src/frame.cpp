@@ -42,6 +42,9 @@ std::string_view MessageTypeName(MessageType type) {
     case MessageType::kError: return "Error";
     case MessageType::kPong: return "Pong";
     case MessageType::kAvatarState: return "AvatarState";
+    case MessageType::kSetTerrain: return "SetTerrain";
+    case MessageType::kWorldTerrain: return "WorldTerrain";
+    case MessageType::kSetLayers: return "SetLayers";
   }
   return "unknown";
 }
@@ -63,7 +66,10 @@ bool IsBulk(MessageType type) {
     case MessageType::kObserve:
     case MessageType::kReply:
     case MessageType::kPoseBatch:
-    case MessageType::kEvents: return true;
+    case MessageType::kEvents:
+    case MessageType::kSetTerrain:
+    case MessageType::kSetLayers:
+    case MessageType::kWorldTerrain: return true;
     default: return false;
   }
 }

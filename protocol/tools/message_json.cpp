@@ -64,9 +64,15 @@ Json Fields(const Remove& m) {
 Json Item(const RequestItem& item) {
   Json json = {{"avatar", item.avatar},
                {"request_id", Wide(item.request_id)},
-               {"type", item.movement.index()}};
+               {"type", item.movement.index()},
+               {"takeover", Number(item.takeover)}};
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
     json["foot"] = Number(step->foot);
+    if (step->at) {
+      json["at_m"] = Vector(step->at->position_m);
+      json["heading_rad"] = step->at->heading_rad ? Json(*step->at->heading_rad) : Json(nullptr);
+      return json;
+    }
     json["length_m"] = step->length_m;
     json["side_m"] = step->side_m ? Json(*step->side_m) : Json(nullptr);
     json["height_m"] = step->height_m;
@@ -75,8 +81,15 @@ Json Item(const RequestItem& item) {
     json["length_m"] = jump->length_m;
     json["height_m"] = jump->height_m;
     json["turn_rad"] = jump->turn_rad;
+  } else if (const auto* stand = std::get_if<StandMovement>(&item.movement)) {
+    json["seconds"] = stand->seconds;
   } else {
-    json["seconds"] = std::get<StandMovement>(item.movement).seconds;
+    const auto& walk = std::get<WalkMovement>(item.movement);
+    json["at_m"] = Vector(walk.position_m);
+    json["heading_rad"] = walk.heading_rad;
+    json["waypoints_m"] = Json::array();
+    for (const DVec3& place : walk.waypoints_m) json["waypoints_m"].push_back(Vector(place));
+    json["speed_m_s"] = walk.speed_m_s ? Json(*walk.speed_m_s) : Json(nullptr);
   }
   return json;
 }
@@ -163,7 +176,8 @@ Json Fields(const WorldInfo& m) {
            {{"joints", joints},
             {"end_sites", end_sites},
             {"left_leg", Leg(m.skeleton.legs[0])},
-            {"right_leg", Leg(m.skeleton.legs[1])}}}};
+            {"right_leg", Leg(m.skeleton.legs[1])}}},
+          {"layers", m.layers}};
 }
 
 Json Fields(const Reply& m) {
@@ -228,6 +242,7 @@ Json Fields(const Events& m) {
                       {"applied", Parameters(event.applied)},
                       {"extrapolated", event.extrapolated},
                       {"clamped", event.clamped},
+                      {"cut_short", event.cut_short},
                       {"foot", Number(event.foot)},
                       {"position_m", Vector(event.position_m)},
                       {"base_position_m", Vector(event.base.position_m)},
@@ -287,6 +302,45 @@ Json Fields(const AvatarState& m) {
           {"queue_size", m.queue_size},
           {"queue", Items(m.queue)}};
 }
+
+Json Terrain(const std::optional<TerrainInfo>& terrain) {
+  if (!terrain) return nullptr;
+  Json json = {{"height_field", nullptr}, {"boxes", Json::array()}};
+  if (const auto& field = terrain->height_field) {
+    json["height_field"] = {{"origin_m", {field->origin_m.x, field->origin_m.z}},
+                            {"cell_m", field->cell_m},
+                            {"columns", field->columns},
+                            {"rows", field->rows},
+                            {"heights_m", field->heights_m}};
+  }
+  for (const TerrainBoxInfo& box : terrain->boxes) {
+    json["boxes"].push_back({{"min_x", box.min_m.x},
+                             {"min_z", box.min_m.z},
+                             {"max_x", box.max_m.x},
+                             {"max_z", box.max_m.z},
+                             {"height_m", box.height_m}});
+  }
+  return json;
+}
+
+Json Fields(const SetTerrain& m) {
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"terrain", Terrain(m.terrain)}};
+}
+
+Json Fields(const SetLayers& m) {
+  Json items = Json::array();
+  for (const LayerItem& item : m.items) {
+    items.push_back({{"avatar", item.avatar},
+                     {"layer", item.layer},
+                     {"off", item.is_off},
+                     {"weight", item.weight},
+                     {"blend_s", item.blend_s},
+                     {"speed", item.speed}});
+  }
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+}
+
+Json Fields(const WorldTerrain& m) { return {{"world", m.world}, {"terrain", Terrain(m.terrain)}}; }
 
 }  // namespace
 

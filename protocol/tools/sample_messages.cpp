@@ -209,6 +209,48 @@ std::vector<SampleMessage> SampleMessages() {
                                             .code = StatusCode::kNoSuchAvatar,
                                             .text = "no avatar of that number"});
   }
+  {
+    Request request{11, 3, {}};
+    StepMovement step{.foot = FootChoice::kLeft, .at = Footprint{DVec3(1.5, 0.25, -2.0), -0.75}};
+    request.items.push_back({41, 1005, step});
+    step = {.at = Footprint{DVec3(0.0), std::nullopt}};
+    request.items.push_back({42, 1006, step});
+    request.items.push_back({42, 1007, StepMovement{FootChoice::kAuto, 0.625, {}, 0.0, 0.0, {}}});
+    add("request_footprints", request);
+
+    Request walks{14, 3, {}};
+    walks.items.push_back(
+        {41, 1008,
+         WalkMovement{DVec3(3.0, 0.0, -5.5), 1.5, {{1.0, 0.0, -2.0}, {3.0, 0.25, -4.0}}, 1.25}});
+    walks.items.push_back({42, 1009, WalkMovement{DVec3(0.0), 0.0, {}, std::nullopt}});
+    add("request_walks", walks);
+
+    Request takeovers{15, 3, {}};
+    takeovers.items.push_back({41, 1010, StepMovement{.length_m = 0.5}, Takeover::kNow});
+    takeovers.items.push_back({42, 1011, JumpMovement{1.0, 0.0, 0.0}, Takeover::kAfterMovement});
+    add("request_takeovers", takeovers);
+
+    TerrainInfo terrain;
+    terrain.height_field =
+        HeightFieldInfo{{-1.5, 2.0}, 0.25, 3, 2, {0.0f, 0.125f, 0.25f, -0.5f, 0.0625f, 1.5f}};
+    terrain.boxes = {{{0.0, 1.0}, {2.0, 3.5}, 0.5}, {{-4.0, -4.0}, {-3.5, -3.0}, -0.25}};
+    add("set_terrain", SetTerrain{12, 3, terrain});
+    add("set_terrain_flat", SetTerrain{13, 3, std::nullopt});
+    TerrainInfo boxes;
+    for (int b = 0; b < 20; ++b)
+      boxes.boxes.push_back({{0.0, 0.5 * b}, {1.0, 0.5 * b + 0.5}, 0.125 * b});
+    add("world_terrain", WorldTerrain{3, terrain});
+    add("set_layers", SetLayers{16,
+                                3,
+                                {{41, "wave", false, 0.75, 0.5, 1.25},
+                                 {42, "carry"},
+                                 {41, "wave", true, 1.0, 0.0, 1.0}}});
+    WorldInfo with_layers{17,           3,          "plaza",          Role::kController, 123'000,
+                          "0f1e2d3c4b", Skeleton(), {"wave", "carry"}};
+    add("world_info_layers", with_layers);
+    add("world_terrain_boxes", WorldTerrain{3, boxes});
+    add("world_terrain_flat", WorldTerrain{3, std::nullopt});
+  }
   return samples;
 }
 

@@ -6,6 +6,7 @@
 #include "ops/libraries.h"
 #include "ops/logging.h"
 #include "ops/server.h"
+#include "ops/terrains.h"
 
 namespace {
 
@@ -31,6 +32,8 @@ int Main(int argc, char** argv) {
 
   auto libraries = Libraries::Load(command->config);
   if (!libraries) return Complain(libraries.error(), kExitBadInput);
+  auto terrains = Terrains::Load(command->config);
+  if (!terrains) return Complain(terrains.error(), kExitBadInput);
   auto viewer = ViewerFiles::Find(command->config.viewer_dir);
   if (!viewer) return Complain(viewer.error(), kExitBadInput);
   if (command->action == Action::kCheckConfig) {
@@ -40,7 +43,7 @@ int Main(int argc, char** argv) {
 
   std::signal(SIGPIPE, SIG_IGN);
   const Log log(command->config.log_level);
-  Server server(command->config, *std::move(libraries), *std::move(viewer));
+  Server server(command->config, *std::move(libraries), *std::move(viewer), *std::move(terrains));
   server.WatchSignals();
   if (const auto status = server.Start(); !status) return Complain(status.error(), kExitFailure);
   std::printf("%s\n", server.ReadyLine().c_str());

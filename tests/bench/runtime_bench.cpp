@@ -145,9 +145,9 @@ void EvaluatePose(benchmark::State& state, const Library& library, int group_ind
 /// A crowd that walks without an end; what is random is the same every time.
 class Crowd {
  public:
-  Crowd(const Library& library, int size) {
+  Crowd(const Library& library, int size, const AvatarOptions& options = {}) {
     for (int i = 0; i < size; ++i) {
-      avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)});
+      avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
       // Each at another place of its walk.
       for (int tick = 0; tick < i % 120; ++tick) avatars_.back().Advance(kTickS);
@@ -175,10 +175,55 @@ class Crowd {
   std::vector<Avatar> avatars_;
 };
 
-void AdvanceCrowd(benchmark::State& state, const Library& library) {
-  Crowd crowd(library, kCrowd);
+void AdvanceCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
+  Crowd crowd(library, kCrowd, {.foot_planting = plants_feet});
   for (auto _ : state) crowd.Advance();
   state.SetItemsProcessed(state.iterations() * kCrowd);
+}
+
+/// Walkers between two steps, at places all along their ways: what deciding on the next one costs.
+void PlanWalkSteps(benchmark::State& state, const Library& library, bool is_rough) {
+  std::shared_ptr<const Terrain> terrain;
+  if (is_rough) {
+    TerrainData data;
+    for (int i = 0; i < 400; ++i) {
+      const double x = -10.0 + (i % 20);
+      const double z = -10.0 + (i / 20);
+      data.boxes.push_back({{x, z}, {x + 0.7, z + 0.7}, 0.03 * (i % 5)});
+    }
+    terrain = Terrain::Make(std::move(data)).value();
+  }
+  struct Place {
+    WalkRequest walk;
+    WalkStance stance;
+  };
+  const WalkGait& gait = library->walk_gait();
+  std::mt19937 random(1);
+  const auto draw = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random() % 1000) / 1000.0;
+  };
+  std::vector<Place> places(kVariations);
+  for (Place& place : places) {
+    place.walk.position_m = DVec3(draw(-4.0, 4.0), 0.0, draw(-4.0, 4.0));
+    place.walk.heading_rad = draw(-3.0, 3.0);
+    // In mid-stride, the left foot ahead.
+    const double stride_m = draw(0.0, 0.6);
+    place.stance.feet[0].position_m = DVec3(0.5 * gait.width_m, 0.0, stride_m);
+    place.stance.feet[1].position_m = DVec3(-0.5 * gait.width_m, 0.0, 0.0);
+    place.stance.last_moved = Foot::kLeft;
+    place.stance.vector.left_from_right_m = DVec3(gait.width_m, 0.0, stride_m);
+  }
+  std::size_t i = 0;
+  int steps = 0;
+  for (auto _ : state) {
+    const Place& place = places[i++ % kVariations];
+    WalkProgress progress{.steps = 1};
+    const WalkDecision decision =
+        PlanWalkStep(*library, terrain.get(), place.walk, place.stance, progress);
+    steps += decision.outcome == WalkOutcome::kStep;
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.counters["steps"] = benchmark::Counter(steps, benchmark::Counter::kAvgIterations);
 }
 
 void EncodePose(benchmark::State& state, const Library& library, PoseMode mode) {
@@ -261,6 +306,18 @@ void OpenLibraryAgain(benchmark::State& state, const std::string& name) {
   for (auto _ : state) benchmark::DoNotOptimize(OpenLibrary(name));
 }
 
+/// One layer of weight `weight` over a pose.
+void ApplyLayerAlone(benchmark::State& state, const Library& library, int index, double weight) {
+  const LayerClip& layer = library->layers()[static_cast<std::size_t>(index)];
+  Pose pose = library->stand_pose();
+  double time_s = 0.0;
+  for (auto _ : state) {
+    ApplyLayer(layer, time_s += 1.0 / 60.0, weight, pose);
+    benchmark::DoNotOptimize(pose.rotations.data());
+  }
+  state.counters["joints"] = static_cast<double>(layer.joints.size());
+}
+
 template <typename... Arguments>
 void Register(const std::string& name, Arguments&&... arguments) {
   benchmark::RegisterBenchmark(name.c_str(), std::forward<Arguments>(arguments)...)
@@ -280,7 +337,15 @@ void RegisterAll(const std::string& path, const Library& library) {
     Register(name + "/synthesize_step/" + kind, SynthesizeStep, library, i);
     Register(name + "/evaluate_pose/" + kind, EvaluatePose, library, i);
   }
-  Register(name + "/advance_avatar", AdvanceCrowd, library);
+  Register(name + "/advance_avatar", AdvanceCrowd, library, true);
+  Register(name + "/advance_avatar_unplanted", AdvanceCrowd, library, false);
+  Register(name + "/plan_walk_step/level", PlanWalkSteps, library, false);
+  Register(name + "/plan_walk_step/slabs", PlanWalkSteps, library, true);
+  for (int i = 0; i < static_cast<int>(library->layers().size()); ++i) {
+    const std::string layer = std::string(library->layers()[static_cast<std::size_t>(i)].name);
+    Register(name + "/layer/" + layer + "/whole", ApplyLayerAlone, library, i, 1.0);
+    Register(name + "/layer/" + layer + "/half", ApplyLayerAlone, library, i, 0.5);
+  }
   for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
     const std::string mode_name = mode == PoseMode::kFull ? "full" : "quantised";
     Register(name + "/encode_pose/" + mode_name, EncodePose, library, mode);

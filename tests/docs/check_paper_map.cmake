@@ -2,7 +2,7 @@
 # docs/PAPER_MAP.md names in `backquotes` is there.
 #
 #   a/b.h          a file, from the root, core/include/stridewire or core/src
-#   Suite.Name     a GoogleTest test, or one that ctest alone knows
+#   Suite.Name     a GoogleTest test, with or without what it is instantiated for, or one that ctest alone knows
 #   Name() Name    what one of the files of the same line has
 cmake_minimum_required(VERSION 3.25)
 
@@ -49,6 +49,7 @@ foreach(line IN LISTS lines)
     endif()
   endforeach()
   foreach(token IN LISTS tokens)
+    string(REGEX REPLACE "^[A-Za-z0-9]+/([A-Z][A-Za-z0-9]*\\.[A-Z][A-Za-z0-9_]*)$" "\\1" token "${token}")
     if(token MATCHES "^[A-Z][A-Za-z0-9]*\\.[A-Z][A-Za-z0-9_]*$")
       math(EXPR checked "${checked} + 1")
       if(NOT token IN_LIST tests)

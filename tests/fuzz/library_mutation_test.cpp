@@ -257,6 +257,14 @@ void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator)
       }
       static_cast<void>(avatar.Enqueue(request));
     }
+    if (!library->layers().empty() && mutator.Below(20) == 0) {
+      static_cast<void>(
+          avatar.SetLayer({.layer = static_cast<int>(mutator.Below(library->layers().size())),
+                           .is_on = mutator.Below(3) != 0,
+                           .weight = mutator.Uniform(),
+                           .blend_s = mutator.Uniform(),
+                           .speed = 0.1 + 3.0 * mutator.Uniform()}));
+    }
     avatar.Advance(mutator.Below(20) == 0 ? 1.0 : 1.0 / 60.0);
     ASSERT_NO_FATAL_FAILURE(ExpectPose(avatar.pose(), "avatar"));
     ASSERT_TRUE(std::isfinite(avatar.base().heading_rad));

@@ -92,7 +92,7 @@ struct Mutator {
         break;
       }
       default: {  // the payload of one type under the number of another
-        static constexpr std::uint16_t kRanges[][2] = {{1, 10}, {32, 1}, {64, 8}};
+        static constexpr std::uint16_t kRanges[][2] = {{1, 12}, {32, 1}, {64, 10}};
         const auto& [first, types] = kRanges[Below(3)];
         const auto type = static_cast<std::uint16_t>(first + Below(types));
         Store(bytes, 6, &type, 2);

@@ -7,14 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
-#include <set>
 #include <vector>
 
+#include "captured_library.h"
 #include "leg_geometry.h"
-#include "stridewire/offline/assemble.h"
-#include "stridewire/offline/bvh_reader.h"
-#include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/offline/synthesis.h"
 
@@ -25,23 +21,6 @@ using Library = std::shared_ptr<const MotionLibrary>;
 using Steps = std::vector<StepRequest>;
 
 Library Builtin() { return OpenLibrary("builtin").value(); }
-
-// Null where the captures are absent.
-Library Captured(std::initializer_list<const char*> folders, LibraryBuilder builder) {
-  AssembleOptions options;
-  options.mirror = true;
-  LibraryAssembler assembler(options);
-  for (const char* folder : folders) {
-    const std::filesystem::path path = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "cmu" / folder;
-    if (!std::filesystem::is_directory(path)) return nullptr;
-    std::set<std::filesystem::path> files;
-    for (const auto& entry : std::filesystem::directory_iterator(path)) {
-      if (entry.path().extension() == ".bvh") files.insert(entry.path());
-    }
-    for (const auto& file : files) assembler.Add(ReadBvh(file).value());
-  }
-  return builder.Build(assembler.Assemble().value()).value();
-}
 
 StepRequest Ahead(double length_m, double turn_rad = 0.0, double height_m = 0.0) {
   return {.length_m = length_m, .height_m = height_m, .turn_rad = turn_rad};
@@ -264,8 +243,9 @@ constexpr double kCapturedApartM = 0.02;
 // did: clamped to the grown hull, knees come out bent backward by up to 3 degrees foot by foot and 11
 // foot over foot. The generated library has those.
 TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
-  const Library library = Captured({"03", "14"}, GetParam().builder);
-  if (library == nullptr) GTEST_SKIP() << "no captures";
+  const std::vector<std::string> subjects = {"03", "14"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
   for (const double rise_m : {0.15, 0.20}) {
     for (const double tread_m : {0.34, 0.38}) {
       ExpectGoodLooks(LookAt("03+14 stairs", library, Stairs(rise_m, tread_m)), kCapturedApartM);
@@ -278,14 +258,16 @@ TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
 }
 
 TEST_P(GeneralStepsCaptured, WalkASlalomAs16Does) {
-  const Library library = Captured({"16"}, GetParam().builder);
-  if (library == nullptr) GTEST_SKIP() << "no captures";
+  const std::vector<std::string> subjects = {"16"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
   ExpectGoodLooks(LookAt("16 slalom", library, Slalom(0.6, 0.4)), kCapturedApartM);
 }
 
 TEST_P(GeneralStepsCaptured, GoAsideAndBackwardAs09Does) {
-  const Library library = Captured({"09"}, GetParam().builder);
-  if (library == nullptr) GTEST_SKIP() << "no captures";
+  const std::vector<std::string> subjects = {"09"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
   for (const Foot lead : {Foot::kLeft, Foot::kRight}) {
     ExpectGoodLooks(LookAt("09 shuffle", library, Shuffle(lead, 0.30, 0.13)), kCapturedApartM);
     ExpectGoodLooks(LookAt("09 shuffle", library, Shuffle(lead, 0.36, 0.18)), kCapturedApartM);

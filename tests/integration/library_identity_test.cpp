@@ -12,11 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "capture_files.h"
-#include "stridewire/offline/assemble.h"
+#include "captured_library.h"
 #include "stridewire/offline/builtin_library.h"
-#include "stridewire/offline/bvh_reader.h"
-#include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/movement.h"
 
@@ -27,20 +24,12 @@ constexpr double kDegrees = 57.29577951308232;
 
 struct Source {
   const char* name;
-  const char* captures;  // null: generated
-  bool all;              // every movement, none averaged
+  std::vector<std::string> captures;  // none: generated
+  bool all;                           // every movement, none averaged
 };
 
 // GoogleTest would print the bytes of the struct into the test's name.
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
-
-std::vector<std::filesystem::path> FilesOf(const std::string& captures) {
-  if (captures == "01") {
-    const std::filesystem::path folder = "/usr/share/assimp/models/BVH";
-    return {folder / "01_01.bvh", folder / "01_03.bvh"};
-  }
-  return MocapFiles("cmu/" + captures);
-}
 
 struct Library {
   RawLibrary raw;
@@ -49,11 +38,11 @@ struct Library {
 
 Library Make(const Source& source) {
   Library library;
-  if (source.captures == nullptr) {
+  if (source.captures.empty()) {
     library.raw = GenerateBuiltinLibrary();
   } else {
     LibraryAssembler assembler;
-    for (const std::filesystem::path& path : FilesOf(source.captures)) {
+    for (const std::filesystem::path& path : TakesOf(source.captures)) {
       const auto capture = ReadBvh(path);
       if (!capture) {
         ADD_FAILURE() << Describe(capture.error());
@@ -82,9 +71,7 @@ class LibraryIdentity : public testing::TestWithParam<Source> {
  protected:
   void SetUp() override {
     const Source& source = GetParam();
-    if (source.captures != nullptr && source.captures == std::string("16")) {
-      STRIDEWIRE_SKIP_WITHOUT(MocapFiles("cmu/16"));
-    }
+    STRIDEWIRE_SKIP_WITHOUT_TAKES(source.captures);
     // Built once for all tests of one program.
     static std::map<std::string, Library> made;
     auto found = made.find(source.name);
@@ -334,11 +321,11 @@ TEST_P(LibraryIdentity, StoredExamplesAreTheCapturedOnes) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Libraries, LibraryIdentity,
-                         testing::Values(Source{"Builtin", nullptr, true},
-                                         Source{"Subject01All", "01", true},
-                                         Source{"Subject01Averaged", "01", false},
-                                         Source{"Subject16All", "16", true},
-                                         Source{"Subject16Averaged", "16", false}),
+                         testing::Values(Source{"Builtin", {}, true},
+                                         Source{"Subject01All", {kDebianTakes}, true},
+                                         Source{"Subject01Averaged", {kDebianTakes}, false},
+                                         Source{"Subject16All", {"16"}, true},
+                                         Source{"Subject16Averaged", {"16"}, false}),
                          [](const auto& param) { return std::string(param.param.name); });
 
 }  // namespace

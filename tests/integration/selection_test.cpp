@@ -6,40 +6,22 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <numeric>
 #include <random>
-#include <set>
 #include <vector>
 
+#include "captured_library.h"
 #include "example_clusters.h"
 #include "grid_cells.h"
 #include "left_out_error.h"
 #include "select_examples.h"
 #include "statistics.h"
-#include "stridewire/offline/assemble.h"
-#include "stridewire/offline/bvh_reader.h"
-#include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/measure.h"
 
 namespace stridewire {
 namespace {
 
 using Clusters = std::vector<std::vector<int>>;
-
-std::optional<RawLibrary> Captured(const char* folder) {
-  const std::filesystem::path path = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "cmu" / folder;
-  if (!std::filesystem::is_directory(path)) return std::nullopt;
-  std::set<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(path)) {
-    if (entry.path().extension() == ".bvh") files.insert(entry.path());
-  }
-  AssembleOptions options;
-  options.mirror = true;
-  LibraryAssembler assembler(options);
-  for (const auto& file : files) assembler.Add(ReadBvh(file).value());
-  return assembler.Assemble().value();
-}
 
 // A group as the builder has it before it selects.
 struct Steps {
@@ -145,13 +127,14 @@ Figures MeasureSelection(const char* folder, const RawLibrary& raw, const RawGro
 }
 
 TEST(Selection, KeepsAFewOfSubject16sStepsThatMakeTheOthersAsWellAsAllDo) {
-  const auto raw = Captured("16");
-  if (!raw) GTEST_SKIP() << "no captures";
+  const std::vector<std::string> subjects = {"16"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
   int straight = 0;
   int general = 0;
-  for (const RawGroup& group : raw->groups) {
+  for (const RawGroup& group : raw.groups) {
     if (!IsStep(group.kind)) continue;
-    const Figures figures = MeasureSelection("16", *raw, group);
+    const Figures figures = MeasureSelection("16", raw, group);
     const bool is_straight = group.parameters.size() == 2;
     ++(is_straight ? straight : general);
     EXPECT_LE(figures.stored, figures.found * 2 / (is_straight ? 6 : 3));
@@ -164,21 +147,23 @@ TEST(Selection, KeepsAFewOfSubject16sStepsThatMakeTheOthersAsWellAsAllDo) {
 
 // Every step over blocks of unequal height is unlike the others.
 TEST(Selection, KeepsSubject03sStepsOverBlocks) {
-  const auto raw = Captured("03");
-  if (!raw) GTEST_SKIP() << "no captures";
-  for (const RawGroup& group : raw->groups) {
+  const std::vector<std::string> subjects = {"03"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
+  for (const RawGroup& group : raw.groups) {
     if (group.parameters.size() < 7) continue;
-    const Figures figures = MeasureSelection("03", *raw, group);
+    const Figures figures = MeasureSelection("03", raw, group);
     EXPECT_GE(figures.stored, figures.found * 9 / 10);
     EXPECT_LE(figures.chosen_m, figures.all_m * 1.01);
   }
 }
 
 TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
-  const auto raw = Captured("16");
-  if (!raw) GTEST_SKIP() << "no captures";
-  const RawGroup& group = raw->groups.front();
-  const Steps steps(*raw, group);
+  const std::vector<std::string> subjects = {"16"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
+  const RawGroup& group = raw.groups.front();
+  const Steps steps(raw, group);
   std::size_t before = steps.examples.size() + 1;
   for (const double bound_m : {0.015, 0.025, 0.05}) {
     const Selected selected = steps.Select({bound_m, 0.0}, 0.0);
@@ -224,11 +209,12 @@ TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
 
 // A step that lies among the others and is made unlike them.
 TEST(Selection, DropsWhatIsUnlikeAllOthersAndSaysWhy) {
-  const auto raw = Captured("16");
-  if (!raw) GTEST_SKIP() << "no captures";
-  RawGroup group = raw->groups.front();
+  const std::vector<std::string> subjects = {"16"};
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+  const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
+  RawGroup group = raw.groups.front();
   const SelectionOptions options{0.0, 5.0};
-  const Steps clean(*raw, group);
+  const Steps clean(raw, group);
   const auto victim = [&] {
     LeftOutProbe probe(clean.layout, clean.skeleton, clean.units);
     for (std::size_t i = 0; i < clean.examples.size(); ++i) {
@@ -247,7 +233,7 @@ TEST(Selection, DropsWhatIsUnlikeAllOthersAndSaysWhy) {
   group.examples[victim].clip.fps /= 1.8;  // the same poses, slowly
   for (double& keytime : group.examples[victim].keytimes_s) keytime *= 1.8;
   {
-    const Selected selected = Steps(*raw, group).Select(options, 0.0);
+    const Selected selected = Steps(raw, group).Select(options, 0.0);
     const SelectedExample& dropped = selected.report.examples[victim];
     EXPECT_EQ(dropped.fate, ExampleFate::kOutlier);
     EXPECT_EQ(dropped.example, -1);
@@ -256,7 +242,7 @@ TEST(Selection, DropsWhatIsUnlikeAllOthersAndSaysWhy) {
   group.examples[victim] = captured;
   for (Vec3& position : group.examples[victim].clip.root_positions_m) position.y -= 0.3f;
   {
-    const Selected selected = Steps(*raw, group).Select(options, 0.0);
+    const Selected selected = Steps(raw, group).Select(options, 0.0);
     const SelectedExample& dropped = selected.report.examples[victim];
     EXPECT_EQ(dropped.fate, ExampleFate::kOutlier);
     EXPECT_NEAR(dropped.error_m, 0.3, 0.05);

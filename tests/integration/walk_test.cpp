@@ -5,12 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <random>
 
-#include "stridewire/offline/assemble.h"
-#include "stridewire/offline/bvh_reader.h"
-#include "stridewire/offline/library_builder.h"
+#include "captured_library.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/offline/synthesis.h"
 
@@ -26,20 +23,6 @@ Library Builtin() {
   auto library = OpenLibrary("builtin");
   EXPECT_TRUE(library.has_value());
   return *library;
-}
-
-// Null where the captures are absent.
-Library Captured16(bool all) {
-  const std::filesystem::path folder = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "cmu" / "16";
-  if (!std::filesystem::is_directory(folder)) return nullptr;
-  std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    paths.push_back(entry.path());
-  std::sort(paths.begin(), paths.end());
-  LibraryAssembler assembler;
-  for (const auto& path : paths) assembler.Add(ReadBvh(path).value());
-  LibraryBuilder builder = all ? LibraryBuilder() : LibraryBuilder::Selecting();
-  return builder.Build(assembler.Assemble().value()).value();
 }
 
 std::vector<MovementRequest> RandomSteps(int count, double low_m, double high_m, unsigned seed) {
@@ -126,8 +109,10 @@ TEST(BuiltinWalk, EqualStepsGoStraight) {
 class CapturedWalk : public testing::TestWithParam<bool> {
  protected:
   void SetUp() override {
-    library_ = Captured16(GetParam());
-    if (!library_) GTEST_SKIP() << "no captures of subject 16 at " STRIDEWIRE_MOCAP_DIR "/cmu/16";
+    const std::vector<std::string> subjects = {"16"};
+    STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
+    LibraryBuilder builder = GetParam() ? LibraryBuilder() : LibraryBuilder::Selecting();
+    library_ = builder.Build(AssembleTakes(TakesOf(subjects), {})).value();
   }
   Library library_;
 };

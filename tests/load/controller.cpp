@@ -33,8 +33,11 @@ Movement ToMovement(const MovementRequest& request) {
           return protocol::JumpMovement{.length_m = movement.length_m,
                                         .height_m = movement.height_m,
                                         .turn_rad = movement.turn_rad};
-        } else {
+        } else if constexpr (std::is_same_v<T, StandRequest>) {
           return protocol::StandMovement{.seconds = movement.seconds};
+        } else {
+          return protocol::WalkMovement{movement.position_m, movement.heading_rad,
+                                        movement.waypoints_m, movement.speed_m_s};
         }
       },
       request.movement);

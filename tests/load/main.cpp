@@ -1,6 +1,7 @@
 // stridewire-load: options in, one report out. All else is in load_run.h.
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdio>
@@ -33,6 +34,19 @@ int Run(int argc, char** argv) {
     Expected<Choreography> read = ReadChoreography(options.choreography);
     if (!read) {
       std::fprintf(stderr, "stridewire-load: --choreography %s\n", Describe(read.error()).c_str());
+      return 2;
+    }
+    // Its avatars stand in many places: what is fixed to one place is not for them.
+    const bool is_fixed = std::ranges::any_of(read->movements, [](const MovementRequest& request) {
+      const auto* step = std::get_if<StepRequest>(&request.movement);
+      return (step != nullptr && step->at.has_value()) ||
+             std::holds_alternative<WalkRequest>(request.movement);
+    });
+    if (is_fixed || read->terrain != nullptr) {
+      std::fprintf(stderr,
+                   "stridewire-load: --choreography %s: at_m, walk_to and terrain belong to one "
+                   "place, and avatars stand in many\n",
+                   options.choreography.c_str());
       return 2;
     }
     choreography = std::move(*read);

@@ -39,4 +39,4 @@ inline std::filesystem::path ModelFile(const std::string& name) {
 
 #define STRIDEWIRE_SKIP_WITHOUT(files) \
   if ((files).empty())                 \
-  GTEST_SKIP() << "no captures in " << ::stridewire::MocapDir() << " (" #files ")"
+  GTEST_SKIP() << "no captures in " << ::stridewire::MocapDir().string() << " (" #files ")"

@@ -37,6 +37,17 @@ void ResetPeak() { peak_bytes = live_bytes.load(); }
 
 void* operator new(std::size_t size) { return stridewire::counted_memory::Allocate(size); }
 void* operator new[](std::size_t size) { return stridewire::counted_memory::Allocate(size); }
+// The standard library's own sorting asks in this way, and frees as all do.
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  try {
+    return stridewire::counted_memory::Allocate(size);
+  } catch (const std::bad_alloc&) {
+    return nullptr;
+  }
+}
+void* operator new[](std::size_t size, const std::nothrow_t& tag) noexcept {
+  return operator new(size, tag);
+}
 void operator delete(void* memory) noexcept { stridewire::counted_memory::Free(memory); }
 void operator delete(void* memory, std::size_t) noexcept {
   stridewire::counted_memory::Free(memory);

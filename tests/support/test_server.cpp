@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "stridewire/offline/open_library.h"
 #include "toy_library.h"
 
 namespace stridewire {
@@ -20,7 +21,8 @@ server::Config TestConfig(int shards) {
 
 TestServer::TestServer(server::Config config, server::ViewerFiles viewer) {
   server::Libraries libraries;
-  libraries.Add(config.library, MakeToyLibrary());
+  libraries.Add(config.library,
+                config.library == "toy" ? MakeToyLibrary() : OpenLibrary(config.library).value());
   server_ =
       std::make_unique<server::Server>(std::move(config), std::move(libraries), std::move(viewer));
   if (const Status status = server_->Start(); !status) {

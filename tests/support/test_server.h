@@ -12,7 +12,7 @@ namespace stridewire {
 /// A configuration for tests: this machine, ports the system chooses.
 [[nodiscard]] server::Config TestConfig(int shards = 2);
 
-/// A server in this process, on the toy library, with real sockets.
+/// A server in this process, on the toy library unless its configuration names another, with real sockets.
 class TestServer {
  public:
   explicit TestServer(server::Config config = TestConfig(), server::ViewerFiles viewer = {});

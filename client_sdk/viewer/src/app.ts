@@ -2,39 +2,40 @@
 
 import * as THREE from 'three';
 
+import {readAddress} from './address.js';
 import {button, h, icon, press, setText} from './dom.js';
+import {Driver, wanderersAtFirst} from './driver.js';
+import {FootprintTool} from './footprint_tool.js';
+import {FrameCap} from './frame_cap.js';
+import {makeHelp} from './help.js';
 import {DrivePanel} from './panels/drive.js';
+import type {GroundTool} from './panels/drive.js';
 import {FiguresPanel} from './panels/figures_panel.js';
 import {Inspector} from './panels/inspector.js';
+import {SidePanels, narrow} from './panels/side_panels.js';
 import {Transport} from './panels/transport.js';
 import {ViewPanel} from './panels/view_panel.js';
 import {Playback} from './playback.js';
 import type {Span} from './playback.js';
-import {makeRenderer} from './renderer.js';
+import {Quality, levelCount} from './quality.js';
+import type {FigureStyle, QualityChoice} from './quality.js';
+import {basePixelRatio, makeRenderer} from './renderer.js';
 import type {RendererInfo} from './renderer.js';
 import {Orbit, listenToPointers} from './scene/camera.js';
 import {Overlay} from './scene/overlay.js';
+import {shareOut} from './scene/share_out.js';
 import {WorldView, projected} from './scene/world_view.js';
 import type {ViewOptions} from './scene/world_view.js';
 import {Client} from './sdk.js';
-import type {MovementRequest, PoseMode, Subscription, World} from './sdk.js';
+import type {PoseMode, Vec3, World} from './sdk.js';
+import type {Chosen, Shown} from './shown.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from './theme.js';
 import type {ThemeName} from './theme.js';
-import {Wander} from './wander.js';
+import {WalkTool} from './walk_tool.js';
 
 const mostViews = 4;
-/** With software rendering a crowd larger than this is drawn by lines. */
-const softwareBodies = 24;
-const slowFrameMs = 55;
-const wanderersAtFirst = 8;
-
-interface Shown {
-  readonly world: World;
-  readonly view: WorldView;
-  subscription: Subscription | null;
-  wander: Wander | null;
-  readonly ours: Set<number>;
-}
+/** What is read of the page's elements, and shown by them, changes this often. */
+const panelsEveryMs = 250;
 
 interface Info {
   version?: string;
@@ -45,8 +46,6 @@ export interface AppOptions {
   readonly host: string;
   readonly secure: boolean;
 }
-
-type PanelName = 'drive' | 'view' | 'inspect' | 'figures';
 
 export class App {
   readonly client: Client;
@@ -66,47 +65,61 @@ export class App {
   private framing = true;
   private figuresMadeRoom = false;
   private readonly options: ViewOptions;
-  private figureChoice: 'auto' | 'bodies' | 'lines' = 'auto';
-  private slow = 0;
-  private mode: PoseMode = 'quantised';
+  private readonly asked = readAddress(location.search);
+  private readonly cap = new FrameCap(this.asked.framesPerS);
+  private readonly quality: Quality;
+  private level = -1;
+  private figureChoice = this.asked.figures;
+  private shadowChoice: boolean | null = null;
+  /** Of the scene, in CSS pixels. */
+  private width = 1;
+  private height = 1;
+  private layOutMs = -1e9;
+  private drivenMs = -1e9;
+  private mode = this.asked.mode;
   private worldNames: string[] = [];
-  private chosen: {shown: Shown; avatar: number} | null = null;
-  private chosenMs = 0;
+  private chosen: Chosen | null = null;
+  /** How long the one chosen has not been seen, in frames that were drawn. */
+  private unseenMs = 0;
+  private lookedMs = 0;
   private active: Shown | null = null;
-  private everybody = false;
   private lastMs = 0;
   private infoTimer = 0;
 
   private readonly overlay: Overlay;
   private readonly transport: Transport;
   private readonly drive: DrivePanel;
+  private readonly driver: Driver;
+  private readonly footprints: FootprintTool;
+  private readonly walks: WalkTool;
+  /** What is dragged on the ground. */
+  private grabbed: FootprintTool | WalkTool | null = null;
   private readonly inspector: Inspector;
   private readonly figures: FiguresPanel;
   private readonly viewPanel: ViewPanel;
-  private readonly panels = new Map<PanelName, {element: HTMLElement; toggle: HTMLButtonElement}>();
+  private readonly panels = new SidePanels(() => (this.layOutMs = -1e9));
   private readonly chips = h('div', {class: 'chips', role: 'group', 'aria-label': 'Worlds shown'});
   private readonly status = h('span', {class: 'status', role: 'status'});
   private readonly notice = h('div', {class: 'notice', role: 'alert'});
   private readonly noticeText = h('p', {});
+  private readonly toast = h('div', {class: 'toast', role: 'status'});
+  private toastUntil = 0;
   private readonly emptyCard = h('div', {class: 'card'});
-  private readonly left = h('div', {class: 'column left'});
-  private readonly right = h('div', {class: 'column right'});
-  private readonly helpDialog = h('dialog', {class: 'help', 'aria-labelledby': 'help-title'});
+  private readonly helpDialog = makeHelp();
   private readonly top: HTMLElement;
   private readonly bottom: HTMLElement;
   private readonly frameButton: HTMLButtonElement;
   private readonly followButton: HTMLButtonElement;
   private readonly themeButton: HTMLButtonElement;
-  private readonly tools: HTMLElement;
+  private readonly qualityButton: HTMLButtonElement;
 
   constructor(root: HTMLElement, readonly rendererInfo: RendererInfo, readonly appOptions: AppOptions) {
-    const query = new URLSearchParams(location.search);
-    const figures = query.get('figures');
-    if (figures === 'bodies' || figures === 'lines') this.figureChoice = figures;
-    if (query.get('mode') === 'full') this.mode = 'full';
+    this.quality = new Quality(rendererInfo.software, this.cap.leastMs);
+    this.quality.choice = this.asked.quality;
     this.options = {
-      style: this.figureChoice === 'lines' ? 'lines' : 'bodies', shadows: true, prints: true,
-      plants: true, plainGround: rendererInfo.software,
+      style: 'bodies', coarse: false, shadows: true, simple: false, prints: true, plants: true,
+      plainGround: rendererInfo.software,
+      mostPrints: this.quality.detail.prints,
     };
     this.client = new Client({
       url: `${appOptions.secure ? 'wss' : 'ws'}://${appOptions.host}/stream`,
@@ -124,14 +137,44 @@ export class App {
     this.renderer = makeRenderer(this.canvas, rendererInfo);
     this.theme = preferredTheme();
 
+    const page = {
+      shown: this.shown,
+      chosen: () => this.chosen,
+      driven: () => this.driven(),
+      choose: (shown: Shown | null, avatar: number) => this.choose(shown, avatar),
+      reframe: () => (this.framing = true),
+      live: () => this.playback.live && this.client.state === 'ready',
+      goLive: () => this.playback.goLive(),
+      inspected: () => this.inspector.state,
+      viewAt: (x: number, y: number) => this.viewAt(x, y),
+      drivenAvatars: () => this.driver.avatars(),
+      say: (text: string) => this.say(text),
+      forgetGround: () => this.drive.forgetGround(),
+      cancelled: (shown: Shown, avatars: readonly number[]) => this.walks.cancelled(shown, avatars),
+      showGoal: (atM: Vec3, headingRad: number | null) => this.drive.showGoal(atM, headingRad),
+    };
+    this.driver = new Driver(page);
+    this.footprints = new FootprintTool(page);
+    this.walks = new WalkTool(page);
     this.transport = new Transport(this.playback);
     this.drive = new DrivePanel({
-      request: (make) => this.request(make),
-      spawn: (count) => void this.spawn(this.driven(), count, false),
-      remove: () => this.remove(),
-      cancel: () => this.cancel(),
-      wander: () => this.toggleWander(),
-      everybody: (on) => (this.everybody = on),
+      request: (make) => this.driver.request(make),
+      spawn: (count) => void this.driver.spawn(this.driven(), count, false),
+      remove: () => this.driver.remove(),
+      cancel: () => this.driver.cancel(),
+      wander: () => this.driver.toggleWander(),
+      everybody: (on) => (this.driver.everybody = on),
+      tool: (tool) => this.useTool(tool),
+      pass: (x, z) => {
+        const shown = this.driven();
+        if (shown) this.walks.pass(shown, [x, shown.view.ground.heightAt(x, z), z]);
+      },
+      walk: (x, z, headingRad) => {
+        const shown = this.driven();
+        if (shown) this.walks.send(shown, [x, shown.view.ground.heightAt(x, z), z], headingRad);
+      },
+      ground: (name) => this.driver.setGround(name),
+      layer: (name) => this.driver.toggleLayer(name),
     });
     this.inspector = new Inspector({
       onLabels: () => {}, onFollow: () => this.toggleFollow(), onClose: () => this.choose(null, 0)});
@@ -140,9 +183,10 @@ export class App {
       () => this.client.statistics, () => this.describe());
     this.viewPanel = new ViewPanel({
       figures: (choice) => this.chooseFigures(choice),
+      quality: (choice) => this.chooseQuality(choice),
       mode: (mode) => this.setMode(mode),
-      toggle: (name, on) => (this.options[name] = on),
-    }, this.figureChoice, this.mode);
+      toggle: (name, on) => this.toggle(name, on),
+    }, {figures: this.figureChoice, quality: this.quality.choice, mode: this.mode});
 
     this.frameButton = button('Frame all', {icon: 'frame', key: 'F', text: false, class: 'round'},
       () => this.frameAll());
@@ -152,34 +196,39 @@ export class App {
       () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark', true));
     const help = button('Keys and help', {icon: 'help', key: '?', text: false, class: 'round'},
       () => this.helpDialog.showModal());
-    this.tools = h('nav', {class: 'tools', 'aria-label': 'Panels'});
-    this.addPanel('drive', 'Drive', 'drive', this.left, this.drive.element);
-    this.addPanel('view', 'View', 'view', this.left, this.viewPanel.element);
-    this.addPanel('inspect', 'Inspect', 'inspect', this.right, this.inspector.element);
-    this.addPanel('figures', 'Figures', 'plots', this.right, this.figures.element);
+    this.panels.add('drive', 'Drive', 'drive', 'left', this.drive.element);
+    this.panels.add('view', 'View', 'view', 'left', this.viewPanel.element);
+    this.panels.add('inspect', 'Inspect', 'inspect', 'right', this.inspector.element);
+    this.panels.add('figures', 'Figures', 'plots', 'right', this.figures.element);
+    this.qualityButton = button('Quality lowered', {class: 'small quality'},
+      () => this.panels.set('view', true));
+    this.qualityButton.hidden = true;
     this.top = h('header', {class: 'top'},
-      h('h1', {}, 'Stridewire'), this.chips, this.status, this.tools,
+      h('h1', {}, 'Stridewire'), this.chips, this.qualityButton, this.status, this.panels.tools,
       h('div', {class: 'corner'},
         h('a', {class: 'link', href: '/library.html', title: 'What the libraries span'}, 'Library'),
         this.frameButton, this.followButton, this.themeButton, help));
     this.bottom = h('footer', {class: 'bottom'}, this.transport.element);
     this.notice.append(this.noticeText);
     this.notice.hidden = true;
-    this.emptyCard.hidden = true;
-    this.buildHelp();
-    root.replaceChildren(this.canvas, overlayCanvas, this.top, this.left, this.right,
-      this.emptyCard, this.notice, this.bottom, this.helpDialog);
+    this.emptyCard.hidden = this.toast.hidden = true;
+    root.replaceChildren(this.canvas, overlayCanvas, this.top, this.panels.left, this.panels.right,
+      this.emptyCard, this.toast, this.notice, this.bottom, this.helpDialog);
 
     this.setTheme(this.theme, false);
-    this.setPanel('drive', innerWidth >= 900);
-    this.setPanel('figures', innerWidth >= 1400);
-    this.setPanel('view', false);
-    this.setPanel('inspect', false);
+    this.panels.set('drive', !narrow());
+    this.panels.set('figures', innerWidth >= 1400);
+    this.panels.set('view', false);
+    this.panels.set('inspect', false);
     this.listen();
-    this.client.on('state', () => this.showConnection());
-    this.client.on('notice', (_code: number, text: string) => this.drive.say(text));
+    this.client.on('state', () => {
+      this.walks.show();  // None while we are not connected.
+      this.showConnection();
+    });
+    this.client.on('notice', (_code: number, text: string) => this.say(text));
     this.client.on('error', () => this.showConnection());
     this.client.on('sessionLost', () => {
+      this.walks.clear(null);
       for (const shown of this.shown) {
         shown.wander?.stop();
         shown.ours.clear();
@@ -188,8 +237,7 @@ export class App {
   }
 
   start(): void {
-    const asked = new URLSearchParams(location.search).getAll('world').filter((name) => name !== '');
-    for (const name of asked.slice(0, mostViews)) this.show(name);
+    for (const name of this.asked.worlds.slice(0, mostViews)) this.show(name);
     this.showConnection();
     this.infoTimer = window.setInterval(() => void this.learn(), 4000);
     requestAnimationFrame((ms) => this.frame(ms));
@@ -235,13 +283,17 @@ export class App {
       ours: new Set()};
     world.on('event', (event) => {
       if (event.type === 'removed') shown.ours.delete(event.avatar);
-      if (event.type === 'rejected') this.drive.say(`Avatar ${event.avatar}: ${event.reason}`);
+      if (!this.walks.onEvent(shown, event) && event.type === 'rejected') {
+        this.say(`Avatar ${event.avatar}: ${event.reason}`);
+      }
     });
     world.on('state', () => this.showConnection());
+    world.on('terrain', () => this.driver.groundChanged(world));
     this.shown.push(shown);
     this.active ??= shown;
     if (!this.worldNames.includes(name)) this.worldNames.push(name);
     this.framing = true;
+    this.layOutMs = -1e9;
     this.showChips();
   }
 
@@ -252,9 +304,11 @@ export class App {
     if (this.chosen?.shown === shown) this.choose(null, 0);
     if (this.active === shown) this.active = this.shown[0]!;
     shown!.wander?.dispose();
+    this.walks.clear(shown!);
     shown!.view.dispose();
     void shown!.world.leave();
     this.framing = true;
+    this.layOutMs = -1e9;
     this.showChips();
   }
 
@@ -293,23 +347,23 @@ export class App {
       if (each.view.following && each.view.chosen) each.view.following = each.view.chosen;
     }
     this.chosen = shown && avatar !== 0 ? {shown, avatar} : null;
-    this.chosenMs = performance.now();
+    this.unseenMs = 0;
     if (shown) this.active = shown;
     this.inspector.choose(this.chosen ? shown!.world : null, avatar);
     this.showDriven();
     if (this.chosen) {
-      if (innerWidth >= 900) {
-        this.setPanel('inspect', true);
-        if (innerHeight < 1000 && this.open('figures')) {
+      if (!narrow()) {
+        this.panels.set('inspect', true);
+        if (innerHeight < 1000 && this.panels.open('figures')) {
           this.figuresMadeRoom = true;
-          this.setPanel('figures', false);
+          this.panels.set('figures', false);
         }
       }
     } else {
       for (const each of this.shown) each.view.following = 0;
-      if (innerWidth >= 900) {
-        this.setPanel('inspect', false);
-        if (this.figuresMadeRoom) this.setPanel('figures', true);
+      if (!narrow()) {
+        this.panels.set('inspect', false);
+        if (this.figuresMadeRoom) this.panels.set('figures', true);
         this.figuresMadeRoom = false;
       }
     }
@@ -324,104 +378,26 @@ export class App {
     this.choose(shown, crowd.avatars[next]!);
   }
 
+  private useTool(tool: GroundTool | null): void {
+    this.canvas.classList.toggle('placing', tool !== null);
+    this.footprints.setPlacing(tool === 'feet');
+    this.walks.setSending(tool === 'walk');
+  }
+
+  /** In the Drive panel; over the scene where that is closed. */
+  private say(text: string): void {
+    this.drive.say(text);
+    this.toastUntil = performance.now() + 8000;
+    setText(this.toast, text);
+    this.showToast();
+  }
+
+  private showToast(): void {
+    this.toast.hidden = performance.now() > this.toastUntil || this.panels.open('drive');
+  }
+
   private driven(): Shown | null {
     return this.chosen?.shown ?? this.active ?? this.shown[0] ?? null;
-  }
-
-  private drivenAvatars(): number[] {
-    const shown = this.driven();
-    if (!shown) return [];
-    if (this.everybody) return [...shown.world.avatars()];
-    if (this.chosen) return [this.chosen.avatar];
-    return shown.world.avatars().length === 1 ? [...shown.world.avatars()] : [];
-  }
-
-  private request(make: (avatar: number) => MovementRequest): void {
-    const shown = this.driven();
-    const avatars = this.drivenAvatars();
-    if (!shown || avatars.length === 0) {
-      this.drive.say('Click a figure first, or command everybody.');
-      return;
-    }
-    this.playback.goLive();
-    void shown.world.request(avatars.map(make)).then((reply) => {
-      if (!reply.ok) this.drive.say(`Refused: ${reply.items[0]?.text || reply.text}`);
-      else this.drive.say(avatars.length === 1 ? 'Asked for.' : `Asked ${avatars.length} avatars.`);
-    });
-  }
-
-  private cancel(): void {
-    const shown = this.driven();
-    const avatars = this.drivenAvatars();
-    if (!shown || avatars.length === 0) return;
-    for (const avatar of avatars) shown.wander?.drop(avatar);
-    void shown.world.cancel(avatars).then((reply) => {
-      this.drive.say(reply.ok ? 'Queue cleared.' : `Refused: ${reply.text}`);
-    });
-  }
-
-  private remove(): void {
-    const shown = this.driven();
-    const avatars = this.drivenAvatars();
-    if (!shown || avatars.length === 0) return;
-    void shown.world.remove(avatars).then((reply) => {
-      if (!reply.ok) this.drive.say(`Refused: ${reply.items[0]?.text || reply.text}`);
-      else if (this.chosen && avatars.includes(this.chosen.avatar)) this.choose(null, 0);
-    });
-  }
-
-  /** Puts avatars where there is room; they leave when this page does. */
-  private async spawn(shown: Shown | null, count: number, wander: boolean): Promise<void> {
-    if (!shown) return;
-    const centre = shown.view.view.target;
-    const already = shown.world.avatars().length;
-    const items: {positionM: readonly [number, number, number]; headingRad: number}[] = [];
-    for (let i = 0; i < count; ++i) {
-      const k = already === 0 ? i : already + i;
-      const r = 1.1 * Math.sqrt(k);
-      const angle = k * 2.399963;
-      items.push({
-        positionM: [(already ? centre.x : 0) + r * Math.sin(angle), 0,
-          (already ? centre.z : 0) + r * Math.cos(angle)] as const,
-        headingRad: count > 1 ? angle : 0,
-      });
-    }
-    const reply = await shown.world.spawn(items);
-    if (!reply.ok) {
-      this.drive.say(`Refused: ${reply.items.find((item) => item.text)?.text || reply.text}`);
-      return;
-    }
-    for (const item of reply.items) shown.ours.add(item.avatar);
-    if (wander) {
-      shown.wander ??= new Wander(shown.world, (text) => this.drive.say(`Refused: ${text}`));
-      reply.items.forEach((item, i) => {
-        const {positionM, headingRad} = items[i]!;
-        shown.wander!.add(item.avatar, positionM[0], positionM[2], headingRad);
-      });
-      this.framing = true;
-    } else if (count === 1 && reply.items[0]) {
-      this.choose(shown, reply.items[0].avatar);
-    }
-  }
-
-  private toggleWander(): void {
-    const shown = this.driven();
-    if (!shown) return;
-    if (shown.wander && shown.wander.size > 0) {
-      shown.wander.stop();
-      return;
-    }
-    const avatars = this.chosen && !this.everybody ? [this.chosen.avatar] :
-      this.everybody || shown.ours.size === 0 ? [...shown.world.avatars()] : [...shown.ours];
-    if (avatars.length === 0) {
-      void this.spawn(shown, wanderersAtFirst, true);
-      return;
-    }
-    shown.wander ??= new Wander(shown.world, (text) => this.drive.say(`Refused: ${text}`));
-    for (const avatar of avatars) {
-      const at = shown.view.place(avatar);
-      shown.wander.add(avatar, at?.x ?? 0, at?.z ?? 0, at?.headingRad ?? 0);
-    }
   }
 
   // ---- camera
@@ -460,7 +436,7 @@ export class App {
         // Views that are higher than wide see as much sideways as square ones, see ViewCamera.
         const aspect = Math.min(1.7, Math.max(1, view.free.width / Math.max(1, view.free.height)));
         view.wantDistanceM = Math.min(
-          110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.2 * extent.radius));
+          110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.3 * extent.radius));
         nearest = Math.min(nearest, view.wantDistanceM);
       }
     }
@@ -474,28 +450,44 @@ export class App {
 
   // ---- appearance
 
-  private chooseFigures(choice: 'auto' | 'bodies' | 'lines'): void {
+  private chooseFigures(choice: 'auto' | FigureStyle): void {
     this.figureChoice = choice;
-    this.slow = 0;
-    if (choice !== 'auto') this.options.style = choice;
-    else this.options.style = 'bodies';
+    this.level = -1;
   }
 
-  /** Lines where bodies would be slow. */
-  private adapt(frameMs: number, avatars: number): void {
-    this.viewPanel.setAuto(this.options.style);
-    if (this.figureChoice !== 'auto') return;
-    if (this.rendererInfo.software && avatars > softwareBodies) this.options.style = 'lines';
-    this.slow = frameMs > slowFrameMs ? this.slow + 1 : Math.max(0, this.slow - 2);
-    if (this.slow > 45) {
-      if (this.options.shadows && avatars <= softwareBodies) {
-        this.options.shadows = false;
-        this.viewPanel.set('shadows', false);
-      } else {
-        this.options.style = 'lines';
-      }
-      this.slow = 0;
-    }
+  private chooseQuality(choice: QualityChoice): void {
+    this.quality.choice = choice;
+    this.shadowChoice = null;
+    this.level = -1;
+  }
+
+  private toggle(name: 'shadows' | 'prints' | 'plants', on: boolean): void {
+    this.options[name] = on;
+    if (name === 'shadows') this.shadowChoice = on;
+  }
+
+  /** Takes up what the quality has come to; cheap while it stays. */
+  private adapt(ms: number, avatars: number): void {
+    this.quality.frame(ms, avatars);
+    const {level, detail} = this.quality;
+    if (level === this.level) return;
+    this.level = level;
+    const {options} = this;
+    options.style = this.figureChoice === 'auto' ? detail.style : this.figureChoice;
+    options.coarse = detail.coarse;
+    options.simple = detail.simple;
+    options.mostPrints = detail.prints;
+    options.shadows = this.shadowChoice ?? detail.shadows;
+    const ratio = basePixelRatio(this.rendererInfo) * detail.scale;
+    if (Math.abs(ratio - this.renderer.getPixelRatio()) > 1e-3) this.renderer.setPixelRatio(ratio);
+    this.viewPanel.set('shadows', options.shadows);
+    const what = `${options.coarse && options.style === 'bodies' ? 'plain ' : ''}${options.style}` +
+      (detail.scale < 1 ? ` at ${(detail.scale * 100).toFixed(0)} % of the resolution` : '');
+    this.viewPanel.setAuto(`Drawn as ${what} now` + (!this.quality.lowered ? '.' :
+      this.rendererInfo.software ? ': the processor draws, there is no graphics card.' :
+        ': this machine is slower otherwise.'));
+    this.qualityButton.hidden = !this.quality.lowered;
+    this.qualityButton.title = `Drawn as ${what}, to keep up. Opens the panel where you can choose.`;
   }
 
   private setTheme(name: ThemeName, remember: boolean): void {
@@ -507,38 +499,8 @@ export class App {
     const label = name === 'dark' ? 'Light' : 'Dark';
     this.themeButton.setAttribute('aria-label', label);
     this.themeButton.title = label;
+    for (const {view} of this.shown) view.crowd?.redress();
     if (remember) rememberTheme(name);
-  }
-
-  private addPanel(
-    name: PanelName, title: string, iconName: string, column: HTMLElement, body: HTMLElement): void {
-    const id = `panel-${name}`;
-    const toggle = button(title, {icon: iconName, class: 'tool'}, () => {
-      this.setPanel(name, this.panels.get(name)!.element.hidden);
-    });
-    toggle.setAttribute('aria-controls', id);
-    const close = button(`Close ${title}`, {icon: 'close', text: false, class: 'round small'}, () => {
-      this.setPanel(name, false);
-      toggle.focus();
-    });
-    const element = h('section', {id, class: `panel ${name}`, 'aria-label': title},
-      h('div', {class: 'panel-head'}, h('h2', {}, title), close), body);
-    this.panels.set(name, {element, toggle});
-    this.tools.append(toggle);
-    column.append(element);
-  }
-
-  private setPanel(name: PanelName, open: boolean): void {
-    const narrow = innerWidth < 900;
-    for (const [other, {element, toggle}] of this.panels) {
-      if (other === name) element.hidden = !open;
-      else if (narrow && open) element.hidden = true;
-      toggle.setAttribute('aria-expanded', String(!element.hidden));
-    }
-  }
-
-  private open(name: PanelName): boolean {
-    return !this.panels.get(name)!.element.hidden;
   }
 
   private showConnection(): void {
@@ -570,7 +532,7 @@ export class App {
     this.emptyCard.hidden = !empty;
     if (!empty) return;
     const go = button('Let them wander', {icon: 'wander', class: 'primary'},
-      () => void this.spawn(this.driven(), wanderersAtFirst, true));
+      () => void this.driver.spawn(this.driven(), wanderersAtFirst, true));
     this.emptyCard.replaceChildren(h('h2', {}, 'Nobody is here yet'),
       h('p', {}, `Put ${wanderersAtFirst} avatars into ${shown!.world.name} and let them walk. They leave ` +
         'when this page closes.'), go);
@@ -588,9 +550,12 @@ export class App {
 
   // ---- frame
 
-  private layOut(): void {
-    const width = this.canvas.clientWidth;
-    const height = this.canvas.clientHeight;
+  private layOut(ms: number): void {
+    // Reading where elements lie may make the browser lay them out.
+    if (ms - this.layOutMs < panelsEveryMs) return;
+    this.layOutMs = ms;
+    const width = (this.width = this.canvas.clientWidth);
+    const height = (this.height = this.canvas.clientHeight);
     const ratio = this.renderer.getPixelRatio();
     if (this.canvas.width !== Math.floor(width * ratio) ||
         this.canvas.height !== Math.floor(height * ratio)) {
@@ -598,37 +563,18 @@ export class App {
       this.overlay.resize(width, height);
     }
     // What panels leave free.
-    const narrow = innerWidth < 900;
     let [x0, x1, y0, y1] = [0, width, this.top.offsetHeight, height - this.bottom.offsetHeight];
-    if (!narrow) {
-      if (this.open('drive') || this.open('view')) x0 = this.left.offsetWidth + 12;
-      if (this.open('inspect') || this.open('figures')) x1 = width - this.right.offsetWidth - 12;
+    if (narrow()) {
+      y1 = Math.min(y1, this.panels.highestTop());
     } else {
-      for (const {element} of this.panels.values()) {
-        if (!element.hidden) y1 = Math.min(y1, element.getBoundingClientRect().top);
+      if (this.panels.open('drive') || this.panels.open('view')) x0 = this.panels.left.offsetWidth + 12;
+      if (this.panels.open('inspect') || this.panels.open('figures')) {
+        x1 = width - this.panels.right.offsetWidth - 12;
       }
     }
     if (x1 - x0 < 80) [x0, x1] = [0, width];
     if (y1 - y0 < 80) [y0, y1] = [0, height];
-    const n = this.shown.length;
-    const across = x1 - x0 >= y1 - y0;
-    this.shown.forEach(({view}, i) => {
-      const from = i / n;
-      const to = (i + 1) / n;
-      if (across) {
-        Object.assign(view.free, {
-          x: x0 + (x1 - x0) * from, y: y0, width: (x1 - x0) / n, height: y1 - y0});
-        const left = i === 0 ? 0 : view.free.x;
-        const end = i === n - 1 ? width : x0 + (x1 - x0) * to;
-        Object.assign(view.box, {x: left, y: 0, width: end - left, height});
-      } else {
-        Object.assign(view.free, {
-          x: x0, y: y0 + (y1 - y0) * from, width: x1 - x0, height: (y1 - y0) / n});
-        const start = i === 0 ? 0 : view.free.y;
-        const end = i === n - 1 ? height : y0 + (y1 - y0) * to;
-        Object.assign(view.box, {x: 0, y: start, width, height: end - start});
-      }
-    });
+    shareOut(this.shown.map(({view}) => view), {x0, x1, y0, y1}, width, height);
   }
 
   private span(renderS: number): Span | null {
@@ -645,10 +591,11 @@ export class App {
 
   private frame(ms: number): void {
     requestAnimationFrame((next) => this.frame(next));
-    const dtS = Math.min(0.1, Math.max(0, (ms - this.lastMs) / 1000));
+    if (!this.cap.draws(ms)) return;
+    const dtS = Math.min(Math.max(100, 1.5 * this.cap.leastMs), Math.max(0, ms - this.lastMs)) / 1000;
     if (this.lastMs > 0) this.frameMs += (Math.min(200, ms - this.lastMs) - this.frameMs) * 0.1;
     this.lastMs = ms;
-    this.layOut();
+    this.layOut(ms);
 
     const renderS = this.client.renderTimeS();
     let avatars = 0;
@@ -659,26 +606,41 @@ export class App {
       for (const {view} of this.shown) avatars += view.update(timeS, this.playback.live);
       this.transport.show(span);
       this.inspector.update(ms, timeS, this.playback.live, this.client.state === 'ready',
-        this.open('inspect'));
+        this.panels.open('inspect'));
     }
     this.aim(dtS);
     this.draw();
     ++this.framesDrawn;
     if (this.firstFigureMs === 0 && avatars > 0) this.firstFigureMs = performance.now();
-    this.adapt(this.frameMs, avatars);
-    this.figures.update(ms, this.framesDrawn, this.open('figures'));
+    this.adapt(ms, avatars);
+    this.figures.update(ms, this.framesDrawn, this.panels.open('figures'));
     this.showEmpty(avatars);
-    if (this.framesDrawn % 8 === 1) this.showDriven();
+    if (ms - this.drivenMs >= panelsEveryMs) {
+      this.drivenMs = ms;
+      this.showDriven();
+    }
   }
 
   private showDriven(): void {
-    if (this.chosen && this.playback.live && performance.now() - this.chosenMs > 3000 &&
-        this.chosen.shown.view.indexOf(this.chosen.avatar) < 0) {
+    // A page that was kept from drawing has not looked meanwhile.
+    const nowMs = performance.now();
+    this.unseenMs += Math.min(2 * panelsEveryMs, nowMs - this.lookedMs);
+    this.lookedMs = nowMs;
+    if (this.chosen && (!this.playback.live || this.chosen.shown.view.indexOf(this.chosen.avatar) >= 0)) {
+      this.unseenMs = 0;
+    } else if (this.chosen && this.unseenMs > 3000) {
       this.choose(null, 0);  // It has left.
       return;
     }
-    const avatars = this.drivenAvatars();
+    const avatars = this.driver.avatars();
     const where = this.driven();
+    this.drive.offer(this.client.serverHas('footprints'), this.client.serverHas('walks'),
+      this.client.serverHas('terrain'));
+    this.drive.offerLayers(where?.world.layers ?? [], (layer) => this.driver.plays(layer));
+    this.footprints.show();
+    this.walks.show();
+    this.showToast();
+    if (where) this.driver.lookAt(where.world);
     this.drive.show(
       avatars.length === 0 ? 'Nobody chosen: click a figure.' :
         avatars.length === 1 ? `Avatar ${avatars[0]} of ${where!.world.name}` :
@@ -689,13 +651,12 @@ export class App {
   }
 
   private draw(): void {
-    const {renderer} = this;
-    const height = this.canvas.clientHeight;
+    const {renderer, height} = this;
     renderer.info.autoReset = false;
     renderer.info.reset();
     renderer.setScissorTest(true);
     if (this.shown.length === 0) {
-      renderer.setScissor(0, 0, this.canvas.clientWidth, height);
+      renderer.setScissor(0, 0, this.width, height);
       renderer.clear();
     }
     for (const {view} of this.shown) {
@@ -705,7 +666,7 @@ export class App {
       renderer.clear();
       renderer.render(view.scene, view.view.camera);
     }
-    this.overlay.draw(this.shown.map(({view}) => view), this.inspector.labels);
+    this.overlay.draw(this.shown, this.inspector.labels);
   }
 
   // ---- input
@@ -732,10 +693,19 @@ export class App {
         this.framing = false;
         this.orbit.zoom(factor);
       },
-      click: (x, y, twice) => {
+      click: (x, y, twice, shift) => {
         const shown = this.viewAt(x, y);
         if (!shown) return;
         this.active = shown;
+        if (this.footprints.placing && this.driver.avatars().length === 1) {
+          this.footprints.place(shown, x, y);
+          return;
+        }
+        if (this.walks.sending && this.driver.avatars().length === 1 && this.driven() === shown) {
+          const atM = shift ? shown.view.groundAt(x, y) : null;
+          if (atM) this.walks.pass(shown, atM);
+          return;
+        }
         const avatar = shown.view.pick(x, y, 28);
         if (twice && avatar !== 0) {
           this.choose(shown, avatar);
@@ -746,9 +716,16 @@ export class App {
           if (avatar === 0) this.active = shown;
         }
       },
+      grab: (x, y, touch) => {
+        this.grabbed = this.footprints.grab(x, y) ? this.footprints : this.walks.grab(x, y, touch) ? this.walks : null;
+        return this.grabbed !== null;
+      },
+      drag: (x, y) => this.grabbed?.drag(x, y),
+      drop: (heldMs) => void this.grabbed?.drop(heldMs),
+      release: () => this.grabbed?.release(),
     });
     addEventListener('keydown', (e) => this.key(e));
-    addEventListener('resize', () => this.layOut());
+    addEventListener('resize', () => (this.layOutMs = -1e9));
     matchMedia('(prefers-color-scheme: light)').addEventListener('change', () =>
       this.setTheme(preferredTheme(), false));
   }
@@ -757,7 +734,7 @@ export class App {
     if (e.ctrlKey || e.metaKey || e.altKey || this.helpDialog.open) return;
     const target = e.target as HTMLElement;
     const tag = target.tagName;
-    if (tag === 'SELECT' || (tag === 'INPUT' && (target as HTMLInputElement).type === 'text')) return;
+    if (tag === 'SELECT' || (tag === 'INPUT' && /^(text|number)$/.test((target as HTMLInputElement).type))) return;
     // Sliders, boxes and buttons keep the keys that work them.
     const widget = tag === 'INPUT' || tag === 'BUTTON' || tag === 'SUMMARY';
     if (widget && /^(Arrow|Home|End|Page| |Enter)/.test(e.key)) return;
@@ -768,13 +745,17 @@ export class App {
       ',': () => this.transport.nudge(-1 / 30), '.': () => this.transport.nudge(1 / 30),
       f: () => this.frameAll(), c: () => this.toggleFollow(),
       n: () => this.chooseNext(1), p: () => this.chooseNext(-1),
-      Escape: () => this.choose(null, 0),
+      Escape: () => {
+        if (this.walks.letGo()) return;
+        if (this.drive.tool !== null) this.drive.toggleTool(this.drive.tool);
+        else this.choose(null, 0);
+      },
       w: () => this.drive.step('auto'), a: () => this.drive.step('left'),
       d: () => this.drive.step('right'), j: () => this.drive.jump(), s: () => this.drive.stand(),
-      q: () => this.drive.nudgeTurn(5), e: () => this.drive.nudgeTurn(-5),
+      t: () => this.drive.toggleTool('feet'), m: () => this.drive.toggleTool('walk'), q: () => this.drive.nudgeTurn(5), e: () => this.drive.nudgeTurn(-5),
       r: () => this.drive.nudgeLength(0.05), v: () => this.drive.nudgeLength(-0.05),
-      x: () => this.cancel(), b: () => void this.spawn(this.driven(), 1, false),
-      Delete: () => this.remove(), g: () => this.toggleWander(),
+      x: () => this.driver.cancel(), b: () => void this.driver.spawn(this.driven(), 1, false),
+      Delete: () => this.driver.remove(), g: () => this.driver.toggleWander(),
       ArrowLeft: () => this.orbit.turn(turn, 0), ArrowRight: () => this.orbit.turn(-turn, 0),
       ArrowUp: () => this.orbit.turn(0, turn), ArrowDown: () => this.orbit.turn(0, -turn),
       '+': () => this.zoomBy(0.9), '=': () => this.zoomBy(0.9), '-': () => this.zoomBy(1.1),
@@ -791,32 +772,15 @@ export class App {
     this.orbit.zoom(factor);
   }
 
-  private buildHelp(): void {
-    const rows: [string, string][] = [
-      ['Drag, arrow keys', 'orbit'], ['Wheel, pinch, + −', 'zoom'],
-      ['Shift or right drag, two fingers', 'move the view'], ['F', 'frame all'],
-      ['C, double click', 'follow'], ['Click, N, P', 'choose a figure'], ['Esc', 'deselect'],
-      ['Space', 'pause'], ['[ ]', 'slower, faster'], [', .', 'a moment back, on'], ['L', 'live'],
-      ['W, A, D', 'step: next foot, left, right'], ['Q, E', 'turn more left, right'],
-      ['R, V', 'longer, shorter steps'], ['J', 'jump'], ['S', 'stand'], ['X', 'clear the queue'],
-      ['B, Delete', 'spawn, remove'], ['G', 'let them wander'],
-    ];
-    const close = button('Close', {class: 'primary'}, () => this.helpDialog.close());
-    this.helpDialog.append(
-      h('h2', {id: 'help-title'}, 'Keys'),
-      h('p', {class: 'hint'}, 'Rings mark feet that carry: green the left, orange the right; ' +
-        'footprints fade after 14 s. Lines on the ground are a metre apart, strong ones five.'),
-      h('dl', {class: 'keys'}, ...rows.flatMap(([key, what]) => [h('dt', {}, key), h('dd', {}, what)])),
-      close);
-  }
-
   // ---- for tests, see README.md
 
-  get drawInfo(): {style: string; calls: number; triangles: number; lines: number} {
+  get drawInfo(): {
+    style: string; level: number; levels: number; scale: number; calls: number; triangles: number; lines: number;
+  } {
     const {render} = this.renderer.info;
     return {
-      style: this.options.style, calls: render.calls, triangles: render.triangles,
-      lines: render.lines};
+      style: this.options.style, level: this.quality.level, levels: levelCount, scale: this.quality.detail.scale,
+      calls: render.calls, triangles: render.triangles, lines: render.lines};
   }
   get liveFigures(): FiguresPanel['figures'] {
     return this.figures.figures;

@@ -56,6 +56,9 @@ if (!info) {
           jointsM: view.crowd ? [...view.crowd.positions.subarray(
             0, view.crowd.count * view.crowd.skeleton.jointCount * 3)] : [],
           footprints: view.footprints.laid,
+          planned: view.plannedCount,
+          goals: view.goalCount,
+          waypoints: view.waypointCount,
         }));
       },
     },

@@ -20,11 +20,17 @@ export function probe(): RendererInfo | null {
   return {name, software: /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name)};
 }
 
+/** Canvas pixels a CSS pixel at the finest. */
+export function basePixelRatio(info: RendererInfo): number {
+  return info.software ? 1 : Math.min(devicePixelRatio || 1, 2);
+}
+
 export function makeRenderer(canvas: HTMLCanvasElement, info: RendererInfo): THREE.WebGLRenderer {
   const renderer = new THREE.WebGLRenderer({
     canvas, antialias: !info.software, stencil: true, powerPreference: 'high-performance',
   });
   renderer.autoClear = false;
-  renderer.setPixelRatio(info.software ? 1 : Math.min(devicePixelRatio || 1, 2));
+  canvas.classList.toggle('exact', info.software);
+  renderer.setPixelRatio(basePixelRatio(info));
   return renderer;
 }

@@ -2,8 +2,8 @@
 
 export {Client, createCrowdPose} from '@stridewire/client';
 export type {
-  CrowdPose, MovementRequest, Parameters, PoseMode, Reply, Skeleton, Statistics, Subscription, World,
-  WorldEvent,
+  CrowdPose, HeightField, MovementRequest, Parameters, PoseMode, QueuedRequest, Reply, Skeleton, Statistics,
+  Subscription, Terrain, TerrainBox, Vec3, World, WorldEvent,
 } from '@stridewire/client';
 
 import type {World} from '@stridewire/client';

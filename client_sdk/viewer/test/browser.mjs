@@ -10,11 +10,13 @@ export function findChromium() {
     '/usr/bin/google-chrome'].find(existsSync);
 }
 
+export const switches = [
+  '--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
+  '--enable-precise-memory-info', '--disable-quic', '--no-first-run', '--disable-background-networking',
+  '--disable-component-update', '--disable-sync'];
+
 export function launch() {
   const executablePath = findChromium();
   if (!executablePath) throw new Error('there is no Chromium; on Debian: apt-get install chromium');
-  return chromium.launch({executablePath, args: [
-    '--headless', '--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-    '--enable-precise-memory-info', '--disable-quic', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync']});
+  return chromium.launch({executablePath, args: switches, timeout: 120_000});
 }

@@ -2,7 +2,8 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import {figureOf, restPositions} from '../src/scene/figure.js';
-import {Region, buildBody, buildLines} from '../src/scene/skeleton_body.js';
+import {lineFigure} from '../src/scene/line_figure.js';
+import {Region, buildBody} from '../src/scene/skeleton_body.js';
 import {captured, makeSkeleton, plain} from './skeletons.js';
 
 for (const [name, skeleton] of [['plain', plain()], ['captured', captured()]] as const) {
@@ -59,11 +60,37 @@ for (const [name, skeleton] of [['plain', plain()], ['captured', captured()]] as
   });
 
   test(`has lines of the ${name} skeleton`, () => {
-    const lines = buildLines(skeleton);
-    assert.equal(lines.positions.length, lines.regions.length * 3);
-    assert.equal(lines.regions.length % 2, 0);
-    assert.ok(lines.regions.length / 2 >= skeleton.jointCount - 6);
-    assert.ok(lines.positions.every(Number.isFinite));
+    for (const simple of [false, true]) {
+      const {lines, regions, pointCount, joints, extraJoints, extraRest} = lineFigure(skeleton, simple);
+      assert.equal(regions.length, pointCount);
+      assert.equal(pointCount, joints.length + extraJoints.length);
+      assert.equal(extraRest.length, extraJoints.length * 3);
+      assert.ok(lines.length % 2 === 0 && lines.every((point) => point >= 0 && point < pointCount));
+      if (simple) assert.ok(lines.length / 2 <= 24, `${lines.length / 2} lines`);
+      else assert.ok(lines.length / 2 >= skeleton.jointCount - 6);
+      // A line's colour is that of its end: no joint ends two lines.
+      const ends = lines.filter((_, i) => i % 2 === 1);
+      joints.forEach((_, p) => assert.ok(ends.filter((end) => end === p).length <= 1));
+      // Feet, hands and head are reached.
+      const reached = new Set(lines.map((p) => p < joints.length ? joints[p]! : extraJoints[p - joints.length]!));
+      const figure = figureOf(skeleton);
+      for (const leg of figure.legs) assert.ok(reached.has(leg.ball.joint) && reached.has(leg.knee.joint));
+      for (const arm of figure.arms) assert.ok(reached.has(arm.wrist.joint) && reached.has(arm.elbow.joint));
+      assert.ok(reached.has(figure.head.joint));
+    }
+  });
+
+  test(`a coarse ${name} body is the same person with fewer faces`, () => {
+    const fine = buildBody(skeleton, 8);
+    const coarse = buildBody(skeleton, 5, true);
+    assert.ok(coarse.indices.length < 0.45 * fine.indices.length,
+      `${coarse.indices.length / 3} faces, ${fine.indices.length / 3}`);
+    assert.ok(coarse.normals.every(Number.isFinite));
+    for (let k = 0; k < 3; ++k) {
+      const reach = (body: {positions: Float32Array}): number =>
+        body.positions.reduce((most, v, i) => i % 3 === k ? Math.max(most, Math.abs(v)) : most, 0);
+      assert.ok(Math.abs(reach(fine) - reach(coarse)) < 0.03);
+    }
   });
 }
 
@@ -78,7 +105,11 @@ test('makes something of skeletons that are no people', () => {
     [], ['a', 'b', 'c', 'd']),
   ];
   for (const skeleton of odd) {
-    for (const body of [buildBody(skeleton), buildLines(skeleton)]) {
+    for (const simple of [false, true]) {
+      const figure = lineFigure(skeleton, simple);
+      assert.ok(figure.lines.length > 0 && figure.extraRest.every(Number.isFinite));
+    }
+    for (const body of [buildBody(skeleton), buildBody(skeleton, 4, true)]) {
       assert.ok(body.positions.every(Number.isFinite));
       assert.ok(body.joints.every((j) => j >= 0 && j < skeleton.jointCount));
     }

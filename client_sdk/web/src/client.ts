@@ -1,7 +1,7 @@
 import {Session, defaultOptions} from './session';
 import {Status} from './status';
 import type {
-  ClientListeners, ClientOptions, ClientState, Role, Statistics, World
+  ClientListeners, ClientOptions, ClientState, Feature, Role, Statistics, World
 } from './types';
 
 /** Between two looks at the clock while connected; also what a browser's hidden page is given. */
@@ -96,6 +96,11 @@ export class Client {
    * are asked for again at the next `connect`. */
   close(): void {
     this.session.close(this.nowS());
+  }
+
+  /** Whether the server we are connected to can do that; false while we are not. */
+  serverHas(feature: Feature): boolean {
+    return this.session.has(feature);
   }
 
   /** May be called at any time; the world is joined as soon as there is a connection. A name that is

@@ -5,25 +5,30 @@ import {Listeners} from './listeners';
 import {WorldRecording} from './recording';
 import {Status, statusName, statusText} from './status';
 import type {
-  AvatarState, ClientListeners, ClientOptions, ClientState, Observation, Reply, Role, Statistics,
-  Subscription, WorldEvent
+  AvatarState, ClientListeners, ClientOptions, ClientState, Feature, Observation, Reply, Role,
+  Statistics, Subscription, WorldEvent
 } from './types';
 import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureEventReplay, featureInspect, featureQuantised, featureResume, maxBulkBytes,
-  maxControlBytes, maxItems, maxReplyMemory, maxAvatarNumber, maxNameBytes, maxAuthTokenBytes,
-  protocolVersion
+  featureEventReplay, featureFootprints, featureInspect, featureQuantised, featureResume,
+  featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
+  maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
 import {Malformed} from './wire/malformed';
 import type {
   AvatarStateMessage, ClientMessage, CommandMessage, ErrorNotice, Events, Goodbye, Lagging, Pong,
-  PoseBatch, ReplyMessage, ServerLimits, SpawnEntry, Welcome, WorldInfo
+  PoseBatch, ReplyMessage, ServerLimits, SpawnEntry, Welcome, WorldInfo, WorldTerrain
 } from './wire/messages';
 import {checkName, checkText} from './wire/text';
 import {WorldHandle} from './world';
 import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
+
+const featureBits: Record<Feature, bigint> = {
+  inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
+  takeovers: featureTakeovers, layers: featureLayers,
+};
 
 /** What the caller may set, filled in. */
 export type SessionOptions = Required<Omit<ClientOptions, 'url' | 'webSocket' | 'now'>>;
@@ -416,7 +421,8 @@ export class Session {
       protocolMin: protocolVersion,
       protocolMax: protocolVersion,
       clientName: this.options.clientName,
-      features: featureResume | featureEventReplay | featureQuantised | featureInspect,
+      features: featureResume | featureEventReplay | featureQuantised | featureInspect |
+          featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -587,6 +593,10 @@ export class Session {
 
   private sendCommand(command: Command): void {
     const {message, world} = command;
+    if (!this.understands(message)) {
+      this.answer(command, Status.unsupported, '');
+      return;
+    }
     message.seq = this.nextSeq;
     if ('world' in message) message.world = world.serverId;
     if (!this.send(message)) {
@@ -604,6 +614,24 @@ export class Session {
       if (wanted !== undefined) wanted.unsent = false;
     }
     this.unanswered.set(this.nextSeq++, command);
+  }
+
+  /** Of the connection that is ready; false while none is. */
+  has(feature: Feature): boolean {
+    return this.state === 'ready' && (this.features & featureBits[feature]) !== 0n;
+  }
+
+  /** Whether this server knows what it is asked. */
+  private understands(message: CommandMessage): boolean {
+    switch (message.type) {
+      case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
+      case 'SetLayers': return (this.features & featureLayers) !== 0n;
+      case 'Request':
+        return message.items.every((item) => (item.atM === null ||
+            (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
+            (item.takeover === 'none' || (this.features & featureTakeovers) !== 0n));
+      default: return true;
+    }
   }
 
   /** False: it is larger than the server takes; `lastError` says so. */
@@ -694,6 +722,7 @@ export class Session {
       case 'Lagging': return this.onLagging(message);
       case 'Pong': return this.onPong(message, nowS);
       case 'AvatarState': return this.onAvatarState(message);
+      case 'WorldTerrain': return this.onTerrain(message);
       default: throw new Malformed("is a client's message", message.type);
     }
   }
@@ -989,6 +1018,11 @@ export class Session {
     this.later(() => world.listeners.emit('lagging', droppedBatches, droppedEvents));
   }
 
+  private onTerrain(message: WorldTerrain): void {
+    const world = this.findWorld(message.world);
+    if (world !== undefined) world.terrain = message.terrain;
+  }
+
   private onPong(message: Pong, nowS: number): void {
     this.clock.addSample(nowS, message.serverTimeS);
     if (this.rttsS.length === maxRtts) this.rttsS.shift();
@@ -1114,9 +1148,14 @@ export class Session {
     if (this.telling) return;
     this.telling = true;
     for (const world of this.worlds) {
-      if (world.view.version === world.toldVersion) continue;
-      world.toldVersion = world.view.version;
-      this.later(() => world.listeners.emit('avatars', world.view.avatars()));
+      if (world.view.version !== world.toldVersion) {
+        world.toldVersion = world.view.version;
+        this.later(() => world.listeners.emit('avatars', world.view.avatars()));
+      }
+      if (world.terrain !== world.toldTerrain) {
+        world.toldTerrain = world.terrain;
+        this.later(() => world.listeners.emit('terrain', world.terrain));
+      }
     }
     for (let i = 0; i < this.told.length; ++i) this.told[i]!();
     this.told.length = 0;

@@ -8,7 +8,12 @@ export type Role = 'controller' | 'observer';
 /** `full`: float32, as the server has them. `quantised`: 2.5 times smaller, off by at most 0.00016
  * rad and 0.03 mm. */
 export type PoseMode = 'full' | 'quantised';
-export type MovementType = 'step' | 'jump' | 'stand';
+export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
+/** When a movement begins: after all that is queued; after the one under way, or as soon as feet allow, and
+ * then what was queued is dropped. */
+export type Takeover = 'none' | 'afterMovement' | 'now';
+/** What servers may or may not know of. */
+export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers';
 export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
@@ -52,11 +57,53 @@ export interface ReplyItem {
   readonly text: string;
 }
 
+/** Heights at the corners of a grid, bilinear between them. */
+export interface HeightField {
+  /** x and z of the first. */
+  readonly originM: readonly [number, number];
+  readonly cellM: number;
+  /** Along x, 2 to 1024. */
+  readonly columns: number;
+  /** Along z, 2 to 1024. */
+  readonly rows: number;
+  /** Row by row, x fastest. */
+  readonly heightsM: Float32Array;
+}
+
+/** A block with upright sides and a flat top. */
+export interface TerrainBox {
+  /** x and z. */
+  readonly minM: readonly [number, number];
+  readonly maxM: readonly [number, number];
+  readonly heightM: number;
+}
+
+/** The ground: the highest of the height field (0 beside it) and the boxes there. */
+export interface Terrain {
+  readonly heightField: HeightField | null;
+  readonly boxes: readonly TerrainBox[];
+}
+
 export interface SpawnItem {
   /** Its number in the world, up to 2^32 - 1; absent or 0: the server chooses. */
   avatar?: number;
   positionM: Vec3;
   headingRad: number;
+}
+
+/** A clip of the library over what an avatar does; legs do what they do without. */
+export interface LayerRequest {
+  readonly avatar: number;
+  /** One of World.layers. */
+  readonly layer: string;
+  /** Eases it out and ends it; weight and speed then mean nothing. */
+  readonly off?: boolean;
+  /** Above 0, up to 1 (the default). */
+  readonly weight?: number;
+  /** How long weight and speed take to get there, 0 to 10; 0.3. */
+  readonly blendS?: number;
+  /** 0.1 to 4; 1: as recorded. */
+  readonly speed?: number;
 }
 
 /** A movement to do. Numbers that a type does not have are ignored; absent ones are 0. */
@@ -67,6 +114,19 @@ export interface MovementRequest {
   type: MovementType;
   /** Step. `auto` (default): the other foot than last time. */
   foot?: FootChoice;
+  /** Step: where the ball of the foot lands, in the world; then length, side, height and turn are
+   * ignored. Refused (`unsupported`) by a server that knows no footprints. Walk: where it ends, on the
+   * ground; needed. Its steps carry its id in events; then `finished` of kind `stand` says that it has
+   * arrived, `rejected` why it goes no further. */
+  atM?: Vec3;
+  /** Step with `atM`: where the foot looks. Absent: the server chooses. Walk: the heading at its end. */
+  headingRad?: number;
+  /** Walk: places to pass, at most 64. */
+  waypointsM?: readonly Vec3[];
+  /** Walk: 0.05 to 5, as near as the library's steps come. Absent: as is comfortable. */
+  speedMPerS?: number;
+  /** Absent: none. Another is refused (`unsupported`) by a server that knows no takeovers. */
+  takeover?: Takeover;
   /** Step: forward distance between the feet at its end. Jump. */
   lengthM?: number;
   /** Step: sideways, towards the moving foot's side. Absent: as the library has it. */
@@ -85,12 +145,20 @@ export interface QueuedRequest {
   readonly requestId: bigint;
   readonly type: MovementType;
   readonly foot: FootChoice;
+  /** Null: no walk, nor a step to a place. */
+  readonly atM: Vec3 | null;
+  /** Null: the server chooses. */
+  readonly headingRad: number | null;
   readonly lengthM: number;
   /** Null: as the library has it. */
   readonly sideM: number | null;
   readonly heightM: number;
   readonly turnRad: number;
   readonly seconds: number;
+  readonly waypointsM: readonly Vec3[];
+  /** Null: as is comfortable. */
+  readonly speedMPerS: number | null;
+  readonly takeover: Takeover;
 }
 
 /** What an avatar does: the answer to `World.inspect`. */
@@ -171,6 +239,8 @@ export interface WorldEvent {
   readonly applied: Parameters;
   readonly extrapolated: boolean;
   readonly clamped: boolean;
+  /** Finished: another movement took over before its end. */
+  readonly cutShort: boolean;
   /** Foot strike. */
   readonly foot: Foot | null;
   /** Foot strike. */
@@ -272,7 +342,11 @@ export interface World {
   /** Null until the server has described it. */
   readonly skeleton: Skeleton | null;
   readonly libraryHash: string;
+  /** Names of the library's clips that setLayers plays; empty where the server has no such feature. */
+  readonly layers: readonly string[];
   readonly recording: Recording;
+  /** The ground; null: flat at 0. Replaced as a whole when it changes. */
+  readonly terrain: Terrain | null;
   /** The server's answer to joining, the first time. */
   readonly joined: Promise<Reply>;
 
@@ -282,6 +356,10 @@ export interface World {
   cancel(avatars: readonly number[]): Promise<Reply>;
   /** Queues movements; an avatar may stand in the list several times. */
   request(items: readonly MovementRequest[]): Promise<Reply>;
+  /** Gives the world another ground, for all its avatars; null: flat at 0. */
+  setTerrain(terrain: Terrain | null): Promise<Reply>;
+  /** Starts or ends layers (see `layers`) over what avatars do; at most four at a time for one. */
+  setLayers(items: readonly LayerRequest[]): Promise<Reply>;
   observe(observation: Observation): Subscription;
   /** What an avatar does right now, about a tick later. Rejected with a StridewireError when there is
    * no such avatar, no connection, or a server that does not tell. */
@@ -303,6 +381,8 @@ export interface WorldListeners {
   event: (event: WorldEvent) => void;
   /** The set of avatars seen has changed. */
   avatars: (avatars: Uint32Array) => void;
+  /** `terrain` has changed. */
+  terrain: (terrain: Terrain | null) => void;
   /** `state` or `skeleton` has changed. */
   state: (state: WorldState) => void;
   /** We read too slowly: totals since joining. */

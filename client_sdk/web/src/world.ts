@@ -2,8 +2,8 @@ import {Listeners} from './listeners';
 import type {WorldRecording} from './recording';
 import type {Command, Session} from './session';
 import type {
-  AvatarState, CrowdPose, MovementRequest, Observation, Pose, PoseKind, Recording, Reply, Role,
-  Skeleton, SpawnItem, Subscription, World, WorldListeners, WorldState
+  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseKind, Recording, Reply, Role,
+  Skeleton, SpawnItem, Subscription, Terrain, World, WorldListeners, WorldState
 } from './types';
 import * as check from './wire/check';
 import type {Observe, SpawnEntry, WorldInfo} from './wire/messages';
@@ -21,6 +21,8 @@ export class WorldHandle implements World {
   state: WorldState = 'wanted';
   skeleton: Skeleton | null = null;
   libraryHash = '';
+  layers: readonly string[] = [];
+  terrain: Terrain | null = null;
   readonly joined: Promise<Reply>;
 
   // The session's part.
@@ -36,6 +38,7 @@ export class WorldHandle implements World {
   toldDroppedEvents = 0;
   /** Of the view, whose avatars listeners know. */
   toldVersion = 0;
+  toldTerrain: Terrain | null = null;
 
   constructor(private readonly session: Session, readonly name: string, readonly role: Role,
               readonly view: WorldView, readonly record: WorldRecording) {
@@ -60,6 +63,14 @@ export class WorldHandle implements World {
 
   request(items: readonly MovementRequest[]): Promise<Reply> {
     return this.session.command(this, () => check.request(items, () => this.session.nextRequest()));
+  }
+
+  setTerrain(terrain: Terrain | null): Promise<Reply> {
+    return this.session.command(this, () => check.setTerrain(terrain));
+  }
+
+  setLayers(items: readonly LayerRequest[]): Promise<Reply> {
+    return this.session.command(this, () => check.setLayers(items));
   }
 
   observe(observation: Observation): Subscription {
@@ -101,6 +112,7 @@ export class WorldHandle implements World {
       this.skeleton = skeleton;
     }
     this.libraryHash = info.libraryHash;
+    this.layers = info.layers;
   }
 
   /** Nothing of it is known any more. */
@@ -113,6 +125,8 @@ export class WorldHandle implements World {
     this.record.clear();
     this.skeleton = null;
     this.libraryHash = '';
+    this.layers = [];
+    this.terrain = null;
   }
 
   /** Poses of whom are kept follows from what is observed. */

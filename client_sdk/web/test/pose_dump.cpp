@@ -23,9 +23,12 @@ int main(int argc, char** argv) {
   }
   Pose pose;
   std::uint64_t tick = UINT64_MAX;
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   for (int count = 0; count < wanted;) {
-    if (std::chrono::steady_clock::now() > end) return 1;
+    if (std::chrono::steady_clock::now() > end) {
+      std::fprintf(stderr, "web_pose_dump: %d of %d poses came within 120 s\n", count, wanted);
+      return 1;
+    }
     if (!client->NextPose(world, avatar, tick, pose) || pose.missing()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
       continue;

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Session, defaultOptions, type SessionOptions} from '../src/session';
 import {Status} from '../src/status';
-import type {Reply, WorldEvent} from '../src/types';
+import type {Reply, Terrain, WorldEvent} from '../src/types';
 import {decodeFrame} from '../src/wire/decode';
 import type {Message} from '../src/wire/messages';
 import type {WorldHandle} from '../src/world';
@@ -581,4 +581,133 @@ test('what a listener does inside its call is done, and what it throws is its ow
   assert.deepEqual(summary(h.sent()), ['Request 3', 'Goodbye']);
   assert.equal(uncaught.length, 2);
   assert.throws(uncaught[0]!, /of the listener/);
+});
+
+test('a world has the ground that the server told of last', () => {
+  const h = new Harness();
+  const world = h.joined();
+  const told: (number[] | null)[] = [];
+  world.on('terrain', (terrain) => told.push(terrain?.boxes.map((box) => box.heightM) ?? null));
+  const ground = (): Terrain | null => world.terrain;
+  assert.equal(ground(), null);
+  h.receive(server.worldTerrain(null));  // As it was: nobody is told.
+  h.receive(server.worldTerrain([0.5, 0.25]), server.worldTerrain([1], 4));
+  assert.deepEqual(ground()?.boxes[1], {minM: [1, 0], maxM: [2, 1], heightM: 0.25});
+  h.receive(server.worldTerrain([0.125]));
+  h.receive(server.worldTerrain(null));
+  h.receive(server.worldTerrain([2]));
+  h.lose();
+  assert.deepEqual(told, [[0.5, 0.25], [0.125], null, [2]]);
+  h.connect();  // A new session: the server will tell of it anew.
+  assert.equal(ground(), null);
+  assert.deepEqual(told, [[0.5, 0.25], [0.125], null, [2], null]);
+});
+
+test('a ground and footprints are sent as given, to a server that knows them', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  const heightField = {
+    originM: [-1, 2] as const, cellM: 0.5, columns: 2, rows: 2,
+    heightsM: Float32Array.of(0, 0.5, 1, 1.5),
+  };
+  const boxes = [{minM: [0, 0] as const, maxM: [1, 2] as const, heightM: 0.25}];
+  const set = world.setTerrain({heightField, boxes});
+  heightField.heightsM[0] = 9;  // The caller's own again.
+  const cleared = world.setTerrain(null);
+  const stepped = world.request([
+    {avatar: 1, type: 'step', foot: 'left', atM: [1, 0.25, -2], headingRad: 0, lengthM: 3},
+    {avatar: 1, type: 'step', atM: [1, 0, 0]},
+  ]);
+  const [first, second, third] = h.sent();
+  assert.ok(first?.type === 'SetTerrain' && second?.type === 'SetTerrain');
+  assert.deepEqual(first.terrain, {
+    heightField: {...heightField, heightsM: Float32Array.of(0, 0.5, 1, 1.5)}, boxes
+  });
+  assert.equal(second.terrain, null);
+  assert.ok(third?.type === 'Request');
+  assert.deepEqual(third.items.map(({atM, headingRad, lengthM}) => ({atM, headingRad, lengthM})), [
+    {atM: [1, 0.25, -2], headingRad: 0, lengthM: 0},
+    {atM: [1, 0, 0], headingRad: null, lengthM: 0},
+  ]);
+  h.receive(server.reply(3n), server.reply(4n), server.reply(5n));
+  assert.deepEqual((await Promise.all([set, cleared, stepped])).map(ok), ['ok', 'ok', 'ok']);
+
+  const bad = [
+    {heightField: {...heightField, columns: 3}, boxes: []},
+    {heightField: {...heightField, cellM: 0}, boxes: []},
+    {heightField: {...heightField, heightsM: Float32Array.of(0, 1, 2, NaN)}, boxes: []},
+    {heightField: null, boxes: [{minM: [0, 0] as const, maxM: [0, 1] as const, heightM: 0}]},
+  ];
+  for (const terrain of bad) {
+    assert.equal((await world.setTerrain(terrain)).status, 'invalid_argument');
+  }
+  assert.equal((await world.request([{avatar: 1, type: 'step', atM: [1, 2, NaN]}])).status,
+               'invalid_argument');
+  assert.deepEqual(h.sent(), []);
+});
+
+test('a walk is sent as given, to a server that knows it', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  void world.request([
+    {avatar: 1, type: 'walk', atM: [3, 0, -5], headingRad: 0, waypointsM: [[1, 0, -2]], speedMPerS: 1.25},
+    {avatar: 2, type: 'walk', atM: [1, 0, 0], headingRad: 1, lengthM: 3},
+  ]);
+  const [sent] = h.sent();
+  assert.ok(sent?.type === 'Request');
+  assert.deepEqual(
+    sent.items.map(({type, atM, headingRad, waypointsM, speedMPerS}) => [type, atM, headingRad, waypointsM, speedMPerS]),
+    [['walk', [3, 0, -5], 0, [[1, 0, -2]], 1.25], ['walk', [1, 0, 0], 1, [], null]]);
+  const goal = {avatar: 1, type: 'walk', atM: [0, 0, 1], headingRad: 0} as const;
+  for (const bad of [
+    {...goal, atM: undefined}, {...goal, headingRad: undefined}, {...goal, speedMPerS: NaN},
+    {...goal, waypointsM: Array.from({length: 65}, () => [0, 0, 0] as const)},
+  ]) {
+    assert.equal((await world.request([bad as typeof goal])).status, 'invalid_argument');
+  }
+  const old = new Harness();
+  assert.equal((await old.joined({features: 127n}).request([goal])).status, 'unsupported');
+});
+
+test('a movement takes over as it is asked to, of a server that knows of it', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  const step = {avatar: 1, type: 'step', lengthM: 0.5} as const;
+  void world.request([{...step, takeover: 'now'}, {...step, takeover: 'afterMovement'}, step]);
+  const [sent] = h.sent();
+  assert.ok(sent?.type === 'Request');
+  assert.deepEqual(sent.items.map(({takeover}) => takeover), ['now', 'afterMovement', 'none']);
+  assert.equal((await world.request([{...step, takeover: 'soon'} as never])).status, 'invalid_argument');
+  const old = new Harness();
+  assert.equal((await old.joined({features: 255n}).request([{...step, takeover: 'now'}])).status, 'unsupported');
+});
+
+test('layers are sent as given, to a server that knows them', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  void world.setLayers([{avatar: 1, layer: 'wave'}, {avatar: 2, layer: 'carry', off: true, blendS: 0}]);
+  const [sent] = h.sent();
+  assert.ok(sent?.type === 'SetLayers');
+  assert.deepEqual(sent.items, [
+    {avatar: 1, layer: 'wave', off: false, weight: 1, blendS: 0.3, speed: 1},
+    {avatar: 2, layer: 'carry', off: true, weight: 1, blendS: 0, speed: 1},
+  ]);
+  for (const wrong of [{avatar: 0, layer: 'wave'}, {avatar: 1, layer: ''}, {avatar: 1},
+                       {avatar: 1, layer: 'wave', weight: NaN}]) {
+    assert.equal((await world.setLayers([wrong as never])).status, 'invalid_argument');
+  }
+  const old = new Harness();
+  const before = old.joined({features: 511n});
+  assert.equal((await before.setLayers([{avatar: 1, layer: 'wave'}])).status, 'unsupported');
+});
+
+test('a server of before is not asked for ground or footprints', async () => {
+  const h = new Harness();
+  const world = h.joined({features: 31n});
+  assert.equal((await world.setTerrain(null)).status, 'unsupported');
+  const step = {avatar: 1, type: 'step'} as const;
+  assert.equal((await world.request([step, {...step, atM: [1, 0, 0]}])).status, 'unsupported');
+  assert.deepEqual(h.sent(), []);
+  void world.request([step]);
+  assert.deepEqual(summary(h.sent()), ['Request 3']);
 });

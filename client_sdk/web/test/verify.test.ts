@@ -57,8 +57,10 @@ test('the layout of each table agrees with what flatc reads', () => {
         if (single !== undefined) {
           assert.deepEqual([size, align], [bytes[single], bytes[single]], where);
         } else {
-          const struct = /new (\w+)\(\)/.exec(reads)![1];
-          assert.deepEqual([size, align], struct === 'Vec3' ? [24, 8] : [12, 4], where);
+          const struct = /new (\w+)\(\)/.exec(reads)![1]!;
+          const structs: {[name: string]: number[]} =
+              {Vec3: [24, 8], Offset: [12, 4], GroundPoint: [16, 8]};
+          assert.deepEqual([size, align], structs[struct], where);
         }
       }
     });

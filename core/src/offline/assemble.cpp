@@ -219,30 +219,6 @@ bool SameOffsets(const Skeleton& a, const Skeleton& b) {
   return true;
 }
 
-// How the second tree departs from the first, which is of the capture named.
-std::string TreeDifference(const Skeleton& first, const std::string& first_path,
-                           const Skeleton& other) {
-  const auto parent = [](const Skeleton& skeleton, std::size_t j) {
-    const int index = skeleton.joints[j].parent;
-    return index < 0 ? std::string("no joint")
-                     : skeleton.joints[static_cast<std::size_t>(index)].name;
-  };
-  for (std::size_t j = 0; j < std::min(first.joints.size(), other.joints.size()); ++j) {
-    const Joint& a = first.joints[j];
-    const Joint& b = other.joints[j];
-    if (a.name != b.name) {
-      return "its joint " + std::to_string(j) + " is " + b.name + " where " + first_path + " has " +
-             a.name;
-    }
-    if (a.parent != b.parent) {
-      return "its joint " + b.name + " hangs on " + parent(other, j) + " where in " + first_path +
-             " it hangs on " + parent(first, j);
-    }
-  }
-  return "it has " + std::to_string(other.joints.size()) + " joints, " + first_path + " has " +
-         std::to_string(first.joints.size());
-}
-
 }  // namespace
 
 LibraryAssembler::LibraryAssembler(AssembleOptions options) : options_(std::move(options)) {}
@@ -272,6 +248,29 @@ const Extraction& LibraryAssembler::Add(const Capture& capture) {
 
 Expected<RawLibrary> LibraryAssembler::Assemble() const {
   return Assembler(options_, skeleton_, files_).Run();
+}
+
+std::string TreeDifference(const Skeleton& first, const std::string& first_name,
+                           const Skeleton& other) {
+  const auto parent = [](const Skeleton& skeleton, std::size_t j) {
+    const int index = skeleton.joints[j].parent;
+    return index < 0 ? std::string("no joint")
+                     : skeleton.joints[static_cast<std::size_t>(index)].name;
+  };
+  for (std::size_t j = 0; j < std::min(first.joints.size(), other.joints.size()); ++j) {
+    const Joint& a = first.joints[j];
+    const Joint& b = other.joints[j];
+    if (a.name != b.name) {
+      return "its joint " + std::to_string(j) + " is " + b.name + " where " + first_name + " has " +
+             a.name;
+    }
+    if (a.parent != b.parent) {
+      return "its joint " + b.name + " hangs on " + parent(other, j) + " where in " + first_name +
+             " it hangs on " + parent(first, j);
+    }
+  }
+  return "it has " + std::to_string(other.joints.size()) + " joints, " + first_name + " has " +
+         std::to_string(first.joints.size());
 }
 
 bool SameJointTree(const Skeleton& a, const Skeleton& b) {

@@ -5,6 +5,7 @@
 
 #include "builtin/figure.h"
 #include "builtin/general_steps.h"
+#include "builtin/gestures.h"
 #include "builtin/jump.h"
 #include "builtin/step.h"
 
@@ -28,6 +29,7 @@ RawLibrary GenerateBuiltinLibrary() {
   builtin::AddTurningSteps(library);
   builtin::AddSideSteps(library);
   builtin::AddClimbingSteps(library);
+  builtin::AddGestures(library);
   return library;
 }
 

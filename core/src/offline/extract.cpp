@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "ground.h"
+#include "horizontal_distance.h"
 #include "stand_pose.h"
 #include "stridewire/offline/body_tracks.h"
 #include "stridewire/offline/glitch_repair.h"
@@ -21,10 +22,6 @@ constexpr double kJumpStraightMaxRad = 0.35;  // Jumps that turn by less count a
 
 double HeadingBetween(const DVec3& from, const DVec3& to) {
   return std::atan2(to.x - from.x, to.z - from.z);
-}
-
-double HorizontalDistance(const DVec3& a, const DVec3& b) {
-  return std::hypot(a.x - b.x, a.z - b.z);
 }
 
 double LegLength(const Skeleton& skeleton) {

@@ -7,6 +7,7 @@
 
 #include "example_clusters.h"
 #include "parallel.h"
+#include "parameter_scales.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/convex_hull.h"
 #include "stridewire/runtime/correction.h"
@@ -17,12 +18,6 @@ namespace {
 
 constexpr double kHullGrowth = 0.1;  // as requests are clamped
 constexpr double kSameSite = 1e-9;
-
-std::vector<double> ScalesOf(const MotionGroup& group) {
-  std::vector<double> scales;
-  for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
-  return scales;
-}
 
 // Averages of the examples but one, where they are near duplicates, as sites.
 struct Others {

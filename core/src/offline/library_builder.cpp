@@ -8,6 +8,7 @@
 #include "grid_cells.h"
 #include "grid_example.h"
 #include "select_examples.h"
+#include "stridewire/offline/layers.h"
 #include "stridewire/offline/library_writer.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/measure.h"
@@ -226,7 +227,9 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     }
     views.push_back(std::move(view));
   }
-  return WriteLibrary({raw.skeleton, raw.stand_pose, views});
+  Expected<StoredLayers> layers = StoreLayers(raw.layers, raw.skeleton);
+  if (!layers) return std::unexpected(layers.error());
+  return WriteLibrary({raw.skeleton, raw.stand_pose, views, layers->views()});
 }
 
 }  // namespace stridewire

@@ -53,6 +53,16 @@ flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& gro
                          keytimes, headings, grid, sources_offset, mirrored);
 }
 
+flatbuffers::Offset<fb::Layer> AddLayer(Builder& builder, const LayerClip& layer) {
+  const auto name = builder.CreateString(layer.name.data(), layer.name.size());
+  const auto source = builder.CreateString(layer.source.data(), layer.source.size());
+  const auto joints = AddVector(builder, layer.joints);
+  const auto weights = AddVector(builder, layer.weights);
+  const auto rotations = AddVector(builder, layer.rotations);
+  return fb::CreateLayer(builder, name, source, layer.fps, layer.is_looping, joints, weights,
+                         rotations);
+}
+
 }  // namespace
 
 Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent& content) {
@@ -83,8 +93,13 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   const fb::Vec3 stand_root = ToFb(content.stand_pose.root_position_m);
   const auto stand_offset = builder.CreateVectorOfStructs(stand);
   const auto groups_offset = builder.CreateVector(groups);
-  fb::FinishMotionLibraryBuffer(builder, fb::CreateMotionLibrary(builder, skeleton, &stand_root,
-                                                                 stand_offset, groups_offset));
+  std::vector<flatbuffers::Offset<fb::Layer>> layers;
+  for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
+  // A library without layers has the bytes it had before there were any.
+  const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
+  fb::FinishMotionLibraryBuffer(
+      builder, fb::CreateMotionLibrary(builder, skeleton, &stand_root, stand_offset, groups_offset,
+                                       layers_offset));
 
   const std::span payload(reinterpret_cast<const std::byte*>(builder.GetBufferPointer()),
                           builder.GetSize());

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "hull_survey.h"
+#include "parameter_scales.h"
 #include "stridewire/offline/library_writer.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/measure.h"
@@ -37,12 +38,6 @@ struct Candidate {
   CardinalBasis basis;
   MotionGroup group;  // spans into `sites` and `basis`
 };
-
-std::vector<double> ScalesOf(const MotionGroup& group) {
-  std::vector<double> scales;
-  for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
-  return scales;
-}
 
 Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Sites sites,
                                                RadiusRule radii) {
@@ -453,7 +448,8 @@ Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
     candidates.push_back(std::move(outcome->candidate));
     refinement.groups.push_back(std::move(outcome->report));
   }
-  auto refined = WriteLibrary({library->skeleton(), library->stand_pose(), groups});
+  auto refined =
+      WriteLibrary({library->skeleton(), library->stand_pose(), groups, library->layers()});
   if (!refined) return std::unexpected(refined.error());
   refinement.library = *std::move(refined);
   if (options.progress) static_cast<void>(options.progress(1.0));

@@ -2,22 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "horizontal_distance.h"
 #include "segment_jumps.h"
 #include "statistics.h"
+#include "text.h"
 
 namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
 constexpr double kHalfSupportMinShare = 0.5;  // of the usual, at the ends of a recording
-
-std::string Text(const char* format, double value) {
-  char text[128];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
-}
 
 // One lift of a foot, with the supports around it.
 struct Swing {
@@ -71,10 +66,6 @@ double UsualHalfSupport(const std::vector<Swing>& swings, int frame_count, doubl
     if (swing.SupportEnd() < frame_count && after < standing_max_s * fps) halves.push_back(after);
   }
   return halves.empty() ? kHalfSupportDefaultS * fps : Median(std::move(halves));
-}
-
-double HorizontalDistance(const DVec3& a, const DVec3& b) {
-  return std::hypot(a.x - b.x, a.z - b.z);
 }
 
 double FootYaw(const BodyTracks::FootTrack& track, int frame) {

@@ -3,7 +3,8 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "text.h"
 
 // pelvis height      ____                 .-.
 //                        \               /   \              ____
@@ -84,12 +85,6 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
     if (speed < still_m_s) break;
   }
   return standing;
-}
-
-std::string Text(const char* format, double value) {
-  char text[128];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "horizontal_distance.h"
 #include "statistics.h"
 #include "stridewire/offline/normalise.h"
 #include "stridewire/runtime/pose.h"
@@ -22,10 +23,6 @@ double StandHeight(const BodyTracks& tracks) {
   heights.reserve(tracks.pelvis_m.size());
   for (const DVec3& p : tracks.pelvis_m) heights.push_back(p.y);
   return Percentile(std::move(heights), 75.0);
-}
-
-double HorizontalDistance(const DVec3& a, const DVec3& b) {
-  return std::hypot(a.x - b.x, a.z - b.z);
 }
 
 // The still moments of a capture may be a crouch before a jump or a reach for a bar: how far the body

@@ -2,16 +2,43 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
 
+#include "stridewire/runtime/contact_keytimes.h"
 #include "stridewire/runtime/measure.h"
 
 namespace stridewire {
 namespace {
 
-DVec3 Ball(const MotionLibrary& library, const Clip& clip, double time_s, Pose& scratch,
-           Foot foot) {
-  SampleClip(clip, time_s, scratch);
-  return DVec3(BallPosition(library.skeleton(), scratch, foot));
+// The frames from `from_s` to `to_s`, both within a millionth of one; empty: first > last.
+struct Frames {
+  Frames(const Clip& clip, double from_s, double to_s)
+      : first(static_cast<int>(std::ceil(from_s * clip.fps - 1e-6))),
+        last(std::min(static_cast<int>(std::floor(to_s * clip.fps + 1e-6)),
+                      clip.frame_count() - 1)) {}
+  int first;
+  int last;
+};
+
+DVec3 Ball(const MotionLibrary& library, const Clip& clip, int frame, Foot foot) {
+  return DVec3(BallPosition(library.skeleton(), clip.frame(frame), foot));
+}
+
+// Where feet were planted, from the movement's own plan; a step's landing last.
+std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& movement) {
+  std::vector<PlantRecord> plants;
+  const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
+  for (const Foot foot : {OtherFoot(last), last}) {
+    const FootTrack& track = movement.feet.foot(foot);
+    const double end_s = record.start_s + movement.duration_s();
+    const double release_s = std::min(record.start_s + track.release_s, end_s);
+    plants.push_back({foot, record.start_s, release_s, track.from.position_m, 0.0});
+    if (record.start_s + track.land_s <= end_s) {
+      plants.push_back({foot, record.start_s + track.land_s, end_s, track.to.position_m, 0.0});
+    }
+  }
+  return plants;
 }
 
 // The fixed foot of a step stands all along, the moving one before toe-off and after heel-strike;
@@ -22,35 +49,68 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
   const auto add = [&](Foot foot, std::size_t from, std::size_t to) {
     plants.push_back({foot, record.keytimes_s[from], record.keytimes_s[to], {}, 0.0});
   };
+  const ContactKeytimes contact = ContactKeytimesOf(record.kind, static_cast<int>(n));
   if (IsStep(record.kind)) {
     const Foot moving = MovingFoot(record.kind);
     add(OtherFoot(moving), 0, n);
-    if (n >= 2) add(moving, n - 1, n);
+    if (n >= 2) add(moving, contact.landing, n);
   } else if (record.kind == MovementKind::kJump) {
-    const std::size_t toe_off = n == 5 ? 2 : 1;
-    const std::size_t landing = n == 5 ? 3 : n - 1;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      add(foot, 0, toe_off);
-      add(foot, landing, n);
+      add(foot, 0, contact.toe_off);
+      add(foot, contact.landing, n);
     }
   }
   return plants;
 }
 
-void MeasurePlants(const MotionLibrary& library, const Clip& clip, Pose& scratch,
-                   MovementRecord& record) {
-  record.plants = PlantsOf(record);
+// Where a planted step was asked to bring its foot.
+Footprint AskedOf(MovementKind kind, const FootPlan& feet) {
+  Footprint asked = feet.foot(MovingFoot(kind)).to;
+  asked.position_m += feet.missed_m;
+  asked.heading_rad += feet.missed_rad;
+  return asked;
+}
+
+void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecord& record) {
+  const bool is_planted = !record.plants.empty();
+  if (!is_planted) record.plants = PlantsOf(record);
   for (PlantRecord& plant : record.plants) {
-    plant.anchor_m = Ball(library, clip, plant.from_s, scratch, plant.foot);
-    for (double t = plant.from_s; t <= plant.to_s; t += 1.0 / clip.fps) {
-      const DVec3 away = Ball(library, clip, t, scratch, plant.foot) - plant.anchor_m;
+    const Frames frames(clip, plant.from_s, plant.to_s);
+    if (!is_planted && frames.first <= frames.last) {
+      plant.anchor_m = Ball(library, clip, frames.first, plant.foot);
+    }
+    for (int frame = frames.first; frame <= frames.last; ++frame) {
+      const DVec3 away = Ball(library, clip, frame, plant.foot) - plant.anchor_m;
       plant.drift_m = std::max(plant.drift_m, std::hypot(away.x, away.z));
     }
   }
 }
 
-// How far the measured end of a step is from what was requested, in the parameters its group has.
-void MeasureLanding(const MotionGroup& group, MovementRecord& record) {
+// Ids are the caller's own; walks are told by how they end: with a stand that no movement was for.
+bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
+  return event.type == AvatarEventType::kRejected ||
+         (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand &&
+          walks.contains(event.request_id));
+}
+
+// How far a step's foot, when it first stands, is from where it was asked to.
+void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& asked,
+                    MovementRecord& record) {
+  const Foot foot = MovingFoot(record.kind);
+  const double end_s = clip.frame_count() / clip.fps;
+  const int frame = Frames(clip, record.plants.back().from_s, end_s).first;
+  if (frame >= clip.frame_count()) return;
+  const ConstPoseSpan pose = clip.frame(frame);
+  LegPose leg;
+  EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
+  const BlendedFoot lands = FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg);
+  record.landing_error_m =
+      std::hypot(lands.ball_m.x - asked.position_m.x, lands.ball_m.z - asked.position_m.z);
+  record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - asked.heading_rad));
+}
+
+// Without planting: how far the measured end is from what was requested, in the parameters the group has.
+void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
   double squared = 0.0;
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
     const double miss = record.measured.values[l] - record.requested.values[l];
@@ -97,6 +157,11 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
 
   Pose scratch(joint_count);
   GridCache cache(library->layout());
+  std::vector<std::optional<Footprint>> asked;  // of steps that were planted
+  std::set<std::uint64_t> walks;
+  for (const MovementRequest& request : requests) {
+    if (std::holds_alternative<WalkRequest>(request.movement)) walks.insert(request.id);
+  }
   std::size_t next = 0;
   while (next < requests.size() || !avatar.idle()) {
     while (next < requests.size() && avatar.queue_size() < Avatar::kMaxQueue) {
@@ -114,6 +179,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
     record_pose();
     for (const AvatarEvent& event : avatar.events()) {
       if (event.type == AvatarEventType::kStarted) {
+        asked.emplace_back();
         MovementRecord record;
         record.kind = event.kind;
         record.request_id = event.request_id;
@@ -131,19 +197,31 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
                                         movement->keytimes_s[static_cast<std::size_t>(i)]);
           }
           cache.Clear();
+          if (movement->feet.is_active) {
+            record.plants = PlantsOf(record, *movement);
+            if (IsStep(record.kind)) asked.back() = AskedOf(record.kind, movement->feet);
+          }
           record.measured = MeasureMovement(*library, *movement, cache, scratch);
         }
         result.movements.push_back(std::move(record));
+      } else if (EndsWalk(event, walks)) {
+        result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
+                                event.reason, event.time_s, event.base});
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
         result.movements.back().end_s = event.time_s;
         result.movements.back().base = event.base;
       }
     }
   }
-  for (MovementRecord& record : result.movements) {
+  for (std::size_t i = 0; i < result.movements.size(); ++i) {
+    MovementRecord& record = result.movements[i];
     if (record.keytimes_s.empty()) continue;
-    MeasurePlants(*library, result.clip, scratch, record);
-    if (IsStep(record.kind)) MeasureLanding(library->group(record.group), record);
+    MeasurePlants(*library, result.clip, record);
+    if (asked[i]) {
+      MeasureLanding(*library, result.clip, *asked[i], record);
+    } else if (IsStep(record.kind)) {
+      MeasureUnplantedLanding(library->group(record.group), record);
+    }
   }
   return result;
 }

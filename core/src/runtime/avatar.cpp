@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
+#include "stridewire/runtime/contact_keytimes.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/foot_vector.h"
 
@@ -20,19 +21,9 @@ constexpr double kFeetApartAsideM = 0.3;
 constexpr int kMaxClosingSteps = 3;
 constexpr double kClosingGainM = 0.03;  // a second one must be worth taking
 
-// Parameters of height are measured at the balls, which differ by some centimetres on level ground
-// at the middle of double support, since feet roll. Taken for ground, that climbs half a metre in a
-// hundred level steps.
-constexpr double kLevelRiseM = 0.05;
-
-// Events one movement can add in a tick: started, two foot-strikes, finished, and the next started.
-constexpr std::size_t kEventReserve = 6;
-
-// The keytime at which feet land, counted from the end: a jump has its lowest point after it.
-int LandingKeytime(const MotionGroup& group) {
-  const int n = group.interval_count();
-  return group.kind == MovementKind::kJump && n == 5 ? 3 : std::max(n - 1, 0);
-}
+// Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end, and the next
+// started.
+constexpr std::size_t kEventReserve = 7;
 
 }  // namespace
 
@@ -41,7 +32,10 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
     : library_(std::move(library)), options_(options), cache_(library_->layout()) {
   const int joint_count = library_->skeleton().joint_count();
   pose_ = Pose(joint_count);
+  layered_pose_ = Pose(joint_count);
+  earlier_pose_ = Pose(joint_count);
   movement_.difference = Pose(joint_count);
+  movement_.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
   movement_.weights.reserve(static_cast<std::size_t>(library_->max_example_count()));
   weight_scratch_.resize(static_cast<std::size_t>(library_->max_example_count()));
   stand_feet_.left_from_right_m =
@@ -58,15 +52,31 @@ void Avatar::Teleport(const BaseFrame& start) {
   pose_.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
   closing_steps_ = 0;
+  blended_pose_ = pose_;
+  if (PlantsFeet()) {
+    holds_ = HoldsOf(library_->skeleton(), library_->leg_rig(), pose_, start.position_m.y,
+                     options_.terrain.get());
+    StandOn(holds_, movement_);
+    earlier_feet_[0] =
+        CorrectFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, blended_pose_);
+    PlantFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, pose_);
+  }
   feet_ = stand_feet_;
   last_moved_ = Foot::kRight;
   CancelQueue();
+  ShowLayers();
 }
 
 Status Avatar::Enqueue(const MovementRequest& request) {
   if (Status status = ValidateRequest(*library_, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
+  }
+  if (request.takeover != Takeover::kNone) {
+    CancelQueue();
+    takes_over_ = request.takeover == Takeover::kNow && is_moving_ &&
+                  !std::holds_alternative<StandRequest>(request.movement);
+    if (is_in_stand_) stand_left_s_ = 0.0;
   }
   if (queue_head_ > 64 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
@@ -80,6 +90,8 @@ int Avatar::CancelQueue() {
   const int dropped = queue_size();
   queue_.clear();
   queue_head_ = 0;
+  walk_ = {};
+  takes_over_ = false;
   return dropped;
 }
 
@@ -96,7 +108,9 @@ FootState Avatar::MeasureFeet() const {
 }
 
 void Avatar::Evaluate(double time_s) {
-  EvaluateMovement(group(), library_->layout(), movement_, time_s, cache_, pose_);
+  EvaluateMovement(group(), library_->layout(), movement_, time_s, cache_, blended_pose_);
+  pose_ = blended_pose_;  // of the same size: no allocation
+  PlantFeet(library_->skeleton(), library_->leg_rig(), movement_, time_s, pose_);
 }
 
 void Avatar::Advance(double dt_s) {
@@ -110,7 +124,11 @@ void Avatar::Advance(double dt_s) {
     const bool may_change = event_count_ + kEventReserve <= events_.size();
     if (is_moving_) {
       const double before_s = movement_time_s_;
-      const double duration_s = movement_.duration_s();
+      if (may_change && RedirectsSwing()) {
+        RedirectSwing();
+        continue;
+      }
+      const double duration_s = EndOfMovement();
       if (before_s + left_s < duration_s || !may_change) {
         movement_time_s_ = before_s + left_s;
         time_s_ = end_s;
@@ -120,7 +138,7 @@ void Avatar::Advance(double dt_s) {
       left_s = before_s + left_s - duration_s;
       time_s_ = end_s - left_s;
       ReportFootStrikes(before_s, duration_s);
-      FinishMovement();
+      FinishMovement(duration_s);
     } else if (is_in_stand_) {
       if (stand_left_s_ > left_s || !may_change) {
         stand_left_s_ -= left_s;
@@ -134,6 +152,15 @@ void Avatar::Advance(double dt_s) {
   }
   time_s_ = end_s;
   if (is_moving_) Evaluate(movement_time_s_);
+  layers_.Advance(*library_, dt_s);
+  ShowLayers();
+}
+
+void Avatar::ShowLayers() {
+  has_layers_ = !layers_.empty();
+  if (!has_layers_) return;
+  layered_pose_ = pose_;  // of the same size: no allocation
+  layers_.Apply(*library_, layered_pose_);
 }
 
 bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
@@ -144,10 +171,13 @@ bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
 }
 
 bool Avatar::StartNext() {
+  takes_over_ = false;
   const bool is_empty = queue_size() == 0;
+  const bool next_is_walk =
+      !is_empty && std::holds_alternative<WalkRequest>(queue_[queue_head_].movement);
   const bool next_is_step =
       !is_empty && std::holds_alternative<StepRequest>(queue_[queue_head_].movement);
-  if (is_walking_ && !next_is_step) {
+  if (is_walking_ && !next_is_step && !next_is_walk) {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
@@ -165,9 +195,13 @@ bool Avatar::StartNext() {
     return false;
   }
 
-  const MovementRequest request = queue_[queue_head_++];
-  if (queue_size() == 0) CancelQueue();
   is_idle_reported_ = false;
+  if (next_is_walk) {
+    GoOnWalking();
+    return true;
+  }
+  const MovementRequest request = std::move(queue_[queue_head_++]);
+  if (queue_size() == 0) CancelQueue();
   if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
     is_in_stand_ = true;
     request_id_ = request.id;
@@ -175,17 +209,92 @@ bool Avatar::StartNext() {
     AddEvent({.type = AvatarEventType::kStarted, .request_id = request.id});
     return true;
   }
-  const auto* step = std::get_if<StepRequest>(&request.movement);
-  const auto plan = step != nullptr ? PlanStep(*library_, *step, feet_, last_moved_, !is_walking_)
-                                    : PlanJump(*library_, std::get<JumpRequest>(request.movement));
+  const auto plan = PlanRequest(request);
   STRIDEWIRE_CHECK(plan.has_value());  // Enqueue saw to it that the library has the kind
   StartPlan(*plan, request.id);
   return true;
 }
 
-void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
+// The next step of the walk at the queue's head, which stays there until it has arrived or can not.
+void Avatar::GoOnWalking() {
+  const std::uint64_t id = queue_[queue_head_].id;
+  WalkStance stance;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const auto f = static_cast<std::size_t>(foot);
+    stance.feet[f] = PlantsFeet() ? holds_[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+  }
+  stance.heading_rad = base_.heading_rad;
+  stance.last_moved = last_moved_;
+  stance.vector = feet_;
+  stance.last_step_s = is_walking_ ? movement_.duration_s() : 0.0;
+  stance.is_exact = PlantsFeet();
+  const WalkDecision decision =
+      PlanWalkStep(*library_, options_.terrain.get(),
+                   std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
+  if (decision.outcome == WalkOutcome::kStep) {
+    StartPlan(decision.plan, id);
+    return;
+  }
+  ++queue_head_;
+  walk_ = {};
+  if (queue_size() == 0) CancelQueue();
+  if (decision.outcome == WalkOutcome::kArrived) {
+    AddEvent({.type = AvatarEventType::kFinished, .request_id = id, .base = base_});
+  } else {
+    AddEvent({.type = AvatarEventType::kRejected,
+              .request_id = id,
+              .base = base_,
+              .reason = decision.reason});
+  }
+}
+
+// Where the ball of a foot is between two movements.
+DVec3 Avatar::StandsAt(Foot foot) const {
+  return PlantsFeet() ? holds_[static_cast<std::size_t>(foot)].print.position_m
+                      : DVec3(BallPosition(library_->skeleton(), pose_, foot));
+}
+
+// How much higher than the standing foot the ground is where a step would land.
+double Avatar::RiseAhead(const StepRequest& step) const {
+  const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
+  const auto f = static_cast<std::size_t>(foot);
+  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
+  const DVec3 stands = holds_[1 - f].print.position_m;
+  const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
+                                         DVec3(outward * side_m, 0.0, step.length_m));
+  return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
+}
+
+std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) const {
+  if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+    return PlanJump(*library_, *jump);
+  }
+  StepRequest step = std::get<StepRequest>(request.movement);
+  if (!step.at) {
+    if (options_.terrain != nullptr && PlantsFeet()) step.height_m = RiseAhead(step);
+    return PlanStep(*library_, step, feet_, last_moved_, !is_walking_);
+  }
+
+  // By footprint: the same as seen from the foot that stays.
+  Footprint exact{step.at->position_m, step.at->heading_rad.value_or(base_.heading_rad)};
+  exact.heading_rad = UnwrapAngle(exact.heading_rad, base_.heading_rad);
+  if (options_.terrain != nullptr) {
+    exact.position_m.y = options_.terrain->HeightAt(exact.position_m.x, exact.position_m.z);
+  }
+  Foot foot = step.foot.value_or(OtherFoot(last_moved_));
+  if (!step.foot && !is_walking_) {
+    const DVec3 centre = 0.5 * (StandsAt(Foot::kLeft) + StandsAt(Foot::kRight));
+    const double aside_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
+    foot = aside_m >= 0.0 ? Foot::kLeft : Foot::kRight;
+  }
+  return PlanFootprint(*library_, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad, feet_);
+}
+
+// The movement goes on from where both feet stand or, for one that takes over in mid-swing, from the same
+// part of its own swing.
+void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id, double swing_part) {
   const MotionGroup& next = library_->group(plan.group);
-  const Pose& displayed = pose_;
   ParameterValues parameters = plan.applied;
   if (options_.run_time_correction) {
     // The difference pose is made below: until then it is room to measure in.
@@ -198,19 +307,45 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
   StartMovement(next, plan.group,
                 std::span(parameters.values).first(static_cast<std::size_t>(parameters.count)),
                 base_, weight_scratch_, movement_);
-  // D = P - M(0), with P what is displayed.
-  EvaluateBlend(next, library_->layout(), movement_, 0.0, cache_, movement_.difference);
-  Subtract(displayed, movement_.difference, movement_.difference);
+  if (swing_part > 0.0) {
+    const SwingTimes swing = SwingTimesOf(next.kind, movement_);
+    movement_.entered_s = swing.release_s + swing_part * (swing.land_s - swing.release_s);
+    movement_.ease_out_s = std::min(kEaseOutS, movement_.duration_s() - movement_.entered_s);
+  }
+  // Who stood has no speed to keep.
+  const bool keeps_speed = moved_until_s_ == time_s_;
+  std::optional<ConstPoseSpan> earlier;
+  if (keeps_speed) earlier.emplace(earlier_pose_);
+  if (PlantsFeet()) {
+    PlanFeet(*library_, holds_, {plan, options_.terrain.get(), base_.position_m},
+             {blended_pose_, earlier}, cache_, pose_, movement_);
+    KeepFeetGoing(keeps_speed);
+  } else {
+    // D = P - M, with P what is displayed.
+    movement_.feet.is_active = false;
+    EvaluateBlend(next, library_->layout(), movement_, movement_.entered_s, cache_,
+                  movement_.difference);
+    Subtract(pose_, movement_.difference, movement_.difference);
+    if (earlier) {
+      SetDifferenceVelocity(next, library_->layout(), blended_pose_, *earlier, cache_, pose_,
+                            movement_);
+    }
+  }
+
+  // A footprint that planting reaches is met, whatever the examples span.
+  const bool is_met = plan.exact && movement_.feet.is_active &&
+                      movement_.feet.missed_m == DVec3(0.0) && movement_.feet.missed_rad == 0.0;
 
   is_moving_ = true;
+  is_exact_ = plan.exact.has_value();
   closing_steps_ = 0;
   is_idle_reported_ = false;
-  movement_time_s_ = 0.0;
+  movement_time_s_ = movement_.entered_s;
   request_id_ = request_id;
   const int rise =
       next.FindParameter(IsStep(next.kind) ? ParameterName::kEndY : ParameterName::kHeight);
-  const double rise_m = rise >= 0 ? plan.applied.values[static_cast<std::size_t>(rise)] : 0.0;
-  ground_rise_m_ = std::fabs(rise_m) > kLevelRiseM ? rise_m : 0.0;
+  ground_rise_m_ =
+      rise >= 0 ? GroundRise(plan.applied.values[static_cast<std::size_t>(rise)]) : 0.0;
   AddEvent({.type = AvatarEventType::kStarted,
             .request_id = request_id,
             .kind = next.kind,
@@ -218,19 +353,46 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
             .requested = plan.requested,
             .applied = plan.applied,
             .extrapolated = plan.extrapolated,
-            .clamped = plan.clamped});
+            .clamped = is_met ? false : plan.clamped});
 }
 
-void Avatar::FinishMovement() {
+// A straight walk hangs on its feet along the way only: aside, where the examples have nothing to
+// say, on the body's own line.
+void Avatar::KeepToLine(const DVec3& line_m) {
+  if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
+  const double heading_rad = movement_.base.heading_rad;
+  const DVec3 root = DVec3(blended_pose_.root_position_m);
+  const double aside_m = RotateYaw(-heading_rad, root - movement_.base.position_m).x +
+                         RotateYaw(-heading_rad, line_m - base_.position_m).x;
+  base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
+}
+
+void Avatar::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
-  Evaluate(movement_.duration_s());
+  const bool has_moved = at_s > SwingTimesOf(finished.kind, movement_).release_s;
+  KeepJoin(at_s);
+  // Without planting the base is the root's own and rises by what the library says.
+  const BaseFrame before = base_;
   base_ = BaseAfter(movement_, pose_);
-  base_.position_m.y += ground_rise_m_;
+  base_.position_m.y = before.position_m.y + (has_moved ? ground_rise_m_ : 0.0);
+  if (!has_moved) base_.heading_rad = before.heading_rad;
+  if (movement_.feet.is_active) {
+    if (!is_exact_) KeepToLine(before.position_m);
+    holds_ = HoldsAt(*library_, movement_, at_s, blended_pose_);
+    const auto& left = holds_[0].print.position_m;
+    const auto& right = holds_[1].print.position_m;
+    if (IsStep(finished.kind)) {
+      const Foot landed = has_moved ? MovingFoot(finished.kind) : last_moved_;
+      base_.position_m.y = (landed == Foot::kLeft ? left : right).y;
+    } else {
+      base_.position_m.y = 0.5 * (left.y + right.y);
+    }
+  }
   feet_ = MeasureFeet();
   is_moving_ = false;
   is_walking_ = false;
   if (IsStep(finished.kind)) {
-    last_moved_ = MovingFoot(finished.kind);
+    if (has_moved) last_moved_ = MovingFoot(finished.kind);
     const DVec3 apart = feet_.left_from_right_m - stand_feet_.left_from_right_m;
     is_walking_ = closing_steps_ < kMaxClosingSteps && (std::fabs(apart.z) > kFeetApartForwardM ||
                                                         std::fabs(apart.x) > kFeetApartAsideM);
@@ -239,6 +401,7 @@ void Avatar::FinishMovement() {
             .request_id = request_id_,
             .kind = finished.kind,
             .group = movement_.group,
+            .is_cut_short = at_s < movement_.duration_s(),
             .base = base_});
 }
 
@@ -247,9 +410,16 @@ void Avatar::FinishStand() {
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
 }
 
+Vec3 Avatar::LandingBall(Foot foot) const {
+  if (!movement_.feet.is_active) return BallPosition(library_->skeleton(), pose_, foot);
+  const DVec3 print = movement_.feet.foot(foot).to.position_m;
+  return Vec3(print.x, print.y + library_->leg_rig().side(foot).ball_height_m, print.z);
+}
+
 void Avatar::ReportFootStrikes(double before_s, double after_s) {
   const MotionGroup& moving = group();
-  const double strike_s = movement_.keytimes_s[static_cast<std::size_t>(LandingKeytime(moving))];
+  const double strike_s =
+      movement_.keytimes_s[ContactKeytimesOf(moving.kind, moving.interval_count()).landing];
   if (!(before_s < strike_s && strike_s <= after_s)) return;
   Evaluate(strike_s);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -259,7 +429,7 @@ void Avatar::ReportFootStrikes(double before_s, double after_s) {
               .kind = moving.kind,
               .group = movement_.group,
               .foot = foot,
-              .position_m = BallPosition(library_->skeleton(), pose_, foot)});
+              .position_m = LandingBall(foot)});
   }
 }
 

@@ -315,6 +315,60 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   return group;
 }
 
+// What a layer may touch, and keys that can be played.
+Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_legs) {
+  const auto fail = [&](const char* text) { return Fail(ErrorCode::kMalformed, text); };
+  if (!IsLayerName(layer.name)) {
+    return fail("a layer's name is not 1 to 32 of a-z, A-Z, 0-9, '_', '-', '.'");
+  }
+  if (!(layer.fps >= kMinLayerFps && layer.fps <= kMaxLayerFps)) {
+    return fail("a layer's keys a second are out of range");
+  }
+  if (layer.joints.empty() || layer.joints.size() > joints_of_legs.size() ||
+      layer.weights.size() != layer.joints.size()) {
+    return fail("a layer's mask has the wrong size");
+  }
+  int before = -1;
+  for (const int joint : layer.joints) {
+    if (joint <= before || static_cast<std::size_t>(joint) >= joints_of_legs.size()) {
+      return fail("a layer's mask names a joint that is not there, or not in order");
+    }
+    if (joints_of_legs[static_cast<std::size_t>(joint)]) {
+      return Fail(ErrorCode::kMalformed, "a layer's mask touches the root or a leg", joint);
+    }
+    before = joint;
+  }
+  for (const float weight : layer.weights) {
+    if (!(weight > 0.0f && weight <= 1.0f))
+      return fail("a layer's mask holds a weight not in (0, 1]");
+  }
+  const std::size_t key_floats = 4 * layer.joints.size();
+  if (layer.rotations.empty() || layer.rotations.size() % key_floats != 0 ||
+      layer.rotations.size() / key_floats > static_cast<std::size_t>(kMaxLayerFrames)) {
+    return fail("a layer's keys have the wrong size");
+  }
+  for (std::size_t i = 0; i < layer.rotations.size(); i += 4) {
+    const float* q = &layer.rotations[i];
+    const double norm = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] +
+                                  double{q[3]} * q[3]);
+    if (!(std::fabs(norm - 1.0) <= kUnitTolerance)) {
+      return Fail(ErrorCode::kMalformed, "a layer holds a rotation not of unit length",
+                  static_cast<std::int64_t>(i / 4));
+    }
+  }
+  return {};
+}
+
+LayerClip ToLayer(const fb::Layer& from) {
+  return {.name = from.name()->string_view(),
+          .source = from.source()->string_view(),
+          .fps = from.fps(),
+          .is_looping = from.is_looping(),
+          .joints = ToSpan(from.joints()),
+          .weights = ToSpan(from.weights()),
+          .rotations = ToSpan(from.rotations())};
+}
+
 }  // namespace
 
 std::string_view MovementKindName(MovementKind kind) {
@@ -340,6 +394,13 @@ std::string_view ParameterText(ParameterName name) {
     case ParameterName::kHeight: return "height_m";
   }
   return "unknown";
+}
+
+int MotionLibrary::FindLayer(std::string_view name) const {
+  for (std::size_t i = 0; i < layers_.size(); ++i) {
+    if (layers_[i].name == name) return static_cast<int>(i);
+  }
+  return -1;
 }
 
 int MotionGroup::FindParameter(ParameterName name) const {
@@ -465,6 +526,7 @@ Status MotionLibrary::Load() {
         std::fabs(stand.z) <= kMaxRootM)) {
     return Fail(ErrorCode::kMalformed, "the stand pose's root is out of range");
   }
+  leg_rig_ = MakeLegRig(skeleton_, stand_pose_);
 
   if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
     return Fail(ErrorCode::kMalformed, "the group count is out of range", root.groups()->size());
@@ -474,6 +536,20 @@ Status MotionLibrary::Load() {
     if (!group) return std::unexpected(group.error());
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
+  }
+  walk_gait_ = MakeWalkGait(*this);
+  if (root.layers() == nullptr) return {};
+  if (root.layers()->size() > static_cast<std::size_t>(kMaxLayerClips)) {
+    return Fail(ErrorCode::kMalformed, "there are too many layers", root.layers()->size());
+  }
+  const std::vector<bool> joints_of_legs = JointsOfLegs(skeleton_);
+  for (const fb::Layer* from : *root.layers()) {
+    const LayerClip layer = ToLayer(*from);
+    if (Status status = CheckLayer(layer, joints_of_legs); !status) return status;
+    if (FindLayer(layer.name) >= 0) {
+      return Fail(ErrorCode::kMalformed, "two layers have the same name");
+    }
+    layers_.push_back(layer);
   }
   return {};
 }

@@ -10,6 +10,24 @@ namespace {
 
 constexpr float kSmallestNorm = 0.1f;
 
+// What goes on faster is no motion of a body. It is cut, so that a join overshoots by 4/27 of it at most.
+constexpr float kMaxJointRadPerS = 20.0f;
+constexpr float kMaxRootMPerS = 4.0f;
+
+Vec3 NoFaster(const Vec3& velocity, float most) {
+  const float speed = std::sqrt(glm::dot(velocity, velocity));
+  return speed > most ? velocity * (most / speed) : velocity;
+}
+
+// A small rotation as a vector, and back. Not of the vector's length exactly, but the same bits everywhere.
+Vec3 RotationVector(const Quat& q) {
+  const float sign = q.w < 0.0f ? -2.0f : 2.0f;
+  return sign * Vec3(q.x, q.y, q.z);
+}
+Quat RotationAlong(const Vec3& vector) {
+  return Normalise(Quat(1.0f, 0.5f * vector.x, 0.5f * vector.y, 0.5f * vector.z));
+}
+
 // Catmull-Rom weights of the grid points around a cell, ends by quadratic extrapolation.
 struct CellWeights {
   int first = 0;  // grid point of weights[0]
@@ -98,6 +116,37 @@ double EaseOut(double s) {
   return r * r * (3.0 - 2.0 * r);
 }
 
+double EaseOutSlope(double s) {
+  if (s <= 0.0 || s >= 1.0) return 0.0;
+  return s * (1.0 - s) * (1.0 - s);
+}
+
+void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
+                           ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
+                           Movement& movement) {
+  // Before its beginning a movement is taken to go on as it begins.
+  const bool is_reflected = movement.entered_s < kJoinStepS;
+  EvaluateBlend(group, layout, movement,
+                movement.entered_s + (is_reflected ? kJoinStepS : -kJoinStepS), cache, scratch);
+  const auto per_s = static_cast<float>(1.0 / kJoinStepS);
+  const Pose& difference = movement.difference;
+  const Vec3 entered_m = before.root_position_m - difference.root_position_m;
+  const Vec3 blend_m =
+      is_reflected ? 2.0f * entered_m - scratch.root_position_m : scratch.root_position_m;
+  movement.difference_velocity.root_m_s = NoFaster(
+      per_s * (difference.root_position_m - (earlier.root_position_m - blend_m)), kMaxRootMPerS);
+  movement.difference_velocity.joints_rad_s.resize(before.rotations.size());
+  for (std::size_t j = 0; j < before.rotations.size(); ++j) {
+    const Quat entered = before.rotations[j] * glm::conjugate(difference.rotations[j]);
+    const Quat blend = is_reflected ? entered * (glm::conjugate(scratch.rotations[j]) * entered)
+                                    : scratch.rotations[j];
+    const Quat was = glm::conjugate(blend) * earlier.rotations[j];
+    movement.difference_velocity.joints_rad_s[j] = NoFaster(
+        per_s * RotationVector(glm::conjugate(was) * difference.rotations[j]), kMaxJointRadPerS);
+  }
+  movement.is_inertial = true;
+}
+
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement) {
   const auto n = static_cast<std::size_t>(group.example_count);
@@ -131,6 +180,9 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement) {
   SetWeights(group, group_index, parameters, weight_scratch, movement);
   movement.base = base;
+  movement.steer_rad = 0.0;
+  movement.entered_s = 0.0;
+  movement.is_inertial = false;
   movement.interval_count = group.interval_count();
   const std::span<double> keytimes =
       std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count) + 1);
@@ -186,6 +238,7 @@ void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Mov
     position += weight * DVec3(row[0], row[1], row[2]);
     yaw_rad += weight * row[3];
   }
+  yaw_rad += movement.steer_rad * (1.0 - EaseOut(time_s / movement.duration_s()));
   out.root_position_m =
       Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, position));
   out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
@@ -194,12 +247,20 @@ void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Mov
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out) {
   EvaluateBlend(group, layout, movement, time_s, cache, out);
-  const auto f = static_cast<float>(EaseOut(time_s / movement.ease_out_s));
+  const double s = (time_s - movement.entered_s) / movement.ease_out_s;
+  const auto f = static_cast<float>(EaseOut(s));
   if (f == 0.0f) return;
   // M' = f D + M, i.e. r = r_M slerp(1, r_D, f): Add(Scale(f, D), M) without a temporary.
   out.root_position_m += f * movement.difference.root_position_m;
   for (std::size_t j = 0; j < out.rotations.size(); ++j) {
     out.rotations[j] = out.rotations[j] * SlerpFromIdentity(movement.difference.rotations[j], f);
+  }
+  if (!movement.is_inertial) return;
+  const PoseVelocity& velocity = movement.difference_velocity;
+  const auto seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(s));
+  out.root_position_m += seconds * velocity.root_m_s;
+  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
+    out.rotations[j] = out.rotations[j] * RotationAlong(seconds * velocity.joints_rad_s[j]);
   }
 }
 
@@ -207,7 +268,7 @@ BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {
   BaseFrame base = movement.base;
   base.position_m.x = end_pose.root_position_m.x;
   base.position_m.z = end_pose.root_position_m.z;
-  base.heading_rad += movement.heading_change_rad;
+  base.heading_rad += movement.heading_change_rad + movement.steer_rad;
   return base;
 }
 

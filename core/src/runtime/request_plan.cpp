@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "stridewire/runtime/contact_keytimes.h"
 #include "stridewire/runtime/convex_hull.h"
 #include "stridewire/runtime/foot_vector.h"
 #include "stridewire/runtime/measure.h"
@@ -27,6 +28,9 @@ constexpr double kStartSlackM = 0.12;
 constexpr double kLevelSlackM = 0.05;  // balls roll up and down on level ground
 // Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
 constexpr double kStraightMetresPerRadian = 2.0;
+// Of a footprint, what a group misses sidewise is eased into the swing, and little of a turn is missed.
+constexpr double kExactSideWeight = 0.4;
+constexpr double kExactMetresPerRadian = 1.0;
 // Landing higher or lower than asked puts a foot into the air or the ground: worse than falling short.
 constexpr double kHeightWeight = 4.0;
 constexpr double kChangeM = 1e-6;
@@ -144,16 +148,22 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
     At(wishes, ParameterName::kStartX) = {start.x, true, kStartWeight};
     At(wishes, ParameterName::kStartY) = {start.y, true, kStartWeight};
     At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
-    At(wishes, ParameterName::kEndX) = {outward * request.side_m.value_or(0.0),
-                                        request.side_m.has_value(), 1.0,
-                                        !request.side_m && is_wide};
+    At(wishes, ParameterName::kEndX) = {
+        outward * request.side_m.value_or(0.0), request.side_m.has_value(),
+        request.at ? kExactSideWeight : 1.0, !request.side_m && is_wide};
     At(wishes, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
     At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
-    At(wishes, ParameterName::kTurn) = {
-        request.turn_rad, true,
-        request.turn_rad == 0.0 ? kStraightMetresPerRadian : kMetresPerRadian};
+    At(wishes, ParameterName::kTurn) = {request.turn_rad, true,
+                                        request.at                ? kExactMetresPerRadian
+                                        : request.turn_rad == 0.0 ? kStraightMetresPerRadian
+                                                                  : kMetresPerRadian};
     const bool is_plain = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
-    return BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x, is_plain);
+    auto plan = BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x, is_plain);
+    if (plan) {
+      plan->is_side_given = request.side_m.has_value();
+      plan->turn_rad = request.turn_rad;
+    }
+    return plan;
   };
 
   if (request.foot) return plan_foot(*request.foot);
@@ -163,6 +173,22 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
   if (!expected) return other;
   if (!other || other->cost_m > expected->cost_m - kFootPreferenceM) return expected;
   return other;
+}
+
+std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
+                                         const Footprint& print, const DVec3& fixed_m,
+                                         double heading_rad, const FootState& feet) {
+  const DVec3 vector = RotateYaw(-print.heading_rad, print.position_m - fixed_m);
+  StepRequest step;
+  step.foot = foot;
+  step.at = FootprintRequest{print.position_m, print.heading_rad};
+  step.length_m = vector.z;
+  step.side_m = foot == Foot::kLeft ? vector.x : -vector.x;
+  step.height_m = GroundRise(vector.y);
+  step.turn_rad = print.heading_rad - heading_rad;
+  std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
+  if (plan) plan->exact = print;
+  return plan;
 }
 
 std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequest& request) {
@@ -211,6 +237,32 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
     }
     if (!has_kind(MovementKind::kJump)) {
       return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
+    }
+  } else if (const auto* walk = std::get_if<WalkRequest>(&request.movement)) {
+    const auto is_place = [&](const DVec3& place) {
+      return within(place.x, kMaxWalkPositionM) && within(place.y, kMaxWalkPositionM) &&
+             within(place.z, kMaxWalkPositionM);
+    };
+    if (!is_place(walk->position_m)) {
+      return Fail(ErrorCode::kOutOfRange, "position_m is not within 1000000 m", "walk_to");
+    }
+    if (!within(walk->heading_rad, kMaxWalkHeadingRad)) {
+      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad",
+                  "walk_to");
+    }
+    if (walk->waypoints_m.size() > kMaxWaypoints) {
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m holds more than 64 places", "walk_to");
+    }
+    if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",
+                  "walk_to");
+    }
+    if (walk->speed_m_s &&
+        !(*walk->speed_m_s >= kMinWalkSpeedMPerS && *walk->speed_m_s <= kMaxWalkSpeedMPerS)) {
+      return Fail(ErrorCode::kOutOfRange, "speed_m_s is not a number from 0.05 to 5", "walk_to");
+    }
+    if (!has_kind(MovementKind::kStepLeft) || !has_kind(MovementKind::kStepRight)) {
+      return Fail(ErrorCode::kUnsupported, "the library has no steps of both feet", "walk_to");
     }
   } else if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
     if (!(stand->seconds >= 0.0 && stand->seconds <= kMaxStandS)) {

@@ -6,7 +6,7 @@
 namespace stridewire {
 namespace {
 
-bool IsFinite(const Vec3& v) {
+bool IsOffset(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z) &&
          std::fabs(v.x) <= kMaxOffsetM && std::fabs(v.y) <= kMaxOffsetM &&
          std::fabs(v.z) <= kMaxOffsetM;
@@ -31,7 +31,7 @@ Status Skeleton::Validate() const {
     if (j == 0 ? joint.parent != -1 : joint.parent < 0 || joint.parent >= j) {
       return Fail(ErrorCode::kOutOfRange, "a joint's parent must come before it", j);
     }
-    if (!IsFinite(joint.offset_m)) {
+    if (!IsOffset(joint.offset_m)) {
       return Fail(ErrorCode::kInvalidArgument, "a joint's offset is not finite or too large", j);
     }
     if (joint.name.empty() || !names.insert(joint.name).second) {
@@ -42,7 +42,7 @@ Status Skeleton::Validate() const {
     if (site.joint < 0 || site.joint >= count) {
       return Fail(ErrorCode::kOutOfRange, "an end site hangs on no joint", site.joint);
     }
-    if (!IsFinite(site.offset_m)) {
+    if (!IsOffset(site.offset_m)) {
       return Fail(ErrorCode::kInvalidArgument, "an end site's offset is not finite or too large",
                   site.joint);
     }
@@ -53,7 +53,7 @@ Status Skeleton::Validate() const {
         return Fail(ErrorCode::kOutOfRange, "a leg names no joint", joint);
       }
     }
-    if (!IsFinite(leg.ball_offset_m) || !IsFinite(leg.toe_tip_offset_m)) {
+    if (!IsOffset(leg.ball_offset_m) || !IsOffset(leg.toe_tip_offset_m)) {
       return Fail(ErrorCode::kInvalidArgument, "a foot's offset is not finite or too large");
     }
   }

@@ -36,6 +36,7 @@ struct SynthesizeCommand {
   std::string out;
   double fps = 60.0;
   bool no_correction = false;
+  bool no_planting = false;
   bool json = false;
 };
 int RunSynthesize(const SynthesizeCommand& command);
@@ -60,6 +61,16 @@ struct ReportCommand {
   bool json = false;
 };
 int RunReport(const ReportCommand& command);
+
+struct AddLayersCommand {
+  std::string library;
+  std::string out;
+  std::vector<std::string> loops;   // NAME=FILE[:FROM_S:TO_S]
+  std::vector<std::string> once;    // likewise
+  std::vector<std::string> joints;  // empty: the upper body
+  bool json = false;
+};
+int RunAddLayers(const AddLayersCommand& command);
 
 struct ExportCommand {
   std::string library;

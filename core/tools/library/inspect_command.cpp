@@ -21,6 +21,7 @@ int RunInspect(const InspectCommand& command) {
   std::printf("skeleton: %d joints, feet %s and %s\n", (*library)->skeleton().joint_count(),
               json["skeleton"]["left_foot"].get<std::string>().c_str(),
               json["skeleton"]["right_foot"].get<std::string>().c_str());
+  PrintLayers(**library);
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
     const MotionGroup& group = (*library)->groups()[g];
     const auto& entry = json["groups"][g];

@@ -1,6 +1,7 @@
 #include "library_json.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <limits>
 
 #include "stridewire/offline/interpolation_error.h"
@@ -122,7 +123,36 @@ Json LibraryToJson(const MotionLibrary& library, bool examples) {
     groups.push_back(std::move(entry));
   }
   json["groups"] = std::move(groups);
+  json["layers"] = LayersToJson(library);
   return json;
+}
+
+Json LayersToJson(const MotionLibrary& library) {
+  Json layers = Json::array();
+  for (const LayerClip& layer : library.layers()) {
+    Json mask = Json::object();
+    for (std::size_t i = 0; i < layer.joints.size(); ++i) {
+      mask[library.skeleton().joints[static_cast<std::size_t>(layer.joints[i])].name] =
+          layer.weights[i];
+    }
+    layers.push_back({{"name", layer.name},
+                      {"source", layer.source},
+                      {"loop", layer.is_looping},
+                      {"duration_s", layer.duration_s()},
+                      {"keys", layer.frame_count()},
+                      {"mask", std::move(mask)}});
+  }
+  return layers;
+}
+
+void PrintLayers(const MotionLibrary& library) {
+  for (const LayerClip& layer : library.layers()) {
+    std::printf(
+        "layer %s: %.2f s, %s, %zu joints from %s on, %s\n", std::string(layer.name).c_str(),
+        layer.duration_s(), layer.is_looping ? "a loop" : "once", layer.joints.size(),
+        library.skeleton().joints[static_cast<std::size_t>(layer.joints.front())].name.c_str(),
+        std::string(layer.source).c_str());
+  }
 }
 
 }  // namespace stridewire

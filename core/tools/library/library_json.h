@@ -19,4 +19,8 @@ namespace stridewire {
 // Text that came from a file, safe to print as JSON: bytes that are not UTF-8 are replaced.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json);
 
+// What layers a library has, for reading by programs and by people.
+[[nodiscard]] nlohmann::ordered_json LayersToJson(const MotionLibrary& library);
+void PrintLayers(const MotionLibrary& library);
+
 }  // namespace stridewire

@@ -124,6 +124,8 @@ int Run(int argc, char** argv) {
       ->check(Number(10.0, 1000.0, false));
   synthesize_app->add_flag("--no-correction", synthesize.no_correction,
                            "Start movements with the parameters asked for, uncorrected");
+  synthesize_app->add_flag("--no-planting", synthesize.no_planting,
+                           "Leave the feet where the blend has them, sliding");
   synthesize_app->add_flag("--json", synthesize.json, "Report as one JSON object on stdout");
   synthesize_app->footer(
       "Example:\n  echo '{\"movements\":[{\"step\":{\"length_m\":0.6}}]}' > c.json\n"
@@ -139,6 +141,27 @@ int Run(int argc, char** argv) {
       ->required()
       ->check(NotEmpty());
   export_app->footer("Example:\n  stridewire-library export-capture builtin --out examples/\n");
+
+  AddLayersCommand add_layers;
+  CLI::App* add_layers_app = app.add_subcommand(
+      "add-layers", "Adds clips of the upper body that are played over movements");
+  add_layers_app->add_option("library", add_layers.library, "A .swl file or builtin")
+      ->required()
+      ->check(NotEmpty());
+  add_layers_app->add_option("--out", add_layers.out, "The library to write (.swl)")
+      ->required()
+      ->check(NotEmpty());
+  add_layers_app->add_option("--layer", add_layers.loops,
+                             "A loop: NAME=FILE.bvh or NAME=FILE.bvh:FROM_S:TO_S; may be repeated");
+  add_layers_app->add_option("--layer-once", add_layers.once, "The same, played once");
+  add_layers_app
+      ->add_option("--layer-joints", add_layers.joints,
+                   "Joints to move, with all that hangs on them; else the upper body")
+      ->delimiter(',');
+  add_layers_app->add_flag("--json", add_layers.json, "Report as one JSON object on stdout");
+  add_layers_app->footer(
+      "Example:\n  stridewire-library add-layers walk.swl --out both.swl --layer "
+      "wave=wave.bvh:1.5:3\n");
 
   RefineCommand refine;
   CLI::App* refine_app =
@@ -193,7 +216,7 @@ int Run(int argc, char** argv) {
   const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
   if (!wrong.empty()) {
     return Complain(wrong +
-                    "; there are build, inspect, refine, report, synthesize and "
+                    "; there are build, inspect, refine, add-layers, report, synthesize and "
                     "export-capture");
   }
 
@@ -212,6 +235,7 @@ int Run(int argc, char** argv) {
   }
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);
+  if (*add_layers_app) return RunAddLayers(add_layers);
   if (*refine_app) return RunRefine(refine);
   if (*report_app) return RunReport(report);
   if (*synthesize_app) return RunSynthesize(synthesize);

@@ -57,12 +57,14 @@ int RunSynthesize(const SynthesizeCommand& command) {
   if (Status status = CheckOutputFile(command.out); !status) {
     return ComplainOfOutput(status.error());
   }
-  const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
   const auto choreography = ReadChoreography(command.choreography);
   if (!choreography) return ComplainOfInput(choreography.error());
+  const auto library = OpenLibrary(command.library);
+  if (!library) return ComplainOfInput(library.error());
   auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps,
-                              {.run_time_correction = !command.no_correction});
+                              {.run_time_correction = !command.no_correction,
+                               .foot_planting = !command.no_planting,
+                               .terrain = choreography->terrain});
   if (!synthesis) {
     Error error = synthesis.error();
     std::string where = command.choreography;
@@ -85,6 +87,14 @@ int RunSynthesize(const SynthesizeCommand& command) {
     for (const MovementRecord& record : synthesis->movements) {
       json["movements"].push_back(RecordToJson(**library, record));
     }
+    json["walks"] = Json::array();
+    for (const WalkRecord& walk : synthesis->walks) {
+      json["walks"].push_back({{"request", walk.request_id - 1},
+                               {"arrived", walk.arrived},
+                               {"reason", walk.reason},
+                               {"end_s", walk.end_s},
+                               {"base", BaseToJson(walk.base)}});
+    }
     std::printf("%s\n", Dump(json).c_str());
     return kExitDone;
   }
@@ -94,6 +104,11 @@ int RunSynthesize(const SynthesizeCommand& command) {
               synthesis->clip.frame_count(), synthesis->clip.duration_s(),
               synthesis->movements.size());
   if (clamped > 0) std::printf(", %d of them not as asked (see --json)", clamped);
+  for (const WalkRecord& walk : synthesis->walks) {
+    if (walk.arrived) continue;
+    std::printf("; movements[%llu] does not arrive: %s",
+                static_cast<unsigned long long>(walk.request_id - 1), walk.reason.c_str());
+  }
   std::printf("\n");
   return kExitDone;
 }

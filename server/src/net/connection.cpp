@@ -155,6 +155,12 @@ bool Connection::SendEvents(SharedFrame frame) {
   return true;
 }
 
+void Connection::SendGround(WorldId world, SharedFrame frame) {
+  if (is_closed_ || is_closing_) return;
+  queue_.PushGround(world, std::move(frame));
+  ScheduleFlush();
+}
+
 std::size_t Connection::SendPoses(const PoseDelivery& delivery) {
   if (is_closed_ || is_closing_) return 0;
   const std::size_t dropped = queue_.PushPoses(delivery);

@@ -52,6 +52,8 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   [[nodiscard]] bool SendEvents(SharedFrame frame);
   /// Returns how many frames a slow peer lost by it.
   [[nodiscard]] std::size_t SendPoses(const PoseDelivery& delivery);
+  void SendGround(WorldId world, SharedFrame frame);
+  void DropGround(WorldId world) { queue_.DropGround(world); }
   void DropPoses(WorldId world, protocol::PoseMode mode) { queue_.DropPoses(world, mode); }
 
   [[nodiscard]] const SendQueue& queue() const { return queue_; }

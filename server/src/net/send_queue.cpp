@@ -32,6 +32,10 @@ bool SendQueue::PushEvents(SharedFrame frame) {
   return true;
 }
 
+void SendQueue::PushGround(WorldId world, SharedFrame frame) {
+  grounds_.insert_or_assign(world, std::move(frame));
+}
+
 std::size_t SendQueue::PushPoses(const PoseDelivery& delivery) {
   Lane& lane = lanes_[{delivery.world, delivery.mode, delivery.from_shard}];
   std::size_t dropped = 0;
@@ -65,6 +69,11 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     out.bytes += control_.front()->size();
     out.frames.push_back(std::move(control_.front()));
     control_.pop_front();
+  }
+  if (control_.empty() && !grounds_.empty()) {
+    out.bytes += grounds_.begin()->second->size();
+    out.frames.push_back(std::move(grounds_.begin()->second));
+    grounds_.erase(grounds_.begin());
   }
   std::size_t pose_bytes = 0;
   std::size_t pose_frames = 0;

@@ -18,9 +18,10 @@ namespace stridewire::server {
 ///   lane      world 1, quantised, shard 0: [tick 7][tick 8]   a backlog of ticks; a new tick
 ///   lane      world 1, quantised, shard 1: [tick 7]           drives out the oldest
 ///
-/// Control goes first, but every write also takes poses, so neither starves the other. Memory is
-/// bounded: control by its budget (events beyond it are refused; replies are bounded by whoever
-/// stops reading commands), poses by lanes times backlog, in frames that all observers share.
+/// Control goes first, then grounds (behind the WorldInfo that they belong to), but every write also
+/// takes poses, so neither starves the other. Memory is bounded: control by its budget (events
+/// beyond it are refused; replies are bounded by whoever stops reading commands), grounds by one a
+/// world and poses by lanes times backlog, both in frames that all observers share.
 class SendQueue {
  public:
   SendQueue(std::size_t control_budget_bytes, int backlog_ticks);
@@ -33,6 +34,10 @@ class SendQueue {
 
   /// Takes a batch; returns how many frames of older ones it drove out.
   [[nodiscard]] std::size_t PushPoses(const PoseDelivery& delivery);
+
+  /// Takes a world's ground in place of one that still waits: the last is what holds.
+  void PushGround(WorldId world, SharedFrame frame);
+  void DropGround(WorldId world) { grounds_.erase(world); }
 
   /// Forgets the poses of a world, or of all.
   void DropPoses(WorldId world, protocol::PoseMode mode);
@@ -47,11 +52,14 @@ class SendQueue {
     void clear();
   };
 
-  /// Moves frames to `out`, which is cleared first: control until `max_bytes`, then poses until
-  /// `max_bytes` more, lane after lane; of either at least one frame that waits.
+  /// Moves frames to `out`, which is cleared first: control until `max_bytes`, a ground if no
+  /// control waits any more, then poses until `max_bytes` more, lane after lane; of each at least
+  /// one frame that waits.
   void Gather(std::size_t max_bytes, Gathered& out);
 
-  [[nodiscard]] bool empty() const { return control_.empty() && waiting_batches_ == 0; }
+  [[nodiscard]] bool empty() const {
+    return control_.empty() && grounds_.empty() && waiting_batches_ == 0;
+  }
   [[nodiscard]] bool control_empty() const { return control_.empty(); }
   [[nodiscard]] std::size_t control_bytes() const { return control_bytes_; }
   [[nodiscard]] std::size_t waiting_batches() const { return waiting_batches_; }
@@ -75,6 +83,7 @@ class SendQueue {
   std::size_t backlog_ticks_;
   std::deque<SharedFrame> control_;
   std::size_t control_bytes_ = 0;
+  std::map<WorldId, SharedFrame> grounds_;
   std::map<LaneKey, Lane> lanes_;
   std::size_t waiting_batches_ = 0;
   LaneKey last_lane_;  // where the last gathering stopped

@@ -180,6 +180,8 @@ std::vector<ConfigKey> MakeKeys() {
       Flag("run_time_correction",
            "Correct a movement's parameters when it starts, so that it has those asked for",
            &Config::run_time_correction),
+      Flag("foot_planting", "Keep feet still where they land, on the ground of the world",
+           &Config::foot_planting),
       Flag("allow_insecure", "Listen beyond this machine without tokens and TLS",
            &Config::allow_insecure),
       Flag("open_worlds", "Worlds the file does not name come into being when joined",
@@ -362,6 +364,7 @@ std::string PrintConfig(const Config& config) {
   for (const auto& [name, world] : config.worlds) {
     text += fmt::format("\n[worlds.{}]\n", Quoted(name));
     if (!world.library.empty()) text += fmt::format("library = {}\n", Quoted(world.library));
+    if (!world.terrain.empty()) text += fmt::format("terrain = {}\n", Quoted(world.terrain));
     text += fmt::format("persistent = {}\n", world.persistent);
   }
   return text;

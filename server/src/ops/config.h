@@ -26,6 +26,7 @@ struct Endpoint {
 /// What [worlds.NAME] says.
 struct WorldConfig {
   std::string library;      ///< "builtin" or a file; empty: the default library.
+  std::string terrain;      ///< A file of its ground; empty: flat.
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
   bool operator==(const WorldConfig&) const = default;
 };
@@ -45,6 +46,7 @@ struct Config {
   int shards = 0;  ///< 0: one a processor.
   int max_catch_up_ticks = 10;
   bool run_time_correction = true;  ///< Movements start with corrected parameters.
+  bool foot_planting = true;        ///< Feet stand still where they land.
   bool allow_insecure = false;
   bool open_worlds = true;  ///< Worlds the file does not name come into being when joined.
   bool persistent = false;  ///< Of worlds the file does not name.

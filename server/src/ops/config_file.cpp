@@ -74,6 +74,12 @@ Status ReadWorld(const toml::table& table, const std::string& name, const std::s
         return Fail(ErrorCode::kInvalidArgument, "expected a file or 'builtin', in quotes", where);
       }
       world.library = *library;
+    } else if (key == "terrain") {
+      const auto terrain = node.value_exact<std::string>();
+      if (!terrain || terrain->empty()) {
+        return Fail(ErrorCode::kInvalidArgument, "expected a file, in quotes", where);
+      }
+      world.terrain = *terrain;
     } else if (key == "persistent") {
       const auto persistent = node.value_exact<bool>();
       if (!persistent) return Fail(ErrorCode::kInvalidArgument, "expected true or false", where);

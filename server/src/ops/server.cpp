@@ -31,16 +31,20 @@ cmake --build --preset release --target viewer</pre>
 </body></html>
 )";
 
+constexpr std::uint64_t kGroundTicksAhead = 3;
+
 }  // namespace
 
-Server::Server(Config config, Libraries libraries, ViewerFiles viewer)
+Server::Server(Config config, Libraries libraries, ViewerFiles viewer, Terrains terrains)
     : config_(std::move(config)),
       libraries_(std::move(libraries)),
+      terrains_(std::move(terrains)),
       viewer_(std::move(viewer)),
       metrics_(config_.shard_count()),
       avatar_budget_(config_.limits.max_avatars_per_world, config_.limits.max_avatars),
-      worlds_(config_, libraries_),
+      worlds_(config_, libraries_, terrains_),
       sessions_(config_.limits, config_.shard_count()),
+      clock_(TickClock::Clock::time_point{}, config_.tick_hz),
       listener_(context_),
       http_listener_(context_),
       http_(config_.limits.max_http_connections, metrics_.ops()),
@@ -60,6 +64,7 @@ Server::Server(Config config, Libraries libraries, ViewerFiles viewer)
 Server::~Server() {
   // All threads end before any shard goes: they post to each other.
   for (const auto& shard : shards_) shard->Stop();
+  for (const auto& shard : shards_) shard->CloseConnections();
 }
 
 Status Server::Start() {
@@ -81,10 +86,10 @@ Status Server::Start() {
     spdlog::warn("streaming on {} WITHOUT tokens and TLS: the same holds there",
                  ToText(config_.http));
   }
-  const TickClock clock(TickClock::Clock::now(), config_.tick_hz);
+  clock_ = TickClock(TickClock::Clock::now(), config_.tick_hz);
   std::vector<Shard*> peers;
   for (const auto& shard : shards_) peers.push_back(shard.get());
-  for (const auto& shard : shards_) shard->Prepare(clock, peers);
+  for (const auto& shard : shards_) shard->Prepare(clock_, peers);
   for (const auto& shard : shards_) shard->Start();
   listener_.Start([this](auto socket) {
     boost::system::error_code error;
@@ -187,6 +192,26 @@ void Server::JoinWorld(int shard, SessionId session, protocol::Seq seq, std::str
 
 void Server::LeaveWorld(WorldId world) {
   asio::post(context_, [this, world] { worlds_.Leave(world); });
+}
+
+void Server::SetTerrain(TerrainChange change) {
+  asio::post(context_, [this, change = std::move(change)]() mutable {
+    auto ground = worlds_.SetTerrain(*change.world, std::move(change.terrain));
+    if (!ground) {
+      shards_[static_cast<std::size_t>(change.from_shard)]->RefuseTerrain(
+          change.session, change.seq, std::move(ground.error()));
+      return;
+    }
+    // Far enough ahead that every shard has it in time.
+    const std::uint64_t tick = clock_.TickAt(TickClock::Clock::now()) + kGroundTicksAhead;
+    for (const auto& shard : shards_) {
+      shard->ChangeGround({.world = change.world,
+                           .from_shard = change.from_shard,
+                           .session = change.session,
+                           .seq = change.seq,
+                           .part = GroundPart{*ground, tick}});
+    }
+  });
 }
 
 void Server::SessionEnded(SessionId session) {

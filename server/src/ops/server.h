@@ -26,7 +26,7 @@ namespace stridewire::server {
 /// and worlds (the one that calls Run), and one thread a shard.
 class Server : public ShardPeers {
  public:
-  Server(Config config, Libraries libraries, ViewerFiles viewer = {});
+  Server(Config config, Libraries libraries, ViewerFiles viewer = {}, Terrains terrains = {});
   ~Server() override;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
@@ -56,6 +56,7 @@ class Server : public ShardPeers {
  private:
   void JoinWorld(int shard, SessionId session, protocol::Seq seq, std::string name) override;
   void LeaveWorld(WorldId world) override;
+  void SetTerrain(TerrainChange change) override;
   void SessionEnded(SessionId session) override;
   void SessionBegan(int shard, SessionIdentity identity) override;
 
@@ -67,6 +68,7 @@ class Server : public ShardPeers {
 
   const Config config_;
   const Libraries libraries_;
+  const Terrains terrains_;
   const ViewerFiles viewer_;
   LibraryPages library_pages_;
   Metrics metrics_;
@@ -75,6 +77,7 @@ class Server : public ShardPeers {
   WorldDirectory worlds_;
   SessionDirectory sessions_;
   std::vector<std::unique_ptr<Shard>> shards_;
+  TickClock clock_;
   Listener listener_;
   Listener http_listener_;
   HttpServer http_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <utility>
 
 #include "stridewire/base/check.h"
@@ -20,10 +21,30 @@ using protocol::StatusCode;
 
 namespace {
 
+// What one of the requests needs and this client has not agreed on; null: nothing.
+const char* FeatureMissing(const std::vector<protocol::RequestItem>& items,
+                           std::uint64_t features) {
+  for (const protocol::RequestItem& item : items) {
+    const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
+    const bool is_walk = std::holds_alternative<protocol::WalkMovement>(item.movement);
+    if (step != nullptr && step->at && (features & protocol::kFeatureFootprints) == 0) {
+      return "footprints";
+    }
+    if (is_walk && (features & protocol::kFeatureWalks) == 0) return "walks";
+    if (item.takeover != protocol::Takeover::kNone &&
+        (features & protocol::kFeatureTakeovers) == 0) {
+      return "takeovers";
+    }
+  }
+  return nullptr;
+}
+
 // An event takes under 512 bytes of a frame, so this many stay below the smallest frame limit.
 constexpr std::size_t kEventsPerFrame = 100;
 // A refused item takes under 256 bytes of a Reply; with no more items a Reply always fits.
 constexpr std::size_t kReplyItemBytes = 256;
+// Heights and boxes of a terrain that count as one item: the largest is then half a burst.
+constexpr std::size_t kNumbersPerItem = 32;
 
 std::size_t MaxItems(const Limits& limits) {
   return std::min(protocol::kMaxItems, limits.max_bulk_bytes / kReplyItemBytes);
@@ -111,7 +132,10 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   welcome.limits.idle_timeout_s = limits.idle_timeout_s;
   welcome.limits.resume_window_s = limits.resume_window_s;
   Send(welcome);
-  for (auto& [id, membership] : worlds_) SendWorldInfo(0, membership);
+  for (auto& [id, membership] : worlds_) {
+    SendWorldInfo(0, membership);
+    SendGround(*membership.world, true);
+  }
 
   // Whatever was on its way when the connection broke goes out again.
   event_replay_.ForEachAfter(hello.last_events_number, [this](EventReplay::Kept& kept) {
@@ -288,6 +312,7 @@ void Session::Handle(Command command) {
       const ReplyMemory::Answer& answer = replies_.Find(seq);
       if (const auto it = worlds_.find(answer.joined); it != worlds_.end()) {
         SendWorldInfo(seq, it->second);
+        SendGround(*it->second.world, false);
       }
       connection_->SendControl(answer.reply);
       return;
@@ -379,6 +404,7 @@ void Session::OnJoined(Seq seq, Outcome<std::shared_ptr<World>>&& outcome) {
       worlds_.emplace(world->id, Membership{.world = world, .role = role}).first->second;
   host_.InterestChanged(world);
   SendWorldInfo(seq, membership);
+  SendGround(*world, false);
   Answer(Reply{.seq = seq}, world->id);
 }
 
@@ -400,6 +426,7 @@ void Session::Leave(WorldId id) {
   if (connection_ != nullptr) {
     connection_->DropPoses(id, PoseMode::kFull);
     connection_->DropPoses(id, PoseMode::kQuantised);
+    connection_->DropGround(id);
   }
   if (is_controller) {
     for (int shard = 0; shard < host_.shard_count(); ++shard) {
@@ -488,6 +515,11 @@ void Session::Execute(protocol::Spawn&& command) {
 void Session::Execute(protocol::Request&& command) {
   const Membership* membership = Commanding(command.seq, command.world);
   if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
+  if (const char* feature = FeatureMissing(command.items, features_)) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           std::string("the feature '") + feature + "' was not agreed on in the handshake");
+    return;
+  }
   std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()));
   std::uint32_t index = 0;
   for (const protocol::RequestItem& item : command.items) {
@@ -496,6 +528,25 @@ void Session::Execute(protocol::Request&& command) {
   }
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = command.items.size(), .reply = {}});
+}
+
+void Session::Execute(protocol::SetLayers&& command) {
+  const Membership* membership = Commanding(command.seq, command.world);
+  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
+  if ((features_ & protocol::kFeatureLayers) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'layers' was not agreed on in the handshake");
+    return;
+  }
+  const std::size_t item_count = command.items.size();
+  std::vector<LayerPart> parts(static_cast<std::size_t>(host_.shard_count()));
+  std::uint32_t index = 0;
+  for (protocol::LayerItem& item : command.items) {
+    parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(
+        {index++, std::move(item)});
+  }
+  SubmitParts(command.seq, membership->world, std::move(parts),
+              Pending{.item_count = item_count, .reply = {}});
 }
 
 void Session::Inspect(const protocol::InspectAvatar& question) {
@@ -529,7 +580,16 @@ void Session::Inspect(const protocol::InspectAvatar& question) {
 
 void Session::OnInspected(const protocol::AvatarState& state) {
   --pending_questions_;
-  Send(state);
+  const auto is_walk = [](const protocol::RequestItem& item) {
+    return std::holds_alternative<protocol::WalkMovement>(item.movement);
+  };
+  if ((features_ & protocol::kFeatureWalks) != 0 || std::ranges::none_of(state.queue, is_walk)) {
+    Send(state);
+    return;
+  }
+  protocol::AvatarState without = state;
+  std::erase_if(without.queue, is_walk);
+  Send(without);
 }
 
 template <typename Part>
@@ -552,6 +612,48 @@ void Session::Execute(protocol::Remove&& command) {
 
 void Session::Execute(protocol::CancelQueue&& command) {
   SubmitAvatars<CancelPart>(command.seq, command.world, command.avatars);
+}
+
+void Session::Execute(protocol::SetTerrain&& command) {
+  const Membership* membership = Commanding(command.seq, command.world);
+  if (membership == nullptr) return;
+  if ((features_ & protocol::kFeatureTerrain) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'terrain' was not agreed on in the handshake");
+    return;
+  }
+  // What it costs to make and to tell, in items.
+  std::size_t numbers = 0;
+  if (command.terrain) {
+    numbers = command.terrain->boxes.size();
+    if (const auto& field = command.terrain->height_field) numbers += field->heights_m.size();
+  }
+  const std::size_t item_count = 1 + numbers / kNumbersPerItem;
+  if (!Affords(command.seq, item_count)) return;
+  Pending pending{.outstanding = host_.shard_count(), .item_count = item_count, .reply = {}};
+  pending.reply.seq = command.seq;
+  pending.reply.accepted = 1;
+  pending_items_ += item_count;
+  pending_.emplace(command.seq, std::move(pending));
+  host_.SetTerrain({.world = membership->world,
+                    .from_shard = host_.shard_index(),
+                    .session = identity_.id,
+                    .seq = command.seq,
+                    .terrain = std::move(command.terrain)});
+}
+
+void Session::OnTerrainRefused(Seq seq, Refusal refusal) {
+  const auto it = pending_.find(seq);
+  if (is_ended_ || it == pending_.end()) return;
+  pending_items_ -= it->second.item_count;
+  pending_.erase(it);
+  Answer(seq, refusal.code, std::move(refusal.text));
+  UpdatePause();
+}
+
+void Session::OnGround(WorldId world, const SharedFrame& frame) {
+  if (connection_ == nullptr || (features_ & protocol::kFeatureTerrain) == 0) return;
+  if (worlds_.contains(world)) connection_->SendGround(world, frame);
 }
 
 void Session::OnResult(CommandResult&& result) {
@@ -646,13 +748,27 @@ void Session::Answer(Reply&& reply, WorldId joined) {
 
 void Session::SendWorldInfo(Seq seq, const Membership& membership) {
   const World& world = *membership.world;
+  std::vector<std::string> layers;
+  if ((features_ & protocol::kFeatureLayers) != 0) {
+    for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
+  }
   Send(protocol::WorldInfo{.seq = seq,
                            .world = world.id,
                            .name = world.name,
                            .role = membership.role,
                            .tick = host_.tick(),
                            .library_hash = world.library->hash(),
-                           .skeleton = ToWire(world.library->skeleton())});
+                           .skeleton = ToWire(world.library->skeleton()),
+                           .layers = std::move(layers)});
+}
+
+void Session::SendGround(const World& world, bool also_flat) {
+  if (connection_ == nullptr || (features_ & protocol::kFeatureTerrain) == 0) return;
+  if (const auto ground = world.ground.Get()) {
+    connection_->SendGround(world.id, ground->frame);
+  } else if (also_flat) {
+    Send(protocol::WorldTerrain{.world = world.id, .terrain = {}});
+  }
 }
 
 void Session::SendLagging(Membership& membership) {

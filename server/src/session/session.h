@@ -19,7 +19,8 @@ namespace stridewire::server {
 /// Features this server has.
 inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
-    protocol::kFeatureInspect;
+    protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
+    protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {
@@ -64,6 +65,9 @@ class Session : private ConnectionHandler {
   void OnResult(CommandResult&& result);
   void OnJoined(protocol::Seq seq, Outcome<std::shared_ptr<World>>&& outcome);
   void OnInspected(const protocol::AvatarState& state);
+  void OnTerrainRefused(protocol::Seq seq, Refusal refusal);
+  /// The ground of a world has changed.
+  void OnGround(WorldId world, const SharedFrame& frame);
   void OnPoses(const PoseDelivery& delivery);
   void OnEvents(SharedEvents& events);
 
@@ -125,6 +129,8 @@ class Session : private ConnectionHandler {
   void Execute(protocol::Remove&& command);
   void Execute(protocol::Request&& command);
   void Execute(protocol::CancelQueue&& command);
+  void Execute(protocol::SetTerrain&& command);
+  void Execute(protocol::SetLayers&& command);
   void Execute(protocol::Observe&& command);
   void Execute(protocol::StopObserving&& command);
 
@@ -143,6 +149,8 @@ class Session : private ConnectionHandler {
   void Answer(protocol::Seq seq, protocol::StatusCode code, std::string text = {});
   void Answer(protocol::Reply&& reply, WorldId joined = 0);
   void SendWorldInfo(protocol::Seq seq, const Membership& membership);
+  /// The world's ground, if it has one or if it is wanted all the same.
+  void SendGround(const World& world, bool also_flat);
   void SendLagging(Membership& membership);
   template <typename Message>
   void Send(const Message& message);

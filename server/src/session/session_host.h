@@ -35,6 +35,9 @@ class SessionHost {
   /// Session::OnJoined hears of it.
   virtual void JoinWorld(SessionId session, protocol::Seq seq, std::string name) = 0;
   virtual void LeaveWorld(WorldId world) = 0;
+  /// A ground is made of it; Session::OnResult hears of it from every shard, or once
+  /// Session::OnTerrainRefused.
+  virtual void SetTerrain(TerrainChange&& change) = 0;
   /// The session is to be destroyed, but not before this returns.
   virtual void SessionEnded(SessionId session) = 0;
   /// What a session wants of this world has changed.

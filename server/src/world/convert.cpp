@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <type_traits>
+#include <utility>
 
 namespace stridewire::server {
 namespace {
@@ -34,6 +35,7 @@ protocol::EventType TypeToWire(AvatarEventType type) {
     case AvatarEventType::kFootStrike: return protocol::EventType::kFootStrike;
     case AvatarEventType::kFinished: return protocol::EventType::kFinished;
     case AvatarEventType::kIdle: return protocol::EventType::kIdle;
+    case AvatarEventType::kRejected: return protocol::EventType::kRejected;
   }
   return protocol::EventType::kIdle;
 }
@@ -44,6 +46,10 @@ static_assert(static_cast<int>(MovementKind::kStepLeft) ==
 static_assert(static_cast<int>(MovementKind::kStand) ==
               static_cast<int>(protocol::MovementKind::kStand));
 static_assert(static_cast<int>(Foot::kRight) == static_cast<int>(protocol::FootSide::kRight));
+static_assert(kMaxWaypoints == protocol::kMaxWaypoints);
+static_assert(kMaxTerrainColumns == protocol::kMaxTerrainColumns &&
+              kMaxTerrainRows == protocol::kMaxTerrainColumns &&
+              kMaxTerrainBoxes == protocol::kMaxTerrainBoxes);
 static_assert(static_cast<int>(ParameterName::kHeight) + 1 == protocol::kParameterNames);
 
 }  // namespace
@@ -69,6 +75,7 @@ BaseFrame FromWire(const protocol::Placement& placement) {
 MovementRequest FromWire(const protocol::RequestItem& item) {
   MovementRequest request;
   request.id = item.request_id;
+  request.takeover = static_cast<Takeover>(item.takeover);
   std::visit(
       [&]<typename T>(const T& movement) {
         if constexpr (std::is_same_v<T, protocol::StepMovement>) {
@@ -79,9 +86,15 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           step.side_m = movement.side_m;
           step.height_m = movement.height_m;
           step.turn_rad = movement.turn_rad;
+          if (movement.at) {
+            step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
+          }
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
           request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad};
+        } else if constexpr (std::is_same_v<T, protocol::WalkMovement>) {
+          request.movement = WalkRequest{movement.position_m, movement.heading_rad,
+                                         movement.waypoints_m, movement.speed_m_s};
         } else {
           request.movement = StandRequest{movement.seconds};
         }
@@ -93,6 +106,7 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
 protocol::RequestItem ToWire(const MovementRequest& request) {
   protocol::RequestItem item;
   item.request_id = request.id;
+  item.takeover = static_cast<protocol::Takeover>(request.takeover);
   std::visit(
       [&]<typename T>(const T& movement) {
         if constexpr (std::is_same_v<T, StepRequest>) {
@@ -105,16 +119,55 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           step.side_m = movement.side_m;
           step.height_m = movement.height_m;
           step.turn_rad = movement.turn_rad;
+          if (movement.at) {
+            step = {.foot = step.foot,
+                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad}};
+          }
           item.movement = step;
         } else if constexpr (std::is_same_v<T, JumpRequest>) {
           item.movement =
               protocol::JumpMovement{movement.length_m, movement.height_m, movement.turn_rad};
+        } else if constexpr (std::is_same_v<T, WalkRequest>) {
+          item.movement = protocol::WalkMovement{movement.position_m, movement.heading_rad,
+                                                 movement.waypoints_m, movement.speed_m_s};
         } else {
           item.movement = protocol::StandMovement{movement.seconds};
         }
       },
       request.movement);
   return item;
+}
+
+protocol::TerrainInfo ToWire(const TerrainData& terrain) {
+  protocol::TerrainInfo info;
+  if (const auto& field = terrain.height_field) {
+    info.height_field = {.origin_m = {field->origin_m.x, field->origin_m.z},
+                         .cell_m = field->cell_m,
+                         .columns = static_cast<std::uint16_t>(field->columns),
+                         .rows = static_cast<std::uint16_t>(field->rows),
+                         .heights_m = field->heights_m};
+  }
+  info.boxes.reserve(terrain.boxes.size());
+  for (const TerrainBox& box : terrain.boxes) {
+    info.boxes.push_back({{box.min_m.x, box.min_m.z}, {box.max_m.x, box.max_m.z}, box.height_m});
+  }
+  return info;
+}
+
+TerrainData FromWire(protocol::TerrainInfo&& terrain) {
+  TerrainData data;
+  if (auto& field = terrain.height_field) {
+    data.height_field = {.origin_m = {field->origin_m.x, field->origin_m.z},
+                         .cell_m = field->cell_m,
+                         .columns = field->columns,
+                         .rows = field->rows,
+                         .heights_m = std::move(field->heights_m)};
+  }
+  data.boxes.reserve(terrain.boxes.size());
+  for (const protocol::TerrainBoxInfo& box : terrain.boxes) {
+    data.boxes.push_back({{box.min_m.x, box.min_m.z}, {box.max_m.x, box.max_m.z}, box.height_m});
+  }
+  return data;
 }
 
 protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
@@ -130,9 +183,14 @@ protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
   }
   wire.extrapolated = event.extrapolated;
   wire.clamped = event.clamped;
+  wire.cut_short = event.is_cut_short;
   wire.foot = static_cast<protocol::FootSide>(event.foot);
   wire.position_m = DVec3(event.position_m);
   wire.base = ToWire(event.base);
+  if (event.type == AvatarEventType::kRejected) {
+    wire.code = ToStatusCode(event.code);
+    wire.reason = event.reason;
+  }
   return wire;
 }
 

@@ -5,6 +5,7 @@
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/terrain.h"
 
 /// Between the runtime's values and the wire's, which know nothing of each other.
 namespace stridewire::server {
@@ -15,6 +16,9 @@ namespace stridewire::server {
 [[nodiscard]] MovementRequest FromWire(const protocol::RequestItem& item);
 /// Without avatar number.
 [[nodiscard]] protocol::RequestItem ToWire(const MovementRequest& request);
+
+[[nodiscard]] protocol::TerrainInfo ToWire(const TerrainData& terrain);
+[[nodiscard]] TerrainData FromWire(protocol::TerrainInfo&& terrain);
 
 /// Without avatar, tick and time, which the runtime's event does not have.
 [[nodiscard]] protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library);

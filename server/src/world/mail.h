@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -27,6 +28,13 @@ struct RequestPart {
   };
   std::vector<Item> items;
 };
+struct LayerPart {
+  struct Item {
+    std::uint32_t index = 0;
+    protocol::LayerItem layer;
+  };
+  std::vector<Item> items;
+};
 struct AvatarRef {
   std::uint32_t index = 0;
   AvatarNumber avatar = 0;
@@ -40,13 +48,29 @@ struct CancelPart {
 /// Removes what a session spawned: it has ended, or left the world.
 struct ReleasePart {};
 
+/// Another ground for all avatars, on all shards from the same tick on.
+struct GroundPart {
+  std::shared_ptr<const Ground> ground;
+  std::uint64_t tick = 0;
+};
+
 /// What a shard has to do for a session at its next tick.
 struct WorldCommand {
   std::shared_ptr<World> world;
   int from_shard = 0;  ///< The session's shard.
   SessionId session = 0;
   protocol::Seq seq = 0;  ///< 0: no answer is wanted.
-  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart> part;
+  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, GroundPart, LayerPart>
+      part;
+};
+
+/// A SetTerrain that is on its way to be made a ground of.
+struct TerrainChange {
+  std::shared_ptr<World> world;
+  int from_shard = 0;  ///< The session's shard.
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  std::optional<protocol::TerrainInfo> terrain;
 };
 
 /// What came of it on one shard.

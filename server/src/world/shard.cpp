@@ -58,6 +58,20 @@ void Shard::Stop() {
   if (thread_.joinable()) thread_.join();
 }
 
+void Shard::CloseConnections() {
+  tick_timer_.cancel();
+  housekeeping_timer_.cancel();
+  for (const auto& weak : connections_) {
+    if (const auto connection = weak.lock()) {
+      connection->set_handler(nullptr);
+      connection->Close();
+    }
+  }
+  // A WebSocket that was reading while it closed has its read parked with the io_context it was made on.
+  context_.restart();
+  context_.poll();
+}
+
 // ---- ticks
 
 void Shard::ScheduleTick() {
@@ -239,6 +253,23 @@ void Shard::JoinWorld(SessionId session, protocol::Seq seq, std::string name) {
 }
 
 void Shard::LeaveWorld(WorldId world) { peers_.LeaveWorld(world); }
+
+void Shard::SetTerrain(TerrainChange&& change) { peers_.SetTerrain(std::move(change)); }
+
+void Shard::ChangeGround(WorldCommand command) {
+  asio::post(context_, [this, command = std::move(command)]() mutable {
+    const SharedFrame frame = std::get<GroundPart>(command.part).ground->frame;
+    for (const auto& [id, session] : sessions_) session->OnGround(command.world->id, frame);
+    inbox_.push_back(std::move(command));
+  });
+}
+
+void Shard::RefuseTerrain(SessionId session, protocol::Seq seq, Refusal refusal) {
+  asio::post(context_, [this, session, seq, refusal = std::move(refusal)]() mutable {
+    const auto it = sessions_.find(session);
+    if (it != sessions_.end()) it->second->OnTerrainRefused(seq, std::move(refusal));
+  });
+}
 
 void Shard::Deliver(SessionId session, protocol::Seq seq, Outcome<std::shared_ptr<World>> joined) {
   asio::post(context_, [this, session, seq, joined = std::move(joined)]() mutable {

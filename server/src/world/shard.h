@@ -24,6 +24,7 @@ class ShardPeers {
   virtual ~ShardPeers() = default;
   virtual void JoinWorld(int shard, SessionId session, protocol::Seq seq, std::string name) = 0;
   virtual void LeaveWorld(WorldId world) = 0;
+  virtual void SetTerrain(TerrainChange change) = 0;
   virtual void SessionEnded(SessionId session) = 0;
   /// A session the directory had given up is there after all.
   virtual void SessionBegan(int shard, SessionIdentity identity) = 0;
@@ -49,6 +50,9 @@ class Shard : public SessionHost {
   void Start();
   /// Ends the thread, whatever is under way.
   void Stop();
+  /// Closes what connections are left and lets what waits on them end, so that nothing of them outlives
+  /// this shard elsewhere. When all shards have stopped.
+  void CloseConnections();
 
   // Any thread:
 
@@ -62,6 +66,9 @@ class Shard : public SessionHost {
   };
   void Adopt(Arrival arrival);
   void Deliver(SessionId session, protocol::Seq seq, Outcome<std::shared_ptr<World>> joined);
+  /// A world has another ground: this shard's avatars from a tick on, its sessions are told.
+  void ChangeGround(WorldCommand command);
+  void RefuseTerrain(SessionId session, protocol::Seq seq, Refusal refusal);
   void Drain();
   /// Calls `done` on this shard when its connections have sent what they had.
   void WhenDrained(std::function<void()> done);
@@ -80,6 +87,7 @@ class Shard : public SessionHost {
   void Ask(int shard, Inspection&& question) override;
   void JoinWorld(SessionId session, protocol::Seq seq, std::string name) override;
   void LeaveWorld(WorldId world) override;
+  void SetTerrain(TerrainChange&& change) override;
   void SessionEnded(SessionId session) override;
   void InterestChanged(const std::shared_ptr<World>& world) override;
 

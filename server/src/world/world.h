@@ -8,6 +8,7 @@
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
+#include "world/ground.h"
 
 namespace stridewire::server {
 
@@ -15,7 +16,7 @@ using protocol::AvatarNumber;
 using protocol::WorldId;
 using SessionId = std::uint64_t;
 
-/// What all shards and sessions share of a world. Immutable but for the two counters.
+/// What all shards and sessions share of a world. Immutable but for the two counters and the ground.
 struct World {
   WorldId id = 0;
   std::string name;
@@ -25,6 +26,7 @@ struct World {
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
   std::atomic<AvatarNumber> last_number{0};   ///< Largest avatar number ever asked for.
+  GroundSlot ground;  ///< As last set; a shard's avatars have it from a tick on.
 };
 
 /// The shard an avatar lives on.

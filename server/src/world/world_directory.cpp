@@ -1,6 +1,7 @@
 #include "world/world_directory.h"
 
 #include "stridewire/base/check.h"
+#include "world/convert.h"
 
 namespace stridewire::server {
 
@@ -27,12 +28,36 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   world->id = ++last_id_;
   world->name = std::string(name);
   world->avatar_options.run_time_correction = config_.run_time_correction;
+  world->avatar_options.foot_planting = config_.foot_planting;
   world->persistent = is_configured ? configured->second.persistent : config_.persistent;
   const bool has_library = is_configured && !configured->second.library.empty();
   world->library = libraries_.Find(has_library ? configured->second.library : config_.library);
   STRIDEWIRE_CHECK(world->library != nullptr);  // all that are configured were loaded at the start
+  if (is_configured && !configured->second.terrain.empty()) {
+    auto ground = MakeGround(world->id, terrains_.Find(configured->second.terrain), encoder_);
+    STRIDEWIRE_CHECK(ground.has_value());  // the same
+    world->ground.Set(*std::move(ground));
+  }
   worlds_.emplace(world->name, Entry{world, 1});
   return world;
+}
+
+Outcome<std::shared_ptr<const Ground>> WorldDirectory::SetTerrain(
+    World& world, std::optional<protocol::TerrainInfo>&& terrain) {
+  const auto refuse = [](const Error& error) {
+    const bool is_limit = error.code == ErrorCode::kLimitExceeded;
+    return Refuse(is_limit ? StatusCode::kLimitReached : StatusCode::kOutOfRange, Describe(error));
+  };
+  std::shared_ptr<const Terrain> made;
+  if (terrain) {
+    auto checked = Terrain::Make(FromWire(*std::move(terrain)));
+    if (!checked) return refuse(checked.error());
+    made = *std::move(checked);
+  }
+  auto ground = MakeGround(world.id, std::move(made), encoder_);
+  if (!ground) return refuse(ground.error());
+  world.ground.Set(*ground);
+  return *std::move(ground);
 }
 
 void WorldDirectory::Leave(WorldId id) {

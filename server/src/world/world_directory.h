@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -9,6 +10,7 @@
 
 #include "ops/config.h"
 #include "ops/libraries.h"
+#include "ops/terrains.h"
 #include "session/refusal.h"
 #include "world/world.h"
 
@@ -18,9 +20,12 @@ namespace stridewire::server {
 /// when nobody is in it and no avatar lives.
 class WorldDirectory {
  public:
-  /// Borrows both.
-  WorldDirectory(const Config& config, const Libraries& libraries)
-      : config_(config), libraries_(libraries) {}
+  /// Borrows all.
+  WorldDirectory(const Config& config, const Libraries& libraries, const Terrains& terrains)
+      : config_(config),
+        libraries_(libraries),
+        terrains_(terrains),
+        encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}) {}
 
   /// One member more. kInvalidArgument: no name for a world; kNoSuchWorld: not configured, and
   /// worlds are not open; kLimitReached: max_worlds.
@@ -28,6 +33,11 @@ class WorldDirectory {
 
   /// One member less.
   void Leave(WorldId id);
+
+  /// Gives a world the ground that was sent, null: flat; what its shards and sessions are to share.
+  /// kOutOfRange, kLimitReached: it is no terrain.
+  [[nodiscard]] Outcome<std::shared_ptr<const Ground>> SetTerrain(
+      World& world, std::optional<protocol::TerrainInfo>&& terrain);
 
   /// Forgets empty worlds and says which.
   [[nodiscard]] std::vector<WorldId> DropEmpty();
@@ -47,6 +57,8 @@ class WorldDirectory {
   };
   const Config& config_;
   const Libraries& libraries_;
+  const Terrains& terrains_;
+  protocol::Encoder encoder_;
   std::map<std::string, Entry, std::less<>> worlds_;
   WorldId last_id_ = 0;
 };

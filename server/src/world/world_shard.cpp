@@ -39,7 +39,8 @@ WorldShard::WorldShard(std::shared_ptr<World> world, int shard, int shard_count,
       clock_(clock),
       budget_(budget),
       metrics_(metrics),
-      interests_(static_cast<std::size_t>(shard_count)) {}
+      interests_(static_cast<std::size_t>(shard_count)),
+      ground_(world_->ground.Get()) {}
 
 WorldShard::~WorldShard() { budget_.Release(*world_, static_cast<std::int64_t>(avatars_.size())); }
 
@@ -66,6 +67,10 @@ CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tic
           Remove(part, tick, result);
         } else if constexpr (std::is_same_v<T, CancelPart>) {
           Cancel(part, result);
+        } else if constexpr (std::is_same_v<T, LayerPart>) {
+          SetLayers(part, result);
+        } else if constexpr (std::is_same_v<T, GroundPart>) {
+          grounds_.push_back(part);
         } else {
           Release(command.session, tick);
         }
@@ -76,6 +81,8 @@ CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tic
 
 void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::uint64_t tick,
                        CommandResult& result) {
+  AvatarOptions options = world_->avatar_options;
+  options.terrain = terrain();
   for (const SpawnPart::Item& item : part.items) {
     const AvatarNumber number = item.spawn.avatar;
     ReplyItem reply{.index = item.index, .avatar = number};
@@ -92,7 +99,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
       continue;
     }
     const BaseFrame start = FromWire(item.spawn.start);
-    avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start, world_->avatar_options),
+    avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start, options),
                                    .owner = command.session,
                                    .spawn_tick = tick});
     if (events_wanted_) {
@@ -113,7 +120,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
     }
     Avatar& avatar = it->second.avatar;
     ReplyItem refused{.index = item.index, .avatar = asked.avatar, .request_id = asked.request_id};
-    if (avatar.queue_size() >= max_queue_) {
+    if (asked.takeover == protocol::Takeover::kNone && avatar.queue_size() >= max_queue_) {
       metrics_.Reached(Limit::kQueue);
       refused.code = StatusCode::kQueueFull;
       refused.text = "the avatar's queue is full";
@@ -158,6 +165,36 @@ void WorldShard::Cancel(const CancelPart& part, CommandResult& result) {
   }
 }
 
+void WorldShard::SetLayers(const LayerPart& part, CommandResult& result) {
+  for (const LayerPart::Item& item : part.items) {
+    const protocol::LayerItem& asked = item.layer;
+    const auto it = avatars_.find(asked.avatar);
+    if (it == avatars_.end()) {
+      result.items.push_back(NoSuchAvatar(item.index, asked.avatar));
+      continue;
+    }
+    const Status status =
+        it->second.avatar.SetLayer({.layer = world_->library->FindLayer(asked.layer),
+                                    .is_on = !asked.is_off,
+                                    .weight = asked.weight,
+                                    .blend_s = asked.blend_s,
+                                    .speed = asked.speed});
+    if (status) {
+      ++result.accepted;
+      continue;
+    }
+    const ErrorCode code = status.error().code;
+    result.items.push_back({.index = item.index,
+                            .avatar = asked.avatar,
+                            .code = code == ErrorCode::kNotFound        ? StatusCode::kNoMovement
+                                    : code == ErrorCode::kLimitExceeded ? StatusCode::kLimitReached
+                                                                        : StatusCode::kOutOfRange,
+                            .text = status.error().text});
+  }
+  metrics_.requests_accepted.Add(result.accepted);
+  metrics_.requests_rejected.Add(part.items.size() - result.accepted);
+}
+
 void WorldShard::Release(SessionId session, std::uint64_t tick) {
   if (world_->persistent) return;
   const std::size_t removed = std::erase_if(avatars_, [&](const auto& item) {
@@ -168,7 +205,31 @@ void WorldShard::Release(SessionId session, std::uint64_t tick) {
   budget_.Release(*world_, static_cast<std::int64_t>(removed));
 }
 
+void WorldShard::ChangeGround(std::uint64_t tick) {
+  while (!grounds_.empty() && grounds_.front().tick <= tick) {
+    ground_ = std::move(grounds_.front().ground);
+    grounds_.pop_front();
+    for (auto& [number, entry] : avatars_) entry.avatar.SetTerrain(terrain());
+  }
+}
+
 void WorldShard::Advance(std::uint64_t tick, int steps) {
+  // Ticks that are made up for have the ground of their own time.
+  while (steps > 1 && !grounds_.empty() && grounds_.front().tick <= tick) {
+    const std::uint64_t first = tick - static_cast<std::uint64_t>(steps) + 1;
+    const std::uint64_t change = grounds_.front().tick;
+    if (change <= first) {
+      ChangeGround(first);
+      continue;
+    }
+    AdvanceAvatars(change - 1, static_cast<int>(change - first));
+    steps = static_cast<int>(tick - change) + 1;
+  }
+  ChangeGround(tick);
+  AdvanceAvatars(tick, steps);
+}
+
+void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   for (auto& [number, entry] : avatars_) {
     for (int step = 1; step <= steps; ++step) {

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <vector>
@@ -57,6 +58,10 @@ class WorldShard {
 
   [[nodiscard]] std::size_t avatar_count() const { return avatars_.size(); }
   [[nodiscard]] const World& world() const { return *world_; }
+  /// The ground its avatars are on, null: flat at 0.
+  [[nodiscard]] std::shared_ptr<const Terrain> terrain() const {
+    return ground_ == nullptr ? nullptr : ground_->terrain;
+  }
   [[nodiscard]] bool HasInterest() const;
 
  private:
@@ -75,8 +80,11 @@ class WorldShard {
              CommandResult& result);
   void Request(const RequestPart& part, std::uint64_t tick, CommandResult& result);
   void Remove(const RemovePart& part, std::uint64_t tick, CommandResult& result);
+  void SetLayers(const LayerPart& part, CommandResult& result);
   void Cancel(const CancelPart& part, CommandResult& result);
   void Release(SessionId session, std::uint64_t tick);
+  void ChangeGround(std::uint64_t tick);
+  void AdvanceAvatars(std::uint64_t tick, int steps);
   protocol::Event& AddEvent(protocol::EventType type, AvatarNumber avatar, std::uint64_t tick);
 
   std::shared_ptr<World> world_;
@@ -90,6 +98,8 @@ class WorldShard {
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;
+  std::shared_ptr<const Ground> ground_;  // null: flat
+  std::deque<GroundPart> grounds_;        // from later ticks on
   std::array<bool, 2> last_batch_had_avatars_{};
 };
 

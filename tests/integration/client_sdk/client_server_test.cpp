@@ -486,5 +486,142 @@ TEST(Sample, WalksOnAfterTheServerWasRestarted) {
 }
 #endif
 
+TEST(ClientAndServer, AGroundIsSetAndSeenByEverybody) {
+  Daemon daemon;
+  User builder(daemon.port());
+  User watcher(daemon.port(), STRIDEWIRE_OBSERVER);
+  ASSERT_TRUE(watcher.Next(STRIDEWIRE_EVENT_WORLD_JOINED));
+  client::Terrain flat;
+  ASSERT_TRUE(watcher.client.GetTerrain(watcher.world, flat));
+  EXPECT_EQ(flat.columns, 0u);
+  EXPECT_TRUE(flat.boxes.empty());
+
+  client::Terrain terrain;
+  terrain.origin_m[0] = -1.5;
+  terrain.cell_m = 0.5;
+  terrain.columns = 2;
+  terrain.rows = 3;
+  EXPECT_FALSE(builder.client.SetTerrain(builder.world, terrain));
+  terrain.heights_m = {0.0f, 0.125f, 0.25f, 0.5f, -0.5f, 1.0f};
+  terrain.boxes = {{{0.0, 1.0}, {2.0, 3.0}, 0.25}};
+  ASSERT_TRUE(builder.client.SetTerrain(builder.world, terrain));
+  for (User* user : {&builder, &watcher}) {
+    ASSERT_TRUE(user->Next(STRIDEWIRE_EVENT_TERRAIN));
+    client::Terrain seen;
+    ASSERT_TRUE(user->client.GetTerrain(user->world, seen));
+    EXPECT_EQ(seen.origin_m[0], -1.5);
+    EXPECT_EQ(seen.cell_m, 0.5);
+    EXPECT_EQ(seen.columns, 2u);
+    EXPECT_EQ(seen.rows, 3u);
+    EXPECT_EQ(seen.heights_m, terrain.heights_m);
+    ASSERT_EQ(seen.boxes.size(), 1u);
+    EXPECT_EQ(seen.boxes[0].max_m[1], 3.0);
+    EXPECT_EQ(seen.boxes[0].height_m, 0.25);
+  }
+  ASSERT_TRUE(builder.client.SetTerrain(builder.world, {}));
+  ASSERT_TRUE(watcher.Next(STRIDEWIRE_EVENT_TERRAIN));
+  ASSERT_TRUE(watcher.client.GetTerrain(watcher.world, terrain));
+  EXPECT_EQ(terrain.columns, 0u);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AStepLandsOnTheGroundThatIsThere) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(2);  // The second hears of the ground, too, though it does nothing.
+  client::Terrain terrain;
+  terrain.boxes = {{{-5.0, 0.25}, {5.0, 5.0}, 0.1}};
+  ASSERT_TRUE(user.client.SetTerrain(user.world, terrain));
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_REPLY));
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // It holds from a tick on.
+  ASSERT_TRUE(user.client.Request(user.world, {client::Step(1, 7, 0.5)}));
+  const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
+  ASSERT_TRUE(strike);
+  EXPECT_GT(strike->position_m[2], 0.25);
+  EXPECT_NEAR(strike->position_m[1], 0.1, 0.03);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_FULL));
+  client::Skeleton skeleton;
+  ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_REPLY));
+  ASSERT_TRUE(user.client.GetSkeleton(user.world, skeleton));
+  const auto joint = [&](const std::string& name) {
+    std::size_t j = 0;
+    while (j < skeleton.joints.size() && name != skeleton.joints[j].name) ++j;
+    return j;
+  };
+  client::Pose before;
+  const auto sample = [&](client::Pose& pose) {
+    const auto time_s = user.client.RenderTime();
+    return time_s && user.client.SamplePose(user.world, 1, *time_s, pose) && !pose.missing();
+  };
+  const auto until = [&](const std::function<bool()>& is_so) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+    while (!is_so() && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    return is_so();
+  };
+  ASSERT_TRUE(until([&] { return sample(before); }));
+  ASSERT_TRUE(user.client.SetLayers(
+      user.world, {client::LayerOn(1, "wave", 1.0, 0.1), client::LayerOn(1, "dance")}));
+  const auto refused = user.Next(STRIDEWIRE_EVENT_ITEM);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->item_index, 1u);
+  EXPECT_EQ(refused->status, STRIDEWIRE_NO_MOVEMENT);
+  client::Pose pose;
+  const auto turned = [&](const char* name) {
+    const auto& a = before.rotations[joint(name)];
+    const auto& b = pose.rotations[joint(name)];
+    return std::abs(a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w) < 0.9f;
+  };
+  EXPECT_TRUE(until([&] { return sample(pose) && turned("RightArm"); }));
+  EXPECT_FALSE(turned("LeftArm"));
+  for (const char* name : {"Hips", "LeftUpLeg", "RightLeg", "LeftFoot"}) {
+    EXPECT_FALSE(turned(name)) << name;
+  }
+  ASSERT_TRUE(user.client.SetLayers(user.world, {client::LayerOff(1, "wave", 0.1)}));
+  EXPECT_TRUE(until([&] { return sample(pose) && !turned("RightArm"); }));
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AWalkArrives) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Request(user.world, {client::WalkTo(1, 7, 1.2, 0.0, 0.8, 0.5)}));
+  auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+  int steps = 0;
+  for (; finished && finished->kind != STRIDEWIRE_KIND_STAND; ++steps) {
+    EXPECT_EQ(finished->request_id, 7u);
+    finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
+  }
+  ASSERT_TRUE(finished);
+  EXPECT_GE(steps, 2);
+  EXPECT_NEAR(finished->base_position_m[0], 1.2, 0.01);
+  EXPECT_NEAR(finished->base_position_m[2], 0.8, 0.01);
+  EXPECT_NEAR(finished->base_heading_rad, 0.5, 0.01);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
+TEST(ClientAndServer, AStepGoesToItsFootprint) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  ASSERT_TRUE(user.client.Request(
+      user.world, {client::StepTo(1, 7, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT)}));
+  const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
+  ASSERT_TRUE(strike);
+  EXPECT_EQ(strike->foot, STRIDEWIRE_FOOT_LEFT);
+  EXPECT_NEAR(strike->position_m[0], 1.1, 0.01);
+  EXPECT_NEAR(strike->position_m[2], 0.45, 0.01);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
 }  // namespace
 }  // namespace stridewire

@@ -237,6 +237,19 @@ TEST(LoadProgram, EndsWithTwoOnBadOptions) {
   EXPECT_EQ(file.err, "stridewire-load: --choreography /nowhere/c.json: there is no such file\n");
 }
 
+TEST(LoadProgram, TakesNoChoreographyThatIsFixedToAPlace) {
+  const test::ScratchFolder scratch;
+  for (const char* text : {R"({"movements":[{"step":{"at_m":[0,0,1]}}]})",
+                           R"({"movements":[{"walk_to":{"position_m":[0,0,1],"heading_rad":0}}]})",
+                           R"({"terrain":{},"movements":[{"stand":{"seconds":1}}]})"}) {
+    const ProgramResult result = RunProgram(
+        STRIDEWIRE_LOAD, {"--connect", "127.0.0.1:1", "--avatars", "5", "--observers", "1",
+                          "--seconds", "1", "--choreography", scratch.Write("c.json", text)});
+    EXPECT_EQ(result.exit_code, 2) << text;
+    EXPECT_THAT(result.err, HasSubstr("c.json: at_m, walk_to and terrain belong to one place"));
+  }
+}
+
 TEST(LoadProgram, HelpsAndTellsItsVersion) {
   EXPECT_EQ(RunProgram(STRIDEWIRE_LOAD, {"--help"}).exit_code, 0);
   const ProgramResult version = RunProgram(STRIDEWIRE_LOAD, {"--version"});

@@ -611,5 +611,214 @@ TEST(ServerSession, SurvivesMutatedFrames) {
   EXPECT_TRUE(client.Join("after"));
 }
 
+protocol::TerrainInfo Slab(double height_m) {
+  protocol::TerrainInfo info;
+  info.height_field = protocol::HeightFieldInfo{{-2, -2}, 0.5, 3, 2, {0, 0.5f, 0, 1, 0, 0.25f}};
+  info.boxes = {{{0, 0}, {1, 2}, height_m}};
+  return info;
+}
+
+TEST(ServerSession, TellsEverybodyInAWorldOfItsGround) {
+  server::Config config = TestConfig();
+  config.shards = 3;
+  TestServer server(config);
+  RawClient controller = server.Connect();
+  RawClient observer = server.Connect();
+  ASSERT_TRUE(controller.SayHello() && observer.SayHello());
+  const auto world = controller.Join("hall");
+  ASSERT_TRUE(world && observer.Join("hall", protocol::Role::kObserver));
+  const auto set = [&](const std::optional<protocol::TerrainInfo>& terrain) {
+    controller.Send(protocol::SetTerrain{
+        .seq = controller.NextSeq(), .world = world->world, .terrain = terrain});
+    return controller.Await<Reply>();
+  };
+  const auto reply = set(Slab(0.5));
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, StatusCode::kOk) << reply->text;
+  EXPECT_EQ(reply->accepted, 1u);
+  const protocol::WorldTerrain told{world->world, Slab(0.5)};
+  EXPECT_EQ(observer.Await<protocol::WorldTerrain>(), told);
+
+  // Who comes later hears of it, too; who does not know of grounds does not.
+  RawClient late = server.Connect();
+  ASSERT_TRUE(late.SayHello());
+  ASSERT_TRUE(late.Join("hall"));
+  EXPECT_EQ(late.Await<protocol::WorldTerrain>(), told);
+  RawClient old = server.Connect();
+  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
+  ASSERT_TRUE(old.Join("hall"));
+
+  const auto refused = set(Slab(20'000.0));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, StatusCode::kOutOfRange);
+  EXPECT_THAT(refused->text, testing::HasSubstr("boxes[0].height_m"));
+  ASSERT_TRUE(set(std::nullopt));
+  EXPECT_EQ(observer.Await<protocol::WorldTerrain>(),
+            (protocol::WorldTerrain{world->world, std::nullopt}));
+
+  observer.Send(protocol::SetTerrain{.seq = observer.NextSeq(), .world = world->world});
+  const auto not_allowed = observer.Await<Reply>();
+  ASSERT_TRUE(not_allowed);
+  EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
+  old.Send(protocol::SetTerrain{.seq = old.NextSeq(), .world = world->world});
+  bool was_told = false;
+  const auto unsupported = old.Await<Reply>([&](const protocol::Message& message) {
+    was_told |= std::holds_alternative<protocol::WorldTerrain>(message);
+  });
+  ASSERT_TRUE(unsupported);
+  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
+  EXPECT_FALSE(was_told);
+}
+
+TEST(ServerSession, AResumedSessionHearsOfTheGroundThatIs) {
+  TestServer server;
+  RawClient other = server.Connect();
+  ASSERT_TRUE(other.SayHello());
+  const auto world = other.Join("hall");
+  RawClient client = server.Connect();
+  const auto welcome = client.SayHello();
+  ASSERT_TRUE(world && welcome && client.Join("hall"));
+  for (const std::optional<protocol::TerrainInfo>& terrain :
+       {std::optional(Slab(0.25)), std::optional<protocol::TerrainInfo>()}) {
+    client.Abort();
+    other.Send(
+        protocol::SetTerrain{.seq = other.NextSeq(), .world = world->world, .terrain = terrain});
+    ASSERT_TRUE(other.Await<Reply>());
+    client = server.Connect();
+    const auto back = client.SayHello(~0ull, welcome->resume_token);
+    ASSERT_TRUE(back && back->resumed);
+    EXPECT_EQ(client.Await<protocol::WorldTerrain>(),
+              (protocol::WorldTerrain{world->world, terrain}));
+  }
+}
+
+// What a client of before terrain, footprints and walks is answered when it asks for the movement.
+std::optional<StatusCode> WhatOldClientsHear(
+    TestServer& server, const decltype(protocol::RequestItem::movement)& movement,
+    protocol::Takeover takeover = protocol::Takeover::kNone) {
+  RawClient old = server.Connect();
+  if (!old.SayHello(protocol::kFeatureQuantised)) return {};
+  const auto world = old.Join("hall");
+  if (!world) return {};
+  const auto reply = old.Request(world->world, {{1, 9, movement, takeover}});
+  if (!reply) return {};
+  return reply->code;
+}
+
+// Somebody who commands one avatar.
+class ServerSessionOfOne : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(client_.SayHello());
+    const auto world = client_.Join("hall");
+    ASSERT_TRUE(world);
+    world_ = world->world;
+    ASSERT_TRUE(client_.Spawn(world_, {{1, {}}}));
+  }
+
+  TestServer server_;
+  RawClient client_ = server_.Connect();
+  protocol::WorldId world_ = 0;
+};
+
+TEST_F(ServerSessionOfOne, WalksForWhoKnowsOfThem) {
+  protocol::WalkMovement walk{DVec3(0.5, 0.0, 2.0), 1.0, {DVec3(0.0, 0.0, 1.0)}, 1.0};
+  const auto reply = client_.Request(world_, {{1, 7, walk}});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->accepted, 1u) << (reply->items.empty() ? "" : reply->items[0].text);
+  walk.speed_m_s = 9.0;
+  const auto too_fast = client_.Request(world_, {{1, 8, walk}});
+  ASSERT_TRUE(too_fast);
+  ASSERT_EQ(too_fast->items.size(), 1u);
+  EXPECT_EQ(too_fast->items[0].code, StatusCode::kOutOfRange);
+  EXPECT_EQ(WhatOldClientsHear(server_, walk), StatusCode::kUnsupported);
+}
+
+TEST_F(ServerSessionOfOne, RequestsTakeOver) {
+  ASSERT_TRUE(client_.Request(
+      world_, {{1, 7, protocol::StandMovement{100.0}}, {1, 8, protocol::StandMovement{1.0}}}));
+  const protocol::RequestItem now{1, 9, protocol::StepMovement{.length_m = 0.3},
+                                  protocol::Takeover::kNow};
+  const auto reply = client_.Request(world_, {now});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->accepted, 1u);
+  // Had it not, the first stand would go on for a minute and a half.
+  std::vector<protocol::RequestId> finished;
+  while (finished.size() < 2) {
+    const auto events = client_.Await<protocol::Events>();
+    ASSERT_TRUE(events);
+    for (const protocol::Event& event : events->events) {
+      if (event.type == protocol::EventType::kFinished && event.request_id != 0) {
+        finished.push_back(event.request_id);
+      }
+    }
+  }
+  EXPECT_EQ(finished, (std::vector<protocol::RequestId>{7, 9}));
+  EXPECT_EQ(WhatOldClientsHear(server_, protocol::StepMovement{}, protocol::Takeover::kNow),
+            StatusCode::kUnsupported);
+  EXPECT_NE(WhatOldClientsHear(server_, protocol::StepMovement{}), StatusCode::kUnsupported);
+}
+
+TEST(ServerSession, LayersForWhoKnowsOfThem) {
+  server::Config config = TestConfig();
+  config.shards = 3;
+  config.library = "builtin";
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("hall");
+  ASSERT_TRUE(world);
+  EXPECT_EQ(world->layers, (std::vector<std::string>{"wave", "carry"}));
+  ASSERT_TRUE(client.Spawn(world->world, {{1, {}}, {2, {}}, {3, {}}}));
+  const auto set = [](RawClient& who, protocol::WorldId id,
+                      std::vector<protocol::LayerItem> items) {
+    who.Send(protocol::SetLayers{.seq = who.NextSeq(), .world = id, .items = std::move(items)});
+    return who.Await<Reply>();
+  };
+  const auto reply = set(client, world->world,
+                         {{1, "wave"},
+                          {9, "wave"},
+                          {2, "dance"},
+                          {3, "carry", false, 2.0},
+                          {3, "carry", false, 1.0, 11.0},
+                          {2, "wave", false, 1.0, 0.3, 0.0},
+                          {3, "carry"},
+                          {2, "carry", true}});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, StatusCode::kOk);
+  EXPECT_EQ(reply->accepted, 3u);
+  std::vector<std::pair<std::uint32_t, StatusCode>> refused;
+  for (const protocol::ReplyItem& item : reply->items) refused.emplace_back(item.index, item.code);
+  EXPECT_EQ(refused,
+            (std::vector<std::pair<std::uint32_t, StatusCode>>{{1, StatusCode::kNoSuchAvatar},
+                                                               {2, StatusCode::kNoMovement},
+                                                               {3, StatusCode::kOutOfRange},
+                                                               {4, StatusCode::kOutOfRange},
+                                                               {5, StatusCode::kOutOfRange}}));
+
+  RawClient observer = server.Connect();
+  ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
+  const auto not_allowed = set(observer, world->world, {{1, "wave"}});
+  ASSERT_TRUE(not_allowed);
+  EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
+  RawClient old = server.Connect();
+  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
+  const auto old_world = old.Join("hall");
+  ASSERT_TRUE(old_world);
+  EXPECT_TRUE(old_world->layers.empty());
+  const auto unsupported = set(old, world->world, {{1, "wave"}});
+  ASSERT_TRUE(unsupported);
+  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
+}
+
+TEST_F(ServerSessionOfOne, StepsToAFootprint) {
+  const protocol::StepMovement step{.foot = protocol::FootChoice::kLeft,
+                                    .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0}};
+  const auto reply = client_.Request(world_, {{1, 7, step}});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->accepted, 1u) << (reply->items.empty() ? "" : reply->items[0].text);
+  EXPECT_EQ(WhatOldClientsHear(server_, step), StatusCode::kUnsupported);
+}
+
 }  // namespace
 }  // namespace stridewire

@@ -398,6 +398,85 @@ TEST_F(SessionTest, NothingOfAnEarlierServerIsShownAfterALostSession) {
   EXPECT_TRUE(session_->FindWorld(world)->Find(1)->stamp(0).discontinuity);
 }
 
+protocol::TerrainInfo Slab(double height_m) {
+  protocol::TerrainInfo info;
+  info.height_field = protocol::HeightFieldInfo{{-2, -2}, 0.5, 3, 2, {0, 0.5f, 0, 1, 0, 0.25f}};
+  info.boxes = {{{0, 0}, {1, 2}, height_m}};
+  return info;
+}
+
+TEST_F(SessionTest, AWorldHasTheGroundThatTheServerToldOfLast) {
+  const stridewire_world world = Joined();
+  (void)Events();
+  EXPECT_FALSE(session_->TerrainOf(world));
+  Tell(protocol::WorldTerrain{5, std::nullopt});  // As it was: nobody is told.
+  Tell(protocol::WorldTerrain{6, Slab(0.5)});     // Somebody else's.
+  EXPECT_TRUE(Events().empty());
+  Tell(protocol::WorldTerrain{5, Slab(0.5)});
+  Tell(protocol::WorldTerrain{5, Slab(0.5)});
+  EXPECT_EQ(session_->TerrainOf(world), Slab(0.5));
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].type, STRIDEWIRE_EVENT_TERRAIN);
+  EXPECT_EQ(events[0].world, world);
+
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  Ready(true);
+  EXPECT_TRUE(session_->TerrainOf(world)) << "resumed: it is still that";
+  session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
+  (void)Events();
+  Ready(false);
+  EXPECT_FALSE(session_->TerrainOf(world)) << "a new session will be told anew";
+  EXPECT_THAT(EventTypes(), testing::Contains(int{STRIDEWIRE_EVENT_TERRAIN}));
+}
+
+TEST_F(SessionTest, SendsGroundsFootprintsAndWalksToAServerThatKnowsThem) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->SetTerrain(world, {0, 0, Slab(0.25)}, command_), STRIDEWIRE_OK);
+  protocol::Request request = StepOf(1, 9);
+  request.items[0].movement =
+      protocol::StepMovement{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5}};
+  EXPECT_EQ(session_->Request(world, request, command_), STRIDEWIRE_OK);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 2u);
+  EXPECT_EQ(std::get<protocol::SetTerrain>(sent[0]), (protocol::SetTerrain{2, 5, Slab(0.25)}));
+  EXPECT_EQ(std::get<protocol::Request>(sent[1]).items[0].movement, request.items[0].movement);
+
+  protocol::Request walk = StepOf(1, 10);
+  walk.items[0].movement =
+      protocol::WalkMovement{DVec3(1.0, 0.0, 2.0), 0.5, {DVec3(0.0, 0.0, 1.0)}, 1.25};
+  EXPECT_EQ(session_->Request(world, walk, command_), STRIDEWIRE_OK);
+  const auto walks = Sent();
+  ASSERT_EQ(walks.size(), 1u);
+  EXPECT_EQ(std::get<protocol::Request>(walks[0]).items[0].movement, walk.items[0].movement);
+
+  protocol::SetTerrain bad{0, 0, Slab(0.25)};
+  bad.terrain->height_field->heights_m.pop_back();
+  EXPECT_NE(session_->SetTerrain(world, bad, command_), STRIDEWIRE_OK);
+  EXPECT_THAT(session_->last_text(), testing::HasSubstr("heights_m"));
+
+  Use({});
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Connect();
+  protocol::Welcome welcome = toy::Welcome();
+  welcome.features = protocol::kFeatureResume;
+  Tell(welcome);
+  stridewire_world old = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
+  LetIn();
+  (void)Events();
+  EXPECT_EQ(session_->SetTerrain(old, {0, 0, Slab(0.25)}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->Request(old, walk, command_), STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[2].status, STRIDEWIRE_UNSUPPORTED);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
+  EXPECT_EQ(events[1].status, STRIDEWIRE_UNSUPPORTED);
+  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
+}
+
 TEST_F(SessionTest, CommandsAreBounded) {
   SessionOptions options;
   options.max_commands = 10;
@@ -709,6 +788,7 @@ TEST_F(SessionTest, MutatedFramesOfAServerNeverHarm) {
   add(protocol::Events{5, 1, 10, {event}});
   add(protocol::Lagging{5, 10, 1});
   add(protocol::Pong{1, 0.5, 1.0, 3});
+  add(protocol::WorldTerrain{5, Slab(0.5)});
   add(protocol::ErrorNotice{protocol::StatusCode::kInternal, "oh", false, 2});
   frames.push_back(toy::PoseFrame(5, 7, {{1}, {2}}));
   frames.push_back(toy::PoseFrame(5, 8, {{1}, {2}}, protocol::PoseMode::kQuantised));

@@ -441,6 +441,94 @@ TEST(Check, AvatarState) {
       1);
 }
 
+TEST(Check, Footprints) {
+  Request good = GoodRequest();
+  good.items[0].movement = StepMovement{.at = Footprint{DVec3(1.0, 2.0, 3.0), 0.5}};
+  const auto at = [](Request& m) -> Footprint& {
+    return *std::get<StepMovement>(m.items[0].movement).at;
+  };
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return at(m).position_m.z; }, "Request.at_m");
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return *at(m).heading_rad; }, "Request.heading_rad");
+}
+
+TEST(Check, Walks) {
+  Request good = GoodRequest();
+  good.items[0].movement = WalkMovement{DVec3(1.0, 2.0, 3.0), 0.5, {DVec3(1.0)}, 1.0};
+  const auto walk = [](Request& m) -> WalkMovement& {
+    return std::get<WalkMovement>(m.items[0].movement);
+  };
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return walk(m).position_m.z; }, "Request.at_m");
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return walk(m).heading_rad; }, "Request.heading_rad");
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return walk(m).waypoints_m[0].x; }, "Request.waypoints_m");
+  RefusedWhenNotFinite<Request>(
+      good, [&](Request& m) -> double& { return *walk(m).speed_m_s; }, "Request.speed_m_s");
+  Refused<Request>(
+      good, [&](Request& m) { walk(m).waypoints_m.resize(kMaxWaypoints + 1); },
+      ErrorCode::kLimitExceeded, "Request.waypoints_m", kMaxWaypoints + 1);
+}
+
+TEST(Check, Layers) {
+  using L = SetLayers;
+  const L good{1, 2, {{41, "wave"}, {42, "carry", true}}};
+  constexpr auto kRange = ErrorCode::kOutOfRange;
+  Refused<L>(good, [](L& m) { m.seq = 0; }, kRange, "SetLayers.seq");
+  Refused<L>(good, [](L& m) { m.world = 0; }, kRange, "SetLayers.world");
+  Refused<L>(good, [](L& m) { m.items.clear(); }, ErrorCode::kMalformed, "SetLayers.items");
+  Refused<L>(good, [](L& m) { m.items[1].avatar = 0; }, kRange, "SetLayers.avatar", 1);
+  Refused<L>(
+      good, [](L& m) { m.items[1].layer.clear(); }, ErrorCode::kMalformed, "SetLayers.layer", 1);
+  Refused<L>(
+      good, [](L& m) { m.items[0].layer.assign(65, 'a'); }, ErrorCode::kLimitExceeded,
+      "SetLayers.layer", 0);
+  RefusedWhenNotFinite<L>(
+      good, [](L& m) -> double& { return m.items[0].weight; }, "SetLayers.weight");
+  RefusedWhenNotFinite<L>(
+      good, [](L& m) -> double& { return m.items[0].blend_s; }, "SetLayers.blend_s");
+  RefusedWhenNotFinite<L>(
+      good, [](L& m) -> double& { return m.items[0].speed; }, "SetLayers.speed");
+}
+
+TEST(Check, Terrain) {
+  using T = SetTerrain;
+  T good{1, 2, TerrainInfo{}};
+  good.terrain->height_field = HeightFieldInfo{{0, 0}, 0.5, 2, 3, std::vector<float>(6)};
+  good.terrain->boxes = {{{0, 0}, {1, 1}, 0.5}, {{0, 0}, {1, 1}, 0.5}};
+  constexpr auto kRange = ErrorCode::kOutOfRange;
+  Refused<T>(good, [](T& m) { m.seq = 0; }, kRange, "SetTerrain.seq");
+  Refused<T>(good, [](T& m) { m.world = 0; }, kRange, "SetTerrain.world");
+  Refused<WorldTerrain>(
+      {1, good.terrain}, [](WorldTerrain& m) { m.world = 0; }, kRange, "WorldTerrain.world");
+  RefusedWhenNotFinite<T>(
+      good, [](T& m) -> double& { return m.terrain->height_field->origin_m.z; },
+      "Terrain.origin_m");
+  for (const double cell_m : {0.0, -1.0, kNaN, kInfinity}) {
+    Refused<T>(
+        good, [&](T& m) { m.terrain->height_field->cell_m = cell_m; }, kRange, "Terrain.cell_m");
+  }
+  Refused<T>(
+      good, [](T& m) { m.terrain->height_field->columns = 1; }, kRange, "Terrain.columns", 1);
+  Refused<T>(
+      good, [](T& m) { m.terrain->height_field->rows = 1025; }, kRange, "Terrain.rows", 1025);
+  Refused<T>(
+      good, [](T& m) { m.terrain->height_field->heights_m.pop_back(); }, ErrorCode::kShapeMismatch,
+      "Terrain.heights_m", 5);
+  Refused<T>(
+      good,
+      [](T& m) { m.terrain->height_field->heights_m[4] = std::numeric_limits<float>::infinity(); },
+      kRange, "Terrain.heights_m", 4);
+  RefusedWhenNotFinite<T>(
+      good, [](T& m) -> double& { return m.terrain->boxes[1].height_m; }, "Terrain.boxes");
+  Refused<T>(good, [](T& m) { m.terrain->boxes[1].max_m.x = 0.0; }, kRange, "Terrain.boxes", 1);
+  Refused<T>(
+      good, [](T& m) { m.terrain->boxes.resize(kMaxTerrainBoxes + 1, m.terrain->boxes[0]); },
+      ErrorCode::kLimitExceeded, "Terrain.boxes");
+}
+
 TEST(Check, AvatarStateMovement) {
   using S = AvatarState;
   const S good = GoodState();

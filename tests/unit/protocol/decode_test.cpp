@@ -61,7 +61,10 @@ TEST(Decode, EveryTypeIsChecked) {
       {MessageType::kLagging, "Lagging.world"},
       {MessageType::kError, ""},
       {MessageType::kPong, ""},
-      {MessageType::kAvatarState, "AvatarState.world"}};
+      {MessageType::kAvatarState, "AvatarState.world"},
+      {MessageType::kSetTerrain, "SetTerrain.seq"},
+      {MessageType::kWorldTerrain, "WorldTerrain.world"},
+      {MessageType::kSetLayers, "SetLayers.seq"}};
   EXPECT_EQ(first_wrong.size(), std::variant_size_v<Message>);
   FlatBufferBuilder builder;
   const auto empty = Finished(builder, wire::CreatePing(builder));

@@ -41,7 +41,7 @@ void TakeAll(FrameReader& reader, std::span<const std::byte> bytes, std::vector<
   EXPECT_TRUE(bytes.empty());
 }
 
-std::array<std::byte, kFrameHeaderBytes> Header(MessageType type, std::size_t payload_bytes) {
+std::array<std::byte, kFrameHeaderBytes> HeaderOf(MessageType type, std::size_t payload_bytes) {
   std::array<std::byte, kFrameHeaderBytes> bytes;
   WriteFrameHeader({type, static_cast<std::uint32_t>(payload_bytes)}, bytes);
   return bytes;
@@ -103,7 +103,7 @@ TEST(FrameReader, ReadsUnalignedInput) {
 
 TEST(FrameReader, AnErrorStays) {
   FrameReader reader(Sender::kClient);
-  auto bad = Header(MessageType::kPing, 16);
+  auto bad = HeaderOf(MessageType::kPing, 16);
   bad[0] = std::byte{0};
   for (std::size_t i = 0; i < bad.size(); ++i) {
     std::span<const std::byte> one = std::span(bad).subspan(i, 1);
@@ -130,7 +130,7 @@ TEST(FrameReader, RefusesWhatThePeerMayNotSend) {
 
 TEST(FrameReader, AnAnnouncedLengthAllocatesNothing) {
   FrameReader reader(Sender::kClient);
-  const auto header = Header(MessageType::kRequest, kMaxBulkBytes);
+  const auto header = HeaderOf(MessageType::kRequest, kMaxBulkBytes);
   std::span<const std::byte> bytes = header;
   const auto next = reader.Next(bytes);
   ASSERT_TRUE(next);
@@ -140,7 +140,7 @@ TEST(FrameReader, AnAnnouncedLengthAllocatesNothing) {
 
 TEST(FrameReader, MemoryFollowsWhatArrivesAndEndsAtOneFrame) {
   FrameReader reader(Sender::kClient);
-  const auto header = Header(MessageType::kRequest, kMaxBulkBytes);
+  const auto header = HeaderOf(MessageType::kRequest, kMaxBulkBytes);
   std::span<const std::byte> bytes = header;
   ASSERT_TRUE(reader.Next(bytes));
   const std::vector<std::byte> piece(10'000);
@@ -168,7 +168,7 @@ TEST(FrameReader, LimitsMayChangeBetweenFrames) {
   std::span<const std::byte> bytes = hello;
   ASSERT_TRUE(reader.Next(bytes));
   reader.set_limits({});
-  const auto header = Header(MessageType::kRequest, 1 << 20);
+  const auto header = HeaderOf(MessageType::kRequest, 1 << 20);
   bytes = header;
   EXPECT_TRUE(reader.Next(bytes));
 

@@ -12,8 +12,8 @@
 namespace stridewire::protocol {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kFloatNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
 
 Quat RandomRotation(std::mt19937& random) {
   std::normal_distribution<double> normal;
@@ -184,7 +184,7 @@ TEST(PoseCodec, EncodeRefusesWhatIsNoPose) {
     const std::size_t bytes = PoseBytes(mode, 1);
     EXPECT_EQ(code(mode, Vec3(0.0f), one, bytes - 1), ErrorCode::kShapeMismatch);
     EXPECT_EQ(code(mode, Vec3(0.0f), one, bytes + 1), ErrorCode::kShapeMismatch);
-    for (const float bad : {kNaN, kInfinity, -kInfinity}) {
+    for (const float bad : {kFloatNaN, kFloatInfinity, -kFloatInfinity}) {
       EXPECT_EQ(code(mode, Vec3(0.0f, bad, 0.0f), one, bytes), ErrorCode::kOutOfRange);
       EXPECT_EQ(code(mode, Vec3(0.0f), Quat(1.0f, bad, 0.0f, 0.0f), bytes), ErrorCode::kOutOfRange);
     }
@@ -218,7 +218,7 @@ TEST(PoseCodec, FullDecodeRefusesWhatIsNoPose) {
   };
   ASSERT_TRUE(decode());
   for (std::size_t i = 0; i < numbers.size(); ++i) {
-    for (const float bad : {kNaN, kInfinity, -kInfinity}) {
+    for (const float bad : {kFloatNaN, kFloatInfinity, -kFloatInfinity}) {
       const float kept = std::exchange(numbers[i], bad);
       const Status status = decode();
       ASSERT_FALSE(status);

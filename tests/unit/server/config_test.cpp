@@ -79,9 +79,10 @@ TEST(Config, PrintsWhatItReads) {
   config.tick_hz = 29.97;
   config.allow_insecure = true;
   config.run_time_correction = false;
+  config.foot_planting = false;
   config.limits.max_sessions = 3;
   config.limits.idle_timeout_s = 0.0;
-  config.worlds["hall"] = {.library = "hall.swl", .persistent = true};
+  config.worlds["hall"] = {.library = "hall.swl", .terrain = "hall \"1\".json", .persistent = true};
   config.worlds["a.b-c_1"] = {};
   const std::string text = PrintConfig(config);
   Config read;
@@ -93,6 +94,7 @@ TEST(Config, PrintsWhatItReads) {
   EXPECT_EQ(read.allowed_origins, config.allowed_origins);
   EXPECT_EQ(read.tick_hz, 29.97);
   EXPECT_FALSE(read.run_time_correction);
+  EXPECT_FALSE(read.foot_planting);
   EXPECT_EQ(read.worlds, config.worlds);
   EXPECT_EQ(read.limits.idle_timeout_s, 0.0);
 }
@@ -128,6 +130,7 @@ TEST(Config, FileErrorsNameFileLineAndKey) {
       {"[worlds.\"../x\"]\nlibrary = \"a\"", "worlds.../x", "a world's name"},
       {"[worlds.hall]\nlibrary = 1", "f.toml:2: worlds.hall.library", "in quotes"},
       {"[worlds.hall]\nlibrary = \"\"", "f.toml:2: worlds.hall.library", "in quotes"},
+      {"[worlds.hall]\nterrain = true", "f.toml:2: worlds.hall.terrain", "in quotes"},
       {"[worlds.hall]\npersistent = \"yes\"", "f.toml:2: worlds.hall.persistent", "true or false"},
       {"[worlds.hall]\nbig = true", "f.toml:2: worlds.hall.big", "no such key"},
       {"tick_hz = = 3", "f.toml:1", "not TOML"},

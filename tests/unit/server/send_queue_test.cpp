@@ -46,6 +46,27 @@ TEST(SendQueue, SendsControlInOrderAndBeforePoses) {
   EXPECT_EQ(queue.control_bytes(), 0u);
 }
 
+TEST(SendQueue, OfAGroundTheLastIsSentAndBehindControl) {
+  SendQueue queue(1000, 4);
+  queue.PushGround(1, Frame(5000, 10));
+  queue.PushGround(2, Frame(10, 20));
+  queue.PushGround(1, Frame(5000, 11));
+  queue.PushGround(3, Frame(10, 30));
+  queue.DropGround(3);
+  EXPECT_EQ(queue.control_bytes(), 0u) << "events have their budget to themselves";
+  EXPECT_EQ(queue.PushPoses(Batch(50)), 0u);
+  for (int i = 1; i <= 3; ++i) queue.PushControl(Frame(10, i));
+  SendQueue::Gathered out;
+  queue.Gather(20, out);  // The third does not fit: what it tells may be what a ground is about.
+  EXPECT_THAT(Marks(out), ElementsAre(1, 2, 50));
+  queue.Gather(1 << 20, out);
+  EXPECT_THAT(Marks(out), ElementsAre(3, 11));
+  EXPECT_FALSE(queue.empty());
+  queue.Gather(1 << 20, out);
+  EXPECT_THAT(Marks(out), ElementsAre(20));
+  EXPECT_TRUE(queue.empty());
+}
+
 TEST(SendQueue, ASlowObserverKeepsTheLatestTicks) {
   SendQueue queue(1000, 3);
   std::size_t dropped = 0;

@@ -11,26 +11,26 @@ namespace stridewire::server {
 namespace {
 
 using testing::ElementsAre;
-using Verdict = ReplyMemory::Verdict;
+using Known = ReplyMemory::Verdict;
 
-SharedFrame Frame(std::size_t bytes) {
+SharedFrame FrameOf(std::size_t bytes) {
   return std::make_shared<const std::vector<std::byte>>(bytes);
 }
 
 TEST(ReplyMemory, TakesCommandsInOrderAndOnce) {
   ReplyMemory memory(10, 1000);
   EXPECT_EQ(memory.last_seq(), 0u);
-  EXPECT_EQ(memory.Judge(1), Verdict::kNew);
-  EXPECT_EQ(memory.Judge(2), Verdict::kGap);
+  EXPECT_EQ(memory.Judge(1), Known::kNew);
+  EXPECT_EQ(memory.Judge(2), Known::kGap);
   memory.Take(1);
   EXPECT_EQ(memory.last_seq(), 1u);
-  EXPECT_EQ(memory.Judge(1), Verdict::kPending);
-  EXPECT_EQ(memory.Judge(2), Verdict::kNew);
+  EXPECT_EQ(memory.Judge(1), Known::kPending);
+  EXPECT_EQ(memory.Judge(2), Known::kNew);
   memory.Take(2);
-  const SharedFrame second = Frame(10);
+  const SharedFrame second = FrameOf(10);
   EXPECT_EQ(memory.Remember(2, second, 5), 0u);  // answers may come in any order
-  EXPECT_EQ(memory.Judge(1), Verdict::kPending);
-  EXPECT_EQ(memory.Judge(2), Verdict::kAnswered);
+  EXPECT_EQ(memory.Judge(1), Known::kPending);
+  EXPECT_EQ(memory.Judge(2), Known::kAnswered);
   EXPECT_EQ(memory.Find(2).reply, second);
   EXPECT_EQ(memory.Find(2).joined, 5u);
 }
@@ -39,25 +39,25 @@ TEST(ReplyMemory, ForgetsTheOldestBeyondItsCount) {
   ReplyMemory memory(3, 1000);
   for (protocol::Seq seq = 1; seq <= 5; ++seq) {
     memory.Take(seq);
-    memory.Remember(seq, Frame(1), 0);
+    memory.Remember(seq, FrameOf(1), 0);
   }
-  EXPECT_EQ(memory.Judge(1), Verdict::kForgotten);
-  EXPECT_EQ(memory.Judge(2), Verdict::kForgotten);
-  EXPECT_EQ(memory.Judge(3), Verdict::kAnswered);
-  EXPECT_EQ(memory.Judge(6), Verdict::kNew);
+  EXPECT_EQ(memory.Judge(1), Known::kForgotten);
+  EXPECT_EQ(memory.Judge(2), Known::kForgotten);
+  EXPECT_EQ(memory.Judge(3), Known::kAnswered);
+  EXPECT_EQ(memory.Judge(6), Known::kNew);
 }
 
 TEST(ReplyMemory, ForgetsTheOldestBeyondItsBytesButKeepsTheLast) {
   ReplyMemory memory(100, 1000);
   for (protocol::Seq seq = 1; seq <= 50; ++seq) {
     memory.Take(seq);
-    memory.Remember(seq, Frame(300), 0);
+    memory.Remember(seq, FrameOf(300), 0);
     EXPECT_LE(memory.bytes(), 1000u);
   }
   memory.Take(51);
-  memory.Remember(51, Frame(5000), 0);
-  EXPECT_EQ(memory.Judge(51), Verdict::kAnswered);
-  EXPECT_EQ(memory.Judge(50), Verdict::kForgotten);
+  memory.Remember(51, FrameOf(5000), 0);
+  EXPECT_EQ(memory.Judge(51), Known::kAnswered);
+  EXPECT_EQ(memory.Judge(50), Known::kForgotten);
 }
 
 TEST(ReplyMemory, NeverForgetsWhatIsNotAnswered) {
@@ -65,16 +65,17 @@ TEST(ReplyMemory, NeverForgetsWhatIsNotAnswered) {
   memory.Take(1);
   for (protocol::Seq seq = 2; seq <= 9; ++seq) {
     memory.Take(seq);
-    EXPECT_EQ(memory.Remember(seq, Frame(100), 0), 0u);
+    EXPECT_EQ(memory.Remember(seq, FrameOf(100), 0), 0u);
   }
-  EXPECT_EQ(memory.Judge(1), Verdict::kPending);
-  EXPECT_EQ(memory.Remember(1, Frame(100), 0), 8u);
-  EXPECT_EQ(memory.Judge(9), Verdict::kAnswered);
+  EXPECT_EQ(memory.Judge(1), Known::kPending);
+  EXPECT_EQ(memory.Remember(1, FrameOf(100), 0), 8u);
+  EXPECT_EQ(memory.Judge(9), Known::kAnswered);
 }
 
 TEST(EventReplay, GivesBackWhatCameAfterANumber) {
   EventReplay replay(1000);
-  for (std::uint64_t number = 1; number <= 4; ++number) replay.Keep({number, 2, true, Frame(100)});
+  for (std::uint64_t number = 1; number <= 4; ++number)
+    replay.Keep({number, 2, true, FrameOf(100)});
   std::vector<std::uint64_t> numbers;
   replay.ForEachAfter(2, [&](EventReplay::Kept& kept) { numbers.push_back(kept.number); });
   EXPECT_THAT(numbers, ElementsAre(3u, 4u));
@@ -83,16 +84,16 @@ TEST(EventReplay, GivesBackWhatCameAfterANumber) {
 
 TEST(EventReplay, IsBoundedAndCountsOnlyWhatNobodyGot) {
   EventReplay replay(250);
-  replay.Keep({1, 7, true, Frame(100)});
-  replay.Keep({2, 5, false, Frame(100)});
-  replay.Keep({3, 3, false, Frame(100)});
+  replay.Keep({1, 7, true, FrameOf(100)});
+  replay.Keep({2, 5, false, FrameOf(100)});
+  replay.Keep({3, 3, false, FrameOf(100)});
   EXPECT_EQ(replay.TakeForgotten(), 0u);  // 1 had been sent
-  replay.Keep({4, 1, false, Frame(100)});
+  replay.Keep({4, 1, false, FrameOf(100)});
   EXPECT_EQ(replay.TakeForgotten(), 5u);
   EXPECT_EQ(replay.TakeForgotten(), 0u);
   EXPECT_LE(replay.bytes(), 250u);
   EventReplay none(0);
-  none.Keep({1, 2, false, Frame(8)});
+  none.Keep({1, 2, false, FrameOf(8)});
   EXPECT_EQ(none.TakeForgotten(), 2u);
   EXPECT_EQ(none.bytes(), 0u);
 }

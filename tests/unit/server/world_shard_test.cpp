@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/decode.h"
 #include "toy_library.h"
 #include "world/world_directory.h"
@@ -143,6 +144,67 @@ TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
   const protocol::AvatarState nobody = bench.shard.Inspect(9, bench.tick, kPlenty);
   EXPECT_EQ(nobody.code, StatusCode::kNoSuchAvatar);
   EXPECT_EQ(nobody.avatar, 9u);
+}
+
+// Layers begin and end at the tick that a command comes to, as they would for an avatar alone.
+TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
+  const auto library = OpenLibrary("builtin").value();
+  const auto world = std::make_shared<World>();
+  world->id = 3;
+  world->library = library;
+  AvatarBudget budget(100, 100);
+  ThreadMetrics metrics;
+  for (const int shard_count : {1, 2}) {
+    std::vector<std::unique_ptr<WorldShard>> shards;
+    for (int s = 0; s < shard_count; ++s) {
+      shards.push_back(
+          std::make_unique<WorldShard>(world, s, shard_count, 8, kClock, budget, metrics));
+    }
+    const auto execute = [&]<typename Part>(AvatarNumber avatar, std::uint64_t tick, Part part) {
+      const int s = ShardOf(avatar, shard_count);
+      return shards[static_cast<std::size_t>(s)]
+          ->Execute({.world = world, .session = 1, .seq = 1, .part = std::move(part)}, tick)
+          .accepted;
+    };
+    std::vector<Avatar> alone;
+    for (const AvatarNumber avatar : {1u, 2u}) {
+      ASSERT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
+      ASSERT_EQ(execute(avatar, 1, SpawnPart{{{0, {.avatar = avatar}}}}), 1u);
+      alone.emplace_back(library, BaseFrame{});
+      const protocol::RequestItem step{
+          avatar, 7, protocol::StepMovement{.length_m = 0.3 + 0.1 * avatar}, {}};
+      ASSERT_EQ(execute(avatar, 1, RequestPart{{{0, step}}}), 1u);
+      ASSERT_TRUE(
+          alone.back().Enqueue({7, StepRequest{.length_m = 0.3 + 0.1 * avatar}}).has_value());
+    }
+    for (std::uint64_t tick = 1; tick <= 120; ++tick) {
+      if (tick == 20 || tick == 70) {
+        const bool is_off = tick == 70;
+        ASSERT_EQ(execute(1, tick, LayerPart{{{0, {1, "wave", is_off, 0.75, 0.5, 1.5}}}}), 1u);
+        ASSERT_EQ(execute(2, tick, LayerPart{{{0, {2, "carry", is_off}}}}), 1u);
+        const int wave = library->FindLayer("wave");
+        const int carry = library->FindLayer("carry");
+        ASSERT_TRUE(alone[0].SetLayer({wave, !is_off, 0.75, 0.5, 1.5}).has_value());
+        ASSERT_TRUE(alone[1].SetLayer({carry, !is_off, 1.0, 0.3, 1.0}).has_value());
+      }
+      for (const auto& shard : shards) shard->Advance(tick, 1);
+      for (Avatar& avatar : alone) avatar.Advance(kClock.tick_s());
+      for (const auto& shard : shards) {
+        protocol::PoseBatchEncoder encoder;
+        PoseDelivery delivery;
+        ASSERT_TRUE(shard->Encode(PoseMode::kFull, tick, encoder, delivery));
+        const Decoded decoded(delivery.parts.at(0));
+        for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
+          const ConstPoseSpan expected = alone[decoded.batch.avatars[i] - 1].pose();
+          Pose pose(library->skeleton().joint_count());
+          ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, decoded.batch.pose(i),
+                                           pose.root_position_m, pose.rotations));
+          ASSERT_TRUE(std::ranges::equal(pose.rotations, expected.rotations)) << tick;
+        }
+      }
+    }
+    EXPECT_TRUE(alone[0].layers().empty());
+  }
 }
 
 TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
@@ -331,14 +393,84 @@ TEST(TickClock, TicksAreDueWhenTheClockSaysSo) {
   }
 }
 
+std::shared_ptr<const Ground> MakeGround(double height_m) {
+  const auto terrain = Terrain::Make({{}, {{{0, 0}, {1, 1}, height_m}}});
+  EXPECT_TRUE(terrain);
+  protocol::Encoder encoder;
+  const auto ground = server::MakeGround(3, *terrain, encoder);
+  EXPECT_TRUE(ground);
+  return *ground;
+}
+
+TEST(WorldShard, ChangesTheGroundAtItsTick) {
+  Bench bench;
+  bench.Spawn({1});
+  EXPECT_EQ(bench.shard.terrain(), nullptr);
+  bench.tick = 100;
+  bench.Do(GroundPart{MakeGround(0.25), 103});
+  bench.Do(GroundPart{MakeGround(0.5), 105});
+  const auto height = [&] {
+    const auto terrain = bench.shard.terrain();
+    return terrain == nullptr ? 0.0 : terrain->HeightAt(0.5, 0.5);
+  };
+  bench.shard.Advance(102, 1);
+  EXPECT_EQ(height(), 0.0);
+  bench.shard.Advance(103, 1);
+  EXPECT_EQ(height(), 0.25);
+  bench.shard.Advance(110, 7);  // A late tick, made up for.
+  EXPECT_EQ(height(), 0.5);
+}
+
+TEST(WorldShard, MadeLateItHasTheGroundOfItsWorld) {
+  Bench bench;
+  bench.world->ground.Set(MakeGround(0.125));
+  const WorldShard late(bench.world, 0, 1, 8, kClock, bench.budget, bench.metrics);
+  ASSERT_NE(late.terrain(), nullptr);
+  EXPECT_EQ(late.terrain()->HeightAt(0.5, 0.5), 0.125);
+}
+
+TEST(WorldDirectory, GivesAWorldItsGround) {
+  Config config;
+  config.library = "toy";
+  config.worlds["hall"] = {.library = "", .terrain = "hall.json", .persistent = false};
+  Libraries libraries;
+  libraries.Add("toy", MakeToyLibrary());
+  Terrains terrains;
+  terrains.Add("hall.json", MakeGround(0.5)->terrain);
+  WorldDirectory directory(config, libraries, terrains);
+  const auto hall = directory.Join("hall");
+  ASSERT_TRUE(hall);
+  ASSERT_NE((*hall)->ground.Get(), nullptr);
+  EXPECT_EQ((*hall)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.5);
+  const auto other = directory.Join("other");
+  ASSERT_TRUE(other);
+  EXPECT_EQ((*other)->ground.Get(), nullptr);
+
+  protocol::TerrainInfo info;
+  info.boxes = {{{0, 0}, {1, 1}, 0.75}};
+  ASSERT_TRUE(directory.SetTerrain(**other, info));
+  EXPECT_EQ((*other)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.75);
+  info.boxes[0].height_m = 1e5;
+  const auto refused = directory.SetTerrain(**other, info);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, StatusCode::kOutOfRange);
+  EXPECT_THAT(refused.error().text, testing::HasSubstr("boxes[0].height_m"));
+  info.boxes.assign(kMaxTerrainBoxesPerCell + 1, {{0, 0}, {1, 1}, 0.5});
+  EXPECT_EQ(directory.SetTerrain(**other, info).error().code, StatusCode::kLimitReached);
+  EXPECT_EQ((*other)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.75) << "as it was";
+  ASSERT_TRUE(directory.SetTerrain(**hall, std::nullopt));
+  EXPECT_EQ((*hall)->ground.Get()->terrain, nullptr);
+}
+
 TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
   Config config;
   config.library = "toy";
   config.limits.max_worlds = 2;
-  config.worlds["hall"] = {.library = "", .persistent = true};
+  config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true};
   Libraries libraries;
   libraries.Add("toy", MakeToyLibrary());
-  WorldDirectory directory(config, libraries);
+  const Terrains terrains;
+  WorldDirectory directory(config, libraries, terrains);
   const auto hall = directory.Join("hall");
   ASSERT_TRUE(hall);
   EXPECT_TRUE((*hall)->persistent);

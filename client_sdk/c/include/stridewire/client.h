@@ -44,12 +44,14 @@ extern "C" {
 #endif
 
 /// Grows when a struct of this header changes; options carry it, and create compares it.
-#define STRIDEWIRE_ABI_VERSION 1
+#define STRIDEWIRE_ABI_VERSION 2
 
 #define STRIDEWIRE_MAX_NAME_BYTES 64  /* names of worlds, clients and joints, without the final 0 */
 #define STRIDEWIRE_MAX_TEXT_BYTES 160 /* texts in events, final 0 included; longer ones are cut */
 #define STRIDEWIRE_MAX_ITEMS 65536    /* spawns, avatars or movements in one call */
 #define STRIDEWIRE_MAX_JOINTS 256
+#define STRIDEWIRE_MAX_TERRAIN_COLUMNS 1024 /* of a height field; rows as well */
+#define STRIDEWIRE_MAX_TERRAIN_BOXES 65536
 #define STRIDEWIRE_MAX_PARAMETERS 7
 
 /// What came of a call or a command, in ranges by who can act: 1xx the caller, 2xx whoever made the
@@ -217,6 +219,7 @@ typedef enum stridewire_movement_type {
   STRIDEWIRE_STEP = 0,
   STRIDEWIRE_JUMP = 1,
   STRIDEWIRE_STAND = 2,
+  STRIDEWIRE_WALK = 3,  ///< To a place, in as many steps as it takes.
   STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
 } stridewire_movement_type;
 
@@ -226,6 +229,14 @@ typedef enum stridewire_foot {
   STRIDEWIRE_FOOT_RIGHT = 2,
   STRIDEWIRE_FOOT_MAX = 0x7fffffff
 } stridewire_foot;
+
+/// When a movement begins, and what becomes of those before it.
+typedef enum stridewire_takeover {
+  STRIDEWIRE_QUEUED = 0,          ///< After all that is queued.
+  STRIDEWIRE_AFTER_MOVEMENT = 1,  ///< After the movement under way; the queue is dropped.
+  STRIDEWIRE_NOW = 2,             ///< As soon as feet allow; the queue is dropped.
+  STRIDEWIRE_TAKEOVER_MAX = 0x7fffffff
+} stridewire_takeover;
 
 typedef struct stridewire_movement {
   uint32_t avatar;      ///< Not 0.
@@ -238,9 +249,23 @@ typedef struct stridewire_movement {
   double turn_rad;       ///< Step, jump.
   double seconds;        ///< Stand.
   uint8_t has_side;      ///< 0: the server takes a natural one.
+  uint8_t has_at;       ///< Step: 1: it lands at `at_m` instead of a length, side, height and turn.
+  uint8_t has_heading;  ///< Step, if has_at: 0: the server chooses.
+  double at_m[3];       ///< Where the ball of the foot lands, in the world. Walk: where it ends.
+  double heading_rad;   ///< Where the foot looks. Walk: the heading at its end.
+  const double* waypoints_m;  ///< Walk: x, y, z of each place to pass, 3 * waypoint_count numbers.
+  size_t waypoint_count;      ///< At most STRIDEWIRE_MAX_WAYPOINTS.
+  uint8_t has_speed;          ///< Walk: 0: as is comfortable.
+  double speed_m_s;  ///< Walk, if has_speed: 0.05 to 5, as near as the library's steps come.
+  stridewire_takeover takeover;
 } stridewire_movement;
 
-/// Queues movements; an avatar may stand in the list several times, and does them in order.
+#define STRIDEWIRE_MAX_WAYPOINTS 64
+
+/// Queues movements; an avatar may stand in the list several times, and does them in order. The REPLY
+/// is UNSUPPORTED when one of them has `has_at` and the server knows no footprints, or is a walk and it
+/// knows no walks, or takes over and it knows no takeovers. A walk's steps come in events with its request_id; then FINISHED of kind STAND says it has
+/// arrived, REJECTED why it goes no further.
 stridewire_status stridewire_client_request(stridewire_client* client, stridewire_world world,
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
@@ -249,6 +274,47 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
 stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire_world world,
                                            const uint32_t* avatars, size_t count,
                                            uint64_t* command);
+
+/// Heights at the corners of a grid, bilinear between them.
+typedef struct stridewire_height_field {
+  double origin_m[2];      ///< x and z of the first.
+  double cell_m;           ///< From one to the next, 0.01 to 1000.
+  uint32_t columns;        ///< Along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
+  uint32_t rows;           ///< Along z, the same.
+  const float* heights_m;  ///< columns * rows numbers, row by row, x fastest.
+} stridewire_height_field;
+
+/// A block with upright sides and a flat top.
+typedef struct stridewire_terrain_box {
+  double min_m[2];  ///< x and z.
+  double max_m[2];
+  double height_m;
+} stridewire_terrain_box;
+
+/// Gives a world another ground, for all its avatars: the highest of the height field (0 beside it)
+/// and the boxes there. `height_field` may be NULL, `box_count` 0; neither: flat at 0. The REPLY is
+/// OUT_OF_RANGE or LIMIT_REACHED when the server takes no such ground, UNSUPPORTED when it knows none.
+stridewire_status stridewire_client_set_terrain(stridewire_client* client, stridewire_world world,
+                                                const stridewire_height_field* height_field,
+                                                const stridewire_terrain_box* boxes,
+                                                size_t box_count, uint64_t* command);
+
+/// A clip of the library over what an avatar does (waving, carrying); legs do what they do without. Its
+/// names are those of `stridewire-library inspect`.
+typedef struct stridewire_layer {
+  uint32_t avatar;   ///< Not 0.
+  const char* name;  ///< 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
+  uint8_t off;       ///< 1: eases it out and ends it; weight and speed then mean nothing.
+  double weight;     ///< Above 0, up to 1.
+  double blend_s;    ///< How long weight and speed take to get there, 0 to 10.
+  double speed;      ///< 0.1 to 4; 1: as recorded.
+} stridewire_layer;
+
+/// Starts and ends layers; at most four at a time for an avatar. The REPLY is UNSUPPORTED when the
+/// server knows none; an ITEM is NO_MOVEMENT when the library has no such layer.
+stridewire_status stridewire_client_set_layers(stridewire_client* client, stridewire_world world,
+                                               const stridewire_layer* layers, size_t count,
+                                               uint64_t* command);
 
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,       ///< float32: as the server has them.
@@ -294,6 +360,8 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_LAGGING = 8,  ///< dropped_batches, dropped_events: we read too slowly
   STRIDEWIRE_EVENT_NOTICE = 9,   ///< status, text: something the server has to say
   STRIDEWIRE_EVENT_PONG = 10,    ///< rtt_s
+  STRIDEWIRE_EVENT_TERRAIN =
+      11,  ///< world: it has another ground, see stridewire_client_get_terrain
 
   // A world: world, avatar, tick, time_s.
   STRIDEWIRE_EVENT_ACCEPTED = 32,     ///< request_id was queued
@@ -339,6 +407,7 @@ typedef struct stridewire_event {
   uint8_t resumed;
   uint8_t extrapolated;
   uint8_t clamped;
+  uint8_t cut_short;  ///< FINISHED: another movement took over before its end.
   double position_m[3];
   double base_position_m[3];
   double base_heading_rad;
@@ -397,6 +466,22 @@ stridewire_status stridewire_client_get_skeleton(stridewire_client* client, stri
                                                  stridewire_joint* joints, size_t joint_capacity,
                                                  stridewire_end_site* end_sites,
                                                  size_t end_site_capacity);
+
+typedef struct stridewire_terrain {
+  double origin_m[2];
+  double cell_m;
+  uint32_t columns;  ///< 0: there is no height field.
+  uint32_t rows;
+  uint32_t box_count;
+} stridewire_terrain;
+
+/// The ground of a world, flat until STRIDEWIRE_EVENT_TERRAIN. Writes at most `height_capacity`
+/// heights (of columns * rows, row by row) and `box_capacity` boxes; either array may be NULL with
+/// capacity 0. BUFFER_TOO_SMALL when there are more, with the counts in `terrain`.
+stridewire_status stridewire_client_get_terrain(stridewire_client* client, stridewire_world world,
+                                                stridewire_terrain* terrain, float* heights_m,
+                                                size_t height_capacity,
+                                                stridewire_terrain_box* boxes, size_t box_capacity);
 
 /// Avatars whose poses arrive, in growing order. Writes at most `capacity` numbers; `count` gets how
 /// many there are. BUFFER_TOO_SMALL when there are more (`avatars` may be NULL with capacity 0).

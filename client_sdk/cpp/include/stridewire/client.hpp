@@ -44,6 +44,41 @@ inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, 
   m.turn_rad = turn_rad;
   return m;
 }
+/// A step whose foot lands in a place, looking where the server chooses unless told.
+inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id, double x_m,
+                                  double y_m, double z_m,
+                                  std::optional<double> heading_rad = std::nullopt,
+                                  stridewire_foot foot = STRIDEWIRE_FOOT_AUTO) {
+  stridewire_movement m = Step(avatar, request_id, 0.0, 0.0, foot);
+  m.has_at = 1;
+  m.at_m[0] = x_m;
+  m.at_m[1] = y_m;
+  m.at_m[2] = z_m;
+  m.has_heading = heading_rad ? 1 : 0;
+  m.heading_rad = heading_rad.value_or(0.0);
+  return m;
+}
+/// The same movement, which takes over from what the avatar does.
+inline stridewire_movement Now(stridewire_movement movement) {
+  movement.takeover = STRIDEWIRE_NOW;
+  return movement;
+}
+/// A walk to a place and heading.
+inline stridewire_movement WalkTo(std::uint32_t avatar, std::uint64_t request_id, double x_m,
+                                  double y_m, double z_m, double heading_rad,
+                                  std::optional<double> speed_m_s = std::nullopt) {
+  stridewire_movement m{};
+  m.avatar = avatar;
+  m.request_id = request_id;
+  m.type = STRIDEWIRE_WALK;
+  m.at_m[0] = x_m;
+  m.at_m[1] = y_m;
+  m.at_m[2] = z_m;
+  m.heading_rad = heading_rad;
+  m.has_speed = speed_m_s ? 1 : 0;
+  m.speed_m_s = speed_m_s.value_or(0.0);
+  return m;
+}
 inline stridewire_movement Jump(std::uint32_t avatar, std::uint64_t request_id, double length_m) {
   stridewire_movement m{};
   m.avatar = avatar;
@@ -59,6 +94,15 @@ inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id,
   m.type = STRIDEWIRE_STAND;
   m.seconds = seconds;
   return m;
+}
+
+/// Starts a clip of the library over what an avatar does.
+inline stridewire_layer LayerOn(std::uint32_t avatar, const char* name, double weight = 1.0,
+                                double blend_s = 0.3, double speed = 1.0) {
+  return {avatar, name, 0, weight, blend_s, speed};
+}
+inline stridewire_layer LayerOff(std::uint32_t avatar, const char* name, double blend_s = 0.3) {
+  return {avatar, name, 1, 1.0, blend_s, 1.0};
 }
 
 struct Quaternion {
@@ -80,6 +124,13 @@ struct Skeleton : stridewire_skeleton {
   Skeleton() : stridewire_skeleton() {}
   std::vector<stridewire_joint> joints;
   std::vector<stridewire_end_site> end_sites;
+};
+
+/// The ground of a world; `columns` 0: without a height field.
+struct Terrain : stridewire_terrain {
+  Terrain() : stridewire_terrain() {}
+  std::vector<float> heights_m;  ///< columns * rows of them, row by row, x fastest.
+  std::vector<stridewire_terrain_box> boxes;
 };
 
 /// One client. Movable, not copyable. Threads: as the C ABI.
@@ -141,6 +192,26 @@ class Client {
                 std::uint64_t* command = nullptr) {
     return stridewire_client_cancel(handle_, world, avatars.data(), avatars.size(), command);
   }
+  /// `box_count` follows from `boxes`. INVALID_ARGUMENT: heights_m are not columns * rows.
+  Result SetTerrain(stridewire_world world, const Terrain& terrain,
+                    std::uint64_t* command = nullptr) {
+    stridewire_height_field field{};
+    field.origin_m[0] = terrain.origin_m[0];
+    field.origin_m[1] = terrain.origin_m[1];
+    field.cell_m = terrain.cell_m;
+    field.columns = terrain.columns;
+    field.rows = terrain.rows;
+    field.heights_m = terrain.heights_m.data();
+    if (terrain.heights_m.size() != std::size_t{terrain.columns} * terrain.rows) {
+      return STRIDEWIRE_INVALID_ARGUMENT;
+    }
+    return stridewire_client_set_terrain(handle_, world, terrain.columns > 0 ? &field : nullptr,
+                                         terrain.boxes.data(), terrain.boxes.size(), command);
+  }
+  Result SetLayers(stridewire_world world, const std::vector<stridewire_layer>& layers,
+                   std::uint64_t* command = nullptr) {
+    return stridewire_client_set_layers(handle_, world, layers.data(), layers.size(), command);
+  }
   Result Observe(stridewire_world world, const stridewire_observation& observation,
                  std::uint32_t* subscription = nullptr, std::uint64_t* command = nullptr) {
     return stridewire_client_observe(handle_, world, &observation, subscription, command);
@@ -176,6 +247,17 @@ class Client {
       if (status != STRIDEWIRE_OK && status != STRIDEWIRE_BUFFER_TOO_SMALL) return status;
       skeleton.joints.resize(skeleton.joint_count);
       skeleton.end_sites.resize(skeleton.end_site_count);
+      if (status == STRIDEWIRE_OK) return status;
+    }
+  }
+  Result GetTerrain(stridewire_world world, Terrain& terrain) const {
+    for (;;) {
+      const stridewire_status status = stridewire_client_get_terrain(
+          handle_, world, &terrain, terrain.heights_m.data(), terrain.heights_m.size(),
+          terrain.boxes.data(), terrain.boxes.size());
+      if (status != STRIDEWIRE_OK && status != STRIDEWIRE_BUFFER_TOO_SMALL) return status;
+      terrain.heights_m.resize(std::size_t{terrain.columns} * terrain.rows);
+      terrain.boxes.resize(terrain.box_count);
       if (status == STRIDEWIRE_OK) return status;
     }
   }

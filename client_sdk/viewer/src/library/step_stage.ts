@@ -8,7 +8,7 @@ import {createCrowdPose} from '../sdk.js';
 import {Orbit, ViewCamera, listenToPointers} from '../scene/camera.js';
 import {CrowdMesh} from '../scene/crowd_mesh.js';
 import type {SkeletonLike} from '../scene/figure.js';
-import {Grid} from '../scene/ground.js';
+import {Grid} from '../scene/grid.js';
 import type {ViewColours} from '../scene/world_view.js';
 import type {Clip} from './library_source.js';
 import {durationOf, matchingTime, samplePose} from './clip_pose.js';

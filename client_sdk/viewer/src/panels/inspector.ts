@@ -1,7 +1,7 @@
 // What one avatar does and why: movement, parameters, weights, examples, time line, base, queue.
 
 import {degrees, h, setText, svg} from '../dom.js';
-import type {AvatarState, MovementState, World} from '../sdk.js';
+import type {AvatarState, MovementState, QueuedRequest, World} from '../sdk.js';
 import {genericTime, stateAt} from '../time_line.js';
 
 const everyMs = 200;
@@ -149,7 +149,7 @@ export class Inspector {
         Math.sin(state.baseHeadingRad), Math.cos(state.baseHeadingRad)))}`);
     setText(this.queueTitle, `Queue: ${state.queueSize === 0 ? 'empty' :
       `${state.queueSize} waiting`}`);
-    const items = state.queue.map((item) => h('li', {}, queueText(item as unknown as QueueItem)));
+    const items = state.queue.map((item) => h('li', {}, queueText(item)));
     if (state.queueSize > items.length) items.push(h('li', {}, `and ${state.queueSize - items.length} more`));
     this.queue.replaceChildren(...items);
     const movement = state.movement;
@@ -341,16 +341,13 @@ export class Inspector {
   }
 }
 
-interface QueueItem {
-  type: string;
-  foot?: string;
-  lengthM?: number;
-  turnRad?: number;
-  seconds?: number;
-}
-function queueText(item: QueueItem): string {
-  if (item.type === 'stand') return `stand ${(item.seconds ?? 0).toFixed(1)} s`;
-  const foot = item.foot && item.foot !== 'auto' ? ` ${item.foot}` : '';
+function queueText(item: QueuedRequest): string {
+  if (item.type === 'stand') return `stand ${item.seconds.toFixed(1)} s`;
+  const foot = item.foot !== 'auto' ? ` ${item.foot}` : '';
+  if (item.type === 'walk') {
+    return `walk to x ${item.atM![0].toFixed(2)}, z ${item.atM![2].toFixed(2)} m`;
+  }
+  if (item.atM) return `step${foot} to x ${item.atM[0].toFixed(2)}, z ${item.atM[2].toFixed(2)} m`;
   const turn = item.turnRad ? `, ${degrees(item.turnRad)}` : '';
-  return `${item.type}${foot} ${(item.lengthM ?? 0).toFixed(2)} m${turn}`;
+  return `${item.type}${foot} ${item.lengthM.toFixed(2)} m${turn}`;
 }

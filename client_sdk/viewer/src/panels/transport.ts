@@ -56,7 +56,8 @@ export class Transport {
   show(span: Span | null): void {
     this.span = span;
     const {playback} = this;
-    const back = span ? playback.timeS - span.lastS : 0;
+    // Live is at the end, however late the newest pose comes.
+    const back = span && !playback.live ? playback.timeS - span.lastS : 0;
     const state = `${playback.paused}/${playback.rate}/${playback.live}/${back.toFixed(2)}/` +
       `${span ? (span.lastS - span.firstS).toFixed(0) : ''}`;
     if (state === this.shown) return;
@@ -67,10 +68,13 @@ export class Transport {
       this.play.title = `${label} (Space)`;
       this.play.replaceChildren(icon(playback.paused ? 'play' : 'pause'));
     }
-    this.rate.value = String(playback.rate);
+    const rate = String(playback.rate);
+    if (this.rate.value !== rate) this.rate.value = rate;
     this.scrub.disabled = span === null;
-    if (span) this.scrub.min = (-Math.min(20, Math.max(0.1, span.lastS - span.firstS))).toFixed(2);
-    this.scrub.value = back.toFixed(2);
+    const first = span ? (-Math.min(20, Math.max(0.1, span.lastS - span.firstS))).toFixed(2) : '';
+    if (span && this.scrub.min !== first) this.scrub.min = first;
+    const value = back.toFixed(2);
+    if (this.scrub.value !== value) this.scrub.value = value;
     const text = playback.live ? 'live' : `−${Math.max(0, -back).toFixed(1)} s`;
     setText(this.behind, playback.live ? '' : text);
     this.scrub.setAttribute('aria-valuetext', text);

@@ -2,8 +2,9 @@
 
 import {h, setText} from '../dom.js';
 import type {PoseMode} from '../sdk.js';
+import type {FigureStyle, QualityChoice} from '../quality.js';
 
-type Choice = 'auto' | 'bodies' | 'lines';
+type Choice = 'auto' | FigureStyle;
 type Mark = 'shadows' | 'prints' | 'plants';
 
 export class ViewPanel {
@@ -13,13 +14,16 @@ export class ViewPanel {
 
   constructor(
     actions: {
-      figures(choice: Choice): void; mode(mode: PoseMode): void; toggle(name: Mark, on: boolean): void;
-    }, choice: Choice, mode: PoseMode) {
+      figures(choice: Choice): void; quality(choice: QualityChoice): void; mode(mode: PoseMode): void;
+      toggle(name: Mark, on: boolean): void;
+    }, now: {figures: Choice; quality: QualityChoice; mode: PoseMode}) {
     this.element = h('div', {class: 'panel-body'},
       radios('Figures', 'figures', [['auto', 'Automatic'], ['bodies', 'Bodies'], ['lines', 'Lines']],
-        choice, (value) => actions.figures(value as Choice)),
+        now.figures, (value) => actions.figures(value as Choice)),
+      radios('Quality', 'quality', [['auto', 'Automatic'], ['high', 'High'], ['low', 'Low']],
+        now.quality, (value) => actions.quality(value as QualityChoice)),
       this.auto,
-      radios('Poses travel', 'mode', [['quantised', 'Quantised'], ['full', 'Full']], mode,
+      radios('Poses travel', 'mode', [['quantised', 'Quantised'], ['full', 'Full']], now.mode,
         (value) => actions.mode(value as PoseMode)),
       this.check('shadows', 'Shadows', actions), this.check('prints', 'Footprints', actions),
       this.check('plants', 'Planted feet', actions));
@@ -28,8 +32,8 @@ export class ViewPanel {
   set(name: Mark, on: boolean): void {
     this.marks.get(name)!.checked = on;
   }
-  setAuto(style: string): void {
-    setText(this.auto, `Drawn as ${style} now.`);
+  setAuto(text: string): void {
+    setText(this.auto, text);
   }
 
   private check(

@@ -3,6 +3,8 @@
 
 import * as THREE from 'three';
 
+import type {Ground} from '../terrain.js';
+
 const minDistanceM = 1.2;
 const maxDistanceM = 160;
 
@@ -69,16 +71,16 @@ export class ViewCamera {
    * `free` is what panels leave of the page: its middle is where the target is seen. `box` is what
    * is drawn, panels or not. Both in CSS pixels.
    */
-  advance(orbit: Orbit, dtS: number, free: Box, box: Box): void {
+  advance(orbit: Orbit, dtS: number, free: Box, box: Box, ground: Ground | null = null): void {
     const aspect = free.width / Math.max(1, free.height);
     this.target.lerp(this.want, 1 - Math.exp(-dtS * 7));
     this.scale += (this.wantScale - this.scale) * (1 - Math.exp(-dtS * 5));
     const distance = orbit.distanceM * this.scale;
     const flat = Math.cos(orbit.elevationRad) * distance;
-    this.camera.position.set(
-      this.target.x + Math.sin(orbit.azimuthRad) * flat,
-      Math.max(0.15, this.target.y + Math.sin(orbit.elevationRad) * distance),
-      this.target.z + Math.cos(orbit.azimuthRad) * flat);
+    const x = this.target.x + Math.sin(orbit.azimuthRad) * flat;
+    const z = this.target.z + Math.cos(orbit.azimuthRad) * flat;
+    const y = this.target.y + Math.sin(orbit.elevationRad) * distance;
+    this.camera.position.set(x, Math.max(0.15 + (ground?.heightAt(x, z) ?? 0), y), z);
     this.camera.aspect = aspect;
     // A narrow view keeps the width of a square one.
     this.camera.fov = aspect >= 1 ? 42 :
@@ -95,7 +97,13 @@ export interface PointerActions {
   orbit(dx: number, dy: number): void;
   pan(dx: number, dy: number, x: number, y: number): void;
   zoom(factor: number): void;
-  click(x: number, y: number, twice: boolean): void;
+  click(x: number, y: number, twice: boolean, shift: boolean): void;
+  /** Something lies there that is dragged instead of the view; then `drag` till `drop`, or till `release`
+   * where another finger comes or the press is taken away. */
+  grab?(x: number, y: number, touch: boolean): boolean;
+  drag?(x: number, y: number): void;
+  drop?(heldMs: number): void;
+  release?(): void;
 }
 
 /** Mouse and touch on `element`; positions in CSS pixels within it. */
@@ -103,7 +111,9 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
   const pointers = new Map<number, {x: number; y: number}>();
   let moved = 0;
   let downAt = 0;
+  let downStamp = 0;
   let lastClick = -1e9;
+  let grabbed = false;
   const where = (e: PointerEvent | WheelEvent): [number, number] => {
     const box = element.getBoundingClientRect();
     return [e.clientX - box.left, e.clientY - box.top];
@@ -113,6 +123,13 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
     if (pointers.size === 0) {
       moved = 0;
       downAt = performance.now();
+      downStamp = e.timeStamp;
+      grabbed = e.button === 0 && !e.shiftKey &&
+        (actions.grab?.(...where(e), e.pointerType === 'touch') ?? false);
+    } else if (grabbed) {
+      grabbed = false;
+      moved = Infinity;  // It is no click either.
+      actions.release?.();
     }
     pointers.set(e.pointerId, {x: e.clientX, y: e.clientY});
   });
@@ -123,7 +140,8 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
     const dy = e.clientY - p.y;
     const [x, y] = where(e);
     if (pointers.size === 1) {
-      if (e.buttons & 6 || e.shiftKey) actions.pan(dx, dy, x, y);
+      if (grabbed) actions.drag?.(x, y);
+      else if (e.buttons & 6 || e.shiftKey) actions.pan(dx, dy, x, y);
       else if (moved > 4) actions.orbit(dx, dy);
     } else if (pointers.size === 2) {
       const other = [...pointers.entries()].find(([id]) => id !== e.pointerId)![1];
@@ -138,11 +156,17 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
   });
   const up = (e: PointerEvent): void => {
     const known = pointers.delete(e.pointerId);
+    if (known && grabbed && pointers.size === 0) {
+      grabbed = false;
+      if (e.type === 'pointercancel') actions.release?.();
+      else actions.drop?.(e.timeStamp - downStamp);
+      return;
+    }
     if (!known || e.type === 'pointercancel' || pointers.size > 0) return;
     const now = performance.now();
     if (moved <= 6 && now - downAt < 600 && e.button === 0) {
       const [x, y] = where(e);
-      actions.click(x, y, now - lastClick < 350);
+      actions.click(x, y, now - lastClick < 350, e.shiftKey);
       lastClick = now;
     }
   };

@@ -1,5 +1,5 @@
-// A crowd of one skeleton in one draw call: the body (or its lines) once an avatar, moved by the
-// joints' matrices, which lie in one texture of floats: three texels a joint, row by row.
+// A crowd of one skeleton in one draw call: the body once an avatar, moved by the joints' matrices,
+// which lie in one texture of floats: three texels a joint, row by row. Or lines, see `LineCrowd`.
 
 import * as THREE from 'three';
 
@@ -7,9 +7,11 @@ import type {CrowdPose} from '../sdk.js';
 import {restPositions} from './figure.js';
 import type {SkeletonLike} from './figure.js';
 import {carry, matrixFloats, solve} from './kinematics.js';
-import {buildBody, buildLines} from './skeleton_body.js';
-
-export type FigureStyle = 'bodies' | 'lines';
+import {LineCrowd} from './line_crowd.js';
+import {buildBody} from './skeleton_body.js';
+import {SkinnedCrowd} from './skinned_crowd.js';
+import type {FigureStyle} from '../quality.js';
+import type {Ground} from '../terrain.js';
 
 const textureWidth = 1024;
 
@@ -28,10 +30,21 @@ in vec2 joints;
 in float blend;
 in float region;
 in vec4 look;          // rgb of the shirt, 1 when chosen
+in float ground;       // height of the ground beneath
+#ifdef COARSE
+uniform vec3 sun;
+uniform vec3 skyLight;
+uniform vec3 groundLight;
+uniform vec3 fogColour;
+uniform float fogDistance;
+uniform vec3 accent;
+out vec3 vColour;
+#else
 out vec3 vNormal;
 out vec3 vWorld;
 out vec3 vColour;
 out float vChosen;
+#endif
 
 void rows(int joint, out vec4 a, out vec4 b, out vec4 c) {
   int texel = (gl_InstanceID * jointCount + joint) * 3;
@@ -54,22 +67,40 @@ void main() {
   }
   vec4 p = vec4(position, 1.0);
   vec3 world = vec3(dot(a, p), dot(b, p), dot(c, p));
-  vNormal = vec3(dot(a.xyz, normal), dot(b.xyz, normal), dot(c.xyz, normal));
+  vec3 n = vec3(dot(a.xyz, normal), dot(b.xyz, normal), dot(c.xyz, normal));
   if (shadow.w > 0.5) {
-    world -= shadow.xyz * (max(world.y, 0.0) / shadow.y);
-    world.y = 0.004;
+    world -= shadow.xyz * (max(world.y - ground, 0.0) / shadow.y);
+    world.y = ground + 0.004;
   }
-  vWorld = world;
-  vChosen = look.w;
   // Trousers and hair differ a little from one avatar to the next, by the shirt's own colour.
   float tint = fract(look.r * 7.13 + look.g * 3.71 + look.b * 5.37);
   vec3 skin = mix(vec3(0.87, 0.66, 0.53), vec3(0.55, 0.36, 0.26), smoothstep(0.45, 1.0, tint));
   vec3 trousers = mix(vec3(0.16, 0.20, 0.29), vec3(0.33, 0.31, 0.28), fract(tint * 3.3));
   vec3 hair = mix(vec3(0.11, 0.08, 0.06), vec3(0.42, 0.28, 0.15), fract(tint * 5.7));
-  vColour = region < 0.5 ? skin : region < 1.5 ? look.rgb : region < 2.5 ? trousers :
+  vec3 base = region < 0.5 ? skin : region < 1.5 ? look.rgb : region < 2.5 ? trousers :
     region < 3.5 ? vec3(0.13, 0.13, 0.15) : hair;
-  gl_Position = projectionMatrix * viewMatrix * vec4(world, 1.0);
+  vec4 seen = viewMatrix * vec4(world, 1.0);
+#ifdef COARSE
+  vec3 lit = base * (mix(groundLight, skyLight, n.y * 0.5 + 0.5) +
+    vec3(1.0, 0.96, 0.9) * max(dot(n, sun), 0.0) * 1.15);
+  lit = mix(lit, accent, look.w * 0.4);
+  float far = clamp(-seen.z / fogDistance, 0.0, 1.0);
+  vColour = mix(lit, fogColour, far * far * far);
+#else
+  vNormal = n;
+  vWorld = world;
+  vChosen = look.w;
+  vColour = base;
+#endif
+  gl_Position = projectionMatrix * seen;
 }`;
+
+// Lit once a vertex.
+const coarseFragment = /* glsl */ `
+precision mediump float;
+in vec3 vColour;
+out vec4 colour;
+void main() { colour = vec4(vColour, 1.0); }`;
 
 const fragmentShader = /* glsl */ `
 precision highp float;
@@ -80,25 +111,19 @@ uniform vec3 groundLight;
 uniform vec3 fogColour;
 uniform float fogDistance;
 uniform vec3 accent;
-uniform float flatColour;   // 1: lines, unlit
 in vec3 vNormal;
 in vec3 vWorld;
 in vec3 vColour;
 in float vChosen;
 out vec4 colour;
 void main() {
-  vec3 lit = vColour;
-  if (flatColour < 0.5) {
-    vec3 n = normalize(vNormal);
-    vec3 view = normalize(cameraPosition - vWorld);
-    float key = max(dot(n, sun), 0.0);
-    vec3 around = mix(groundLight, skyLight, n.y * 0.5 + 0.5);
-    float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);
-    lit = vColour * (around + vec3(1.0, 0.96, 0.9) * key * 1.15) + skyLight * rim * 0.16;
-    lit = mix(lit, accent, vChosen * (0.1 + 0.75 * rim));
-  } else {
-    lit = mix(lit * 1.25 + 0.12, accent, vChosen);
-  }
+  vec3 n = normalize(vNormal);
+  vec3 view = normalize(cameraPosition - vWorld);
+  float key = max(dot(n, sun), 0.0);
+  vec3 around = mix(groundLight, skyLight, n.y * 0.5 + 0.5);
+  float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);
+  vec3 lit = vColour * (around + vec3(1.0, 0.96, 0.9) * key * 1.15) + skyLight * rim * 0.16;
+  lit = mix(lit, accent, vChosen * (0.1 + 0.75 * rim));
   float far = clamp(length(cameraPosition - vWorld) / fogDistance, 0.0, 1.0);
   lit = mix(lit, fogColour, far * far * far);
   // Display colours: the renderer writes what it is given.
@@ -142,7 +167,6 @@ export class CrowdMesh {
   avatars = new Uint32Array(0);
   count = 0;
   style: FigureStyle;
-  vertexCount = 0;
 
   private readonly lights: Lights;
   private readonly uniforms: Record<string, THREE.IUniform>;
@@ -150,15 +174,24 @@ export class CrowdMesh {
   private readonly colour = new THREE.Color();
   private readonly lookAvatars: number[] = [];
   private geometry: THREE.InstancedBufferGeometry | null = null;
-  private mesh: THREE.Mesh | THREE.LineSegments | null = null;
+  private mesh: THREE.Mesh | null = null;
+  private lines: LineCrowd | null = null;
+  private skinned: SkinnedCrowd | null = null;
   private shadowMesh: THREE.Mesh | null = null;
   private texture: THREE.DataTexture | null = null;
   private look: THREE.InstancedBufferAttribute | null = null;
+  private floor: THREE.InstancedBufferAttribute | null = null;
+  private onPlane = true;
   private chosen = 0;
   private fineness = 0;
+  private coarse = false;
+  private simple = false;
   private shadows = true;
+  private capacity = 0;
 
-  constructor(skeleton: SkeletonLike, style: FigureStyle, lights: Lights) {
+  /** `byScript`: coarse bodies are moved here and not by a shader, see `SkinnedCrowd`. */
+  constructor(
+    skeleton: SkeletonLike, style: FigureStyle, lights: Lights, private readonly byScript = false) {
     this.skeleton = skeleton;
     this.jointCount = skeleton.jointCount;
     this.rest = restPositions(skeleton);
@@ -169,20 +202,26 @@ export class CrowdMesh {
       shadow: {value: new THREE.Vector4(0, 1, 0, 0)}, sun: {value: lights.sun},
       skyLight: {value: lights.skyLight}, groundLight: {value: lights.groundLight},
       fogColour: {value: lights.fogColour}, fogDistance: {value: 90},
-      accent: {value: lights.accent}, flatColour: {value: 0},
+      accent: {value: lights.accent},
     };
     this.heightM = buildBody(skeleton, 5).heightM;
     this.grow(16);
   }
 
-  setStyle(style: FigureStyle): void {
-    if (style === this.style) return;
+  /** `coarse`: bodies of few faces, lit once a vertex; `simple`: figures of few lines. */
+  setStyle(style: FigureStyle, coarse: boolean, simple: boolean): void {
+    if (style === this.style && coarse === this.coarse && simple === this.simple) return;
     this.style = style;
+    this.coarse = coarse;
+    this.simple = simple;
     this.build();
   }
 
   setShadows(on: boolean): void {
+    if (on === this.shadows) return;
     this.shadows = on;
+    // Shadows are the shader's: it moves the bodies, too, then.
+    if (this.byScript && this.coarse && this.style === 'bodies') this.build();
     if (this.shadowMesh) this.shadowMesh.visible = on;
   }
 
@@ -192,8 +231,13 @@ export class CrowdMesh {
     this.lookAvatars.length = 0;
   }
 
+  /** Colours may have changed. */
+  redress(): void {
+    this.lookAvatars.length = 0;
+  }
+
   /** Takes the crowd's poses; allocates only when the crowd has grown. */
-  update(pose: CrowdPose): void {
+  update(pose: CrowdPose, ground: Ground | null = null): void {
     if (pose.count * this.jointCount * matrixFloats > this.matrices.length) this.grow(pose.count);
     this.count = pose.count;
     const {jointCount, skeleton} = this;
@@ -210,20 +254,47 @@ export class CrowdMesh {
           (i * jointCount + ball) * 3, leg.ballOffsetM, this.balls, i * 6 + f * 3);
       }
     }
+    if (this.style === 'bodies' && this.finenessNow() !== this.fineness) this.build();
+    this.stand(ground);
     this.dress();
     if (this.geometry) this.geometry.instanceCount = pose.count;
-    if (this.texture) this.texture.needsUpdate = true;
-    // A body of finer tubes while there are few, of coarser ones in a crowd.
-    const fineness = pose.count > 300 ? 6 : pose.count > 60 ? 8 : 12;
-    if (this.style === 'bodies' && fineness !== this.fineness) this.build();
+    if (this.lines) this.lines.update(this.matrices, this.positions, pose.count);
+    else if (this.skinned) this.skinned.update(this.matrices, pose.count);
+    else if (this.texture) this.texture.needsUpdate = true;
+  }
+
+  /** Shadows fall on what the avatar stands on. */
+  private stand(ground: Ground | null): void {
+    const flat = ground === null || ground.flat;
+    if (!this.floor || !this.geometry || (flat && this.onPlane)) return;
+    this.onPlane = flat;
+    const heights = this.floor.array as Float32Array;
+    if (flat) heights.fill(0);
+    for (let i = 0; i < this.count && !flat; ++i) {
+      const at = i * this.jointCount * 3;
+      heights[i] = ground.heightAt(this.positions[at]!, this.positions[at + 2]!);
+    }
+    this.floor.needsUpdate = true;
+  }
+
+  /** Finer tubes while there are few, coarser ones in a crowd. */
+  private finenessNow(): number {
+    return this.coarse ? (this.count > 24 ? 4 : 5) : this.count > 300 ? 6 : this.count > 60 ? 8 : 12;
   }
 
   dispose(): void {
-    this.geometry?.dispose();
+    this.clear();
     this.texture?.dispose();
+  }
+
+  private clear(): void {
+    this.geometry?.dispose();
     for (const mesh of [this.mesh, this.shadowMesh]) {
       if (mesh) (mesh.material as THREE.Material).dispose();
     }
+    this.lines?.dispose();
+    this.skinned?.dispose();
+    this.geometry = this.mesh = this.shadowMesh = this.lines = this.skinned = null;
     this.group.clear();
   }
 
@@ -237,6 +308,8 @@ export class CrowdMesh {
       shirtColour(avatar, this.colour);
       this.look.setXYZW(i, this.colour.r, this.colour.g, this.colour.b,
         avatar === this.chosen ? 1 : 0);
+      this.lines?.dress(i, this.colour, avatar === this.chosen);
+      this.skinned?.dress(i, this.colour, avatar === this.chosen);
       changed = true;
     }
     if (changed) this.look.needsUpdate = true;
@@ -245,6 +318,7 @@ export class CrowdMesh {
   private grow(atLeast: number): void {
     let capacity = 16;
     while (capacity < atLeast) capacity *= 2;
+    this.capacity = capacity;
     const texels = capacity * this.jointCount * 3;
     const rows = Math.ceil(texels / textureWidth);
     this.matrices = new Float32Array(rows * textureWidth * 4);
@@ -258,68 +332,61 @@ export class CrowdMesh {
     this.uniforms['matrices']!.value = this.texture;
     this.look = new THREE.InstancedBufferAttribute(new Float32Array(capacity * 4), 4);
     this.look.setUsage(THREE.DynamicDrawUsage);
+    this.floor = new THREE.InstancedBufferAttribute(new Float32Array(capacity), 1);
+    this.floor.setUsage(THREE.DynamicDrawUsage);
+    this.onPlane = true;
     this.lookAvatars.length = 0;
     this.build();
   }
 
   private build(): void {
-    this.geometry?.dispose();
-    for (const mesh of [this.mesh, this.shadowMesh]) {
-      if (mesh) (mesh.material as THREE.Material).dispose();
+    this.clear();
+    this.lookAvatars.length = 0;
+    if (this.style === 'lines') {
+      this.lines = new LineCrowd(this.skeleton, this.lights, this.capacity, this.simple);
+      this.group.add(this.lines.object);
+      return;
     }
-    this.group.clear();
-    this.shadowMesh = null;
+    const {uniforms, coarse} = this;
     const geometry = new THREE.InstancedBufferGeometry();
-    const uniforms = this.uniforms;
-    if (this.style === 'bodies') {
-      this.fineness = this.count > 300 ? 6 : this.count > 60 ? 8 : 12;
-      const body = buildBody(this.skeleton, this.fineness);
-      geometry.setAttribute('position', new THREE.BufferAttribute(body.positions, 3));
-      geometry.setAttribute('normal', new THREE.BufferAttribute(body.normals, 3));
-      geometry.setAttribute('joints', new THREE.BufferAttribute(body.joints, 2));
-      geometry.setAttribute('blend', new THREE.BufferAttribute(body.blends, 1));
-      geometry.setAttribute('region', new THREE.BufferAttribute(body.regions, 1));
-      geometry.setIndex(new THREE.BufferAttribute(body.indices, 1));
-      this.vertexCount = body.blends.length;
-    } else {
-      const lines = buildLines(this.skeleton);
-      const n = lines.regions.length;
-      geometry.setAttribute('position', new THREE.BufferAttribute(lines.positions, 3));
-      geometry.setAttribute('normal', new THREE.BufferAttribute(new Float32Array(n * 3), 3));
-      geometry.setAttribute('joints', new THREE.BufferAttribute(lines.joints, 2));
-      geometry.setAttribute('blend', new THREE.BufferAttribute(new Float32Array(n), 1));
-      geometry.setAttribute('region', new THREE.BufferAttribute(lines.regions, 1));
-      this.vertexCount = n;
+    this.fineness = this.finenessNow();
+    const body = buildBody(this.skeleton, this.fineness, coarse);
+    if (coarse && this.byScript && !this.shadows) {
+      this.skinned = new SkinnedCrowd(body, this.jointCount, this.lights, this.capacity);
+      this.group.add(this.skinned.object);
+      return;
     }
+    geometry.setAttribute('position', new THREE.BufferAttribute(body.positions, 3));
+    geometry.setAttribute('normal', new THREE.BufferAttribute(body.normals, 3));
+    geometry.setAttribute('joints', new THREE.BufferAttribute(body.joints, 2));
+    geometry.setAttribute('blend', new THREE.BufferAttribute(body.blends, 1));
+    geometry.setAttribute('region', new THREE.BufferAttribute(body.regions, 1));
+    geometry.setIndex(new THREE.BufferAttribute(body.indices, 1));
     geometry.setAttribute('look', this.look!);
+    geometry.setAttribute('ground', this.floor!);
     geometry.instanceCount = this.count;
     this.geometry = geometry;
-    uniforms['flatColour']!.value = this.style === 'lines' ? 1 : 0;
-    const material = new THREE.RawShaderMaterial({
-      glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms,
-    });
-    this.mesh = this.style === 'bodies' ?
-      new THREE.Mesh(geometry, material) : new THREE.LineSegments(geometry, material);
+    this.mesh = new THREE.Mesh(geometry, new THREE.RawShaderMaterial({
+      glslVersion: THREE.GLSL3, vertexShader, uniforms, defines: coarse ? {COARSE: 1} : {},
+      fragmentShader: coarse ? coarseFragment : fragmentShader,
+    }));
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = 3;
     this.group.add(this.mesh);
-    if (this.style === 'bodies') {
-      // The same bodies flattened along the light: a shadow, darkened once by the stencil.
-      const flat = new THREE.RawShaderMaterial({
-        glslVersion: THREE.GLSL3, vertexShader, fragmentShader: shadowFragment,
-        uniforms: {
-          ...uniforms, shade: {value: this.lights.shade},
-          shadow: {value: new THREE.Vector4(
-            this.lights.sun.x, this.lights.sun.y, this.lights.sun.z, 1)},
-        },
-        transparent: true, depthWrite: false, stencilWrite: true,
-        stencilFunc: THREE.EqualStencilFunc, stencilRef: 0, stencilZPass: THREE.IncrementStencilOp,
-      });
-      this.shadowMesh = new THREE.Mesh(geometry, flat);
-      this.shadowMesh.frustumCulled = false;
-      this.shadowMesh.renderOrder = 1;
-      this.shadowMesh.visible = this.shadows;
-      this.group.add(this.shadowMesh);
-    }
+    // The same bodies flattened along the light: a shadow, darkened once by the stencil.
+    this.shadowMesh = new THREE.Mesh(geometry, new THREE.RawShaderMaterial({
+      glslVersion: THREE.GLSL3, vertexShader, fragmentShader: shadowFragment,
+      uniforms: {
+        ...uniforms, shade: {value: this.lights.shade},
+        shadow: {value: new THREE.Vector4(
+          this.lights.sun.x, this.lights.sun.y, this.lights.sun.z, 1)},
+      },
+      transparent: true, depthWrite: false, stencilWrite: true,
+      stencilFunc: THREE.EqualStencilFunc, stencilRef: 0, stencilZPass: THREE.IncrementStencilOp,
+    }));
+    this.shadowMesh.frustumCulled = false;
+    this.shadowMesh.renderOrder = 1;
+    this.shadowMesh.visible = this.shadows;
+    this.group.add(this.shadowMesh);
   }
 }

@@ -37,9 +37,11 @@ export class Overlay {
     };
   }
 
-  draw(views: readonly WorldView[], jointNames: boolean): void {
-    const chosen = views.find((view) => view.chosen !== 0 && view.indexOf(view.chosen) >= 0);
-    const several = views.length > 1;
+  draw(shown: readonly {readonly view: WorldView}[], jointNames: boolean): void {
+    const chosen = shown.find(({view}) => view.chosen !== 0 && view.indexOf(view.chosen) >= 0)?.view;
+    const several = shown.length > 1;
+    // A layer the less for the browser to put over the scene while there is nothing to write.
+    this.canvas.hidden = !chosen && !several;
     if (!chosen && !several && !this.dirty) return;
     const {context} = this;
     context.setTransform(this.scale, 0, 0, this.scale, 0, 0);
@@ -47,7 +49,7 @@ export class Overlay {
     this.dirty = false;
     if (several) {
       this.dirty = true;
-      views.forEach((view, i) => {
+      shown.forEach(({view}, i) => {
         if (i > 0) {
           context.strokeStyle = this.colours.line;
           context.lineWidth = 2;

@@ -24,13 +24,6 @@ export interface Body {
   readonly groundY: number;
 }
 
-/** Lines in the rest pose, for machines that draw in software: two vertices a line. */
-export interface LineBody {
-  readonly positions: Float32Array;
-  readonly joints: Float32Array;
-  readonly regions: Float32Array;
-}
-
 interface Hold {
   readonly a: number;
   readonly b: number;
@@ -53,6 +46,9 @@ class Builder {
   readonly regions: number[] = [];
   readonly indices: number[] = [];
 
+  /** `coarse`: half the rings, no small parts. */
+  constructor(readonly coarse: boolean) {}
+
   vertex(p: Vec, hold: Hold, region: number): number {
     this.positions.push(p[0], p[1], p[2]);
     this.joints.push(hold.a, hold.b);
@@ -62,7 +58,8 @@ class Builder {
   }
 
   /** A closed tube through the rings, in their order; u x v points along the way. */
-  loft(rings: readonly Ring[], segments: number, squareness = 1): void {
+  loft(all: readonly Ring[], segments: number, squareness = 1): void {
+    const rings = this.coarse ? fewer(all) : all;
     const first = this.blends.length;
     for (const ring of rings) {
       for (let s = 0; s < segments; ++s) {
@@ -90,6 +87,17 @@ class Builder {
       this.indices.push(start, first + t, first + s, stop, last + s, last + t);
     }
   }
+}
+
+/** Every other ring, but the ends, where one region meets another, and the last of one. */
+function fewer(rings: readonly Ring[]): Ring[] {
+  let skipped = true;
+  return rings.filter((ring, i) => {
+    const needed = i === 0 || i === rings.length - 1 || skipped ||
+      rings[i - 1]!.region !== ring.region || rings[i + 1]!.region !== ring.region;
+    skipped = !needed;
+    return needed;
+  });
 }
 
 /** Two axes across `along`; the first as near to `side` as can be. */
@@ -243,6 +251,7 @@ function buildHead(builder: Builder, figure: Figure, segments: number): void {
   // Hair: a larger half egg, higher and further back.
   egg(builder, add(centre, [0, 0.024 * h, -0.011 * h]), [0, 1, 0.12], [0, 0, 1],
     [half * 0.8, half * 0.76, half * 0.74], hold, segments + 2, 5, () => Region.hair);
+  if (builder.coarse) return;
   // A nose, so that one sees where it looks.
   egg(builder, add(centre, [0, -0.006 * h, half * 0.8]), [0, 1, 0], [0, 0, 1],
     [0.009 * h, 0.013 * h, 0.007 * h], hold, 6, 3, () => Region.skin);
@@ -271,7 +280,7 @@ function buildArm(builder: Builder, figure: Figure, index: number, segments: num
   const palm = (t: number, wide: number, thick: number): Ring =>
     ring(add(arm.wrist.at, along, reach * t), along, [0, 0, 1], wide * h, thick * h, hold,
       Region.skin);
-  const fingers = countTips(figure, arm.wrist.joint) >= 4;
+  const fingers = !builder.coarse && countTips(figure, arm.wrist.joint) >= 4;
   if (fingers) {
     builder.loft([palm(-0.06, 0.012, 0.01), palm(0.12, 0.021, 0.014), palm(0.42, 0.026, 0.013),
       palm(0.55, 0.018, 0.008)], segments);
@@ -292,6 +301,7 @@ function buildArm(builder: Builder, figure: Figure, index: number, segments: num
   }
   builder.loft([palm(-0.06, 0.012, 0.01), palm(0.1, 0.02, 0.014), palm(0.38, 0.026, 0.014),
     palm(0.66, 0.023, 0.0115), palm(0.9, 0.017, 0.009), palm(1, 0.008, 0.005)], segments);
+  if (builder.coarse) return;
   const root = add(add(arm.wrist.at, along, reach * 0.18), [0, 0, 0.018 * h]);
   const tip = add(add(arm.wrist.at, along, reach * 0.5), [0, 0, 0.04 * h]);
   bone(builder, root, tip, arm.wrist.joint, 0.0085 * h, Region.skin);
@@ -357,10 +367,11 @@ function countTips(figure: Figure, j: number): number {
   return below.reduce((sum, child) => sum + countTips(figure, child), 0);
 }
 
-/** A body for `skeleton`; `segments` is the fineness of its tubes, from 5 on. */
-export function buildBody(skeleton: SkeletonLike, segments = 9): Body {
+/** A body for `skeleton`; `segments` is the fineness of its tubes, from 4 on; `coarse` leaves out what
+ * is not seen from afar. */
+export function buildBody(skeleton: SkeletonLike, segments = 9, coarse = false): Body {
   const figure = figureOf(skeleton);
-  const builder = new Builder();
+  const builder = new Builder(coarse);
   const h = figure.heightM;
   if (figure.trunk.length > 1) {
     buildTrunk(builder, figure, segments);
@@ -416,59 +427,4 @@ function smoothNormals(positions: Float32Array, indices: ArrayLike<number>): Flo
     normals.set(n, v);
   }
   return normals;
-}
-
-/** Lines for `skeleton`: every bone, a ring for the head, outlines of the feet. */
-export function buildLines(skeleton: SkeletonLike): LineBody {
-  const figure = figureOf(skeleton);
-  const positions: number[] = [];
-  const joints: number[] = [];
-  const regions: number[] = [];
-  const line = (a: Vec, b: Vec, ja: number, jb: number, region: number): void => {
-    positions.push(...a, ...b);
-    joints.push(ja, ja, jb, jb);
-    regions.push(region, region);
-  };
-  const legJoints = new Set<number>();
-  for (const leg of figure.legs) {
-    for (const joint of [leg.knee.joint, leg.ankle.joint, leg.ball.joint]) legJoints.add(joint);
-  }
-  const armSkin = new Set(figure.arms.map((arm) => arm.wrist.joint));
-  for (let j = 1; j < skeleton.jointCount; ++j) {
-    const parent = skeleton.parents[j]!;
-    const a = restAt(figure, parent);
-    const b = restAt(figure, j);
-    if (length(subtract(a, b)) < 1e-4) continue;
-    const region = legJoints.has(j) ? Region.trousers : armSkin.has(j) ? Region.skin : Region.shirt;
-    line(a, b, parent, parent, region);
-  }
-  const h = figure.heightM;
-  const r = 0.06 * h;
-  const c: Vec = [figure.head.at[0], figure.crownY - r, figure.head.at[2] + 0.01 * h];
-  for (const [u, v] of [[[1, 0, 0], [0, 1, 0]], [[0, 0, 1], [0, 1, 0]]] as [Vec, Vec][]) {
-    for (let s = 0; s < 8; ++s) {
-      const p = (i: number): Vec => {
-        const angle = (i / 8) * 2 * Math.PI;
-        return add(add(c, u, Math.cos(angle) * r * 0.8), v, Math.sin(angle) * r);
-      };
-      line(p(s), p(s + 1), figure.head.joint, figure.head.joint, Region.skin);
-    }
-  }
-  for (const leg of figure.legs) {
-    const sole = figure.groundY;
-    const flat = (p: Vec): Vec => [p[0], sole, p[2]];
-    const back = normalised([leg.ankle.at[0] - leg.toe[0], 0, leg.ankle.at[2] - leg.toe[2]], [0, 0, -1]);
-    const heel = add(flat(leg.ankle.at), back, 0.03 * h);
-    line(leg.ankle.at, heel, leg.ankle.joint, leg.ankle.joint, Region.shoes);
-    line(heel, flat(leg.ball.at), leg.ankle.joint, leg.ankle.joint, Region.shoes);
-    line(flat(leg.ball.at), leg.toe, leg.ball.joint, leg.ball.joint, Region.shoes);
-    line(leg.ankle.at, leg.toe, leg.ankle.joint, leg.ball.joint, Region.shoes);
-  }
-  for (const arm of figure.arms) {
-    line(arm.wrist.at, arm.tip, arm.wrist.joint, arm.wrist.joint, Region.skin);
-  }
-  return {
-    positions: new Float32Array(positions), joints: new Float32Array(joints),
-    regions: new Float32Array(regions),
-  };
 }

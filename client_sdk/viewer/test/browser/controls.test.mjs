@@ -4,11 +4,11 @@
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
 
-import {Client} from '@stridewire/client';
+import {Client, createPose} from '@stridewire/client';
 import WebSocket from 'ws';
 
 import {launch} from '../browser.mjs';
-import {Server, differing, openPage, until} from './support.mjs';
+import {Server, cameraRests, differing, framesDrawn, keep, openPage, tell, until} from './support.mjs';
 
 let server;
 let client;
@@ -46,7 +46,10 @@ const controlsOf = (page) => page.evaluate(() => [...document.querySelectorAll(
 }));
 
 test('every control does what its label says', async () => {
-  const {page, context, errors} = await openPage(browser, server.httpPort, 'world=alpha&figures=bodies');
+  const {page, context, errors} = await openPage(browser, server.httpPort, 'world=alpha&figures=bodies',
+    // As small as it may be with panels beside the scene.
+    {hasTouch: true, viewport: {width: 920, height: 540}});
+  const devtools = await context.newCDPSession(page);
   await until('the page is there', () => page.evaluate(
     () => window.stridewire?.worlds[0]?.world.skeleton));
   const look = (f, argument) => page.evaluate(f, argument);
@@ -57,25 +60,8 @@ test('every control does what its label says', async () => {
   const key = (name) => page.locator('canvas.scene').press(name);
   const slide = (id, value) => page.locator(`#${id}`).fill(String(value));
   const avatars = () => look(() => [...window.stridewire.worlds[0].world.avatars()]);
-  const frames = async (count) => {
-    const from = await look(() => window.stridewire.stats.framesDrawn);
-    await eventually('frames are drawn', (n) => window.stridewire.stats.framesDrawn >= n, from + count);
-  };
+  const frames = (count) => framesDrawn(page, count);
   const live = () => eventually('it is live', () => window.stridewire.playback.live);
-  const cameraRests = async () => {
-    const where = () => look(() => {
-      const {view} = window.stridewire.worlds[0];
-      return [...view.view.camera.position.toArray(), ...view.view.target.toArray()];
-    });
-    let last = await where();
-    await until('the camera rests', async () => {
-      await frames(2);
-      const now = await where();
-      const rests = now.every((x, i) => Math.abs(x - last[i]) < 1e-4);
-      last = now;
-      return rests;
-    });
-  };
   const picture = async () => {
     await frames(2);
     return page.screenshot({clip: await look(() => {
@@ -83,6 +69,17 @@ test('every control does what its label says', async () => {
       return {x: Math.ceil(x), y: Math.ceil(y), width: Math.floor(width), height: Math.floor(height)};
     })});
   };
+  /** Nothing changes between pictures because a frame took long. */
+  const holdQuality = async () => {
+    await look(() => window.stridewire.app.chooseQuality('low'));
+    await frames(2);
+  };
+  const letQualityGo = () => look(() => window.stridewire.app.chooseQuality('auto'));
+  /** Of what no panel covers. */
+  const middle = () => look(() => {
+    const {x, y, width, height} = window.stridewire.worlds[0].view.free;
+    return {x: x + width / 2, y: y + height / 2};
+  });
   const orbit = () => look(() => {
     const {wantAzimuth, wantElevation, wantDistance} = window.stridewire.app.orbit;
     return {wantAzimuth, wantElevation, wantDistance};
@@ -101,13 +98,16 @@ test('every control does what its label says', async () => {
     });
     return state.queue[size - 1];
   };
+  const pauseS = 2;
   /** Alone and busy, so that what follows stays in its queue. */
   const busy = async () => {
     await alpha.cancel([driven]);
-    await alpha.request(Array.from({length: 10}, () => ({avatar: driven, type: 'stand', seconds: 5})));
     await until('it is busy', async () => {
       const {movement, queueSize} = await alpha.inspect(driven);
-      return movement !== null && queueSize <= 9;
+      if (movement !== null && queueSize >= 10) return true;
+      await alpha.request(Array.from(
+        {length: 12 - queueSize}, () => ({avatar: driven, type: 'stand', seconds: pauseS})));
+      return false;
     });
   };
   /** `act` adds one item to the queue. */
@@ -119,7 +119,7 @@ test('every control does what its label says', async () => {
     return until('it is queued', async () => {
       const {queue} = await alpha.inspect(driven);
       const last = queue.at(-1);
-      return last && !(last.type === 'stand' && last.seconds === 5) && queue.length <= queueSize + 1 ?
+      return last && !(last.type === 'stand' && last.seconds === pauseS) && queue.length <= queueSize + 1 ?
         last : null;
     });
   };
@@ -128,6 +128,39 @@ test('every control does what its label says', async () => {
     await busy();
     await act();
     await until('the queue is empty', async () => (await alpha.inspect(driven)).queueSize === 0);
+  };
+  /** Does nothing, and is drawn so. */
+  const stands = async () => {
+    await alpha.cancel([driven]);
+    const {timeS} = await until('it stands', async () => {
+      const state = await alpha.inspect(driven);
+      return state.movement === null && state.queueSize === 0 ? state : null;
+    });
+    await eventually('that is seen', (t) => window.stridewire.sampled()[0].timeS > t + 0.5, timeS);
+  };
+  /** A layer of the driven avatar begins and ends with its button: the right arm tells. */
+  const layers = async (layer) => {
+    await stands();
+    const subscription = alpha.observe({mode: 'full', avatars: [driven]});
+    const pose = createPose();
+    const joint = alpha.skeleton.names.indexOf('RightArm');
+    const arm = () => until('a pose of it has come', () => {
+      const timeS = client.renderTimeS();
+      return timeS !== null && alpha.sample(driven, timeS, pose) !== 'missing' &&
+        [...pose.rotations.subarray(4 * joint, 4 * joint + 4)];
+    });
+    const hangs = await arm();
+    const isUp = async () => {
+      const now = await arm();
+      return Math.abs(now.reduce((sum, x, i) => sum + x * hangs[i], 0)) < 0.99;
+    };
+    const toggle = page.locator(`#drive-layer-${layer}`);
+    for (const on of [true, false]) {
+      await toggle.click();
+      await until(`it is ${on ? 'on' : 'off'}`, async () =>
+        await isUp() === on && await toggle.getAttribute('aria-pressed') === String(on));
+    }
+    await subscription.stop();
   };
   const spawns = async (act) => {
     const before = await avatars();
@@ -164,7 +197,8 @@ test('every control does what its label says', async () => {
       await page.getByRole('button', {name: 'Frame all'}).getAttribute('aria-pressed') === 'true');
     await frames(1);
     const framed = (await orbit()).wantDistance;
-    await page.mouse.move(640, 300);
+    const {x, y} = await middle();
+    await page.mouse.move(x, y);
     await page.mouse.wheel(0, 600);
     await until('it is out', async () => (await orbit()).wantDistance > framed);
     await act();
@@ -220,16 +254,18 @@ test('every control does what its label says', async () => {
   /** A box that shows something which the picture then has. */
   const shows = async (id) => {
     await opened('View');
+    await holdQuality();
     const box = page.locator(`#${id}`);
-    assert.ok(await box.isChecked());
+    await box.check();
+    await cameraRests(page);
     await until(`the picture tells ${id}`, async () => {
-      await cameraRests();
       const on = await picture();
       await box.uncheck();
-      const shown = await differing(page, on, await picture());
+      const shown = differing(on, await picture());
       await box.check();
-      return shown > 2e-5 && await differing(page, on, await picture()) < shown / 2;
+      return shown > 2e-5 && differing(on, await picture()) < shown / 2;
     });
+    await letQualityGo();
   };
   const bytesAPose = async () => {
     const count = () => look(() => {
@@ -239,7 +275,7 @@ test('every control does what its label says', async () => {
     const from = await count();
     const to = await until('poses came', async () => {
       const now = await count();
-      return now.poses >= from.poses + 120 ? now : null;
+      return now.poses >= from.poses + 30 ? now : null;
     });
     return (to.bytes - from.bytes) / (to.poses - from.poses);
   };
@@ -262,6 +298,70 @@ test('every control does what its label says', async () => {
       drawn.add(await look(() => document.querySelector('.scatter').innerHTML));
     }
     assert.ok(drawn.size > 1, [...drawn].join(' '));
+  };
+
+  const pressed = async (id) => await page.locator(`#${id}`).getAttribute('aria-pressed') === 'true';
+  /** Places on level ground so far from the driven avatar along x and z, and where they are on the page. */
+  const beside = (...offsets) => look(([number, all]) => {
+    const {view} = window.stridewire.worlds[0];
+    const {x, z} = view.place(number);
+    return all.map(([dx, dz]) => {
+      const at = [x + dx, 0, z + dz];
+      return {at, ...view.onPage(at)};
+    });
+  }, [driven, offsets]);
+  /** A click on the ground asks for a foot there while `toggle` has it so. */
+  const places = async (toggle) => {
+    await cameraRests(page);
+    await toggle();
+    assert.ok(await pressed('drive-place'));
+    const [wanted] = await beside([0.35, 0.3]);
+    const item = await adds(() => page.mouse.click(wanted.x, wanted.y));
+    assert.equal(item.type, 'step');
+    item.atM.forEach((v, k) => assert.ok(Math.abs(v - wanted.at[k]) < 0.03, `${item.atM}, not ${wanted.at}`));
+    assert.equal(await chosen(), driven);
+    await eventually('it is marked', () => window.stridewire.sampled()[0].planned === 1);
+    await toggle();
+    assert.equal(await pressed('drive-place'), false);
+    await alpha.cancel([driven]);
+    await eventually('the mark is gone', () => window.stridewire.sampled()[0].planned === 0);
+  };
+  const toGo = (goals, waypoints) => eventually(`${goals} goals and ${waypoints} places to pass are marked`,
+    (wanted) => {
+      const shown = window.stridewire.sampled()[0];
+      return shown.goals === wanted.goals && shown.waypoints === wanted.waypoints;
+    }, {goals, waypoints});
+  /** What `act` sends the driven avatar to, once that is marked; then somebody else cancels it. */
+  const goes = async (act, waypoints = 0) => {
+    const item = await adds(act);
+    assert.equal(item.type, 'walk');
+    assert.equal(item.waypointsM.length, waypoints);
+    await toGo(1, waypoints);
+    assert.equal(await chosen(), driven);
+    await alpha.cancel([driven]);
+    await toGo(0, 0);
+    return item;
+  };
+  const closeTo = (at, wanted) => at.forEach(
+    (v, k) => assert.ok(Math.abs(v - wanted[k]) < 0.03, `${at}, not ${wanted}`));
+  /** A click on the ground sends it there while `toggle` has it so. */
+  const sends = async (toggle) => {
+    await cameraRests(page);
+    await toggle();
+    assert.ok(await pressed('drive-walk') && !await pressed('drive-place'));
+    const [wanted] = await beside([0.5, 0.4]);
+    closeTo((await goes(() => page.mouse.click(wanted.x, wanted.y))).atM, wanted.at);
+    // One of the two tools at a time.
+    await page.locator('#drive-place').click();
+    assert.ok(await pressed('drive-place') && !await pressed('drive-walk'));
+    await toggle();
+    assert.ok(await pressed('drive-walk') && !await pressed('drive-place'));
+    await toggle();
+    assert.equal(await pressed('drive-walk') || await pressed('drive-place'), false);
+  };
+  const walkTo = async (id, value) => {
+    await page.locator(`#${id}`).fill(String(value));
+    return goes(() => inDrive('Walk there'));
   };
 
   const everyone = 8;
@@ -323,6 +423,51 @@ test('every control does what its label says', async () => {
     }],
     ['drive: Stand', async () => assert.equal((await adds(() => inDrive('Stand'))).type, 'stand')],
     ['drive: Clear queue', () => queueIsEmpty(() => inDrive('Clear queue'))],
+    ['drive: drive-place', () => places(() => page.locator('#drive-place').click())],
+    ['drive: drive-walk', () => sends(() => page.locator('#drive-walk').click())],
+    ['drive: walk-x', async () => near((await walkTo('walk-x', -1.25)).atM[0], -1.25)],
+    ['drive: walk-z', async () => near((await walkTo('walk-z', 0.75)).atM[2], 0.75)],
+    ['drive: walk-heading', async () => near((await walkTo('walk-heading', 120)).headingRad, 2 * Math.PI / 3)],
+    ['drive: Walk there', async () => {
+      const at = await look(() => ['walk-x', 'walk-z'].map((id) => Number(document.getElementById(id).value)));
+      const {atM} = await goes(() => page.locator('#walk-z').press('Enter'));
+      near(atM[0], at[0]);
+      near(atM[2], at[1]);
+    }],
+    ['drive: Pass by', async () => {
+      await page.locator('#walk-x').fill('1.5');
+      await inDrive('Pass by');
+      await toGo(0, 1);
+      await page.locator('#walk-x').fill('0.5');
+      const {waypointsM, atM} = await goes(() => inDrive('Walk there'), 1);
+      near(waypointsM[0][0], 1.5);
+      near(atM[0], 0.5);
+    }],
+    ['drive: drive-layer-wave', () => layers('wave')],
+    ['drive: drive-layer-carry', () => layers('carry')],
+    ['drive: drive-ground', async () => {
+      const grounds = await page.locator('#drive-ground option').evaluateAll(
+        (options) => options.map(({value}) => value).filter((value) => value !== ''));
+      assert.ok(grounds.length > 2);
+      // Nothing but the ground is to change: it stands, from far enough to see what lies ahead of it, with
+      // one quality, and without prints that fade.
+      await holdQuality();
+      await stands();
+      for (let i = 0; i < 8; ++i) await key('-');
+      await cameraRests(page);
+      await look(() => window.stridewire.worlds[0].view.footprints.clear());
+      const flat = await picture();
+      for (const name of [...grounds.filter((name) => name !== 'flat'), 'flat']) {
+        await page.locator('#drive-ground').selectOption(name);
+        // Another client is told, and it is drawn.
+        await until(`${name} is the ground`, () => (alpha.terrain === null) === (name === 'flat'));
+        await until(`${name} is drawn`, async () =>
+          (differing(flat, await picture()) > 0.003) === (name !== 'flat'));
+        assert.equal(await page.locator('#drive-ground').inputValue(), name);
+      }
+      await key('f');
+      await letQualityGo();
+    }],
     ['inspect: Follow', () => follows(() => press('Follow', '#panel-inspect'))],
     ['page: Follow the chosen one', () => follows(() => press('Follow the chosen one'))],
     ['page: Frame all', () => frameAll(() => press('Frame all'))],
@@ -397,17 +542,14 @@ test('every control does what its label says', async () => {
       await look(() => window.stridewire.playback.goLive());
       const laid = await look(() => window.stridewire.sampled()[0].footprints);
       await steps();
-      await eventually('prints are there', (n) => window.stridewire.sampled()[0].footprints >= n, laid + 8);
+      await eventually('prints are there', (n) => window.stridewire.sampled()[0].footprints >= n, laid + 4);
       await look(() => window.stridewire.playback.pause());
       await shows('view-prints');
     }],
     ['view: view-plants', async () => {
       // While it stands: both feet are planted.
       await look(() => window.stridewire.playback.goLive());
-      await alpha.cancel([driven]);
-      await until('it stands', async () => (await alpha.inspect(driven)).movement === null);
-      const {timeS} = await alpha.inspect(driven);
-      await eventually('that is seen', (t) => window.stridewire.sampled()[0].timeS > t + 0.5, timeS);
+      await stands();
       await look(() => window.stridewire.playback.pause());
       await shows('view-plants');
       await look(() => window.stridewire.playback.goLive());
@@ -415,7 +557,7 @@ test('every control does what its label says', async () => {
     ['view: figures-lines', async () => {
       await page.locator('label[for=figures-lines]').click();
       await eventually('lines', () => window.stridewire.draw.style === 'lines' &&
-        document.querySelector('#panel-view .hint').textContent === 'Drawn as lines now.');
+        document.querySelector('#panel-view .hint').textContent.startsWith('Drawn as lines now'));
     }],
     ['view: figures-auto', async () => {
       await page.locator('label[for=figures-auto]').click();
@@ -429,6 +571,30 @@ test('every control does what its label says', async () => {
       await page.locator('label[for=figures-bodies]').click();
       await eventually('bodies', (n) => window.stridewire.draw.style === 'bodies' &&
         window.stridewire.draw.triangles > n, lines);
+    }],
+    ['view: quality-low', async () => {
+      await page.locator('label[for=quality-low]').click();
+      await eventually('it is drawn as simply as can be', () =>
+        window.stridewire.draw.level === window.stridewire.draw.levels - 1 &&
+        document.querySelector('.quality').hidden);
+    }],
+    ['view: quality-high', async () => {
+      await frames(2);
+      const low = await look(() => window.stridewire.draw.triangles);
+      await page.locator('label[for=quality-high]').click();
+      await eventually('finer bodies', (n) => window.stridewire.draw.level === 0 &&
+        window.stridewire.draw.triangles > 2 * n && document.querySelector('.quality').hidden, low);
+      assert.ok(await page.locator('#view-shadows').isChecked());
+    }],
+    ['view: quality-auto', async () => {
+      await page.locator('label[for=quality-auto]').click();
+      await eventually('it chooses, and says so', () => window.stridewire.app.quality.lowered &&
+        !document.querySelector('.quality').hidden);
+    }],
+    ['page: Quality lowered', async () => {
+      await press('Close View');
+      await press('Quality lowered');
+      assert.ok(await page.locator('#panel-view').isVisible());
     }],
     ['view: mode-full', async () => {
       const quantised = await bytesAPose();
@@ -447,7 +613,7 @@ test('every control does what its label says', async () => {
     }],
     ['page: the scene', async () => {
       await press('Frame all');
-      await cameraRests();
+      await cameraRests(page);
       const at = await figureAt();
       await page.mouse.click(at.x, at.y);
       assert.equal(await chosen(), driven);
@@ -484,7 +650,8 @@ test('every control does what its label says', async () => {
       const beta = page.locator('.chip', {hasText: 'beta'});
       await beta.click();
       assert.equal(await names(), 'alpha,beta');
-      assert.deepEqual(new URL(page.url()).searchParams.getAll('world').sort(), ['alpha', 'beta']);
+      assert.deepEqual(await look(() => new URLSearchParams(location.search).getAll('world').sort()),
+        ['alpha', 'beta']);
       await eventually('its avatar is seen', () => window.stridewire.sampled()[1].avatars.length === 1);
       await beta.click();
       assert.equal(await names(), 'alpha');
@@ -499,11 +666,23 @@ test('every control does what its label says', async () => {
     assert.ok(changed(was, now), `${JSON.stringify(was)} ${JSON.stringify(now)}`);
   };
   const drag = async (dx, dy, options = {}) => {
-    await page.mouse.move(700, 200);
+    const {x, y} = await middle();
+    await page.mouse.move(x, y);
     await page.mouse.down(options);
-    await page.mouse.move(700 + dx / 2, 200 + dy / 2);
-    await page.mouse.move(700 + dx, 200 + dy);
+    await page.mouse.move(x + dx / 2, y + dy / 2);
+    await page.mouse.move(x + dx, y + dy);
     await page.mouse.up(options);
+  };
+  /** Two fingers, each from one place to another, relative to the middle. */
+  const twoFingers = async (from, to) => {
+    const at = await middle();
+    const points = (share) => from.map(([x, y], id) => ({
+      id, x: at.x + x + (to[id][0] - x) * share, y: at.y + y + (to[id][1] - y) * share}));
+    const touch = (type, touchPoints) => devtools.send('Input.dispatchTouchEvent', {type, touchPoints});
+    await touch('touchStart', points(0));
+    for (let i = 1; i <= 2; ++i) await touch('touchMove', points(i / 2));
+    await touch('touchEnd', []);
+    await frames(1);
   };
   const choose = async () => {
     await key('Escape');
@@ -524,6 +703,14 @@ test('every control does what its label says', async () => {
     'Wheel, pinch, + −': async () => {
       await turned(() => key('+'), (a, b) => b.wantDistance < a.wantDistance);
       await turned(() => key('-'), (a, b) => b.wantDistance > a.wantDistance);
+      const [near, far] = [[[-30, 0], [30, 0]], [[-90, 0], [90, 0]]];
+      // Twice as far apart, half as far away, but where the camera's range ends.
+      await turned(() => twoFingers(near, far), (a, b) => b.wantDistance < a.wantDistance * 0.6 &&
+        b.wantAzimuth === a.wantAzimuth);
+      await turned(() => twoFingers(far, near), (a, b) => b.wantDistance > a.wantDistance * 1.6 &&
+        b.wantAzimuth === a.wantAzimuth);
+      // The page itself keeps its size.
+      assert.equal(await look(() => visualViewport.scale), 1);
     },
     'Shift or right drag, two fingers': async () => {
       for (const right of [false, true]) {
@@ -537,19 +724,24 @@ test('every control does what its label says', async () => {
         }
         assert.notDeepEqual(await target(), was);
       }
+      const was = await target();
+      const away = (await orbit()).wantDistance;
+      await twoFingers([[-40, 0], [40, 0]], [[20, 30], [100, 30]]);
+      assert.notDeepEqual(await target(), was);
+      assert.ok(Math.abs((await orbit()).wantDistance / away - 1) < 0.05);
     },
     'F': () => frameAll(() => key('f')),
     'C, double click': async () => {
       await choose();
       await follows(() => key('c'));
       await key('f');
-      await cameraRests();
+      await cameraRests(page);
       const at = await figureAt();
       await page.mouse.dblclick(at.x, at.y);
       // The first click may open a panel, which moves the figure from under the second.
       await until('it is followed', async () => {
         if (await following() === driven) return true;
-        await cameraRests();
+        await cameraRests(page);
         const {x, y} = await figureAt();
         await page.mouse.dblclick(x, y);
         return false;
@@ -618,6 +810,82 @@ test('every control does what its label says', async () => {
       await key('v');
       near(await length(), was);
     },
+    'T': () => places(() => key('t')),
+    'M': () => sends(() => key('m')),
+    'M, then drag': async () => {
+      await cameraRests(page);
+      await key('m');
+      const [from, to] = await beside([0.4, 0.4], [0.9, 0.1]);
+      const camera = await orbit();
+      const {atM, headingRad} = await goes(async () => {
+        await page.mouse.move(from.x, from.y);
+        await page.mouse.down();
+        await page.mouse.move((from.x + to.x) / 2, (from.y + to.y) / 2);
+        await page.mouse.move(to.x, to.y);
+        await page.mouse.up();
+      });
+      closeTo(atM, from.at);
+      assert.ok(Math.abs(headingRad - Math.atan2(0.5, -0.3)) < 0.1, `${headingRad}`);
+      assert.deepEqual(await orbit(), camera);
+      await key('m');
+    },
+    'M, then Shift click, long touch': async () => {
+      await cameraRests(page);
+      await key('m');
+      const [first, second, goal] = await beside([0.5, 0.2], [0.3, 0.6], [-0.4, 0.5]);
+      const item = await goes(async () => {
+        await page.keyboard.down('Shift');
+        await page.mouse.click(first.x, first.y);
+        await page.keyboard.up('Shift');
+        await toGo(0, 1);
+        const touch = (type, touchPoints) => devtools.send('Input.dispatchTouchEvent', {type, touchPoints});
+        await touch('touchStart', [{x: second.x, y: second.y}]);
+        const beganMs = await look(() => performance.now());
+        await eventually('the finger rested', (ms) => performance.now() > ms + 700, beganMs);
+        await touch('touchEnd', []);
+        await toGo(0, 2);
+        await page.touchscreen.tap(goal.x, goal.y);
+      }, 2);
+      closeTo(item.waypointsM[0], first.at);
+      closeTo(item.waypointsM[1], second.at);
+      closeTo(item.atM, goal.at);
+      // Escape takes places back before it lays the tool down.
+      await page.keyboard.down('Shift');
+      await page.mouse.click(first.x, first.y);
+      await page.keyboard.up('Shift');
+      await toGo(0, 1);
+      await key('Escape');
+      await toGo(0, 0);
+      assert.ok(await pressed('drive-walk'));
+      await key('Escape');
+      assert.equal(await pressed('drive-walk'), false);
+      assert.equal(await chosen(), driven);
+    },
+    'Drag an outlined print': async () => {
+      await cameraRests(page);
+      const [from, to] = await look((number) => {
+        const {view} = window.stridewire.worlds[0];
+        const {x, z} = view.place(number);
+        return [[x + 0.4, 0, z + 0.3], [x + 0.1, 0, z + 0.45]].map((at) => ({at, ...view.onPage(at)}));
+      }, driven);
+      await adds(() => alpha.request([
+        {avatar: driven, type: 'step', atM: from.at}, {avatar: driven, type: 'step', foot: 'left', atM: [9, 0, 9]}]));
+      await eventually('both are marked', () => window.stridewire.sampled()[0].planned === 2);
+      const camera = await orbit();
+      await page.mouse.move(from.x, from.y);
+      await page.mouse.down();
+      await page.mouse.move((from.x + to.x) / 2, (from.y + to.y) / 2);
+      await page.mouse.move(to.x, to.y);
+      await page.mouse.up();
+      await until('it is to land there', async () => {
+        const places = (await alpha.inspect(driven)).queue.flatMap(({atM}) => atM === null ? [] : [atM]);
+        return places.length === 2 && Math.hypot(places[0][0] - to.at[0], places[0][2] - to.at[2]) < 0.03 &&
+          places[1][0] === 9;
+      });
+      assert.deepEqual(await orbit(), camera);
+      await alpha.cancel([driven]);
+      await eventually('the marks are gone', () => window.stridewire.sampled()[0].planned === 0);
+    },
     'J': async () => assert.equal((await adds(() => key('j'))).type, 'jump'),
     'S': async () => assert.equal((await adds(() => key('s'))).type, 'stand'),
     'X': () => queueIsEmpty(() => key('x')),
@@ -633,10 +901,13 @@ test('every control does what its label says', async () => {
 
   const seen = new Set(await controlsOf(page));
   for (const [name, check] of checks) {
+    const began = performance.now();
     try {
       await check();
+      tell(began, name);
     } catch (error) {
       error.message = `${name}: ${error.message}`;
+      await keep(page, 'failed_control');
       throw error;
     }
     for (const control of await controlsOf(page)) seen.add(control);
@@ -647,10 +918,13 @@ test('every control does what its label says', async () => {
   const told = await page.locator('dialog dt').allTextContents();
   assert.deepEqual(told.sort(), Object.keys(keys).sort());
   for (const [name, check] of Object.entries(keys)) {
+    const began = performance.now();
     try {
       await check();
+      tell(began, `keys ${name}`);
     } catch (error) {
       error.message = `keys ${name}: ${error.message}`;
+      await keep(page, 'failed_key');
       throw error;
     }
   }

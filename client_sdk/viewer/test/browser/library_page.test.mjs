@@ -5,24 +5,19 @@ import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
 
 import {launch} from '../browser.mjs';
-import {Server, keep, sleep, until} from './support.mjs';
+import {Server, keep, openIn, sleep, until} from './support.mjs';
 
 let server;
 let browser;
 let context;
 let page;
-const errors = [];
+let errors;
 
 before(async () => {
   server = await Server.start();
   browser = await launch();
   context = await browser.newContext({viewport: {width: 1280, height: 720}, colorScheme: 'light'});
-  page = await context.newPage();
-  page.on('console', (message) => {
-    if (message.type() === 'error') errors.push(message.text());
-  });
-  page.on('pageerror', (error) => errors.push(String(error)));
-  await page.goto(`http://127.0.0.1:${server.httpPort}/library.html`);
+  ({page, errors} = await openIn(context, `http://127.0.0.1:${server.httpPort}/library.html`));
   await stepShown(0);
 });
 

@@ -8,6 +8,8 @@ import net from 'node:net';
 import {Client} from '@stridewire/client';
 import WebSocket from 'ws';
 
+import {decodePng} from './png.mjs';
+
 export const programs = process.env.STRIDEWIRE_BIN;
 const screenshots = process.env.STRIDEWIRE_SCREENSHOTS ?? '/tmp/stridewire-screenshots';
 
@@ -21,19 +23,37 @@ export function numberFrom(name, otherwise) {
 
 export const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
+/** Says what takes long, where STRIDEWIRE_TIMES is set. */
+export function tell(beganMs, what) {
+  if (process.env.STRIDEWIRE_TIMES) console.log(`${(performance.now() - beganMs).toFixed(0)} ms ${what}`);
+}
+
 /** Waits for what must come, however slow the machine is. */
-export async function until(what, holds, seconds = 60) {
-  const endMs = performance.now() + 1000 * seconds;
+export async function until(what, holds, seconds = 120) {
+  const beganMs = performance.now();
   let value;
   while (!(value = await holds())) {
-    if (performance.now() > endMs) throw new Error(`waited ${seconds} s until ${what}`);
-    await sleep(50);
+    if (performance.now() > beganMs + 1000 * seconds) throw new Error(`waited ${seconds} s until ${what}`);
+    await sleep(20);
   }
+  tell(beganMs, `until ${what}`);
   return value;
 }
 
 export class Server {
+  /** On free ports, or where another one was before: that a port is taken meanwhile passes. */
   static async start(port = 0, httpPort = 0) {
+    for (let attempt = 1; ; ++attempt) {
+      try {
+        return await this.launch(port, httpPort);
+      } catch (error) {
+        if (port === 0 || attempt === 20) throw error;
+        await sleep(500);
+      }
+    }
+  }
+
+  static async launch(port, httpPort) {
     const child = spawn(`${programs}/stridewired`, [
       '--listen', `127.0.0.1:${port}`, '--http', `127.0.0.1:${httpPort}`, '--log-level', 'warning',
     ], {stdio: ['ignore', 'pipe', 'inherit']});
@@ -153,6 +173,7 @@ export class Walkers {
 
 /** Poses as the C++ library has them: [tick, time, root, rotations]. */
 export async function dumpPoses(server, world, avatar, count, mode) {
+  const beganMs = performance.now();
   const child = spawn(`${programs}/web_pose_dump`, [
     '127.0.0.1', `${server.port}`, world, `${avatar}`, `${count}`, mode,
   ], {stdio: ['ignore', 'pipe', 'inherit']});
@@ -161,21 +182,40 @@ export async function dumpPoses(server, world, avatar, count, mode) {
   child.stdout.on('data', (text) => out += text);
   const [code] = await once(child, 'close');
   if (code !== 0) throw new Error(`web_pose_dump ended with ${code}`);
+  tell(beganMs, `to dump ${count} poses`);
   return out.trim().split('\n').map((line) => line.split(' ').map(Number));
 }
+
+// A frame costs a processor that draws 50 ms: as many as it manages would leave nothing to what else runs.
+const framesPerS = 8;
 
 /** A page of the viewer, and what it complained of. */
 export async function openPage(browser, port, query, options = {}) {
   const context = await browser.newContext({
-    viewport: {width: 1280, height: 720}, colorScheme: 'light', ...options});
+    viewport: {width: 960, height: 600}, colorScheme: 'light', ...options});
+  return {context, ...await openIn(context, `http://127.0.0.1:${port}/?frames=${framesPerS}&${query}`)};
+}
+
+/** The same in a context that there is. */
+export async function openIn(context, link) {
+  context.setDefaultTimeout(120_000);  // However slow the machine is.
+  const beganMs = performance.now();
   const page = await context.newPage();
   const errors = [];
   page.on('console', (message) => {
     if (message.type() === 'error') errors.push(message.text());
   });
   page.on('pageerror', (error) => errors.push(String(error)));
-  await page.goto(`http://127.0.0.1:${port}/?${query}`);
-  return {page, context, errors};
+  await page.goto(link);
+  tell(beganMs, `to open ${link}`);
+  return {page, errors};
+}
+
+/** So many more frames are drawn. */
+export async function framesDrawn(page, count) {
+  const from = await page.evaluate(() => window.stridewire.stats.framesDrawn);
+  await until('frames are drawn', () => page.evaluate(
+    (n) => window.stridewire.stats.framesDrawn >= n, from + count));
 }
 
 /** Figures are drawn. */
@@ -186,33 +226,45 @@ export async function figuresShown(page, count = 1) {
 
 export async function keep(page, name) {
   mkdirSync(screenshots, {recursive: true});
+  const beganMs = performance.now();
   await page.screenshot({path: `${screenshots}/${name}.png`});
+  tell(beganMs, `to keep ${name}`);
 }
 
-/** Share of pixels that differ between two pictures of the scene, a moment apart. */
+/** The first world's camera is where it wants to be. */
+export async function cameraRests(page) {
+  const where = () => page.evaluate(() => {
+    const {view} = window.stridewire.worlds[0].view;
+    return [...view.camera.position.toArray(), ...view.target.toArray()];
+  });
+  let last = await where();
+  await until('the camera rests', async () => {
+    await framesDrawn(page, 2);
+    const now = await where();
+    const rests = now.every((x, i) => Math.abs(x - last[i]) < 1e-4);
+    last = now;
+    return rests;
+  });
+}
+
+/** Share of pixels that differ between two pictures of the scene, a moment and some frames apart. */
 export async function movingShare(page, clip, apartMs) {
   const first = await page.screenshot({clip});
   await sleep(apartMs);
-  return differing(page, first, await page.screenshot({clip}));
+  await framesDrawn(page, 3);
+  return differing(first, await page.screenshot({clip}));
 }
 
 /** Share of pixels that differ between two pictures of one size. */
-export function differing(page, first, second) {
-  return page.evaluate(async (pictures) => {
-    const pixels = await Promise.all(pictures.map(async (text) => {
-      const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-      const image = await createImageBitmap(new Blob([bytes], {type: 'image/png'}));
-      const canvas = new OffscreenCanvas(image.width, image.height);
-      const drawing = canvas.getContext('2d');
-      drawing.drawImage(image, 0, 0);
-      return drawing.getImageData(0, 0, image.width, image.height).data;
-    }));
-    const [a, b] = pixels;
-    let different = 0;
-    for (let i = 0; i < a.length; i += 4) {
-      const d = Math.abs(a[i] - b[i]) + Math.abs(a[i + 1] - b[i + 1]) + Math.abs(a[i + 2] - b[i + 2]);
-      if (d > 48) ++different;
-    }
-    return different / (a.length / 4);
-  }, [first.toString('base64'), second.toString('base64')]);
+export function differing(first, second) {
+  const [a, b] = [decodePng(first), decodePng(second)];
+  if (a.width !== b.width || a.height !== b.height) return 1;  // The page was laid out anew.
+  let different = 0;
+  for (let i = 0; i < a.width * a.height; ++i) {
+    const [p, q] = [i * a.channels, i * b.channels];
+    const d = Math.abs(a.pixels[p] - b.pixels[q]) + Math.abs(a.pixels[p + 1] - b.pixels[q + 1]) +
+      Math.abs(a.pixels[p + 2] - b.pixels[q + 2]);
+    if (d > 48) ++different;
+  }
+  return different / (a.width * a.height);
 }

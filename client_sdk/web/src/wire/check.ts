@@ -1,8 +1,15 @@
-import type {MovementRequest, Observation, QueuedRequest, Role, SpawnItem} from '../types';
-import {footChoices, movementTypes, poseModes, roles} from './decode';
-import {maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes} from './limits';
+import type {
+  LayerRequest, MovementRequest, Observation, QueuedRequest, Role, SpawnItem, Terrain, TerrainBox, Vec3
+} from '../types';
+import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
+import {
+  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxTerrainBoxes, maxTerrainColumns,
+  maxWaypoints
+} from './limits';
 import {Malformed} from './malformed';
-import type {CancelQueue, JoinWorld, Observe, Remove, Request, Spawn} from './messages';
+import type {
+  CancelQueue, JoinWorld, LayerEntry, Observe, Remove, Request, SetLayers, SetTerrain, Spawn
+} from './messages';
 import {checkName} from './text';
 
 /** What callers pass, as messages to send: checked as the receiver would. Numbers that the session
@@ -41,6 +48,22 @@ function oneOf<T>(values: readonly T[], value: unknown, field: string, index = -
   return value as T;
 }
 
+function vector(value: unknown, field: string, index: number): Vec3 {
+  const numbers = value as Vec3 | undefined;
+  if (!numbers || numbers.length !== 3) throw new Malformed('is not three numbers', field, index);
+  return [
+    finite(numbers[0], field, index), finite(numbers[1], field, index),
+    finite(numbers[2], field, index)
+  ];
+}
+
+/** x and z. */
+function place(value: unknown, field: string, index: number): readonly [number, number] {
+  const numbers = value as readonly number[] | undefined;
+  if (!numbers || numbers.length !== 2) throw new Malformed('is not two numbers', field, index);
+  return [finite(numbers[0], field, index), finite(numbers[1], field, index)];
+}
+
 function avatarList(avatars: readonly number[], least: number, field: string): Uint32Array {
   list(avatars, least, field);
   return Uint32Array.from(avatars, (avatar, i) => avatarNumber(avatar, 1, field, i));
@@ -56,20 +79,11 @@ export function spawn(items: readonly SpawnItem[]): Spawn {
     type: 'Spawn',
     seq: 0n,
     world: 0,
-    items: list(items, 1, 'items').map((item, i) => {
-      const position = item?.positionM;
-      if (!position || position.length !== 3) {
-        throw new Malformed('is not three numbers', 'positionM', i);
-      }
-      return {
-        avatar: avatarNumber(item.avatar ?? 0, 0, 'avatar', i),
-        positionM: [
-          finite(position[0], 'positionM', i), finite(position[1], 'positionM', i),
-          finite(position[2], 'positionM', i)
-        ],
-        headingRad: finite(item.headingRad, 'headingRad', i),
-      };
-    }),
+    items: list(items, 1, 'items').map((item, i) => ({
+      avatar: avatarNumber(item?.avatar ?? 0, 0, 'avatar', i),
+      positionM: vector(item?.positionM, 'positionM', i),
+      headingRad: finite(item.headingRad, 'headingRad', i),
+    })),
   };
 }
 
@@ -91,20 +105,36 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
       if (item === null || typeof item !== 'object') throw new Malformed('is none', 'items', i);
       const type = oneOf(movementTypes, item.type, 'type', i);
       const step = type === 'step';
-      const moves = type !== 'stand';
+      const walk = type === 'walk';
+      const at = walk || (step && item.atM !== undefined) ? vector(item.atM, 'atM', i) : null;
+      const moves = type !== 'stand' && at === null;
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
         requestId: item.requestId === undefined ? nextId() : requestId(item.requestId, i),
         type,
         foot: step ? oneOf(footChoices, item.foot ?? 'auto', 'foot', i) : 'auto',
+        atM: at,
+        headingRad: at !== null && (walk || item.headingRad !== undefined)
+            ? finite(item.headingRad, 'headingRad', i) : null,
         lengthM: moves ? finite(item.lengthM ?? 0, 'lengthM', i) : 0,
-        sideM: step && item.sideM !== undefined ? finite(item.sideM, 'sideM', i) : null,
+        sideM: step && moves && item.sideM !== undefined ? finite(item.sideM, 'sideM', i) : null,
         heightM: moves ? finite(item.heightM ?? 0, 'heightM', i) : 0,
         turnRad: moves ? finite(item.turnRad ?? 0, 'turnRad', i) : 0,
-        seconds: moves ? 0 : finite(item.seconds ?? 0, 'seconds', i),
+        seconds: type === 'stand' ? finite(item.seconds ?? 0, 'seconds', i) : 0,
+        waypointsM: walk ? waypoints(item.waypointsM ?? [], i) : [],
+        speedMPerS: walk && item.speedMPerS !== undefined
+            ? finite(item.speedMPerS, 'speedMPerS', i) : null,
+        takeover: oneOf(takeovers, item.takeover ?? 'none', 'takeover', i),
       };
     }),
   };
+}
+
+function waypoints(places: readonly Vec3[], index: number): readonly Vec3[] {
+  if (!Array.isArray(places) || places.length > maxWaypoints) {
+    throw new Malformed('is not a list of up to 64 places', 'waypointsM', index);
+  }
+  return places.map((place: Vec3) => vector(place, 'waypointsM', index));
 }
 
 function requestId(value: unknown, index: number): bigint {
@@ -113,6 +143,63 @@ function requestId(value: unknown, index: number): bigint {
     throw new Malformed('is not a whole number from 1 on, exact as it is', 'requestId', index);
   }
   return id;
+}
+
+/** A copy: what the caller does with its arrays later changes nothing. */
+export function setTerrain(terrain: Terrain | null): SetTerrain {
+  const message: SetTerrain = {type: 'SetTerrain', seq: 0n, world: 0, terrain: null};
+  if (terrain === null) return message;
+  if (typeof terrain !== 'object') throw new Malformed('is none', 'terrain');
+  const from = terrain.heightField ?? null;
+  let heightField = null;
+  if (from !== null) {
+    const {columns, rows, heightsM} = from;
+    for (const samples of [columns, rows]) {
+      if (!Number.isInteger(samples) || samples < 2 || samples > maxTerrainColumns) {
+        throw new Malformed('is not 2 to 1024', 'columns, rows');
+      }
+    }
+    if (heightsM?.length !== columns * rows) throw new Malformed('is not one a sample', 'heightsM');
+    const cellM = finite(from.cellM, 'cellM', -1);
+    if (!(cellM > 0)) throw new Malformed('is not above 0', 'cellM');
+    const copy = Float32Array.from(heightsM);
+    copy.forEach((height, h) => finite(height, 'heightsM', h));
+    heightField = {originM: place(from.originM, 'originM', -1), cellM, columns, rows, heightsM: copy};
+  }
+  const boxes = terrain.boxes ?? [];
+  if (boxes.length > maxTerrainBoxes) throw new Malformed('has more than 65536', 'boxes');
+  message.terrain = {
+    heightField,
+    boxes: Array.from(boxes, (box, b): TerrainBox => {
+      const minM = place(box?.minM, 'boxes.minM', b);
+      const maxM = place(box?.maxM, 'boxes.maxM', b);
+      if (!(minM[0] < maxM[0] && minM[1] < maxM[1])) {
+        throw new Malformed('is not above minM', 'boxes.maxM', b);
+      }
+      return {minM, maxM, heightM: finite(box.heightM, 'boxes.heightM', b)};
+    }),
+  };
+  return message;
+}
+
+export function setLayers(items: readonly LayerRequest[]): SetLayers {
+  return {
+    type: 'SetLayers',
+    seq: 0n,
+    world: 0,
+    items: list(items, 1, 'items').map((item, i): LayerEntry => {
+      if (item === null || typeof item !== 'object') throw new Malformed('is none', 'items', i);
+      checkName(item.layer, maxNameBytes, 'layer');
+      return {
+        avatar: avatarNumber(item.avatar, 1, 'avatar', i),
+        layer: item.layer,
+        off: item.off === true,
+        weight: finite(item.weight ?? 1, 'weight', i),
+        blendS: finite(item.blendS ?? 0.3, 'blendS', i),
+        speed: finite(item.speed ?? 1, 'speed', i),
+      };
+    }),
+  };
 }
 
 export function observe(observation: Observation): Observe {

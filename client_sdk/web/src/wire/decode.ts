@@ -3,16 +3,17 @@ import {tableNumbers} from '../../generated/layout';
 import * as wire from '../../generated/wire';
 import type {
   CurrentMovement, EndSite, FootChoice, Leg, MovementKind, MovementType, ParameterName, Parameters,
-  PoseMode, QueuedRequest, Role, Vec3, WorldEvent, WorldEventType
+  PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
 } from '../types';
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
-  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxNameBytes, maxParameters,
-  maxReasonBytes, maxResumeTokenBytes, maxTextBytes, maxWeights, minResumeTokenBytes
+  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLayerNames, maxNameBytes, maxParameters,
+  maxReasonBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
+  minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
-import type {Joint, Message, ReplyEntry, SpawnEntry} from './messages';
+import type {Joint, LayerEntry, Message, ReplyEntry, SpawnEntry} from './messages';
 import {poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
@@ -22,7 +23,8 @@ const asBytes = Encoding.UTF8_BYTES;
 
 export const roles: readonly Role[] = ['controller', 'observer'];
 export const poseModes: readonly (PoseMode | 'movement')[] = ['full', 'quantised', 'movement'];
-export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand'];
+export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand', 'walk'];
+export const takeovers: readonly Takeover[] = ['none', 'afterMovement', 'now'];
 export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
 export const movementKinds: readonly MovementKind[] = ['stepLeft', 'stepRight', 'jump', 'stand'];
 export const eventTypes: readonly WorldEventType[] = [
@@ -334,6 +336,9 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       endSites,
       leftLeg: leg(skeleton!.leftLeg(), jointCount),
       rightLeg: leg(skeleton!.rightLeg(), jointCount),
+      layers: Array.from(
+          {length: count(m.layersLength(), 0, maxLayerNames, 'WorldInfo.layers')},
+          (_, l) => name(m.layers(l)!.name(asBytes), 'WorldInfo.layers', l)),
     };
   },
 
@@ -429,6 +434,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
                             'Event.applied', i),
         extrapolated: event.extrapolated(),
         clamped: event.clamped(),
+        cutShort: event.cutShort(),
         foot: type !== 'footStrike' ? null : foot === 0 ? 'left' : 'right',
         positionM: vector(event.positionM(), 'Event.positionM', i),
         basePositionM: vector(event.basePositionM(), 'Event.basePositionM', i),
@@ -510,6 +516,49 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       },
     };
   },
+
+  SetTerrain(bytes) {
+    const m = wire.SetTerrain.getRootAsSetTerrain(bytes);
+    return {
+      type: 'SetTerrain',
+      seq: id(m.seq(), 'SetTerrain.seq'),
+      world: id(m.world(), 'SetTerrain.world'),
+      terrain: terrain(m.terrain()),
+    };
+  },
+
+  SetLayers(bytes) {
+    const m = wire.SetLayers.getRootAsSetLayers(bytes);
+    const length = count(m.itemsLength(), 1, maxItems, 'SetLayers.items');
+    const items: LayerEntry[] = [];
+    const item = new wire.LayerItem();
+    for (let i = 0; i < length; ++i) {
+      m.items(i, item);
+      items.push({
+        avatar: id(item.avatar(), 'SetLayers.avatar', i),
+        layer: name(item.layer(asBytes), 'SetLayers.layer', i),
+        off: item.off(),
+        weight: finite(item.weight(), 'SetLayers.weight', i),
+        blendS: finite(item.blendS(), 'SetLayers.blendS', i),
+        speed: finite(item.speed(), 'SetLayers.speed', i),
+      });
+    }
+    return {
+      type: 'SetLayers',
+      seq: id(m.seq(), 'SetLayers.seq'),
+      world: id(m.world(), 'SetLayers.world'),
+      items,
+    };
+  },
+
+  WorldTerrain(bytes) {
+    const m = wire.WorldTerrain.getRootAsWorldTerrain(bytes);
+    return {
+      type: 'WorldTerrain',
+      world: id(m.world(), 'WorldTerrain.world'),
+      terrain: terrain(m.terrain()),
+    };
+  },
 };
 
 /** What the generated readers give for a text asked for as bytes. */
@@ -531,17 +580,32 @@ function finiteOrNull(value: number | null, field: string, index: number): numbe
 function request(item: wire.RequestItem, i: number): QueuedRequest {
   const type = known(movementTypes, item.type(), 'Request.type', i);
   const step = type === 'step';
-  const moves = type !== 'stand';
+  const walk = type === 'walk';
+  const place = step || walk ? item.atM() : null;
+  const moves = type !== 'stand' && place === null;
+  if (walk && (place === null || item.headingRad() === null)) {
+    throw new Malformed('has no goal', 'Request.atM', i);
+  }
+  const waypointsM: Vec3[] = [];
+  const waypoints = walk ? count(item.waypointsMLength(), 0, maxWaypoints, 'Request.waypointsM') : 0;
+  for (let w = 0; w < waypoints; ++w) {
+    waypointsM.push(vector(item.waypointsM(w), 'Request.waypointsM', i));
+  }
   return {
     avatar: id(item.avatar(), 'Request.avatar', i),
     requestId: id(item.requestId(), 'Request.requestId', i),
     type,
     foot: step ? known(footChoices, item.foot(), 'Request.foot', i) : 'auto',
+    atM: place === null ? null : vector(place, 'Request.atM', i),
+    headingRad: place === null ? null : finiteOrNull(item.headingRad(), 'Request.headingRad', i),
     lengthM: moves ? finite(item.lengthM(), 'Request.lengthM', i) : 0,
-    sideM: step ? finiteOrNull(item.sideM(), 'Request.sideM', i) : null,
+    sideM: step && moves ? finiteOrNull(item.sideM(), 'Request.sideM', i) : null,
     heightM: moves ? finite(item.heightM(), 'Request.heightM', i) : 0,
     turnRad: moves ? finite(item.turnRad(), 'Request.turnRad', i) : 0,
-    seconds: moves ? 0 : finite(item.seconds(), 'Request.seconds', i),
+    seconds: type === 'stand' ? finite(item.seconds(), 'Request.seconds', i) : 0,
+    waypointsM,
+    speedMPerS: walk ? finiteOrNull(item.speedMS(), 'Request.speedMPerS', i) : null,
+    takeover: known(takeovers, item.takeover(), 'Request.takeover', i),
   };
 }
 
@@ -592,6 +656,47 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
     parameterNames: names,
     sites,
   };
+}
+
+function terrain(m: wire.Terrain | null): Terrain | null {
+  if (m === null) return null;
+  const from = m.heightField();
+  let heightField = null;
+  if (from !== null) {
+    const origin = from.originM();
+    const cellM = from.cellM();
+    if (!(finite(cellM, 'Terrain.cellM') > 0)) throw new Malformed('is not above 0', 'Terrain.cellM');
+    const columns = from.columns();
+    const rows = from.rows();
+    for (const samples of [columns, rows]) {
+      if (samples < 2 || samples > maxTerrainColumns) {
+        throw new Malformed('is not 2 to 1024', 'Terrain.columns, rows');
+      }
+    }
+    const heightsM =
+        numbers(from.heightsMArray(), maxTerrainColumns * maxTerrainColumns, 'Terrain.heightsM');
+    if (heightsM.length !== columns * rows) {
+      throw new Malformed('is not one a sample', 'Terrain.heightsM');
+    }
+    const originM = [
+      finite(origin?.x() ?? 0, 'Terrain.originM'), finite(origin?.z() ?? 0, 'Terrain.originM')
+    ] as const;
+    heightField = {originM, cellM, columns, rows, heightsM};
+  }
+  const boxes: TerrainBox[] = [];
+  const length = count(m.boxesLength(), 0, maxTerrainBoxes, 'Terrain.boxes');
+  const box = new wire.TerrainBox();
+  for (let b = 0; b < length; ++b) {
+    m.boxes(b, box);
+    const number = (value: number): number => finite(value, 'Terrain.boxes', b);
+    const minM = [number(box.minX()), number(box.minZ())] as const;
+    const maxM = [number(box.maxX()), number(box.maxZ())] as const;
+    if (!(minM[0] < maxM[0] && minM[1] < maxM[1])) {
+      throw new Malformed('max is not above min', 'Terrain.boxes', b);
+    }
+    boxes.push({minM, maxM, heightM: number(box.heightM())});
+  }
+  return {heightField, boxes};
 }
 
 /** A copy, for the frame it came in is not kept. */

@@ -1,9 +1,10 @@
 import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
-import {footChoices, movementTypes, poseModes, roles} from './decode';
+import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
 import {makeFrame, maxPayloadBytes} from './frame';
 import {maxBulkBytes, maxControlBytes} from './limits';
 import {Malformed} from './malformed';
+import type {Terrain} from '../types';
 import type {ClientMessage} from './messages';
 
 /** Makes frames of checked messages; sender's limits are those of the server it talks to. */
@@ -24,6 +25,31 @@ export class Encoder {
     }
     return makeFrame(message.type, bytes);
   }
+}
+
+function buildTerrain(b: Builder, terrain: Terrain): number {
+  const from = terrain.heightField;
+  let field = 0;
+  if (from !== null) {
+    const heights = wire.HeightField.createHeightsMVector(b, from.heightsM);
+    wire.HeightField.startHeightField(b);
+    wire.HeightField.addOriginM(b, wire.GroundPoint.createGroundPoint(b, ...from.originM));
+    wire.HeightField.addCellM(b, from.cellM);
+    wire.HeightField.addColumns(b, from.columns);
+    wire.HeightField.addRows(b, from.rows);
+    wire.HeightField.addHeightsM(b, heights);
+    field = wire.HeightField.endHeightField(b);
+  }
+  wire.Terrain.startBoxesVector(b, terrain.boxes.length);
+  for (let i = terrain.boxes.length - 1; i >= 0; --i) {  // Written from the end.
+    const {minM, maxM, heightM} = terrain.boxes[i]!;
+    wire.TerrainBox.createTerrainBox(b, ...minM, ...maxM, heightM);
+  }
+  const boxes = b.endVector();
+  wire.Terrain.startTerrain(b);
+  if (field !== 0) wire.Terrain.addHeightField(b, field);
+  wire.Terrain.addBoxes(b, boxes);
+  return wire.Terrain.endTerrain(b);
 }
 
 function build(b: Builder, m: ClientMessage): number {
@@ -55,6 +81,12 @@ function build(b: Builder, m: ClientMessage): number {
                                       wire.Remove.createAvatarsVector(b, m.avatars));
     case 'Request': {
       const items = m.items.map((item) => {
+        let waypoints = 0;
+        if (item.waypointsM.length > 0) {
+          wire.RequestItem.startWaypointsMVector(b, item.waypointsM.length);
+          for (const [x, y, z] of [...item.waypointsM].reverse()) wire.Vec3.createVec3(b, x, y, z);
+          waypoints = b.endVector();
+        }
         wire.RequestItem.startRequestItem(b);
         wire.RequestItem.addAvatar(b, item.avatar);
         wire.RequestItem.addRequestId(b, item.requestId);
@@ -69,6 +101,22 @@ function build(b: Builder, m: ClientMessage): number {
         wire.RequestItem.addHeightM(b, item.heightM);
         wire.RequestItem.addTurnRad(b, item.turnRad);
         wire.RequestItem.addSeconds(b, item.seconds);
+        if (item.atM !== null) {
+          const [x, y, z] = item.atM;
+          wire.RequestItem.addAtM(b, wire.Vec3.createVec3(b, x, y, z));
+          if (item.headingRad !== null) {
+            b.forceDefaults(true);
+            wire.RequestItem.addHeadingRad(b, item.headingRad);
+            b.forceDefaults(false);
+          }
+        }
+        if (waypoints !== 0) wire.RequestItem.addWaypointsM(b, waypoints);
+        if (item.speedMPerS !== null) {
+          b.forceDefaults(true);
+          wire.RequestItem.addSpeedMS(b, item.speedMPerS);
+          b.forceDefaults(false);
+        }
+        wire.RequestItem.addTakeover(b, takeovers.indexOf(item.takeover));
         return wire.RequestItem.endRequestItem(b);
       });
       return wire.Request.createRequest(b, m.seq, m.world,
@@ -82,6 +130,23 @@ function build(b: Builder, m: ClientMessage): number {
       return wire.Observe.createObserve(b, m.seq, m.world, m.subscription,
                                         poseModes.indexOf(m.mode), avatars, m.everyNTicks,
                                         m.withEvents);
+    }
+    case 'SetTerrain': {
+      const terrain = m.terrain === null ? 0 : buildTerrain(b, m.terrain);
+      wire.SetTerrain.startSetTerrain(b);
+      wire.SetTerrain.addSeq(b, m.seq);
+      wire.SetTerrain.addWorld(b, m.world);
+      if (terrain !== 0) wire.SetTerrain.addTerrain(b, terrain);
+      return wire.SetTerrain.endSetTerrain(b);
+    }
+    case 'SetLayers': {
+      const items = m.items.map((item) => {
+        const layer = b.createSharedString(item.layer);
+        return wire.LayerItem.createLayerItem(b, item.avatar, layer, item.off, item.weight,
+                                              item.blendS, item.speed);
+      });
+      return wire.SetLayers.createSetLayers(b, m.seq, m.world,
+                                            wire.SetLayers.createItemsVector(b, items));
     }
     case 'StopObserving':
       return wire.StopObserving.createStopObserving(b, m.seq, m.subscription);

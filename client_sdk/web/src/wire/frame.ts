@@ -14,6 +14,8 @@ export const MessageType = {
   StopObserving: 9,
   Ping: 10,
   InspectAvatar: 11,
+  SetTerrain: 12,
+  SetLayers: 13,
   Goodbye: 32,
   Welcome: 64,
   WorldInfo: 65,
@@ -24,6 +26,7 @@ export const MessageType = {
   Error: 70,
   Pong: 71,
   AvatarState: 72,
+  WorldTerrain: 73,
 } as const;
 export type MessageName = keyof typeof MessageType;
 export type Sender = 'client' | 'server';
@@ -34,7 +37,8 @@ const frameVersion = 1;
 const names = new Map<number, MessageName>(
     Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
 const bulk = new Set<MessageName>([
-  'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events'
+  'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events',
+  'SetTerrain', 'WorldTerrain', 'SetLayers'
 ]);
 
 export function isBulk(name: MessageName): boolean {

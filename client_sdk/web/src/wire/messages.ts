@@ -1,6 +1,6 @@
 /** Messages as plain objects, checked. 64-bit numbers are bigint where all their bits matter. */
 import type {
-  AvatarState, EndSite, Leg, PoseMode, QueuedRequest, Role, Vec3, WorldEvent
+  AvatarState, EndSite, Leg, PoseMode, QueuedRequest, Role, Terrain, Vec3, WorldEvent
 } from '../types';
 
 export interface Hello {
@@ -124,6 +124,7 @@ export interface WorldInfo {
   endSites: EndSite[];
   leftLeg: Leg;
   rightLeg: Leg;
+  layers: string[];
 }
 export interface ReplyEntry {
   index: number;
@@ -192,10 +193,37 @@ export interface AvatarStateMessage {
   state: AvatarState;
 }
 
+export interface SetTerrain {
+  type: 'SetTerrain';
+  seq: bigint;
+  world: number;
+  terrain: Terrain | null;
+}
+export interface LayerEntry {
+  avatar: number;
+  layer: string;
+  off: boolean;
+  weight: number;
+  blendS: number;
+  speed: number;
+}
+export interface SetLayers {
+  type: 'SetLayers';
+  seq: bigint;
+  world: number;
+  items: LayerEntry[];
+}
+export interface WorldTerrain {
+  type: 'WorldTerrain';
+  world: number;
+  terrain: Terrain | null;
+}
+
 export type CommandMessage =
-    JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving;
+    JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving |
+    SetTerrain | SetLayers;
 export type ClientMessage = Hello | CommandMessage | Ping | InspectAvatar | Goodbye;
 export type ServerMessage =
     Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong |
-    AvatarStateMessage | Goodbye;
+    AvatarStateMessage | WorldTerrain | Goodbye;
 export type Message = ClientMessage | ServerMessage;

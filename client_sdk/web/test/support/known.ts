@@ -5,14 +5,15 @@ import {PoseReader} from '../../src/wire/pose_codec';
 const texts = new Set([
   'Hello', 'JoinWorld', 'LeaveWorld', 'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe',
   'StopObserving', 'Ping', 'InspectAvatar', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch',
-  'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'controller', 'observer', 'full',
-  'quantised', 'movement', 'step', 'jump', 'stand', 'auto', 'left', 'right', 'stepLeft',
+  'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'controller', 'observer', 'full',
+  'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
   'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
   'removed', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
 ]);
 /** Fields whose texts are free; all others are enumerators. */
 const free = new Set([
-  'text', 'reason', 'name', 'clientName', 'authToken', 'serverName', 'serverVersion', 'libraryHash'
+  'text', 'reason', 'name', 'clientName', 'authToken', 'serverName', 'serverVersion', 'libraryHash',
+  'layer', 'layers'
 ]);
 
 /** Every number finite, every enumerator one that is known, every text clean and short. */

@@ -35,7 +35,7 @@ export function welcome(fields: WelcomeFields = {}): ArrayBuffer {
       fields.idleTimeoutS ?? 30, 60);
   wire.Welcome.startWelcome(b);
   wire.Welcome.addProtocol(b, fields.protocol ?? 1);
-  wire.Welcome.addFeatures(b, fields.features ?? 31n);
+  wire.Welcome.addFeatures(b, fields.features ?? 1023n);
   wire.Welcome.addSession(b, 5n);
   wire.Welcome.addResumeToken(b, token);
   wire.Welcome.addResumed(b, fields.resumed ?? false);
@@ -160,6 +160,26 @@ export function events(number: bigint, list: EventFields[], world = 3): ArrayBuf
   });
   const vector = wire.Events.createEventsVector(b, offsets);
   return finish(b, 'Events', wire.Events.createEvents(b, world, number, 1n, vector));
+}
+
+/** Boxes of one square metre along x, of these heights; null: flat. */
+export function worldTerrain(heights: number[] | null, world = 3): ArrayBuffer {
+  const b = builder();
+  let terrain = 0;
+  if (heights !== null) {
+    wire.Terrain.startBoxesVector(b, heights.length);
+    for (let i = heights.length - 1; i >= 0; --i) {
+      wire.TerrainBox.createTerrainBox(b, i, 0, i + 1, 1, heights[i]!);
+    }
+    const boxes = b.endVector();
+    wire.Terrain.startTerrain(b);
+    wire.Terrain.addBoxes(b, boxes);
+    terrain = wire.Terrain.endTerrain(b);
+  }
+  wire.WorldTerrain.startWorldTerrain(b);
+  wire.WorldTerrain.addWorld(b, world);
+  if (terrain !== 0) wire.WorldTerrain.addTerrain(b, terrain);
+  return finish(b, 'WorldTerrain', wire.WorldTerrain.endWorldTerrain(b));
 }
 
 export function lagging(batches: number, dropped: number, world = 3): ArrayBuffer {

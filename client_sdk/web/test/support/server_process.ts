@@ -9,7 +9,19 @@ export class ServerProcess {
   private constructor(private readonly child: ChildProcess, readonly port: number,
                       readonly httpPort: number) {}
 
+  /** On free ports, or where another one was before: that a port is taken meanwhile passes. */
   static async start(port = 0, httpPort = 0, more: string[] = []): Promise<ServerProcess> {
+    for (let attempt = 1; ; ++attempt) {
+      try {
+        return await ServerProcess.launch(port, httpPort, more);
+      } catch (error) {
+        if (port === 0 || attempt === 20) throw error;
+        await new Promise((resolve) => setTimeout(resolve, 500));
+      }
+    }
+  }
+
+  private static async launch(port: number, httpPort: number, more: string[]): Promise<ServerProcess> {
     const child = spawn(`${programs}/stridewired`, [
       '--listen', `127.0.0.1:${port}`, '--http', `127.0.0.1:${httpPort}`, '--log-level', 'warning',
       ...more
@@ -52,7 +64,7 @@ export async function run(program: string, args: string[]): Promise<string> {
 }
 
 /** Waits for what must come, however slow the machine is. */
-export async function until(what: string, holds: () => boolean, seconds = 30): Promise<void> {
+export async function until(what: string, holds: () => boolean, seconds = 120): Promise<void> {
   const endMs = performance.now() + 1000 * seconds;
   while (!holds()) {
     if (performance.now() > endMs) throw new Error(`waited ${seconds} s until ${what}`);

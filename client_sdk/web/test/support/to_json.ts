@@ -1,10 +1,10 @@
 import {
-  eventTypes, footChoices, movementKinds, movementTypes, parameterNames, poseModes, roles
+  eventTypes, footChoices, movementKinds, movementTypes, takeovers, parameterNames, poseModes, roles
 } from '../../src/wire/decode';
 import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
 import type {
-  CurrentMovement, Leg, Parameters, QueuedRequest, Vec3
+  CurrentMovement, Leg, Parameters, QueuedRequest, Terrain, Vec3
 } from '../../src/types';
 
 type Json = unknown;
@@ -21,9 +21,16 @@ function parameters(set: Parameters): Json {
 
 function request(item: QueuedRequest): Json {
   const type = movementTypes.indexOf(item.type);
-  const common = {avatar: item.avatar, request_id: u64(item.requestId), type};
+  const common = {avatar: item.avatar, request_id: u64(item.requestId), type,
+    takeover: takeovers.indexOf(item.takeover)};
   switch (item.type) {
     case 'step':
+      if (item.atM !== null) {
+        return {
+          ...common, foot: footChoices.indexOf(item.foot), at_m: vec3(item.atM),
+          heading_rad: item.headingRad,
+        };
+      }
       return {
         ...common, foot: footChoices.indexOf(item.foot), length_m: item.lengthM,
         side_m: item.sideM, height_m: item.heightM, turn_rad: item.turnRad,
@@ -33,7 +40,26 @@ function request(item: QueuedRequest): Json {
         ...common, length_m: item.lengthM, height_m: item.heightM, turn_rad: item.turnRad
       };
     case 'stand': return {...common, seconds: item.seconds};
+    case 'walk':
+      return {
+        ...common, at_m: vec3(item.atM!), heading_rad: item.headingRad,
+        waypoints_m: item.waypointsM.map(vec3), speed_m_s: item.speedMPerS,
+      };
   }
+}
+
+function terrain(from: Terrain | null): Json {
+  if (from === null) return null;
+  const field = from.heightField;
+  return {
+    height_field: field === null ? null : {
+      origin_m: [...field.originM], cell_m: field.cellM, columns: field.columns, rows: field.rows,
+      heights_m: [...field.heightsM],
+    },
+    boxes: from.boxes.map(({minM, maxM, heightM}) => ({
+      min_x: minM[0], min_z: minM[1], max_x: maxM[0], max_z: maxM[1], height_m: heightM,
+    })),
+  };
 }
 
 function leg(from: Leg): Json {
@@ -110,6 +136,7 @@ export function toJson(m: Message): {[name: string]: Json} {
           })),
           left_leg: leg(m.leftLeg), right_leg: leg(m.rightLeg),
         },
+        layers: [...m.layers],
       };
     case 'Reply':
       return {
@@ -144,7 +171,7 @@ export function toJson(m: Message): {[name: string]: Json} {
           type: eventTypes.indexOf(e.type), avatar: e.avatar, request_id: u64(e.requestId),
           kind: movementKinds.indexOf(e.kind), group: e.group, tick: u64(e.tick),
           time_s: e.timeS, requested: parameters(e.requested), applied: parameters(e.applied),
-          extrapolated: e.extrapolated, clamped: e.clamped, foot: e.foot === 'right' ? 1 : 0,
+          extrapolated: e.extrapolated, clamped: e.clamped, cut_short: e.cutShort, foot: e.foot === 'right' ? 1 : 0,
           position_m: vec3(e.positionM), base_position_m: vec3(e.basePositionM),
           base_heading_rad: e.baseHeadingRad, code: e.code, reason: e.reason,
         })),
@@ -159,6 +186,17 @@ export function toJson(m: Message): {[name: string]: Json} {
       return {
         nonce: u64(m.nonce), time_s: m.timeS, server_time_s: m.serverTimeS, tick: u64(m.tick)
       };
+    case 'SetTerrain':
+      return {seq: u64(m.seq), world: m.world, terrain: terrain(m.terrain)};
+    case 'SetLayers':
+      return {
+        seq: u64(m.seq), world: m.world,
+        items: m.items.map((item) => ({
+          avatar: item.avatar, layer: item.layer, off: item.off, weight: item.weight,
+          blend_s: item.blendS, speed: item.speed,
+        })),
+      };
+    case 'WorldTerrain': return {world: m.world, terrain: terrain(m.terrain)};
     case 'AvatarState': {
       const {state} = m;
       return {

@@ -57,4 +57,8 @@ class LibraryAssembler {
 /// Whether two skeletons have the same joints (names and parents, in order).
 [[nodiscard]] bool SameJointTree(const Skeleton& a, const Skeleton& b);
 
+/// How `other` departs from `first`, which is what `first_name` has, as a sentence: "its joint 3 is …".
+[[nodiscard]] std::string TreeDifference(const Skeleton& first, const std::string& first_name,
+                                         const Skeleton& other);
+
 }  // namespace stridewire

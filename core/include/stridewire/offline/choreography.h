@@ -2,12 +2,14 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <string_view>
 #include <vector>
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
+#include "stridewire/runtime/terrain.h"
 
 namespace stridewire {
 
@@ -21,17 +23,22 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 /// Movements asked for one after the other, and where the avatar stands before the first.
 ///
 ///   {"start":{"position_m":[0,0,0],"heading_rad":0},
+///    "terrain":{…as in terrain_file.h…},
 ///    "movements":[{"step":{"length_m":0.6}},
 ///                 {"step":{"foot":"left","length_m":0.5,"side_m":0.1,"height_m":0.15,"turn_rad":0.3}},
+///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0}},
+///                 {"walk_to":{"position_m":[3,0,5],"heading_rad":1.6,"waypoints_m":[[0,0,4]],"speed_m_s":1}},
 ///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
 ///                 {"stand":{"seconds":1.5}}]}
 ///
-/// `start` and what is in it may be left out (the origin, heading 0). A step and a jump need
-/// `length_m`, a stand `seconds`; the rest may be left out. A key that is not listed here is an
-/// error, so is one that stands twice. `terrain`, `walk_to` and a step's `at_m` are known but not
-/// supported yet.
+/// `start` and what is in it may be left out (the origin, heading 0), and so may `terrain` (flat at
+/// y = 0). A step and a jump need `length_m`, a stand `seconds`; the rest may be left out. A key
+/// that is not listed here is an error, so is one that stands twice. A step's `at_m`, where the ball
+/// of its foot lands in the world, stands instead of length, side, height and turn; the `heading_rad`
+/// of that footprint may be left out. A `walk_to` needs position and heading.
 struct Choreography {
   BaseFrame start;
+  std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground.
   std::vector<MovementRequest> movements;  ///< 1 to kMaxChoreographyMovements, ids 1, 2, 3, …
 };
 
@@ -39,7 +46,7 @@ struct Choreography {
 /// whether a library has such movements is for ValidateRequest to say.
 ///
 /// Errors: kNotFound, kIo with `where` = file; kMalformed with "file:line:column" where the text is
-/// not JSON; kMalformed, kOutOfRange, kUnsupported with the field, e.g.
+/// not JSON; kMalformed, kOutOfRange, kShapeMismatch, kUnsupported with the field, e.g.
 /// "c.json: movements[3].step.length_m"; kLimitExceeded with file or field.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 

@@ -13,6 +13,7 @@ struct LibraryContent {
   const Skeleton& skeleton;
   const Pose& stand_pose;
   std::span<const MotionGroup> groups;
+  std::span<const LayerClip> layers = {};
 };
 
 /// Puts a library together: the bytes of its file, opened again and so checked. Same content, same

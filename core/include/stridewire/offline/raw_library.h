@@ -28,11 +28,21 @@ struct RawGroup {
   std::vector<RawExample> examples;
 };
 
+/// A clip that will be played over the movement (LayerClip), with all joints of the skeleton.
+struct RawLayer {
+  std::string name;
+  Clip clip;                   ///< Of a loop, the last frame is the first.
+  std::vector<float> weights;  ///< One a joint, in [0, 1]; 0 for the root and the legs
+  bool is_looping = true;
+  std::string source;
+};
+
 /// What a library is built from: the open, editable form. `LibraryBuilder` makes the immutable one.
 struct RawLibrary {
   Skeleton skeleton;
   Pose stand_pose;  ///< Root at x = z = 0, heading 0, y above the ground
   std::vector<RawGroup> groups;
+  std::vector<RawLayer> layers;
 };
 
 }  // namespace stridewire

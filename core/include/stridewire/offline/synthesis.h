@@ -15,8 +15,8 @@ struct PlantRecord {
   Foot foot = Foot::kLeft;
   double from_s = 0.0;
   double to_s = 0.0;
-  DVec3 anchor_m = DVec3(0.0);  ///< Where its ball is at `from_s`
-  double drift_m = 0.0;         ///< How far the ball gets from there, horizontally
+  DVec3 anchor_m = DVec3(0.0);  ///< Where its ball is to stand; unplanted: where it is at first
+  double drift_m = 0.0;         ///< How far the ball gets from there in any frame, horizontally
 };
 
 /// What became of one movement. Times count from the start of the choreography.
@@ -35,14 +35,26 @@ struct MovementRecord {
   bool clamped = false;
   std::vector<float> weights;
   std::vector<PlantRecord> plants;
-  double landing_error_m = 0.0;    ///< Steps: measured against requested end of the moving foot
-  double landing_error_rad = 0.0;  ///< Steps: turn against the requested one
-  BaseFrame base;                  ///< After the movement
+  // Steps: how far from where it was asked to the moving foot is when it first stands, horizontally, and
+  // how far turned; without planting what `measured` misses of `requested`.
+  double landing_error_m = 0.0;
+  double landing_error_rad = 0.0;
+  BaseFrame base;  ///< After the movement
+};
+
+/// How a walk ended.
+struct WalkRecord {
+  std::uint64_t request_id = 0;
+  bool arrived = false;
+  std::string reason;  ///< Why not
+  double end_s = 0.0;
+  BaseFrame base;  ///< Where it ended
 };
 
 struct Synthesis {
   Clip clip;  ///< World poses; frame 0 is the stand before the first tick
   std::vector<MovementRecord> movements;
+  std::vector<WalkRecord> walks;
 };
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;

@@ -4,13 +4,17 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "stridewire/base/error.h"
+#include "stridewire/runtime/foot_planner.h"
+#include "stridewire/runtime/layer_stack.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/request_plan.h"
+#include "stridewire/runtime/walk_planner.h"
 
 namespace stridewire {
 
@@ -19,6 +23,7 @@ enum class AvatarEventType : std::uint8_t {
   kFootStrike,  ///< A foot landed: foot and where its ball is.
   kFinished,    ///< A movement ended: the new base frame. The commit point.
   kIdle,        ///< Queue empty and standing still.
+  kRejected,  ///< A request turned out impossible: code and reason. What is queued behind it goes on.
 };
 
 struct AvatarEvent {
@@ -30,15 +35,25 @@ struct AvatarEvent {
   ParameterValues requested;     ///< kStarted
   ParameterValues applied;       ///< kStarted: after clamping to what the examples span
   bool extrapolated = false;     ///< kStarted: applied lies outside the hull of the examples
-  bool clamped = false;          ///< kStarted: applied differs from requested
+  bool clamped = false;          ///< kStarted: not as asked, since the examples do not reach it
+  bool is_cut_short = false;     ///< kFinished: another request took over before its end
   Foot foot = Foot::kLeft;       ///< kFootStrike
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike
   BaseFrame base;                ///< kFinished: base frame after the movement
+  ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
+  const char* reason = "";                   ///< kRejected: a sentence, static storage
 };
 
 struct AvatarOptions {
   /// Movements start with corrected parameters (CorrectParameters), so that they have those applied.
   bool run_time_correction = true;
+  /// Feet stand still where they land (PlanFeet); off, they are where the blend has them.
+  bool foot_planting = true;
+  /// How movements begin.
+  JoinKind join = JoinKind::kInertial;
+  /// The ground feet land on; null: level, at the height an avatar is put at, and rising only as
+  /// requests say.
+  std::shared_ptr<const Terrain> terrain;
 };
 
 /// An avatar: base frame, queue of requests, current movement, displayed pose.
@@ -56,21 +71,35 @@ class Avatar {
   Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
          const AvatarOptions& options = {});
 
-  /// Checks and queues a request. kOutOfRange: a number not finite or over its limit;
+  /// A swing less than this part of which is left is not sent elsewhere.
+  static constexpr double kLeastSwingLeft = 0.4;
+
+  /// Checks and queues a request; one that takes over empties the queue first. kOutOfRange: a number not finite or over its limit;
   /// kUnsupported: the library has no group for it; kLimitExceeded: queue full.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops what has not started; the current movement goes on to its end. Returns how many.
   int CancelQueue();
 
-  /// Puts the avatar somewhere else at once, standing; queue dropped.
+  /// Plays a layer over the movement, or ends it, from the next Advance on. Legs, root and all that
+  /// movements do are bit by bit what they are without. Errors as LayerStack::Set. Never allocates.
+  [[nodiscard]] Status SetLayer(const LayerRequest& request) {
+    return layers_.Set(*library_, request);
+  }
+
+  /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
   void Teleport(const BaseFrame& start);
+
+  /// Changes the ground. Feet that stand stay where they are until their next step.
+  void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
 
   /// Goes on by `dt_s` (> 0, at most 1 s): finishes and starts movements, updates the pose.
   /// Events of this call are in `events()` until the next.
   void Advance(double dt_s);
 
-  [[nodiscard]] ConstPoseSpan pose() const { return pose_; }  ///< Displayed, in the world.
+  /// Displayed, in the world.
+  [[nodiscard]] ConstPoseSpan pose() const { return has_layers_ ? layered_pose_ : pose_; }
+  [[nodiscard]] const LayerStack& layers() const { return layers_; }
   [[nodiscard]] std::span<const AvatarEvent> events() const {
     return std::span(events_).first(event_count_);
   }
@@ -95,26 +124,53 @@ class Avatar {
  private:
   void AddEvent(const AvatarEvent& event);
   [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
+  [[nodiscard]] bool PlantsFeet() const {
+    return options_.foot_planting && library_->leg_rig().is_usable;
+  }
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
+  void ShowLayers();
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
-  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
-  void FinishMovement();
+  void GoOnWalking();
+  [[nodiscard]] double RiseAhead(const StepRequest& step) const;
+  [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
+  void StartPlan(const RequestPlan& plan, std::uint64_t request_id, double swing_part = 0.0);
+  [[nodiscard]] double EndOfMovement() const;
+  [[nodiscard]] double Landed() const;
+  [[nodiscard]] bool RedirectsSwing() const;
+  void RedirectSwing();
+  void KeepJoin(double time_s);
+  void KeepFeetGoing(bool keeps_speed);
+  void FinishMovement(double at_s);
+  void KeepToLine(const DVec3& line_m);
   void FinishStand();
+  [[nodiscard]] DVec3 StandsAt(Foot foot) const;
+  [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   void ReportFootStrikes(double before_s, double after_s);
 
   std::shared_ptr<const MotionLibrary> library_;
   AvatarOptions options_;
   BaseFrame base_;
-  Pose pose_;
-  double time_s_ = 0.0;  // avatar time
+  Pose pose_;  // displayed, but for layers
+  LayerStack layers_;
+  Pose layered_pose_;  // with layers, if there are any
+  bool has_layers_ = false;
+  Pose blended_pose_;  // the same before feet were planted
+  // What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
+  // begins then and keeps their speed, kJoinStepS before, as well as the blended pose.
+  std::array<FeetCorrection, 2> earlier_feet_;
+  Pose earlier_pose_;
+  double moved_until_s_ = -1.0;  // avatar time
+  double time_s_ = 0.0;          // avatar time
 
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
   bool is_walking_ = false;       // a step left the feet apart: close before anything but a step
+  bool takes_over_ = false;       // the request at the queue's head does not wait for the end
+  bool is_exact_ = false;         // the step under way lands where it was sent
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
   std::uint64_t request_id_ = 0;  // of the movement or stand under way
   double stand_left_s_ = 0.0;
@@ -127,7 +183,9 @@ class Avatar {
 
   FootState stand_feet_;  // of the library's stand pose
   FootState feet_;
+  FootHolds holds_;  // where the feet stood when the movement began
   Foot last_moved_ = Foot::kRight;
+  WalkProgress walk_;                   // of the walk at the queue's head
   std::vector<MovementRequest> queue_;  // live from queue_head_ on
   std::size_t queue_head_ = 0;
   std::array<AvatarEvent, kMaxEventsPerAdvance> events_{};

@@ -11,8 +11,11 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/keytimes.h"
+#include "stridewire/runtime/layer_clip.h"
+#include "stridewire/runtime/leg_rig.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
+#include "stridewire/runtime/walk_gait.h"
 
 namespace stridewire {
 
@@ -139,8 +142,16 @@ class MotionLibrary {
   [[nodiscard]] const MotionGroup& group(int index) const {
     return groups_[static_cast<std::size_t>(index)];
   }
+  /// Clips to be played over the movement, names all different; kMaxLayerClips at most.
+  [[nodiscard]] std::span<const LayerClip> layers() const { return layers_; }
+  /// Index of the layer of that name, -1 if there is none.
+  [[nodiscard]] int FindLayer(std::string_view name) const;
   /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
+  /// The skeleton's legs, for planting.
+  [[nodiscard]] const LegRig& leg_rig() const { return leg_rig_; }
+  /// How its examples walk, for walks to a place.
+  [[nodiscard]] const WalkGait& walk_gait() const { return walk_gait_; }
   /// 32 lower-case hex digits: XXH3-128 of the payload.
   [[nodiscard]] const std::string& hash() const { return hash_; }
   /// The whole file, header included: what `Open` read and what may be written elsewhere.
@@ -155,7 +166,10 @@ class MotionLibrary {
   Skeleton skeleton_;
   GridLayout layout_;
   std::vector<MotionGroup> groups_;
+  std::vector<LayerClip> layers_;
   Pose stand_pose_;
+  LegRig leg_rig_;
+  WalkGait walk_gait_;
   std::string hash_;
   int max_example_count_ = 0;
   std::span<const std::byte> bytes_;  // mapped or allocated, 64-byte aligned

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
 #include "stridewire/base/error.h"
+#include "stridewire/runtime/foot_plan.h"
 #include "stridewire/runtime/keytimes.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
@@ -19,8 +21,23 @@ struct BaseFrame {
   double heading_rad = 0.0;  ///< Unwrapped: 2 pi is one full left turn.
 };
 
+/// A movement may be turned this much further, or less, than its examples turn.
+inline constexpr double kMaxSteerRad = 0.3;
+
 /// The longest an old pose is eased out over (paper, Section 5: T).
 inline constexpr double kEaseOutS = 0.2;
+
+/// How what is displayed is brought onto a movement that begins.
+enum class JoinKind : std::uint8_t {
+  kCubic,     ///< The difference fades from rest (paper, Eq. (5)): joints may change speed at once.
+  kInertial,  ///< It goes on as fast as it did while it fades: no joint changes its speed at once.
+};
+
+/// How fast a pose changes: of each joint as a rotation vector in the joint's own frame.
+struct PoseVelocity {
+  Vec3 root_m_s = Vec3(0.0f);
+  std::vector<Vec3> joints_rad_s;
+};
 
 /// One synthesized variation: everything that can be seen of an avatar while it lasts follows from
 /// this value, its group and the time.
@@ -32,9 +49,14 @@ struct Movement {
   int interval_count = 0;
   TimeWarp warp;
   double heading_change_rad = 0.0;  ///< blended
+  double steer_rad = 0.0;           ///< Turned further than that, evenly over the movement
   BaseFrame base;
-  Pose difference;                ///< D = P - M(0), world frame
-  double ease_out_s = kEaseOutS;  ///< T = min(kEaseOutS, duration)
+  double entered_s = 0.0;            ///< Where it began: later than 0 if it took over in mid-swing
+  Pose difference;                   ///< D = P - M(entered_s), world frame
+  PoseVelocity difference_velocity;  ///< Of D when the movement was entered
+  bool is_inertial = false;          ///< There is a difference_velocity
+  double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration)
+  FootPlan feet;                     ///< Not active: feet are where the blend has them
 
   [[nodiscard]] double duration_s() const {
     return keytimes_s[static_cast<std::size_t>(interval_count)];
@@ -84,12 +106,26 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out);
 
-/// What is displayed: M'(t) = f(t/T) D + M(t) (Eq. (5)). M'(0) = P, M'(t) = M(t) from T on.
+/// What is displayed: M'(t) = f(s) D + M(t) with s = (t - entered_s)/T (Eq. (5)). M'(entered_s) = P and
+/// M'(t) = M(t) from T on. If it is inertial, f(s) D is followed by T h(s) V with V the difference's velocity.
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
 
 /// f(s) = 3(1-s)^2 - 2(1-s)^3, 1 at 0, 0 from 1 on.
 [[nodiscard]] double EaseOut(double s);
+
+/// h(s) = s (1-s)^2: 0 at both ends, of slope 1 at 0; with f the cubic through any value and slope at 0.
+[[nodiscard]] double EaseOutSlope(double s);
+
+/// Poses this far apart tell how fast they change.
+inline constexpr double kJoinStepS = 0.004;
+
+/// Sets the velocity of a difference pose that is there, from `before`, which was displayed when the movement
+/// was entered, and `earlier`, kJoinStepS before that. `scratch` has one rotation a joint. Never allocates if
+/// the velocity has room for all joints.
+void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
+                           ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
+                           Movement& movement);
 
 /// Base frame after the movement: below the displayed root at its end, heading turned by the blended
 /// change (the paper takes the displayed heading, which swings with the pelvis and veers).

@@ -4,11 +4,19 @@
 #include <cstdint>
 #include <optional>
 #include <variant>
+#include <vector>
 
 #include "stridewire/base/error.h"
+#include "stridewire/runtime/footprint.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
+
+/// A footprint asked for. Without a heading: that of the avatar when the step begins.
+struct FootprintRequest {
+  DVec3 position_m = DVec3(0.0);
+  std::optional<double> heading_rad;
+};
 
 /// One step: where the moving foot lands relative to the fixed one.
 struct StepRequest {
@@ -17,6 +25,8 @@ struct StepRequest {
   std::optional<double> side_m;  ///< Fixed to moving foot, positive to the moving foot's own side.
   double height_m = 0.0;         ///< Moving above fixed foot at the end.
   double turn_rad = 0.0;         ///< Change of heading, left positive.
+  /// Instead of all of these: where the moving foot lands in the world.
+  std::optional<FootprintRequest> at;
 };
 
 struct JumpRequest {
@@ -30,15 +40,40 @@ struct StandRequest {
   double seconds = 0.0;
 };
 
+/// A walk to a place in as many steps as it takes (walk_planner.h). Its steps carry the request's id; a
+/// finished stand with that id says that it has arrived, a rejected one why it can not.
+struct WalkRequest {
+  DVec3 position_m = DVec3(0.0);    ///< Of the base frame; y is the ground's, whatever it says
+  double heading_rad = 0.0;         ///< Of the base frame
+  std::vector<DVec3> waypoints_m;   ///< Passed on the way, in order; at most kMaxWaypoints
+  std::optional<double> speed_m_s;  ///< As near as the library's steps come to it
+};
+
+/// When a request begins, and what becomes of those before it.
+enum class Takeover : std::uint8_t {
+  kNone,           ///< After all that is queued
+  kAfterMovement,  ///< After the movement under way; what is queued is dropped, a stand or walk ends
+  /// At once if both feet stand, else when they have landed; what is queued is dropped. A step of the foot
+  /// that swings takes it to its own footprint, if there is swing enough left (Avatar::kLeastSwingLeft). Who
+  /// is to stand finishes the movement first.
+  kNow,
+};
+
 struct MovementRequest {
   std::uint64_t id = 0;  ///< The caller's; comes back in events.
-  std::variant<StepRequest, JumpRequest, StandRequest> movement;
+  std::variant<StepRequest, JumpRequest, StandRequest, WalkRequest> movement;
+  Takeover takeover = Takeover::kNone;
 };
 
 /// Limits on what may be asked for, far outside what any library spans: meaning, not taste.
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Lengths, sides and heights, either sign.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
+inline constexpr double kMaxWalkPositionM = 1e6;  ///< Each coordinate of goals and waypoints.
+inline constexpr double kMaxWalkHeadingRad = 1e4;
+inline constexpr double kMinWalkSpeedMPerS = 0.05;
+inline constexpr double kMaxWalkSpeedMPerS = 5.0;
+inline constexpr std::size_t kMaxWaypoints = 64;
 
 /// kOutOfRange: a number not finite or beyond its limit; kUnsupported: the library has no movement
 /// of that kind.

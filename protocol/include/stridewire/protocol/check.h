@@ -30,5 +30,8 @@ namespace stridewire::protocol {
 [[nodiscard]] Status Check(const ErrorNotice& m);
 [[nodiscard]] Status Check(const Pong& m);
 [[nodiscard]] Status Check(const AvatarState& m);
+[[nodiscard]] Status Check(const SetTerrain& m);
+[[nodiscard]] Status Check(const SetLayers& m);
+[[nodiscard]] Status Check(const WorldTerrain& m);
 
 }  // namespace stridewire::protocol

@@ -25,6 +25,8 @@ enum class MessageType : std::uint16_t {
   kStopObserving = 9,
   kPing = 10,
   kInspectAvatar = 11,
+  kSetTerrain = 12,
+  kSetLayers = 13,
   // Both ways.
   kGoodbye = 32,
   // Server to client.
@@ -37,6 +39,7 @@ enum class MessageType : std::uint16_t {
   kError = 70,
   kPong = 71,
   kAvatarState = 72,
+  kWorldTerrain = 73,
 };
 
 /// Who sent it.

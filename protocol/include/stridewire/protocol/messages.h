@@ -31,6 +31,13 @@ using Seq = std::uint64_t;
 
 enum class Role : std::uint8_t { kController = 0, kObserver = 1 };
 enum class FootChoice : std::uint8_t { kAuto = 0, kLeft = 1, kRight = 2 };
+/// When a request begins, and what becomes of those before it.
+enum class Takeover : std::uint8_t {
+  kNone = 0,  ///< After all that is queued.
+  kAfterMovement =
+      1,     ///< After the movement under way; the queue is dropped, a stand or walk ends.
+  kNow = 2,  ///< As soon as feet allow; the queue is dropped.
+};
 enum class FootSide : std::uint8_t { kLeft = 0, kRight = 1 };
 enum class MovementKind : std::uint8_t { kStepLeft = 0, kStepRight = 1, kJump = 2, kStand = 3 };
 
@@ -92,12 +99,21 @@ struct Remove {
   bool operator==(const Remove&) const = default;
 };
 
+/// Where a foot is to land, in the world.
+struct Footprint {
+  DVec3 position_m = DVec3(0.0);      ///< Of the ball of the foot, on the ground.
+  std::optional<double> heading_rad;  ///< Absent: the server chooses.
+  bool operator==(const Footprint&) const = default;
+};
+
 struct StepMovement {
   FootChoice foot = FootChoice::kAuto;  ///< kAuto: the other foot than last time.
   double length_m = 0.0;                ///< Forward distance between the feet at the end.
   std::optional<double> side_m;         ///< Fixed to moving foot, towards the moving foot's side.
   double height_m = 0.0;
   double turn_rad = 0.0;
+  /// Lands here, if there is one; then length, side, height and turn are not sent.
+  std::optional<Footprint> at;
   bool operator==(const StepMovement&) const = default;
 };
 
@@ -113,10 +129,21 @@ struct StandMovement {
   bool operator==(const StandMovement&) const = default;
 };
 
+/// As many steps as it takes to a place. Only with kFeatureWalks. Its steps carry its request id; a
+/// finished stand with that id says it has arrived, a rejected one why it can not.
+struct WalkMovement {
+  DVec3 position_m = DVec3(0.0);   ///< Of the base frame; the height is the ground's.
+  double heading_rad = 0.0;        ///< Of the base frame.
+  std::vector<DVec3> waypoints_m;  ///< Passed on the way, in order; at most kMaxWaypoints.
+  std::optional<double> speed_m_s;
+  bool operator==(const WalkMovement&) const = default;
+};
+
 struct RequestItem {
   AvatarNumber avatar = 0;   ///< Not 0.
   RequestId request_id = 0;  ///< Not 0; comes back in events.
-  std::variant<StepMovement, JumpMovement, StandMovement> movement;
+  std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
+  Takeover takeover = Takeover::kNone;  ///< Another one only with kFeatureTakeovers.
   bool operator==(const RequestItem&) const = default;
 };
 
@@ -136,6 +163,68 @@ struct CancelQueue {
   WorldId world = 0;
   std::vector<AvatarNumber> avatars;  ///< 1 to kMaxItems
   bool operator==(const CancelQueue&) const = default;
+};
+
+/// A place on the ground, seen from above.
+struct GroundPlace {
+  double x = 0.0;
+  double z = 0.0;
+  bool operator==(const GroundPlace&) const = default;
+};
+
+/// Heights at the corners of a grid, from `origin_m` on; bilinear between them.
+struct HeightFieldInfo {
+  GroundPlace origin_m;
+  double cell_m = 0.0;
+  std::uint16_t columns = 0;     ///< Along x, 2 to kMaxTerrainColumns.
+  std::uint16_t rows = 0;        ///< Along z, 2 to kMaxTerrainColumns.
+  std::vector<float> heights_m;  ///< Row by row, x fastest.
+  bool operator==(const HeightFieldInfo&) const = default;
+};
+
+struct TerrainBoxInfo {
+  GroundPlace min_m;
+  GroundPlace max_m;
+  double height_m = 0.0;  ///< Of the flat top.
+  bool operator==(const TerrainBoxInfo&) const = default;
+};
+
+/// Ground of a world: the highest of its height field (0 beside it) and its boxes. Nothing: flat
+/// at 0.
+struct TerrainInfo {
+  std::optional<HeightFieldInfo> height_field;
+  std::vector<TerrainBoxInfo> boxes;  ///< Up to kMaxTerrainBoxes.
+  bool operator==(const TerrainInfo&) const = default;
+};
+
+/// Gives a world another ground, or none. Only with kFeatureTerrain.
+struct SetTerrain {
+  static constexpr MessageType kType = MessageType::kSetTerrain;
+  Seq seq = 0;
+  WorldId world = 0;
+  std::optional<TerrainInfo> terrain;  ///< Absent: flat at 0.
+  bool operator==(const SetTerrain&) const = default;
+};
+
+/// Starts a clip of the library over what an avatar does, or ends it. Ranges are the server's to check,
+/// item by item.
+struct LayerItem {
+  AvatarNumber avatar = 0;  ///< Not 0.
+  std::string layer;        ///< One of WorldInfo::layers, 1 to kMaxNameBytes.
+  bool is_off = false;      ///< Ends it; weight and speed then mean nothing.
+  double weight = 1.0;      ///< Above 0, up to 1.
+  double blend_s = 0.3;     ///< How long weight and speed take to get there: 0 to 10.
+  double speed = 1.0;       ///< 0.1 to 4; 1: as recorded.
+  bool operator==(const LayerItem&) const = default;
+};
+
+/// Only with kFeatureLayers.
+struct SetLayers {
+  static constexpr MessageType kType = MessageType::kSetLayers;
+  Seq seq = 0;
+  WorldId world = 0;
+  std::vector<LayerItem> items;  ///< 1 to kMaxItems
+  bool operator==(const SetLayers&) const = default;
 };
 
 struct Observe {
@@ -255,6 +344,7 @@ struct WorldInfo {
   std::uint64_t tick = 0;
   std::string library_hash;  ///< As `stridewire-library inspect` prints it.
   SkeletonInfo skeleton;
+  std::vector<std::string> layers;  ///< Names for SetLayers; only with kFeatureLayers.
   bool operator==(const WorldInfo&) const = default;
 };
 
@@ -349,6 +439,7 @@ struct Event {
   Placement base;
   StatusCode code = StatusCode::kOk;
   std::string reason;
+  bool cut_short = false;  ///< Finished: another request took over before its end.
   bool operator==(const Event&) const = default;
 };
 
@@ -426,9 +517,18 @@ struct AvatarState {
   bool operator==(const AvatarState&) const = default;
 };
 
-using Message =
-    std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue, Observe,
-                 StopObserving, Ping, InspectAvatar, Goodbye, Welcome, WorldInfo, Reply, PoseBatch,
-                 Events, Lagging, ErrorNotice, Pong, AvatarState>;
+/// The ground of a world joined: after WorldInfo if it has one (after Welcome of a resumed session
+/// always), and whenever it changes. Only with kFeatureTerrain.
+struct WorldTerrain {
+  static constexpr MessageType kType = MessageType::kWorldTerrain;
+  WorldId world = 0;
+  std::optional<TerrainInfo> terrain;  ///< Absent: flat at 0.
+  bool operator==(const WorldTerrain&) const = default;
+};
+
+using Message = std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue,
+                             Observe, StopObserving, Ping, InspectAvatar, Goodbye, Welcome,
+                             WorldInfo, Reply, PoseBatch, Events, Lagging, ErrorNotice, Pong,
+                             AvatarState, SetTerrain, WorldTerrain, SetLayers>;
 
 }  // namespace stridewire::protocol

@@ -28,7 +28,7 @@ enum class StatusCode : std::uint16_t {
   kAlreadyJoined = 115,
   // 200 to 299: data.
   kMalformed = 200,   ///< Bytes that do not follow the standard.
-  kNoMovement = 201,  ///< The library has no movement of that kind.
+  kNoMovement = 201,  ///< The library has no movement of that kind, or no such layer.
   // 300 to 399: the network.
   kTimeout = 300,  ///< Nothing heard for too long.
   kTooSlow = 301,  ///< The peer does not read what it is sent.

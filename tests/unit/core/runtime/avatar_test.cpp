@@ -46,7 +46,10 @@ class AvatarTest : public testing::Test {
 };
 
 TEST_F(AvatarTest, StandsWhereItIsPut) {
-  Avatar avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
+  // Planting bends the toy's straight legs a little.
+  Avatar planted(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
+  EXPECT_NEAR(planted.pose().root_position_m.y, 1.9, 0.01);
+  Avatar avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2}, {.foot_planting = false});
   EXPECT_NEAR(avatar.pose().root_position_m.x, 2.0, 1e-6);
   EXPECT_NEAR(avatar.pose().root_position_m.y, 1.9, 1e-6);
   const Vec3 before = avatar.pose().root_position_m;
@@ -214,6 +217,21 @@ TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
   EXPECT_EQ(code(StepRequest{.length_m = 0.5}), "none");
   for (int i = 0; i < 200; ++i) avatar.Advance(kTickS);
   EXPECT_TRUE(avatar.idle());
+}
+
+// Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read that is not.
+TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
+  RawLibrary raw = MakeToyRawLibrary();
+  raw.skeleton.legs[0].ankle = raw.skeleton.legs[1].ankle;
+  LibraryBuilder builder;
+  const auto library = builder.Build(raw);
+  ASSERT_TRUE(library.has_value());
+  ASSERT_FALSE((*library)->leg_rig().is_usable);
+  Avatar avatar(*library, {});
+  ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+  for (int i = 0; i < 200; ++i) avatar.Advance(kTickS);
+  EXPECT_TRUE(avatar.idle());
+  EXPECT_GT(avatar.pose().root_position_m.z, 0.1f);
 }
 
 }  // namespace

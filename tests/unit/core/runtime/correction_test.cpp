@@ -5,12 +5,15 @@
 #include <cmath>
 #include <cstring>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "counted_memory.h"
 #include "distorted_library.h"
 #include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/foot_support.h"
 #include "stridewire/runtime/measure.h"
+#include "stridewire/runtime/terrain.h"
 #include "toy_library.h"
 
 namespace stridewire {
@@ -142,6 +145,24 @@ TEST(Correction, NeverAllocates) {
   const Correction correction = scratch.Correct(*library, wanted, {.max_iterations = 20});
   EXPECT_EQ(counted_memory::PeakBytes(), before);
   EXPECT_GT(correction.iterations, 1);
+}
+
+TEST(Terrain, NeverAllocatesWhenAsked) {
+  TerrainData data;
+  data.height_field = HeightField{{-1, -1}, 0.5, 3, 3, {0, 1, 0, 1, 0, 1, 0, 1, 0}};
+  for (int b = 0; b < 100; ++b) data.boxes.push_back({{0.1 * b, 0}, {0.1 * b + 0.2, 1}, 0.01 * b});
+  const auto terrain = Terrain::Make(std::move(data));
+  ASSERT_TRUE(terrain);
+  const std::size_t before = counted_memory::LiveBytes();
+  counted_memory::ResetPeak();
+  double sum = 0.0;
+  for (double x = -2.0; x < 11.0; x += 0.1) {
+    sum += (*terrain)->HeightAt(x, 0.5) + (*terrain)->NormalAt(x, 0.5).y +
+           (*terrain)->HighestWithin(x, 0.5, 0.6) + (*terrain)->LowestWithin(x, 0.5, 0.6) +
+           SupportOf(**terrain, x, 0.5, x, {0.2, 0.1, 0.05}).gap_m;
+  }
+  EXPECT_EQ(counted_memory::PeakBytes(), before);
+  EXPECT_GT(sum, 0.0);
 }
 
 // Where a movement starts has no part in its weights: a client that evaluates it far away gets the same.

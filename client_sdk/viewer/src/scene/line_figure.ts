@@ -1,0 +1,120 @@
+// A figure of lines: every bone, a ring for the head, outlines of the feet; or, for a crowd, limbs
+// only. Points are joints first, then some that a joint carries; a line has the colour of its second
+// point.
+
+import {add, figureOf, length, normalised, subtract} from './figure.js';
+import type {SkeletonLike, Vec} from './figure.js';
+import {Region} from './skeleton_body.js';
+
+export interface LineFigure {
+  readonly pointCount: number;
+  /** Pairs of points. */
+  readonly lines: readonly number[];
+  /** What a point, as the end of a line, shows: a `Region`. */
+  readonly regions: Uint8Array;
+  /** The first points: joints. */
+  readonly joints: Uint16Array;
+  /** The points after them: who carries them, and where they lie in the rest pose. */
+  readonly extraJoints: Uint16Array;
+  readonly extraRest: Float32Array;
+}
+
+export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
+  const figure = figureOf(skeleton);
+  const h = figure.heightM;
+  const at = (j: number): Vec => [figure.rest[j * 3]!, figure.rest[j * 3 + 1]!, figure.rest[j * 3 + 2]!];
+
+  // Joints as points, in the order in which they are needed.
+  const joints: number[] = [];
+  const place = new Map<number, number>();
+  const regions: number[] = [];
+  const point = (joint: number, region: number = Region.shirt): number => {
+    let i = place.get(joint);
+    if (i === undefined) {
+      i = joints.length;
+      joints.push(joint);
+      regions.push(region);
+      place.set(joint, i);
+    }
+    return i;
+  };
+  // Extra points are numbered from -1 down until it is known how many joints come before them.
+  const extraJoints: number[] = [];
+  const extraRest: number[] = [];
+  const extraRegions: number[] = [];
+  const extra = (joint: number, where: Vec, region: number): number => {
+    extraJoints.push(joint);
+    extraRest.push(...where);
+    extraRegions.push(region);
+    return -extraJoints.length;
+  };
+
+  const part = new Map<number, number>();
+  for (const leg of figure.legs) {
+    for (const joint of [leg.knee.joint, leg.ankle.joint]) part.set(joint, Region.trousers);
+    if (leg.ball.joint !== leg.ankle.joint) part.set(leg.ball.joint, Region.shoes);
+  }
+  for (const arm of figure.arms) part.set(arm.wrist.joint, Region.skin);
+  const lines: number[] = [];
+  const bone = (from: number, to: number): void => {
+    if (from === to || length(subtract(at(from), at(to))) < 1e-4) return;
+    lines.push(point(from), point(to, part.get(to)));
+  };
+  if (simple && figure.trunk.length > 1) {
+    const first = figure.trunk[0]!.joint;
+    const middle = figure.trunk[figure.trunk.length >> 1]!.joint;
+    bone(first, middle);
+    bone(middle, figure.head.joint);
+    for (const {shoulder, elbow, wrist} of figure.arms) {
+      bone(middle, shoulder.joint);
+      bone(shoulder.joint, elbow.joint);
+      bone(elbow.joint, wrist.joint);
+    }
+    for (const {hip, knee, ankle} of figure.legs) {
+      bone(first, hip.joint);
+      bone(hip.joint, knee.joint);
+      bone(knee.joint, ankle.joint);
+    }
+  } else {
+    for (let j = 1; j < skeleton.jointCount; ++j) {
+      if (skeleton.parents[j]! >= 0) bone(skeleton.parents[j]!, j);
+    }
+  }
+
+  const r = 0.06 * h;
+  const centre: Vec = [figure.head.at[0], figure.crownY - r, figure.head.at[2] + 0.01 * h];
+  const sides = simple ? 4 : 6;
+  for (const u of (simple ? [[0.7, 0, 0.7]] : [[1, 0, 0], [0, 0, 1]]) as Vec[]) {
+    const ring: number[] = [];
+    for (let s = 0; s < sides; ++s) {
+      const angle = (s + 0.5) / sides * 2 * Math.PI;
+      ring.push(extra(figure.head.joint, add(
+        add(centre, u, Math.cos(angle) * r * 0.8), [0, 1, 0], Math.sin(angle) * r), Region.skin));
+    }
+    ring.forEach((p, s) => lines.push(p, ring[(s + 1) % sides]!));
+  }
+  for (const {ankle, ball, toe} of figure.legs) {
+    const tip = extra(ball.joint, toe, Region.shoes);
+    if (!simple) {
+      const sole = figure.groundY;
+      const back = normalised([ankle.at[0] - toe[0], 0, ankle.at[2] - toe[2]], [0, 0, -1]);
+      const heel = extra(
+        ankle.joint, add([ankle.at[0], sole, ankle.at[2]], back, 0.03 * h), Region.shoes);
+      const pad = extra(ankle.joint, [ball.at[0], sole, ball.at[2]], Region.shoes);
+      lines.push(point(ankle.joint), heel, heel, pad, pad, tip);
+    }
+    lines.push(point(ankle.joint), tip);
+  }
+  if (!simple) {
+    for (const arm of figure.arms) {
+      lines.push(point(arm.wrist.joint), extra(arm.wrist.joint, arm.tip, Region.skin));
+    }
+  }
+  if (lines.length === 0) lines.push(point(0), extra(0, add(at(0), [0, 0.2, 0]), Region.shirt));
+  return {
+    pointCount: joints.length + extraJoints.length,
+    lines: lines.map((p) => p < 0 ? joints.length - 1 - p : p),
+    regions: Uint8Array.from([...regions, ...extraRegions]), joints: Uint16Array.from(joints),
+    extraJoints: Uint16Array.from(extraJoints), extraRest: Float32Array.from(extraRest),
+  };
+}

@@ -1,0 +1,133 @@
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include "stridewire/runtime/footprint.h"
+#include "stridewire/runtime/leg_rig.h"
+
+namespace stridewire {
+
+struct Movement;
+
+/// How one foot goes through a movement, as corrections to where the blend has it: b(t), the ball
+/// of the blended and eased pose in the world.
+///
+///   horizontally  t <= release: from - b(t), so that the ball stands still at `from`
+///                 then a cubic that goes on with the same offset and velocity and arrives at
+///                 t >= land:    to - b(t)
+///   heading: held like the ball while the sole is down; with the heel up it turns as the blend
+///   height: values to add, eased from one to the next; the ball's height follows the blend
+///   (holding it still bends knees by 25 degrees on captures)
+struct FootTrack {
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+
+  Footprint from;             ///< Where it stands at the start
+  Footprint to;               ///< Where it stands at the end
+  double release_s = kNever;  ///< Leaves `from`; kNever: stands all through the movement
+  double land_s = kNever;     ///< Stands on `to` from here on
+  DVec3 release_offset_m = DVec3(0.0);
+  double release_turn_rad = 0.0;  ///< What holding the foot's heading adds to its turning there
+  DVec3 release_velocity_m_s = DVec3(0.0);  ///< Of the offset
+  DVec3 land_offset_m = DVec3(0.0);
+  DVec3 land_velocity_m_s = DVec3(0.0);
+  // What is added to the blend's height and heading: at t = 0, once the difference pose is eased
+  // out, and from landing on.
+  std::array<double, 3> height_m{};
+  std::array<double, 3> turn_rad{};
+  std::array<Vec3, 2> normals{Vec3(0.0f, 1.0f, 0.0f), Vec3(0.0f, 1.0f, 0.0f)};  ///< from, to
+  double lift_m = 0.0;         ///< Highest point of what is added in the swing to clear the ground
+  DVec3 aside_m = DVec3(0.0);  ///< The same sidewise, to pass the other foot
+  double root_weight = 0.0;    ///< How far the root follows this foot; over both feet 1
+  DVec3 root_shift_m = DVec3(0.0);  ///< Added to the root by the end
+
+  [[nodiscard]] bool IsPlanted(double time_s) const {
+    return time_s <= release_s || time_s >= land_s;
+  }
+};
+
+/// What a correction differs by from the one that was when the movement was entered, and how fast that
+/// changes: eased out.
+struct FootRest {
+  DVec3 offset_m = DVec3(0.0);
+  DVec3 offset_m_s = DVec3(0.0);
+  double turn_rad = 0.0;
+  double turn_rad_s = 0.0;
+  double over_s = 0.2;  ///< Nothing is left of it then
+};
+
+/// Both feet through a movement: a value of the movement, from which with the blended pose and the
+/// time everything about planting follows.
+struct FootPlan {
+  std::array<FootTrack, 2> feet;   ///< Indexed by Foot.
+  std::array<FootRest, 2> rests;   ///< Indexed by Foot.
+  DVec3 root_rest_m = DVec3(0.0);  ///< The same of the root, which may change the foot it follows
+  DVec3 root_rest_m_s = DVec3(0.0);
+  /// On terrain: soles are lifted out of the ground they leave and land on. Level ground the blend
+  /// itself keeps to within what the examples do, and knees move less.
+  bool keeps_above_ground = false;
+  bool is_active = false;
+  DVec3 missed_m = DVec3(0.0);  ///< From where a step lands to where it was asked to, horizontally
+  double missed_rad = 0.0;      ///< The same for the foot's heading
+
+  [[nodiscard]] const FootTrack& foot(Foot f) const { return feet[static_cast<std::size_t>(f)]; }
+  [[nodiscard]] FootTrack& foot(Foot f) { return feet[static_cast<std::size_t>(f)]; }
+};
+
+/// The root takes this long to come to where the feet of a movement have it.
+inline constexpr double kRootShiftS = 0.25;
+/// In height this part of a movement, where that is longer: a body climbs as long as its leg stretches.
+inline constexpr double kRootRisePart = 0.75;
+
+/// Where the blend has a foot.
+struct BlendedFoot {
+  DVec3 ball_m = DVec3(0.0);  ///< In the world
+  double heading_rad = 0.0;   ///< Less the toe-out of the stand pose
+  double flatness = 1.0;      ///< LegPose::Flatness
+};
+
+/// Corrections of one foot at a time.
+struct FootCorrection {
+  DVec3 offset_m = DVec3(0.0);
+  double turn_rad = 0.0;
+  double free_turn_rad = 0.0;  ///< The same had its heading not been held
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
+  double root_weight = 0.0;
+  DVec3 root_shift_m = DVec3(0.0);
+};
+
+/// How much of `lift_m` is added at a part of the swing: up soon, down late, as who steps over an edge does.
+[[nodiscard]] double LiftShare(double swing);
+
+/// The rotation a correction gives the foot, about its ball and in world axes.
+[[nodiscard]] Quat TurnOf(const FootCorrection& correction);
+
+/// The corrections of a movement's plan at `time_s` (from its start).
+[[nodiscard]] FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
+                                         const BlendedFoot& blended);
+
+/// Corrections of both feet of a blended and eased pose, and where they bring the root.
+struct FeetCorrection {
+  std::array<FootCorrection, 2> feet;  ///< Indexed by Foot.
+  DVec3 root_m = DVec3(0.0);           ///< Added to the root, before legs too short lower it
+};
+[[nodiscard]] FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig,
+                                         const Movement& movement, double time_s,
+                                         ConstPoseSpan pose);
+
+/// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kJoinStepS
+/// earlier. `planned` is what the plan itself corrects when the movement is entered, and kJoinStepS later. The
+/// same twice: from rest.
+void GoOnFrom(const std::array<FeetCorrection, 2>& before,
+              const std::array<FeetCorrection, 2>& planned, Movement& movement);
+
+/// A foot of a pose with its root at `root_m`.
+[[nodiscard]] BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m,
+                                 const LegPose& leg);
+
+/// Plants the feet of a movement's blended and eased pose: moves the root by the feet's weighted offsets, lowers it
+/// until both legs reach, bends the legs for what remains. Never allocates; same bytes everywhere.
+void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement, double time_s,
+               PoseSpan pose);
+
+}  // namespace stridewire

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <optional>
+
+#include "stridewire/runtime/foot_support.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement.h"
+#include "stridewire/runtime/request_plan.h"
+
+namespace stridewire {
+
+/// Where a foot is between two movements, and what planting adds to the blend there.
+struct FootHold {
+  Footprint print;
+  double height_m = 0.0;
+  double turn_rad = 0.0;
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
+  double root_weight = 0.5;
+};
+using FootHolds = std::array<FootHold, 2>;  ///< Indexed by Foot.
+
+/// Feet as the unplanted pose has them, on the ground below them or, without terrain, at height `ground_m`.
+[[nodiscard]] FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
+                                double ground_m, const Terrain* terrain);
+
+/// How a foot would stand at a place.
+[[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
+                                    const Footprint& print);
+
+/// Makes a movement of one in which both feet stay where they are held.
+void StandOn(const FootHolds& holds, Movement& movement);
+
+/// Where a movement is to bring the feet.
+struct LandingWish {
+  const RequestPlan& request;  ///< Its applied ends are kept exactly, the footprint if there is one
+  const Terrain* terrain;      ///< Null: level where the library and the request say
+  /// A point of the line the body goes along, which groups that say nothing of where feet stand aside keep to.
+  DVec3 line_m;
+};
+
+/// What a movement goes on from.
+struct JoinFrom {
+  ConstPoseSpan before;                  ///< Blended and eased, without planting
+  std::optional<ConstPoseSpan> earlier;  ///< The same kJoinStepS before, if its speed is to be kept
+};
+
+/// A footprint further from where the library's step ends than the request says is approached so far
+/// only. A heading is met as far as this.
+inline constexpr double kMaxFootTurnRad = 0.35;
+/// The root goes no further from where its steps have it, for who is to stand in a place.
+inline constexpr double kMaxRootShiftM = 0.4;
+
+/// Plans the feet of a movement that StartMovement has filled, heading and all, and that goes on from
+/// `join`. Sets the movement's base position, so that the
+/// foot that stays (for a jump: the middle of both) is where it stands and nothing drifts; its
+/// difference pose; and `movement.feet`.
+///
+/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates.
+void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
+              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement);
+
+/// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
+[[nodiscard]] FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement,
+                                double time_s, ConstPoseSpan pose);
+
+/// When the feet that a movement moves leave the ground and stand again, planted or not.
+struct SwingTimes {
+  double release_s = 0.0;
+  double land_s = 0.0;
+};
+[[nodiscard]] SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement);
+
+}  // namespace stridewire

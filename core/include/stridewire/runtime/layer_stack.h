@@ -1,0 +1,77 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include "stridewire/base/error.h"
+#include "stridewire/runtime/layer_clip.h"
+
+namespace stridewire {
+
+class MotionLibrary;
+
+/// Asks for one of a library's layer clips over the movement, or for its end.
+struct LayerRequest {
+  int layer = 0;  ///< Index in MotionLibrary::layers().
+  bool is_on = true;
+  double weight = 1.0;   ///< In (0, 1], on top of the clip's mask. Unused when off.
+  double blend_s = 0.3;  ///< How long weight and speed take to get there: [0, kMaxLayerBlendS].
+  double speed = 1.0;    ///< [kMinLayerSpeed, kMaxLayerSpeed]; 1: as recorded. Unused when off.
+};
+
+inline constexpr double kMaxLayerBlendS = 10.0;
+inline constexpr double kMinLayerSpeed = 0.1;
+inline constexpr double kMaxLayerSpeed = 4.0;
+
+/// The layers one avatar plays. Weights ease in and out with a continuous derivative, also when a
+/// request comes while one is on its way. Later layers lie over earlier ones. Never allocates.
+class LayerStack {
+ public:
+  static constexpr std::size_t kMaxLayers = 4;  ///< At a time, those that ease out included.
+
+  /// A layer in play.
+  struct Playing {
+    int layer = 0;
+    double time_s = 0.0;     ///< In its clip.
+    double weight = 0.0;     ///< Now.
+    double speed = 1.0;      ///< Now.
+    bool is_ending = false;  ///< On its way out.
+    // Weight and speed go from where they were to their targets over ease_s; what speed the weight had
+    // when it set out runs off over slope_s.
+    double from_weight = 0.0;
+    double to_weight = 0.0;
+    double from_speed = 1.0;
+    double to_speed = 1.0;
+    double slope = 0.0;  // weight a second
+    double slope_s = 0.0;
+    double elapsed_s = 0.0;
+    double ease_s = 0.0;
+    double blend_s = 0.0;  // as asked, for a clip that ends by itself
+  };
+
+  /// A layer that is on gets the new weight and speed; one that eases out comes back if it is a loop,
+  /// and starts anew beside itself if it is played once. Ending what is not in play is no error.
+  /// kNotFound: no such layer; kOutOfRange: a number not finite or out of its range; kLimitExceeded:
+  /// kMaxLayers are in play. Nothing changes then.
+  [[nodiscard]] Status Set(const MotionLibrary& library, const LayerRequest& request);
+
+  /// Goes on by `dt_s`. Clips that are played once ease out towards their end.
+  void Advance(const MotionLibrary& library, double dt_s);
+
+  /// Applies all to a pose of the library's skeleton.
+  void Apply(const MotionLibrary& library, PoseSpan pose) const;
+
+  [[nodiscard]] std::span<const Playing> playing() const {
+    return std::span(playing_).first(count_);
+  }
+  [[nodiscard]] bool empty() const { return count_ == 0; }
+
+ private:
+  [[nodiscard]] Playing* Find(int layer, bool is_ending);
+
+  std::array<Playing, kMaxLayers> playing_{};
+  std::size_t count_ = 0;
+};
+
+}  // namespace stridewire

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <cmath>
+
+#include "stridewire/base/math.h"
+
+namespace stridewire {
+
+// How far apart two places are on level ground.
+[[nodiscard]] inline double HorizontalDistance(const DVec3& a, const DVec3& b) {
+  return std::hypot(a.x - b.x, a.z - b.z);
+}
+
+}  // namespace stridewire

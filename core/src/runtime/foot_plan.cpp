@@ -1,0 +1,306 @@
+#include "stridewire/runtime/foot_plan.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/movement.h"
+
+namespace stridewire {
+namespace {
+
+// A leg may always be as long as the blend has it, and anyway this part of its length.
+constexpr double kEasyExtension = 0.995;
+constexpr double kLongestExtension = 0.999;
+// Roundness of the maxima below: the root goes down softly.
+constexpr double kSoftM = 0.002;
+constexpr double kSoftLowerM = 0.01;
+constexpr double kSoftGroundM = 0.006;
+// A foot this near to a print is kept out of its ground wholly, and this far from it not at all.
+constexpr double kNearPrintM = 0.15;
+constexpr double kFarFromPrintM = 0.35;
+
+// Cubic with given values and slopes at both ends of [0, length].
+DVec3 Hermite(const DVec3& p0, const DVec3& v0, const DVec3& p1, const DVec3& v1, double length_s,
+              double t) {
+  const double s = std::clamp(t / length_s, 0.0, 1.0);
+  const double r = 1.0 - s;
+  return (1.0 + 2.0 * s) * r * r * p0 + s * s * (1.0 + 2.0 * r) * p1 +
+         length_s * s * r * (r * v0 - s * v1);
+}
+
+double SmoothMax(double a, double b, double soft_m) {
+  const double d = a - b;
+  return 0.5 * (a + b + std::sqrt(d * d + soft_m * soft_m));
+}
+
+// Part of the swing that is over, 0 to 1.
+double SwingAt(const FootTrack& track, double time_s) {
+  if (time_s <= track.release_s) return 0.0;
+  if (time_s >= track.land_s) return 1.0;
+  return (time_s - track.release_s) / (track.land_s - track.release_s);
+}
+
+// Eased from 0 to 1 within the window [from, to] of the swing: a foot that climbs rises early, one
+// that descends sinks late.
+double RiseAt(double swing, double rise_m) {
+  const double from = rise_m > 0.0 ? 0.0 : 0.35;
+  const double to = rise_m > 0.0 ? 0.65 : 1.0;
+  return 1.0 - EaseOut((swing - from) / (to - from));
+}
+
+// How far a standing foot's heading is held: wholly with the sole down, not at all with the heel up,
+// where the foot is too short from above to have one.
+double HoldOf(double flatness) {
+  constexpr double kUp = 0.5;
+  constexpr double kDown = 0.8;
+  return 1.0 - EaseOut((flatness - kUp) / (kDown - kUp));
+}
+
+double AsideAt(double swing) {
+  const double x = 4.0 * swing * (1.0 - swing);
+  return x * x;
+}
+
+Quat RotationFromUp(const Vec3& normal) {
+  return Normalise(Quat(1.0f + normal.y, normal.z, 0.0f, -normal.x));
+}
+
+// How far the root goes along with the correction of a foot.
+DVec3 RootShare(const FootCorrection& correction) {
+  return correction.root_weight * correction.offset_m + correction.root_shift_m;
+}
+
+DVec3 RootRest(const Movement& movement, double time_s) {
+  const FootPlan& plan = movement.feet;
+  const double since_s = time_s - movement.entered_s;
+  const double flat = EaseOut(since_s / kRootShiftS);
+  const double rise =
+      EaseOut(since_s / std::max(kRootShiftS, kRootRisePart * movement.duration_s()));
+  return DVec3(flat, rise, flat) * plan.root_rest_m +
+         movement.ease_out_s * EaseOutSlope(since_s / movement.ease_out_s) * plan.root_rest_m_s;
+}
+
+}  // namespace
+
+double LiftShare(double swing) {
+  constexpr double kEnds = 0.35;
+  return (1.0 - EaseOut(swing / kEnds)) * EaseOut((swing - (1.0 - kEnds)) / kEnds);
+}
+
+Quat TurnOf(const FootCorrection& correction) {
+  return RotationFromUp(correction.normal) * YawRotation(correction.turn_rad);
+}
+
+BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m, const LegPose& leg) {
+  const LegRig::Side& side = rig.side(foot);
+  return {root_m + DVec3(leg.ball_m), leg.FootHeading(side) - side.toe_out_rad, leg.Flatness(side)};
+}
+
+FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
+                           const BlendedFoot& blended) {
+  const FootTrack& track = movement.feet.foot(foot);
+  const double duration_s = movement.duration_s();
+  const double swing = SwingAt(track, time_s);
+  const bool has_landed = time_s >= track.land_s;
+  const bool is_planted = track.IsPlanted(time_s);
+  const Footprint& print = has_landed ? track.to : track.from;
+
+  FootCorrection correction;
+  if (is_planted) {
+    correction.offset_m = print.position_m - blended.ball_m;
+  } else {
+    correction.offset_m =
+        Hermite(track.release_offset_m, track.release_velocity_m_s, track.land_offset_m,
+                track.land_velocity_m_s, track.land_s - track.release_s, time_s - track.release_s) +
+        AsideAt(swing) * track.aside_m;
+  }
+  const double since_s = time_s - movement.entered_s;
+  const double settled = 1.0 - EaseOut(since_s / movement.ease_out_s);
+  const auto& height = track.height_m;
+  const double rise = height[2] - height[1];
+  correction.offset_m.y = height[0] + settled * (height[1] - height[0]) +
+                          rise * RiseAt(swing, rise) + track.lift_m * LiftShare(swing);
+
+  const auto& turn = track.turn_rad;
+  const double turned = 1.0 - EaseOut(swing);
+  double free_rad = turn[0] + settled * (turn[1] - turn[0]) + turned * (turn[2] - turn[1]);
+  // A standing foot does not turn with the body; one in the air catches up, and stands again.
+  const auto steered = [&](double at_s) {
+    return movement.steer_rad * (1.0 - EaseOut(at_s / duration_s));
+  };
+  free_rad += steered(std::min(track.land_s, duration_s)) * turned - steered(time_s);
+  const FootRest& rest = movement.feet.rests[static_cast<std::size_t>(foot)];
+  const double value = EaseOut(since_s / rest.over_s);
+  const double slope = rest.over_s * EaseOutSlope(since_s / rest.over_s);
+  correction.offset_m += value * rest.offset_m + slope * rest.offset_m_s;
+  free_rad += value * rest.turn_rad + slope * rest.turn_rad_s;
+  correction.free_turn_rad = free_rad;
+  if (is_planted) {
+    const double held_rad = WrapAngle(print.heading_rad - blended.heading_rad - free_rad);
+    correction.turn_rad = free_rad + HoldOf(blended.flatness) * held_rad;
+  } else {
+    correction.turn_rad = free_rad + (1.0 - turned) * track.release_turn_rad;
+  }
+
+  const auto tilted = static_cast<float>(turned);
+  const Vec3 normal = (1.0f - tilted) * track.normals[0] + tilted * track.normals[1];
+  correction.normal = normal / std::sqrt(glm::dot(normal, normal));
+  correction.root_weight = track.root_weight;
+  correction.root_shift_m = (1.0 - EaseOut(time_s / duration_s)) * track.root_shift_m;
+  return correction;
+}
+
+FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
+                           double time_s, ConstPoseSpan pose) {
+  FeetCorrection corrections;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(skeleton, rig, pose, foot, leg);
+    FootCorrection& correction = corrections.feet[static_cast<std::size_t>(foot)];
+    correction =
+        CorrectFoot(movement, foot, time_s, FootOf(rig, foot, DVec3(pose.root_position_m), leg));
+    corrections.root_m += RootShare(correction);
+  }
+  corrections.root_m += RootRest(movement, time_s);
+  return corrections;
+}
+
+void GoOnFrom(const std::array<FeetCorrection, 2>& before,
+              const std::array<FeetCorrection, 2>& planned, Movement& movement) {
+  FootPlan& plan = movement.feet;
+  const double per_s = 1.0 / kJoinStepS;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const FootTrack& track = plan.feet[f];
+    const bool is_planted = track.IsPlanted(movement.entered_s);
+    const auto turn_of = [&](const FeetCorrection& correction) {
+      return is_planted ? correction.feet[f].free_turn_rad : correction.feet[f].turn_rad;
+    };
+    FootRest& rest = plan.rests[f];
+    rest.offset_m = before[0].feet[f].offset_m - planned[0].feet[f].offset_m;
+    rest.offset_m_s = per_s * ((before[0].feet[f].offset_m - before[1].feet[f].offset_m) -
+                               (planned[1].feet[f].offset_m - planned[0].feet[f].offset_m));
+    rest.turn_rad = WrapAngle(turn_of(before[0]) - turn_of(planned[0]));
+    rest.turn_rad_s = per_s * (WrapAngle(turn_of(before[0]) - turn_of(before[1])) -
+                               WrapAngle(turn_of(planned[1]) - turn_of(planned[0])));
+    rest.over_s = movement.ease_out_s;
+    if (is_planted) {
+      // It stands: only its height and what turns with the heel up goes on.
+      rest.offset_m.x = rest.offset_m.z = rest.offset_m_s.x = rest.offset_m_s.z = 0.0;
+    } else {
+      rest.over_s = track.land_s - movement.entered_s;
+    }
+  }
+  // The root goes along with what the feet keep; only what is missing then is its own.
+  std::array<DVec3, 2> root{planned[0].root_m, planned[1].root_m};
+  for (std::size_t i = 0; i < 2; ++i) {
+    for (std::size_t f = 0; f < 2; ++f) {
+      const FootRest& rest = plan.rests[f];
+      root[i] += planned[i].feet[f].root_weight *
+                 (rest.offset_m + static_cast<double>(i) * kJoinStepS * rest.offset_m_s);
+    }
+  }
+  plan.root_rest_m = before[0].root_m - root[0];
+  plan.root_rest_m_s = per_s * ((before[0].root_m - before[1].root_m) - (root[1] - root[0]));
+}
+
+namespace {
+
+// How deep a sole is below the ground a print lies on, taken for a plane; less the further it is away.
+double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Side& side,
+                  const LegPose& leg, const DVec3& ball, const Quat& turn) {
+  const DVec3 print = stands.position_m;
+  const double away_m =
+      std::sqrt((ball.x - print.x) * (ball.x - print.x) + (ball.z - print.z) * (ball.z - print.z));
+  const double near = EaseOut((away_m - kNearPrintM) / (kFarFromPrintM - kNearPrintM));
+  if (near <= 0.0) return 0.0;
+  const auto depth_of = [&](const Vec3& point, double rest_m) {
+    const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
+    const double ground_m =
+        print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) / normal.y;
+    return ground_m + rest_m / normal.y - at.y;
+  };
+  const double depth_m =
+      std::max({depth_of(leg.ball_m, side.ball_height_m), depth_of(leg.heel_m, side.ball_height_m),
+                depth_of(leg.toe_tip_m, side.toe_height_m)});
+  return near * SmoothMax(0.0, depth_m, kSoftGroundM);
+}
+
+// How much higher a foot must be so that its sole is not below the ground it leaves or lands on.
+double LiftOutOfGround(const FootTrack& track, double time_s, const LegRig::Side& side,
+                       const LegPose& leg, const DVec3& ball, const Quat& turn) {
+  const double second = 1.0 - EaseOut((SwingAt(track, time_s) - 0.3) / 0.4);
+  double lift_m = 0.0;
+  if (second < 1.0) {
+    lift_m += (1.0 - second) * DepthBelow(track.from, track.normals[0], side, leg, ball, turn);
+  }
+  if (second > 0.0)
+    lift_m += second * DepthBelow(track.to, track.normals[1], side, leg, ball, turn);
+  return lift_m;
+}
+
+}  // namespace
+
+void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement, double time_s,
+               PoseSpan pose) {
+  const FootPlan& plan = movement.feet;
+  if (!plan.is_active) return;
+  struct Side {
+    LegPose leg;
+    FootCorrection correction;
+    Quat turn = kIdentityQuat;  // of the foot
+    DVec3 ankle_m{0.0};         // wanted, in the world
+  };
+  std::array<Side, 2> sides;
+  const DVec3 root = DVec3(pose.root_position_m);
+  DVec3 shift(0.0);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    Side& side = sides[static_cast<std::size_t>(foot)];
+    EvaluateLeg(skeleton, rig, pose, foot, side.leg);
+    const BlendedFoot blended = FootOf(rig, foot, root, side.leg);
+    side.correction = CorrectFoot(movement, foot, time_s, blended);
+    side.turn = TurnOf(side.correction);
+    if (plan.keeps_above_ground) {
+      side.correction.offset_m.y +=
+          LiftOutOfGround(plan.foot(foot), time_s, rig.side(foot), side.leg,
+                          blended.ball_m + side.correction.offset_m, side.turn);
+    }
+    const Vec3 ankle = side.leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)];
+    side.ankle_m =
+        blended.ball_m + side.correction.offset_m + DVec3(side.turn * (ankle - side.leg.ball_m));
+    shift += RootShare(side.correction);
+  }
+  shift += RootRest(movement, time_s);
+
+  // Down until both ankles are in reach.
+  double lower_m = 0.0;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Side& side = sides[static_cast<std::size_t>(foot)];
+    const LegRig::Side& bones = rig.side(foot);
+    const Vec3 hip = side.leg.positions_m[static_cast<std::size_t>(bones.hip)];
+    const Vec3 blended = side.leg.positions_m[static_cast<std::size_t>(bones.ankle)] - hip;
+    const double length_m = static_cast<double>(bones.thigh_m) + bones.shank_m;
+    const double blended_m = std::sqrt(glm::dot(blended, blended));
+    const double allowed_m = std::min(SmoothMax(blended_m, kEasyExtension * length_m, kSoftM),
+                                      kLongestExtension * length_m);
+    const DVec3 reach = side.ankle_m - (root + shift + DVec3(hip));
+    const double flat_squared = reach.x * reach.x + reach.z * reach.z;
+    const double drop_squared = allowed_m * allowed_m - flat_squared;
+    // A foot too far to the side is not reached by going down: only as far as makes sense.
+    const double deepest_m = 0.5 * length_m;
+    const double drop_m = std::sqrt(std::max(drop_squared, deepest_m * deepest_m));
+    lower_m = SmoothMax(lower_m, -reach.y - drop_m, kSoftLowerM);
+  }
+  shift.y -= lower_m;
+
+  pose.root_position_m = Vec3(root + shift);
+  const DVec3 moved = DVec3(pose.root_position_m);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Side& side = sides[static_cast<std::size_t>(foot)];
+    const LegRig::Side& bones = rig.side(foot);
+    const auto ankle = static_cast<std::size_t>(bones.ankle);
+    const auto target = Vec3(side.ankle_m - moved);
+    SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
+  }
+}
+
+}  // namespace stridewire

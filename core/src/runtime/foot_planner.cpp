@@ -1,0 +1,424 @@
+#include "stridewire/runtime/foot_planner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/contact_keytimes.h"
+
+namespace stridewire {
+namespace {
+
+// On captures the ball leaves the ground this long before toe-off and comes to rest this long after
+// heel-strike.
+constexpr double kBallLeavesS = 0.06;
+constexpr double kBallRestsS = 0.08;
+constexpr double kShortestSwingS = 0.05;
+constexpr double kVelocityStepS = 0.004;
+
+constexpr double kHalfFootWidthM = 0.04;
+constexpr double kBumpM = 0.05;
+constexpr double kClearanceM = 0.037;
+constexpr double kMaxLiftM = 0.4;
+constexpr double kPassingRadiusM = 0.02;
+// Nearer its prints a foot is kept out of their ground instead (LiftOutOfGround).
+constexpr std::array<double, 15> kClearanceSamples{0.13,   0.1825, 0.235,  0.2875, 0.34,
+                                                   0.3925, 0.445,  0.4975, 0.55,   0.6025,
+                                                   0.655,  0.7075, 0.76,   0.8125, 0.865};
+
+constexpr double kMaxAsideM = 0.05;
+
+// A foot that passes the other closer than this is pushed aside for it.
+constexpr double kPassApartM = 0.11;
+constexpr double kLandApartM = 0.05;  // no nearer unless asked to
+constexpr double kPassingM = 0.2;
+constexpr double kCrossingM = 0.04;
+constexpr double kMaxPushM = 0.08;
+constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
+
+constexpr std::array<double, 5> kStanceSamples{0.1, 0.3, 0.5, 0.7, 0.9};
+
+// The ball's centre is this much higher over a slope than over level ground, straight above the same
+// point of the sole.
+double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
+  return side.ball_height_m * (1.0 / normal.y - 1.0);
+}
+
+// A sole rests on what sticks out of the plane it fits, but for walls that it should not stand at.
+double StandingHeight(const FootSupport& support) {
+  return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
+}
+
+class Planner {
+ public:
+  Planner(const MotionLibrary& library, GridCache& cache, PoseSpan pose, Movement& movement)
+      : library_(library),
+        skeleton_(library.skeleton()),
+        rig_(library.leg_rig()),
+        group_(library.group(movement.group)),
+        cache_(cache),
+        pose_(pose),
+        movement_(movement) {}
+
+  using FeetAt = std::array<BlendedFoot, 2>;
+
+  FeetAt FeetOf(ConstPoseSpan pose) const {
+    FeetAt feet;
+    LegPose leg;
+    for (std::size_t f = 0; f < 2; ++f) {
+      EvaluateLeg(skeleton_, rig_, pose, static_cast<Foot>(f), leg);
+      feet[f] = FootOf(rig_, static_cast<Foot>(f), DVec3(pose.root_position_m), leg);
+    }
+    return feet;
+  }
+  FeetAt Blended(double time_s) {
+    EvaluateBlend(group_, library_.layout(), movement_, time_s, cache_, pose_);
+    return FeetOf(pose_);
+  }
+  FeetAt Eased(double time_s) {
+    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+    return FeetOf(pose_);
+  }
+
+  // The base below which the feet that stay stand where they do.
+  void HangBase(const FootHolds& holds, std::span<const Foot> staying, double stance_end_s) {
+    movement_.base.position_m = DVec3(0.0);
+    const FeetAt start = Blended(0.0);
+    std::array<double, 2> lowest_m{start[0].ball_m.y, start[1].ball_m.y};
+    for (const double part : kStanceSamples) {
+      const FeetAt feet = Blended(part * stance_end_s);
+      for (std::size_t f = 0; f < 2; ++f) lowest_m[f] = std::min(lowest_m[f], feet[f].ball_m.y);
+    }
+    DVec3 position(0.0);
+    for (const Foot foot : staying) {
+      const auto f = static_cast<std::size_t>(foot);
+      const DVec3 stands = holds[f].print.position_m;
+      position += DVec3(stands.x - start[f].ball_m.x,
+                        stands.y + rig_.sides[f].ball_height_m +
+                            SlopeRise(rig_.sides[f], holds[f].normal) - lowest_m[f],
+                        stands.z - start[f].ball_m.z);
+    }
+    movement_.base.position_m = position / static_cast<double>(staying.size());
+  }
+
+  // Offsets and their velocities at release and landing, so that the way between is smooth.
+  void JoinSwing(Foot foot, const FeetAt& landing, FootTrack& track) {
+    const auto f = static_cast<std::size_t>(foot);
+    const auto velocity_at = [&](double time_s) {
+      const double from_s = std::max(0.0, time_s - kVelocityStepS);
+      const double to_s = std::min(movement_.duration_s(), time_s + kVelocityStepS);
+      return (Eased(to_s)[f].ball_m - Eased(from_s)[f].ball_m) / (to_s - from_s);
+    };
+    track.release_velocity_m_s = -velocity_at(track.release_s);
+    const BlendedFoot released = Eased(track.release_s)[f];
+    track.release_offset_m = track.from.position_m - released.ball_m;
+    const FootCorrection at_release = CorrectFoot(movement_, foot, track.release_s, released);
+    track.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
+    track.land_velocity_m_s = -velocity_at(track.land_s);
+    track.land_offset_m = track.to.position_m - landing[f].ball_m;
+  }
+
+  // How far the swinging foot must be pushed outward, at most of its swing, to pass the standing leg.
+  double PushAside(Foot moving) {
+    const FootTrack& track = movement_.feet.foot(moving);
+    const auto f = static_cast<std::size_t>(moving);
+    const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+    const DVec3 stands = movement_.feet.foot(OtherFoot(moving)).from.position_m;
+    const auto vector = [&](const DVec3& ball, double part) {
+      const double heading = movement_.base.heading_rad + part * movement_.heading_change_rad;
+      return RotateYaw(-heading, ball - stands);
+    };
+    // Who starts or lands across the other foot means to.
+    if (outward * vector(track.from.position_m, 0.0).x < kCrossingM ||
+        outward * vector(track.to.position_m, 1.0).x < kCrossingM) {
+      return 0.0;
+    }
+    double push_m = 0.0;
+    for (const double part : kSwingSamples) {
+      const double time_s = track.release_s + part * (track.land_s - track.release_s);
+      const BlendedFoot blended = Eased(time_s)[f];
+      const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
+      const DVec3 apart = vector(ball, part);
+      if (std::fabs(apart.z) > kPassingM) continue;
+      const double lift = 4.0 * part * (1.0 - part);
+      push_m = std::max(push_m, (kPassApartM - outward * apart.x) / (lift * lift));
+    }
+    return std::min(push_m, kMaxPushM);
+  }
+
+  // What brings the root above a place by the end of the movement.
+  DVec3 RootShift(const DVec3& place_m) {
+    const double end_s = movement_.duration_s();
+    const FeetAt feet = Eased(end_s);
+    DVec3 shift = place_m - DVec3(pose_.root_position_m);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const FootCorrection correction =
+          CorrectFoot(movement_, foot, end_s, feet[static_cast<std::size_t>(foot)]);
+      shift -= correction.root_weight * correction.offset_m + correction.root_shift_m;
+    }
+    shift.y = 0.0;
+    const double length_m = std::sqrt(shift.x * shift.x + shift.z * shift.z);
+    return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
+  }
+
+  void StandOnGround(Foot foot, const Terrain& terrain, FootTrack& track) const {
+    const FootSupport support = SupportOf(terrain, rig_.side(foot), track.to);
+    track.to.position_m.y = StandingHeight(support);
+    track.normals[1] = support.normal;
+  }
+
+  // How much higher the swinging foot must go, at most of its swing, to clear the ground below its sole.
+  double LiftOver(Foot moving, const Terrain& terrain) {
+    const FootTrack& track = movement_.feet.foot(moving);
+    const LegRig::Side& side = rig_.side(moving);
+    LegPose leg;
+    double lift_m = 0.0;
+    for (const double part : kClearanceSamples) {
+      const double time_s = track.release_s + part * (track.land_s - track.release_s);
+      EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+      EvaluateLeg(skeleton_, rig_, pose_, moving, leg);
+      const BlendedFoot blended = FootOf(rig_, moving, DVec3(pose_.root_position_m), leg);
+      const FootCorrection correction = CorrectFoot(movement_, moving, time_s, blended);
+      const DVec3 ball = blended.ball_m + correction.offset_m;
+      const Quat turn = TurnOf(correction);
+      const double lift = LiftShare(part);
+      const auto clear = [&](const Vec3& point, double rest_m) {
+        const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
+        const double ground_m = terrain.HighestWithin(at.x, at.z, kPassingRadiusM);
+        lift_m = std::max(lift_m, (ground_m + kClearanceM * lift - (at.y - rest_m)) / lift);
+      };
+      clear(leg.ball_m, side.ball_height_m);
+      clear(leg.heel_m, side.ball_height_m);
+      clear(leg.toe_tip_m, side.toe_height_m);
+    }
+    return std::min(lift_m, kMaxLiftM);
+  }
+
+ private:
+  const MotionLibrary& library_;
+  const Skeleton& skeleton_;
+  const LegRig& rig_;
+  const MotionGroup& group_;
+  GridCache& cache_;
+  PoseSpan pose_;
+  Movement& movement_;
+};
+
+double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
+               double otherwise) {
+  const int l = group.FindParameter(name);
+  return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
+}
+
+}  // namespace
+
+SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
+  const double duration_s = movement.duration_s();
+  if (movement.interval_count < 3) return {0.25 * duration_s, 0.9 * duration_s};
+  const ContactKeytimes contact = ContactKeytimesOf(kind, movement.interval_count);
+  const double off_s = movement.keytimes_s[contact.toe_off];
+  SwingTimes times;
+  times.release_s = std::max(off_s - kBallLeavesS, 0.5 * off_s);
+  times.land_s = std::min(movement.keytimes_s[contact.landing] + kBallRestsS, duration_s);
+  times.release_s = std::min(times.release_s, times.land_s - kShortestSwingS);
+  return times;
+}
+
+FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Footprint& print) {
+  return SupportOf(terrain, print.position_m.x, print.position_m.z, print.heading_rad,
+                   {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
+}
+
+FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, double ground_m,
+                  const Terrain* terrain) {
+  FootHolds holds;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(skeleton, rig, pose, foot, leg);
+    const BlendedFoot blended = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
+    FootHold& hold = holds[static_cast<std::size_t>(foot)];
+    hold.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
+    if (terrain == nullptr) continue;
+    const FootSupport support = SupportOf(*terrain, rig.side(foot), hold.print);
+    hold.print.position_m.y = StandingHeight(support);
+    hold.normal = support.normal;
+    hold.height_m = hold.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
+  }
+  return holds;
+}
+
+void StandOn(const FootHolds& holds, Movement& movement) {
+  movement.interval_count = 1;
+  movement.keytimes_s = {0.0, kEaseOutS};
+  movement.entered_s = movement.steer_rad = 0.0;
+  movement.ease_out_s = kEaseOutS;
+  FootPlan& plan = movement.feet;
+  plan = {};
+  plan.is_active = true;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const FootHold& hold = holds[f];
+    FootTrack& track = plan.feet[f];
+    track.from = track.to = hold.print;
+    track.normals.fill(hold.normal);
+    track.height_m.fill(hold.height_m);
+    track.turn_rad.fill(hold.turn_rad);
+    track.root_weight = hold.root_weight;
+  }
+}
+
+void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
+              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
+  const RequestPlan& request = wish.request;
+  const MotionGroup& group = library.group(movement.group);
+  const LegRig& rig = library.leg_rig();
+  Planner planner(library, cache, pose, movement);
+  const bool is_step = IsStep(group.kind);
+  const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
+  const Foot fixed = OtherFoot(moving);
+  const auto m = static_cast<std::size_t>(moving);
+  const auto x = static_cast<std::size_t>(fixed);
+  const SwingTimes times = SwingTimesOf(group.kind, movement);
+  if (request.turn_rad) {
+    movement.steer_rad =
+        std::clamp(*request.turn_rad - movement.heading_change_rad, -kMaxSteerRad, kMaxSteerRad);
+  }
+  const double end_heading_rad =
+      movement.base.heading_rad + movement.heading_change_rad + movement.steer_rad;
+
+  constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
+  const std::array<Foot, 1> stays{fixed};
+  if (is_step) {
+    planner.HangBase(holds, stays, movement.duration_s());
+  } else {
+    planner.HangBase(holds, kBoth, times.release_s);
+  }
+
+  // D = P - M, with P what was before.
+  EvaluateBlend(group, library.layout(), movement, movement.entered_s, cache, movement.difference);
+  const Planner::FeetAt start = planner.FeetOf(movement.difference);
+  const Planner::FeetAt was = planner.FeetOf(join.before);
+  Subtract(join.before, movement.difference, movement.difference);
+  if (join.earlier) {
+    SetDifferenceVelocity(group, library.layout(), join.before, *join.earlier, cache, pose,
+                          movement);
+  }
+
+  FootPlan& plan = movement.feet;
+  plan = {};
+  plan.is_active = true;
+  plan.keeps_above_ground = wish.terrain != nullptr;
+  for (std::size_t f = 0; f < 2; ++f) {
+    FootTrack& track = plan.feet[f];
+    const FootHold& hold = holds[f];
+    track.from = track.to = hold.print;
+    track.normals.fill(hold.normal);
+    // What the difference pose takes away in height and turning while it fades is put back, so that
+    // a foot on the ground does neither; only the foot that carries comes to rest.
+    const double sinks_m = was[f].ball_m.y - start[f].ball_m.y;
+    const double turns_rad = WrapAngle(was[f].heading_rad - start[f].heading_rad);
+    const bool stays_down = is_step && f == x;
+    track.height_m = {hold.height_m, stays_down ? 0.0 : hold.height_m + sinks_m, 0.0};
+    track.turn_rad = {hold.turn_rad, hold.turn_rad + turns_rad, hold.turn_rad + turns_rad};
+    track.height_m[2] = track.height_m[1];
+    track.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
+  }
+
+  const Planner::FeetAt end = planner.Blended(movement.duration_s());
+  if (is_step) {
+    const DVec3 blended = RotateYaw(-end_heading_rad, end[m].ball_m - end[x].ball_m);
+    // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
+    const double aside_m =
+        std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement.base.position_m).x,
+                   -kMaxAsideM, kMaxAsideM);
+    DVec3 vector{ValueOr(group, request.applied, ParameterName::kEndX, blended.x + aside_m),
+                 GroundRise(ValueOr(group, request.applied, ParameterName::kEndY, 0.0)),
+                 ValueOr(group, request.applied, ParameterName::kEndZ, blended.z)};
+    if (!request.is_side_given) {
+      const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+      vector.x = outward * std::max(outward * vector.x, kLandApartM);
+    }
+    FootTrack& track = plan.feet[m];
+    const double rise_m = vector.y;
+    track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
+    track.release_s = times.release_s;
+    track.land_s = times.land_s;
+    double turn_rad = 0.0;
+    const Planner::FeetAt landing = planner.Eased(times.land_s);
+    const double landing_rad = landing[m].heading_rad;
+    if (request.exact) {
+      DVec3 residual = request.exact->position_m - track.to.position_m;
+      const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
+      const double part =
+          std::min(1.0, request.most_residual_m / std::max(length_m, request.most_residual_m));
+      plan.missed_m = (1.0 - part) * DVec3(residual.x, 0.0, residual.z);
+      residual.x *= part;
+      residual.z *= part;
+      track.to.position_m += residual;
+      const double wanted_rad = WrapAngle(request.exact->heading_rad - landing_rad);
+      turn_rad = std::clamp(wanted_rad, -kMaxFootTurnRad, kMaxFootTurnRad);
+      plan.missed_rad = wanted_rad - turn_rad;
+    } else {
+      const auto missed = [&](ParameterName name) {
+        return ValueOr(group, request.requested, name, 0.0) -
+               ValueOr(group, request.applied, name, 0.0);
+      };
+      plan.missed_m = RotateYaw(
+          end_heading_rad, DVec3(missed(ParameterName::kEndX), 0.0, missed(ParameterName::kEndZ)));
+      const double turned_rad = movement.heading_change_rad + movement.steer_rad;
+      plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
+    }
+    track.to.heading_rad = landing_rad + turn_rad;
+    track.turn_rad[2] = turn_rad;
+    if (wish.terrain != nullptr) planner.StandOnGround(moving, *wish.terrain, track);
+    track.height_m[2] = track.to.position_m.y - holds[x].print.position_m.y - rise_m +
+                        SlopeRise(rig.sides[m], track.normals[1]) -
+                        SlopeRise(rig.sides[x], holds[x].normal);
+    planner.JoinSwing(moving, landing, track);
+    const double push_m = planner.PushAside(moving);
+    if (wish.terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish.terrain);
+    track.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                              DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+    if (request.root_m) track.root_shift_m = planner.RootShift(*request.root_m);
+    return;
+  }
+
+  const DVec3 centre =
+      0.5 * (holds[0].print.position_m + holds[1].print.position_m) +
+      RotateYaw(movement.base.heading_rad,
+                DVec3(0.0, ValueOr(group, request.applied, ParameterName::kHeight, 0.0),
+                      ValueOr(group, request.applied, ParameterName::kLength, 0.0)));
+  const DVec3 apart = 0.5 * (end[0].ball_m - end[1].ball_m);
+  const Planner::FeetAt landing = planner.Eased(times.land_s);
+  for (const Foot foot : kBoth) {
+    const auto f = static_cast<std::size_t>(foot);
+    FootTrack& track = plan.feet[f];
+    const double sign = foot == Foot::kLeft ? 1.0 : -1.0;
+    track.to.position_m = centre + sign * DVec3(apart.x, 0.0, apart.z);
+    track.to.heading_rad = landing[f].heading_rad;
+    track.turn_rad[2] = 0.0;
+    track.height_m[2] = 0.0;
+    track.release_s = times.release_s;
+    track.land_s = times.land_s;
+    planner.JoinSwing(foot, landing, track);
+  }
+}
+
+FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement, double time_s,
+                  ConstPoseSpan pose) {
+  FootHolds holds;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
+    const FootCorrection correction = CorrectFoot(
+        movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
+    FootHold& hold = holds[static_cast<std::size_t>(foot)];
+    const FootTrack& track = movement.feet.foot(foot);
+    hold.print = time_s > track.release_s ? track.to : track.from;
+    hold.height_m = correction.offset_m.y;
+    hold.turn_rad = correction.free_turn_rad;
+    hold.normal = correction.normal;
+    hold.root_weight = correction.root_weight;
+  }
+  return holds;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,129 @@
+#include "stridewire/runtime/layer_stack.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+namespace {
+
+bool IsWithin(double value, double low, double high) { return value >= low && value <= high; }
+
+// 0 to 1 with no slope at either end.
+double Ease(double u) { return u >= 1.0 ? 1.0 : u * u * (3.0 - 2.0 * u); }
+
+// The part of the way that is behind, and how fast it is gone there.
+double Progress(const LayerStack::Playing& p) {
+  return p.elapsed_s >= p.ease_s ? 1.0 : p.elapsed_s / p.ease_s;
+}
+
+double WeightOf(const LayerStack::Playing& p) {
+  const double weight = p.from_weight + (p.to_weight - p.from_weight) * Ease(Progress(p));
+  if (p.elapsed_s >= p.slope_s) return std::clamp(weight, 0.0, 1.0);
+  // t (1 - t / T)^2: the slope at first, none at T.
+  const double left = 1.0 - p.elapsed_s / p.slope_s;
+  return std::clamp(weight + p.slope * p.elapsed_s * left * left, 0.0, 1.0);
+}
+
+double SlopeOf(const LayerStack::Playing& p) {
+  const double u = Progress(p);
+  double slope = u >= 1.0 ? 0.0 : (p.to_weight - p.from_weight) * 6.0 * u * (1.0 - u) / p.ease_s;
+  if (p.elapsed_s < p.slope_s) {
+    const double part = p.elapsed_s / p.slope_s;
+    slope += p.slope * (1.0 - part) * (1.0 - 3.0 * part);
+  }
+  return slope;
+}
+
+// Heads for another weight and speed from where it is. What slope the weight has runs off within what
+// was left of the way: then it does not overshoot.
+void HeadFor(double weight, double speed, double blend_s, LayerStack::Playing& p) {
+  const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
+  p.slope = SlopeOf(p);
+  p.slope_s = std::min(left_s, blend_s);
+  p.from_weight = p.weight;
+  p.to_weight = weight;
+  p.from_speed = p.speed;
+  p.to_speed = speed;
+  p.elapsed_s = 0.0;
+  p.ease_s = blend_s;
+}
+
+}  // namespace
+
+LayerStack::Playing* LayerStack::Find(int layer, bool is_ending) {
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (playing_[i].layer == layer && playing_[i].is_ending == is_ending) return &playing_[i];
+  }
+  return nullptr;
+}
+
+Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request) {
+  if (request.layer < 0 || static_cast<std::size_t>(request.layer) >= library.layers().size()) {
+    return Fail(ErrorCode::kNotFound, "the library has no such layer", request.layer);
+  }
+  // Not "outside", so that what is not a number fails as well.
+  if (!IsWithin(request.blend_s, 0.0, kMaxLayerBlendS)) {
+    return Fail(ErrorCode::kOutOfRange, "a layer's blend must take 0 to 10 s");
+  }
+  Playing* on = Find(request.layer, false);
+  if (!request.is_on) {
+    if (on == nullptr) return {};
+    HeadFor(0.0, on->speed, request.blend_s, *on);
+    on->is_ending = true;
+    return {};
+  }
+  if (!(request.weight > 0.0 && request.weight <= 1.0)) {
+    return Fail(ErrorCode::kOutOfRange, "a layer's weight must lie above 0 and up to 1");
+  }
+  if (!IsWithin(request.speed, kMinLayerSpeed, kMaxLayerSpeed)) {
+    return Fail(ErrorCode::kOutOfRange, "a layer's speed must lie from 0.1 to 4");
+  }
+  if (on == nullptr && library.layers()[static_cast<std::size_t>(request.layer)].is_looping) {
+    on = Find(request.layer, true);
+  }
+  if (on == nullptr) {
+    if (count_ == kMaxLayers) {
+      return Fail(ErrorCode::kLimitExceeded, "the avatar plays four layers already", kMaxLayers);
+    }
+    on = &playing_[count_++];
+    *on = {.layer = request.layer, .speed = request.speed};
+  }
+  HeadFor(request.weight, request.speed, request.blend_s, *on);
+  on->is_ending = false;
+  on->blend_s = request.blend_s;
+  on->weight = WeightOf(*on);
+  return {};
+}
+
+void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < count_; ++i) {
+    Playing p = playing_[i];
+    p.elapsed_s += dt_s;
+    p.speed = p.from_speed + (p.to_speed - p.from_speed) * Ease(Progress(p));
+    p.time_s += dt_s * p.speed;
+    const LayerClip& clip = library.layers()[static_cast<std::size_t>(p.layer)];
+    const double duration_s = clip.duration_s();
+    p.weight = WeightOf(p);
+    if (clip.is_looping) {
+      p.time_s -= std::floor(p.time_s / duration_s) * duration_s;
+    } else if (!p.is_ending && p.time_s + p.blend_s * p.speed >= duration_s) {
+      HeadFor(0.0, p.speed, p.blend_s, p);
+      p.is_ending = true;
+    }
+    if (p.is_ending && p.elapsed_s >= p.ease_s) continue;
+    playing_[kept++] = p;
+  }
+  count_ = kept;
+}
+
+void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
+  for (const Playing& p : playing()) {
+    if (p.weight <= 0.0) continue;
+    ApplyLayer(library.layers()[static_cast<std::size_t>(p.layer)], p.time_s, p.weight, pose);
+  }
+}
+
+}  // namespace stridewire

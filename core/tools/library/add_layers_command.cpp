@@ -1,0 +1,120 @@
+#include <charconv>
+#include <cstdio>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "command_line.h"
+#include "commands.h"
+#include "library_json.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/layers.h"
+#include "stridewire/offline/open_library.h"
+
+namespace stridewire {
+namespace {
+
+struct LayerSource {
+  LayerCut cut;
+  std::string path;
+};
+
+// Takes ":number" off the end of `text`.
+std::optional<double> TakeTime(std::string_view& text) {
+  const std::size_t colon = text.rfind(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  const std::string_view digits = text.substr(colon + 1);
+  double value = 0.0;
+  const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (failed != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
+  text = text.substr(0, colon);
+  return value;
+}
+
+// "wave=file.bvh:1.5:3": times belong together, and a file may have colons in its name.
+std::optional<LayerSource> ParseSource(std::string_view text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string_view::npos || equals == 0) return std::nullopt;
+  LayerSource source;
+  source.cut.name = text.substr(0, equals);
+  text.remove_prefix(equals + 1);
+  std::string_view without_times = text;
+  const auto to_s = TakeTime(without_times);
+  const auto from_s = to_s ? TakeTime(without_times) : std::nullopt;
+  if (from_s) {
+    source.cut.from_s = from_s;
+    source.cut.to_s = to_s;
+    text = without_times;
+  }
+  source.path = text;
+  if (source.path.empty()) return std::nullopt;
+  return source;
+}
+
+}  // namespace
+
+int RunAddLayers(const AddLayersCommand& command) {
+  if (command.loops.empty() && command.once.empty()) {
+    return Complain("add-layers: names no layer; give --layer or --layer-once");
+  }
+  std::vector<LayerSource> sources;
+  for (const auto* texts : {&command.loops, &command.once}) {
+    for (const std::string& text : *texts) {
+      auto source = ParseSource(text);
+      if (!source) {
+        return Complain("\"" + text + "\" is not NAME=FILE or NAME=FILE:FROM_S:TO_S");
+      }
+      if (IsSameFile(command.out, source->path)) {
+        return Complain("--out: " + command.out + " is a file to read from");
+      }
+      source->cut.is_looping = texts == &command.loops;
+      sources.push_back(*std::move(source));
+    }
+  }
+  if (IsSameFile(command.out, command.library)) {
+    return Complain("--out: " + command.out + " is the library to add to");
+  }
+  if (Status status = CheckOutputFile(command.out); !status) {
+    return ComplainOfOutput(status.error());
+  }
+  const auto library = OpenLibrary(command.library);
+  if (!library) return ComplainOfInput(library.error());
+  const Skeleton& skeleton = (*library)->skeleton();
+  std::optional<std::vector<float>> mask;
+  if (!command.joints.empty()) {
+    auto named = MaskOfJoints(skeleton, command.joints);
+    if (!named) {
+      Error error = named.error();
+      error.where = "--layer-joints: " + error.where;
+      return ComplainOfInput(error);
+    }
+    mask = *std::move(named);
+  }
+  std::vector<RawLayer> layers;
+  for (const LayerSource& source : sources) {
+    const auto capture = ReadBvh(source.path);
+    if (!capture) return ComplainOfInput(capture.error());
+    auto layer = CutLayer(*capture, skeleton, source.cut);
+    if (!layer) return ComplainOfInput(layer.error());
+    if (mask) layer->weights = *mask;
+    layers.push_back(*std::move(layer));
+  }
+  const auto made = AddLayers(**library, layers);
+  if (!made) return ComplainOfInput(made.error());
+  if (Status status = WriteFile(command.out, (*made)->bytes()); !status) {
+    return ComplainOfOutput(status.error());
+  }
+  if (command.json) {
+    std::printf("%s\n", Dump({{"layers", LayersToJson(**made)},
+                              {"hash", (*made)->hash()},
+                              {"bytes", (*made)->bytes().size()}})
+                            .c_str());
+    return kExitDone;
+  }
+  PrintLayers(**made);
+  std::printf("%s: %zu bytes\n", command.out.c_str(), (*made)->bytes().size());
+  return kExitDone;
+}
+
+}  // namespace stridewire

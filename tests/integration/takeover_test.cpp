@@ -1,0 +1,316 @@
+// Requests that take over from a movement under way, at any time: no joint changes its speed at once and no
+// foot that stands slides.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "captured_library.h"
+#include "random.h"
+#include "stridewire/runtime/avatar.h"
+#include "velocity_steps.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+constexpr double kFps = 60.0;
+constexpr double kTickS = 1.0 / kFps;
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr int kAvatars = 3;  // one thread, twenty times as slow
+#else
+constexpr int kAvatars = 15;
+#endif
+
+struct Walker {
+  const char* name;
+  std::vector<std::string> subjects;  // captured; none: the generated library
+  double longest_m;
+};
+void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
+
+MovementRequest RandomRequest(const Walker& walker, const Avatar& avatar, std::uint64_t id,
+                              Random& random) {
+  MovementRequest request{
+      id, {}, random.Draw(0, 1) < 0.8 ? Takeover::kNow : Takeover::kAfterMovement};
+  const double what = random.Draw(0.0, 1.0);
+  if (what < 0.6) {
+    StepRequest step;
+    if (random.Draw(0, 1) < 0.5) step.foot = random.Draw(0, 1) < 0.5 ? Foot::kLeft : Foot::kRight;
+    step.length_m = random.Draw(0.0, walker.longest_m);
+    step.turn_rad = random.Draw(-0.4, 0.4);
+    request.movement = step;
+  } else if (what < 0.7) {
+    request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.5)};
+  } else if (what < 0.8) {
+    request.movement = StandRequest{random.Draw(0.0, 0.5)};
+  } else {
+    WalkRequest walk;
+    walk.position_m = {random.Draw(-4, 4), 0.0, random.Draw(-4, 4)};
+    walk.heading_rad = random.Draw(-3, 3);
+    request.movement = walk;
+  }
+  if (!ValidateRequest(avatar.library(), request)) request.movement = StepRequest{.length_m = 0.3};
+  return request;
+}
+
+struct Figures {
+  int requests = 0;  // while a movement was under way
+  int cut_short = 0;
+  double largest_drift_m = 0.0;  // of a foot from where it stood when it was said to stand
+  std::vector<double>
+      at_cuts;  // largest change of a joint's angular velocity at each takeover, rad/s
+  double largest_at_joins = 0.0;  // wherever a movement begins
+  double largest_elsewhere = 0.0;
+};
+
+// Looks at one avatar after every frame.
+class Observer {
+ public:
+  Observer(const Avatar& avatar, Figures& figures)
+      : avatar_(avatar), figures_(figures), steps_(avatar.library().skeleton(), kFps) {}
+
+  void Look() {
+    for (const AvatarEvent& event : avatar_.events()) {
+      if (event.type != AvatarEventType::kFinished) continue;
+      frames_since_join_ = 0;
+      if (!event.is_cut_short) continue;
+      ++figures_.cut_short;
+      frames_since_cut_ = 0;
+      at_cut_ = 0.0;
+    }
+    LookAtJoints();
+    LookAtFeet();
+  }
+
+ private:
+  static constexpr int kFramesOfJoin = 3;  // a change of velocity shows in three poses
+
+  void LookAtJoints() {
+    const double step = steps_.Add(avatar_.pose()).joint_rad_s;
+    double& largest =
+        frames_since_join_ < kFramesOfJoin ? figures_.largest_at_joins : figures_.largest_elsewhere;
+    largest = std::max(largest, step);
+    at_cut_ = std::max(at_cut_, step);
+    ++frames_since_join_;
+    if (++frames_since_cut_ == kFramesOfJoin) figures_.at_cuts.push_back(at_cut_);
+  }
+
+  void LookAtFeet() {
+    for (int f = 0; f < 2; ++f) {
+      const auto foot = static_cast<Foot>(f);
+      const Movement* movement = avatar_.movement();
+      const bool stands =
+          movement == nullptr || movement->feet.foot(foot).IsPlanted(avatar_.movement_time_s());
+      const DVec3 ball(BallPosition(avatar_.library().skeleton(), avatar_.pose(), foot));
+      if (stands && !stood_[f]) anchors_[f] = ball;
+      if (stands) {
+        figures_.largest_drift_m = std::max(
+            figures_.largest_drift_m, std::hypot(ball.x - anchors_[f].x, ball.z - anchors_[f].z));
+      }
+      stood_[f] = stands;
+    }
+  }
+
+  const Avatar& avatar_;
+  Figures& figures_;
+  VelocitySteps steps_;
+  int frames_since_join_ = 0;
+  int frames_since_cut_ = kFramesOfJoin;
+  double at_cut_ = 0.0;
+  DVec3 anchors_[2];
+  bool stood_[2] = {false, false};
+};
+
+Figures InterruptAll(const Walker& walker, const Library& library, JoinKind join, int avatars,
+                     double seconds, unsigned seed) {
+  Figures figures;
+  for (int i = 0; i < avatars; ++i) {
+    Random random(seed + static_cast<unsigned>(i));
+    Avatar avatar(library, BaseFrame{}, {.join = join});
+    Observer observer(avatar, figures);
+    double next_s = 0.0;
+    std::uint64_t id = 0;
+    for (int frame = 0; frame < static_cast<int>(seconds * kFps); ++frame) {
+      if (frame / kFps >= next_s) {
+        next_s = frame / kFps + random.Draw(0.05, 1.2);
+        figures.requests += avatar.movement() != nullptr;
+        EXPECT_TRUE(avatar.Enqueue(RandomRequest(walker, avatar, ++id, random)).has_value());
+      }
+      avatar.Advance(kTickS);
+      observer.Look();
+    }
+  }
+  std::ranges::sort(figures.at_cuts);
+  return figures;
+}
+
+class TakeOver : public testing::TestWithParam<Walker> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, TakeOver,
+                         testing::Values(Walker{"Builtin", {}, 0.75},
+                                         Walker{"Subject16", {"16"}, 0.75},
+                                         Walker{"Subject01", {"01"}, 0.58}),
+                         [](const auto& walker) { return walker.param.name; });
+
+TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
+  const Walker& walker = GetParam();
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
+  const Library library = LibraryOf(walker.subjects);
+  const unsigned seed = 20261122;
+  const char* asked = std::getenv("STRIDEWIRE_AVATARS");
+  const int avatars = asked == nullptr ? kAvatars : std::atoi(asked);
+  const double examples = LargestStepOfExamples(*library, kFps).joint_rad_s;
+  for (const JoinKind join : {JoinKind::kCubic, JoinKind::kInertial}) {
+    const Figures figures = InterruptAll(walker, library, join, avatars, 60.0, seed);
+    ASSERT_GT(figures.at_cuts.size(), 5u * static_cast<unsigned>(avatars));
+    std::printf(
+        "%s, %s: seed %u, %d avatars, %d requests in mid-movement, %d cut short; drift %.4f mm; "
+        "joints step by "
+        "%.2f rad/s at takeovers (median; %.2f the worst of a hundred), at most %.2f where "
+        "movements begin, "
+        "%.2f elsewhere, %.2f in the examples (ratio %.2f)\n",
+        walker.name, join == JoinKind::kCubic ? "cubic" : "inertial", seed, avatars,
+        figures.requests, figures.cut_short, 1e3 * figures.largest_drift_m,
+        figures.at_cuts[figures.at_cuts.size() / 2],
+        figures.at_cuts[figures.at_cuts.size() * 99 / 100], figures.largest_at_joins,
+        figures.largest_elsewhere, examples, figures.largest_at_joins / examples);
+    EXPECT_LE(figures.largest_drift_m, 1e-3);
+    if (join == JoinKind::kInertial) {
+      EXPECT_LE(figures.largest_at_joins, 1.5 * examples);
+    }
+  }
+}
+
+class TakeOverOfBuiltin : public testing::Test {
+ protected:
+  // Advances until `done`, or for 20 s; the events meanwhile.
+  template <typename Done>
+  std::vector<AvatarEvent> AdvanceUntil(const Done& done) {
+    std::vector<AvatarEvent> events;
+    for (int i = 0; i < 1200; ++i) {
+      avatar_.Advance(kTickS);
+      events.insert(events.end(), avatar_.events().begin(), avatar_.events().end());
+      if (done()) return events;
+    }
+    ADD_FAILURE() << "never";
+    return events;
+  }
+  void SwingTheLeftFoot() {
+    ASSERT_TRUE(
+        avatar_.Enqueue({1, StepRequest{.foot = Foot::kLeft, .at = {{{0.1, 0.0, 0.5}, 0.0}}}})
+            .has_value());
+    AdvanceUntil([&] {
+      return avatar_.movement() != nullptr &&
+             !avatar_.movement()->feet.foot(Foot::kLeft).IsPlanted(avatar_.movement_time_s());
+    });
+    for (int i = 0; i < 6; ++i) avatar_.Advance(kTickS);
+  }
+  void TakeOverBy(decltype(MovementRequest::movement) movement,
+                  Takeover takeover = Takeover::kNow) {
+    ASSERT_TRUE(avatar_.Enqueue({2, std::move(movement), takeover}).has_value());
+  }
+
+  Avatar avatar_{OpenLibrary("builtin").value(), BaseFrame{}};
+};
+
+using Type = AvatarEventType;
+
+TEST_F(TakeOverOfBuiltin, ASwingingFootLandsOnItsNewFootprint) {
+  SwingTheLeftFoot();
+  TakeOverBy(StepRequest{.at = {{{0.22, 0.0, 0.4}, 0.2}}});
+  avatar_.Advance(kTickS);
+  ASSERT_EQ(avatar_.events().size(), 2u);
+  EXPECT_EQ(avatar_.events()[0].type, Type::kFinished);
+  EXPECT_EQ(avatar_.events()[0].request_id, 1u);
+  EXPECT_TRUE(avatar_.events()[0].is_cut_short);
+  EXPECT_EQ(avatar_.events()[1].type, Type::kStarted);
+  EXPECT_EQ(avatar_.events()[1].request_id, 2u);
+  EXPECT_GT(avatar_.movement()->entered_s, 0.0);
+  AdvanceUntil([&] {
+    return avatar_.movement()->feet.foot(Foot::kLeft).land_s <= avatar_.movement_time_s();
+  });
+  const Vec3 ball = BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft);
+  EXPECT_NEAR(ball.x, 0.22, 1e-3);
+  EXPECT_NEAR(ball.z, 0.4, 1e-3);
+}
+
+TEST_F(TakeOverOfBuiltin, TheOtherFootWaitsForTheLandingOnly) {
+  SwingTheLeftFoot();
+  const double duration_s = avatar_.movement()->duration_s();
+  const double land_s = avatar_.movement()->feet.foot(Foot::kLeft).land_s;
+  const double now_s = avatar_.movement_time_s();
+  TakeOverBy(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
+  const auto events = AdvanceUntil([&] { return avatar_.started()->request_id == 2; });
+  ASSERT_EQ(events.size(), 3u);
+  EXPECT_EQ(events[0].type, Type::kFootStrike);
+  EXPECT_EQ(events[1].type, Type::kFinished);
+  EXPECT_TRUE(events[1].is_cut_short);
+  EXPECT_NEAR(events[2].time_s - events[0].time_s, 0.08, 0.03);
+  EXPECT_LT(land_s, duration_s);
+  EXPECT_GT(land_s, now_s);
+}
+
+TEST_F(TakeOverOfBuiltin, BeforeAFootHasLeftItNeedNot) {
+  ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}}).has_value());
+  avatar_.Advance(kTickS);
+  const Vec3 stood = BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft);
+  TakeOverBy(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
+  avatar_.Advance(kTickS);
+  EXPECT_EQ(avatar_.started()->request_id, 2u);
+  EXPECT_EQ(avatar_.started()->kind, MovementKind::kStepRight);
+  AdvanceUntil([&] { return avatar_.movement_time_s() > 0.8 * avatar_.movement()->duration_s(); });
+  const Vec3 stands = BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft);
+  EXPECT_NEAR(std::hypot(stands.x - stood.x, stands.z - stood.z), 0.0, 1e-4);
+}
+
+TEST_F(TakeOverOfBuiltin, WhoHasBegunToJumpLands) {
+  ASSERT_TRUE(avatar_.Enqueue({1, JumpRequest{.length_m = 1.0}}).has_value());
+  avatar_.Advance(kTickS);
+  TakeOverBy(StepRequest{.length_m = 0.5});
+  const auto events = AdvanceUntil([&] { return avatar_.started()->request_id == 2; });
+  EXPECT_EQ(std::ranges::count(events, Type::kFootStrike, &AvatarEvent::type), 2);
+  EXPECT_GT(BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft).z, 0.9);
+}
+
+TEST_F(TakeOverOfBuiltin, AStandOrWhateverWaitsDropsTheQueueAndFinishesTheMovement) {
+  for (const bool stands : {true, false}) {
+    avatar_.Teleport({});
+    ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+    ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+    avatar_.Advance(kTickS);
+    if (stands) {
+      TakeOverBy(StandRequest{0.1});
+    } else {
+      TakeOverBy(StepRequest{.length_m = 0.3}, Takeover::kAfterMovement);
+    }
+    EXPECT_EQ(avatar_.queue_size(), 1);
+    const auto events = AdvanceUntil([&] { return avatar_.idle(); });
+    EXPECT_EQ(std::ranges::count(events, true, &AvatarEvent::is_cut_short), 0);
+    EXPECT_EQ(std::ranges::count_if(events,
+                                    [](const AvatarEvent& event) {
+                                      return event.type == Type::kFinished && event.request_id == 1;
+                                    }),
+              1);
+  }
+}
+
+TEST_F(TakeOverOfBuiltin, AWalkAndAStandEnd) {
+  ASSERT_TRUE(avatar_.Enqueue({1, WalkRequest{.position_m = {0.0, 0.0, 5.0}}}).has_value());
+  for (int i = 0; i < 90; ++i) avatar_.Advance(kTickS);
+  TakeOverBy(WalkRequest{.position_m = {1.0, 0.0, 0.0}, .heading_rad = 1.0});
+  AdvanceUntil([&] { return avatar_.idle(); });
+  EXPECT_NEAR(avatar_.base().position_m.x, 1.0, 0.01);
+  EXPECT_NEAR(avatar_.base().position_m.z, 0.0, 0.01);
+
+  ASSERT_TRUE(avatar_.Enqueue({1, StandRequest{100.0}}).has_value());
+  avatar_.Advance(kTickS);
+  TakeOverBy(StepRequest{.length_m = 0.5});
+  avatar_.Advance(kTickS);
+  EXPECT_EQ(avatar_.started()->request_id, 2u);
+}
+
+}  // namespace
+}  // namespace stridewire

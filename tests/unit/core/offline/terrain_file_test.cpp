@@ -1,0 +1,125 @@
+#include "stridewire/offline/terrain_file.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <random>
+#include <string>
+
+#include "bad_text.h"
+
+namespace stridewire {
+namespace {
+
+constexpr const char* kBoth = R"({
+  "height_field": {"origin_m": [-1, 2.5], "cell_m": 0.25, "columns": 3, "rows": 2,
+                   "heights_m": [0, 0.125, 0.25, -1, 1e3, 0.5]},
+  "boxes": [{"min_m": [0, 1], "max_m": [2, 3], "height_m": 0.5},
+            {"min_m": [-4, -4], "max_m": [-3.5, -3], "height_m": -0.25}]})";
+
+TEST(ParseTerrain, ReadsFieldAndBoxes) {
+  const auto read = ParseTerrain(kBoth, "t.json");
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  TerrainData expected;
+  expected.height_field =
+      HeightField{{-1.0, 2.5}, 0.25, 3, 2, {0.0f, 0.125f, 0.25f, -1.0f, 1e3f, 0.5f}};
+  expected.boxes = {{{0, 1}, {2, 3}, 0.5}, {{-4, -4}, {-3.5, -3}, -0.25}};
+  EXPECT_EQ((*read)->data(), expected);
+}
+
+TEST(ParseTerrain, EitherMayBeLeftOut) {
+  for (const char* text : {"{}", R"({"boxes":[]})"}) {
+    const auto read = ParseTerrain(text, "t.json");
+    ASSERT_TRUE(read.has_value()) << Describe(read.error());
+    EXPECT_EQ((*read)->data(), TerrainData{});
+  }
+}
+
+const BadText kBadTerrains[] = {
+    {"{", ErrorCode::kMalformed, "t.json:1:1: the text is not JSON near here"},
+    {"3", ErrorCode::kMalformed, "t.json: is not an object"},
+    {R"({"box":[]})", ErrorCode::kMalformed, "t.json: box: is not a key known here"},
+    {R"({"boxes":{}})", ErrorCode::kMalformed, "t.json: boxes: is not an array"},
+    {R"({"boxes":[[]]})", ErrorCode::kMalformed, "t.json: boxes[0]: is not an object"},
+    {R"({"boxes":[{"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
+     "t.json: boxes[0].min_m: is missing"},
+    {R"({"boxes":[{"min_m":[1],"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
+     "t.json: boxes[0].min_m: is not an array of two numbers"},
+    {R"({"boxes":[{"min_m":[0,true],"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
+     "t.json: boxes[0].min_m[1]: is not a number within 1000000 m"},
+    {R"({"boxes":[{"min_m":[0,0],"max_m":[1,1]}]})", ErrorCode::kMalformed,
+     "t.json: boxes[0].height_m: is missing"},
+    {R"({"boxes":[{"min_m":[0,0],"max_m":[1,1],"height_m":20000}]})", ErrorCode::kOutOfRange,
+     "t.json: boxes[0].height_m: is not a number within 10000 m"},
+    {R"({"boxes":[{"min_m":[0,0],"max_m":[-1,1],"height_m":0}]})", ErrorCode::kOutOfRange,
+     "t.json: boxes[0].max_m: is not above min_m"},
+    {R"({"height_field":null})", ErrorCode::kMalformed, "t.json: height_field: is not an object"},
+    {R"({"height_field":{"origin_m":[0,0],"cell_m":0,"columns":2,"rows":2,"heights_m":[0,0,0,0]}})",
+     ErrorCode::kOutOfRange, "t.json: height_field.cell_m: is not a number from 0.01 to 1000 m"},
+    {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2.5,"rows":2,"heights_m":[]}})",
+     ErrorCode::kOutOfRange, "t.json: height_field.columns: is not a whole number from 2 to 1024"},
+    {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":"2","heights_m":[]}})",
+     ErrorCode::kMalformed, "t.json: height_field.rows: is not a whole number from 2 to 1024"},
+    {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":2,"heights_m":[0,0,0]}})",
+     ErrorCode::kShapeMismatch,
+     "t.json: height_field.heights_m: has not columns x rows numbers (3)"},
+    {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":2,"heights_m":[0,0,0,1e300]}})",
+     ErrorCode::kOutOfRange, "t.json: height_field.heights_m[3]: is not a number within 10000 m"},
+};
+
+TEST(ParseTerrain, TellsFileFieldAndReason) {
+  ExpectRefused(kBadTerrains, [](const char* text) { return ParseTerrain(text, "t.json"); });
+  const auto too_long = ParseTerrain(std::string(kMaxTerrainFileBytes + 1, ' '), "t.json");
+  ASSERT_FALSE(too_long.has_value());
+  EXPECT_EQ(too_long.error().code, ErrorCode::kLimitExceeded);
+}
+
+TEST(ParseTerrain, SurvivesMutatedText) {
+  const std::uint64_t seed = std::random_device{}();
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  std::mt19937_64 random(seed);
+  const auto below = [&random](std::size_t n) { return random() % n; };
+  const char* const pieces[] = {"{", "}", "[", "]", ",", ":", "\"", "null", "-1e308", "1e9", "0"};
+  int read_count = 0;
+  int refused_count = 0;
+  for (int round = 0; round < 10'000; ++round) {
+    std::string text = kBoth;
+    for (std::size_t change = 0, changes = 1 + below(3); change < changes; ++change) {
+      const std::size_t at = below(text.size());
+      switch (below(4)) {
+        case 0: text[at] = static_cast<char>(below(256)); break;
+        case 1: text.erase(at, 1 + below(12)); break;
+        case 2: text.insert(at, pieces[below(std::size(pieces))]); break;
+        default: text.insert(at, text.substr(below(text.size()), below(40))); break;
+      }
+    }
+    const auto read = ParseTerrain(text, "t.json");
+    if (read) {
+      ++read_count;
+      EXPECT_LE(std::abs((*read)->HeightAt(0.5, 2.5)), kMaxTerrainHeightM);
+    } else {
+      ++refused_count;
+      EXPECT_TRUE(read.error().where.starts_with("t.json")) << text;
+    }
+  }
+  EXPECT_GT(read_count, 0);
+  EXPECT_GT(refused_count, 0);
+}
+
+TEST(ReadTerrain, ReadsAFileAndTellsWhyNot) {
+  const std::string path = testing::TempDir() + "terrain_" + std::to_string(getpid()) + ".json";
+  std::ofstream(path) << kBoth;
+  const auto read = ReadTerrain(path);
+  std::remove(path.c_str());
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  EXPECT_EQ((*read)->data().boxes.size(), 2u);
+
+  const auto missing = ReadTerrain(path);
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_EQ(missing.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(missing.error().where, path);
+}
+
+}  // namespace
+}  // namespace stridewire
