@@ -144,6 +144,8 @@ int Run(int argc, char** argv) {
 
   const int frames = recording->clip.frame_count();
   if (json) {
+    nlohmann::ordered_json gaps = nlohmann::ordered_json::array();
+    for (const Gap& gap : recording->gaps) gaps.push_back({gap.first_frame, gap.frames});
     const nlohmann::ordered_json report = {
         {"world", options.world},
         {"avatar", options.avatar},
@@ -156,6 +158,7 @@ int Run(int argc, char** argv) {
         {"library_hash", recording->library_hash},
         {"first_tick", recording->first_tick},
         {"ticks_missing", recording->ticks_missing},
+        {"gaps", gaps},
         {"discontinuities", recording->discontinuities},
         {"bytes_received", recording->bytes_received},
         {"cut_short", recording->cut_short.empty() ? nlohmann::ordered_json()

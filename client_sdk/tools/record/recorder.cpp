@@ -178,8 +178,13 @@ class Recorder {
     Clip& clip = recording_.clip;
     const std::uint64_t ticks = pose_.tick - last_tick_;
     const int from = frame_count() - 1;
-    for (std::uint64_t i = 1; i < ticks && frame_count() < wanted_frames_; ++i) {
-      ++recording_.ticks_missing;
+    const std::uint64_t filled =
+        std::min(ticks - 1, static_cast<std::uint64_t>(wanted_frames_ - frame_count()));
+    recording_.ticks_missing += filled;
+    if (filled > 0 && recording_.gaps.size() < kMaxGaps) {
+      recording_.gaps.push_back({from + 1, static_cast<int>(filled)});
+    }
+    for (std::uint64_t i = 1; i <= filled; ++i) {
       const float u = pose_.discontinuity != 0
                           ? 0.0f
                           : static_cast<float>(static_cast<double>(i) / static_cast<double>(ticks));

@@ -373,6 +373,8 @@ TEST(Record, GoesOnWhenItWasTooSlow) {
   const json report = json::parse(*line);
   EXPECT_EQ(report["frames"], 360);
   EXPECT_GT(report["ticks_missing"], 0);  // Dropped by the server, and filled.
+  ASSERT_FALSE(report["gaps"].empty());
+  EXPECT_GT(report["gaps"][0][0], 0);  // The first frame is always one received.
   const auto capture = ReadBvh(folder.File("slow.bvh"), {});
   ASSERT_TRUE(capture) << Describe(capture.error());
   EXPECT_EQ(capture->clip.frame_count(), 360);
