@@ -99,7 +99,9 @@ export class App {
   private readonly viewPanel: ViewPanel;
   private readonly panels = new SidePanels(() => (this.layOutMs = -1e9));
   private readonly chips = h('div', {class: 'chips', role: 'group', 'aria-label': 'Worlds shown'});
-  private readonly status = h('span', {class: 'status', role: 'status'});
+  private readonly statusWord = h('span', {});
+  private readonly statusRate = h('span', {class: 'rate'});
+  private readonly status = h('span', {class: 'status', role: 'status'}, this.statusWord, this.statusRate);
   private readonly notice = h('div', {class: 'notice', role: 'alert'});
   private readonly noticeText = h('p', {});
   private readonly toast = h('div', {class: 'toast', role: 'status'});
@@ -506,8 +508,8 @@ export class App {
   private showConnection(): void {
     const {state} = this.client;
     const ready = state === 'ready';
-    setText(this.status, ready ? `Connected, ${this.client.tickHz.toFixed(0)} Hz` :
-      state === 'closed' ? 'Closed' : 'Connecting…');
+    setText(this.statusWord, ready ? 'Connected' : state === 'closed' ? 'Closed' : 'Connecting…');
+    setText(this.statusRate, ready ? `, ${this.client.tickHz.toFixed(0)} Hz` : '');
     this.status.classList.toggle('ready', ready);
     const {host} = this.appOptions;
     let text = '';

@@ -216,7 +216,7 @@ export class Inspector {
     const x = 8 + Math.min(1, Math.max(0, t / span)) * 264;
     this.playhead.setAttribute('transform', `translate(${x.toFixed(1)} 0)`);
     const text = genericTime(movement.keytimesS, t).toFixed(2);
-    const left = x > 220;
+    const left = x > 150;
     this.playheadText.setAttribute('x', (x + (left ? -7 : 7)).toFixed(1));
     this.playheadText.setAttribute('text-anchor', left ? 'end' : 'start');
     setText(this.playheadText, `generic time ${text}`);
