@@ -586,6 +586,23 @@ TEST_F(LibraryTool, InspectsAsText) {
   EXPECT_THAT(Tool({"inspect", "builtin"}).out, Not(HasSubstr("(mirrored)")));
 }
 
+TEST_F(LibraryTool, InspectTellsHowMovementsFollowEachOther) {
+  const json shown = ParseOutput(Tool({"inspect", "builtin", "--json"}).out);
+  const std::size_t nodes = shown["groups"].size() + 1;
+  ASSERT_EQ(shown["transitions"].size(), nodes * nodes);
+  const json& first = shown["transitions"][0];
+  EXPECT_EQ(first["from"], "step_left");
+  EXPECT_EQ(first["from_group"], 0);
+  EXPECT_EQ(first["to_group"], 0);
+  const json& last = shown["transitions"][nodes * nodes - 1];
+  EXPECT_EQ(last["from"], "stand");
+  EXPECT_TRUE(last["to_group"].is_null());
+  EXPECT_EQ(last["distance_m"], 0.0);
+  EXPECT_THAT(Tool({"inspect", "builtin"}).out,
+              AllOf(HasSubstr("step_left  to jump"), HasSubstr("jump       to stand"),
+                    HasSubstr("stand      to step_right"), Not(HasSubstr("stand      to stand"))));
+}
+
 constexpr const char* kStepsOnly =
     R"({"movements":[{"step":{"length_m":0.5}},{"step":{"length_m":0.4}}]})";
 

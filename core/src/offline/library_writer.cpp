@@ -8,6 +8,7 @@
 
 #include "library_file.h"
 #include "motion_library_generated.h"
+#include "stridewire/offline/transitions.h"
 
 namespace stridewire {
 namespace {
@@ -97,9 +98,14 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
   // A library without layers has the bytes it had before there were any.
   const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
+  std::vector<fb::Transition> transitions;
+  for (const Transition& t : FindTransitions(content)) {
+    transitions.emplace_back(t.distance_m, t.end_example, t.start_example);
+  }
+  const auto transitions_offset = builder.CreateVectorOfStructs(transitions);
   fb::FinishMotionLibraryBuffer(
       builder, fb::CreateMotionLibrary(builder, skeleton, &stand_root, stand_offset, groups_offset,
-                                       layers_offset));
+                                       layers_offset, transitions_offset));
 
   const std::span payload(reinterpret_cast<const std::byte*>(builder.GetBufferPointer()),
                           builder.GetSize());

@@ -538,6 +538,13 @@ Status MotionLibrary::Load() {
     groups_.push_back(std::move(*group));
   }
   walk_gait_ = MakeWalkGait(*this);
+  if (const auto* from = root.transitions()) {
+    std::vector<Transition> transitions;
+    for (const fb::Transition* t : *from) {
+      transitions.push_back({t->distance_m(), t->end_example(), t->start_example()});
+    }
+    if (Status status = LoadTransitions(transitions); !status) return status;
+  }
   if (root.layers() == nullptr) return {};
   if (root.layers()->size() > static_cast<std::size_t>(kMaxLayerClips)) {
     return Fail(ErrorCode::kMalformed, "there are too many layers", root.layers()->size());
@@ -551,6 +558,28 @@ Status MotionLibrary::Load() {
     }
     layers_.push_back(layer);
   }
+  return {};
+}
+
+Status MotionLibrary::LoadTransitions(const std::vector<Transition>& transitions) {
+  const std::size_t nodes = groups_.size() + 1;
+  if (transitions.size() != nodes * nodes) {
+    return Fail(ErrorCode::kMalformed, "the table of transitions has the wrong size",
+                static_cast<std::int64_t>(transitions.size()));
+  }
+  const auto is_example_of = [&](std::int32_t example, std::size_t node) {
+    return node == groups_.size() ? example == -1
+                                  : example >= 0 && example < groups_[node].example_count;
+  };
+  for (std::size_t i = 0; i < transitions.size(); ++i) {
+    const Transition& t = transitions[i];
+    if (!(t.distance_m >= 0.0f && IsSane(t.distance_m)) ||
+        !is_example_of(t.end_example, i / nodes) || !is_example_of(t.start_example, i % nodes)) {
+      return Fail(ErrorCode::kMalformed, "a transition is not between two examples",
+                  static_cast<std::int64_t>(i));
+    }
+  }
+  transitions_ = transitions;
   return {};
 }
 

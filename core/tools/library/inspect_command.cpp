@@ -59,6 +59,7 @@ int RunInspect(const InspectCommand& command) {
                   group.mirrored[static_cast<std::size_t>(e)] != 0 ? " (mirrored)" : "");
     }
   }
+  PrintTransitions(**library, command.examples);
   return kExitDone;
 }
 

@@ -1,6 +1,7 @@
 #include "library_json.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <limits>
 
@@ -124,7 +125,82 @@ Json LibraryToJson(const MotionLibrary& library, bool examples) {
   }
   json["groups"] = std::move(groups);
   json["layers"] = LayersToJson(library);
+  json["transitions"] = TransitionsToJson(library);
   return json;
+}
+
+namespace {
+
+// "group 4, 16_01.bvh 0.93-1.47 s" or "stand".
+std::string ExampleText(const MotionLibrary& library, std::size_t node, int example) {
+  if (node == library.groups().size()) return "stand";
+  const MotionGroup& group = library.groups()[node];
+  const auto e = static_cast<std::size_t>(example);
+  return "group " + std::to_string(node) + ", " + std::string(group.sources[e]) +
+         (group.mirrored[e] != 0 ? " (mirrored)" : "");
+}
+
+std::string_view NodeKind(const MotionLibrary& library, std::size_t node) {
+  return MovementKindName(node == library.groups().size() ? MovementKind::kStand
+                                                          : library.groups()[node].kind);
+}
+
+}  // namespace
+
+Json TransitionsToJson(const MotionLibrary& library) {
+  Json transitions = Json::array();
+  const std::size_t nodes = library.groups().size() + 1;
+  for (std::size_t i = 0; i < library.transitions().size(); ++i) {
+    const Transition& t = library.transitions()[i];
+    const auto node_to_json = [&](std::size_t node) {
+      return node + 1 == nodes ? Json(nullptr) : Json(node);
+    };
+    transitions.push_back({{"from", NodeKind(library, i / nodes)},
+                           {"from_group", node_to_json(i / nodes)},
+                           {"to", NodeKind(library, i % nodes)},
+                           {"to_group", node_to_json(i % nodes)},
+                           {"distance_m", t.distance_m},
+                           {"end", ExampleText(library, i / nodes, t.end_example)},
+                           {"start", ExampleText(library, i % nodes, t.start_example)}});
+  }
+  return transitions;
+}
+
+void PrintTransitions(const MotionLibrary& library, bool examples) {
+  if (library.transitions().empty()) {
+    std::printf("\nno transitions: made before there were any\n");
+    return;
+  }
+  // Of the groups of a kind the ones that meet best.
+  const std::size_t nodes = library.groups().size() + 1;
+  constexpr std::array kKinds{MovementKind::kStepLeft, MovementKind::kStepRight,
+                              MovementKind::kJump, MovementKind::kStand};
+  std::printf("\ntransitions, where ends and starts meet best:\n");
+  for (const MovementKind from : kKinds) {
+    for (const MovementKind to : kKinds) {
+      if (from == to && from == MovementKind::kStand) continue;
+      const Transition* best = nullptr;
+      std::size_t best_at = 0;
+      for (std::size_t i = 0; i < library.transitions().size(); ++i) {
+        const Transition& t = library.transitions()[i];
+        if (NodeKind(library, i / nodes) != MovementKindName(from) ||
+            NodeKind(library, i % nodes) != MovementKindName(to) ||
+            (best != nullptr && best->distance_m <= t.distance_m)) {
+          continue;
+        }
+        best = &t;
+        best_at = i;
+      }
+      if (best == nullptr) continue;
+      std::printf("  %-10s to %-10s %6.3f m", std::string(MovementKindName(from)).c_str(),
+                  std::string(MovementKindName(to)).c_str(), best->distance_m);
+      if (examples) {
+        std::printf("  %s; %s", ExampleText(library, best_at / nodes, best->end_example).c_str(),
+                    ExampleText(library, best_at % nodes, best->start_example).c_str());
+      }
+      std::printf("\n");
+    }
+  }
 }
 
 Json LayersToJson(const MotionLibrary& library) {

@@ -23,4 +23,9 @@ namespace stridewire {
 [[nodiscard]] nlohmann::ordered_json LayersToJson(const MotionLibrary& library);
 void PrintLayers(const MotionLibrary& library);
 
+// How its movements go on where others end: of every two groups; people see the best of every two
+// kinds, with `examples` between which.
+[[nodiscard]] nlohmann::ordered_json TransitionsToJson(const MotionLibrary& library);
+void PrintTransitions(const MotionLibrary& library, bool examples);
+
 }  // namespace stridewire

@@ -15,6 +15,7 @@
 #include "stridewire/runtime/leg_rig.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
+#include "stridewire/runtime/transition.h"
 #include "stridewire/runtime/walk_gait.h"
 
 namespace stridewire {
@@ -146,6 +147,14 @@ class MotionLibrary {
   [[nodiscard]] std::span<const LayerClip> layers() const { return layers_; }
   /// Index of the layer of that name, -1 if there is none.
   [[nodiscard]] int FindLayer(std::string_view name) const;
+  /// How movements go on where others ended: [from][to] of all groups and, behind them, the stand. Empty in a
+  /// library made before there were any.
+  [[nodiscard]] std::span<const Transition> transitions() const { return transitions_; }
+  /// One of them; `from` and `to` are groups, or as many as there are groups: the stand. Null if the library
+  /// has none.
+  [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const {
+    return transitions_.empty() ? nullptr : &transitions_[from * (groups_.size() + 1) + to];
+  }
   /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
   /// The skeleton's legs, for planting.
@@ -162,11 +171,13 @@ class MotionLibrary {
  private:
   MotionLibrary() = default;
   [[nodiscard]] Status Load();
+  [[nodiscard]] Status LoadTransitions(const std::vector<Transition>& transitions);
 
   Skeleton skeleton_;
   GridLayout layout_;
   std::vector<MotionGroup> groups_;
   std::vector<LayerClip> layers_;
+  std::vector<Transition> transitions_;
   Pose stand_pose_;
   LegRig leg_rig_;
   WalkGait walk_gait_;
