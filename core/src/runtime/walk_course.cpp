@@ -29,10 +29,10 @@ constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
 
 // Somebody who faces away from the way by more than this turns before they set out.
-constexpr double kSlowTurnRad = 1.0;
+constexpr double kSlowTurnRad = 0.7;
 // The goal's heading is walked into in a curve, as far as that is not a loop.
-constexpr double kCurvePart = 0.4;
-constexpr double kCurveM = 1.2;
+constexpr double kCurvePart = 0.2;
+constexpr double kCurveM = 0.6;
 constexpr double kMaxCurveRad = 1.9;
 constexpr double kCurveFadeRad = 0.6;
 
