@@ -1,16 +1,26 @@
-// How movements go on where others ended: the table a library has of it.
+// How movements go on where others ended: the table a library has of it, and what an avatar makes of it.
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
+#include <string>
 #include <vector>
 
+#include "captured_library.h"
 #include "library_file.h"
 #include "motion_library_generated.h"
+#include "random.h"
 #include "stridewire/offline/library_builder.h"
+#include "stridewire/offline/synthesis.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/foot_vector.h"
 #include "toy_library.h"
+#include "velocity_steps.h"
 
 namespace stridewire {
 namespace {
@@ -126,6 +136,216 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
   EXPECT_EQ(with(jump_to_stand, {-0.1f, 3, -1}), refused);
   EXPECT_EQ(with(jump_to_stand, {std::numeric_limits<float>::quiet_NaN(), 3, -1}), refused);
   EXPECT_EQ(with(jump_to_stand, {std::numeric_limits<float>::infinity(), 3, -1}), refused);
+}
+
+// What an avatar does when it is asked for movements one after the other, until it stands idle: "left jump", with
+// "+" before what it inserts and "-" before what it refuses, and the reason.
+std::string Does(std::shared_ptr<const MotionLibrary> library,
+                 const std::vector<decltype(MovementRequest::movement)>& movements) {
+  Avatar avatar(std::move(library), BaseFrame{});
+  std::uint64_t id = 0;
+  for (const auto& movement : movements) {
+    const Status status = avatar.Enqueue({++id, movement});
+    EXPECT_TRUE(status.has_value()) << Describe(status.error());
+  }
+  std::string text;
+  for (int tick = 0; tick < 3600 && !avatar.idle(); ++tick) {
+    avatar.Advance(1.0 / 60.0);
+    for (const AvatarEvent& event : avatar.events()) {
+      if (event.type == AvatarEventType::kStarted) {
+        text += (text.empty() ? "" : " ") + std::string(event.request_id == 0 ? "+" : "") +
+                std::string(MovementKindName(event.kind));
+      } else if (event.type == AvatarEventType::kRejected) {
+        EXPECT_EQ(event.code, ErrorCode::kUnsupported);
+        text += " -(" + std::string(event.reason) + ")";
+      }
+    }
+  }
+  EXPECT_TRUE(avatar.idle());
+  return text;
+}
+
+StepRequest Step(Foot foot, double length_m) { return {.foot = foot, .length_m = length_m}; }
+
+TEST(Ways, AreAsShortAsCanBe) {
+  const auto library = OpenLibrary("builtin").value();
+  const StepRequest left = Step(Foot::kLeft, 0.6);
+  const StepRequest right = Step(Foot::kRight, 0.6);
+  const JumpRequest jump{.length_m = 0.9};
+  const StandRequest stand{0.2};
+  EXPECT_EQ(Does(library, {left, right}), "step_left step_right +step_left");
+  EXPECT_EQ(Does(library, {left, jump}), "step_left +step_right jump");
+  EXPECT_EQ(Does(library, {left, left}), "step_left +step_right step_left +step_right");
+  EXPECT_EQ(Does(library, {left, stand, left}),
+            "step_left +step_right stand step_left +step_right");
+  EXPECT_EQ(Does(library, {jump, right, jump}), "jump step_right +step_left jump");
+  EXPECT_EQ(Does(library, {jump, jump, stand, jump}), "jump jump stand jump");
+  // Nothing is in the way of feet that are together, nor of one that is drawn back to the other.
+  EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.0), left}), "step_left step_left +step_right");
+  EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.3), Step(Foot::kLeft, 0.0), jump}),
+            "step_left step_left jump");
+}
+
+TEST(Ways, AStepOfTheSameFootIsWhatWasAskedFor) {
+  const auto library = OpenLibrary("builtin").value();
+  const std::vector<MovementRequest> requests{{1, Step(Foot::kLeft, 0.6)},
+                                              {2, Step(Foot::kLeft, 0.5)}};
+  const Synthesis synthesis = Synthesize(library, BaseFrame{}, requests, 60.0).value();
+  ASSERT_EQ(synthesis.movements.size(), 4u);
+  EXPECT_EQ(synthesis.movements[1].request_id, 0u);
+  EXPECT_EQ(synthesis.movements[2].request_id, 2u);
+  EXPECT_LT(synthesis.movements[2].landing_error_m, 0.001);
+}
+
+TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
+  const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
+  ASSERT_GT(DistanceM(*strides, kLeft, kJump), 0.1f);
+  const StepRequest left = Step(Foot::kLeft, 0.5);
+  const JumpRequest jump{.length_m = 0.6};
+  EXPECT_EQ(Does(strides, {jump, left}), "jump step_left +step_right");
+  EXPECT_EQ(
+      Does(strides, {left, jump, StepRequest{.length_m = 0.5}}),
+      "step_left -(no way leads from step_left to jump in this library) step_right +step_left");
+  EXPECT_EQ(Does(strides, {left, left}), "step_left +step_right step_left +step_right");
+  const std::vector<MovementRequest> requests{{1, left}, {2, jump}};
+  const auto synthesis = Synthesize(strides, BaseFrame{}, requests, 60.0);
+  ASSERT_FALSE(synthesis.has_value());
+  EXPECT_EQ(Describe(synthesis.error()),
+            "movements[1]: no way leads from step_left to jump in this library");
+}
+
+TEST(Ways, ALibraryOfOneFootSaysSo) {
+  RawLibrary raw = MakeToyRawLibrary();
+  raw.groups.erase(raw.groups.begin() + kRight);
+  const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
+  EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
+            "step_left -(no way leads from step_left to step_left in this library) +step_left");
+  // What draws it back is no new step.
+  EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.2}, StepRequest{.length_m = 0.2}}),
+            "step_left step_left +step_left");
+}
+
+// A jump that flies on at its end: feet are together, but the table says that no step begins so fast.
+TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
+  RawLibrary raw = MakeToyRawLibrary();
+  for (RawExample& jump : raw.groups[kJump].examples) {
+    for (int f = 0; f < jump.clip.frame_count(); ++f) {
+      const double s = f / (jump.clip.frame_count() - 1.0);
+      jump.clip.root_positions_m[static_cast<std::size_t>(f)].z = static_cast<float>(2.0 * s * s);
+    }
+  }
+  const auto library = std::shared_ptr(LibraryBuilder().Build(raw).value());
+  ASSERT_GT(DistanceM(*library, kJump, kLeft), 0.3f);
+  const StepRequest left = Step(Foot::kLeft, 0.4);
+  EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, left}),
+            "jump -(no way leads from jump to step_left in this library)");
+  // Who has stood goes anywhere.
+  EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, StandRequest{0.1}, left}),
+            "jump stand step_left +step_right");
+}
+
+TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
+  RawLibrary raw = MakeToyRawLibrary();
+  raw.groups.pop_back();
+  const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
+  Avatar avatar(no_jumps, BaseFrame{});
+  const Status status = avatar.Enqueue({1, JumpRequest{.length_m = 0.6}});
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
+  EXPECT_EQ(status.error().text, std::string("the library has no jump"));
+}
+
+struct Subject {
+  const char* name;
+  std::vector<std::string> subjects;  // none: generated
+};
+void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
+
+class Joins : public testing::TestWithParam<Subject> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, Joins,
+                         testing::Values(Subject{"Builtin", {}}, Subject{"Subject16", {"16"}},
+                                         Subject{"Debian", {kDebianTakes}}),
+                         [](const auto& subject) { return subject.param.name; });
+
+constexpr int kKinds = 4;  // of MovementKind, the stand last
+constexpr double kFramesPerS = 60.0;
+
+// Steps, jumps and stands in any order. From one movement to the next no joint changes its speed more than half as
+// fast again as inside the examples of both kinds, a stand having none of its own.
+TEST_P(Joins, AreNoRougherThanMovements) {
+  STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
+  const auto library = LibraryOf(GetParam().subjects);
+  std::array<double, kKinds> inside{};
+  for (int kind = 0; kind + 1 < kKinds; ++kind) {
+    inside[static_cast<std::size_t>(kind)] =
+        LargestStepOfExamples(*library, kFramesPerS, static_cast<MovementKind>(kind)).joint_rad_s;
+  }
+  const FootState stand{FootVector(library->skeleton(), library->stand_pose(), Foot::kLeft, 0.0)};
+  const unsigned seed = 20261122;
+  std::array<std::array<double, kKinds>, kKinds> across{};
+  std::array<std::array<int, kKinds>, kKinds> counts{};
+  int inserted = 0;
+  for (unsigned i = 0; i < 12; ++i) {
+    Random random(seed + i);
+    Avatar avatar(library, BaseFrame{});
+    VelocitySteps steps(library->skeleton(), kFramesPerS);
+    std::size_t from = 3;
+    std::size_t to = 3;
+    double since_s = 0.0;
+    std::uint64_t id = 0;
+    while (id < 40 || !avatar.idle()) {
+      if (avatar.queue_size() == 0 && id < 40) {
+        MovementRequest request{++id, StandRequest{0.3}};
+        const double what = random.Draw(0.0, 1.0);
+        if (what < 0.55) {
+          StepRequest step{.length_m = random.Draw(0.0, 0.7)};
+          if (random.Draw(0.0, 1.0) < 0.4) step.foot = what < 0.3 ? Foot::kLeft : Foot::kRight;
+          request.movement = step;
+        } else if (what < 0.8) {
+          request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.4)};
+        }
+        ASSERT_TRUE(avatar.Enqueue(request).has_value());
+      }
+      avatar.Advance(1.0 / kFramesPerS);
+      since_s += 1.0 / kFramesPerS;
+      for (const AvatarEvent& event : avatar.events()) {
+        ASSERT_NE(event.type, AvatarEventType::kRejected) << event.reason << ", seed " << seed + i;
+        const bool is_start = event.type == AvatarEventType::kStarted;
+        if (!is_start && event.type != AvatarEventType::kIdle) continue;
+        from = std::exchange(to, is_start ? static_cast<std::size_t>(event.kind) : 3);
+        since_s = 0.0;
+        ++counts[from][to];
+        if (!is_start || event.kind == MovementKind::kStand) continue;
+        // Nothing is inserted that feet do not need, and a jump does not wait for less.
+        const FootState feet{
+            FootVector(library->skeleton(), avatar.pose(), Foot::kLeft, avatar.base().heading_rad)};
+        if (event.request_id == 0) {
+          ++inserted;
+          EXPECT_TRUE(AreFeetApart(feet, stand)) << "seed " << seed + i;
+        } else if (event.kind == MovementKind::kJump) {
+          EXPECT_NEAR(feet.left_from_right_m.z, stand.left_from_right_m.z, 0.25);
+        }
+      }
+      const double step = steps.Add(avatar.pose()).joint_rad_s;
+      if (since_s < kEaseOutS) across[from][to] = std::max(across[from][to], step);
+    }
+  }
+  for (std::size_t a = 0; a < kKinds; ++a) {
+    for (std::size_t b = 0; b < kKinds; ++b) {
+      if (counts[a][b] == 0 || (a == 3 && b == 3)) continue;
+      const double ratio = across[a][b] / std::max(inside[a], inside[b]);
+      std::printf("%s: %-10s to %-10s %3d times, %5.2f rad/s a frame, %.2f of the examples'\n",
+                  GetParam().name,
+                  std::string(MovementKindName(static_cast<MovementKind>(a))).c_str(),
+                  std::string(MovementKindName(static_cast<MovementKind>(b))).c_str(), counts[a][b],
+                  across[a][b], ratio);
+      EXPECT_LE(ratio, 1.5);
+    }
+  }
+  std::printf("%s: seed %u, %d steps inserted\n", GetParam().name, seed, inserted);
+  for (const auto& [a, b] : {std::pair(0, 2), {2, 1}, {3, 0}, {3, 2}, {1, 3}, {2, 3}}) {
+    EXPECT_GT(counts[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)], 5);
+  }
 }
 
 }  // namespace

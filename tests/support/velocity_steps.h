@@ -63,14 +63,15 @@ class VelocitySteps {
   int frames_ = 0;
 };
 
-/// The largest inside what was captured: every example of a step on its own.
-inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double fps) {
+/// The largest inside what was captured: every example of a kind on its own.
+inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double fps,
+                                          MovementKind kind) {
   VelocityStep largest;
   GridCache cache(library.layout());
   Pose pose(library.skeleton().joint_count());
   for (int g = 0; g < static_cast<int>(library.groups().size()); ++g) {
     const MotionGroup& group = library.group(g);
-    if (!IsStep(group.kind)) continue;
+    if (group.kind != kind) continue;
     std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
     for (int e = 0; e < group.example_count; ++e) {
       Movement movement;
@@ -94,6 +95,13 @@ inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double f
     }
   }
   return largest;
+}
+
+/// The same of all steps.
+inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double fps) {
+  const VelocityStep left = LargestStepOfExamples(library, fps, MovementKind::kStepLeft);
+  const VelocityStep right = LargestStepOfExamples(library, fps, MovementKind::kStepRight);
+  return {std::max(left.joint_rad_s, right.joint_rad_s), std::max(left.root_m_s, right.root_m_s)};
 }
 
 }  // namespace stridewire

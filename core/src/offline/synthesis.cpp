@@ -88,9 +88,16 @@ void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecor
 
 // Ids are the caller's own; walks are told by how they end: with a stand that no movement was for.
 bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
-  return event.type == AvatarEventType::kRejected ||
-         (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand &&
-          walks.contains(event.request_id));
+  return walks.contains(event.request_id) &&
+         (event.type == AvatarEventType::kRejected ||
+          (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand));
+}
+
+// A step or jump that no way leads to when its turn comes.
+Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests) {
+  const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);
+  return {event.code, event.reason, -1,
+          "movements[" + std::to_string(request - requests.begin()) + "]"};
 }
 
 // How far a step's foot, when it first stands, is from where it was asked to.
@@ -207,6 +214,8 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
       } else if (EndsWalk(event, walks)) {
         result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
                                 event.reason, event.time_s, event.base});
+      } else if (event.type == AvatarEventType::kRejected) {
+        return std::unexpected(Rejected(event, requests));
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
         result.movements.back().end_s = event.time_s;
         result.movements.back().base = event.base;

@@ -56,7 +56,7 @@ class MomentReader {
 
  private:
   static std::span<const double> KeytimesOf(const MotionGroup& group, int example) {
-    const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
+    const auto keys = static_cast<std::size_t>(group.interval_count()) + 1;
     return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
   }
 

@@ -12,14 +12,8 @@
 namespace stridewire {
 namespace {
 
-// Feet this far from where the stand pose has them, forward or aside, are not a stand. Few libraries
-// have steps that bring feet together sideways, so a wide stand is left alone for longer.
-constexpr double kFeetApartForwardM = 0.12;
-constexpr double kFeetApartAsideM = 0.3;
-
-// A library may not reach a stand in one step from a long stride; after this many it stands as it is.
-constexpr int kMaxClosingSteps = 3;
-constexpr double kClosingGainM = 0.03;  // a second one must be worth taking
+// A library may not reach a stand in one step from a long stride; a second one must be worth taking.
+constexpr double kClosingGainM = 0.03;
 
 // Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end, and the next
 // started.
@@ -62,6 +56,7 @@ void Avatar::Teleport(const BaseFrame& start) {
     PlantFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, pose_);
   }
   feet_ = stand_feet_;
+  last_group_ = library_->groups().size();
   last_moved_ = Foot::kRight;
   CancelQueue();
   ShowLayers();
@@ -173,18 +168,13 @@ bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
 bool Avatar::StartNext() {
   takes_over_ = false;
   const bool is_empty = queue_size() == 0;
-  const bool next_is_walk =
-      !is_empty && std::holds_alternative<WalkRequest>(queue_[queue_head_].movement);
-  const bool next_is_step =
-      !is_empty && std::holds_alternative<StepRequest>(queue_[queue_head_].movement);
-  if (is_walking_ && !next_is_step && !next_is_walk) {
+  const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
+  if (is_walking_ && (is_empty || stand != nullptr)) {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
     if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
-      const int closing_steps = closing_steps_ + 1;
-      StartPlan(*plan, 0);
-      closing_steps_ = closing_steps;
+      StartInserted(*plan);
       return true;
     }
   }
@@ -192,32 +182,60 @@ bool Avatar::StartNext() {
     if (!std::exchange(is_idle_reported_, true)) {
       AddEvent({.type = AvatarEventType::kIdle, .base = base_});
     }
+    last_group_ = library_->groups().size();
     return false;
   }
 
   is_idle_reported_ = false;
-  if (next_is_walk) {
+  if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
     GoOnWalking();
     return true;
   }
-  const MovementRequest request = std::move(queue_[queue_head_++]);
-  if (queue_size() == 0) CancelQueue();
-  if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
+  if (stand != nullptr) {
     is_in_stand_ = true;
-    request_id_ = request.id;
     stand_left_s_ = stand->seconds;
-    AddEvent({.type = AvatarEventType::kStarted, .request_id = request.id});
+    request_id_ = PopQueue();
+    AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
     return true;
   }
-  const auto plan = PlanRequest(request);
-  STRIDEWIRE_CHECK(plan.has_value());  // Enqueue saw to it that the library has the kind
-  StartPlan(*plan, request.id);
+  StartOnTheWay();
   return true;
+}
+
+// The step or jump at the queue's head, or a step that has to go before it.
+void Avatar::StartOnTheWay() {
+  const MovementRequest& request = queue_[queue_head_];
+  const auto direct = PlanRequest(request);
+  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue saw to it that the library has the kind
+  const Way way =
+      FindWay(*library_, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
+  if (way.is_inserted) {
+    StartInserted(*way.plan);
+  } else if (way.plan) {
+    StartPlan(*way.plan, PopQueue());
+  } else {
+    AddEvent({.type = AvatarEventType::kRejected,
+              .request_id = PopQueue(),
+              .base = base_,
+              .reason = NoWayReason(group().kind, library_->group(direct->group).kind)});
+  }
+}
+
+void Avatar::StartInserted(const RequestPlan& plan) {
+  const int inserted = closing_steps_ + 1;
+  StartPlan(plan, 0);
+  closing_steps_ = inserted;
+}
+
+// Takes the request off the queue's head; its id.
+std::uint64_t Avatar::PopQueue() {
+  const std::uint64_t id = queue_[queue_head_++].id;
+  if (queue_size() == 0) CancelQueue();
+  return id;
 }
 
 // The next step of the walk at the queue's head, which stays there until it has arrived or can not.
 void Avatar::GoOnWalking() {
-  const std::uint64_t id = queue_[queue_head_].id;
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
@@ -232,12 +250,11 @@ void Avatar::GoOnWalking() {
       PlanWalkStep(*library_, options_.terrain.get(),
                    std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
   if (decision.outcome == WalkOutcome::kStep) {
-    StartPlan(decision.plan, id);
+    StartPlan(decision.plan, queue_[queue_head_].id);
     return;
   }
-  ++queue_head_;
+  const std::uint64_t id = PopQueue();
   walk_ = {};
-  if (queue_size() == 0) CancelQueue();
   if (decision.outcome == WalkOutcome::kArrived) {
     AddEvent({.type = AvatarEventType::kFinished, .request_id = id, .base = base_});
   } else {
@@ -389,13 +406,12 @@ void Avatar::FinishMovement(double at_s) {
     }
   }
   feet_ = MeasureFeet();
+  last_group_ = static_cast<std::size_t>(movement_.group);
   is_moving_ = false;
   is_walking_ = false;
   if (IsStep(finished.kind)) {
     if (has_moved) last_moved_ = MovingFoot(finished.kind);
-    const DVec3 apart = feet_.left_from_right_m - stand_feet_.left_from_right_m;
-    is_walking_ = closing_steps_ < kMaxClosingSteps && (std::fabs(apart.z) > kFeetApartForwardM ||
-                                                        std::fabs(apart.x) > kFeetApartAsideM);
+    is_walking_ = closing_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,
@@ -407,6 +423,7 @@ void Avatar::FinishMovement(double at_s) {
 
 void Avatar::FinishStand() {
   is_in_stand_ = false;
+  last_group_ = library_->groups().size();
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
 }
 

@@ -60,7 +60,7 @@ struct Synthesis {
 inline constexpr int kMaxSynthesisFrames = 1 << 20;
 
 /// Runs an avatar through requests, without a server: what `fps` ticks a second would show, until it
-/// stands idle. kUnsupported, kOutOfRange: a request is refused (index: its place); kLimitExceeded:
+/// stands idle. kUnsupported, kOutOfRange: a request is refused or no way leads to it (`where`); kLimitExceeded:
 /// more than kMaxSynthesisFrames.
 [[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
                                              const BaseFrame& start,

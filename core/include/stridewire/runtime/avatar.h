@@ -15,6 +15,7 @@
 #include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/request_plan.h"
 #include "stridewire/runtime/walk_planner.h"
+#include "stridewire/runtime/way_planner.h"
 
 namespace stridewire {
 
@@ -28,7 +29,7 @@ enum class AvatarEventType : std::uint8_t {
 
 struct AvatarEvent {
   AvatarEventType type = AvatarEventType::kIdle;
-  std::uint64_t request_id = 0;  ///< 0: the avatar's own doing (closing step).
+  std::uint64_t request_id = 0;  ///< 0: the avatar's own doing (inserted step).
   MovementKind kind = MovementKind::kStand;
   int group = -1;
   double time_s = 0.0;           ///< Avatar time (seconds since it was made) at which it happened.
@@ -133,6 +134,9 @@ class Avatar {
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
   void GoOnWalking();
+  void StartOnTheWay();
+  void StartInserted(const RequestPlan& plan);
+  std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
   void StartPlan(const RequestPlan& plan, std::uint64_t request_id, double swing_part = 0.0);
@@ -168,7 +172,7 @@ class Avatar {
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
-  bool is_walking_ = false;       // a step left the feet apart: close before anything but a step
+  bool is_walking_ = false;       // a step left the feet apart: close before standing
   bool takes_over_ = false;       // the request at the queue's head does not wait for the end
   bool is_exact_ = false;         // the step under way lands where it was sent
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
@@ -185,7 +189,8 @@ class Avatar {
   FootState feet_;
   FootHolds holds_;  // where the feet stood when the movement began
   Foot last_moved_ = Foot::kRight;
-  WalkProgress walk_;                   // of the walk at the queue's head
+  std::size_t last_group_ = 0;  // of the movement before; as many as there are groups: a stand
+  WalkProgress walk_;           // of the walk at the queue's head
   std::vector<MovementRequest> queue_;  // live from queue_head_ on
   std::size_t queue_head_ = 0;
   std::array<AvatarEvent, kMaxEventsPerAdvance> events_{};
