@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "counted_memory.h"
 #include "library_file.h"
 #include "motion_library_generated.h"
 #include "random.h"
@@ -105,13 +106,18 @@ Expected<std::shared_ptr<const MotionLibrary>> Changed(const MotionLibrary& libr
   return MotionLibrary::FromBytes(bytes);
 }
 
-TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
-  const auto older = Changed(*MakeToyLibrary(), [](std::uint8_t* payload) {
+// The library as it was written before there were transitions.
+Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& library) {
+  return Changed(library, [](std::uint8_t* payload) {
     const auto* root = fb::GetMotionLibrary(payload);
     const auto* table = reinterpret_cast<const std::uint8_t*>(root);
     const std::uint8_t* fields = table - flatbuffers::ReadScalar<flatbuffers::soffset_t>(table);
     std::memset(payload + (fields - payload) + fb::MotionLibrary::VT_TRANSITIONS, 0, 2);
   });
+}
+
+TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
+  const auto older = Older(*MakeToyLibrary());
   ASSERT_TRUE(older.has_value()) << Describe(older.error());
   EXPECT_TRUE((*older)->transitions().empty());
   EXPECT_EQ((*older)->FindTransition(kLeft, kJump), nullptr);
@@ -242,6 +248,41 @@ TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
   // Who has stood goes anywhere.
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, StandRequest{0.1}, left}),
             "jump stand step_left +step_right");
+}
+
+// Without a table its feet alone decide.
+TEST(Ways, AnOlderLibraryGoesByItsFeet) {
+  const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
+  const auto older = Older(*strides);
+  ASSERT_TRUE(older.has_value());
+  const StepRequest left = Step(Foot::kLeft, 0.5);
+  EXPECT_EQ(Does(*older, {left, JumpRequest{.length_m = 0.6}}),
+            "step_left -(no way leads from step_left to jump in this library) +step_right");
+  EXPECT_EQ(Does(Older(*MakeToyLibrary()).value(), {left, left, JumpRequest{.length_m = 0.6}}),
+            "step_left +step_right step_left +step_right jump");
+}
+
+TEST(Ways, AreFoundWithoutAllocating) {
+  const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
+  for (const auto& library : {OpenLibrary("builtin").value(), strides}) {
+    Avatar avatar(library, BaseFrame{});
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_TRUE(avatar.Enqueue({1, Step(Foot::kLeft, 0.5)}).has_value());
+      ASSERT_TRUE(avatar.Enqueue({2, Step(Foot::kLeft, 0.5)}).has_value());
+      ASSERT_TRUE(avatar.Enqueue({3, JumpRequest{.length_m = 0.6}}).has_value());
+    }
+    const std::size_t before = counted_memory::LiveBytes();
+    counted_memory::ResetPeak();
+    int inserted = 0;
+    for (int tick = 0; tick < 3600 && !avatar.idle(); ++tick) {
+      avatar.Advance(1.0 / 60.0);
+      for (const AvatarEvent& event : avatar.events()) {
+        inserted += event.type == AvatarEventType::kStarted && event.request_id == 0;
+      }
+    }
+    EXPECT_GE(inserted, 3);
+    EXPECT_LE(counted_memory::PeakBytes(), before);
+  }
 }
 
 TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
