@@ -3,6 +3,9 @@
 import * as THREE from 'three';
 
 import {readAddress} from './address.js';
+import {Appearance} from './appearance.js';
+import {CameraControl} from './camera_control.js';
+import {ConnectionStatus} from './connection_status.js';
 import {button, h, icon, press, setText} from './dom.js';
 import {Driver, wanderersAtFirst} from './driver.js';
 import {FootprintTool} from './footprint_tool.js';
@@ -17,15 +20,13 @@ import {Transport} from './panels/transport.js';
 import {ViewPanel} from './panels/view_panel.js';
 import {Playback} from './playback.js';
 import type {Span} from './playback.js';
-import {Quality, levelCount} from './quality.js';
-import type {FigureStyle, QualityChoice} from './quality.js';
-import {basePixelRatio, makeRenderer} from './renderer.js';
+import {levelCount} from './quality.js';
+import {makeRenderer} from './renderer.js';
 import type {RendererInfo} from './renderer.js';
-import {Orbit, listenToPointers} from './scene/camera.js';
+import {listenToPointers} from './scene/camera.js';
 import {Overlay} from './scene/overlay.js';
 import {shareOut} from './scene/share_out.js';
 import {WorldView, projected} from './scene/world_view.js';
-import type {ViewOptions} from './scene/world_view.js';
 import {Client} from './sdk.js';
 import type {PoseMode, Vec3, World} from './sdk.js';
 import type {Chosen, Shown} from './shown.js';
@@ -61,16 +62,11 @@ export class App {
   private readonly renderer: THREE.WebGLRenderer;
   private readonly colours = makeColours();
   private theme: ThemeName;
-  private readonly orbit = new Orbit();
-  private framing = true;
+  private readonly camera = new CameraControl(this.shown);
   private figuresMadeRoom = false;
-  private readonly options: ViewOptions;
+  private readonly appearance: Appearance;
   private readonly asked = readAddress(location.search);
   private readonly cap = new FrameCap(this.asked.framesPerS);
-  private readonly quality: Quality;
-  private level = -1;
-  private figureChoice = this.asked.figures;
-  private shadowChoice: boolean | null = null;
   /** Of the scene, in CSS pixels. */
   private width = 1;
   private height = 1;
@@ -99,11 +95,7 @@ export class App {
   private readonly viewPanel: ViewPanel;
   private readonly panels = new SidePanels(() => (this.layOutMs = -1e9));
   private readonly chips = h('div', {class: 'chips', role: 'group', 'aria-label': 'Worlds shown'});
-  private readonly statusWord = h('span', {});
-  private readonly statusRate = h('span', {class: 'rate'});
-  private readonly status = h('span', {class: 'status', role: 'status'}, this.statusWord, this.statusRate);
-  private readonly notice = h('div', {class: 'notice', role: 'alert'});
-  private readonly noticeText = h('p', {});
+  private readonly status: ConnectionStatus;
   private readonly toast = h('div', {class: 'toast', role: 'status'});
   private toastUntil = 0;
   private readonly emptyCard = h('div', {class: 'card'});
@@ -116,17 +108,12 @@ export class App {
   private readonly qualityButton: HTMLButtonElement;
 
   constructor(root: HTMLElement, readonly rendererInfo: RendererInfo, readonly appOptions: AppOptions) {
-    this.quality = new Quality(rendererInfo.software, this.cap.leastMs);
-    this.quality.choice = this.asked.quality;
-    this.options = {
-      style: 'bodies', coarse: false, shadows: true, simple: false, prints: true, plants: true,
-      plainGround: rendererInfo.software,
-      mostPrints: this.quality.detail.prints,
-    };
+    this.appearance = new Appearance(rendererInfo, this.asked, this.cap.leastMs);
     this.client = new Client({
       url: `${appOptions.secure ? 'wss' : 'ws'}://${appOptions.host}/stream`,
       clientName: 'stridewire-viewer',
     });
+    this.status = new ConnectionStatus(this.client, appOptions.host, this.shown);
     // The network is slow to begin with: let it work while the scene is made.
     this.client.connect();
     void this.learn();
@@ -144,7 +131,7 @@ export class App {
       chosen: () => this.chosen,
       driven: () => this.driven(),
       choose: (shown: Shown | null, avatar: number) => this.choose(shown, avatar),
-      reframe: () => (this.framing = true),
+      reframe: () => (this.camera.framing = true),
       live: () => this.playback.live && this.client.state === 'ready',
       goLive: () => this.playback.goLive(),
       inspected: () => this.inspector.state,
@@ -184,14 +171,14 @@ export class App {
       `${appOptions.secure ? 'https' : 'http'}://${appOptions.host}/metrics`,
       () => this.client.statistics, () => this.describe());
     this.viewPanel = new ViewPanel({
-      figures: (choice) => this.chooseFigures(choice),
-      quality: (choice) => this.chooseQuality(choice),
+      figures: (choice) => this.appearance.chooseFigures(choice),
+      quality: (choice) => this.appearance.chooseQuality(choice),
       mode: (mode) => this.setMode(mode),
-      toggle: (name, on) => this.toggle(name, on),
-    }, {figures: this.figureChoice, quality: this.quality.choice, mode: this.mode});
+      toggle: (name, on) => this.appearance.toggle(name, on),
+    }, {figures: this.asked.figures, quality: this.asked.quality, mode: this.mode});
 
     this.frameButton = button('Frame all', {icon: 'frame', key: 'F', text: false, class: 'round'},
-      () => this.frameAll());
+      () => this.camera.frameAll());
     this.followButton = button('Follow the chosen one', {icon: 'follow', key: 'C', text: false,
       class: 'round'}, () => this.toggleFollow());
     this.themeButton = button('Dark or light', {icon: 'sun', text: false, class: 'round'},
@@ -206,16 +193,14 @@ export class App {
       () => this.panels.set('view', true));
     this.qualityButton.hidden = true;
     this.top = h('header', {class: 'top'},
-      h('h1', {}, 'Stridewire'), this.chips, this.qualityButton, this.status, this.panels.tools,
+      h('h1', {}, 'Stridewire'), this.chips, this.qualityButton, this.status.element, this.panels.tools,
       h('div', {class: 'corner'},
         h('a', {class: 'link', href: '/library.html', title: 'What the libraries span'}, 'Library'),
         this.frameButton, this.followButton, this.themeButton, help));
     this.bottom = h('footer', {class: 'bottom'}, this.transport.element);
-    this.notice.append(this.noticeText);
-    this.notice.hidden = true;
     this.emptyCard.hidden = this.toast.hidden = true;
     root.replaceChildren(this.canvas, overlayCanvas, this.top, this.panels.left, this.panels.right,
-      this.emptyCard, this.toast, this.notice, this.bottom, this.helpDialog);
+      this.emptyCard, this.toast, this.status.notice, this.bottom, this.helpDialog);
 
     this.setTheme(this.theme, false);
     this.panels.set('drive', !narrow());
@@ -225,10 +210,10 @@ export class App {
     this.listen();
     this.client.on('state', () => {
       this.walks.show();  // None while we are not connected.
-      this.showConnection();
+      this.status.show();
     });
     this.client.on('notice', (_code: number, text: string) => this.say(text));
-    this.client.on('error', () => this.showConnection());
+    this.client.on('error', () => this.status.show());
     this.client.on('sessionLost', () => {
       this.walks.clear(null);
       for (const shown of this.shown) {
@@ -240,7 +225,7 @@ export class App {
 
   start(): void {
     for (const name of this.asked.worlds.slice(0, mostViews)) this.show(name);
-    this.showConnection();
+    this.status.show();
     this.infoTimer = window.setInterval(() => void this.learn(), 4000);
     requestAnimationFrame((ms) => this.frame(ms));
   }
@@ -279,7 +264,7 @@ export class App {
   private show(name: string): void {
     if (this.shown.some((shown) => shown.world.name === name) || this.shown.length >= mostViews) return;
     const world = this.client.joinWorld(name, 'controller');
-    const view = new WorldView(world, this.colours, this.options);
+    const view = new WorldView(world, this.colours, this.appearance.options);
     const shown: Shown = {
       world, view, subscription: world.observe({mode: this.mode, withEvents: true}), wander: null,
       ours: new Set()};
@@ -289,12 +274,12 @@ export class App {
         this.say(`Avatar ${event.avatar}: ${event.reason}`);
       }
     });
-    world.on('state', () => this.showConnection());
+    world.on('state', () => this.status.show());
     world.on('terrain', () => this.driver.groundChanged(world));
     this.shown.push(shown);
     this.active ??= shown;
     if (!this.worldNames.includes(name)) this.worldNames.push(name);
-    this.framing = true;
+    this.camera.framing = true;
     this.layOutMs = -1e9;
     this.showChips();
   }
@@ -309,7 +294,7 @@ export class App {
     this.walks.clear(shown!);
     shown!.view.dispose();
     void shown!.world.leave();
-    this.framing = true;
+    this.camera.framing = true;
     this.layOutMs = -1e9;
     this.showChips();
   }
@@ -362,7 +347,7 @@ export class App {
         }
       }
     } else {
-      for (const each of this.shown) each.view.following = 0;
+      this.camera.unfollow();
       if (!narrow()) {
         this.panels.set('inspect', false);
         if (this.figuresMadeRoom) this.panels.set('figures', true);
@@ -404,91 +389,24 @@ export class App {
 
   // ---- camera
 
-  private frameAll(): void {
-    this.framing = true;
-    for (const shown of this.shown) shown.view.following = 0;
-  }
-
   private toggleFollow(): void {
-    if (!this.chosen) {
-      this.chooseNext(1);
-      if (!this.chosen) return;
-    }
-    const {shown, avatar} = this.chosen!;
-    const on = shown.view.following !== avatar;
-    for (const each of this.shown) each.view.following = 0;
-    shown.view.following = on ? avatar : 0;
-    if (on) {
-      this.framing = false;
-      this.orbit.setDistance(5.2);
-    }
-  }
-
-  private aim(dtS: number): void {
-    let nearest = Infinity;
-    for (const {view} of this.shown) {
-      view.follow();
-      view.view.wantScale = 1;
-      if (view.following) continue;
-      const extent = view.extent();
-      if (!extent) continue;
-      if (this.framing || !view.framed) {
-        view.view.moveTo(extent.x, 0.8, extent.z, !view.framed);
-        view.framed = true;
-        // Views that are higher than wide see as much sideways as square ones, see ViewCamera.
-        const aspect = Math.min(1.7, Math.max(1, view.free.width / Math.max(1, view.free.height)));
-        view.wantDistanceM = Math.min(
-          110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.3 * extent.radius));
-        nearest = Math.min(nearest, view.wantDistanceM);
-      }
-    }
-    if (this.framing && nearest < Infinity) {
-      this.orbit.setDistance(nearest);
-      for (const {view} of this.shown) view.view.wantScale = view.wantDistanceM / nearest;
-    }
-    this.orbit.advance(dtS);
-    for (const {view} of this.shown) view.aim(this.orbit, dtS);
+    if (!this.chosen) this.chooseNext(1);
+    if (this.chosen) this.camera.toggleFollow(this.chosen);
   }
 
   // ---- appearance
 
-  private chooseFigures(choice: 'auto' | FigureStyle): void {
-    this.figureChoice = choice;
-    this.level = -1;
-  }
-
-  private chooseQuality(choice: QualityChoice): void {
-    this.quality.choice = choice;
-    this.shadowChoice = null;
-    this.level = -1;
-  }
-
-  private toggle(name: 'shadows' | 'prints' | 'plants', on: boolean): void {
-    this.options[name] = on;
-    if (name === 'shadows') this.shadowChoice = on;
-  }
-
-  /** Takes up what the quality has come to; cheap while it stays. */
   private adapt(ms: number, avatars: number): void {
-    this.quality.frame(ms, avatars);
-    const {level, detail} = this.quality;
-    if (level === this.level) return;
-    this.level = level;
-    const {options} = this;
-    options.style = this.figureChoice === 'auto' ? detail.style : this.figureChoice;
-    options.coarse = detail.coarse;
-    options.simple = detail.simple;
-    options.mostPrints = detail.prints;
-    options.shadows = this.shadowChoice ?? detail.shadows;
-    const ratio = basePixelRatio(this.rendererInfo) * detail.scale;
-    if (Math.abs(ratio - this.renderer.getPixelRatio()) > 1e-3) this.renderer.setPixelRatio(ratio);
-    this.viewPanel.set('shadows', options.shadows);
-    const what = `${options.coarse && options.style === 'bodies' ? 'plain ' : ''}${options.style}` +
-      (detail.scale < 1 ? ` at ${(detail.scale * 100).toFixed(0)} % of the resolution` : '');
-    this.viewPanel.setAuto(`Drawn as ${what} now` + (!this.quality.lowered ? '.' :
-      this.rendererInfo.software ? ': the processor draws, there is no graphics card.' :
-        ': this machine is slower otherwise.'));
-    this.qualityButton.hidden = !this.quality.lowered;
+    const {appearance, renderer} = this;
+    if (!appearance.adapt(ms, avatars)) return;
+    if (Math.abs(appearance.pixelRatio - renderer.getPixelRatio()) > 1e-3) {
+      renderer.setPixelRatio(appearance.pixelRatio);
+    }
+    const what = appearance.describe();
+    const why = appearance.whyLowered();
+    this.viewPanel.set('shadows', appearance.options.shadows);
+    this.viewPanel.setAuto(`Drawn as ${what} now${why === '' ? '' : `: ${why}`}.`);
+    this.qualityButton.hidden = why === '';
     this.qualityButton.title = `Drawn as ${what}, to keep up. Opens the panel where you can choose.`;
   }
 
@@ -503,27 +421,6 @@ export class App {
     this.themeButton.title = label;
     for (const {view} of this.shown) view.crowd?.redress();
     if (remember) rememberTheme(name);
-  }
-
-  private showConnection(): void {
-    const {state} = this.client;
-    const ready = state === 'ready';
-    setText(this.statusWord, ready ? 'Connected' : state === 'closed' ? 'Closed' : 'Connecting…');
-    setText(this.statusRate, ready ? `, ${this.client.tickHz.toFixed(0)} Hz` : '');
-    this.status.classList.toggle('ready', ready);
-    const {host} = this.appOptions;
-    let text = '';
-    if (state === 'waiting' || (state === 'connecting' && this.client.lastError !== '')) {
-      text = `No server answers at ${host}: start one with ./deploy/demo.sh, and this page connects ` +
-        'by itself.';
-    } else if (state === 'closed') {
-      text = `The server let this page go (${this.client.lastError}): reload the page to try again.`;
-    } else if (ready) {
-      const refused = this.shown.find((shown) => shown.world.state === 'refused');
-      if (refused) text = `World ${refused.world.name} cannot be joined here: choose another above.`;
-    }
-    this.notice.hidden = text === '';
-    setText(this.noticeText, text);
   }
 
   private showEmpty(avatars: number): void {
@@ -610,7 +507,7 @@ export class App {
       this.inspector.update(ms, timeS, this.playback.live, this.client.state === 'ready',
         this.panels.open('inspect'));
     }
-    this.aim(dtS);
+    this.camera.advance(dtS);
     this.draw();
     ++this.framesDrawn;
     if (this.firstFigureMs === 0 && avatars > 0) this.firstFigureMs = performance.now();
@@ -648,8 +545,8 @@ export class App {
         avatars.length === 1 ? `Avatar ${avatars[0]} of ${where!.world.name}` :
           `All ${avatars.length} avatars of ${where!.world.name}`,
       avatars.length > 0, where?.wander?.size ?? 0);
-    press(this.frameButton, this.framing);
-    press(this.followButton, this.shown.some((shown) => shown.view.following !== 0));
+    press(this.frameButton, this.camera.framing);
+    press(this.followButton, this.camera.following);
   }
 
   private draw(): void {
@@ -680,21 +577,9 @@ export class App {
 
   private listen(): void {
     listenToPointers(this.canvas, {
-      orbit: (dx, dy) => this.orbit.turn(-dx * 0.006, dy * 0.006),
-      pan: (dx, dy, x, y) => {
-        this.framing = false;
-        const shown = this.viewAt(x, y);
-        for (const each of this.shown) {
-          if (each !== shown && this.shown.length > 1) continue;
-          each.view.following = 0;
-          const scale = 1 / Math.max(1, each.view.free.height);
-          each.view.view.pan(this.orbit, -dx * scale, dy * scale);
-        }
-      },
-      zoom: (factor) => {
-        this.framing = false;
-        this.orbit.zoom(factor);
-      },
+      orbit: (dx, dy) => this.camera.orbit.turn(-dx * 0.006, dy * 0.006),
+      pan: (dx, dy, x, y) => this.camera.pan(dx, dy, this.viewAt(x, y)),
+      zoom: (factor) => this.camera.zoom(factor),
       click: (x, y, twice, shift) => {
         const shown = this.viewAt(x, y);
         if (!shown) return;
@@ -745,7 +630,7 @@ export class App {
       ' ': () => this.transport.toggle(), l: () => this.playback.goLive(),
       '[': () => this.transport.faster(-1), ']': () => this.transport.faster(1),
       ',': () => this.transport.nudge(-1 / 30), '.': () => this.transport.nudge(1 / 30),
-      f: () => this.frameAll(), c: () => this.toggleFollow(),
+      f: () => this.camera.frameAll(), c: () => this.toggleFollow(),
       n: () => this.chooseNext(1), p: () => this.chooseNext(-1),
       Escape: () => {
         if (this.walks.letGo()) return;
@@ -758,9 +643,9 @@ export class App {
       r: () => this.drive.nudgeLength(0.05), v: () => this.drive.nudgeLength(-0.05),
       x: () => this.driver.cancel(), b: () => void this.driver.spawn(this.driven(), 1, false),
       Delete: () => this.driver.remove(), g: () => this.driver.toggleWander(),
-      ArrowLeft: () => this.orbit.turn(turn, 0), ArrowRight: () => this.orbit.turn(-turn, 0),
-      ArrowUp: () => this.orbit.turn(0, turn), ArrowDown: () => this.orbit.turn(0, -turn),
-      '+': () => this.zoomBy(0.9), '=': () => this.zoomBy(0.9), '-': () => this.zoomBy(1.1),
+      ArrowLeft: () => this.camera.orbit.turn(turn, 0), ArrowRight: () => this.camera.orbit.turn(-turn, 0),
+      ArrowUp: () => this.camera.orbit.turn(0, turn), ArrowDown: () => this.camera.orbit.turn(0, -turn),
+      '+': () => this.camera.zoom(0.9), '=': () => this.camera.zoom(0.9), '-': () => this.camera.zoom(1.1),
       '?': () => this.helpDialog.showModal(),
     };
     const act = keys[e.key.length === 1 ? e.key.toLowerCase() : e.key];
@@ -769,19 +654,15 @@ export class App {
     act();
   }
 
-  private zoomBy(factor: number): void {
-    this.framing = false;
-    this.orbit.zoom(factor);
-  }
-
   // ---- for tests, see README.md
 
   get drawInfo(): {
     style: string; level: number; levels: number; scale: number; calls: number; triangles: number; lines: number;
   } {
     const {render} = this.renderer.info;
+    const {options, quality} = this.appearance;
     return {
-      style: this.options.style, level: this.quality.level, levels: levelCount, scale: this.quality.detail.scale,
+      style: options.style, level: quality.level, levels: levelCount, scale: quality.detail.scale,
       calls: render.calls, triangles: render.triangles, lines: render.lines};
   }
   get liveFigures(): FiguresPanel['figures'] {

@@ -71,17 +71,17 @@ test('every control does what its label says', async () => {
   };
   /** Nothing changes between pictures because a frame took long. */
   const holdQuality = async () => {
-    await look(() => window.stridewire.app.chooseQuality('low'));
+    await look(() => window.stridewire.app.appearance.chooseQuality('low'));
     await frames(2);
   };
-  const letQualityGo = () => look(() => window.stridewire.app.chooseQuality('auto'));
+  const letQualityGo = () => look(() => window.stridewire.app.appearance.chooseQuality('auto'));
   /** Of what no panel covers. */
   const middle = () => look(() => {
     const {x, y, width, height} = window.stridewire.worlds[0].view.free;
     return {x: x + width / 2, y: y + height / 2};
   });
   const orbit = () => look(() => {
-    const {wantAzimuth, wantElevation, wantDistance} = window.stridewire.app.orbit;
+    const {wantAzimuth, wantElevation, wantDistance} = window.stridewire.app.camera.orbit;
     return {wantAzimuth, wantElevation, wantDistance};
   });
   const target = () => look(() => window.stridewire.worlds[0].view.view.want.toArray());
@@ -561,7 +561,7 @@ test('every control does what its label says', async () => {
     }],
     ['view: figures-auto', async () => {
       await page.locator('label[for=figures-auto]').click();
-      await eventually('it chooses', () => window.stridewire.app.figureChoice === 'auto' &&
+      await eventually('it chooses', () => window.stridewire.app.appearance.figures === 'auto' &&
         document.querySelector('#panel-view .hint').textContent.includes(window.stridewire.draw.style));
     }],
     ['view: figures-bodies', async () => {
@@ -588,7 +588,7 @@ test('every control does what its label says', async () => {
     }],
     ['view: quality-auto', async () => {
       await page.locator('label[for=quality-auto]').click();
-      await eventually('it chooses, and says so', () => window.stridewire.app.quality.lowered &&
+      await eventually('it chooses, and says so', () => window.stridewire.app.appearance.quality.lowered &&
         !document.querySelector('.quality').hidden);
     }],
     ['page: Quality lowered', async () => {
