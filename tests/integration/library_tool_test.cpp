@@ -398,6 +398,29 @@ TEST_F(LibraryTool, WalksToAPlaceOrSaysWhyNot) {
   EXPECT_FALSE(output["walks"][1]["reason"].get<std::string>().empty());
 }
 
+TEST_F(LibraryTool, LeavesOutAStepThatMustBeMetAndIsNot) {
+  const std::string choreography =
+      folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}},
+                                 {"step":{"at_m":[0,0,7],"heading_rad":0,"must_be_met":true}}]})");
+  const std::vector<std::string> arguments = {"synthesize", "builtin", "--choreography",
+                                              choreography, "--out",   Out()};
+  const ProgramResult told = Tool(arguments);
+  EXPECT_EQ(told.exit_code, 0) << told.err;
+  EXPECT_THAT(told.out, testing::HasSubstr(
+                            "; movements[1] is left out: the footprint is out of reach: the "));
+  std::vector<std::string> json_arguments = arguments;
+  json_arguments.push_back("--json");
+  const json output = ParseOutput(Tool(json_arguments).out);
+  ASSERT_EQ(output["refusals"].size(), 1u);
+  const json& refusal = output["refusals"][0];
+  EXPECT_THAT(Keys(refusal), testing::UnorderedElementsAre("request", "reason", "time_s", "nearest",
+                                                           "missed_m", "missed_rad"));
+  EXPECT_EQ(refusal["request"], 1);
+  EXPECT_NEAR(refusal["nearest"]["at_m"][2].get<double>() + refusal["missed_m"].get<double>(), 7.0,
+              0.1);
+  EXPECT_TRUE(output["walks"].empty());
+}
+
 TEST_F(LibraryTool, NamesAMovementTheLibraryDoesNotHave) {
   ASSERT_EQ(Tool({"build", "--out", Out(), "--kinds", "jump", kJumps}).exit_code, 0);
   const std::string choreography = folder_.Write(

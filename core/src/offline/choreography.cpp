@@ -59,9 +59,19 @@ Status ReadFootprint(const JsonField& field, FootprintRequest& at) {
   return ReadNumber(field, "heading_rad", kHeading, at.heading_rad.emplace());
 }
 
+Status ReadMustBeMet(const JsonField& field, bool& out) {
+  const json* value = field.Find("must_be_met");
+  if (value == nullptr) return {};
+  if (!value->is_boolean()) {
+    return Fail(ErrorCode::kMalformed, "is neither true nor false", field.WhereOf("must_be_met"));
+  }
+  out = value->get<bool>();
+  return {};
+}
+
 Status ReadStep(const JsonField& field, StepRequest& step) {
-  if (auto ok = CheckKeys(
-          field, {"foot", "length_m", "side_m", "height_m", "turn_rad", "at_m", "heading_rad"});
+  if (auto ok = CheckKeys(field, {"foot", "length_m", "side_m", "height_m", "turn_rad", "at_m",
+                                  "heading_rad", "must_be_met"});
       !ok) {
     return ok;
   }
@@ -75,10 +85,13 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
                   field.WhereOf("foot"));
     }
   }
-  if (field.Find("at_m") != nullptr) return ReadFootprint(field, step.at.emplace());
-  if (field.Find("heading_rad") != nullptr) {
-    return Fail(ErrorCode::kMalformed, "has a meaning only beside at_m",
-                field.WhereOf("heading_rad"));
+  if (field.Find("at_m") != nullptr) {
+    if (auto ok = ReadMustBeMet(field, step.must_be_met); !ok) return ok;
+    return ReadFootprint(field, step.at.emplace());
+  }
+  for (const char* key : {"heading_rad", "must_be_met"}) {
+    if (field.Find(key) == nullptr) continue;
+    return Fail(ErrorCode::kMalformed, "has a meaning only beside at_m", field.WhereOf(key));
   }
   if (auto ok = ReadRequiredNumber(field, "length_m", kLength, step.length_m); !ok) return ok;
   if (field.Find("side_m") != nullptr) {

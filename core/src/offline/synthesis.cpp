@@ -214,6 +214,9 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
       } else if (EndsWalk(event, walks)) {
         result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
                                 event.reason, event.time_s, event.base});
+      } else if (event.missed) {
+        result.refusals.push_back(
+            {event.request_id, DescribeRejection(event), event.time_s, *event.missed});
       } else if (event.type == AvatarEventType::kRejected) {
         return std::unexpected(Rejected(event, requests));
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {

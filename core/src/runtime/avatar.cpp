@@ -15,9 +15,17 @@ namespace {
 // A library may not reach a stand in one step from a long stride; a second one must be worth taking.
 constexpr double kClosingGainM = 0.03;
 
-// Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end, and the next
-// started.
+// Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end or a refusal, and the
+// next started.
 constexpr std::size_t kEventReserve = 7;
+
+// Room for any movement of a library.
+void MakeRoom(const MotionLibrary& library, Movement& movement) {
+  const int joint_count = library.skeleton().joint_count();
+  movement.difference = Pose(joint_count);
+  movement.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
+  movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
+}
 
 }  // namespace
 
@@ -28,9 +36,7 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
   pose_ = Pose(joint_count);
   layered_pose_ = Pose(joint_count);
   earlier_pose_ = Pose(joint_count);
-  movement_.difference = Pose(joint_count);
-  movement_.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
-  movement_.weights.reserve(static_cast<std::size_t>(library_->max_example_count()));
+  MakeRoom(*library_, movement_);
   weight_scratch_.resize(static_cast<std::size_t>(library_->max_example_count()));
   stand_feet_.left_from_right_m =
       FootVector(library_->skeleton(), library_->stand_pose(), Foot::kLeft, 0.0);
@@ -66,6 +72,15 @@ Status Avatar::Enqueue(const MovementRequest& request) {
   if (Status status = ValidateRequest(*library_, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
+  }
+  if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->must_be_met) {
+    if (!PlantsFeet()) {
+      return Fail(ErrorCode::kUnsupported, "feet are not planted: no footprint is sure to be met");
+    }
+    if (kept_pose_.rotations.empty()) {
+      kept_pose_ = Pose(library_->skeleton().joint_count());
+      MakeRoom(*library_, kept_movement_);
+    }
   }
   if (request.takeover != Takeover::kNone) {
     CancelQueue();
@@ -212,7 +227,9 @@ void Avatar::StartOnTheWay() {
   if (way.is_inserted) {
     StartInserted(*way.plan);
   } else if (way.plan) {
-    StartPlan(*way.plan, PopQueue());
+    const MovementRequest taken = request;
+    PopQueue();
+    if (PlanRequested(taken, *way.plan, 0.0)) BeginMovement(*way.plan, taken.id);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -308,9 +325,14 @@ std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) c
   return PlanFootprint(*library_, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad, feet_);
 }
 
+void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
+  PlanMovement(plan, 0.0);
+  BeginMovement(plan, request_id);
+}
+
 // The movement goes on from where both feet stand or, for one that takes over in mid-swing, from the same
 // part of its own swing.
-void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id, double swing_part) {
+void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = library_->group(plan.group);
   ParameterValues parameters = plan.applied;
   if (options_.run_time_correction) {
@@ -348,7 +370,11 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id, double
                             movement_);
     }
   }
+}
 
+// What was planned is under way.
+void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
+  const MotionGroup& next = group();
   // A footprint that planting reaches is met, whatever the examples span.
   const bool is_met = plan.exact && movement_.feet.is_active &&
                       movement_.feet.missed_m == DVec3(0.0) && movement_.feet.missed_rad == 0.0;

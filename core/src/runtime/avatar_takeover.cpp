@@ -51,7 +51,8 @@ void Avatar::KeepJoin(double time_s) {
   earlier_feet_[0] = corrections(time_s);
 }
 
-// A step of the foot in the air takes over from the step under way, at the same part of the swing.
+// A step of the foot in the air takes over from the step under way, at the same part of the swing. One that may
+// be refused and is leaves the step under way to go on.
 void Avatar::RedirectSwing() {
   const SwingTimes swing = SwingTimesOf(group().kind, movement_);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
@@ -60,15 +61,17 @@ void Avatar::RedirectSwing() {
   auto& step = std::get<StepRequest>(request.movement);
   step.foot = MovingFoot(group().kind);
   KeepJoin(movement_time_s_);
-  AddEvent({.type = AvatarEventType::kFinished,
-            .request_id = request_id_,
-            .kind = group().kind,
-            .group = movement_.group,
-            .is_cut_short = true,
-            .base = base_});
   const auto plan = PlanRequest(request);
   STRIDEWIRE_CHECK(plan.has_value());
-  StartPlan(*plan, request.id, part);
+  const AvatarEvent left{.type = AvatarEventType::kFinished,
+                         .request_id = request_id_,
+                         .kind = group().kind,
+                         .group = movement_.group,
+                         .is_cut_short = true,
+                         .base = base_};
+  if (!PlanRequested(request, *plan, part)) return;
+  AddEvent(left);
+  BeginMovement(*plan, request.id);
 }
 
 // The corrections of the movement just planned go on from those before it.

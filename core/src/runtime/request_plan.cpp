@@ -204,6 +204,10 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
   const auto within = [](double value, double limit) {
     return std::isfinite(value) && std::fabs(value) <= limit;
   };
+  const auto is_place = [&](const DVec3& place) {
+    return within(place.x, kMaxWalkPositionM) && within(place.y, kMaxWalkPositionM) &&
+           within(place.z, kMaxWalkPositionM);
+  };
   const auto has_kind = [&](MovementKind kind) {
     return std::any_of(library.groups().begin(), library.groups().end(),
                        [&](const MotionGroup& group) { return group.kind == kind; });
@@ -220,6 +224,16 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
     }
     if (!within(step->turn_rad, kMaxRequestTurnRad)) {
       return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "step");
+    }
+    if (step->at && !is_place(step->at->position_m)) {
+      return Fail(ErrorCode::kOutOfRange, "at_m is not within 1000000 m", "step");
+    }
+    if (step->at && !within(step->at->heading_rad.value_or(0.0), kMaxWalkHeadingRad)) {
+      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
+    }
+    if (step->must_be_met && !step->at) {
+      return Fail(ErrorCode::kInvalidArgument, "must_be_met has a meaning only beside at_m",
+                  "step");
     }
     const bool found =
         step->foot ? has_kind(StepKind(*step->foot))
@@ -239,10 +253,6 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
       return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
     }
   } else if (const auto* walk = std::get_if<WalkRequest>(&request.movement)) {
-    const auto is_place = [&](const DVec3& place) {
-      return within(place.x, kMaxWalkPositionM) && within(place.y, kMaxWalkPositionM) &&
-             within(place.z, kMaxWalkPositionM);
-    };
     if (!is_place(walk->position_m)) {
       return Fail(ErrorCode::kOutOfRange, "position_m is not within 1000000 m", "walk_to");
     }

@@ -95,6 +95,19 @@ int RunSynthesize(const SynthesizeCommand& command) {
                                {"end_s", walk.end_s},
                                {"base", BaseToJson(walk.base)}});
     }
+    json["refusals"] = Json::array();
+    for (const RefusalRecord& refusal : synthesis->refusals) {
+      const Footprint& nearest = refusal.missed.nearest;
+      json["refusals"].push_back(
+          {{"request", refusal.request_id - 1},
+           {"reason", refusal.reason},
+           {"time_s", refusal.time_s},
+           {"nearest",
+            {{"at_m", {nearest.position_m.x, nearest.position_m.y, nearest.position_m.z}},
+             {"heading_rad", nearest.heading_rad}}},
+           {"missed_m", refusal.missed.distance_m},
+           {"missed_rad", refusal.missed.turn_rad}});
+    }
     std::printf("%s\n", Dump(json).c_str());
     return kExitDone;
   }
@@ -108,6 +121,10 @@ int RunSynthesize(const SynthesizeCommand& command) {
     if (walk.arrived) continue;
     std::printf("; movements[%llu] does not arrive: %s",
                 static_cast<unsigned long long>(walk.request_id - 1), walk.reason.c_str());
+  }
+  for (const RefusalRecord& refusal : synthesis->refusals) {
+    std::printf("; movements[%llu] is left out: %s",
+                static_cast<unsigned long long>(refusal.request_id - 1), refusal.reason.c_str());
   }
   std::printf("\n");
   return kExitDone;

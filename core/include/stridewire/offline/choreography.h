@@ -26,7 +26,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 ///    "terrain":{…as in terrain_file.h…},
 ///    "movements":[{"step":{"length_m":0.6}},
 ///                 {"step":{"foot":"left","length_m":0.5,"side_m":0.1,"height_m":0.15,"turn_rad":0.3}},
-///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0}},
+///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0,"must_be_met":true}},
 ///                 {"walk_to":{"position_m":[3,0,5],"heading_rad":1.6,"waypoints_m":[[0,0,4]],"speed_m_s":1}},
 ///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
 ///                 {"stand":{"seconds":1.5}}]}
@@ -35,7 +35,8 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 /// y = 0). A step and a jump need `length_m`, a stand `seconds`; the rest may be left out. A key
 /// that is not listed here is an error, so is one that stands twice. A step's `at_m`, where the ball
 /// of its foot lands in the world, stands instead of length, side, height and turn; the `heading_rad`
-/// of that footprint may be left out. A `walk_to` needs position and heading.
+/// of that footprint may be left out, and so may `must_be_met`, with which the step is left out if that is out of
+/// reach. A `walk_to` needs position and heading.
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground.

@@ -51,10 +51,19 @@ struct WalkRecord {
   BaseFrame base;  ///< Where it ended
 };
 
+/// A step that was not played, since it would have missed a footprint it had to meet.
+struct RefusalRecord {
+  std::uint64_t request_id = 0;
+  std::string reason;
+  double time_s = 0.0;
+  FootprintMiss missed;
+};
+
 struct Synthesis {
   Clip clip;  ///< World poses; frame 0 is the stand before the first tick
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
+  std::vector<RefusalRecord> refusals;
 };
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;

@@ -3,7 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -24,7 +26,16 @@ enum class AvatarEventType : std::uint8_t {
   kFootStrike,  ///< A foot landed: foot and where its ball is.
   kFinished,    ///< A movement ended: the new base frame. The commit point.
   kIdle,        ///< Queue empty and standing still.
-  kRejected,  ///< A request turned out impossible: code and reason. What is queued behind it goes on.
+  /// A request turned out impossible: code and reason; for a footprint that had to be met also the nearest in
+  /// reach and the foot. What is queued behind it goes on.
+  kRejected,
+};
+
+/// By what a step would have missed the footprint it had to meet.
+struct FootprintMiss {
+  Footprint nearest;  ///< What it would have landed on, less what the other foot had given way
+  double distance_m = 0.0;  ///< From it to the one asked for
+  double turn_rad = 0.0;    ///< The same of the heading, 0 or more
 };
 
 struct AvatarEvent {
@@ -43,7 +54,12 @@ struct AvatarEvent {
   BaseFrame base;                ///< kFinished: base frame after the movement
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
   const char* reason = "";                   ///< kRejected: a sentence, static storage
+  std::optional<FootprintMiss> missed;       ///< kRejected: of a footprint that had to be met
 };
+
+/// Why a request was rejected: the reason, for a footprint followed by the nearest, as in "the footprint is out of
+/// reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off". At most 200 bytes.
+[[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
 struct AvatarOptions {
   /// Movements start with corrected parameters (CorrectParameters), so that they have those applied.
@@ -75,8 +91,8 @@ class Avatar {
   /// A swing less than this part of which is left is not sent elsewhere.
   static constexpr double kLeastSwingLeft = 0.4;
 
-  /// Checks and queues a request; one that takes over empties the queue first. kOutOfRange: a number not finite or over its limit;
-  /// kUnsupported: the library has no group for it; kLimitExceeded: queue full.
+  /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
+  /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops what has not started; the current movement goes on to its end. Returns how many.
@@ -139,7 +155,14 @@ class Avatar {
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
-  void StartPlan(const RequestPlan& plan, std::uint64_t request_id, double swing_part = 0.0);
+  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
+  void PlanMovement(const RequestPlan& plan, double swing_part);
+  void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
+  [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
+                                   double swing_part);
+  [[nodiscard]] FootprintMiss NearestInReach(const Footprint& asked, const FootprintMiss& missed,
+                                             double swing_part);
+  [[nodiscard]] FootprintMiss MissOf(const Footprint& asked);
   [[nodiscard]] double EndOfMovement() const;
   [[nodiscard]] double Landed() const;
   [[nodiscard]] bool RedirectsSwing() const;
@@ -184,6 +207,10 @@ class Avatar {
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
   GridCache cache_;
   std::vector<double> weight_scratch_;
+  // What is put back when a movement that was planned is not played. Has its size from the first request on
+  // that may be refused.
+  Movement kept_movement_;
+  Pose kept_pose_;
 
   FootState stand_feet_;  // of the library's stand pose
   FootState feet_;

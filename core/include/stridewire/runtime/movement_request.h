@@ -27,6 +27,9 @@ struct StepRequest {
   double turn_rad = 0.0;         ///< Change of heading, left positive.
   /// Instead of all of these: where the moving foot lands in the world.
   std::optional<FootprintRequest> at;
+  /// Only with `at`: if that is out of reach when the step is about to start, it is rejected instead of landing
+  /// as near as it can.
+  bool must_be_met = false;
 };
 
 struct JumpRequest {
@@ -69,14 +72,15 @@ struct MovementRequest {
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Lengths, sides and heights, either sign.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
-inline constexpr double kMaxWalkPositionM = 1e6;  ///< Each coordinate of goals and waypoints.
-inline constexpr double kMaxWalkHeadingRad = 1e4;
+inline constexpr double kMaxWalkPositionM =
+    1e6;  ///< Each coordinate of goals, waypoints, footprints.
+inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Of goals and footprints.
 inline constexpr double kMinWalkSpeedMPerS = 0.05;
 inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;
 
-/// kOutOfRange: a number not finite or beyond its limit; kUnsupported: the library has no movement
-/// of that kind.
+/// kOutOfRange: a number not finite or beyond its limit; kInvalidArgument: nothing is there that must be
+/// met; kUnsupported: the library has no movement of that kind.
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
 /// Parameter values in the order of the group they belong to; `count` = its parameter count.

@@ -67,7 +67,7 @@ TEST(ParseChoreography, StartsAtTheOriginUnlessToldOtherwise) {
 TEST(ParseChoreography, ReadsFootprints) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"movements":[{"step":{"foot":"right","at_m":[1,0.25,-2],"heading_rad":0.5}},
-                       {"step":{"at_m":[0,0,0]}}]})",
+                       {"step":{"at_m":[0,0,0],"must_be_met":true}}]})",
       "c.json");
   ASSERT_TRUE(read.has_value()) << Describe(read.error());
   const auto& first = std::get<StepRequest>(read->movements[0].movement);
@@ -78,6 +78,8 @@ TEST(ParseChoreography, ReadsFootprints) {
   const auto& second = std::get<StepRequest>(read->movements[1].movement);
   ASSERT_TRUE(second.at.has_value());
   EXPECT_FALSE(second.at->heading_rad.has_value());
+  EXPECT_FALSE(first.must_be_met);
+  EXPECT_TRUE(second.must_be_met);
 }
 
 TEST(ParseChoreography, ReadsWalks) {
@@ -189,6 +191,10 @@ const BadText kBadTexts[] = {
      "c.json: movements[0].step.length_m: has no meaning beside at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.heading_rad: has a meaning only beside at_m"},
+    {R"({"movements":[{"step":{"length_m":0.5,"must_be_met":true}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.must_be_met: has a meaning only beside at_m"},
+    {R"({"movements":[{"step":{"at_m":[0,0,1],"must_be_met":1}}]})", ErrorCode::kMalformed,
+     "c.json: movements[0].step.must_be_met: is neither true nor false"},
     {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
     {R"({"movements":[{"step":{"foot":1,"length_m":0.5}}]})", ErrorCode::kMalformed,

@@ -1,0 +1,147 @@
+// The part of an avatar that plans a step to a footprint and does not play it when it would land elsewhere.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "stridewire/runtime/avatar.h"
+
+namespace stridewire {
+namespace {
+
+// A foot this near is on its footprint, which is within 1 mm: planting is exact to a hundredth of that.
+constexpr double kMetM = 0.9e-3;
+constexpr double kMetRad = 1e-3;
+// The pose is looked at as often from landing to the end.
+constexpr int kLooks = 5;
+// On terrain a sole may be lifted out of the ground by as much as heels and toes go down: not a miss.
+constexpr double kLiftedM = 0.1;
+
+// What a step lands on when sent too far is not always where it lands when sent there: the library's own part of it is
+// another. Going on from there comes to one that is met soon; sooner when going on by more than was missed.
+constexpr int kMaxTries = 8;
+constexpr double kOvershoot = 1.5;
+
+constexpr double kDegreesPerRadian = 57.29577951308232;
+
+bool IsMet(const FootprintMiss& missed) {
+  return missed.distance_m <= kMetM && missed.turn_rad <= kMetRad;
+}
+
+}  // namespace
+
+std::string DescribeRejection(const AvatarEvent& event) {
+  if (!event.missed) return event.reason;
+  const FootprintMiss& missed = *event.missed;
+  const DVec3 nearest = missed.nearest.position_m;
+  char text[201];
+  std::snprintf(text, sizeof text,
+                "%s: the %s foot reaches (%.6g, %.6g, %.6g) m heading %.4g rad, %.3g m and %.3g "
+                "degrees off",
+                event.reason, event.foot == Foot::kLeft ? "left" : "right", nearest.x, nearest.y,
+                nearest.z, missed.nearest.heading_rad, missed.distance_m,
+                missed.turn_rad * kDegreesPerRadian);
+  return text;
+}
+
+// Plans the movement of a request. False: its footprint had to be met and is not; it is rejected, and everything is
+// as it was before.
+bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
+                           double swing_part) {
+  const auto* step = std::get_if<StepRequest>(&request.movement);
+  if (step == nullptr || !step->must_be_met) {
+    PlanMovement(plan, swing_part);
+    return true;
+  }
+  kept_pose_ = pose_;  // of the same size: no allocation
+  std::swap(movement_, kept_movement_);
+  PlanMovement(plan, swing_part);
+  FootprintMiss missed = MissOf(*plan.exact);
+  if (IsMet(missed)) return true;
+  missed = NearestInReach(*plan.exact, missed, swing_part);
+  AddEvent({.type = AvatarEventType::kRejected,
+            .request_id = request.id,
+            .kind = group().kind,
+            .foot = MovingFoot(group().kind),
+            .base = base_,
+            .code = ErrorCode::kOutOfRange,
+            .reason = "the footprint is out of reach",
+            .missed = missed});
+  std::swap(movement_, kept_movement_);
+  cache_.Clear();
+  pose_ = kept_pose_;
+  return false;
+}
+
+// A footprint near one that was missed that the step just planned would meet were it sent there.
+FootprintMiss Avatar::NearestInReach(const Footprint& asked, const FootprintMiss& missed,
+                                     double swing_part) {
+  const Foot moving = MovingFoot(group().kind);
+  Footprint tried = asked;
+  FootprintMiss off = missed;
+  for (int i = 0; i < kMaxTries && !IsMet(off); ++i) {
+    const double further = i == 0 ? 1.0 : kOvershoot;
+    tried.position_m += further * (off.nearest.position_m - tried.position_m);
+    tried.heading_rad += further * (off.nearest.heading_rad - tried.heading_rad);
+    const auto plan = PlanRequest(
+        {.movement = StepRequest{.foot = moving,
+                                 .at = FootprintRequest{tried.position_m, tried.heading_rad}}});
+    PlanMovement(*plan, swing_part);
+    off = MissOf(*plan->exact);
+  }
+  const DVec3 away_m = asked.position_m - off.nearest.position_m;
+  return {off.nearest, std::sqrt(glm::dot(away_m, away_m)),
+          std::fabs(asked.heading_rad - off.nearest.heading_rad)};
+}
+
+// Where the step just planned brings its foot. What the plan misses is not all of it: that legs are too short for a
+// step up or down shows in the pose only. If there the other foot gives way instead, the one would have landed as
+// far off had the other stayed.
+FootprintMiss Avatar::MissOf(const Footprint& asked) {
+  const Skeleton& skeleton = library_->skeleton();
+  const LegRig& rig = library_->leg_rig();
+  const Foot moving = MovingFoot(group().kind);
+  const auto m = static_cast<std::size_t>(moving);
+  const auto x = 1 - m;
+  const auto feet_of_pose = [&] {
+    std::array<BlendedFoot, 2> feet;
+    LegPose leg;
+    for (std::size_t f = 0; f < 2; ++f) {
+      EvaluateLeg(skeleton, rig, pose_, static_cast<Foot>(f), leg);
+      feet[f] = FootOf(rig, static_cast<Foot>(f), DVec3(pose_.root_position_m), leg);
+    }
+    return feet;
+  };
+
+  FootprintMiss worst{asked};
+  const double land_s = movement_.feet.foot(moving).land_s;
+  const double stands_s = movement_.duration_s() - land_s;
+  const int looks = stands_s > 0.0 ? kLooks : 1;
+  for (int look = 0; look < looks; ++look) {
+    const double time_s = land_s + stands_s * look / std::max(looks - 1, 1);
+    EvaluateMovement(group(), library_->layout(), movement_, time_s, cache_, pose_);
+    std::array<BlendedFoot, 2> planned = feet_of_pose();
+    for (std::size_t f = 0; f < 2; ++f) {
+      planned[f].ball_m +=
+          CorrectFoot(movement_, static_cast<Foot>(f), time_s, planned[f]).offset_m;
+    }
+    PlantFeet(skeleton, rig, movement_, time_s, pose_);
+    const std::array<BlendedFoot, 2> lands = feet_of_pose();
+    DVec3 off_m = lands[m].ball_m - planned[m].ball_m;
+    const DVec3 from_other_m = off_m - (lands[x].ball_m - planned[x].ball_m);
+    if (glm::dot(from_other_m, from_other_m) > glm::dot(off_m, off_m)) off_m = from_other_m;
+    if (movement_.feet.keeps_above_ground && std::fabs(off_m.y) < kLiftedM) off_m.y = 0.0;
+    // Heights of balls follow the blend, so they are compared with what was planned.
+    const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - off_m.x, -off_m.y,
+                       asked.position_m.z - planned[m].ball_m.z - off_m.z);
+    const double turn_rad = WrapAngle(asked.heading_rad - lands[m].heading_rad);
+    const double distance_m =
+        std::sqrt(away_m.x * away_m.x + away_m.y * away_m.y + away_m.z * away_m.z);
+    if (distance_m + std::fabs(turn_rad) <= worst.distance_m + worst.turn_rad) continue;
+    worst = {
+        {asked.position_m - away_m, asked.heading_rad - turn_rad}, distance_m, std::fabs(turn_rad)};
+  }
+  return worst;
+}
+
+}  // namespace stridewire
