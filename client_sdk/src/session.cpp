@@ -390,10 +390,10 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features = protocol::kFeatureResume | protocol::kFeatureEventReplay |
-                   protocol::kFeatureQuantised | protocol::kFeatureTerrain |
-                   protocol::kFeatureFootprints | protocol::kFeatureWalks |
-                   protocol::kFeatureTakeovers | protocol::kFeatureLayers;
+  hello.features =
+      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
+      protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
+      protocol::kFeatureTakeovers | protocol::kFeatureLayers | protocol::kFeatureRefusals;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -541,11 +541,13 @@ bool Session::Understands(const CommandMessage& message) const {
   const bool knows_footprints = (features_ & protocol::kFeatureFootprints) != 0;
   const bool knows_walks = (features_ & protocol::kFeatureWalks) != 0;
   const bool knows_takeovers = (features_ & protocol::kFeatureTakeovers) != 0;
+  const bool knows_refusals = (features_ & protocol::kFeatureRefusals) != 0;
   return std::ranges::none_of(request->items, [&](const protocol::RequestItem& item) {
     if (item.takeover != protocol::Takeover::kNone && !knows_takeovers) return true;
     if (std::holds_alternative<protocol::WalkMovement>(item.movement)) return !knows_walks;
     const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
-    return step != nullptr && step->at.has_value() && !knows_footprints;
+    if (step == nullptr) return false;
+    return (step->at.has_value() && !knows_footprints) || (step->must_be_met && !knows_refusals);
   });
 }
 

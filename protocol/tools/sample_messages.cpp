@@ -230,6 +230,15 @@ std::vector<SampleMessage> SampleMessages() {
     takeovers.items.push_back({42, 1011, JumpMovement{1.0, 0.0, 0.0}, Takeover::kAfterMovement});
     add("request_takeovers", takeovers);
 
+    Request refusals{18, 3, {}};
+    step = {.foot = FootChoice::kRight,
+            .at = Footprint{DVec3(0.5, 0.0, 1.25), 0.25},
+            .must_be_met = true};
+    refusals.items.push_back({41, 1012, step});
+    step.at->heading_rad.reset();
+    refusals.items.push_back({42, 1013, step, Takeover::kNow});
+    add("request_refusals", refusals);
+
     TerrainInfo terrain;
     terrain.height_field =
         HeightFieldInfo{{-1.5, 2.0}, 0.25, 3, 2, {0.0f, 0.125f, 0.25f, -0.5f, 0.0625f, 1.5f}};

@@ -12,7 +12,7 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureEventReplay, featureFootprints, featureInspect, featureQuantised, featureResume,
+  featureEventReplay, featureFootprints, featureInspect, featureQuantised, featureRefusals, featureResume,
   featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
   maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
@@ -27,7 +27,7 @@ import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
 
 const featureBits: Record<Feature, bigint> = {
   inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
-  takeovers: featureTakeovers, layers: featureLayers,
+  takeovers: featureTakeovers, layers: featureLayers, refusals: featureRefusals,
 };
 
 /** What the caller may set, filled in. */
@@ -422,7 +422,8 @@ export class Session {
       protocolMax: protocolVersion,
       clientName: this.options.clientName,
       features: featureResume | featureEventReplay | featureQuantised | featureInspect |
-          featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers,
+          featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
+          featureRefusals,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -629,7 +630,8 @@ export class Session {
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
-            (item.takeover === 'none' || (this.features & featureTakeovers) !== 0n));
+            (item.takeover === 'none' || (this.features & featureTakeovers) !== 0n) &&
+            (!item.mustBeMet || (this.features & featureRefusals) !== 0n));
       default: return true;
     }
   }

@@ -13,7 +13,7 @@ export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
  * then what was queued is dropped. */
 export type Takeover = 'none' | 'afterMovement' | 'now';
 /** What servers may or may not know of. */
-export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers';
+export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals';
 export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
@@ -121,6 +121,9 @@ export interface MovementRequest {
   atM?: Vec3;
   /** Step with `atM`: where the foot looks. Absent: the server chooses. Walk: the heading at its end. */
   headingRad?: number;
+  /** Step, only with `atM`: when it is out of reach as the step is about to start, it is `rejected` with the
+   * nearest place in reach, instead of landing there. Refused (`unsupported`) by a server that knows no refusals. */
+  mustBeMet?: boolean;
   /** Walk: places to pass, at most 64. */
   waypointsM?: readonly Vec3[];
   /** Walk: 0.05 to 5, as near as the library's steps come. Absent: as is comfortable. */
@@ -159,6 +162,7 @@ export interface QueuedRequest {
   /** Null: as is comfortable. */
   readonly speedMPerS: number | null;
   readonly takeover: Takeover;
+  readonly mustBeMet: boolean;
 }
 
 /** What an avatar does: the answer to `World.inspect`. */
@@ -243,7 +247,7 @@ export interface WorldEvent {
   readonly cutShort: boolean;
   /** Foot strike. */
   readonly foot: Foot | null;
-  /** Foot strike. */
+  /** Foot strike; a step rejected as out of reach: where the nearest footprint is. */
   readonly positionM: Vec3;
   /** Finished, idle, spawned: the new base frame. */
   readonly basePositionM: Vec3;

@@ -682,6 +682,29 @@ test('a movement takes over as it is asked to, of a server that knows of it', as
   assert.equal((await old.joined({features: 255n}).request([{...step, takeover: 'now'}])).status, 'unsupported');
 });
 
+test('a footprint that must be met is told to a server that knows of it', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  const step = {avatar: 1, type: 'step', atM: [1, 0, 2], mustBeMet: true} as const;
+  void world.request([step, {...step, mustBeMet: false}, {avatar: 1, type: 'step', atM: [1, 0, 2]}]);
+  const [sent] = h.sent();
+  assert.ok(sent?.type === 'Request');
+  assert.deepEqual(sent.items.map(({mustBeMet}) => mustBeMet), [true, false, false]);
+  for (const bad of [
+    {...step, atM: undefined}, {...step, mustBeMet: 1}, {...step, type: 'walk', headingRad: 0},
+    {...step, type: 'jump'},
+  ]) {
+    const reply = await world.request([bad as never]);
+    assert.equal(reply.status, 'invalid_argument');
+    assert.match(reply.text, /mustBeMet/);
+  }
+  const old = new Harness();
+  const before = old.joined({features: 1023n});
+  assert.equal((await before.request([step])).status, 'unsupported');
+  void before.request([{...step, mustBeMet: false}]);
+  assert.deepEqual(summary(old.sent()), ['Request 3']);
+});
+
 test('layers are sent as given, to a server that knows them', async () => {
   const h = new Harness();
   const world = h.joined();

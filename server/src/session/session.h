@@ -20,7 +20,8 @@ namespace stridewire::server {
 inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
     protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
-    protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers;
+    protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
+    protocol::kFeatureRefusals;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {

@@ -89,6 +89,7 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           if (movement.at) {
             step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
           }
+          step.must_be_met = movement.must_be_met;
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
           request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad};
@@ -121,7 +122,8 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           step.turn_rad = movement.turn_rad;
           if (movement.at) {
             step = {.foot = step.foot,
-                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad}};
+                    .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad},
+                    .must_be_met = movement.must_be_met};
           }
           item.movement = step;
         } else if constexpr (std::is_same_v<T, JumpRequest>) {
@@ -189,7 +191,8 @@ protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library) {
   wire.base = ToWire(event.base);
   if (event.type == AvatarEventType::kRejected) {
     wire.code = ToStatusCode(event.code);
-    wire.reason = event.reason;
+    wire.reason = DescribeRejection(event);
+    if (event.missed) wire.position_m = event.missed->nearest.position_m;
   }
   return wire;
 }

@@ -625,5 +625,31 @@ TEST(ClientAndServer, AStepGoesToItsFootprint) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
+TEST(ClientAndServer, AStepOutOfReachIsRejectedIfItMustBeMet) {
+  Daemon daemon;
+  User user(daemon.port());
+  user.Spawn(1);
+  EXPECT_EQ(user.client.Request(user.world, {client::OrNot(client::Step(1, 7, 0.5))}).status(),
+            STRIDEWIRE_INVALID_ARGUMENT);
+  ASSERT_TRUE(user.client.Request(
+      user.world,
+      {client::OrNot(client::StepTo(1, 7, 1.1, 0.0, 5.0, 0.0, STRIDEWIRE_FOOT_LEFT)),
+       client::OrNot(client::StepTo(1, 8, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT))}));
+  const auto rejected = user.Next(STRIDEWIRE_EVENT_REJECTED);
+  ASSERT_TRUE(rejected);
+  EXPECT_EQ(rejected->request_id, 7u);
+  EXPECT_EQ(rejected->status, STRIDEWIRE_OUT_OF_RANGE);
+  EXPECT_EQ(rejected->kind, STRIDEWIRE_KIND_STEP_LEFT);
+  EXPECT_GT(rejected->position_m[2], 0.5);
+  EXPECT_LT(rejected->position_m[2], 2.0);
+  EXPECT_EQ(std::string(rejected->text).rfind("the footprint is out of reach: ", 0), 0u)
+      << rejected->text;
+  const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
+  ASSERT_TRUE(strike);
+  EXPECT_EQ(strike->request_id, 8u);
+  EXPECT_NEAR(strike->position_m[2], 0.45, 0.001);
+  EXPECT_EQ(daemon.Terminate(), 0);
+}
+
 }  // namespace
 }  // namespace stridewire

@@ -759,6 +759,52 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
   EXPECT_NE(WhatOldClientsHear(server_, protocol::StepMovement{}), StatusCode::kUnsupported);
 }
 
+TEST_F(ServerSessionOfOne, FootprintsThatMustBeMetAreMetOrRejected) {
+  protocol::StepMovement far{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0},
+                             .must_be_met = true};
+  protocol::StepMovement near = far;
+  near.at->position_m.z = 0.45;
+  ASSERT_TRUE(client_.Request(world_, {{1, 7, far}, {1, 8, near}}));
+  std::vector<protocol::Event> heard;
+  while (heard.empty() || heard.back().type != protocol::EventType::kFinished) {
+    const auto events = client_.Await<protocol::Events>();
+    ASSERT_TRUE(events);
+    for (const protocol::Event& event : events->events) {
+      if (event.request_id != 0 && event.type != protocol::EventType::kAccepted) {
+        heard.push_back(event);
+      }
+    }
+  }
+  ASSERT_EQ(heard.size(), 4u);  // rejected; started, foot-strike, finished
+  const protocol::Event& rejected = heard[0];
+  EXPECT_EQ(rejected.type, protocol::EventType::kRejected);
+  EXPECT_EQ(rejected.request_id, 7u);
+  EXPECT_EQ(rejected.code, StatusCode::kOutOfRange);
+  EXPECT_TRUE(rejected.reason.starts_with("the footprint is out of reach: ")) << rejected.reason;
+  EXPECT_GT(rejected.position_m.z, 0.5);
+  EXPECT_LT(rejected.position_m.z, 2.0);
+  EXPECT_EQ(heard[3].request_id, 8u);
+  EXPECT_NEAR(heard[2].position_m.z, 0.45, 1e-3);
+
+  EXPECT_EQ(WhatOldClientsHear(server_, far), StatusCode::kUnsupported);
+}
+
+TEST_F(ServerSessionOfOne, RefusalsAreAFeatureOfTheirOwn) {
+  RawClient before = server_.Connect();
+  ASSERT_TRUE(before.SayHello(protocol::kFeatureFootprints));
+  const auto world = before.Join("hall");
+  ASSERT_TRUE(world);
+  protocol::StepMovement step{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0}};
+  const auto taken = before.Request(world->world, {{1, 9, step}});
+  ASSERT_TRUE(taken);
+  EXPECT_EQ(taken->accepted, 1u);
+  step.must_be_met = true;
+  const auto refused = before.Request(world->world, {{1, 10, step}});
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, StatusCode::kUnsupported);
+  EXPECT_NE(refused->text.find("refusals"), std::string::npos) << refused->text;
+}
+
 TEST(ServerSession, LayersForWhoKnowsOfThem) {
   server::Config config = TestConfig();
   config.shards = 3;

@@ -477,6 +477,39 @@ TEST_F(SessionTest, SendsGroundsFootprintsAndWalksToAServerThatKnowsThem) {
   EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
 }
 
+TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
+  protocol::Request request = StepOf(1, 9);
+  protocol::StepMovement step{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5},
+                              .must_be_met = true};
+  request.items[0].movement = step;
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->Request(world, request, command_), STRIDEWIRE_OK);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(std::get<protocol::Request>(sent[0]).items, request.items);
+
+  Use({});
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Connect();
+  protocol::Welcome welcome = toy::Welcome();
+  welcome.features &= ~protocol::kFeatureRefusals;
+  Tell(welcome);
+  stridewire_world old = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
+  LetIn();
+  (void)Events();
+  (void)Sent();
+  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
+  step.must_be_met = false;
+  request.items[0].movement = step;
+  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(Sent().size(), 1u);
+}
+
 TEST_F(SessionTest, CommandsAreBounded) {
   SessionOptions options;
   options.max_commands = 10;

@@ -441,6 +441,17 @@ TEST(Check, AvatarState) {
       1);
 }
 
+TEST(Check, WhatMustBeMetIsThere) {
+  Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .must_be_met = true}}}};
+  EXPECT_TRUE(Check(message).has_value());
+  std::get<StepMovement>(message.items[0].movement).at.reset();
+  const Status status = Check(message);
+  ASSERT_FALSE(status.has_value());
+  EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
+  EXPECT_EQ(status.error().where, "Request.at_m");
+  EXPECT_STREQ(status.error().text, "must be met and is not there");
+}
+
 TEST(Check, Footprints) {
   Request good = GoodRequest();
   good.items[0].movement = StepMovement{.at = Footprint{DVec3(1.0, 2.0, 3.0), 0.5}};

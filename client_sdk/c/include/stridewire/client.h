@@ -258,14 +258,16 @@ typedef struct stridewire_movement {
   uint8_t has_speed;          ///< Walk: 0: as is comfortable.
   double speed_m_s;  ///< Walk, if has_speed: 0.05 to 5, as near as the library's steps come.
   stridewire_takeover takeover;
+  uint8_t
+      must_be_met;  ///< Step, only if has_at: 1: when it cannot land there it is REJECTED, not done elsewhere.
 } stridewire_movement;
 
 #define STRIDEWIRE_MAX_WAYPOINTS 64
 
 /// Queues movements; an avatar may stand in the list several times, and does them in order. The REPLY
 /// is UNSUPPORTED when one of them has `has_at` and the server knows no footprints, or is a walk and it
-/// knows no walks, or takes over and it knows no takeovers. A walk's steps come in events with its request_id; then FINISHED of kind STAND says it has
-/// arrived, REJECTED why it goes no further.
+/// knows no walks, or takes over and it knows no takeovers, or must be met and it knows no refusals. A walk's steps come
+/// in events with its request_id; then FINISHED of kind STAND says it has arrived, REJECTED why it goes no further.
 stridewire_status stridewire_client_request(stridewire_client* client, stridewire_world world,
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
@@ -369,8 +371,10 @@ typedef enum stridewire_event_type {
   STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< foot, position_m
   STRIDEWIRE_EVENT_FINISHED = 35,     ///< request_id, base: the new base frame
   STRIDEWIRE_EVENT_IDLE = 36,         ///< standing with nothing queued; base
-  STRIDEWIRE_EVENT_REJECTED = 37,     ///< request_id turned out impossible: status, text
-  STRIDEWIRE_EVENT_SPAWNED = 38,      ///< base
+  STRIDEWIRE_EVENT_REJECTED =
+      37,  ///< request_id turned out impossible: status, text; when it must be met and
+           ///< is out of reach also foot, kind, position_m: the nearest in reach
+  STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
   STRIDEWIRE_EVENT_REMOVED = 39
 } stridewire_event_type;
 

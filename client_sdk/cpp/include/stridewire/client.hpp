@@ -58,6 +58,11 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
+/// The same step, which is rejected rather than done when its place is out of reach.
+inline stridewire_movement OrNot(stridewire_movement step_to) {
+  step_to.must_be_met = 1;
+  return step_to;
+}
 /// The same movement, which takes over from what the avatar does.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.takeover = STRIDEWIRE_NOW;

@@ -108,6 +108,11 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
       const walk = type === 'walk';
       const at = walk || (step && item.atM !== undefined) ? vector(item.atM, 'atM', i) : null;
       const moves = type !== 'stand' && at === null;
+      const mustBeMet = item.mustBeMet ?? false;
+      if (typeof mustBeMet !== 'boolean') throw new Malformed('is neither true nor false', 'mustBeMet', i);
+      if (mustBeMet && !(step && at !== null)) {
+        throw new Malformed('has a meaning only for a step with atM', 'mustBeMet', i);
+      }
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
         requestId: item.requestId === undefined ? nextId() : requestId(item.requestId, i),
@@ -125,6 +130,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
         speedMPerS: walk && item.speedMPerS !== undefined
             ? finite(item.speedMPerS, 'speedMPerS', i) : null,
         takeover: oneOf(takeovers, item.takeover ?? 'none', 'takeover', i),
+        mustBeMet,
       };
     }),
   };

@@ -586,6 +586,8 @@ function request(item: wire.RequestItem, i: number): QueuedRequest {
   if (walk && (place === null || item.headingRad() === null)) {
     throw new Malformed('has no goal', 'Request.atM', i);
   }
+  const mustBeMet = step && item.mustBeMet();
+  if (mustBeMet && place === null) throw new Malformed('must be met and is not there', 'Request.atM', i);
   const waypointsM: Vec3[] = [];
   const waypoints = walk ? count(item.waypointsMLength(), 0, maxWaypoints, 'Request.waypointsM') : 0;
   for (let w = 0; w < waypoints; ++w) {
@@ -606,6 +608,7 @@ function request(item: wire.RequestItem, i: number): QueuedRequest {
     waypointsM,
     speedMPerS: walk ? finiteOrNull(item.speedMS(), 'Request.speedMPerS', i) : null,
     takeover: known(takeovers, item.takeover(), 'Request.takeover', i),
+    mustBeMet,
   };
 }
 

@@ -117,6 +117,7 @@ function build(b: Builder, m: ClientMessage): number {
           b.forceDefaults(false);
         }
         wire.RequestItem.addTakeover(b, takeovers.indexOf(item.takeover));
+        wire.RequestItem.addMustBeMet(b, item.mustBeMet);
         return wire.RequestItem.endRequestItem(b);
       });
       return wire.Request.createRequest(b, m.seq, m.world,

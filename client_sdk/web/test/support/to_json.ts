@@ -28,7 +28,7 @@ function request(item: QueuedRequest): Json {
       if (item.atM !== null) {
         return {
           ...common, foot: footChoices.indexOf(item.foot), at_m: vec3(item.atM),
-          heading_rad: item.headingRad,
+          heading_rad: item.headingRad, must_be_met: item.mustBeMet,
         };
       }
       return {
