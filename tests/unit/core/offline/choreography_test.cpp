@@ -5,10 +5,10 @@
 
 #include <cmath>
 #include <fstream>
-#include <random>
 #include <string>
 
 #include "bad_text.h"
+#include "mutated_text.h"
 
 namespace stridewire {
 namespace {
@@ -288,40 +288,10 @@ void ExpectWithinLimits(const Choreography& choreography) {
 }
 
 TEST(ParseChoreography, SurvivesMutatedText) {
-  const std::uint64_t seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937_64 random(seed);
-  const auto below = [&random](std::size_t n) { return random() % n; };
-  const char* const pieces[] = {"{",     "}",    "[",        "]",        ",",          ":",
-                                "\"",    "null", "-1e308",   "1e9",      "10.0000001", "\\u0000",
-                                "false", "\xc3", "\"step\"", "\"at_m\"", "[[[[[[[[",   "0"};
-  int read_count = 0;
-  int refused_count = 0;
-  for (int round = 0; round < 20'000; ++round) {
-    std::string text = kEverything;
-    for (std::size_t change = 0, changes = 1 + below(3); change < changes; ++change) {
-      const std::size_t at = below(text.size());
-      switch (below(4)) {
-        case 0: text[at] = static_cast<char>(below(256)); break;
-        case 1: text.erase(at, 1 + below(12)); break;
-        case 2: text.insert(at, pieces[below(std::size(pieces))]); break;
-        default: text.insert(at, text.substr(below(text.size()), below(40))); break;
-      }
-    }
-    const Expected<Choreography> read = ParseChoreography(text, "c.json");
-    if (read) {
-      ++read_count;
-      ExpectWithinLimits(*read);
-    } else {
-      ++refused_count;
-      EXPECT_TRUE(read.error().where.starts_with("c.json")) << text;
-      EXPECT_NE(std::string(read.error().text), "") << text;
-      EXPECT_EQ(Describe(read.error()).find_first_of("\r\n"), std::string::npos) << text;
-    }
-    if (::testing::Test::HasFailure()) break;
-  }
-  EXPECT_GT(read_count, 0);  // White space and digits are mutated, too.
-  EXPECT_GT(refused_count, 0);
+  ParseMutated(
+      kEverything, 20'000, "c.json",
+      [](const std::string& text) { return ParseChoreography(text, "c.json"); },
+      ExpectWithinLimits);
 }
 
 class ReadChoreographyFile : public ::testing::Test {

@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 #include <fstream>
-#include <random>
 #include <string>
 
 #include "bad_text.h"
+#include "mutated_text.h"
 
 namespace stridewire {
 namespace {
@@ -76,35 +76,11 @@ TEST(ParseTerrain, TellsFileFieldAndReason) {
 }
 
 TEST(ParseTerrain, SurvivesMutatedText) {
-  const std::uint64_t seed = std::random_device{}();
-  SCOPED_TRACE("seed " + std::to_string(seed));
-  std::mt19937_64 random(seed);
-  const auto below = [&random](std::size_t n) { return random() % n; };
-  const char* const pieces[] = {"{", "}", "[", "]", ",", ":", "\"", "null", "-1e308", "1e9", "0"};
-  int read_count = 0;
-  int refused_count = 0;
-  for (int round = 0; round < 10'000; ++round) {
-    std::string text = kBoth;
-    for (std::size_t change = 0, changes = 1 + below(3); change < changes; ++change) {
-      const std::size_t at = below(text.size());
-      switch (below(4)) {
-        case 0: text[at] = static_cast<char>(below(256)); break;
-        case 1: text.erase(at, 1 + below(12)); break;
-        case 2: text.insert(at, pieces[below(std::size(pieces))]); break;
-        default: text.insert(at, text.substr(below(text.size()), below(40))); break;
-      }
-    }
-    const auto read = ParseTerrain(text, "t.json");
-    if (read) {
-      ++read_count;
-      EXPECT_LE(std::abs((*read)->HeightAt(0.5, 2.5)), kMaxTerrainHeightM);
-    } else {
-      ++refused_count;
-      EXPECT_TRUE(read.error().where.starts_with("t.json")) << text;
-    }
-  }
-  EXPECT_GT(read_count, 0);
-  EXPECT_GT(refused_count, 0);
+  ParseMutated(
+      kBoth, 10'000, "t.json", [](const std::string& text) { return ParseTerrain(text, "t.json"); },
+      [](const auto& terrain) {
+        EXPECT_LE(std::abs(terrain->HeightAt(0.5, 2.5)), kMaxTerrainHeightM);
+      });
 }
 
 TEST(ReadTerrain, ReadsAFileAndTellsWhyNot) {
