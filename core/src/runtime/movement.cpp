@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cell_weights.h"
+#include "pose_kernels.h"
 #include "stridewire/runtime/cardinal_basis.h"
 
 namespace stridewire {
 namespace {
-
-constexpr float kSmallestNorm = 0.1f;
 
 // What goes on faster is no motion of a body. It is cut, so that a join overshoots by 4/27 of it at most.
 constexpr float kMaxJointRadPerS = 20.0f;
@@ -19,23 +19,15 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// A small rotation as a vector, and back. Not of the vector's length exactly, but the same bits everywhere.
+// A small rotation as a vector. Not of the vector's length exactly, but the same bits everywhere.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
 }
-Quat RotationAlong(const Vec3& vector) {
-  return Normalise(Quat(1.0f, 0.5f * vector.x, 0.5f * vector.y, 0.5f * vector.z));
-}
 
-// Catmull-Rom weights of the grid points around a cell, ends by quadratic extrapolation.
-struct CellWeights {
-  int first = 0;  // grid point of weights[0]
-  int count = 0;
-  std::array<float, 4> weights{};
-};
+}  // namespace
 
-CellWeights WeightsAt(double grid_position, int point_count) {
+CellWeights CellWeightsAt(double grid_position, int point_count) {
   const int cell = std::clamp(static_cast<int>(grid_position), 0, point_count - 2);
   const double f = std::clamp(grid_position - cell, 0.0, 1.0);
   if (point_count == 2) return {0, 2, {static_cast<float>(1.0 - f), static_cast<float>(f), 0, 0}};
@@ -63,8 +55,6 @@ CellWeights WeightsAt(double grid_position, int point_count) {
            static_cast<float>(after)}};
 }
 
-}  // namespace
-
 std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
                                       int point) {
   const auto slot = static_cast<std::size_t>(point & 3);
@@ -74,37 +64,25 @@ std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const 
   points_[slot] = point;
 
   const std::size_t n = weights.size();
-  const float* source = &group.grid[static_cast<std::size_t>(point) * n * row_floats];
-  std::fill(row.begin(), row.end(), 0.0f);
-  for (std::size_t e = 0; e < n; ++e) {
-    const float weight = weights[e];
-    const float* example = source + e * row_floats;
-    for (std::size_t i = 0; i < row_floats; ++i) row[i] += weight * example[i];
-  }
-
   const auto padded = static_cast<std::size_t>(layout_.padded_joints);
-  float* x = row.data();
-  float* y = x + padded;
-  float* z = y + padded;
-  float* w = z + padded;
-  for (std::size_t j = 0; j < static_cast<std::size_t>(layout_.joint_count); ++j) {
-    const float norm = std::sqrt(x[j] * x[j] + y[j] * y[j] + z[j] * z[j] + w[j] * w[j]);
-    if (norm >= kSmallestNorm) {
-      x[j] /= norm;
-      y[j] /= norm;
-      z[j] /= norm;
-      w[j] /= norm;
-      continue;
+  const auto joint_count = static_cast<std::size_t>(layout_.joint_count);
+  const float* source = &group.grid[static_cast<std::size_t>(point) * n * row_floats];
+  const std::uint32_t degenerate =
+      kernels::BlendRow(source, weights.data(), n, row_floats, padded, joint_count, row.data());
+  if (degenerate == 0) return row;
+
+  // Rotations that cancel each other have no mean; the largest example is at least a pose.
+  degenerate_count_ += degenerate;
+  const auto largest =
+      static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  const float* example = source + largest * row_floats;
+  for (std::size_t j = 0; j < joint_count; ++j) {
+    float norm_squared = 0.0f;
+    for (std::size_t c = 0; c < 4; ++c) {
+      norm_squared += row[c * padded + j] * row[c * padded + j];
     }
-    // Rotations that cancel each other have no mean; the largest example is at least a pose.
-    ++degenerate_count_;
-    const auto largest = static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) -
-                                                  weights.begin());
-    const float* example = source + largest * row_floats;
-    x[j] = example[j];
-    y[j] = example[padded + j];
-    z[j] = example[2 * padded + j];
-    w[j] = example[3 * padded + j];
+    if (norm_squared > 0.5f) continue;  // Unit: it was not one of them.
+    for (std::size_t c = 0; c < 4; ++c) row[c * padded + j] = example[c * padded + j];
   }
   return row;
 }
@@ -205,63 +183,94 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
   out.rotations[0] = YawRotation(movement.base.heading_rad + root[3]) * out.rotations[0];
 }
 
+namespace {
+
+// One pose of a batch: what BlendPoses needs to know of it, and where it goes.
+struct BlendJob {
+  const MotionGroup& group;
+  const Movement& movement;
+  double time_s;
+  GridCache& cache;
+  bool is_eased;  // with the difference pose
+  PoseSpan out;
+};
+
+// At most kernels::kBlock poses. Whatever they are batched with, they are the same bytes.
+void BlendPoses(const GridLayout& layout, std::span<const BlendJob> jobs) {
+  std::array<DVec3, kernels::kBlock> positions;
+  std::array<double, 2 * kernels::kBlock> angles_rad;  // of the base, and half of the root's
+  std::array<double, 2 * kernels::kBlock> sines;
+  std::array<double, 2 * kernels::kBlock> cosines;
+  std::array<double, kernels::kBlock> eased;
+  const auto root = static_cast<std::size_t>(layout.root());
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const BlendJob& job = jobs[i];
+    const Movement& movement = job.movement;
+    const double u = movement.warp.GridPosition(job.time_s);
+    const CellWeights cell = CellWeightsAt(u, job.group.grid_point_count);
+    kernels::RotationBlend blend;
+    blend.padded = static_cast<std::size_t>(layout.padded_joints);
+    blend.joint_count = job.out.rotations.size();
+    DVec3 position(0.0);
+    double yaw_rad = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool is_there = static_cast<int>(k) < cell.count;
+      const int point = cell.first + (is_there ? static_cast<int>(k) : 0);
+      const float* row = job.cache.Row(job.group, movement.weights, point).data();
+      blend.rows[k] = row;
+      blend.weights[k] = cell.weights[k];
+      const double weight = cell.weights[k];
+      position += weight * DVec3(row[root], row[root + 1], row[root + 2]);
+      yaw_rad += weight * row[root + 3];
+    }
+    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.duration_s()));
+    positions[i] = position;
+    angles_rad[2 * i] = movement.base.heading_rad;
+    angles_rad[2 * i + 1] = 0.5 * (movement.base.heading_rad + yaw_rad);
+    eased[i] = (job.time_s - movement.entered_s) / movement.ease_out_s;
+    if (job.is_eased && eased[i] < 1.0) {
+      blend.difference = &movement.difference.rotations[0].x;
+      blend.fraction = static_cast<float>(EaseOut(eased[i]));
+      if (movement.is_inertial) {
+        blend.velocity = &movement.difference_velocity.joints_rad_s[0].x;
+        blend.seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i]));
+      }
+    }
+    kernels::BlendRotations(blend, &job.out.rotations[0].x);
+  }
+  kernels::SinCos(angles_rad.data(), 2 * jobs.size(), sines.data(), cosines.data());
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const BlendJob& job = jobs[i];
+    const double sine = sines[2 * i];
+    const double cosine = cosines[2 * i];
+    const DVec3& local = positions[i];
+    Vec3& out = job.out.root_position_m;
+    out = Vec3(job.movement.base.position_m + DVec3(cosine * local.x + sine * local.z, local.y,
+                                                    cosine * local.z - sine * local.x));
+    job.out.rotations[0] = Quat(static_cast<float>(cosines[2 * i + 1]), 0.0f,
+                                static_cast<float>(sines[2 * i + 1]), 0.0f) *
+                           job.out.rotations[0];
+    if (!job.is_eased || !(eased[i] < 1.0)) continue;
+    const Movement& movement = job.movement;
+    out += static_cast<float>(EaseOut(eased[i])) * movement.difference.root_position_m;
+    if (!movement.is_inertial) continue;
+    out += static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i])) *
+           movement.difference_velocity.root_m_s;
+  }
+}
+
+}  // namespace
+
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out) {
-  const double u = movement.warp.GridPosition(time_s);
-  const CellWeights cell = WeightsAt(u, group.grid_point_count);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
-  const auto root = static_cast<std::size_t>(layout.root());
-  std::array<const float*, 4> rows{};
-  for (int k = 0; k < cell.count; ++k) {
-    rows[static_cast<std::size_t>(k)] = cache.Row(group, movement.weights, cell.first + k).data();
-  }
-
-  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    const Quat first(rows[1][3 * padded + j], rows[1][j], rows[1][padded + j],
-                     rows[1][2 * padded + j]);
-    Quat sum(0.0f, 0.0f, 0.0f, 0.0f);
-    for (int k = 0; k < cell.count; ++k) {
-      const float* row = rows[static_cast<std::size_t>(k)];
-      const Quat q(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
-      // Alignment is per grid point, so a track far from the reference may flip between two.
-      const float weight = cell.weights[static_cast<std::size_t>(k)];
-      sum = sum + q * (Dot(first, q) < 0.0f ? -weight : weight);
-    }
-    out.rotations[j] = Normalise(sum);
-  }
-
-  DVec3 position(0.0);
-  double yaw_rad = 0.0;
-  for (int k = 0; k < cell.count; ++k) {
-    const float* row = rows[static_cast<std::size_t>(k)] + root;
-    const double weight = cell.weights[static_cast<std::size_t>(k)];
-    position += weight * DVec3(row[0], row[1], row[2]);
-    yaw_rad += weight * row[3];
-  }
-  yaw_rad += movement.steer_rad * (1.0 - EaseOut(time_s / movement.duration_s()));
-  out.root_position_m =
-      Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, position));
-  out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
+  const BlendJob job{group, movement, time_s, cache, false, out};
+  BlendPoses(layout, std::span(&job, 1));
 }
 
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out) {
-  EvaluateBlend(group, layout, movement, time_s, cache, out);
-  const double s = (time_s - movement.entered_s) / movement.ease_out_s;
-  const auto f = static_cast<float>(EaseOut(s));
-  if (f == 0.0f) return;
-  // M' = f D + M, i.e. r = r_M slerp(1, r_D, f): Add(Scale(f, D), M) without a temporary.
-  out.root_position_m += f * movement.difference.root_position_m;
-  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    out.rotations[j] = out.rotations[j] * SlerpFromIdentity(movement.difference.rotations[j], f);
-  }
-  if (!movement.is_inertial) return;
-  const PoseVelocity& velocity = movement.difference_velocity;
-  const auto seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(s));
-  out.root_position_m += seconds * velocity.root_m_s;
-  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    out.rotations[j] = out.rotations[j] * RotationAlong(seconds * velocity.joints_rad_s[j]);
-  }
+  const BlendJob job{group, movement, time_s, cache, true, out};
+  BlendPoses(layout, std::span(&job, 1));
 }
 
 BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {

@@ -1,0 +1,259 @@
+// Numbers of several avatars or joints at once: what the kernels are written in. Compiled once for each instruction
+// set by pose_kernels.cpp, hence no ordinary guard. Additions, multiplications, divisions, square roots and comparisons
+// alone, each rounded by itself, so that all of them give the same bytes.
+#if defined(STRIDEWIRE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef STRIDEWIRE_LANES_INL_H
+#undef STRIDEWIRE_LANES_INL_H
+#else
+#define STRIDEWIRE_LANES_INL_H
+#endif
+
+#include <cstddef>
+#include <cstring>
+
+#include "hwy/highway.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace stridewire::kernels::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+using FloatTag = hn::CappedTag<float, kBlock>;
+using DoubleTag = hn::CappedTag<double, kBlock / 2>;
+
+struct Mask {
+  hn::Mask<FloatTag> m;
+};
+
+struct Float {
+  hn::Vec<FloatTag> v;
+  Float() = default;
+  HWY_INLINE explicit Float(hn::Vec<FloatTag> value) : v(value) {}
+  // A number is the same in every lane.
+  HWY_INLINE Float(float value) : v(hn::Set(FloatTag(), value)) {}  // NOLINT
+};
+
+HWY_INLINE Float operator+(Float a, Float b) { return Float(hn::Add(a.v, b.v)); }
+HWY_INLINE Float operator-(Float a, Float b) { return Float(hn::Sub(a.v, b.v)); }
+HWY_INLINE Float operator*(Float a, Float b) { return Float(hn::Mul(a.v, b.v)); }
+HWY_INLINE Float operator/(Float a, Float b) { return Float(hn::Div(a.v, b.v)); }
+HWY_INLINE Float operator-(Float a) { return Float(hn::Neg(a.v)); }
+HWY_INLINE Mask operator<(Float a, Float b) { return {hn::Lt(a.v, b.v)}; }
+HWY_INLINE Mask operator>(Float a, Float b) { return {hn::Gt(a.v, b.v)}; }
+HWY_INLINE Mask operator<=(Float a, Float b) { return {hn::Le(a.v, b.v)}; }
+HWY_INLINE Mask operator>=(Float a, Float b) { return {hn::Ge(a.v, b.v)}; }
+HWY_INLINE Mask operator||(Mask a, Mask b) { return {hn::Or(a.m, b.m)}; }
+HWY_INLINE Mask operator&&(Mask a, Mask b) { return {hn::And(a.m, b.m)}; }
+HWY_INLINE Float Select(Mask mask, Float yes, Float no) {
+  return Float(hn::IfThenElse(mask.m, yes.v, no.v));
+}
+HWY_INLINE Float Sqrt(Float a) { return Float(hn::Sqrt(a.v)); }
+HWY_INLINE Float Abs(Float a) { return Float(hn::Abs(a.v)); }
+HWY_INLINE Float Round(Float a) { return Float(hn::Round(a.v)); }
+// Of two numbers neither of which is not one.
+HWY_INLINE Float Max(Float a, Float b) { return Select(a < b, b, a); }
+HWY_INLINE Float Min(Float a, Float b) { return Select(b < a, b, a); }
+HWY_INLINE Float Clamp(Float a, Float low, Float high) { return Min(Max(a, low), high); }
+HWY_INLINE bool Any(Mask mask) { return !hn::AllFalse(FloatTag(), mask.m); }
+
+// Vec3 and Quat of the scalar code, by lanes.
+struct Vec3x {
+  Float x, y, z;
+};
+HWY_INLINE Vec3x operator+(Vec3x a, Vec3x b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+HWY_INLINE Vec3x operator-(Vec3x a, Vec3x b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+HWY_INLINE Vec3x operator*(Vec3x a, Float s) { return {a.x * s, a.y * s, a.z * s}; }
+HWY_INLINE Float Dot(Vec3x a, Vec3x b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+HWY_INLINE Vec3x Cross(Vec3x a, Vec3x b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+HWY_INLINE Vec3x Select(Mask mask, Vec3x yes, Vec3x no) {
+  return {Select(mask, yes.x, no.x), Select(mask, yes.y, no.y), Select(mask, yes.z, no.z)};
+}
+
+struct Quat4 {
+  Float x, y, z, w;
+};
+HWY_INLINE Quat4 operator+(Quat4 a, Quat4 b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
+}
+HWY_INLINE Quat4 operator*(Quat4 a, Float s) { return {a.x * s, a.y * s, a.z * s, a.w * s}; }
+HWY_INLINE Float Dot(Quat4 a, Quat4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
+HWY_INLINE Quat4 Conjugate(Quat4 q) { return {-q.x, -q.y, -q.z, q.w}; }
+HWY_INLINE Quat4 Multiply(Quat4 a, Quat4 b) {
+  return {
+      a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y + a.y * b.w + a.z * b.x - a.x * b.z,
+      a.w * b.z + a.z * b.w + a.x * b.y - a.y * b.x, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
+}
+HWY_INLINE Vec3x Rotate(Quat4 q, Vec3x v) {
+  const Vec3x u = {q.x, q.y, q.z};
+  const Vec3x t = Cross(u, v);
+  return v + (t * q.w + Cross(u, t)) * Float(2.0f);
+}
+HWY_INLINE Quat4 Normalise(Quat4 q) {
+  const Float norm = Sqrt(Dot(q, q));
+  const Mask is_sound = norm > Float(1e-12f);
+  const Float scale = Select(is_sound, Float(1.0f) / norm, Float(0.0f));
+  return {q.x * scale, q.y * scale, q.z * scale, Select(is_sound, q.w * scale, Float(1.0f))};
+}
+
+// Polynomials by interpolation at Chebyshev's nodes; errors below 2e-8, the last digit of a float.
+HWY_INLINE Float AtanOverX(Float square) {  // |x| <= 1
+  Float p = 2.834064299e-03f;
+  p = p * square - Float(1.600503050e-02f);
+  p = p * square + Float(4.258760747e-02f);
+  p = p * square - Float(7.495445443e-02f);
+  p = p * square + Float(1.063675410e-01f);
+  p = p * square - Float(1.420257051e-01f);
+  p = p * square + Float(1.999248358e-01f);
+  p = p * square - Float(3.333306678e-01f);
+  return p * square + Float(1.0f);
+}
+HWY_INLINE Float SinOverX(Float square) {  // |x| <= pi / 2
+  Float p = 2.605019618e-06f;
+  p = p * square - Float(1.980898300e-04f);
+  p = p * square + Float(8.333049779e-03f);
+  p = p * square - Float(1.666665794e-01f);
+  return p * square + Float(1.0f);
+}
+HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
+  Float p = -2.604960852e-07f;
+  p = p * square + Float(2.476005399e-05f);
+  p = p * square - Float(1.388835928e-03f);
+  p = p * square + Float(4.166663609e-02f);
+  p = p * square - Float(4.999999935e-01f);
+  return p * square + Float(1.0f);
+}
+
+// slerp(1, q, fraction) along the short arc. With m = |xyz| / (1 + w), the tangent of a quarter of the angle, half of
+// it is 2 atan m: all that is needed of the sines are even functions, and nothing is divided by a small sine.
+HWY_INLINE Quat4 SlerpFromIdentity(Quat4 q, Float fraction) {
+  const Mask is_long = q.w < Float(0.0f);
+  const Float sign = Select(is_long, Float(-1.0f), Float(1.0f));
+  const Float beside = Float(1.0f) / (Float(1.0f) + Abs(q.w));
+  const Float xx = q.x * q.x + q.y * q.y + q.z * q.z;
+  const Float per_sine = Float(2.0f) * beside * AtanOverX(Min(xx * beside * beside, Float(1.0f)));
+  const Float k = fraction * per_sine;
+  const Float square = xx * k * k;
+  const Float s = sign * k * SinOverX(square);
+  return {q.x * s, q.y * s, q.z * s, CosNearZero(square)};
+}
+
+// Angle of (x, y) in [-pi, pi]; 0 for (0, 0).
+HWY_INLINE Float Atan2(Float y, Float x) {
+  const Float ax = Abs(x);
+  const Float ay = Abs(y);
+  const Mask is_steep = ay > ax;
+  const Float longer = Select(is_steep, ay, ax);
+  const Float slope = Select(longer > Float(0.0f), Select(is_steep, ax, ay) / longer, Float(0.0f));
+  Float angle = slope * AtanOverX(slope * slope);
+  angle = Select(is_steep, Float(1.57079632679f) - angle, angle);
+  angle = Select(x < Float(0.0f), Float(3.14159265359f) - angle, angle);
+  return Select(y < Float(0.0f), -angle, angle);
+}
+
+// Into [-pi, pi].
+HWY_INLINE Float WrapAngle(Float angle) {
+  return angle - Float(6.28318530718f) * Round(angle * Float(0.159154943092f));
+}
+
+// Rotation about +Y by an angle in [-pi, pi].
+HWY_INLINE Quat4 YawRotation(Float yaw) {
+  const Float half = Float(0.5f) * yaw;
+  const Float square = half * half;
+  return {Float(0.0f), half * SinOverX(square), Float(0.0f), CosNearZero(square)};
+}
+
+// Components of the joints from `at` on, which lie `stride` floats apart.
+HWY_INLINE Quat4 LoadParts(const float* at, std::size_t stride) {
+  const FloatTag d;
+  return {Float(hn::LoadU(d, at)), Float(hn::LoadU(d, at + stride)),
+          Float(hn::LoadU(d, at + 2 * stride)), Float(hn::LoadU(d, at + 3 * stride))};
+}
+HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride) {
+  const FloatTag d;
+  hn::StoreU(q.x.v, d, at);
+  hn::StoreU(q.y.v, d, at + stride);
+  hn::StoreU(q.z.v, d, at + 2 * stride);
+  hn::StoreU(q.w.v, d, at + 3 * stride);
+}
+
+// Quaternions x y z w one behind the other; of the last lanes only `left` are there.
+HWY_INLINE Quat4 LoadQuats(const float* at, std::size_t left) {
+  const FloatTag d;
+  HWY_ALIGN float buffer[4 * kBlock] = {};
+  if (left < hn::Lanes(d)) {
+    std::memcpy(buffer, at, left * 4 * sizeof(float));
+    at = buffer;
+  }
+  Quat4 q;
+  hn::LoadInterleaved4(d, at, q.x.v, q.y.v, q.z.v, q.w.v);
+  return q;
+}
+HWY_INLINE void StoreQuats(Quat4 q, float* at, std::size_t left) {
+  const FloatTag d;
+  if (left >= hn::Lanes(d)) {
+    hn::StoreInterleaved4(q.x.v, q.y.v, q.z.v, q.w.v, d, at);
+    return;
+  }
+  HWY_ALIGN float buffer[4 * kBlock];
+  hn::StoreInterleaved4(q.x.v, q.y.v, q.z.v, q.w.v, d, buffer);
+  std::memcpy(at, buffer, left * 4 * sizeof(float));
+}
+HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
+  const FloatTag d;
+  HWY_ALIGN float buffer[3 * kBlock] = {};
+  if (left < hn::Lanes(d)) {
+    std::memcpy(buffer, at, left * 3 * sizeof(float));
+    at = buffer;
+  }
+  Vec3x v;
+  hn::LoadInterleaved3(d, at, v.x.v, v.y.v, v.z.v);
+  return v;
+}
+
+// Sine and cosine with the operations of base/trig.cpp, in their order.
+HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cosine) {
+  const auto number = [d](double value) HWY_ATTR { return hn::Set(d, value); };
+  const auto angle = hn::Load(d, x);
+  const auto k = hn::Round(hn::Mul(angle, number(2.0 / 3.14159265358979323846)));
+  auto r = hn::Sub(angle, hn::Mul(k, number(1.57079632673412561417e+00)));
+  r = hn::Sub(r, hn::Mul(k, number(6.07710050630396597660e-11)));
+  r = hn::Sub(r, hn::Mul(k, number(2.02226624879595063154e-21)));
+  const auto s = hn::Mul(r, r);
+  auto p = number(1.0 / 355687428096000.0);
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 1307674368000.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 6227020800.0));
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 39916800.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 362880.0));
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 5040.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 120.0));
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 6.0));
+  const auto sin = hn::Add(r, hn::Mul(hn::Mul(r, s), p));
+  p = number(1.0 / 20922789888000.0);
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 87178291200.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 479001600.0));
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 3628800.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 40320.0));
+  p = hn::Sub(hn::Mul(p, s), number(1.0 / 720.0));
+  p = hn::Add(hn::Mul(p, s), number(1.0 / 24.0));
+  const auto cos =
+      hn::Add(hn::Sub(number(1.0), hn::Mul(number(0.5), s)), hn::Mul(hn::Mul(s, s), p));
+  // The quadrant: k - 4 round(k / 4) is -2, -1, 0, 1 or 2.
+  const auto quadrant = hn::Sub(k, hn::Mul(number(4.0), hn::Round(hn::Mul(k, number(0.25)))));
+  const auto is_odd = hn::Eq(hn::Abs(quadrant), number(1.0));
+  const auto is_far = hn::Eq(hn::Abs(quadrant), number(2.0));
+  const auto sin_part = hn::IfThenElse(is_odd, cos, sin);
+  const auto cos_part = hn::IfThenElse(is_odd, sin, cos);
+  const auto sin_flips = hn::Or(is_far, hn::Eq(quadrant, number(-1.0)));
+  const auto cos_flips = hn::Or(is_far, hn::Eq(quadrant, number(1.0)));
+  hn::Store(hn::IfThenElse(sin_flips, hn::Neg(sin_part), sin_part), d, sine);
+  hn::Store(hn::IfThenElse(cos_flips, hn::Neg(cos_part), cos_part), d, cosine);
+}
+
+}  // namespace
+}  // namespace stridewire::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // STRIDEWIRE_LANES_INL_H

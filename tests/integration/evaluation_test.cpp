@@ -1,0 +1,209 @@
+// The fast evaluation beside the plain one, and on every instruction set this machine has.
+
+#include <gtest/gtest.h>
+#include <hwy/highway.h>
+
+#include <cstring>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "captured_library.h"
+#include "pose_kernels.h"
+#include "random.h"
+#include "stridewire/base/trig.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/reference_evaluation.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+
+constexpr double kTickS = 1.0 / 60.0;
+
+// Null where captures are missing.
+Library LibraryOf(const std::string& name) {
+  if (name == "Builtin") return OpenLibrary("builtin").value();
+  const std::vector<std::string> subjects = {name == "Subject16" ? "16" : kDebianTakes};
+  return MissingTakes(subjects).empty() ? BuildFromTakes(TakesOf(subjects)) : nullptr;
+}
+
+// Does something with this program's kernels limited to one instruction set.
+class OnlyInstructionSet {
+ public:
+  explicit OnlyInstructionSet(std::int64_t target) { Choose(target); }
+  ~OnlyInstructionSet() { Choose(0); }
+  OnlyInstructionSet(const OnlyInstructionSet&) = delete;
+  OnlyInstructionSet& operator=(const OnlyInstructionSet&) = delete;
+
+ private:
+  static void Choose(std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+// Those compiled in that this machine has; the last is plain C++.
+std::vector<std::int64_t> InstructionSets() {
+  std::vector<std::int64_t> sets;
+  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_NEON}) {
+    if ((hwy::SupportedTargets() & target) != 0) sets.push_back(target);
+  }
+  sets.push_back(HWY_SCALAR);
+  return sets;
+}
+
+// A crowd that is sent here and there, steps and jumps; what it does depends on `seed` alone.
+class Crowd {
+ public:
+  Crowd(Library library, int size, unsigned seed) : library_(std::move(library)), random_(seed) {
+    for (int i = 0; i < size; ++i) {
+      const BaseFrame start{DVec3(3.0 * i, 0.0, random_.Draw(-50.0, 50.0)),
+                            random_.Draw(-20.0, 20.0)};
+      avatars_.emplace_back(library_, start);
+    }
+  }
+
+  void Advance() {
+    for (Avatar& avatar : avatars_) {
+      if (avatar.queue_size() == 0 && random_.Draw(0.0, 1.0) < 0.2) Ask(avatar);
+      avatar.Advance(kTickS);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+
+ private:
+  void Ask(Avatar& avatar) {
+    MovementRequest request{.id = ++id_};
+    const double kind = random_.Draw(0.0, 1.0);
+    if (kind < 0.5) {
+      request.movement = StepRequest{.length_m = random_.Draw(0.1, 0.8)};
+    } else if (kind < 0.8) {
+      request.movement =
+          WalkRequest{.position_m = avatar.base().position_m +
+                                    DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0)),
+                      .heading_rad = random_.Draw(-3.0, 3.0)};
+    } else {
+      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
+    }
+    if (random_.Draw(0.0, 1.0) < 0.2) request.takeover = Takeover::kNow;
+    (void)avatar.Enqueue(request);
+  }
+
+  Library library_;
+  Random random_;
+  std::uint64_t id_ = 0;
+  std::vector<Avatar> avatars_;
+};
+
+void AppendBytes(const Avatar& avatar, std::string& bytes) {
+  const ConstPoseSpan pose = avatar.pose();
+  bytes.append(reinterpret_cast<const char*>(&pose.root_position_m), sizeof(Vec3));
+  bytes.append(reinterpret_cast<const char*>(pose.rotations.data()), pose.rotations.size_bytes());
+}
+
+TEST(Evaluation, SinesAreThoseOfTheScalarCode) {
+  Random random(20261122);
+  for (const std::int64_t set : InstructionSets()) {
+    const OnlyInstructionSet only(set);
+    for (int round = 0; round < 2000; ++round) {
+      std::array<double, 21> angles{};
+      for (double& angle : angles) {
+        const double range = round % 3 == 0 ? 1e5 : round % 3 == 1 ? 10.0 : 1e-3;
+        angle = random.Draw(-range, range);
+      }
+      angles[0] = 0.0;
+      const auto count = static_cast<std::size_t>(1 + round % 21);
+      std::array<double, 21> sines{};
+      std::array<double, 21> cosines{};
+      kernels::SinCos(angles.data(), count, sines.data(), cosines.data());
+      for (std::size_t i = 0; i < count; ++i) {
+        ASSERT_EQ(sines[i], Sin(angles[i])) << angles[i] << " on " << hwy::TargetName(set);
+        ASSERT_EQ(cosines[i], Cos(angles[i])) << angles[i] << " on " << hwy::TargetName(set);
+      }
+    }
+  }
+}
+
+class EvaluationOf : public testing::TestWithParam<std::string> {
+ protected:
+  void SetUp() override {
+    library_ = LibraryOf(GetParam());
+    if (!library_) GTEST_SKIP() << "no captures for " << GetParam();
+  }
+  Library library_;
+};
+
+TEST_P(EvaluationOf, IsTheReference) {
+  constexpr unsigned kSeed = 1;
+  Crowd crowd(library_, 20, kSeed);
+  Pose fast(library_->skeleton().joint_count());
+  Pose reference(library_->skeleton().joint_count());
+  Pose sampled(library_->skeleton().joint_count());
+  GridCache cache(library_->layout());
+  double largest_m = 0.0;
+  double largest_rad = 0.0;
+  double sampled_rad = 0.0;
+  int poses = 0;
+  for (int tick = 0; tick < 600; ++tick) {
+    crowd.Advance();
+    for (const Avatar& avatar : crowd.avatars()) {
+      const Movement* movement = avatar.movement();
+      if (movement == nullptr) continue;
+      const MotionGroup& group = library_->group(movement->group);
+      cache.Clear();
+      EvaluateMovement(group, library_->layout(), *movement, avatar.movement_time_s(), cache, fast);
+      EvaluateMovementByReference(group, library_->layout(), *movement, avatar.movement_time_s(),
+                                  reference);
+      EvaluateMovementBySampling(group, library_->layout(), *movement, avatar.movement_time_s(),
+                                 sampled);
+      const Vec3 apart = fast.root_position_m - reference.root_position_m;
+      largest_m = std::max(largest_m, static_cast<double>(glm::length(apart)));
+      largest_rad = std::max(largest_rad, LargestJointAngle(fast, reference));
+      sampled_rad = std::max(sampled_rad, LargestJointAngle(sampled, reference));
+      ++poses;
+    }
+  }
+  std::printf("%s: %d poses: %.2g m, %.2g rad from the reference; sampled %.2g rad\n",
+              GetParam().c_str(), poses, largest_m, largest_rad, sampled_rad);
+  EXPECT_GT(poses, 4000);
+  EXPECT_LT(largest_m, 1e-5) << "seed " << kSeed;
+  EXPECT_LT(largest_rad, 1e-5) << "seed " << kSeed;
+  // Blending before interpolating, or after: two ways to the same pose, nearly.
+  EXPECT_LT(sampled_rad, 0.3) << "seed " << kSeed;
+}
+
+TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
+  constexpr unsigned kSeed = 7;
+  std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick]
+  for (const std::int64_t set : InstructionSets()) {
+    const OnlyInstructionSet only(set);
+    Crowd crowd(library_, 24, kSeed);
+    std::vector<std::string>& ticks = bytes[hwy::TargetName(set)];
+    for (int tick = 0; tick < 300; ++tick) {
+      crowd.Advance();
+      ticks.emplace_back();
+      for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, ticks.back());
+    }
+  }
+  std::printf("instruction sets compared:");
+  for (const auto& [set, ticks] : bytes) {
+    std::printf(" %s", set.c_str());
+    for (std::size_t tick = 0; tick < ticks.size(); ++tick) {
+      ASSERT_TRUE(ticks[tick] == bytes.begin()->second[tick])
+          << set << " differs from " << bytes.begin()->first << " from tick " << tick << ", seed "
+          << kSeed;
+    }
+  }
+  std::printf("\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(Libraries, EvaluationOf,
+                         testing::Values("Builtin", "Subject01", "Subject16"),
+                         [](const auto& tested) { return tested.param; });
+
+}  // namespace
+}  // namespace stridewire
