@@ -53,6 +53,9 @@ void Avatar::Teleport(const BaseFrame& start) {
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
   closing_steps_ = 0;
   blended_pose_ = pose_;
+  moved_until_s_ = -1.0;
+  plants_feet_ = foot_planting();
+  begins_planting_ = false;
   if (PlantsFeet()) {
     holds_ = HoldsOf(library_->skeleton(), library_->leg_rig(), pose_, start.position_m.y,
                      options_.terrain.get());
@@ -74,9 +77,7 @@ Status Avatar::Enqueue(const MovementRequest& request) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
   }
   if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->must_be_met) {
-    if (!PlantsFeet()) {
-      return Fail(ErrorCode::kUnsupported, "feet are not planted: no footprint is sure to be met");
-    }
+    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
     if (kept_pose_.rotations.empty()) {
       kept_pose_ = Pose(library_->skeleton().joint_count());
       MakeRoom(*library_, kept_movement_);
@@ -93,6 +94,14 @@ Status Avatar::Enqueue(const MovementRequest& request) {
     queue_head_ = 0;
   }
   queue_.push_back(request);
+  return {};
+}
+
+Status Avatar::SetFootPlanting(bool is_on) {
+  if (is_on && !library_->leg_rig().is_usable) {
+    return Fail(ErrorCode::kUnsupported, "the library's legs are not such as can be planted");
+  }
+  options_.foot_planting = is_on;
   return {};
 }
 
@@ -187,6 +196,7 @@ bool Avatar::StartNext() {
   if (is_walking_ && (is_empty || stand != nullptr)) {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
+    SwitchPlanting();
     const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
     if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
       StartInserted(*plan);
@@ -202,6 +212,7 @@ bool Avatar::StartNext() {
   }
 
   is_idle_reported_ = false;
+  if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
     GoOnWalking();
     return true;
@@ -359,6 +370,9 @@ void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
     PlanFeet(*library_, holds_, {plan, options_.terrain.get(), base_.position_m},
              {blended_pose_, earlier}, cache_, pose_, movement_);
     KeepFeetGoing(keeps_speed);
+    if (begins_planting_) {
+      SettleFrom(library_->skeleton(), library_->leg_rig(), blended_pose_, movement_, pose_);
+    }
   } else {
     // D = P - M, with P what is displayed.
     movement_.feet.is_active = false;
@@ -380,6 +394,7 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
                       movement_.feet.missed_m == DVec3(0.0) && movement_.feet.missed_rad == 0.0;
 
   is_moving_ = true;
+  begins_planting_ = false;
   is_exact_ = plan.exact.has_value();
   closing_steps_ = 0;
   is_idle_reported_ = false;
@@ -414,6 +429,7 @@ void Avatar::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, movement_).release_s;
   KeepJoin(at_s);
+  movement_time_s_ = at_s;
   // Without planting the base is the root's own and rises by what the library says.
   const BaseFrame before = base_;
   base_ = BaseAfter(movement_, pose_);
@@ -422,6 +438,9 @@ void Avatar::FinishMovement(double at_s) {
   if (movement_.feet.is_active) {
     if (!is_exact_) KeepToLine(before.position_m);
     holds_ = HoldsAt(*library_, movement_, at_s, blended_pose_);
+    if (begins_planting_) {
+      for (FootHold& hold : holds_) hold.height_m = hold.turn_rad = 0.0;
+    }
     const auto& left = holds_[0].print.position_m;
     const auto& right = holds_[1].print.position_m;
     if (IsStep(finished.kind)) {

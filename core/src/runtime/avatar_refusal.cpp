@@ -53,6 +53,13 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
     PlanMovement(plan, swing_part);
     return true;
   }
+  if (!PlantsFeet()) {
+    AddEvent({.type = AvatarEventType::kRejected,
+              .request_id = request.id,
+              .base = base_,
+              .reason = kNotPlanted});
+    return false;
+  }
   kept_pose_ = pose_;  // of the same size: no allocation
   std::swap(movement_, kept_movement_);
   PlanMovement(plan, swing_part);

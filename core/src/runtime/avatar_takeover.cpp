@@ -4,6 +4,7 @@
 
 #include "stridewire/base/check.h"
 #include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/contact_keytimes.h"
 
 namespace stridewire {
 
@@ -21,7 +22,7 @@ double Avatar::EndOfMovement() const {
 
 // The foot in the air is the one that the request at the queue's head moves, and far from landing.
 bool Avatar::RedirectsSwing() const {
-  if (!takes_over_ || !IsStep(group().kind)) return false;
+  if (!takes_over_ || !IsStep(group().kind) || plants_feet_ != foot_planting()) return false;
   const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);
   if (step == nullptr ||
       step->foot.value_or(MovingFoot(group().kind)) != MovingFoot(group().kind)) {
@@ -49,6 +50,22 @@ void Avatar::KeepJoin(double time_s) {
   }
   Evaluate(time_s);
   earlier_feet_[0] = corrections(time_s);
+  // Planting that has not set in yet sets in anew.
+  begins_planting_ =
+      movement_.feet.is_active && time_s < movement_.entered_s + movement_.feet.settle_s;
+  if (begins_planting_) TakeForBlended(time_s);
+}
+
+// What is displayed at a time of the movement is taken for what the blend has then: whatever of it is to end is
+// eased out, and feet need no correction.
+void Avatar::TakeForBlended(double time_s) {
+  if (moved_until_s_ == time_s_) {
+    Evaluate(time_s - kJoinStepS);
+    earlier_pose_ = pose_;
+    Evaluate(time_s);
+  }
+  blended_pose_ = pose_;
+  earlier_feet_ = {};
 }
 
 // A step of the foot in the air takes over from the step under way, at the same part of the swing. One that may
@@ -72,6 +89,27 @@ void Avatar::RedirectSwing() {
   if (!PlanRequested(request, *plan, part)) return;
   AddEvent(left);
   BeginMovement(*plan, request.id);
+}
+
+// Before a movement is planned that feet are planted in as they were not before, or the other way round.
+void Avatar::SwitchPlanting() {
+  if (plants_feet_ == foot_planting()) return;
+  plants_feet_ = begins_planting_ = foot_planting();
+  TakeForBlended(movement_time_s_);
+  if (!plants_feet_) return;
+  const Skeleton& skeleton = library_->skeleton();
+  const LegRig& rig = library_->leg_rig();
+  const Terrain* terrain = options_.terrain.get();
+  holds_ = HoldsOf(skeleton, rig, pose_, base_.position_m.y, terrain);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    FootHold& hold = holds_[static_cast<std::size_t>(foot)];
+    hold.height_m = 0.0;
+    hold.normal = Vec3(0.0f, 1.0f, 0.0f);
+    if (terrain != nullptr) continue;
+    // Level, but for feet on different steps of stairs.
+    const double stands_m = BallPosition(skeleton, pose_, foot).y - rig.side(foot).ball_height_m;
+    hold.print.position_m.y += GroundRise(stands_m - base_.position_m.y);
+  }
 }
 
 // The corrections of the movement just planned go on from those before it.

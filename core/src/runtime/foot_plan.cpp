@@ -238,6 +238,24 @@ double LiftOutOfGround(const FootTrack& track, double time_s, const LegRig::Side
   return lift_m;
 }
 
+std::array<std::size_t, 3> JointsOf(const LegRig::Side& side) {
+  const auto joint = [&](int place) {
+    return static_cast<std::size_t>(side.chain[static_cast<std::size_t>(place)]);
+  };
+  return {joint(side.hip), joint(side.knee), joint(side.ankle)};
+}
+
+void Unsettle(const LegRig& rig, const FootPlan& plan, float part, PoseSpan pose) {
+  pose.root_position_m += part * plan.settle_root_m;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto joints = JointsOf(rig.sides[f]);
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      Quat& rotation = pose.rotations[joints[i]];
+      rotation = rotation * SlerpFromIdentity(plan.settle_rotations[f][i], part);
+    }
+  }
+}
+
 }  // namespace
 
 void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement, double time_s,
@@ -252,6 +270,8 @@ void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& move
   };
   std::array<Side, 2> sides;
   const DVec3 root = DVec3(pose.root_position_m);
+  const double settled =
+      plan.settle_s > 0.0 ? 1.0 - EaseOut((time_s - movement.entered_s) / plan.settle_s) : 1.0;
   DVec3 shift(0.0);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Side& side = sides[static_cast<std::size_t>(foot)];
@@ -261,8 +281,8 @@ void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& move
     side.turn = TurnOf(side.correction);
     if (plan.keeps_above_ground) {
       side.correction.offset_m.y +=
-          LiftOutOfGround(plan.foot(foot), time_s, rig.side(foot), side.leg,
-                          blended.ball_m + side.correction.offset_m, side.turn);
+          settled * LiftOutOfGround(plan.foot(foot), time_s, rig.side(foot), side.leg,
+                                    blended.ball_m + side.correction.offset_m, side.turn);
     }
     const Vec3 ankle = side.leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)];
     side.ankle_m =
@@ -300,6 +320,26 @@ void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& move
     const auto ankle = static_cast<std::size_t>(bones.ankle);
     const auto target = Vec3(side.ankle_m - moved);
     SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
+  }
+  if (settled < 1.0) Unsettle(rig, plan, static_cast<float>(1.0 - settled), pose);
+}
+
+void SettleFrom(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan displayed,
+                Movement& movement, PoseSpan pose) {
+  FootPlan& plan = movement.feet;
+  pose.root_position_m = displayed.root_position_m;
+  std::ranges::copy(displayed.rotations, pose.rotations.begin());
+  plan.settle_s = movement.ease_out_s;
+  plan.settle_root_m = Vec3(0.0f);
+  for (auto& leg : plan.settle_rotations) leg.fill(kIdentityQuat);
+  PlantFeet(skeleton, rig, movement, movement.entered_s, pose);
+  plan.settle_root_m = displayed.root_position_m - pose.root_position_m;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto joints = JointsOf(rig.sides[f]);
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      plan.settle_rotations[f][i] =
+          glm::conjugate(pose.rotations[joints[i]]) * displayed.rotations[joints[i]];
+    }
   }
 }
 

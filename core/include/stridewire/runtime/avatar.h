@@ -64,7 +64,7 @@ struct AvatarEvent {
 struct AvatarOptions {
   /// Movements start with corrected parameters (CorrectParameters), so that they have those applied.
   bool run_time_correction = true;
-  /// Feet stand still where they land (PlanFeet); off, they are where the blend has them.
+  /// Feet stand still where they land (PlanFeet); off, they are where the blend has them. See SetFootPlanting.
   bool foot_planting = true;
   /// How movements begin.
   JoinKind join = JoinKind::kInertial;
@@ -107,6 +107,15 @@ class Avatar {
   /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
   void Teleport(const BaseFrame& start);
 
+  /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without a jump. A swing is
+  /// not sent elsewhere meanwhile, and what waits in the queue for a footprint that must be met is rejected while it
+  /// is off. kUnsupported: to be on, but the library's legs are not such as can be planted.
+  [[nodiscard]] Status SetFootPlanting(bool is_on);
+  /// As last set; false where the library's legs can not.
+  [[nodiscard]] bool foot_planting() const {
+    return options_.foot_planting && library_->leg_rig().is_usable;
+  }
+
   /// Changes the ground. Feet that stand stay where they are until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
 
@@ -139,11 +148,12 @@ class Avatar {
   }
 
  private:
+  static constexpr const char* kNotPlanted = "feet are not planted: no footprint is sure to be met";
+
   void AddEvent(const AvatarEvent& event);
   [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
-  [[nodiscard]] bool PlantsFeet() const {
-    return options_.foot_planting && library_->leg_rig().is_usable;
-  }
+  /// What is displayed has planted feet, or would.
+  [[nodiscard]] bool PlantsFeet() const { return plants_feet_; }
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
   void ShowLayers();
@@ -167,6 +177,8 @@ class Avatar {
   [[nodiscard]] double Landed() const;
   [[nodiscard]] bool RedirectsSwing() const;
   void RedirectSwing();
+  void SwitchPlanting();
+  void TakeForBlended(double time_s);
   void KeepJoin(double time_s);
   void KeepFeetGoing(bool keeps_speed);
   void FinishMovement(double at_s);
@@ -197,6 +209,8 @@ class Avatar {
   bool is_idle_reported_ = false;
   bool is_walking_ = false;       // a step left the feet apart: close before standing
   bool takes_over_ = false;       // the request at the queue's head does not wait for the end
+  bool plants_feet_ = false;      // as foot_planting() when the movement under way began
+  bool begins_planting_ = false;  // the movement that begins next is the first planted
   bool is_exact_ = false;         // the step under way lands where it was sent
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
   std::uint64_t request_id_ = 0;  // of the movement or stand under way

@@ -66,6 +66,12 @@ struct FootPlan {
   /// On terrain: soles are lifted out of the ground they leave and land on. Level ground the blend
   /// itself keeps to within what the examples do, and knees move less.
   bool keeps_above_ground = false;
+  /// What was displayed before had no feet planted: soles come out of the ground, and what else planting changes at
+  /// once (a root lower so that legs bend) sets in, over this long.
+  double settle_s = 0.0;
+  Vec3 settle_root_m = Vec3(0.0f);  ///< What was displayed less what planting makes of it
+  std::array<std::array<Quat, 3>, 2>
+      settle_rotations{};  ///< The same of hip, knee and ankle, by Foot
   bool is_active = false;
   DVec3 missed_m = DVec3(0.0);  ///< From where a step lands to where it was asked to, horizontally
   double missed_rad = 0.0;      ///< The same for the foot's heading
@@ -120,6 +126,11 @@ struct FeetCorrection {
 /// same twice: from rest.
 void GoOnFrom(const std::array<FeetCorrection, 2>& before,
               const std::array<FeetCorrection, 2>& planned, Movement& movement);
+
+/// Makes a movement whose feet are planned set in from a pose that was displayed when it was entered and had no feet
+/// planted, the blended and eased one of that time. `pose` is scratch of its size.
+void SettleFrom(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan displayed,
+                Movement& movement, PoseSpan pose);
 
 /// A foot of a pose with its root at `root_m`.
 [[nodiscard]] BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m,

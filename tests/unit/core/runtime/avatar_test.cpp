@@ -228,6 +228,9 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
   ASSERT_TRUE(library.has_value());
   ASSERT_FALSE((*library)->leg_rig().is_usable);
   Avatar avatar(*library, {});
+  EXPECT_FALSE(avatar.foot_planting());
+  EXPECT_EQ(avatar.SetFootPlanting(true).error().code, ErrorCode::kUnsupported);
+  EXPECT_TRUE(avatar.SetFootPlanting(false).has_value());
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
   for (int i = 0; i < 200; ++i) avatar.Advance(kTickS);
   EXPECT_TRUE(avatar.idle());
