@@ -157,8 +157,10 @@ class Crowd {
   void Advance() {
     for (Avatar& avatar : avatars_) {
       if (avatar.queue_size() < 2) Refill(avatar);
-      avatar.Advance(kTickS);
     }
+    all_.clear();
+    for (Avatar& avatar : avatars_) all_.push_back(&avatar);
+    Avatar::AdvanceAll(all_, kTickS);
   }
 
   [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
@@ -173,6 +175,7 @@ class Crowd {
 
   std::mt19937 random_{1};
   std::vector<Avatar> avatars_;
+  std::vector<Avatar*> all_;
 };
 
 void AdvanceCrowd(benchmark::State& state, const Library& library, bool plants_feet) {

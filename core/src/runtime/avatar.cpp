@@ -62,7 +62,7 @@ void Avatar::Teleport(const BaseFrame& start) {
     StandOn(holds_, movement_);
     earlier_feet_[0] =
         CorrectFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, blended_pose_);
-    PlantFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, pose_);
+    PlantFeet(library_->leg_rig(), movement_, 0.0, pose_);
   }
   feet_ = stand_feet_;
   last_group_ = library_->groups().size();
@@ -126,13 +126,44 @@ FootState Avatar::MeasureFeet() const {
   return {FootVector(library_->skeleton(), pose_, Foot::kLeft, base_.heading_rad)};
 }
 
+PoseJob Avatar::JobAt(double time_s) {
+  return {&movement_, time_s, &cache_, &blended_pose_, &pose_};
+}
+
 void Avatar::Evaluate(double time_s) {
-  EvaluateMovement(group(), library_->layout(), movement_, time_s, cache_, blended_pose_);
-  pose_ = blended_pose_;  // of the same size: no allocation
-  PlantFeet(library_->skeleton(), library_->leg_rig(), movement_, time_s, pose_);
+  const PoseJob job = JobAt(time_s);
+  EvaluatePoses(*library_, std::span(&job, 1));
 }
 
 void Avatar::Advance(double dt_s) {
+  Avatar* self = this;
+  AdvanceAll(std::span(&self, 1), dt_s);
+}
+
+void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
+  // Few enough that what one pass brings into the nearest cache is there for the next.
+  constexpr std::size_t kAtOnce = 16;
+  std::array<PoseJob, kAtOnce> jobs;
+  while (!avatars.empty()) {
+    const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), kAtOnce));
+    const MotionLibrary& library = *block.front()->library_;
+    std::size_t moving = 0;
+    for (Avatar* avatar : block) {
+      STRIDEWIRE_CHECK(avatar->library_.get() == &library);
+      avatar->AdvanceState(dt_s);
+      if (avatar->is_moving_) jobs[moving++] = avatar->JobAt(avatar->movement_time_s_);
+    }
+    EvaluatePoses(library, std::span(jobs).first(moving));
+    for (Avatar* avatar : block) {
+      avatar->layers_.Advance(library, dt_s);
+      avatar->ShowLayers();
+    }
+    avatars = avatars.subspan(block.size());
+  }
+}
+
+// All of Advance but the pose at its end.
+void Avatar::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   event_count_ = 0;
   const double end_s = time_s_ + dt_s;
@@ -170,9 +201,6 @@ void Avatar::Advance(double dt_s) {
     if (!may_change || !StartNext()) break;
   }
   time_s_ = end_s;
-  if (is_moving_) Evaluate(movement_time_s_);
-  layers_.Advance(*library_, dt_s);
-  ShowLayers();
 }
 
 void Avatar::ShowLayers() {
@@ -371,8 +399,9 @@ void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
              {blended_pose_, earlier}, cache_, pose_, movement_);
     KeepFeetGoing(keeps_speed);
     if (begins_planting_) {
-      SettleFrom(library_->skeleton(), library_->leg_rig(), blended_pose_, movement_, pose_);
+      SettleFrom(library_->leg_rig(), blended_pose_, movement_, pose_);
     }
+    movement_.feet.packed = PackFootPlan(movement_);
   } else {
     // D = P - M, with P what is displayed.
     movement_.feet.is_active = false;
@@ -483,7 +512,7 @@ void Avatar::ReportFootStrikes(double before_s, double after_s) {
   const double strike_s =
       movement_.keytimes_s[ContactKeytimesOf(moving.kind, moving.interval_count()).landing];
   if (!(before_s < strike_s && strike_s <= after_s)) return;
-  Evaluate(strike_s);
+  if (!movement_.feet.is_active) Evaluate(strike_s);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     if (IsStep(moving.kind) && foot != MovingFoot(moving.kind)) continue;
     AddEvent({.type = AvatarEventType::kFootStrike,

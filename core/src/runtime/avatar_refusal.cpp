@@ -132,7 +132,7 @@ FootprintMiss Avatar::MissOf(const Footprint& asked) {
       planned[f].ball_m +=
           CorrectFoot(movement_, static_cast<Foot>(f), time_s, planned[f]).offset_m;
     }
-    PlantFeet(skeleton, rig, movement_, time_s, pose_);
+    PlantFeet(rig, movement_, time_s, pose_);
     const std::array<BlendedFoot, 2> lands = feet_of_pose();
     DVec3 off_m = lands[m].ball_m - planned[m].ball_m;
     const DVec3 from_other_m = off_m - (lands[x].ball_m - planned[x].ball_m);

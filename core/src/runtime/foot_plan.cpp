@@ -3,21 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "foot_plant_constants.h"
+#include "pose_kernels.h"
 #include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 namespace {
-
-// A leg may always be as long as the blend has it, and anyway this part of its length.
-constexpr double kEasyExtension = 0.995;
-constexpr double kLongestExtension = 0.999;
-// Roundness of the maxima below: the root goes down softly.
-constexpr double kSoftM = 0.002;
-constexpr double kSoftLowerM = 0.01;
-constexpr double kSoftGroundM = 0.006;
-// A foot this near to a print is kept out of its ground wholly, and this far from it not at all.
-constexpr double kNearPrintM = 0.15;
-constexpr double kFarFromPrintM = 0.35;
 
 // Cubic with given values and slopes at both ends of [0, length].
 DVec3 Hermite(const DVec3& p0, const DVec3& v0, const DVec3& p1, const DVec3& v1, double length_s,
@@ -43,17 +34,14 @@ double SwingAt(const FootTrack& track, double time_s) {
 // Eased from 0 to 1 within the window [from, to] of the swing: a foot that climbs rises early, one
 // that descends sinks late.
 double RiseAt(double swing, double rise_m) {
-  const double from = rise_m > 0.0 ? 0.0 : 0.35;
-  const double to = rise_m > 0.0 ? 0.65 : 1.0;
-  return 1.0 - EaseOut((swing - from) / (to - from));
+  const double from = rise_m > 0.0 ? 0.0 : kSinkFrom;
+  return 1.0 - EaseOut((swing - from) / (1.0 - kSinkFrom));
 }
 
 // How far a standing foot's heading is held: wholly with the sole down, not at all with the heel up,
 // where the foot is too short from above to have one.
 double HoldOf(double flatness) {
-  constexpr double kUp = 0.5;
-  constexpr double kDown = 0.8;
-  return 1.0 - EaseOut((flatness - kUp) / (kDown - kUp));
+  return 1.0 - EaseOut((flatness - kHeelUp) / (kSoleDown - kHeelUp));
 }
 
 double AsideAt(double swing) {
@@ -83,8 +71,7 @@ DVec3 RootRest(const Movement& movement, double time_s) {
 }  // namespace
 
 double LiftShare(double swing) {
-  constexpr double kEnds = 0.35;
-  return (1.0 - EaseOut(swing / kEnds)) * EaseOut((swing - (1.0 - kEnds)) / kEnds);
+  return (1.0 - EaseOut(swing / kLiftEnds)) * EaseOut((swing - (1.0 - kLiftEnds)) / kLiftEnds);
 }
 
 Quat TurnOf(const FootCorrection& correction) {
@@ -228,7 +215,7 @@ double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Sid
 // How much higher a foot must be so that its sole is not below the ground it leaves or lands on.
 double LiftOutOfGround(const FootTrack& track, double time_s, const LegRig::Side& side,
                        const LegPose& leg, const DVec3& ball, const Quat& turn) {
-  const double second = 1.0 - EaseOut((SwingAt(track, time_s) - 0.3) / 0.4);
+  const double second = 1.0 - EaseOut((SwingAt(track, time_s) - kGroundFrom) / kGroundOver);
   double lift_m = 0.0;
   if (second < 1.0) {
     lift_m += (1.0 - second) * DepthBelow(track.from, track.normals[0], side, leg, ball, turn);
@@ -245,7 +232,12 @@ std::array<std::size_t, 3> JointsOf(const LegRig::Side& side) {
   return {joint(side.hip), joint(side.knee), joint(side.ankle)};
 }
 
-void Unsettle(const LegRig& rig, const FootPlan& plan, float part, PoseSpan pose) {
+}  // namespace
+
+void Unsettle(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
+  const FootPlan& plan = movement.feet;
+  if (!(time_s < movement.entered_s + plan.settle_s)) return;
+  const auto part = static_cast<float>(EaseOut((time_s - movement.entered_s) / plan.settle_s));
   pose.root_position_m += part * plan.settle_root_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
@@ -256,10 +248,8 @@ void Unsettle(const LegRig& rig, const FootPlan& plan, float part, PoseSpan pose
   }
 }
 
-}  // namespace
-
-void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement, double time_s,
-               PoseSpan pose) {
+void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
+                          double time_s, PoseSpan pose) {
   const FootPlan& plan = movement.feet;
   if (!plan.is_active) return;
   struct Side {
@@ -321,18 +311,17 @@ void PlantFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& move
     const auto target = Vec3(side.ankle_m - moved);
     SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
   }
-  if (settled < 1.0) Unsettle(rig, plan, static_cast<float>(1.0 - settled), pose);
+  Unsettle(rig, movement, time_s, pose);
 }
 
-void SettleFrom(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan displayed,
-                Movement& movement, PoseSpan pose) {
+void SettleFrom(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose) {
   FootPlan& plan = movement.feet;
   pose.root_position_m = displayed.root_position_m;
   std::ranges::copy(displayed.rotations, pose.rotations.begin());
   plan.settle_s = movement.ease_out_s;
   plan.settle_root_m = Vec3(0.0f);
   for (auto& leg : plan.settle_rotations) leg.fill(kIdentityQuat);
-  PlantFeet(skeleton, rig, movement, movement.entered_s, pose);
+  PlantFeet(rig, movement, movement.entered_s, pose);
   plan.settle_root_m = displayed.root_position_m - pose.root_position_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
@@ -341,6 +330,54 @@ void SettleFrom(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan displ
           glm::conjugate(pose.rotations[joints[i]]) * displayed.rotations[joints[i]];
     }
   }
+}
+
+PackedFootPlan PackFootPlan(const Movement& movement) {
+  const FootPlan& plan = movement.feet;
+  const DVec3& base = movement.base.position_m;
+  PackedFootPlan packed{};
+  std::size_t at = 0;
+  const auto add = [&](const DVec3& v, double w) {
+    for (const double value : {v.x, v.y, v.z, w}) packed[at++] = static_cast<float>(value);
+  };
+  for (std::size_t f = 0; f < 2; ++f) {
+    const FootTrack& track = plan.feet[f];
+    const FootRest& rest = plan.rests[f];
+    add(track.from.position_m - base, WrapAngle(track.from.heading_rad));
+    add(track.to.position_m - base, WrapAngle(track.to.heading_rad));
+    add(track.release_offset_m, track.release_turn_rad);
+    add(track.release_velocity_m_s, track.root_weight);
+    add(track.land_offset_m, track.lift_m);
+    add(track.land_velocity_m_s, rest.turn_rad);
+    add(track.aside_m, rest.turn_rad_s);
+    add({track.height_m[0], track.height_m[1], track.height_m[2]}, rest.over_s);
+    add({track.turn_rad[0], track.turn_rad[1], track.turn_rad[2]}, track.release_s);
+    add(DVec3(track.normals[0]), track.land_s);
+    add(DVec3(track.normals[1]), 0.0);
+    add(rest.offset_m, 0.0);
+    add(rest.offset_m_s, 0.0);
+    add(track.root_shift_m, 0.0);
+  }
+  add(plan.root_rest_m, movement.steer_rad);
+  add(plan.root_rest_m_s, movement.duration_s());
+  add({movement.entered_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
+      plan.settle_s);
+  return packed;
+}
+
+void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
+  if (!movement.feet.is_active) return;
+  const PackedFootPlan plan = PackFootPlan(movement);
+  const DVec3& base = movement.base.position_m;
+  float* root = &pose.root_position_m.x;
+  const kernels::PlantJob job{.plan = plan.data(),
+                              .time_s = time_s,
+                              .base_m = {base.x, base.y, base.z},
+                              .root_m = root,
+                              .rotations = &pose.rotations[0].x,
+                              .root_out_m = root};
+  kernels::PlantPoses(rig, &job, 1);
+  Unsettle(rig, movement, time_s, pose);
 }
 
 }  // namespace stridewire

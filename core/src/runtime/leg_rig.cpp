@@ -3,18 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "foot_plant_constants.h"
 #include "stridewire/base/trig.h"
 
 namespace stridewire {
 namespace {
-
-constexpr float kSmallestBoneM = 1e-3f;
-
-// Below the smaller sine of the knee's bend its plane says nothing and the figure's own left-right
-// axis takes over; above the larger the plane alone counts.
-constexpr float kStraightSine = 0.04f;
-constexpr float kBentSine = 0.14f;
-constexpr float kReferenceWeight = 0.1f;
 
 int PlaceOf(const std::vector<int>& chain, int joint) {
   const auto it = std::find(chain.begin(), chain.end(), joint);
@@ -39,6 +32,34 @@ Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Quat& hip_rotation) {
   const float forward = glm::dot(plane, reference) < 0.0f ? 0.0f : 1.0f;
   const float weight = forward > 0.0f ? s * s * (3.0f - 2.0f * s) : 1.0f;
   return forward * plane + kReferenceWeight * weight * reference;
+}
+
+void Copy(const Vec3& from, float (&to)[3]) {
+  to[0] = from.x;
+  to[1] = from.y;
+  to[2] = from.z;
+}
+
+LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& side) {
+  LegRig::Bones bones;
+  bones.count = side.chain.size();
+  for (std::size_t i = 0; i < bones.count; ++i) {
+    bones.joints[i] = static_cast<std::size_t>(side.chain[i]);
+    Copy(skeleton.joints[bones.joints[i]].offset_m, bones.offsets_m[i]);
+  }
+  bones.hip = static_cast<std::size_t>(side.hip);
+  bones.knee = static_cast<std::size_t>(side.knee);
+  bones.ankle = static_cast<std::size_t>(side.ankle);
+  Copy(skeleton.leg(foot).ball_offset_m, bones.ball_m);
+  Copy(skeleton.leg(foot).toe_tip_offset_m, bones.toe_tip_m);
+  Copy(side.heel_m, bones.heel_m);
+  bones.thigh_m = side.thigh_m;
+  bones.shank_m = side.shank_m;
+  bones.ball_height_m = static_cast<float>(side.ball_height_m);
+  bones.toe_height_m = static_cast<float>(side.toe_height_m);
+  bones.toe_out_rad = static_cast<float>(side.toe_out_rad);
+  bones.foot_m = static_cast<float>(side.foot_m);
+  return bones;
 }
 
 }  // namespace
@@ -84,6 +105,11 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
                             : static_cast<float>(-kSoleBehindAnkleM / side.foot_m) * sole;
     side.heel_m = glm::conjugate(pose.world_rotations[static_cast<std::size_t>(side.ankle)]) *
                   Vec3(behind.x, sole.y, behind.z);
+  }
+  if (rig.is_usable) {
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      rig.bones[static_cast<std::size_t>(foot)] = BonesOf(skeleton, foot, rig.side(foot));
+    }
   }
   return rig;
 }

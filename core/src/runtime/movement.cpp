@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "cell_weights.h"
 #include "pose_kernels.h"
 #include "stridewire/runtime/cardinal_basis.h"
 
@@ -26,34 +25,6 @@ Vec3 RotationVector(const Quat& q) {
 }
 
 }  // namespace
-
-CellWeights CellWeightsAt(double grid_position, int point_count) {
-  const int cell = std::clamp(static_cast<int>(grid_position), 0, point_count - 2);
-  const double f = std::clamp(grid_position - cell, 0.0, 1.0);
-  if (point_count == 2) return {0, 2, {static_cast<float>(1.0 - f), static_cast<float>(f), 0, 0}};
-  const double before = f * (-0.5 + f * (1.0 - 0.5 * f));
-  const double left = 1.0 + f * f * (-2.5 + 1.5 * f);
-  const double right = f * (0.5 + f * (2.0 - 1.5 * f));
-  const double after = f * f * (-0.5 + 0.5 * f);
-  // A missing neighbour is p_-1 = 3 p_0 - 3 p_1 + p_2: the tangent at the end becomes the one-sided
-  // second-order difference.
-  if (cell == 0) {
-    return {0,
-            3,
-            {static_cast<float>(left + 3.0 * before), static_cast<float>(right - 3.0 * before),
-             static_cast<float>(after + before), 0.0f}};
-  }
-  if (cell == point_count - 2) {
-    return {cell - 1,
-            3,
-            {static_cast<float>(before + after), static_cast<float>(left - 3.0 * after),
-             static_cast<float>(right + 3.0 * after), 0.0f}};
-  }
-  return {cell - 1,
-          4,
-          {static_cast<float>(before), static_cast<float>(left), static_cast<float>(right),
-           static_cast<float>(after)}};
-}
 
 std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
                                       int point) {
@@ -181,96 +152,6 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
       Vec3(movement.base.position_m +
            RotateYaw(movement.base.heading_rad, DVec3(root[0], root[1], root[2])));
   out.rotations[0] = YawRotation(movement.base.heading_rad + root[3]) * out.rotations[0];
-}
-
-namespace {
-
-// One pose of a batch: what BlendPoses needs to know of it, and where it goes.
-struct BlendJob {
-  const MotionGroup& group;
-  const Movement& movement;
-  double time_s;
-  GridCache& cache;
-  bool is_eased;  // with the difference pose
-  PoseSpan out;
-};
-
-// At most kernels::kBlock poses. Whatever they are batched with, they are the same bytes.
-void BlendPoses(const GridLayout& layout, std::span<const BlendJob> jobs) {
-  std::array<DVec3, kernels::kBlock> positions;
-  std::array<double, 2 * kernels::kBlock> angles_rad;  // of the base, and half of the root's
-  std::array<double, 2 * kernels::kBlock> sines;
-  std::array<double, 2 * kernels::kBlock> cosines;
-  std::array<double, kernels::kBlock> eased;
-  const auto root = static_cast<std::size_t>(layout.root());
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    const BlendJob& job = jobs[i];
-    const Movement& movement = job.movement;
-    const double u = movement.warp.GridPosition(job.time_s);
-    const CellWeights cell = CellWeightsAt(u, job.group.grid_point_count);
-    kernels::RotationBlend blend;
-    blend.padded = static_cast<std::size_t>(layout.padded_joints);
-    blend.joint_count = job.out.rotations.size();
-    DVec3 position(0.0);
-    double yaw_rad = 0.0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const bool is_there = static_cast<int>(k) < cell.count;
-      const int point = cell.first + (is_there ? static_cast<int>(k) : 0);
-      const float* row = job.cache.Row(job.group, movement.weights, point).data();
-      blend.rows[k] = row;
-      blend.weights[k] = cell.weights[k];
-      const double weight = cell.weights[k];
-      position += weight * DVec3(row[root], row[root + 1], row[root + 2]);
-      yaw_rad += weight * row[root + 3];
-    }
-    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.duration_s()));
-    positions[i] = position;
-    angles_rad[2 * i] = movement.base.heading_rad;
-    angles_rad[2 * i + 1] = 0.5 * (movement.base.heading_rad + yaw_rad);
-    eased[i] = (job.time_s - movement.entered_s) / movement.ease_out_s;
-    if (job.is_eased && eased[i] < 1.0) {
-      blend.difference = &movement.difference.rotations[0].x;
-      blend.fraction = static_cast<float>(EaseOut(eased[i]));
-      if (movement.is_inertial) {
-        blend.velocity = &movement.difference_velocity.joints_rad_s[0].x;
-        blend.seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i]));
-      }
-    }
-    kernels::BlendRotations(blend, &job.out.rotations[0].x);
-  }
-  kernels::SinCos(angles_rad.data(), 2 * jobs.size(), sines.data(), cosines.data());
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    const BlendJob& job = jobs[i];
-    const double sine = sines[2 * i];
-    const double cosine = cosines[2 * i];
-    const DVec3& local = positions[i];
-    Vec3& out = job.out.root_position_m;
-    out = Vec3(job.movement.base.position_m + DVec3(cosine * local.x + sine * local.z, local.y,
-                                                    cosine * local.z - sine * local.x));
-    job.out.rotations[0] = Quat(static_cast<float>(cosines[2 * i + 1]), 0.0f,
-                                static_cast<float>(sines[2 * i + 1]), 0.0f) *
-                           job.out.rotations[0];
-    if (!job.is_eased || !(eased[i] < 1.0)) continue;
-    const Movement& movement = job.movement;
-    out += static_cast<float>(EaseOut(eased[i])) * movement.difference.root_position_m;
-    if (!movement.is_inertial) continue;
-    out += static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i])) *
-           movement.difference_velocity.root_m_s;
-  }
-}
-
-}  // namespace
-
-void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                   double time_s, GridCache& cache, PoseSpan out) {
-  const BlendJob job{group, movement, time_s, cache, false, out};
-  BlendPoses(layout, std::span(&job, 1));
-}
-
-void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                      double time_s, GridCache& cache, PoseSpan out) {
-  const BlendJob job{group, movement, time_s, cache, true, out};
-  BlendPoses(layout, std::span(&job, 1));
 }
 
 BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {

@@ -2,10 +2,14 @@
 
 #include <cstring>
 
+#include "foot_plant_constants.h"
+#include "stridewire/runtime/foot_plan.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "pose_kernels.cpp"
 #include "hwy/foreach_target.h"
 // Behind foreach_target.h, which includes this file once for each instruction set.
+#include "foot_plant-inl.h"
 #include "hwy/highway.h"
 #include "lanes-inl.h"
 
@@ -114,6 +118,7 @@ namespace stridewire::kernels {
 HWY_EXPORT(BlendRow);
 HWY_EXPORT(BlendRotations);
 HWY_EXPORT(SinCos);
+HWY_EXPORT(PlantPoses);
 
 std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
                        std::size_t row_floats, std::size_t padded, std::size_t joint_count,
@@ -128,6 +133,10 @@ void BlendRotations(const RotationBlend& blend, float* out) {
 
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines) {
   HWY_DYNAMIC_DISPATCH(SinCos)(angles_rad, count, sines, cosines);
+}
+
+void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(PlantPoses)(rig, jobs, count);
 }
 
 }  // namespace stridewire::kernels

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "stridewire/runtime/leg_rig.h"
+
 namespace stridewire::kernels {
 
 /// The inner loops of evaluation, written once for vectors of any width (Google Highway) and compiled for each
@@ -36,5 +38,18 @@ void BlendRotations(const RotationBlend& blend, float* out);
 
 /// Sine and cosine of `count` angles, the same bits as Sin and Cos of base/trig.h. |x| <= 1e5.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
+
+/// One pose whose feet are planted, in place or from one place to another.
+struct PlantJob {
+  const float* plan = nullptr;    ///< PackedFootPlan
+  double time_s = 0.0;            ///< Of its movement
+  double base_m[3] = {};          ///< The movement's base
+  const float* root_m = nullptr;  ///< [3] blended, in the world
+  float* rotations = nullptr;     ///< [joint] x y z w, blended; those of the legs change
+  float* root_out_m = nullptr;    ///< [3] planted; may be root_m
+};
+
+/// PlantFeet of `count` poses of one skeleton. `rig` is usable.
+void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count);
 
 }  // namespace stridewire::kernels

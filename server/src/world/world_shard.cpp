@@ -231,12 +231,14 @@ void WorldShard::Advance(std::uint64_t tick, int steps) {
 
 void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
-  for (auto& [number, entry] : avatars_) {
-    for (int step = 1; step <= steps; ++step) {
-      entry.avatar.Advance(step_s);
+  advancing_.clear();
+  for (auto& [number, entry] : avatars_) advancing_.push_back(&entry.avatar);
+  for (int step = 1; step <= steps; ++step) {
+    Avatar::AdvanceAll(advancing_, step_s);
+    const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
+    for (auto& [number, entry] : avatars_) {
       entry.time_s += step_s;
       if (!events_wanted_) continue;
-      const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
       for (const AvatarEvent& happened : entry.avatar.events()) {
         protocol::Event& event = events_.emplace_back(ToWire(happened, *world_->library));
         event.avatar = number;

@@ -94,6 +94,7 @@ class WorldShard {
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
   std::map<AvatarNumber, Entry> avatars_;  // in order, so that batches and events are
+  std::vector<Avatar*> advancing_;         // all of them, while they advance
   std::vector<ShardInterest> interests_;   // by shard
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
+#include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/foot_planner.h"
 #include "stridewire/runtime/layer_stack.h"
 #include "stridewire/runtime/motion_library.h"
@@ -123,6 +124,10 @@ class Avatar {
   /// Events of this call are in `events()` until the next.
   void Advance(double dt_s);
 
+  /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
+  /// bit of any pose depends on who else is there.
+  static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s);
+
   /// Displayed, in the world.
   [[nodiscard]] ConstPoseSpan pose() const { return has_layers_ ? layered_pose_ : pose_; }
   [[nodiscard]] const LayerStack& layers() const { return layers_; }
@@ -156,6 +161,8 @@ class Avatar {
   [[nodiscard]] bool PlantsFeet() const { return plants_feet_; }
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
+  [[nodiscard]] PoseJob JobAt(double time_s);
+  void AdvanceState(double dt_s);
   void ShowLayers();
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
+
+inline constexpr int kMaxLegChain = 32;  ///< Longer chains are not planted.
 
 /// What planting needs to know of a skeleton's legs, worked out once for a library.
 struct LegRig {
@@ -23,7 +26,27 @@ struct LegRig {
     double toe_m = 0.0;         ///< Ball to the tip of the toes, likewise.
     double foot_m = 0.0;        ///< Ankle to ball as seen from above, in the stand pose.
   };
-  std::array<Side, 2> sides;  ///< Indexed by Foot.
+  /// A side and its skeleton's offsets laid out flat, for the vectors that plant a crowd.
+  struct Bones {
+    std::size_t count = 0;               ///< Joints of the chain
+    std::size_t joints[kMaxLegChain]{};  ///< [place in chain]
+    float offsets_m[kMaxLegChain][3]{};  ///< [place in chain]: in the frame of the one before
+    std::size_t hip = 0;                 ///< Places in the chain
+    std::size_t knee = 0;
+    std::size_t ankle = 0;
+    float ball_m[3]{};     ///< In the frame of the last
+    float toe_tip_m[3]{};  ///< The same
+    float heel_m[3]{};     ///< In the frame of the ankle
+    float thigh_m = 0.0f;
+    float shank_m = 0.0f;
+    float ball_height_m = 0.0f;
+    float toe_height_m = 0.0f;
+    float toe_out_rad = 0.0f;
+    float foot_m = 0.0f;
+  };
+
+  std::array<Side, 2> sides;   ///< Indexed by Foot.
+  std::array<Bones, 2> bones;  ///< Indexed by Foot; of a usable rig.
   /// Whether each leg is a chain hip, knee, ankle, ball with lengths to bend. If not, feet are not planted.
   bool is_usable = false;
 
@@ -31,8 +54,7 @@ struct LegRig {
 };
 
 inline constexpr double kSoleBehindAnkleM =
-    0.06;                                ///< Skeletons have no heel: where it is taken to be.
-inline constexpr int kMaxLegChain = 32;  ///< Longer chains are not planted.
+    0.06;  ///< Skeletons have no heel: where it is taken to be.
 
 [[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose);
 

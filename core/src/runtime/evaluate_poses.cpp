@@ -1,0 +1,138 @@
+#include "stridewire/runtime/evaluate_poses.h"
+
+#include <algorithm>
+#include <array>
+
+#include "cell_weights.h"
+#include "pose_kernels.h"
+
+namespace stridewire {
+namespace {
+
+// One pose of a batch: what BlendPoses needs to know of it, and where it goes.
+struct BlendJob {
+  const MotionGroup& group;
+  const Movement& movement;
+  double time_s;
+  GridCache& cache;
+  bool is_eased;  // with the difference pose
+  PoseSpan out;
+};
+
+// `count` poses, kernels::kBlock at most; `job_at(i)` tells what they are. Whatever they are batched with, they are
+// the same bytes.
+template <typename JobAt>
+void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
+  std::array<DVec3, kernels::kBlock> positions;
+  std::array<double, 2 * kernels::kBlock> angles_rad;  // of the base, and half of the root's
+  std::array<double, 2 * kernels::kBlock> sines;
+  std::array<double, 2 * kernels::kBlock> cosines;
+  std::array<double, kernels::kBlock> eased;
+  const auto root = static_cast<std::size_t>(layout.root());
+  for (std::size_t i = 0; i < count; ++i) {
+    const BlendJob job = job_at(i);
+    const Movement& movement = job.movement;
+    const double u = movement.warp.GridPosition(job.time_s);
+    const CellWeights cell = CellWeightsAt(u, job.group.grid_point_count);
+    kernels::RotationBlend blend;
+    blend.padded = static_cast<std::size_t>(layout.padded_joints);
+    blend.joint_count = job.out.rotations.size();
+    DVec3 position(0.0);
+    double yaw_rad = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool is_there = static_cast<int>(k) < cell.count;
+      const int point = cell.first + (is_there ? static_cast<int>(k) : 0);
+      const float* row = job.cache.Row(job.group, movement.weights, point).data();
+      blend.rows[k] = row;
+      blend.weights[k] = cell.weights[k];
+      const double weight = cell.weights[k];
+      position += weight * DVec3(row[root], row[root + 1], row[root + 2]);
+      yaw_rad += weight * row[root + 3];
+    }
+    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.duration_s()));
+    positions[i] = position;
+    angles_rad[2 * i] = movement.base.heading_rad;
+    angles_rad[2 * i + 1] = 0.5 * (movement.base.heading_rad + yaw_rad);
+    eased[i] = (job.time_s - movement.entered_s) / movement.ease_out_s;
+    if (job.is_eased && eased[i] < 1.0) {
+      blend.difference = &movement.difference.rotations[0].x;
+      blend.fraction = static_cast<float>(EaseOut(eased[i]));
+      if (movement.is_inertial) {
+        blend.velocity = &movement.difference_velocity.joints_rad_s[0].x;
+        blend.seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i]));
+      }
+    }
+    kernels::BlendRotations(blend, &job.out.rotations[0].x);
+  }
+  kernels::SinCos(angles_rad.data(), 2 * count, sines.data(), cosines.data());
+  for (std::size_t i = 0; i < count; ++i) {
+    const BlendJob job = job_at(i);
+    const double sine = sines[2 * i];
+    const double cosine = cosines[2 * i];
+    const DVec3& local = positions[i];
+    Vec3& out = job.out.root_position_m;
+    out = Vec3(job.movement.base.position_m + DVec3(cosine * local.x + sine * local.z, local.y,
+                                                    cosine * local.z - sine * local.x));
+    job.out.rotations[0] = Quat(static_cast<float>(cosines[2 * i + 1]), 0.0f,
+                                static_cast<float>(sines[2 * i + 1]), 0.0f) *
+                           job.out.rotations[0];
+    if (!job.is_eased || !(eased[i] < 1.0)) continue;
+    const Movement& movement = job.movement;
+    out += static_cast<float>(EaseOut(eased[i])) * movement.difference.root_position_m;
+    if (!movement.is_inertial) continue;
+    out += static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i])) *
+           movement.difference_velocity.root_m_s;
+  }
+}
+
+}  // namespace
+
+void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                   double time_s, GridCache& cache, PoseSpan out) {
+  BlendPoses(layout, 1,
+             [&](std::size_t) { return BlendJob{group, movement, time_s, cache, false, out}; });
+}
+
+void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                      double time_s, GridCache& cache, PoseSpan out) {
+  BlendPoses(layout, 1,
+             [&](std::size_t) { return BlendJob{group, movement, time_s, cache, true, out}; });
+}
+
+void EvaluatePoses(const MotionLibrary& library, std::span<const PoseJob> jobs) {
+  const GridLayout& layout = library.layout();
+  std::array<kernels::PlantJob, kernels::kBlock> plants;
+  while (!jobs.empty()) {
+    const std::size_t count = std::min(jobs.size(), kernels::kBlock);
+    std::size_t planted = 0;
+    BlendPoses(layout, count, [&](std::size_t i) {
+      const PoseJob& job = jobs[i];
+      return BlendJob{library.group(job.movement->group),
+                      *job.movement,
+                      job.time_s,
+                      *job.cache,
+                      true,
+                      *job.blended};
+    });
+    for (const PoseJob& job : jobs.first(count)) {
+      *job.shown = *job.blended;  // of the same size: no allocation
+      if (!job.movement->feet.is_active) continue;
+      const DVec3& base = job.movement->base.position_m;
+      plants[planted++] = {.plan = job.movement->feet.packed.data(),
+                           .time_s = job.time_s,
+                           .base_m = {base.x, base.y, base.z},
+                           .root_m = &job.blended->root_position_m.x,
+                           .rotations = &job.shown->rotations[0].x,
+                           .root_out_m = &job.shown->root_position_m.x};
+    }
+    if (planted > 0) kernels::PlantPoses(library.leg_rig(), plants.data(), planted);
+    for (const PoseJob& job : jobs.first(count)) {
+      if (job.movement->feet.is_active) {
+        Unsettle(library.leg_rig(), *job.movement, job.time_s, *job.shown);
+      }
+    }
+    jobs = jobs.subspan(count);
+  }
+}
+
+}  // namespace stridewire
