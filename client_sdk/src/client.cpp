@@ -492,6 +492,18 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
   });
 }
 
+stridewire_status stridewire_client_set_planting(stridewire_client* client, stridewire_world world,
+                                                 const uint32_t* avatars, size_t count, uint8_t on,
+                                                 uint64_t* command) {
+  if (!IsList(avatars, count)) return STRIDEWIRE_INVALID_ARGUMENT;
+  return Command(client, [&](Session& session) {
+    std::uint64_t id = 0;
+    const auto status = session.SetPlanting(world, {0, 0, {avatars, avatars + count}, on == 0}, id);
+    StoreCommand(command, id);
+    return status;
+  });
+}
+
 stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
                                             const stridewire_observation* observation,
                                             uint32_t* subscription, uint64_t* command) {

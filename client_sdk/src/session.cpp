@@ -256,6 +256,14 @@ stridewire_status Session::SetLayers(stridewire_world world, protocol::SetLayers
   return status;
 }
 
+stridewire_status Session::SetPlanting(stridewire_world world, protocol::SetPlanting message,
+                                       std::uint64_t& command) {
+  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
+  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
+  Pump();
+  return status;
+}
+
 stridewire_status Session::Observe(stridewire_world world, protocol::Observe message,
                                    std::uint32_t& subscription, std::uint64_t& command) {
   if (message.mode == protocol::PoseMode::kMovement) {
@@ -390,10 +398,11 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features =
-      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
-      protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
-      protocol::kFeatureTakeovers | protocol::kFeatureLayers | protocol::kFeatureRefusals;
+  hello.features = protocol::kFeatureResume | protocol::kFeatureEventReplay |
+                   protocol::kFeatureQuantised | protocol::kFeatureTerrain |
+                   protocol::kFeatureFootprints | protocol::kFeatureWalks |
+                   protocol::kFeatureTakeovers | protocol::kFeatureLayers |
+                   protocol::kFeatureRefusals | protocol::kFeaturePlanting;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -535,6 +544,9 @@ bool Session::Understands(const CommandMessage& message) const {
   }
   if (std::holds_alternative<protocol::SetLayers>(message)) {
     return (features_ & protocol::kFeatureLayers) != 0;
+  }
+  if (std::holds_alternative<protocol::SetPlanting>(message)) {
+    return (features_ & protocol::kFeaturePlanting) != 0;
   }
   const auto* request = std::get_if<protocol::Request>(&message);
   if (request == nullptr) return true;

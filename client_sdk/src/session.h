@@ -95,6 +95,8 @@ class Session {
                                std::uint64_t& command);
   stridewire_status SetLayers(stridewire_world world, protocol::SetLayers message,
                               std::uint64_t& command);
+  stridewire_status SetPlanting(stridewire_world world, protocol::SetPlanting message,
+                                std::uint64_t& command);
   stridewire_status Observe(stridewire_world world, protocol::Observe message,
                             std::uint32_t& subscription, std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
@@ -137,7 +139,8 @@ class Session {
   using CommandMessage =
       std::variant<protocol::JoinWorld, protocol::LeaveWorld, protocol::Spawn, protocol::Remove,
                    protocol::Request, protocol::CancelQueue, protocol::SetTerrain,
-                   protocol::SetLayers, protocol::Observe, protocol::StopObserving>;
+                   protocol::SetLayers, protocol::SetPlanting, protocol::Observe,
+                   protocol::StopObserving>;
 
   struct Command {
     std::uint64_t id = 0;

@@ -511,6 +511,14 @@ Status Check(const SetLayers& m) {
   return found.Result();
 }
 
+Status Check(const SetPlanting& m) {
+  Findings found;
+  found.Id(m.seq, "SetPlanting.seq");
+  found.Id(m.world, "SetPlanting.world");
+  found.Avatars(m.avatars, 1, "SetPlanting.avatars");
+  return found.Result();
+}
+
 Status Check(const WorldTerrain& m) {
   Findings found;
   found.Id(m.world, "WorldTerrain.world");

@@ -407,6 +407,7 @@ void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
     Unpack(u, *w.queue()->Get(static_cast<flatbuffers::uoffset_t>(i)), m.queue[i],
            "AvatarState.queue.type", i);
   }
+  m.is_planting_off = w.planting_off();
 }
 
 void Unpack(Unpacker& u, const wire::Terrain* w, std::optional<TerrainInfo>& terrain) {
@@ -449,6 +450,13 @@ void Unpack(Unpacker& u, const wire::SetLayers& w, SetLayers& m) {
     item.blend_s = from->blend_s();
     item.speed = from->speed();
   }
+}
+
+void Unpack(Unpacker& u, const wire::SetPlanting& w, SetPlanting& m) {
+  m.seq = w.seq();
+  m.world = w.world();
+  u.Avatars(w.avatars(), "SetPlanting.avatars", m.avatars);
+  m.is_off = w.off();
 }
 
 void Unpack(Unpacker& u, const wire::WorldTerrain& w, WorldTerrain& m) {
@@ -513,6 +521,7 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     case MessageType::kAvatarState: return Decode<wire::AvatarState, AvatarState>(frame.payload);
     case MessageType::kSetTerrain: return Decode<wire::SetTerrain, SetTerrain>(frame.payload);
     case MessageType::kSetLayers: return Decode<wire::SetLayers, SetLayers>(frame.payload);
+    case MessageType::kSetPlanting: return Decode<wire::SetPlanting, SetPlanting>(frame.payload);
     case MessageType::kWorldTerrain: return Decode<wire::WorldTerrain, WorldTerrain>(frame.payload);
   }
   return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",

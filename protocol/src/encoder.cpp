@@ -275,7 +275,7 @@ Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
   const wire::Vec3 base = ToWire(m.base.position_m);
   return wire::CreateAvatarState(b, m.nonce, m.world, m.avatar, ToWire(m.code), text, m.tick,
                                  m.server_time_s, &base, m.base.heading_rad, movement, m.queue_size,
-                                 queue_offset);
+                                 queue_offset, m.is_planting_off);
 }
 
 Offset<wire::Terrain> Build(FlatBufferBuilder& b, const std::optional<TerrainInfo>& terrain) {
@@ -311,6 +311,10 @@ Offset<wire::SetLayers> Build(FlatBufferBuilder& b, const SetLayers& m) {
                                           item.is_off, item.weight, item.blend_s, item.speed));
   }
   return wire::CreateSetLayers(b, m.seq, m.world, b.CreateVector(items));
+}
+
+Offset<wire::SetPlanting> Build(FlatBufferBuilder& b, const SetPlanting& m) {
+  return wire::CreateSetPlanting(b, m.seq, m.world, b.CreateVector(m.avatars), m.is_off);
 }
 
 Offset<wire::WorldTerrain> Build(FlatBufferBuilder& b, const WorldTerrain& m) {
@@ -365,6 +369,7 @@ Status Encoder::Encode(const Pong& m, Frame& frame) { return impl_->Encode(m, fr
 Status Encoder::Encode(const AvatarState& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const SetTerrain& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const SetLayers& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const SetPlanting& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const WorldTerrain& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Message& m, Frame& frame) {
   return std::visit([&](const auto& alternative) { return impl_->Encode(alternative, frame); }, m);

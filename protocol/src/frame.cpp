@@ -45,6 +45,7 @@ std::string_view MessageTypeName(MessageType type) {
     case MessageType::kSetTerrain: return "SetTerrain";
     case MessageType::kWorldTerrain: return "WorldTerrain";
     case MessageType::kSetLayers: return "SetLayers";
+    case MessageType::kSetPlanting: return "SetPlanting";
   }
   return "unknown";
 }
@@ -69,6 +70,7 @@ bool IsBulk(MessageType type) {
     case MessageType::kEvents:
     case MessageType::kSetTerrain:
     case MessageType::kSetLayers:
+    case MessageType::kSetPlanting:
     case MessageType::kWorldTerrain: return true;
     default: return false;
   }

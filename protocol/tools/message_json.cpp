@@ -301,7 +301,8 @@ Json Fields(const AvatarState& m) {
           {"base_heading_rad", m.base.heading_rad},
           {"movement", m.movement ? Movement(*m.movement) : Json(nullptr)},
           {"queue_size", m.queue_size},
-          {"queue", Items(m.queue)}};
+          {"queue", Items(m.queue)},
+          {"planting_off", m.is_planting_off}};
 }
 
 Json Terrain(const std::optional<TerrainInfo>& terrain) {
@@ -339,6 +340,10 @@ Json Fields(const SetLayers& m) {
                      {"speed", item.speed}});
   }
   return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+}
+
+Json Fields(const SetPlanting& m) {
+  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}, {"off", m.is_off}};
 }
 
 Json Fields(const WorldTerrain& m) { return {{"world", m.world}, {"terrain", Terrain(m.terrain)}}; }

@@ -203,6 +203,11 @@ std::vector<SampleMessage> SampleMessages() {
     state.queue.push_back({41, 1002, StepMovement{FootChoice::kLeft, 0.5, 0.125, 0.15, -0.3}});
     state.queue.push_back({41, 1003, StandMovement{1.5}});
     add("avatar_state", state);
+    state.movement.reset();
+    state.queue.clear();
+    state.queue_size = 0;
+    state.is_planting_off = true;
+    add("avatar_state_unplanted", state);
     add("avatar_state_refused", AvatarState{.nonce = 2,
                                             .world = 3,
                                             .avatar = 99,
@@ -254,6 +259,8 @@ std::vector<SampleMessage> SampleMessages() {
                                 {{41, "wave", false, 0.75, 0.5, 1.25},
                                  {42, "carry"},
                                  {41, "wave", true, 1.0, 0.0, 1.0}}});
+    add("set_planting", SetPlanting{19, 3, {41, 42}, false});
+    add("set_planting_off", SetPlanting{20, 3, {41}, true});
     WorldInfo with_layers{17,           3,          "plaza",          Role::kController, 123'000,
                           "0f1e2d3c4b", Skeleton(), {"wave", "carry"}};
     add("world_info_layers", with_layers);

@@ -164,6 +164,7 @@ export class App {
       },
       ground: (name) => this.driver.setGround(name),
       layer: (name) => this.driver.toggleLayer(name),
+      planting: () => this.driver.togglePlanting(),
     });
     this.inspector = new Inspector({
       onLabels: () => {}, onFollow: () => this.toggleFollow(), onClose: () => this.choose(null, 0)});
@@ -535,6 +536,11 @@ export class App {
     const where = this.driven();
     this.drive.offer(this.client.serverHas('footprints'), this.client.serverHas('walks'),
       this.client.serverHas('terrain'));
+    const state = this.playback.live ? this.inspector.state : null;
+    if (state && this.chosen && state.avatar === this.chosen.avatar) {
+      this.driver.hearPlanting(this.chosen.shown.world, state.avatar, state.plantingOff);
+    }
+    this.drive.offerPlanting(this.client.serverHas('planting'), this.driver.plants());
     this.drive.offerLayers(where?.world.layers ?? [], (layer) => this.driver.plays(layer));
     this.footprints.show();
     this.walks.show();
@@ -640,6 +646,7 @@ export class App {
       w: () => this.drive.step('auto'), a: () => this.drive.step('left'),
       d: () => this.drive.step('right'), j: () => this.drive.jump(), s: () => this.drive.stand(),
       t: () => this.drive.toggleTool('feet'), m: () => this.drive.toggleTool('walk'), q: () => this.drive.nudgeTurn(5), e: () => this.drive.nudgeTurn(-5),
+      k: () => this.driver.togglePlanting(),
       r: () => this.drive.nudgeLength(0.05), v: () => this.drive.nudgeLength(-0.05),
       x: () => this.driver.cancel(), b: () => void this.driver.spawn(this.driven(), 1, false),
       Delete: () => this.driver.remove(), g: () => this.driver.toggleWander(),

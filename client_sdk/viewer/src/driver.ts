@@ -31,6 +31,11 @@ export class Driver {
   private groundOf: World | null = null;
   /** Layers that this page has started, "avatar layer"; nobody tells what others did. */
   private readonly playing = new WeakMap<World, Set<string>>();
+  /** Whose planting this page has switched off, or has heard to be off. */
+  private readonly sliding = new WeakMap<World, Set<number>>();
+
+  /** Switches whose outcome the server's word may not have yet. */
+  private switching = 0;
 
   constructor(private readonly host: DriverHost) {}
 
@@ -115,6 +120,57 @@ export class Driver {
         if (off) playing.delete(`${avatar} ${layer}`);
         else if (!refused.has(avatar)) playing.add(`${avatar} ${layer}`);
       }
+    });
+  }
+
+  /** Whether the feet of all whom commands go to are planted, as far as this page knows. */
+  plants(): boolean {
+    const shown = this.host.driven();
+    const sliding = shown && this.sliding.get(shown.world);
+    return !sliding || !this.avatars().some((avatar) => sliding.has(avatar));
+  }
+
+  /** The server has told of it. */
+  hearPlanting(world: World, avatar: number, off: boolean): void {
+    if (this.switching > 0) return;
+    if (off) this.slidingIn(world).add(avatar);
+    else this.sliding.get(world)?.delete(avatar);
+  }
+
+  private slidingIn(world: World): Set<number> {
+    const sliding = this.sliding.get(world) ?? new Set<number>();
+    this.sliding.set(world, sliding);
+    return sliding;
+  }
+
+  /** Feet are planted from their next movements on, or no more if all of them are. */
+  togglePlanting(): void {
+    const shown = this.host.driven();
+    const avatars = this.avatars();
+    if (!shown || avatars.length === 0) {
+      this.host.say('Click a figure first, or command everybody.');
+      return;
+    }
+    const {world} = shown;
+    const on = !this.plants();
+    this.host.goLive();
+    ++this.switching;
+    void world.setPlanting(avatars, on).then((reply) => {
+      if (!reply.ok || reply.accepted === 0) {
+        this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
+        return;
+      }
+      this.host.say(on ? 'Feet stand still from the next movement on.' :
+        'Feet slide as the examples have them from the next movement on.');
+      const refused = new Set(reply.items.map((item) => item.avatar));
+      const sliding = this.slidingIn(world);
+      for (const avatar of avatars) {
+        if (on) sliding.delete(avatar);
+        else if (!refused.has(avatar)) sliding.add(avatar);
+      }
+    }).finally(() => {
+      // What was asked before and is answered now does not count.
+      setTimeout(() => --this.switching, 1000);
     });
   }
 

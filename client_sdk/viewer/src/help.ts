@@ -12,7 +12,7 @@ export function makeHelp(): HTMLDialogElement {
     ['R, V', 'longer, shorter steps'], ['Drag an outlined print', 'moves that step'],
     ['T', 'clicks on the ground are footprints'], ['M', 'clicks on the ground send there'],
     ['M, then drag', 'the way to look there'], ['M, then Shift click, long touch', 'a place to pass first'],
-    ['J', 'jump'], ['S', 'stand'], ['X', 'clear the queue'],
+    ['K', 'feet stand still, or slide'], ['J', 'jump'], ['S', 'stand'], ['X', 'clear the queue'],
     ['B, Delete', 'spawn, remove'], ['G', 'let them wander'],
   ];
   const close = button('Close', {class: 'primary'}, () => dialog.close());

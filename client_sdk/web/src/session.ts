@@ -12,7 +12,7 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureEventReplay, featureFootprints, featureInspect, featureQuantised, featureRefusals, featureResume,
+  featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureResume,
   featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
   maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
@@ -28,6 +28,7 @@ import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
 const featureBits: Record<Feature, bigint> = {
   inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
   takeovers: featureTakeovers, layers: featureLayers, refusals: featureRefusals,
+  planting: featurePlanting,
 };
 
 /** What the caller may set, filled in. */
@@ -423,7 +424,7 @@ export class Session {
       clientName: this.options.clientName,
       features: featureResume | featureEventReplay | featureQuantised | featureInspect |
           featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
-          featureRefusals,
+          featureRefusals | featurePlanting,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -627,6 +628,7 @@ export class Session {
     switch (message.type) {
       case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
       case 'SetLayers': return (this.features & featureLayers) !== 0n;
+      case 'SetPlanting': return (this.features & featurePlanting) !== 0n;
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&

@@ -13,7 +13,8 @@ export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
  * then what was queued is dropped. */
 export type Takeover = 'none' | 'afterMovement' | 'now';
 /** What servers may or may not know of. */
-export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals';
+export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals' |
+  'planting';
 export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
@@ -179,6 +180,8 @@ export interface AvatarState {
   readonly queueSize: number;
   /** ... and the first 16 of them. */
   readonly queue: readonly QueuedRequest[];
+  /** Feet are not planted, as `World.setPlanting` left it. */
+  readonly plantingOff: boolean;
 }
 
 /** A requested stand has no group, keytimes or weights. */
@@ -364,6 +367,9 @@ export interface World {
   setTerrain(terrain: Terrain | null): Promise<Reply>;
   /** Starts or ends layers (see `layers`) over what avatars do; at most four at a time for one. */
   setLayers(items: readonly LayerRequest[]): Promise<Reply>;
+  /** Feet stand still where they land (as at first), or are where the examples have them: from the next
+   * movement on that each avatar begins. */
+  setPlanting(avatars: readonly number[], on: boolean): Promise<Reply>;
   observe(observation: Observation): Subscription;
   /** What an avatar does right now, about a tick later. Rejected with a StridewireError when there is
    * no such avatar, no connection, or a server that does not tell. */

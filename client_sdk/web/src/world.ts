@@ -73,6 +73,10 @@ export class WorldHandle implements World {
     return this.session.command(this, () => check.setLayers(items));
   }
 
+  setPlanting(avatars: readonly number[], on: boolean): Promise<Reply> {
+    return this.session.command(this, () => check.setPlanting(avatars, on));
+  }
+
   observe(observation: Observation): Subscription {
     return this.session.observe(this, observation);
   }

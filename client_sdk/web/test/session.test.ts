@@ -724,6 +724,22 @@ test('layers are sent as given, to a server that knows them', async () => {
   assert.equal((await before.setLayers([{avatar: 1, layer: 'wave'}])).status, 'unsupported');
 });
 
+test('planting is switched for a list of avatars, on a server that knows it', async () => {
+  const h = new Harness();
+  const world = h.joined();
+  void world.setPlanting([1, 7], false);
+  void world.setPlanting([7], true);
+  const sent = h.sent();
+  assert.deepEqual(sent.map((m) => m.type === 'SetPlanting' && [[...m.avatars], m.off]),
+                   [[[1, 7], true], [[7], false]]);
+  for (const [avatars, on] of [[[], true], [[0], true], [[1], 1]]) {
+    assert.equal((await world.setPlanting(avatars as never, on as never)).status, 'invalid_argument');
+  }
+  const old = new Harness();
+  const before = old.joined({features: 2047n});
+  assert.equal((await before.setPlanting([1], true)).status, 'unsupported');
+});
+
 test('a server of before is not asked for ground or footprints', async () => {
   const h = new Harness();
   const world = h.joined({features: 31n});

@@ -596,10 +596,11 @@ void Session::OnInspected(const protocol::AvatarState& state) {
 }
 
 template <typename Part>
-void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars) {
+void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars,
+                            const Part& empty) {
   const Membership* membership = Commanding(seq, world);
   if (membership == nullptr || !Affords(seq, avatars.size())) return;
-  std::vector<Part> parts(static_cast<std::size_t>(host_.shard_count()));
+  std::vector<Part> parts(static_cast<std::size_t>(host_.shard_count()), empty);
   std::uint32_t index = 0;
   for (const AvatarNumber avatar : avatars) {
     parts[static_cast<std::size_t>(ShardOf(avatar, host_.shard_count()))].avatars.push_back(
@@ -615,6 +616,15 @@ void Session::Execute(protocol::Remove&& command) {
 
 void Session::Execute(protocol::CancelQueue&& command) {
   SubmitAvatars<CancelPart>(command.seq, command.world, command.avatars);
+}
+
+void Session::Execute(protocol::SetPlanting&& command) {
+  if ((features_ & protocol::kFeaturePlanting) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'planting' was not agreed on in the handshake");
+    return;
+  }
+  SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, !command.is_off});
 }
 
 void Session::Execute(protocol::SetTerrain&& command) {

@@ -21,7 +21,7 @@ inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
     protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
     protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-    protocol::kFeatureRefusals;
+    protocol::kFeatureRefusals | protocol::kFeaturePlanting;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {
@@ -132,6 +132,7 @@ class Session : private ConnectionHandler {
   void Execute(protocol::CancelQueue&& command);
   void Execute(protocol::SetTerrain&& command);
   void Execute(protocol::SetLayers&& command);
+  void Execute(protocol::SetPlanting&& command);
   void Execute(protocol::Observe&& command);
   void Execute(protocol::StopObserving&& command);
 
@@ -143,8 +144,10 @@ class Session : private ConnectionHandler {
   template <typename Part>
   void SubmitParts(protocol::Seq seq, const std::shared_ptr<World>& world,
                    std::vector<Part>&& parts, Pending&& pending);
+  /// `empty`: a part without avatars.
   template <typename Part>
-  void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars);
+  void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars,
+                     const Part& empty = {});
   void Leave(WorldId id);
 
   void Answer(protocol::Seq seq, protocol::StatusCode code, std::string text = {});

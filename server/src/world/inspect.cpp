@@ -52,6 +52,7 @@ protocol::AvatarState Inspect(const Avatar& avatar, std::size_t max_site_bytes) 
   if (const AvatarEvent* started = avatar.started()) {
     state.movement = CurrentMovementOf(avatar, *started, max_site_bytes);
   }
+  state.is_planting_off = !avatar.foot_planting();
   const std::span<const MovementRequest> queue = avatar.queue();
   state.queue_size = static_cast<std::uint32_t>(queue.size());
   for (const MovementRequest& request :

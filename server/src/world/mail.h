@@ -45,6 +45,10 @@ struct RemovePart {
 struct CancelPart {
   std::vector<AvatarRef> avatars;
 };
+struct PlantingPart {
+  std::vector<AvatarRef> avatars;
+  bool is_on = true;
+};
 /// Removes what a session spawned: it has ended, or left the world.
 struct ReleasePart {};
 
@@ -60,7 +64,8 @@ struct WorldCommand {
   int from_shard = 0;  ///< The session's shard.
   SessionId session = 0;
   protocol::Seq seq = 0;  ///< 0: no answer is wanted.
-  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, GroundPart, LayerPart>
+  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, GroundPart, LayerPart,
+               PlantingPart>
       part;
 };
 

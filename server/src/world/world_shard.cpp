@@ -69,6 +69,8 @@ CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tic
           Cancel(part, result);
         } else if constexpr (std::is_same_v<T, LayerPart>) {
           SetLayers(part, result);
+        } else if constexpr (std::is_same_v<T, PlantingPart>) {
+          SetPlanting(part, result);
         } else if constexpr (std::is_same_v<T, GroundPart>) {
           grounds_.push_back(part);
         } else {
@@ -193,6 +195,24 @@ void WorldShard::SetLayers(const LayerPart& part, CommandResult& result) {
   }
   metrics_.requests_accepted.Add(result.accepted);
   metrics_.requests_rejected.Add(part.items.size() - result.accepted);
+}
+
+void WorldShard::SetPlanting(const PlantingPart& part, CommandResult& result) {
+  for (const AvatarRef& ref : part.avatars) {
+    const auto it = avatars_.find(ref.avatar);
+    if (it == avatars_.end()) {
+      result.items.push_back(NoSuchAvatar(ref.index, ref.avatar));
+    } else if (const Status status = it->second.avatar.SetFootPlanting(part.is_on); !status) {
+      result.items.push_back({.index = ref.index,
+                              .avatar = ref.avatar,
+                              .code = ToStatusCode(status.error().code),
+                              .text = status.error().text});
+    } else {
+      ++result.accepted;
+    }
+  }
+  metrics_.requests_accepted.Add(result.accepted);
+  metrics_.requests_rejected.Add(part.avatars.size() - result.accepted);
 }
 
 void WorldShard::Release(SessionId session, std::uint64_t tick) {

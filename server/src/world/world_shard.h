@@ -81,6 +81,7 @@ class WorldShard {
   void Request(const RequestPart& part, std::uint64_t tick, CommandResult& result);
   void Remove(const RemovePart& part, std::uint64_t tick, CommandResult& result);
   void SetLayers(const LayerPart& part, CommandResult& result);
+  void SetPlanting(const PlantingPart& part, CommandResult& result);
   void Cancel(const CancelPart& part, CommandResult& result);
   void Release(SessionId session, std::uint64_t tick);
   void ChangeGround(std::uint64_t tick);

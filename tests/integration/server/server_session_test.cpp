@@ -857,6 +857,59 @@ TEST(ServerSession, LayersForWhoKnowsOfThem) {
   EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
 }
 
+TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
+  server::Config config = TestConfig();
+  config.shards = 3;
+  config.library = "builtin";
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("hall");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(client.Spawn(world->world, {{1, {}}, {2, {}}, {3, {}}}));
+  const auto set = [&](RawClient& who, std::vector<protocol::AvatarNumber> avatars, bool is_off) {
+    who.Send(protocol::SetPlanting{
+        .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .is_off = is_off});
+    return who.Await<Reply>();
+  };
+  const auto is_off = [&](protocol::AvatarNumber avatar) {
+    client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
+    const auto state = client.Await<protocol::AvatarState>();
+    EXPECT_TRUE(state && state->code == StatusCode::kOk);
+    return state->is_planting_off;
+  };
+  const auto reply = set(client, {1, 9, 3}, true);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, StatusCode::kOk);
+  EXPECT_EQ(reply->accepted, 2u);
+  ASSERT_EQ(reply->items.size(), 1u);
+  EXPECT_EQ(reply->items[0].index, 1u);
+  EXPECT_EQ(reply->items[0].code, StatusCode::kNoSuchAvatar);
+  EXPECT_TRUE(is_off(1));
+  EXPECT_FALSE(is_off(2));
+  EXPECT_TRUE(is_off(3));
+
+  const protocol::StepMovement must{.foot = protocol::FootChoice::kLeft,
+                                    .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0},
+                                    .must_be_met = true};
+  const auto sliding = client.Request(world->world, {{1, 7, must}, {2, 8, must}});
+  ASSERT_TRUE(sliding);
+  EXPECT_EQ(sliding->accepted, 1u);
+  ASSERT_EQ(sliding->items.size(), 1u);
+  EXPECT_EQ(sliding->items[0].code, StatusCode::kNoMovement);
+  ASSERT_TRUE(set(client, {1}, false));
+  EXPECT_FALSE(is_off(1));
+  EXPECT_EQ(client.Request(world->world, {{1, 9, must}})->accepted, 1u);
+
+  RawClient observer = server.Connect();
+  ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
+  EXPECT_EQ(set(observer, {1}, true)->code, StatusCode::kNotAllowed);
+  RawClient old = server.Connect();
+  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
+  ASSERT_TRUE(old.Join("hall"));
+  EXPECT_EQ(set(old, {1}, true)->code, StatusCode::kUnsupported);
+}
+
 TEST_F(ServerSessionOfOne, StepsToAFootprint) {
   const protocol::StepMovement step{.foot = protocol::FootChoice::kLeft,
                                     .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0}};

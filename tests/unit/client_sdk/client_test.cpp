@@ -125,6 +125,8 @@ TEST_F(ClientTest, CarriesACrowdInOneCommand) {
   ASSERT_TRUE(client_->Spawn(world_, spawns));
   ASSERT_TRUE(client_->Request(world_, movements));
   ASSERT_TRUE(client_->Cancel(world_, {4, 5}));
+  ASSERT_TRUE(client_->SetPlanting(world_, {4, 7}, false));
+  ASSERT_TRUE(client_->SetPlanting(world_, {4}, true));
   ASSERT_TRUE(client_->Remove(world_, {6}));
   const auto spawn = connection_.Expect<protocol::Spawn>();
   ASSERT_TRUE(spawn);
@@ -143,6 +145,12 @@ TEST_F(ClientTest, CarriesACrowdInOneCommand) {
   const auto cancel = connection_.Expect<protocol::CancelQueue>();
   ASSERT_TRUE(cancel);
   EXPECT_EQ(cancel->avatars, (std::vector<std::uint32_t>{4, 5}));
+  for (const bool is_off : {true, false}) {
+    const auto planting = connection_.Expect<protocol::SetPlanting>();
+    ASSERT_TRUE(planting);
+    EXPECT_EQ(planting->is_off, is_off);
+    EXPECT_EQ(planting->avatars.size(), is_off ? 2u : 1u);
+  }
   const auto remove = connection_.Expect<protocol::Remove>();
   ASSERT_TRUE(remove);
   EXPECT_EQ(remove->avatars, (std::vector<std::uint32_t>{6}));

@@ -510,6 +510,33 @@ TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
   EXPECT_EQ(Sent().size(), 1u);
 }
 
+TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
+  const stridewire_world world = Joined();
+  EXPECT_EQ(session_->SetPlanting(world, {0, 0, {4, 5}, true}, command_), STRIDEWIRE_OK);
+  const auto sent = Sent();
+  ASSERT_EQ(sent.size(), 1u);
+  EXPECT_EQ(std::get<protocol::SetPlanting>(sent[0]).avatars,
+            (std::vector<protocol::AvatarNumber>{4, 5}));
+  EXPECT_TRUE(std::get<protocol::SetPlanting>(sent[0]).is_off);
+
+  Use({});
+  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+  Connect();
+  protocol::Welcome welcome = toy::Welcome();
+  welcome.features &= ~protocol::kFeaturePlanting;
+  Tell(welcome);
+  stridewire_world old = 0;
+  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
+  LetIn();
+  (void)Events();
+  (void)Sent();
+  EXPECT_EQ(session_->SetPlanting(old, {0, 0, {4}, true}, command_), STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  const auto events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
+}
+
 TEST_F(SessionTest, CommandsAreBounded) {
   SessionOptions options;
   options.max_commands = 10;

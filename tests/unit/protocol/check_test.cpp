@@ -172,9 +172,10 @@ void RefusesAvatarLists(const std::string& name) {
       name + ".avatars");
 }
 
-TEST(Check, RemoveAndCancel) {
+TEST(Check, ListsOfAvatars) {
   RefusesAvatarLists<Remove>("Remove");
   RefusesAvatarLists<CancelQueue>("CancelQueue");
+  RefusesAvatarLists<SetPlanting>("SetPlanting");
 }
 
 TEST(Check, Request) {

@@ -64,7 +64,8 @@ TEST(Decode, EveryTypeIsChecked) {
       {MessageType::kAvatarState, "AvatarState.world"},
       {MessageType::kSetTerrain, "SetTerrain.seq"},
       {MessageType::kWorldTerrain, "WorldTerrain.world"},
-      {MessageType::kSetLayers, "SetLayers.seq"}};
+      {MessageType::kSetLayers, "SetLayers.seq"},
+      {MessageType::kSetPlanting, "SetPlanting.seq"}};
   EXPECT_EQ(first_wrong.size(), std::variant_size_v<Message>);
   FlatBufferBuilder builder;
   const auto empty = Finished(builder, wire::CreatePing(builder));

@@ -318,6 +318,13 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
                                                const stridewire_layer* layers, size_t count,
                                                uint64_t* command);
 
+/// Feet stand still where they land (1, as at first) or are where the examples have them (0): of each avatar from the
+/// next movement on that it begins. What must be met is refused while they are not planted. The REPLY is UNSUPPORTED
+/// when the server knows no such command; an ITEM is NO_MOVEMENT when the library's legs can not be planted.
+stridewire_status stridewire_client_set_planting(stridewire_client* client, stridewire_world world,
+                                                 const uint32_t* avatars, size_t count, uint8_t on,
+                                                 uint64_t* command);
+
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,       ///< float32: as the server has them.
   STRIDEWIRE_QUANTISED = 1,  ///< 48 bits a joint: off by at most 0.00016 rad and 0.03 mm.

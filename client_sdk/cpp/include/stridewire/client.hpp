@@ -217,6 +217,11 @@ class Client {
                    std::uint64_t* command = nullptr) {
     return stridewire_client_set_layers(handle_, world, layers.data(), layers.size(), command);
   }
+  Result SetPlanting(stridewire_world world, const std::vector<std::uint32_t>& avatars, bool on,
+                     std::uint64_t* command = nullptr) {
+    return stridewire_client_set_planting(handle_, world, avatars.data(), avatars.size(),
+                                          on ? 1 : 0, command);
+  }
   Result Observe(stridewire_world world, const stridewire_observation& observation,
                  std::uint32_t* subscription = nullptr, std::uint64_t* command = nullptr) {
     return stridewire_client_observe(handle_, world, &observation, subscription, command);

@@ -24,6 +24,8 @@ export interface DriveActions {
   ground(name: TerrainName): void;
   /** Begins with a layer, or ends it. */
   layer(name: string): void;
+  /** Plants feet, or no more. */
+  planting(): void;
 }
 
 const grounds: readonly (readonly [TerrainName, string])[] = [
@@ -50,9 +52,10 @@ export class DrivePanel {
   private readonly walkHeading = h('input',
     {type: 'number', id: 'walk-heading', step: 'any', placeholder: 'any'});
   private readonly walkRow: HTMLElement;
+  private readonly planting: HTMLButtonElement;
   private readonly layerButtons = new Map<string, HTMLButtonElement>();
-  private readonly layers = h('div', {class: 'buttons two'});
-  private readonly layersRow = h('div', {class: 'tool-row', role: 'group', 'aria-label': 'While it moves'},
+  private readonly layers = h('div', {class: 'buttons three'});
+  private readonly layersRow = h('div', {class: 'tool-row layers', role: 'group', 'aria-label': 'While it moves'},
     h('span', {}, 'While it moves'), this.layers);
   private readonly ground = h('select', {id: 'drive-ground'});
   private readonly groundRow: HTMLElement;
@@ -70,6 +73,10 @@ export class DrivePanel {
     };
     this.wanderButton = button('Let them wander', {icon: 'wander', key: 'G', class: 'wide'},
       () => actions.wander());
+    this.planting = make('Plant feet', 'K', () => actions.planting());
+    this.planting.id = 'drive-planting';
+    this.planting.hidden = true;
+    this.layers.append(this.planting);
     this.tools = {
       feet: button('Place feet', {key: 'T'}, () => this.toggleTool('feet')),
       walk: button('Send there', {key: 'M'}, () => this.toggleTool('walk')),
@@ -128,6 +135,12 @@ export class DrivePanel {
     this.groundRow.hidden = !terrain;
     if (this.tool !== null && this.tools[this.tool].hidden) this.toggleTool(this.tool);
   }
+  /** Planting can be switched; `on`: their feet are planted. */
+  offerPlanting(can: boolean, on: boolean): void {
+    this.planting.hidden = !can;
+    press(this.planting, on);
+    this.layersRow.hidden = !can && this.layerButtons.size === 0;
+  }
   /** A button for each layer of the world. */
   offerLayers(names: readonly string[], plays: (name: string) => boolean): void {
     if (names.join(' ') !== [...this.layerButtons.keys()].join(' ')) {
@@ -138,8 +151,8 @@ export class DrivePanel {
         element.id = `drive-layer-${name}`;
         this.layerButtons.set(name, element);
       }
-      this.layers.replaceChildren(...this.layerButtons.values());
-      this.layersRow.hidden = names.length === 0;
+      this.layers.replaceChildren(this.planting, ...this.layerButtons.values());
+      this.layersRow.hidden = this.planting.hidden && names.length === 0;
     }
     for (const [name, element] of this.layerButtons) press(element, plays(name));
   }

@@ -8,7 +8,7 @@ import {
 } from './limits';
 import {Malformed} from './malformed';
 import type {
-  CancelQueue, JoinWorld, LayerEntry, Observe, Remove, Request, SetLayers, SetTerrain, Spawn
+  CancelQueue, JoinWorld, LayerEntry, Observe, Remove, Request, SetLayers, SetPlanting, SetTerrain, Spawn
 } from './messages';
 import {checkName} from './text';
 
@@ -206,6 +206,11 @@ export function setLayers(items: readonly LayerRequest[]): SetLayers {
       };
     }),
   };
+}
+
+export function setPlanting(avatars: readonly number[], on: boolean): SetPlanting {
+  if (typeof on !== 'boolean') throw new Malformed('is neither true nor false', 'on');
+  return {type: 'SetPlanting', seq: 0n, world: 0, avatars: avatarList(avatars, 1, 'avatars'), off: !on};
 }
 
 export function observe(observation: Observation): Observe {

@@ -513,6 +513,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
         movement: current === null ? null : movement(current),
         queueSize,
         queue,
+        plantingOff: m.plantingOff(),
       },
     };
   },
@@ -548,6 +549,17 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       seq: id(m.seq(), 'SetLayers.seq'),
       world: id(m.world(), 'SetLayers.world'),
       items,
+    };
+  },
+
+  SetPlanting(bytes) {
+    const m = wire.SetPlanting.getRootAsSetPlanting(bytes);
+    return {
+      type: 'SetPlanting',
+      seq: id(m.seq(), 'SetPlanting.seq'),
+      world: id(m.world(), 'SetPlanting.world'),
+      avatars: avatarList(m.avatarsArray(), 1, 'SetPlanting.avatars'),
+      off: m.off(),
     };
   },
 

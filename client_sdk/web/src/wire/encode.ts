@@ -149,6 +149,9 @@ function build(b: Builder, m: ClientMessage): number {
       return wire.SetLayers.createSetLayers(b, m.seq, m.world,
                                             wire.SetLayers.createItemsVector(b, items));
     }
+    case 'SetPlanting':
+      return wire.SetPlanting.createSetPlanting(
+          b, m.seq, m.world, wire.SetPlanting.createAvatarsVector(b, m.avatars), m.off);
     case 'StopObserving':
       return wire.StopObserving.createStopObserving(b, m.seq, m.subscription);
     case 'Ping': return wire.Ping.createPing(b, m.nonce, m.timeS);

@@ -16,6 +16,7 @@ export const MessageType = {
   InspectAvatar: 11,
   SetTerrain: 12,
   SetLayers: 13,
+  SetPlanting: 14,
   Goodbye: 32,
   Welcome: 64,
   WorldInfo: 65,
@@ -38,7 +39,7 @@ const names = new Map<number, MessageName>(
     Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
 const bulk = new Set<MessageName>([
   'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events',
-  'SetTerrain', 'WorldTerrain', 'SetLayers'
+  'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting'
 ]);
 
 export function isBulk(name: MessageName): boolean {

@@ -12,6 +12,7 @@ export const featureWalks = 128n;
 export const featureTakeovers = 256n;
 export const featureLayers = 512n;
 export const featureRefusals = 1024n;
+export const featurePlanting = 2048n;
 
 export const maxHelloBytes = 16 << 10;
 export const maxControlBytes = 1 << 20;

@@ -207,6 +207,13 @@ export interface LayerEntry {
   blendS: number;
   speed: number;
 }
+export interface SetPlanting {
+  type: 'SetPlanting';
+  seq: bigint;
+  world: number;
+  avatars: Uint32Array;
+  off: boolean;
+}
 export interface SetLayers {
   type: 'SetLayers';
   seq: bigint;
@@ -221,7 +228,7 @@ export interface WorldTerrain {
 
 export type CommandMessage =
     JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving |
-    SetTerrain | SetLayers;
+    SetTerrain | SetLayers | SetPlanting;
 export type ClientMessage = Hello | CommandMessage | Ping | InspectAvatar | Goodbye;
 export type ServerMessage =
     Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong |

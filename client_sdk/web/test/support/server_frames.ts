@@ -35,7 +35,7 @@ export function welcome(fields: WelcomeFields = {}): ArrayBuffer {
       fields.idleTimeoutS ?? 30, 60);
   wire.Welcome.startWelcome(b);
   wire.Welcome.addProtocol(b, fields.protocol ?? 1);
-  wire.Welcome.addFeatures(b, fields.features ?? 2047n);
+  wire.Welcome.addFeatures(b, fields.features ?? 4095n);
   wire.Welcome.addSession(b, 5n);
   wire.Welcome.addResumeToken(b, token);
   wire.Welcome.addResumed(b, fields.resumed ?? false);

@@ -196,6 +196,8 @@ export function toJson(m: Message): {[name: string]: Json} {
           blend_s: item.blendS, speed: item.speed,
         })),
       };
+    case 'SetPlanting':
+      return {seq: u64(m.seq), world: m.world, avatars: [...m.avatars], off: m.off};
     case 'WorldTerrain': return {world: m.world, terrain: terrain(m.terrain)};
     case 'AvatarState': {
       const {state} = m;
@@ -205,6 +207,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         base_position_m: vec3(state.basePositionM), base_heading_rad: state.baseHeadingRad,
         movement: state.movement === null ? null : movement(state.movement),
         queue_size: state.queueSize, queue: state.queue.map(request),
+        planting_off: state.plantingOff,
       };
     }
   }

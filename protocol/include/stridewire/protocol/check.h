@@ -32,6 +32,7 @@ namespace stridewire::protocol {
 [[nodiscard]] Status Check(const AvatarState& m);
 [[nodiscard]] Status Check(const SetTerrain& m);
 [[nodiscard]] Status Check(const SetLayers& m);
+[[nodiscard]] Status Check(const SetPlanting& m);
 [[nodiscard]] Status Check(const WorldTerrain& m);
 
 }  // namespace stridewire::protocol

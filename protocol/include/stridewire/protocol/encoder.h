@@ -47,6 +47,7 @@ class Encoder {
   [[nodiscard]] Status Encode(const AvatarState& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const SetTerrain& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const SetLayers& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const SetPlanting& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const WorldTerrain& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Message& m, std::vector<std::byte>& frame);
 

@@ -27,6 +27,7 @@ enum class MessageType : std::uint16_t {
   kInspectAvatar = 11,
   kSetTerrain = 12,
   kSetLayers = 13,
+  kSetPlanting = 14,
   // Both ways.
   kGoodbye = 32,
   // Server to client.

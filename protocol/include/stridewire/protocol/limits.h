@@ -21,6 +21,7 @@ inline constexpr std::uint64_t kFeatureWalks = 128;       ///< WalkMovement.
 inline constexpr std::uint64_t kFeatureTakeovers = 256;   ///< RequestItem::takeover.
 inline constexpr std::uint64_t kFeatureLayers = 512;      ///< SetLayers, WorldInfo::layers.
 inline constexpr std::uint64_t kFeatureRefusals = 1024;   ///< StepMovement::must_be_met.
+inline constexpr std::uint64_t kFeaturePlanting = 2048;   ///< SetPlanting.
 
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
 inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;   ///< Payload of Hello.

@@ -229,6 +229,17 @@ struct SetLayers {
   bool operator==(const SetLayers&) const = default;
 };
 
+/// Feet stand still where they land, or are where the examples have them: each avatar's from the next movement on
+/// that it begins. Only with kFeaturePlanting.
+struct SetPlanting {
+  static constexpr MessageType kType = MessageType::kSetPlanting;
+  Seq seq = 0;
+  WorldId world = 0;
+  std::vector<AvatarNumber> avatars;  ///< At least one.
+  bool is_off = false;
+  bool operator==(const SetPlanting&) const = default;
+};
+
 struct Observe {
   static constexpr MessageType kType = MessageType::kObserve;
   Seq seq = 0;
@@ -516,6 +527,7 @@ struct AvatarState {
   std::optional<CurrentMovement> movement;
   std::uint32_t queue_size = 0;
   std::vector<RequestItem> queue;  ///< The first kMaxInspectedRequests of it.
+  bool is_planting_off = false;    ///< As SetPlanting left it.
   bool operator==(const AvatarState&) const = default;
 };
 
@@ -531,6 +543,6 @@ struct WorldTerrain {
 using Message = std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue,
                              Observe, StopObserving, Ping, InspectAvatar, Goodbye, Welcome,
                              WorldInfo, Reply, PoseBatch, Events, Lagging, ErrorNotice, Pong,
-                             AvatarState, SetTerrain, WorldTerrain, SetLayers>;
+                             AvatarState, SetTerrain, WorldTerrain, SetLayers, SetPlanting>;
 
 }  // namespace stridewire::protocol
