@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "parallel.h"
+#include "parameter_scales.h"
 #include "stridewire/runtime/convex_hull.h"
 #include "stridewire/runtime/measure.h"
 
@@ -22,16 +23,6 @@ constexpr double kLastStride = 2e-3;
 // Uniform in (0, 1): the standard distributions may differ between C++ libraries.
 double Uniform(std::mt19937& random) {
   return (static_cast<double>(random()) + 0.5) / 4294967296.0;
-}
-
-double ScaledDistance(const MotionGroup& group, const ParameterValues& a,
-                      const ParameterValues& b) {
-  double sum = 0.0;
-  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-    const double difference = (a.values[l] - b.values[l]) / group.parameters[l].scale;
-    sum += difference * difference;
-  }
-  return std::sqrt(sum);
 }
 
 HullPoint Climb(const MotionGroup& group, HullPoint at, GroupProbe& probe) {
@@ -172,7 +163,7 @@ HullSurvey SurveyHull(const MotionGroup& group, std::span<const ParameterValues>
     const HullPoint& point = survey.points[i];
     const bool is_apart =
         std::all_of(survey.peaks.begin(), survey.peaks.end(), [&](const HullPoint& peak) {
-          return ScaledDistance(group, peak.p, point.p) > kPeakDistance;
+          return ScaledDistance(group, peak.p.values, point.p.values) > kPeakDistance;
         });
     if (is_apart) survey.peaks.push_back(point);
     if (survey.peaks.size() == kPeaks) break;

@@ -8,50 +8,51 @@
 #include "example_clusters.h"
 #include "parallel.h"
 #include "parameter_scales.h"
+#include "smooth_examples.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/convex_hull.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/measure.h"
+#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {
 
-constexpr double kHullGrowth = 0.1;  // as requests are clamped
 constexpr double kSameSite = 1e-9;
 
 // Averages of the examples but one, where they are near duplicates, as sites.
 struct Others {
+  std::vector<int> examples;
   std::vector<std::vector<int>> clusters;
   std::vector<double> sites;  // [cluster][parameter]
 };
 
 Others AllBut(const MotionGroup& group, int left_out, double cluster_diameter_m) {
-  std::vector<int> examples;
+  Others others;
   std::vector<GridExample> points;
   for (int e = 0; e < group.example_count; ++e) {
     if (e == left_out) continue;
-    examples.push_back(e);
+    others.examples.push_back(e);
     points.emplace_back().parameters.assign(group.site(e).begin(), group.site(e).end());
   }
   std::vector<double> units;
   for (const Parameter& parameter : group.parameters) {
     units.push_back(parameter.name == ParameterName::kTurn ? kMetresPerRadian : 1.0);
   }
-  Others others;
   for (std::vector<int>& cluster : CompleteLinkage(points, units, cluster_diameter_m)) {
     for (std::size_t l = 0; l < group.parameters.size(); ++l) {
       double sum = 0.0;
       for (const int i : cluster) sum += points[static_cast<std::size_t>(i)].parameters[l];
       others.sites.push_back(sum / static_cast<double>(cluster.size()));
     }
-    for (int& i : cluster) i = examples[static_cast<std::size_t>(i)];
+    for (int& i : cluster) i = others.examples[static_cast<std::size_t>(i)];
     others.clusters.push_back(std::move(cluster));
   }
   return others;
 }
 
-// The group with the others' sites: the same motion, weights of the left out one 0. Those of a cluster
-// share its weight: their blend is its average.
+// The group with the others' sites: the same motion, weights of the left out one 0. What a site stands for is a
+// blend of examples: a blend of sites is one of them as well.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
@@ -59,31 +60,37 @@ struct GroupOfOthers {
   MotionGroup group;  // spans into these
 };
 
-std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, const Others& others) {
+// `shares` [site][example]: the blend each site stands for.
+std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<const double> sites,
+                                         std::span<const double> shares, bool is_smooth) {
   const std::vector<double> scales = ScalesOf(original);
-  const std::size_t count = others.clusters.size();
-  auto basis = CardinalBasisFit{.parameter_count = original.parameter_count(),
-                                .example_count = static_cast<int>(count),
-                                .sites = others.sites,
-                                .scales = scales}
-                   .Run();
-  if (!basis) return nullptr;
-  auto fitted = std::make_unique<GroupOfOthers>();
-  fitted->basis = *std::move(basis);
   const auto n = static_cast<std::size_t>(original.example_count);
-  const auto share = [&](const std::vector<double>& rows) {
-    std::vector<double> shared(rows.size() / count * n);
+  const std::size_t count = shares.size() / n;
+  auto fitted = std::make_unique<GroupOfOthers>();
+  if (is_smooth) {
+    auto wide = FitOverSmooth(sites, scales);
+    if (!wide) return nullptr;
+    fitted->basis = std::move(wide->basis);
+  } else {
+    auto basis = CardinalBasisFit{.parameter_count = original.parameter_count(),
+                                  .example_count = static_cast<int>(count),
+                                  .sites = sites,
+                                  .scales = scales}
+                     .Run();
+    if (!basis) return nullptr;
+    fitted->basis = *std::move(basis);
+  }
+  const auto blend = [&](const std::vector<double>& rows) {
+    std::vector<double> blended(rows.size() / count * n);
     for (std::size_t i = 0; i < rows.size(); ++i) {
-      const std::vector<int>& cluster = others.clusters[i % count];
-      for (const int e : cluster) {
-        shared[i / count * n + static_cast<std::size_t>(e)] =
-            rows[i] / static_cast<double>(cluster.size());
+      for (std::size_t e = 0; e < n; ++e) {
+        blended[i / count * n + e] += rows[i] * shares[i % count * n + e];
       }
     }
-    return shared;
+    return blended;
   };
-  fitted->linear = share(fitted->basis.linear);
-  fitted->radial = share(fitted->basis.radial);
+  fitted->linear = blend(fitted->basis.linear);
+  fitted->radial = blend(fitted->basis.radial);
   MotionGroup& group = fitted->group;
   group = original;
   group.sites = fitted->basis.sites;
@@ -153,9 +160,29 @@ class Comparer {
         pose_(library.skeleton().joint_count()) {}
 
   // Weights [example] as movements get them: brought onto the hull of the others, then corrected.
-  // Empty if they cannot be solved.
-  std::vector<double> CardinalWeights(const Others& others, std::span<const double> wanted) {
-    const auto fitted = FitOthers(group_, others);
+  // Empty if they cannot be solved. `products`: MovementProducts.
+  std::vector<double> CardinalWeights(const Others& others, std::span<const double> products,
+                                      std::span<const double> wanted) {
+    const auto smoothness = ChooseSmoothness(group_, others.examples, products);
+    const auto smooth = smoothness ? FitSmooth(group_, others.examples, *smoothness) : nullptr;
+    const auto n = static_cast<std::size_t>(group_.example_count);
+    std::vector<double> shares(others.clusters.size() * n);
+    std::vector<double> scratch(n);
+    for (std::size_t c = 0; c < others.clusters.size(); ++c) {
+      const std::span<double> share = std::span(shares).subspan(c * n, n);
+      const std::vector<int>& cluster = others.clusters[c];
+      for (const int e : cluster) {
+        share[static_cast<std::size_t>(e)] = 1.0 / static_cast<double>(cluster.size());
+      }
+      if (smooth == nullptr) continue;
+      const std::span<const double> site =
+          std::span(others.sites).subspan(c * wanted.size(), wanted.size());
+      if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch, cache_,
+                           pose_, movement_)) {
+        std::copy(scratch.begin(), scratch.end(), share.begin());
+      }
+    }
+    const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
     if (fitted == nullptr) return {};
     std::vector<double> metric;
     for (const Parameter& parameter : group_.parameters) metric.push_back(1.0 / parameter.scale);
@@ -163,7 +190,6 @@ class Comparer {
     applied.count = group_.parameter_count();
     ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
-    std::vector<double> scratch(static_cast<std::size_t>(group_.example_count));
     const Correction corrected =
         CorrectParameters(library_.skeleton(), library_.layout(), fitted->group, applied,
                           DefaultCorrectionLimits(group_), scratch, cache_, pose_, movement_);
@@ -253,10 +279,12 @@ LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
   std::vector<Comparer> comparers;
   for (int t = 0; t < threads; ++t) comparers.emplace_back(library, group);
   std::vector<std::array<Comparison, kBlendMethodCount>> all(n);
+  const std::vector<double> products =
+      MovementProducts(group, library.layout(), library.skeleton());
   ParallelFor(group.example_count, 1, threads, [&](int e, int thread) {
     const Others others = AllBut(group, e, cluster_diameter_m);
     Comparer& comparer = comparers[static_cast<std::size_t>(thread)];
-    const std::vector<double> cardinal = comparer.CardinalWeights(others, group.site(e));
+    const std::vector<double> cardinal = comparer.CardinalWeights(others, products, group.site(e));
     if (cardinal.empty()) return;
     const auto d = static_cast<std::size_t>(group.parameter_count());
     all[static_cast<std::size_t>(e)] = {comparer.Compare(e, cardinal),

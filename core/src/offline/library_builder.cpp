@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+#include <numeric>
+#include <optional>
 
 #include "grid_cells.h"
 #include "grid_example.h"
 #include "select_examples.h"
+#include "smooth_examples.h"
 #include "stridewire/offline/layers.h"
 #include "stridewire/offline/library_writer.h"
 #include "stridewire/runtime/cardinal_basis.h"
@@ -52,6 +56,8 @@ Status ValidateExample(const RawGroup& group, const RawExample& example, int joi
   return {};
 }
 
+constexpr double kLeastSpread = 1e-6;
+
 struct ParameterRange {
   double min = HUGE_VAL;
   double max = -HUGE_VAL;
@@ -74,21 +80,56 @@ ParameterRange RangeOf(const std::vector<GridExample>& examples, std::size_t l) 
   return range;
 }
 
+// With ranges of the examples, and their spreads as scales; centres are the basis's.
+std::vector<Parameter> ParametersOf(const RawGroup& group,
+                                    const std::vector<GridExample>& examples) {
+  std::vector<Parameter> parameters;
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    const ParameterRange range = RangeOf(examples, l);
+    const double scale = range.spread > kLeastSpread ? range.spread : 1.0;
+    parameters.push_back({group.parameters[l], range.min, range.max, 0.0, scale});
+  }
+  return parameters;
+}
+
 // A group's numbers, in the order a library has them.
 struct StoredGroup {
   CardinalBasis basis;
   std::vector<int> cells;
+  std::vector<double> sites;
   std::vector<double> keytimes_s;
   std::vector<double> heading_changes_rad;
   std::vector<float> grid;
   std::vector<std::string> sources;
   std::vector<std::uint8_t> mirrored;
 
-  // Without kind, parameters and grid point count.
+  StoredGroup(const std::vector<GridExample>& examples, std::vector<int> of_cells,
+              const GridLayout& layout)
+      : cells(std::move(of_cells)) {
+    const std::size_t n = examples.size();
+    const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+    const std::size_t points = examples.front().rows.size() / row_floats;
+    grid.resize(points * n * row_floats);
+    for (std::size_t e = 0; e < n; ++e) {
+      const GridExample& example = examples[e];
+      keytimes_s.insert(keytimes_s.end(), example.keytimes_s.begin(), example.keytimes_s.end());
+      heading_changes_rad.push_back(example.heading_change_rad);
+      mirrored.push_back(example.mirrored ? 1 : 0);
+      sources.push_back(example.source);
+      sites.insert(sites.end(), example.parameters.begin(), example.parameters.end());
+      for (std::size_t p = 0; p < points; ++p) {
+        std::memcpy(&grid[(p * n + e) * row_floats], &example.rows[p * row_floats],
+                    row_floats * sizeof(float));
+      }
+    }
+  }
+
+  // Without kind and parameters; without weights until there is a basis.
   [[nodiscard]] MotionGroup View() const {
     MotionGroup view;
-    view.example_count = view.site_count = basis.example_count;
-    view.sites = basis.sites;
+    view.example_count = view.site_count = static_cast<int>(mirrored.size());
+    view.grid_point_count = 1 + std::accumulate(cells.begin(), cells.end(), 0);
+    view.sites = sites;
     view.dilations = basis.dilations;
     view.linear = basis.linear;
     view.radial = basis.radial;
@@ -101,6 +142,42 @@ struct StoredGroup {
     return view;
   }
 };
+
+// Makes the examples to be stored smooth in their parameters, by all found but outliers.
+std::optional<Smoothness> Smooth(const RawGroup& group, std::vector<GridExample> found,
+                                 const GroupSelection& selection, const std::vector<int>& cells,
+                                 const GridLayout& layout, const Skeleton& skeleton,
+                                 std::vector<GridExample>& examples) {
+  std::size_t i = 0;
+  std::erase_if(found, [&](const GridExample&) {
+    return selection.examples[i++].fate == ExampleFate::kOutlier;
+  });
+  const StoredGroup stored(found, cells, layout);
+  MotionGroup view = stored.View();
+  view.kind = group.kind;
+  view.parameters = ParametersOf(group, found);
+  return SmoothExamples(view, layout, skeleton, examples);
+}
+
+Status FitWeights(std::span<const double> scales, StoredGroup& stored) {
+  const std::size_t d = scales.size();
+  Expected<CardinalBasis> basis =
+      CardinalBasisFit{
+          static_cast<int>(d), static_cast<int>(stored.sites.size() / d), stored.sites, {}, scales}
+          .Run();
+  if (!basis) return std::unexpected(basis.error());
+  stored.basis = *std::move(basis);
+  return {};
+}
+
+// The same over smooth examples.
+Status FitWide(std::span<const double> scales, StoredGroup& stored, double& radius_factor) {
+  Expected<SmoothBasis> wide = FitOverSmooth(stored.sites, scales);
+  if (!wide) return std::unexpected(wide.error());
+  stored.basis = std::move(wide->basis);
+  radius_factor = wide->radius_factor;
+  return {};
+}
 
 template <typename Note>
 void NoteSelection(const GroupSelection& selection, std::size_t stored, const Note& note) {
@@ -129,6 +206,7 @@ void NoteSelection(const GroupSelection& selection, std::size_t stored, const No
 LibraryBuilder LibraryBuilder::Selecting() {
   LibraryBuilder builder;
   builder.cluster_diameter = 0.05;
+  builder.smooths = true;
   builder.selection = {.max_pose_error_m = 0.025, .outlier_deviations = 5.0};
   return builder;
 }
@@ -158,12 +236,12 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     }
 
     const std::vector<int> cells = ChooseCells(group, grid_fps, layout);
-    std::vector<GridExample> examples;
-    examples.reserve(group.examples.size());
+    std::vector<GridExample> found;
+    found.reserve(group.examples.size());
     for (const RawExample& example : group.examples) {
-      examples.push_back(ResampleOnGrid(example, cells, layout));
+      found.push_back(ResampleOnGrid(example, cells, layout));
     }
-    AlignHemispheres(examples, layout, joint_count);
+    AlignHemispheres(found, layout, joint_count);
 
     std::vector<double> units(group.parameters.size(), 1.0);
     for (std::size_t l = 0; l < units.size(); ++l) {
@@ -171,59 +249,50 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     }
     const double diameter = std::max(cluster_diameter, 10.0 * kMinSiteDistance);
     Selected selected =
-        SelectExamples(examples, units, diameter, selection, layout, raw.skeleton, group);
-    examples = std::move(selected.examples);
+        SelectExamples(found, units, diameter, selection, layout, raw.skeleton, group);
+    std::vector<GridExample> examples = std::move(selected.examples);
     selected.report.group = static_cast<int>(g);
     NoteSelection(selected.report, examples.size(), note);
+    std::optional<Smoothness> smoothness;
+    if (smooths) {
+      smoothness =
+          Smooth(group, std::move(found), selected.report, cells, layout, raw.skeleton, examples);
+    }
+    if (smoothness) {
+      selected.report.ridge = smoothness->ridge;
+      selected.report.ridge_radius = smoothness->radius;
+      char text[64];
+      std::snprintf(text, sizeof text, "made smooth in their parameters, ridge %g",
+                    smoothness->ridge);
+      note(text);
+    }
     selections.push_back(std::move(selected.report));
 
-    const std::size_t n = examples.size();
-    const std::size_t d = group.parameters.size();
-    std::vector<double> scales(d);
-    std::vector<ParameterRange> ranges(d);
-    for (std::size_t l = 0; l < d; ++l) {
-      ranges[l] = RangeOf(examples, l);
-      scales[l] = ranges[l].spread > 1e-6 ? ranges[l].spread : 1.0;
-      if (n > 1 && ranges[l].spread <= 1e-6) {
-        note(std::string(ParameterText(group.parameters[l])) +
+    StoredGroup& stored =
+        *groups.emplace_back(std::make_unique<StoredGroup>(examples, cells, layout));
+    MotionGroup view = stored.View();
+    view.kind = group.kind;
+    view.parameters = ParametersOf(group, examples);
+    std::vector<double> scales;
+    for (const Parameter& parameter : view.parameters) {
+      scales.push_back(parameter.scale);
+      if (examples.size() > 1 && parameter.max - parameter.min <= kLeastSpread) {
+        note(std::string(ParameterText(parameter.name)) +
              " is the same in every example: asking for another value has no effect");
       }
     }
-    StoredGroup& stored = *groups.emplace_back(std::make_unique<StoredGroup>());
-    std::vector<double> sites;
-    for (const GridExample& example : examples) {
-      sites.insert(sites.end(), example.parameters.begin(), example.parameters.end());
-      stored.keytimes_s.insert(stored.keytimes_s.end(), example.keytimes_s.begin(),
-                               example.keytimes_s.end());
-      stored.heading_changes_rad.push_back(example.heading_change_rad);
-      stored.mirrored.push_back(example.mirrored ? 1 : 0);
-      stored.sources.push_back(example.source);
-    }
-    Expected<CardinalBasis> basis =
-        CardinalBasisFit{static_cast<int>(d), static_cast<int>(n), sites, {}, scales}.Run();
-    if (!basis) {
-      Error error = basis.error();
+    if (Status status =
+            smoothness ? FitWide(scales, stored, view.radius_factor) : FitWeights(scales, stored);
+        !status) {
+      Error error = status.error();
       error.where = "group " + std::string(MovementKindName(group.kind));
       return std::unexpected(error);
     }
-    stored.basis = *std::move(basis);
-    stored.cells = cells;
-
-    const std::size_t row_floats = static_cast<std::size_t>(layout.row_floats);
-    const std::size_t points = examples.front().rows.size() / row_floats;
-    stored.grid.resize(points * n * row_floats);
-    for (std::size_t p = 0; p < points; ++p) {
-      for (std::size_t e = 0; e < n; ++e) {
-        std::memcpy(&stored.grid[(p * n + e) * row_floats], &examples[e].rows[p * row_floats],
-                    row_floats * sizeof(float));
-      }
-    }
-    MotionGroup view = stored.View();
-    view.kind = group.kind;
-    view.grid_point_count = static_cast<int>(points);
-    for (std::size_t l = 0; l < d; ++l) {
-      view.parameters.push_back(
-          {group.parameters[l], ranges[l].min, ranges[l].max, stored.basis.centres[l], scales[l]});
+    view.dilations = stored.basis.dilations;
+    view.linear = stored.basis.linear;
+    view.radial = stored.basis.radial;
+    for (std::size_t l = 0; l < scales.size(); ++l) {
+      view.parameters[l].centre = stored.basis.centres[l];
     }
     views.push_back(std::move(view));
   }

@@ -51,7 +51,7 @@ flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& gro
   const auto mirrored = AddVector(builder, group.mirrored);
   return fb::CreateGroup(builder, static_cast<std::uint8_t>(group.kind), parameters_offset,
                          group.example_count, sites, site_weights, dilations, linear, radial, cells,
-                         keytimes, headings, grid, sources_offset, mirrored);
+                         keytimes, headings, grid, sources_offset, mirrored, group.radius_factor);
 }
 
 flatbuffers::Offset<fb::Layer> AddLayer(Builder& builder, const LayerClip& layer) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+#include <span>
 #include <vector>
 
 #include "stridewire/runtime/motion_library.h"
@@ -11,6 +13,17 @@ namespace stridewire {
   std::vector<double> scales;
   for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
   return scales;
+}
+
+// Between two points of a group's parameters [d], or more.
+[[nodiscard]] inline double ScaledDistance(const MotionGroup& group, std::span<const double> a,
+                                           std::span<const double> b) {
+  double sum = 0.0;
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    const double difference = (a[l] - b[l]) / group.parameters[l].scale;
+    sum += difference * difference;
+  }
+  return std::sqrt(sum);
 }
 
 }  // namespace stridewire

@@ -19,6 +19,8 @@ constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
 // The largest error must fall by a thousandth: less is the survey's own noise.
 constexpr double kMinGain = 1e-3;
+// Others than the survey's samples have larger sums of |w|, by as much as this leaves.
+constexpr double kSampledWeightShare = 0.96;
 constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;
 constexpr int kMaxChecks = 10;
@@ -69,23 +71,20 @@ Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Site
   return candidate;
 }
 
-Sites ExamplesOf(const MotionGroup& group, double radius_factor) {
+// The examples with radii `factor` times as wide as those of the library that was built.
+Sites ExamplesOf(const MotionGroup& group, double factor) {
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::span<const double> examples = group.sites.first(n * group.parameters.size());
   return {.parameters = {examples.begin(), examples.end()},
           .pseudo_weights = {},
-          .radius_factors = std::vector<double>(n, radius_factor)};
+          .radius_factors = std::vector<double>(n, factor * group.radius_factor)};
 }
 
 double DistanceToSites(const MotionGroup& group, const ParameterValues& p) {
   double nearest = HUGE_VAL;
   for (int s = 0; s < group.site_count; ++s) {
-    double sum = 0.0;
-    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-      const double difference = (group.site(s)[l] - p.values[l]) / group.parameters[l].scale;
-      sum += difference * difference;
-    }
-    nearest = std::min(nearest, std::sqrt(sum));
+    nearest = std::min(nearest, ScaledDistance(group, group.site(s),
+                                               std::span(p.values).first(group.parameters.size())));
   }
   return nearest;
 }
@@ -134,6 +133,8 @@ class GroupRefiner {
     GroupQuality before = QualityOf(survey, (*plain)->basis.condition);
     Verify((*plain)->group, before);
     max_weight_sum_ = std::max(kMaxRefinedWeightSum, before.weight_sum_max);
+    sampled_weight_sum_ =
+        std::max(kSampledWeightShare * kMaxRefinedWeightSum, before.weight_sum_max);
     max_condition_ = std::max(kMaxRefinedCondition, before.condition);
 
     const bool is_bare = options_.rule == RefineRule::kBare;
@@ -194,7 +195,7 @@ class GroupRefiner {
   }
 
   [[nodiscard]] bool IsWithinBounds(const HullSurvey& survey, double condition) const {
-    return survey.weight_sum_max <= max_weight_sum_ && condition <= max_condition_;
+    return survey.weight_sum_max <= sampled_weight_sum_ && condition <= max_condition_;
   }
 
   [[nodiscard]] bool Tell(double fraction) const {
@@ -360,7 +361,7 @@ class GroupRefiner {
         // Most fail where the error was large before.
         const bool is_worse = std::any_of(hot.begin(), hot.end(), [&](const ParameterValues& p) {
           const HullPoint point = probes_[0].At((*next)->group, p);
-          return point.error_m >= below_m || point.weight_sum > max_weight_sum_;
+          return point.error_m >= below_m || point.weight_sum > sampled_weight_sum_;
         });
         if (is_worse) continue;
         HullSurvey next_survey = SurveyHull((*next)->group, samples_, probes_);
@@ -398,6 +399,7 @@ class GroupRefiner {
   const std::function<bool(double)>& progress_;
   std::vector<ParameterValues> samples_;  // of the hull, and peaks met on the way
   double max_weight_sum_ = kMaxRefinedWeightSum;
+  double sampled_weight_sum_ = kMaxRefinedWeightSum;
   double max_condition_ = kMaxRefinedCondition;
   double done_ = 0.0;
   double share_ = 1.0;

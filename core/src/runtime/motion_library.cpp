@@ -29,6 +29,7 @@ constexpr double kMaxRootM = 1000.0;     // from the base frame
 constexpr double kMaxYawRad = 100.0;
 constexpr double kMaxMovementS = 600.0;
 constexpr double kMinScale = 1e-7;
+constexpr double kMaxRadiusFactor = 100.0;
 
 // A parameter may lie this far outside the hull of the examples, in parts of its extent: what
 // requests are clamped to (10 %) and something over.
@@ -208,6 +209,10 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
   }
   for (const double dilation : group.dilations) {
     if (!(dilation > 1e-9)) return Fail(ErrorCode::kMalformed, "a dilation is not positive");
+  }
+  group.radius_factor = from.radius_factor();
+  if (!(group.radius_factor > 0.0 && group.radius_factor <= kMaxRadiusFactor)) {
+    return Fail(ErrorCode::kMalformed, "a group's radius factor is out of range");
   }
   if (Status status = CheckSites(group); !status) return status;
   return CheckWeightTables(group);

@@ -52,7 +52,9 @@ Json SelectionToJson(const std::vector<GroupSelection>& selections) {
   for (const GroupSelection& selection : selections) {
     Json group = {{"group", selection.group},
                   {"kind", std::string(MovementKindName(selection.kind))},
-                  {"found", selection.examples.size()}};
+                  {"found", selection.examples.size()},
+                  {"ridge", selection.ridge},
+                  {"ridge_radius", selection.ridge_radius}};
     for (const ExampleFate fate : {ExampleFate::kKept, ExampleFate::kAveraged,
                                    ExampleFate::kRedundant, ExampleFate::kOutlier}) {
       group[std::string(ExampleFateName(fate))] = selection.Count(fate);

@@ -47,6 +47,7 @@ void AddSites(const MotionGroup& group, Json& json) {
   }
   json["sites"] = std::move(sites);
   json["dilations"] = group.dilations;
+  json["radius_factor"] = group.radius_factor;
   Json centre = Json::array();
   for (const Parameter& parameter : group.parameters) centre.push_back(parameter.centre);
   json["centre"] = std::move(centre);

@@ -16,7 +16,8 @@ namespace stridewire {
 /// hemispheres aligned, near duplicates averaged, weights solved.
 struct LibraryBuilder {
   /// One that keeps a representative selection of captured movements: those within 5 cm of each other
-  /// averaged, outliers of five deviations and what the others make within 2.5 cm left out.
+  /// averaged, outliers of five deviations and what the others make within 2.5 cm left out, the rest
+  /// made smooth.
   [[nodiscard]] static LibraryBuilder Selecting();
 
   double grid_fps = 30.0;  ///< About this many grid cells a second of mean duration, more where
@@ -26,6 +27,11 @@ struct LibraryBuilder {
   double cluster_diameter = 0.0;
   /// Which of the averages to leave out; by default none.
   SelectionOptions selection;
+  /// Store the examples chosen as a smooth function of their parameters has them, which all but outliers
+  /// decide: what they have in common stays, what is one's own goes. How smooth is chosen by the poses of
+  /// examples left out. Groups of fewer than four examples for each number of a linear function (d + 1)
+  /// stay as they are.
+  bool smooths = false;
 
   struct Note {
     int group = 0;

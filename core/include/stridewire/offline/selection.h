@@ -46,6 +46,9 @@ struct GroupSelection {
   int group = 0;
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<SelectedExample> examples;
+  /// What the examples stored were made smooth by (LibraryBuilder::smooths); 0: they are as captured.
+  double ridge = 0.0;
+  double ridge_radius = 0.0;  ///< Of the radial functions, in spreads of the parameters
 
   [[nodiscard]] int Count(ExampleFate fate) const;
 };

@@ -92,6 +92,7 @@ struct MotionGroup {
   std::span<const double> sites;         ///< [site][parameter], in physical units
   std::span<const double> site_weights;  ///< [site - n][example]: rows D of the pseudoexamples
   std::span<const double> dilations;     ///< [site], scaled units
+  double radius_factor = 1.0;            ///< Of the examples' dilations; refinement starts from it
   std::span<const double> linear;        ///< [1 + d][example]: a, row 0 the constant
   std::span<const double> radial;        ///< [site][example]: r
   std::span<const int> cells;            ///< [interval]: grid cells of each keytime interval

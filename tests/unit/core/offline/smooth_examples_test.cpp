@@ -1,0 +1,228 @@
+#include "smooth_examples.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <vector>
+
+#include "stridewire/offline/builtin_library.h"
+#include "stridewire/offline/library_builder.h"
+#include "stridewire/offline/library_writer.h"
+#include "stridewire/runtime/convex_hull.h"
+#include "stridewire/runtime/measure.h"
+
+namespace stridewire {
+namespace {
+
+constexpr int kStraight = 0;  // 15 examples, 2 parameters
+constexpr int kGeneral = 9;   // 30 examples, 5 parameters
+
+// Generated steps, each with a manner of its own: the root that much higher or lower all along.
+class SmoothExamples : public testing::Test {
+ protected:
+  void SetUp() override {
+    RecordProperty("seed", static_cast<int>(seed_));
+    const RawLibrary raw = GenerateBuiltinLibrary();
+    auto built = LibraryBuilder().Build(raw);
+    ASSERT_TRUE(built.has_value());
+    library_ = *built;
+  }
+
+  [[nodiscard]] const GridLayout& layout() const { return library_->layout(); }
+  [[nodiscard]] const Skeleton& skeleton() const { return library_->skeleton(); }
+  [[nodiscard]] const MotionGroup& clean() const { return library_->group(kStraight); }
+
+  MotionGroup WithManner(double deviation_m) {
+    std::normal_distribution<double> height(0.0, deviation_m);
+    MotionGroup group = clean();
+    grid_.assign(group.grid.begin(), group.grid.end());
+    manner_m_.clear();
+    const auto n = static_cast<std::size_t>(group.example_count);
+    const auto row = static_cast<std::size_t>(layout().row_floats);
+    for (std::size_t e = 0; e < n; ++e) {
+      manner_m_.push_back(height(random_));
+      for (std::size_t p = 0; p < static_cast<std::size_t>(group.grid_point_count); ++p) {
+        grid_[(p * n + e) * row + static_cast<std::size_t>(layout().root()) + 1] +=
+            static_cast<float>(manner_m_.back());
+      }
+    }
+    group.grid = grid_;
+    return group;
+  }
+
+  static std::vector<int> All(const MotionGroup& group) {
+    std::vector<int> all(static_cast<std::size_t>(group.example_count));
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+  }
+
+  std::vector<GridExample> Stored(const MotionGroup& group) const {
+    const auto n = static_cast<std::size_t>(group.example_count);
+    const auto row = static_cast<std::size_t>(layout().row_floats);
+    const auto keys = static_cast<std::size_t>(group.interval_count()) + 1;
+    std::vector<GridExample> examples(n);
+    for (std::size_t e = 0; e < n; ++e) {
+      const auto site = group.site(static_cast<int>(e));
+      examples[e].parameters.assign(site.begin(), site.end());
+      const auto times = group.keytimes_s.subspan(e * keys, keys);
+      examples[e].keytimes_s.assign(times.begin(), times.end());
+      for (std::size_t p = 0; p < static_cast<std::size_t>(group.grid_point_count); ++p) {
+        const auto values = group.grid.subspan((p * n + e) * row, row);
+        examples[e].rows.insert(examples[e].rows.end(), values.begin(), values.end());
+      }
+    }
+    return examples;
+  }
+
+  std::uint32_t seed_ = std::random_device{}();
+  std::mt19937 random_{seed_};
+  std::shared_ptr<const MotionLibrary> library_;
+  std::vector<float> grid_;
+  std::vector<double> manner_m_;
+};
+
+TEST_F(SmoothExamples, WeightsSumToOneAndAreRightInTheParameters) {
+  SCOPED_TRACE(seed_);
+  const MotionGroup& group = clean();
+  std::vector<int> used = All(group);
+  used.erase(used.begin() + 4);
+  const auto smooth = FitSmooth(group, used, {0.3, 2.0});
+  ASSERT_NE(smooth, nullptr);
+  std::uniform_real_distribution<double> anywhere(-0.2, 1.0);
+  std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
+  for (int i = 0; i < 100; ++i) {
+    const double p[] = {anywhere(random_), anywhere(random_)};
+    Movement movement;
+    SetWeights(smooth->group, -1, p, scratch, movement);
+    double sum = 0.0;
+    double mean[2] = {0.0, 0.0};
+    for (std::size_t e = 0; e < scratch.size(); ++e) {
+      sum += scratch[e];
+      for (std::size_t l = 0; l < 2; ++l)
+        mean[l] += scratch[e] * group.site(static_cast<int>(e))[l];
+    }
+    EXPECT_EQ(scratch[4], 0.0);
+    EXPECT_NEAR(sum, 1.0, 1e-9);
+    EXPECT_NEAR(mean[0], p[0], 1e-9);
+    EXPECT_NEAR(mean[1], p[1], 1e-9);
+  }
+}
+
+// What ChooseSmoothness reads off one inverse is what leaving each out and solving again gives.
+TEST_F(SmoothExamples, AreAsSmoothAsMakesLeftOutExamplesBest) {
+  SCOPED_TRACE(seed_);
+  for (const double deviation_m : {0.0, 0.005, 0.05}) {
+    const MotionGroup group = WithManner(deviation_m);
+    const std::vector<int> all = All(group);
+    const std::vector<double> products = MovementProducts(group, layout(), skeleton());
+    const auto chosen = ChooseSmoothness(group, all, products);
+    ASSERT_TRUE(chosen.has_value());
+    const auto n = all.size();
+    const auto left_out_m = [&](const Smoothness& smoothness) {
+      double sum_m = 0.0;
+      for (std::size_t i = 0; i < n; ++i) {
+        std::vector<int> others = all;
+        others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+        std::vector<double> sites, applied(2), metric;
+        for (const int e : others) {
+          sites.insert(sites.end(), group.site(e).begin(), group.site(e).end());
+        }
+        for (const Parameter& parameter : group.parameters) metric.push_back(1.0 / parameter.scale);
+        ProjectOntoHull(sites, metric, 0.1, group.site(static_cast<int>(i)), applied);
+        Movement movement;
+        std::vector<double> w(n);
+        SetWeights(FitSmooth(group, others, smoothness)->group, -1, applied, w, movement);
+        w[i] -= 1.0;
+        double squared = 0.0;
+        for (std::size_t a = 0; a < n; ++a) {
+          for (std::size_t b = 0; b < n; ++b) squared += w[a] * w[b] * products[a * n + b];
+        }
+        sum_m += std::sqrt(std::max(0.0, squared));
+      }
+      return sum_m;
+    };
+    const double least_m = left_out_m(*chosen);
+    for (const double ridge : {0.03, 0.1, 0.3, 1.0, 3.0, 10.0}) {
+      for (const double radius : {2.0, 3.0}) {
+        EXPECT_LE(least_m, left_out_m({ridge, radius}) + 1e-6) << deviation_m << " " << ridge;
+      }
+    }
+    if (deviation_m == 0.0) {
+      EXPECT_EQ(chosen->ridge, 0.03);
+    }
+  }
+}
+
+TEST_F(SmoothExamples, LoseTheirMannerAndKeepTheirParameters) {
+  SCOPED_TRACE(seed_);
+  const MotionGroup group = WithManner(0.05);
+  std::vector<GridExample> examples = Stored(group);
+  ASSERT_TRUE(stridewire::SmoothExamples(group, layout(), skeleton(), examples).has_value());
+  const std::vector<GridExample> were = Stored(clean());
+  double before = 0.0;
+  double after = 0.0;
+  for (std::size_t e = 0; e < examples.size(); ++e) {
+    for (std::size_t l = 0; l < 2; ++l) {
+      EXPECT_NEAR(examples[e].parameters[l], were[e].parameters[l], 1.1e-4);
+    }
+    const auto height = [&](const GridExample& example) {
+      return static_cast<double>(example.rows[static_cast<std::size_t>(layout().root()) + 1]);
+    };
+    before += manner_m_[e] * manner_m_[e];
+    after += std::pow(height(examples[e]) - height(were[e]), 2);
+    EXPECT_TRUE(ValidateKeytimes(examples[e].keytimes_s).has_value());
+  }
+  EXPECT_LT(after, 0.8 * before);
+}
+
+TEST_F(SmoothExamples, AreLeftAloneWhereThereAreTooFew) {
+  const MotionGroup group = WithManner(0.05);
+  const std::vector<double> products = MovementProducts(group, layout(), skeleton());
+  std::vector<int> few = All(group);
+  few.resize(12);  // four for each number of a linear function of two parameters
+  EXPECT_TRUE(ChooseSmoothness(group, few, products).has_value());
+  few.pop_back();
+  EXPECT_FALSE(ChooseSmoothness(group, few, products).has_value());
+}
+
+TEST_F(SmoothExamples, HaveWiderRadiiInManyDimensionsAndSaneWeights) {
+  SCOPED_TRACE(seed_);
+  for (const int g : {kStraight, kGeneral}) {
+    const MotionGroup& group = library_->group(g);
+    std::vector<double> scales;
+    for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
+    const auto wide = FitOverSmooth(group.sites, scales);
+    ASSERT_TRUE(wide.has_value());
+    const double factor = wide->radius_factor;
+    EXPECT_NEAR(wide->basis.dilations[0] / group.dilations[0], factor, 1e-12);
+    if (g == kStraight) {
+      EXPECT_EQ(factor, 1.0);
+    } else {
+      EXPECT_GT(factor, 1.05);
+      EXPECT_LE(factor, 1.5);
+    }
+    EXPECT_LT(wide->basis.condition, 1000.0);
+  }
+}
+
+TEST_F(SmoothExamples, TheRadiusFactorIsPartOfTheFile) {
+  std::vector<MotionGroup> groups(library_->groups().begin(), library_->groups().end());
+  const auto written = [&](double factor) {
+    groups[0].radius_factor = factor;
+    return WriteLibrary({skeleton(), library_->stand_pose(), groups, library_->layers()});
+  };
+  const auto wide = written(1.5);
+  ASSERT_TRUE(wide.has_value());
+  EXPECT_EQ((*wide)->group(0).radius_factor, 1.5);
+  EXPECT_EQ((*wide)->group(1).radius_factor, 1.0);
+  for (const double bad : {0.0, -1.0, 1e6, std::nan("")}) {
+    const auto refused = written(bad);
+    ASSERT_FALSE(refused.has_value()) << bad;
+    EXPECT_NE(Describe(refused.error()).find("radius factor"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace stridewire
