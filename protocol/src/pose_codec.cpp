@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "quantise_kernel.h"
+
 namespace stridewire::protocol {
 namespace {
 
@@ -34,28 +36,6 @@ bool IsUnit(const Quat& q) {
 
 // The components that stay when one is left out.
 constexpr std::size_t kStaying[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
-
-void EncodeSmallestThree(const Quat& q, std::byte* out) {
-  const std::array<float, 4> c = {q.x, q.y, q.z, q.w};
-  std::size_t largest = 0;
-  float magnitude = std::abs(c[0]);
-  for (std::size_t i = 1; i < 4; ++i) {
-    const bool larger = std::abs(c[i]) > magnitude;
-    largest = larger ? i : largest;
-    magnitude = larger ? std::abs(c[i]) : magnitude;
-  }
-  // Divided by its length, so that a quaternion at the edge of the tolerance keeps its rotation.
-  const float scale = std::copysign(kSqrt2 * kComponentSteps / std::sqrt(Dot(q, q)), c[largest]);
-  std::array<std::uint16_t, 3> words;
-  for (std::size_t k = 0; k < 3; ++k) {
-    // Never negative, so that cutting off the fraction rounds; std::round is a call.
-    const float steps = c[kStaying[largest][k]] * scale + (kZero + 0.5f);
-    words[k] = static_cast<std::uint16_t>(std::clamp(static_cast<int>(steps), 1, 2 * kZero - 1));
-  }
-  words[0] |= static_cast<std::uint16_t>((largest & 1) << 15);
-  words[1] |= static_cast<std::uint16_t>((largest >> 1) << 15);
-  std::memcpy(out, words.data(), 6);
-}
 
 // False for bits that no encoder writes.
 bool DecodeSmallestThree(const std::byte* in, Quat& q) {
@@ -93,13 +73,14 @@ Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Qu
   if (!IsFinite(root_position_m)) {
     return Fail(ErrorCode::kOutOfRange, "root position is not finite");
   }
-  for (std::size_t j = 0; j < rotations.size(); ++j) {
-    if (!IsUnit(rotations[j])) {
-      return Fail(ErrorCode::kOutOfRange, "rotation is not a unit quaternion",
-                  static_cast<std::int64_t>(j));
-    }
-  }
+  const auto not_unit = [](std::size_t joint) {
+    return Fail(ErrorCode::kOutOfRange, "rotation is not a unit quaternion",
+                static_cast<std::int64_t>(joint));
+  };
   if (mode == PoseMode::kFull) {
+    for (std::size_t j = 0; j < rotations.size(); ++j) {
+      if (!IsUnit(rotations[j])) return not_unit(j);
+    }
     std::memcpy(out.data(), &root_position_m, 12);
     if (!rotations.empty()) {
       std::memcpy(out.data() + 12, rotations.data(), rotations.size_bytes());
@@ -116,9 +97,9 @@ Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Qu
         std::round(static_cast<double>(root_position_m[i]) * kRootStepsPerM));
   }
   std::memcpy(out.data(), root.data(), 12);
-  for (std::size_t j = 0; j < rotations.size(); ++j) {
-    EncodeSmallestThree(rotations[j], out.data() + 12 + 6 * j);
-  }
+  if (rotations.empty()) return {};
+  const std::size_t sound = QuantiseRotations(&rotations[0].x, rotations.size(), out.data() + 12);
+  if (sound < rotations.size()) return not_unit(sound);
   return {};
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "bench_libraries.h"
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
@@ -342,6 +343,7 @@ void RegisterAll(const std::string& path, const Library& library) {
   }
   Register(name + "/advance_avatar", AdvanceCrowd, library, true);
   Register(name + "/advance_avatar_unplanted", AdvanceCrowd, library, false);
+  RegisterCrowd(name, library);
   Register(name + "/plan_walk_step/level", PlanWalkSteps, library, false);
   Register(name + "/plan_walk_step/slabs", PlanWalkSteps, library, true);
   for (int i = 0; i < static_cast<int>(library->layers().size()); ++i) {

@@ -126,12 +126,9 @@ FootState Avatar::MeasureFeet() const {
   return {FootVector(library_->skeleton(), pose_, Foot::kLeft, base_.heading_rad)};
 }
 
-PoseJob Avatar::JobAt(double time_s) {
-  return {&movement_, time_s, &cache_, &blended_pose_, &pose_};
-}
-
+// Shows a time of the movement, and keeps what the blend has then.
 void Avatar::Evaluate(double time_s) {
-  const PoseJob job = JobAt(time_s);
+  const PoseJob job{&movement_, time_s, &cache_, &pose_, &blended_pose_};
   EvaluatePoses(*library_, std::span(&job, 1));
 }
 
@@ -151,7 +148,10 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
     for (Avatar* avatar : block) {
       STRIDEWIRE_CHECK(avatar->library_.get() == &library);
       avatar->AdvanceState(dt_s);
-      if (avatar->is_moving_) jobs[moving++] = avatar->JobAt(avatar->movement_time_s_);
+      if (avatar->is_moving_) {
+        jobs[moving++] = {&avatar->movement_, avatar->movement_time_s_, &avatar->cache_,
+                          &avatar->pose_};
+      }
     }
     EvaluatePoses(library, std::span(jobs).first(moving));
     for (Avatar* avatar : block) {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 
 #include "cell_weights.h"
 #include "pose_kernels.h"
+#include "prefetch.h"
 
 namespace stridewire {
 namespace {
@@ -23,6 +25,7 @@ struct BlendJob {
 // the same bytes.
 template <typename JobAt>
 void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
+  std::array<std::optional<BlendJob>, kernels::kBlock> blends;
   std::array<DVec3, kernels::kBlock> positions;
   std::array<double, 2 * kernels::kBlock> angles_rad;  // of the base, and half of the root's
   std::array<double, 2 * kernels::kBlock> sines;
@@ -30,7 +33,7 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
   std::array<double, kernels::kBlock> eased;
   const auto root = static_cast<std::size_t>(layout.root());
   for (std::size_t i = 0; i < count; ++i) {
-    const BlendJob job = job_at(i);
+    const BlendJob& job = blends[i].emplace(job_at(i));
     const Movement& movement = job.movement;
     const double u = movement.warp.GridPosition(job.time_s);
     const CellWeights cell = CellWeightsAt(u, job.group.grid_point_count);
@@ -66,7 +69,7 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
   }
   kernels::SinCos(angles_rad.data(), 2 * count, sines.data(), cosines.data());
   for (std::size_t i = 0; i < count; ++i) {
-    const BlendJob job = job_at(i);
+    const BlendJob& job = *blends[i];
     const double sine = sines[2 * i];
     const double cosine = cosines[2 * i];
     const DVec3& local = positions[i];
@@ -99,31 +102,54 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
              [&](std::size_t) { return BlendJob{group, movement, time_s, cache, true, out}; });
 }
 
+namespace {
+
+// What is read of a job, into the nearest cache: its memory lies in several places, each of which would be waited for.
+void Prefetch(const PoseJob& job) {
+  const Movement& movement = *job.movement;
+  job.cache->Prefetch();
+  PrefetchBytes(&movement.warp, sizeof(movement.warp));
+  PrefetchBytes(&movement.feet.packed, sizeof(movement.feet.packed));
+  PrefetchBytes(job.shown->rotations.data(), job.shown->rotations.size() * sizeof(Quat));
+  if (job.time_s < movement.entered_s + movement.ease_out_s) {
+    PrefetchBytes(movement.difference.rotations.data(), job.shown->rotations.size() * sizeof(Quat));
+    PrefetchBytes(movement.difference_velocity.joints_rad_s.data(),
+                  movement.difference_velocity.joints_rad_s.size() * sizeof(Vec3));
+  }
+}
+
+}  // namespace
+
 void EvaluatePoses(const MotionLibrary& library, std::span<const PoseJob> jobs) {
+  // Far enough ahead that memory has come by then, near enough that it has not gone again.
+  constexpr std::size_t kAhead = 3;
   const GridLayout& layout = library.layout();
   std::array<kernels::PlantJob, kernels::kBlock> plants;
+  for (std::size_t i = 0; i < std::min(kAhead, jobs.size()); ++i) Prefetch(jobs[i]);
   while (!jobs.empty()) {
     const std::size_t count = std::min(jobs.size(), kernels::kBlock);
     std::size_t planted = 0;
     BlendPoses(layout, count, [&](std::size_t i) {
+      if (i + kAhead < jobs.size()) Prefetch(jobs[i + kAhead]);
       const PoseJob& job = jobs[i];
       return BlendJob{library.group(job.movement->group),
                       *job.movement,
                       job.time_s,
                       *job.cache,
                       true,
-                      *job.blended};
+                      *job.shown};
     });
     for (const PoseJob& job : jobs.first(count)) {
-      *job.shown = *job.blended;  // of the same size: no allocation
+      if (job.blended != nullptr) *job.blended = *job.shown;  // of the same size: no allocation
       if (!job.movement->feet.is_active) continue;
       const DVec3& base = job.movement->base.position_m;
+      float* root = &job.shown->root_position_m.x;
       plants[planted++] = {.plan = job.movement->feet.packed.data(),
                            .time_s = job.time_s,
                            .base_m = {base.x, base.y, base.z},
-                           .root_m = &job.blended->root_position_m.x,
+                           .root_m = root,
                            .rotations = &job.shown->rotations[0].x,
-                           .root_out_m = &job.shown->root_position_m.x};
+                           .root_out_m = root};
     }
     if (planted > 0) kernels::PlantPoses(library.leg_rig(), plants.data(), planted);
     for (const PoseJob& job : jobs.first(count)) {

@@ -182,8 +182,9 @@ HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride) {
 // Quaternions x y z w one behind the other; of the last lanes only `left` are there.
 HWY_INLINE Quat4 LoadQuats(const float* at, std::size_t left) {
   const FloatTag d;
-  HWY_ALIGN float buffer[4 * kBlock] = {};
+  HWY_ALIGN float buffer[4 * kBlock];
   if (left < hn::Lanes(d)) {
+    std::memset(buffer + 4 * left, 0, 4 * (hn::Lanes(d) - left) * sizeof(float));
     std::memcpy(buffer, at, left * 4 * sizeof(float));
     at = buffer;
   }
@@ -203,8 +204,9 @@ HWY_INLINE void StoreQuats(Quat4 q, float* at, std::size_t left) {
 }
 HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
   const FloatTag d;
-  HWY_ALIGN float buffer[3 * kBlock] = {};
+  HWY_ALIGN float buffer[3 * kBlock];
   if (left < hn::Lanes(d)) {
+    std::memset(buffer + 3 * left, 0, 3 * (hn::Lanes(d) - left) * sizeof(float));
     std::memcpy(buffer, at, left * 3 * sizeof(float));
     at = buffer;
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "pose_kernels.h"
+#include "prefetch.h"
 #include "stridewire/runtime/cardinal_basis.h"
 
 namespace stridewire {
@@ -57,6 +58,8 @@ std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const 
   }
   return row;
 }
+
+void GridCache::Prefetch() const { PrefetchBytes(rows_.data(), rows_.size() * sizeof(float)); }
 
 double EaseOut(double s) {
   if (s <= 0.0) return 1.0;

@@ -78,7 +78,7 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
           Select(Dot(first, at) < Float(0.0f), Float(-blend.weights[k]), Float(blend.weights[k]));
       q = q + at * weight;
     }
-    q = Normalise(q);
+    // Lengths multiply: one division at the end serves all.
     const std::size_t left = blend.joint_count - j;
     if (blend.difference != nullptr) {
       const Quat4 difference = LoadQuats(blend.difference + 4 * j, left);
@@ -86,9 +86,9 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
     }
     if (blend.velocity != nullptr) {
       const Vec3x along = LoadVectors(blend.velocity + 3 * j, left) * Float(0.5f * blend.seconds);
-      q = Multiply(q, Normalise({along.x, along.y, along.z, Float(1.0f)}));
+      q = Multiply(q, {along.x, along.y, along.z, Float(1.0f)});
     }
-    StoreQuats(q, out + 4 * j, left);
+    StoreQuats(Normalise(q), out + 4 * j, left);
   }
 }
 

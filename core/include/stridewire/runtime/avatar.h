@@ -161,7 +161,6 @@ class Avatar {
   [[nodiscard]] bool PlantsFeet() const { return plants_feet_; }
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
-  [[nodiscard]] PoseJob JobAt(double time_s);
   void AdvanceState(double dt_s);
   void ShowLayers();
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
@@ -202,7 +201,7 @@ class Avatar {
   LayerStack layers_;
   Pose layered_pose_;  // with layers, if there are any
   bool has_layers_ = false;
-  Pose blended_pose_;  // the same before feet were planted
+  Pose blended_pose_;  // where a movement ended or gave way: the same before feet were planted
   // What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
   // begins then and keeps their speed, kJoinStepS before, as well as the blended pose.
   std::array<FeetCorrection, 2> earlier_feet_;

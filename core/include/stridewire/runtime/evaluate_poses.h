@@ -11,8 +11,8 @@ struct PoseJob {
   const Movement* movement = nullptr;  ///< Its feet, if planted, packed (FootPlan::packed)
   double time_s = 0.0;                 ///< Clamped to the movement
   GridCache* cache = nullptr;          ///< The movement's own: no two jobs share one
-  Pose* blended = nullptr;             ///< What EvaluateMovement gives
-  Pose* shown = nullptr;               ///< The same with the feet planted
+  Pose* shown = nullptr;               ///< With the feet planted
+  Pose* blended = nullptr;             ///< What EvaluateMovement gives, for who needs that too
 };
 
 /// Evaluates poses together: blends them one after the other and plants as many at a time as vectors have lanes. A

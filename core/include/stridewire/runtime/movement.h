@@ -78,6 +78,9 @@ class GridCache {
   [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
                                            int point);
 
+  /// Asks for the rows' memory: they are read soon.
+  void Prefetch() const;
+
   /// Blends whose norm fell below 0.1, where the example of largest weight was taken instead.
   [[nodiscard]] std::uint64_t degenerate_count() const { return degenerate_count_; }
 

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "stridewire/runtime/motion_library.h"
+
+namespace stridewire {
+
+/// Benchmarks of whole crowds on a library.
+void RegisterCrowd(const std::string& name, const std::shared_ptr<const MotionLibrary>& library);
+
+}  // namespace stridewire

@@ -1,0 +1,208 @@
+// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there are. Beside them the
+// floor of this machine and this run, the plain reference, and sampling every example by itself.
+
+#include <benchmark/benchmark.h>
+
+#include <random>
+
+#include "bench_libraries.h"
+#include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/evaluate_poses.h"
+#include "stridewire/runtime/reference_evaluation.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+
+constexpr double kTickS = 1.0 / 60.0;
+constexpr std::size_t kAtOnce = 64;  // Evaluated, then encoded while the cache has them.
+constexpr int kKinds = 240;          // Different steps, so that no branch is learnt by heart.
+
+// Steps of real walks, each at another time of its own, played again and again.
+class Steps {
+ public:
+  Steps(const Library& library, int count, bool plants_feet) : library_(library) {
+    std::mt19937 random(1);
+    std::vector<Movement> kinds;
+    Avatar avatar(library, {}, {.foot_planting = plants_feet});
+    while (kinds.size() < kKinds) {
+      if (avatar.queue_size() < 2) {
+        const double length_m = 0.45 + 0.2 * static_cast<double>(random() % 1000) / 1000.0;
+        (void)avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = length_m}});
+        continue;
+      }
+      avatar.Advance(kTickS);
+      for (const AvatarEvent& event : avatar.events()) {
+        if (event.type == AvatarEventType::kStarted) kinds.push_back(*avatar.movement());
+      }
+    }
+    examples_ = static_cast<double>(library->group(kinds.back().group).example_count);
+    const int joints = library->skeleton().joint_count();
+    walkers_.reserve(static_cast<std::size_t>(count));
+    for (int i = 0; i < count; ++i) {
+      const Movement& kind = kinds[static_cast<std::size_t>(i) % kKinds];
+      const double part = static_cast<double>(random() % 1000) / 1000.0;
+      walkers_.push_back(
+          {kind, GridCache(library->layout()), Pose(joints), part * kind.duration_s()});
+    }
+    for (Walker& walker : walkers_) {
+      jobs_.push_back({&walker.movement, 0.0, &walker.cache, &walker.shown});
+    }
+  }
+
+  // The next tick's poses of some.
+  void Evaluate(std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Walker& walker = walkers_[i];
+      walker.time_s += kTickS;
+      if (walker.time_s > walker.movement.duration_s()) {
+        walker.time_s -= walker.movement.duration_s();
+        walker.cache.Clear();
+      }
+      jobs_[i].time_s = walker.time_s;
+    }
+    EvaluatePoses(*library_, std::span(jobs_).subspan(begin, end - begin));
+  }
+  void Evaluate() { Evaluate(0, walkers_.size()); }
+
+  struct Walker {
+    Movement movement;
+    GridCache cache;
+    Pose shown;
+    double time_s;
+  };
+  [[nodiscard]] std::span<Walker> walkers() { return walkers_; }
+  [[nodiscard]] const MotionLibrary& library() const { return *library_; }
+  [[nodiscard]] double examples() const { return examples_; }
+
+ private:
+  Library library_;
+  double examples_ = 0.0;
+  std::vector<Walker> walkers_;
+  std::vector<PoseJob> jobs_;
+};
+
+void Count(benchmark::State& state, const Steps& steps, int count) {
+  state.SetItemsProcessed(state.iterations() * count);
+  state.counters["examples"] = steps.examples();
+}
+
+void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
+  const auto count = static_cast<int>(state.range(0));
+  Steps steps(library, count, plants_feet);
+  for (auto _ : state) steps.Evaluate();
+  Count(state, steps, count);
+}
+
+// All that a tick does for a pose: evaluated, planted, quantised into the frame that observers share.
+void WholePose(benchmark::State& state, const Library& library) {
+  const auto count = static_cast<int>(state.range(0));
+  Steps steps(library, count, true);
+  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchInfo info;
+  info.world = 1;
+  info.mode = protocol::PoseMode::kQuantised;
+  info.joint_count = static_cast<std::uint16_t>(library->skeleton().joint_count());
+  const std::size_t most = encoder.MaxAvatars(info.mode, info.joint_count);
+  std::vector<std::byte> frame;
+  for (auto _ : state) {
+    ++info.tick;
+    std::size_t i = 0;
+    while (i < steps.walkers().size()) {
+      frame.clear();
+      Status status = encoder.Begin(info);
+      const std::size_t end = std::min(i + most, steps.walkers().size());
+      while (i < end && status) {
+        const std::size_t some = std::min(i + kAtOnce, end);
+        steps.Evaluate(i, some);
+        for (; i < some && status; ++i) {
+          const Pose& pose = steps.walkers()[i].shown;
+          status = encoder.Add(i + 1, 0, pose.root_position_m, pose.rotations);
+        }
+      }
+      if (status) status = encoder.Finish(frame);
+      if (!status) return state.SkipWithError(status.error().text);
+      benchmark::DoNotOptimize(frame.data());
+    }
+  }
+  Count(state, steps, count);
+}
+
+// y += w x over floats, by the widest vectors there are.
+[[gnu::target_clones("avx512f", "avx2", "default")]] void MultiplyAdd(const float* x, float w,
+                                                                      float* y, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) y[i] += w * x[i];
+}
+
+// The floor: the bytes that evaluating a pose can not do without, each read once and given one multiply-add. At 30
+// cells a second every second tick blends a row of all examples; each reads four rows, plan and difference, and
+// writes a pose.
+void Floor(benchmark::State& state, const Library& library) {
+  const auto count = static_cast<std::size_t>(state.range(0));
+  const MotionGroup& group = library->group(0);
+  const auto row = static_cast<std::size_t>(library->layout().row_floats);
+  const std::size_t examples = static_cast<std::size_t>(group.example_count);
+  const std::size_t own = 4 * row + sizeof(PackedFootPlan) / sizeof(float) + row;
+  std::vector<float> rows(count * own, 1.0f);
+  std::vector<float> pose(row);
+  std::vector<float> poses(count * row);
+  std::size_t tick = 0;
+  for (auto _ : state) {
+    ++tick;
+    for (std::size_t i = 0; i < count; ++i) {
+      float* mine = &rows[i * own];
+      if (((i + tick) & 1) == 0) {
+        const std::size_t point = (i + tick / 2) % static_cast<std::size_t>(group.grid_point_count);
+        for (std::size_t e = 0; e < examples; ++e) {
+          MultiplyAdd(&group.grid[(point * examples + e) * row], 1e-3f, mine, row);
+        }
+      }
+      float* out = &poses[i * row];
+      for (std::size_t k = 0; k + row <= own; k += row) MultiplyAdd(mine + k, 0.25f, out, row);
+    }
+    benchmark::DoNotOptimize(poses.data());
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(count));
+}
+
+// The same poses one by one, the plain way.
+void ReferencePoses(benchmark::State& state, const Library& library, bool samples_examples) {
+  const auto count = static_cast<int>(state.range(0));
+  Steps steps(library, count, false);
+  for (auto _ : state) {
+    for (Steps::Walker& walker : steps.walkers()) {
+      const MotionGroup& group = library->group(walker.movement.group);
+      (samples_examples ? EvaluateMovementBySampling : EvaluateMovementByReference)(
+          group, library->layout(), walker.movement, walker.time_s, walker.shown);
+    }
+  }
+  Count(state, steps, count);
+}
+
+template <typename... Arguments>
+void Register(const std::string& name, Arguments&&... arguments) {
+  for (const int count : {100, 1000, 10000, 100000}) {
+    benchmark::RegisterBenchmark(name.c_str(), std::forward<Arguments>(arguments)...)
+        ->Arg(count)
+        ->Unit(benchmark::kMicrosecond);
+  }
+}
+
+}  // namespace
+
+void RegisterCrowd(const std::string& name, const Library& library) {
+  Register(name + "/crowd/floor", Floor, library);
+  Register(name + "/crowd/evaluate", EvaluateCrowd, library, false);
+  Register(name + "/crowd/evaluate_and_plant", EvaluateCrowd, library, true);
+  Register(name + "/crowd/whole_pose", WholePose, library);
+  for (const bool samples : {false, true}) {
+    benchmark::RegisterBenchmark((name + (samples ? "/crowd/sampled" : "/crowd/reference")).c_str(),
+                                 ReferencePoses, library, samples)
+        ->Arg(1000)
+        ->Unit(benchmark::kMicrosecond);
+  }
+}
+
+}  // namespace stridewire
