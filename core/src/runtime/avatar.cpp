@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "prefetch.h"
 #include "stridewire/base/check.h"
 #include "stridewire/runtime/contact_keytimes.h"
 #include "stridewire/runtime/correction.h"
@@ -145,8 +146,10 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
     const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), kAtOnce));
     const MotionLibrary& library = *block.front()->library_;
     std::size_t moving = 0;
+    std::size_t ahead = block.size();
     for (Avatar* avatar : block) {
       STRIDEWIRE_CHECK(avatar->library_.get() == &library);
+      if (ahead < avatars.size()) avatars[ahead++]->PrefetchState();
       avatar->AdvanceState(dt_s);
       if (avatar->is_moving_) {
         jobs[moving++] = {&avatar->movement_, avatar->movement_time_s_, &avatar->cache_,
@@ -160,6 +163,25 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
     }
     avatars = avatars.subspan(block.size());
   }
+}
+
+void Avatar::PrefetchWhereShown() const {
+  PrefetchBytes(&pose_, sizeof(pose_));
+  PrefetchBytes(&has_layers_, sizeof(has_layers_));
+  PrefetchBytes(&is_moving_, sizeof(is_moving_));
+}
+
+void Avatar::PrefetchShown() const {
+  const ConstPoseSpan shown = pose();
+  PrefetchBytes(shown.rotations.data(), shown.rotations.size_bytes());
+}
+
+// What AdvanceState reads of an avatar that goes on walking.
+void Avatar::PrefetchState() const {
+  PrefetchBytes(&time_s_, 2 * kCacheLineBytes);
+  PrefetchBytes(&movement_, kCacheLineBytes);
+  PrefetchBytes(&movement_.keytimes_s, sizeof(movement_.keytimes_s));
+  PrefetchBytes(&movement_.feet.is_active, 1);
 }
 
 // All of Advance but the pose at its end.

@@ -104,6 +104,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
     avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start, options),
                                    .owner = command.session,
                                    .spawn_tick = tick});
+    is_order_known_ = false;
     if (events_wanted_) {
       AddEvent(EventType::kSpawned, number, tick).base = item.spawn.start;
     }
@@ -149,6 +150,7 @@ void WorldShard::Remove(const RemovePart& part, std::uint64_t tick, CommandResul
       result.items.push_back(NoSuchAvatar(ref.index, ref.avatar));
       continue;
     }
+    is_order_known_ = false;
     ++result.accepted;
     if (events_wanted_) AddEvent(EventType::kRemoved, ref.avatar, tick);
   }
@@ -222,6 +224,7 @@ void WorldShard::Release(SessionId session, std::uint64_t tick) {
     if (events_wanted_) AddEvent(EventType::kRemoved, item.first, tick);
     return true;
   });
+  is_order_known_ = false;
   budget_.Release(*world_, static_cast<std::int64_t>(removed));
 }
 
@@ -249,21 +252,33 @@ void WorldShard::Advance(std::uint64_t tick, int steps) {
   AdvanceAvatars(tick, steps);
 }
 
+std::span<const WorldShard::InOrder> WorldShard::AvatarsInOrder() {
+  if (!is_order_known_) {
+    in_order_.clear();
+    advancing_.clear();
+    for (auto& [number, entry] : avatars_) {
+      in_order_.push_back({number, &entry});
+      advancing_.push_back(&entry.avatar);
+    }
+    is_order_known_ = true;
+  }
+  return in_order_;
+}
+
 void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
-  advancing_.clear();
-  for (auto& [number, entry] : avatars_) advancing_.push_back(&entry.avatar);
+  const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
     Avatar::AdvanceAll(advancing_, step_s);
     const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
-    for (auto& [number, entry] : avatars_) {
-      entry.time_s += step_s;
+    for (const auto& [number, entry] : in_order) {
+      entry->time_s += step_s;
       if (!events_wanted_) continue;
-      for (const AvatarEvent& happened : entry.avatar.events()) {
+      for (const AvatarEvent& happened : entry->avatar.events()) {
         protocol::Event& event = events_.emplace_back(ToWire(happened, *world_->library));
         event.avatar = number;
         event.tick = step_tick;
-        event.time_s = clock_.TickTime(step_tick) - (entry.time_s - happened.time_s);
+        event.time_s = clock_.TickTime(step_tick) - (entry->time_s - happened.time_s);
       }
     }
   }
@@ -354,19 +369,27 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, protocol::PoseBatchEn
   delivery.from_shard = shard_;
   delivery.tick = tick;
   delivery.avatar_count = static_cast<std::uint32_t>(avatars_.size());
-  auto it = avatars_.begin();
+  constexpr std::size_t kAhead = 4;
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  std::size_t next = 0;
   for (std::size_t part = 0; part < parts; ++part) {
     info.part = static_cast<std::uint16_t>(part);
     const Status begun = encoder.Begin(info);
     STRIDEWIRE_CHECK(begun.has_value());
-    for (std::size_t i = 0; i < max_avatars && it != avatars_.end(); ++i, ++it) {
-      const Entry& entry = it->second;
+    for (std::size_t i = 0; i < max_avatars && next < in_order.size(); ++i, ++next) {
+      const auto& [number, avatar_entry] = in_order[next];
+      const Entry& entry = *avatar_entry;
+      // In two strides: where a pose lies is told by the avatar.
+      if (next + 2 * kAhead < in_order.size()) {
+        in_order[next + 2 * kAhead].entry->avatar.PrefetchWhereShown();
+      }
+      if (next + kAhead < in_order.size()) in_order[next + kAhead].entry->avatar.PrefetchShown();
       std::uint8_t flags = 0;
       // Long enough to stand in a batch of the observer who takes the fewest.
       if (tick < entry.spawn_tick + max_every_) flags |= protocol::kPoseDiscontinuity;
       if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
       const ConstPoseSpan pose = entry.avatar.pose();
-      if (!encoder.Add(it->first, flags, pose.root_position_m, pose.rotations)) {
+      if (!encoder.Add(number, flags, pose.root_position_m, pose.rotations)) {
         metrics_.pose_errors.Add();
       }
     }

@@ -71,6 +71,10 @@ class WorldShard {
     std::uint64_t spawn_tick = 0;
     double time_s = 0.0;  // avatar time, added up exactly as the avatar does
   };
+  struct InOrder {
+    AvatarNumber number;
+    Entry* entry;
+  };
   struct ShardInterest {
     std::array<std::uint16_t, 2> every{};  // by mode, 0: none
     bool events = false;
@@ -86,6 +90,7 @@ class WorldShard {
   void Release(SessionId session, std::uint64_t tick);
   void ChangeGround(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
+  std::span<const InOrder> AvatarsInOrder();
   protocol::Event& AddEvent(protocol::EventType type, AvatarNumber avatar, std::uint64_t tick);
 
   std::shared_ptr<World> world_;
@@ -95,8 +100,11 @@ class WorldShard {
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
   std::map<AvatarNumber, Entry> avatars_;  // in order, so that batches and events are
-  std::vector<Avatar*> advancing_;         // all of them, while they advance
-  std::vector<ShardInterest> interests_;   // by shard
+  // The same for who goes through all of them, made anew when there are others.
+  std::vector<InOrder> in_order_;
+  std::vector<Avatar*> advancing_;
+  bool is_order_known_ = false;
+  std::vector<ShardInterest> interests_;  // by shard
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;

@@ -130,6 +130,9 @@ class Avatar {
 
   /// Displayed, in the world.
   [[nodiscard]] ConstPoseSpan pose() const { return has_layers_ ? layered_pose_ : pose_; }
+  /// For who reads the poses of many: asks for the memory of pose() and idle(), and before that for where it is.
+  void PrefetchWhereShown() const;
+  void PrefetchShown() const;
   [[nodiscard]] const LayerStack& layers() const { return layers_; }
   [[nodiscard]] std::span<const AvatarEvent> events() const {
     return std::span(events_).first(event_count_);
@@ -162,6 +165,7 @@ class Avatar {
   [[nodiscard]] FootState MeasureFeet() const;
   void Evaluate(double time_s);
   void AdvanceState(double dt_s);
+  void PrefetchState() const;
   void ShowLayers();
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
@@ -208,6 +212,8 @@ class Avatar {
   Pose earlier_pose_;
   double moved_until_s_ = -1.0;  // avatar time
   double time_s_ = 0.0;          // avatar time
+  double movement_time_s_ = 0.0;
+  std::size_t event_count_ = 0;
 
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
@@ -223,7 +229,6 @@ class Avatar {
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
   Movement movement_;
-  double movement_time_s_ = 0.0;
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
   GridCache cache_;
   std::vector<double> weight_scratch_;
@@ -241,7 +246,6 @@ class Avatar {
   std::vector<MovementRequest> queue_;  // live from queue_head_ on
   std::size_t queue_head_ = 0;
   std::array<AvatarEvent, kMaxEventsPerAdvance> events_{};
-  std::size_t event_count_ = 0;
 };
 
 }  // namespace stridewire
