@@ -8,6 +8,7 @@
 #include "bench_libraries.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/reference_evaluation.h"
 
@@ -130,6 +131,53 @@ void WholePose(benchmark::State& state, const Library& library) {
   Count(state, steps, count);
 }
 
+// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty frames.
+void MakeSteps(benchmark::State& state, const Library& library) {
+  constexpr std::size_t kSteps = 16;
+  constexpr int kFrames = 30;
+  const MotionGroup& group = library->group(0);
+  const auto d = static_cast<std::size_t>(group.parameter_count());
+  std::mt19937 random(1);
+  std::vector<ParameterValues> wanted(kKinds);
+  for (ParameterValues& parameters : wanted) {
+    parameters.count = static_cast<int>(d);
+    // Half-way between two examples.
+    for (int corner = 0; corner < 2; ++corner) {
+      const auto site =
+          group.site(static_cast<int>(random() % static_cast<unsigned>(group.example_count)));
+      for (std::size_t l = 0; l < d; ++l) parameters.values[l] += 0.5 * site[l];
+    }
+  }
+  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  Pose measured(library->skeleton().joint_count());
+  std::vector<Movement> movements(kSteps);
+  std::vector<GridCache> caches(kSteps, GridCache(library->layout()));
+  std::vector<Pose> poses(kSteps, measured);
+  for (Movement& movement : movements) movement.difference = measured;
+  std::array<PoseJob, kSteps> jobs;
+  std::size_t next = 0;
+  for (auto _ : state) {
+    for (std::size_t i = 0; i < kSteps; ++i) {
+      const Correction corrected =
+          CorrectParameters(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group),
+                            scratch, caches[i], measured, movements[i]);
+      StartMovement(group, 0, std::span(corrected.parameters.values).first(d), {}, scratch,
+                    movements[i]);
+      caches[i].Clear();
+      jobs[i] = {&movements[i], 0.0, &caches[i], &poses[i]};
+    }
+    for (int frame = 0; frame < kFrames; ++frame) {
+      for (PoseJob& job : jobs) {
+        job.time_s = job.movement->duration_s() * frame / (kFrames - 1);
+      }
+      EvaluatePoses(*library, jobs);
+      benchmark::DoNotOptimize(poses.data());
+    }
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kSteps));
+  state.counters["examples"] = static_cast<double>(group.example_count);
+}
+
 // y += w x over floats, by the widest vectors there are.
 [[gnu::target_clones("avx512f", "avx2", "default")]] void MultiplyAdd(const float* x, float w,
                                                                       float* y, std::size_t count) {
@@ -197,6 +245,8 @@ void RegisterCrowd(const std::string& name, const Library& library) {
   Register(name + "/crowd/evaluate", EvaluateCrowd, library, false);
   Register(name + "/crowd/evaluate_and_plant", EvaluateCrowd, library, true);
   Register(name + "/crowd/whole_pose", WholePose, library);
+  benchmark::RegisterBenchmark((name + "/crowd/steps").c_str(), MakeSteps, library)
+      ->Unit(benchmark::kMicrosecond);
   for (const bool samples : {false, true}) {
     benchmark::RegisterBenchmark((name + (samples ? "/crowd/sampled" : "/crowd/reference")).c_str(),
                                  ReferencePoses, library, samples)

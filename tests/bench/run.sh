@@ -6,6 +6,9 @@
 #   tests/bench/run.sh LIBRARY.swl ...       # builtin and these
 #   tests/bench/run.sh --min-time 2 --filter synthesize
 #
+# Crowds of 100 to 100,000 are told as multiples of a floor as well, which is measured in the same run: what reading their
+# bytes once and giving each float one multiply-add takes.
+#
 #   --out DIR        where the CSV goes (default: build/release/bench)
 #   --min-time S     seconds for each benchmark (default: 0.5)
 #   --filter REGEX   only benchmarks whose name matches
@@ -69,8 +72,8 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
   function number(text) { return text == "" ? "" : sprintf("%.6g", text) }
   function quoted(text) { gsub(/"/, "\"\"", text); return "\"" text "\"" }
   BEGIN {
-    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,commit,compiler,cpu,load_average" > csv
-    printf "%-40s %14s %12s %10s\n", "one core of " cpu, "items/s", "us an item", "MB/s"
+    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,times_floor,commit,compiler,cpu,load_average" > csv
+    printf "%-40s %14s %12s %10s %12s\n", "one core of " cpu, "items/s", "us an item", "MB/s", "times floor"
   }
   /"benchmarks": \[/ { inside = 1; next }
   !inside { next }
@@ -80,15 +83,23 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
     if ("error_message" in f) { print f["name"] ": " f["error_message"] > "/dev/stderr"; failed = 1 }
     us = f["cpu_time"]
     items = f["items_per_second"] != "" ? f["items_per_second"] : 1e6 / us
+    # Crowds are told beside the floor of as many, measured before them.
+    times = ""
+    if (f["name"] ~ /\/crowd\//) {
+      size = f["name"]; sub(/.*\//, "", size)
+      of = f["name"]; sub(/\/crowd\/.*/, "", of)
+      if (f["name"] ~ /\/crowd\/floor\//) floor[of "/" size] = items
+      if ((of "/" size) in floor) times = sprintf("%.2f", floor[of "/" size] / items)
+    }
     print quoted(f["name"]) "," number(items) "," number(us) "," f["iterations"] "," \
           number(f["bytes_per_second"]) "," number(f["examples"]) "," number(f["parameters"]) "," \
-          number(f["library_bytes"]) "," number(f["bytes_per_example"]) "," \
+          number(f["library_bytes"]) "," number(f["bytes_per_example"]) "," times "," \
           quoted(commit) "," quoted(compiler) "," quoted(cpu) "," load > csv
     if (f["library_bytes"] != "") {
       printf "%-40s %d bytes, %d examples, %.0f bytes an example\n", f["name"], f["library_bytes"], f["examples"], f["bytes_per_example"]
     } else {
-      printf "%-40s %14.0f %12.4f %10s\n", f["name"], items, 1e6 / items, \
-             f["bytes_per_second"] != "" ? sprintf("%.0f", f["bytes_per_second"] / 1e6) : ""
+      printf "%-40s %14.0f %12.4f %10s %12s\n", f["name"], items, 1e6 / items, \
+             f["bytes_per_second"] != "" ? sprintf("%.0f", f["bytes_per_second"] / 1e6) : "", times
     }
     split("", f)
   }
