@@ -72,7 +72,8 @@ void Avatar::Teleport(const BaseFrame& start) {
   ShowLayers();
 }
 
-Status Avatar::Enqueue(const MovementRequest& request) {
+Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
+  STRIDEWIRE_CHECK(hold_s >= 0.0);
   if (Status status = ValidateRequest(*library_, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
@@ -84,11 +85,16 @@ Status Avatar::Enqueue(const MovementRequest& request) {
       MakeRoom(*library_, kept_movement_);
     }
   }
+  const double held_until_s = hold_until_s_;
   if (request.takeover != Takeover::kNone) {
     CancelQueue();
     takes_over_ = request.takeover == Takeover::kNow && is_moving_ &&
                   !std::holds_alternative<StandRequest>(request.movement);
     if (is_in_stand_) stand_left_s_ = 0.0;
+  }
+  if (queue_size() == 0) {
+    hold_until_s_ = time_s_ + hold_s;
+    if (held_until_s > time_s_) hold_until_s_ = std::min(hold_until_s_, held_until_s);
   }
   if (queue_head_ > 64 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
@@ -112,6 +118,7 @@ int Avatar::CancelQueue() {
   queue_head_ = 0;
   walk_ = {};
   takes_over_ = false;
+  hold_until_s_ = 0.0;
   return dropped;
 }
 
@@ -261,6 +268,8 @@ bool Avatar::StartNext() {
     return false;
   }
 
+  if (IsHeld() && last_group_ == library_->groups().size()) return false;
+  hold_until_s_ = 0.0;
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {

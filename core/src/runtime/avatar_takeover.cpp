@@ -17,12 +17,15 @@ double Avatar::Landed() const {
 }
 
 double Avatar::EndOfMovement() const {
-  return takes_over_ ? std::min(Landed(), movement_.duration_s()) : movement_.duration_s();
+  return takes_over_ && !IsHeld() ? std::min(Landed(), movement_.duration_s())
+                                  : movement_.duration_s();
 }
 
 // The foot in the air is the one that the request at the queue's head moves, and far from landing.
 bool Avatar::RedirectsSwing() const {
-  if (!takes_over_ || !IsStep(group().kind) || plants_feet_ != foot_planting()) return false;
+  if (!takes_over_ || IsHeld() || !IsStep(group().kind) || plants_feet_ != foot_planting()) {
+    return false;
+  }
   const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);
   if (step == nullptr ||
       step->foot.value_or(MovingFoot(group().kind)) != MovingFoot(group().kind)) {

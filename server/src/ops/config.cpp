@@ -225,6 +225,9 @@ std::vector<ConfigKey> MakeKeys() {
         &Limits::requests_per_s, 1, 100'000'000);
   limit("request_burst", "Items one session may send at once", &Limits::request_burst, 1,
         100'000'000);
+  limit("starts_per_tick",
+        "Avatars one command sets going in a tick; others begin in the next ones",
+        &Limits::starts_per_tick, 16, 1'000'000);
   limit("messages_per_s", "Messages of one session a second; beyond, reading pauses",
         &Limits::messages_per_s, 1, 100'000'000);
   limit("max_pending_commands", "Commands of one session not answered yet; beyond, reading pauses",

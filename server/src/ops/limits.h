@@ -36,6 +36,7 @@ struct Limits {
   // What one session may ask for.
   int requests_per_s = 50'000;     ///< Items of commands; more are refused.
   int request_burst = 65'536;      ///< How many at once.
+  int starts_per_tick = 128;       ///< Avatars a command sets going in one tick, of all shards.
   int messages_per_s = 4000;       ///< Messages of any kind; beyond, reading pauses.
   int max_pending_commands = 256;  ///< Not answered yet; beyond, reading pauses.
 
@@ -66,6 +67,7 @@ enum class Limit : std::uint8_t {
   kAvatarsPerWorld,
   kQueue,
   kRequestsPerSecond,
+  kStartsPerTick,
   kMessagesPerSecond,
   kPendingCommands,
   kControlBuffer,
@@ -93,6 +95,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Limit::kC
      "max_avatars_per_world",
      "max_queue",
      "requests_per_s",
+     "starts_per_tick",
      "messages_per_s",
      "max_pending_commands",
      "control_buffer",

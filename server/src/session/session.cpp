@@ -523,7 +523,15 @@ void Session::Execute(protocol::Request&& command) {
            std::string("the feature '") + feature + "' was not agreed on in the handshake");
     return;
   }
-  std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()));
+  // Movements of one avatar stand beside each other.
+  std::size_t avatars = 0;
+  for (std::size_t i = 0; i < command.items.size(); ++i) {
+    avatars += i == 0 || command.items[i].avatar != command.items[i - 1].avatar;
+  }
+  const auto at_once = static_cast<std::size_t>(host_.config().limits.starts_per_tick);
+  const auto over_ticks = static_cast<std::uint32_t>((avatars + at_once - 1) / at_once);
+  std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()),
+                                 RequestPart{.items = {}, .over_ticks = over_ticks});
   std::uint32_t index = 0;
   for (const protocol::RequestItem& item : command.items) {
     parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(

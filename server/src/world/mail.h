@@ -27,6 +27,7 @@ struct RequestPart {
     protocol::RequestItem request;
   };
   std::vector<Item> items;
+  std::uint32_t over_ticks = 1;  ///< What begins from a stand is spread over, by StartTickOf.
 };
 struct LayerPart {
   struct Item {

@@ -34,6 +34,17 @@ struct World {
   return static_cast<int>(avatar % static_cast<AvatarNumber>(shard_count));
 }
 
+/// In which of so many ticks an avatar begins what a large command asks of all: of no account who else was asked,
+/// in what order, and on which shard they live.
+[[nodiscard]] constexpr std::uint32_t StartTickOf(AvatarNumber avatar, std::uint32_t over_ticks) {
+  // The finaliser of MurmurHash3: numbers in a row are spread whatever `over_ticks` has in common with the shards.
+  std::uint32_t hash = avatar;
+  hash = (hash ^ (hash >> 16)) * 0x85eb'ca6bu;
+  hash = (hash ^ (hash >> 13)) * 0xc2b2'ae35u;
+  hash ^= hash >> 16;
+  return static_cast<std::uint32_t>((std::uint64_t{hash} * over_ticks) >> 32);
+}
+
 /// An avatar number nobody has used in this world; 0 when there is none left.
 [[nodiscard]] inline AvatarNumber NextNumber(World& world) {
   AvatarNumber last = world.last_number.load(std::memory_order_relaxed);

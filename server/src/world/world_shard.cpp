@@ -114,6 +114,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
 }
 
 void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandResult& result) {
+  std::uint64_t held = 0;
   for (const RequestPart::Item& item : part.items) {
     const protocol::RequestItem& asked = item.request;
     const auto it = avatars_.find(asked.avatar);
@@ -122,12 +123,15 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
       continue;
     }
     Avatar& avatar = it->second.avatar;
+    const std::uint32_t hold_ticks = StartTickOf(asked.avatar, part.over_ticks);
+    held += hold_ticks > 0;
     ReplyItem refused{.index = item.index, .avatar = asked.avatar, .request_id = asked.request_id};
     if (asked.takeover == protocol::Takeover::kNone && avatar.queue_size() >= max_queue_) {
       metrics_.Reached(Limit::kQueue);
       refused.code = StatusCode::kQueueFull;
       refused.text = "the avatar's queue is full";
-    } else if (const Status status = avatar.Enqueue(FromWire(asked)); !status) {
+    } else if (const Status status = avatar.Enqueue(FromWire(asked), hold_ticks * clock_.tick_s());
+               !status) {
       refused.code = ToStatusCode(status.error().code);
       refused.text = status.error().text;
     }
@@ -142,6 +146,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
   }
   metrics_.requests_accepted.Add(result.accepted);
   metrics_.requests_rejected.Add(part.items.size() - result.accepted);
+  if (held > 0) metrics_.Reached(Limit::kStartsPerTick, held);
 }
 
 void WorldShard::Remove(const RemovePart& part, std::uint64_t tick, CommandResult& result) {

@@ -150,6 +150,39 @@ void ExpectSameWhereBothHave(const PoseStreams& a, const PoseStreams& b) {
   }
 }
 
+TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
+  server::Config config = TestConfig(2);
+  config.limits.starts_per_tick = 16;
+  TestServer server(config);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto world = client.Join("crowd");
+  ASSERT_TRUE(world);
+  std::vector<protocol::SpawnItem> spawns;
+  for (AvatarNumber avatar = 1; avatar <= 48; ++avatar) spawns.push_back({avatar, Start(avatar)});
+  ASSERT_TRUE(client.Spawn(world->world, spawns));
+  const auto held = [&] { return server.metrics().Sum(Limit::kStartsPerTick); };
+  const auto ask = [&](AvatarNumber count, int steps) {
+    std::vector<protocol::RequestItem> items;
+    for (AvatarNumber avatar = 1; avatar <= count; ++avatar) {
+      for (int i = 0; i < steps; ++i) {
+        items.push_back({.avatar = avatar,
+                         .request_id = 1,
+                         .movement = protocol::StepMovement{.length_m = 0.4}});
+      }
+    }
+    const auto reply = client.Request(world->world, items);
+    return reply ? reply->accepted : 0;
+  };
+  EXPECT_EQ(ask(16, 5), 80u);  // several movements of one are one start
+  EXPECT_EQ(held(), 0u);
+  EXPECT_EQ(ask(48, 1), 48u);
+  std::uint64_t expected = 0;
+  for (AvatarNumber avatar = 1; avatar <= 48; ++avatar)
+    expected += server::StartTickOf(avatar, 3) > 0;
+  EXPECT_EQ(held(), expected);
+}
+
 TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
   constexpr int kAvatars = 6;
   const PoseStreams one = PlayOnServer(1, kAvatars, PoseMode::kFull);

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <map>
 
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/decode.h"
@@ -357,6 +359,82 @@ TEST(WorldShard, BoundsAnAvatarsQueue) {
   EXPECT_EQ(result.items[0].index, 4u);
   EXPECT_EQ(result.items[0].code, StatusCode::kQueueFull);
   EXPECT_EQ(bench.metrics.requests_rejected.value(), 6u);
+}
+
+// Bytes of all poses by avatar and tick of a crowd that begins over some ticks.
+std::map<AvatarNumber, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_count,
+                                                                          bool is_reversed) {
+  constexpr AvatarNumber kAvatars = 40;
+  constexpr std::uint32_t kOverTicks = 3;
+  AvatarBudget budget(100, 100);
+  ThreadMetrics metrics;
+  const auto world = Bench::MakeWorld();
+  std::map<AvatarNumber, std::vector<std::vector<std::byte>>> poses;
+  for (int s = 0; s < shard_count; ++s) {
+    WorldShard shard(world, s, shard_count, 8, kClock, budget, metrics);
+    SpawnPart spawn;
+    RequestPart request{.items = {}, .over_ticks = kOverTicks};
+    for (AvatarNumber avatar = 1; avatar <= kAvatars; ++avatar) {
+      if (ShardOf(avatar, shard_count) != s) continue;
+      EXPECT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
+      spawn.items.push_back({avatar, {.avatar = avatar}});
+      request.items.push_back(
+          {avatar, {.avatar = avatar, .movement = protocol::StepMovement{.length_m = 0.4}}});
+    }
+    if (is_reversed) std::ranges::reverse(request.items);
+    (void)shard.Execute({.world = world, .session = 1, .seq = 1, .part = spawn}, 1);
+    protocol::PoseBatchEncoder encoder;
+    for (std::uint64_t tick = 1; tick <= 30; ++tick) {
+      if (tick == 2) {
+        (void)shard.Execute({.world = world, .session = 1, .seq = 2, .part = request}, tick);
+      }
+      shard.Advance(tick, 1);
+      PoseDelivery delivery;
+      EXPECT_TRUE(shard.Encode(PoseMode::kFull, tick, encoder, delivery));
+      const Decoded decoded(delivery.parts.at(0));
+      for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
+        const auto pose = decoded.batch.pose(i);
+        poses[decoded.batch.avatars[i]].emplace_back(pose.begin(), pose.end());
+      }
+    }
+  }
+  EXPECT_GT(metrics.limits[static_cast<std::size_t>(Limit::kStartsPerTick)].value(), 15u);
+  return poses;
+}
+
+TEST(WorldShard, AHeldCrowdBeginsAlikeOnAnyShardsAndInAnyOrder) {
+  const auto one = PlayHeldCrowd(1, false);
+  std::map<std::size_t, int> begun;  // by tick
+  for (const auto& [avatar, poses] : one) {
+    std::size_t tick = 0;
+    while (poses[tick + 1] == poses[0]) ++tick;
+    EXPECT_EQ(tick, StartTickOf(avatar, 3)) << avatar;
+    ++begun[tick];
+  }
+  ASSERT_EQ(begun.size(), 3u);
+  for (const auto& [tick, count] : begun) EXPECT_LE(count, 20) << tick;
+  for (const int shard_count : {1, 2, 4}) {
+    for (const bool is_reversed : {false, true}) {
+      EXPECT_TRUE(PlayHeldCrowd(shard_count, is_reversed) == one) << shard_count << is_reversed;
+    }
+  }
+}
+
+TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
+  constexpr std::uint32_t kOverTicks = 40;
+  for (const int shard_count : {1, 2, 4, 8}) {
+    std::map<std::pair<int, std::uint32_t>, int> starts;
+    for (AvatarNumber avatar = 1; avatar <= 10'000; ++avatar) {
+      const std::uint32_t tick = StartTickOf(avatar, kOverTicks);
+      ASSERT_LT(tick, kOverTicks);
+      ++starts[{ShardOf(avatar, shard_count), tick}];
+    }
+    const double mean = 10'000.0 / (kOverTicks * shard_count);
+    for (const auto& [where, count] : starts) {
+      EXPECT_LE(count, mean + 5.0 * std::sqrt(mean)) << where.first << " of " << shard_count;
+    }
+  }
+  for (AvatarNumber avatar = 1; avatar <= 1000; ++avatar) EXPECT_EQ(StartTickOf(avatar, 1), 0u);
 }
 
 TEST(WorldShard, AnsweresOnlyTicksItsObserversWant) {

@@ -94,7 +94,10 @@ class Avatar {
 
   /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
   /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
-  [[nodiscard]] Status Enqueue(const MovementRequest& request);
+  ///
+  /// `hold_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
+  /// before. What goes on from a movement is never held. One who is held already is not held longer.
+  [[nodiscard]] Status Enqueue(const MovementRequest& request, double hold_s = 0.0);
 
   /// Drops what has not started; the current movement goes on to its end. Returns how many.
   int CancelQueue();
@@ -159,6 +162,8 @@ class Avatar {
   static constexpr const char* kNotPlanted = "feet are not planted: no footprint is sure to be met";
 
   void AddEvent(const AvatarEvent& event);
+  // Times are sums of ticks: a hold of whole ticks ends with the last of them.
+  [[nodiscard]] bool IsHeld() const { return time_s_ + 1e-6 < hold_until_s_; }
   [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
   /// What is displayed has planted feet, or would.
   [[nodiscard]] bool PlantsFeet() const { return plants_feet_; }
@@ -225,6 +230,7 @@ class Avatar {
   bool begins_planting_ = false;  // the movement that begins next is the first planted
   bool is_exact_ = false;         // the step under way lands where it was sent
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
+  double hold_until_s_ = 0.0;     // avatar time
   std::uint64_t request_id_ = 0;  // of the movement or stand under way
   double stand_left_s_ = 0.0;
   AvatarEvent started_;

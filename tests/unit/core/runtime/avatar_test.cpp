@@ -219,6 +219,43 @@ TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
   EXPECT_TRUE(avatar.idle());
 }
 
+TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
+  const auto ticks_until = [&](auto is_so) {
+    int ticks = 0;
+    for (; ticks < 1000 && !is_so(); ++ticks) avatar_.Advance(kTickS);
+    return ticks;
+  };
+  const auto begun = [&](std::uint64_t id) {
+    return avatar_.started() != nullptr && avatar_.started()->request_id == id;
+  };
+  const auto ask = [&](std::uint64_t id, int hold_ticks, Takeover takeover = Takeover::kNone) {
+    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, takeover}, hold_ticks * kTickS));
+  };
+  ask(1, 5);
+  ask(2, 100);  // goes on from the one before: not held
+  EXPECT_EQ(ticks_until([&] { return begun(1); }), 6);
+  const double duration_s = avatar_.movement()->duration_s();
+  EXPECT_NEAR(ticks_until([&] { return begun(2); }) * kTickS, duration_s, 2 * kTickS);
+  ask(3, 100);
+  EXPECT_LT(ticks_until([&] { return begun(3); }), 90);
+  ticks_until([&] { return avatar_.idle(); });
+
+  // Asked again and again it does not wait for ever, and a smaller command is not held by a larger one.
+  ask(4, 10, Takeover::kNow);
+  for (int i = 0; i < 5; ++i) avatar_.Advance(kTickS);
+  ask(5, 10, Takeover::kNow);
+  EXPECT_EQ(ticks_until([&] { return begun(5); }), 6);
+  ticks_until([&] { return avatar_.idle(); });
+  ask(6, 10);
+  ask(7, 0, Takeover::kNow);
+  EXPECT_EQ(ticks_until([&] { return begun(7); }), 1);
+
+  // Who moves is not taken over before.
+  avatar_.Advance(kTickS);
+  ask(8, 4, Takeover::kNow);
+  EXPECT_EQ(ticks_until([&] { return begun(8); }), 5);
+}
+
 // Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read that is not.
 TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
   RawLibrary raw = MakeToyRawLibrary();
