@@ -6,8 +6,8 @@
 #include "stridewire/protocol/pose_codec.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE \
-  "quantise_kernel.cpp"  // NOLINT(readability-identifier-naming): Highway's
+// NOLINTNEXTLINE(readability-identifier-naming): Highway\'s
+#define HWY_TARGET_INCLUDE "quantise_kernel.cpp"
 #include "hwy/foreach_target.h"
 // Behind foreach_target.h, which includes this file once for each instruction set.
 #include "hwy/highway.h"
