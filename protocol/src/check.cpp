@@ -222,6 +222,13 @@ void CheckMovement(Findings& found, const CurrentMovement& m) {
   for (std::size_t s = 0; s < m.sites.size(); ++s) {
     found.Finite(m.sites[s], "AvatarState.movement.sites", static_cast<std::int64_t>(s));
   }
+  found.Count(m.landings.size(), 0, kMaxLandings, "AvatarState.movement.landings");
+  for (std::size_t l = 0; l < m.landings.size(); ++l) {
+    const auto index = static_cast<std::int64_t>(l);
+    found.Known(m.landings[l].foot, FootSide::kRight, "AvatarState.movement.landings", index);
+    found.FiniteVector(m.landings[l].position_m, "AvatarState.movement.landings", index);
+    found.Finite(m.landings[l].heading_rad, "AvatarState.movement.landings", index);
+  }
 }
 
 void CheckSkeleton(Findings& found, const SkeletonInfo& skeleton) {
@@ -482,6 +489,14 @@ Status Check(const AvatarState& m) {
              "more requests than the queue is long", "AvatarState.queue", m.queue_size);
   for (std::size_t i = 0; i < m.queue.size(); ++i) {
     CheckRequestItem(found, m.queue[i], static_cast<std::int64_t>(i));
+  }
+  found.Count(m.layers.size(), 0, kMaxPlayingLayers, "AvatarState.layers");
+  for (std::size_t i = 0; i < m.layers.size(); ++i) {
+    const auto index = static_cast<std::int64_t>(i);
+    found.Name(m.layers[i].layer, "AvatarState.layers.layer", index);
+    found.Finite(m.layers[i].weight, "AvatarState.layers.weight", index);
+    found.Finite(m.layers[i].time_s, "AvatarState.layers.time_s", index);
+    found.Finite(m.layers[i].speed, "AvatarState.layers.speed", index);
   }
   return found.Result();
 }

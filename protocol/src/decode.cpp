@@ -389,6 +389,12 @@ void Unpack(Unpacker& u, const wire::CurrentMovement& w, CurrentMovement& m) {
   u.Numbers(w.parameter_names(), kMaxParameters, "AvatarState.movement.parameter_names",
             m.parameter_names);
   u.Numbers(w.sites(), kMaxWeights * kMaxParameters, "AvatarState.movement.sites", m.sites);
+  m.landings.resize(u.Count(w.landings(), kMaxLandings, "AvatarState.movement.landings"));
+  for (std::size_t l = 0; l < m.landings.size(); ++l) {
+    const auto* from = w.landings()->Get(static_cast<flatbuffers::uoffset_t>(l));
+    m.landings[l] = {static_cast<FootSide>(from->foot()), FromWire(&from->position_m()),
+                     from->heading_rad()};
+  }
 }
 
 void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
@@ -408,6 +414,17 @@ void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
            "AvatarState.queue.type", i);
   }
   m.is_planting_off = w.planting_off();
+  m.layers.resize(u.Count(w.layers(), kMaxPlayingLayers, "AvatarState.layers"));
+  for (std::size_t i = 0; i < m.layers.size(); ++i) {
+    const auto* from = w.layers()->Get(static_cast<flatbuffers::uoffset_t>(i));
+    PlayingLayer& layer = m.layers[i];
+    u.Text(from->layer(), kMaxNameBytes, layer.layer, "AvatarState.layers.layer",
+           static_cast<std::int64_t>(i));
+    layer.weight = from->weight();
+    layer.time_s = from->time_s();
+    layer.speed = from->speed();
+    layer.is_ending = from->ending();
+  }
 }
 
 void Unpack(Unpacker& u, const wire::Terrain* w, std::optional<TerrainInfo>& terrain) {

@@ -258,10 +258,16 @@ Offset<wire::CurrentMovement> Build(FlatBufferBuilder& b, const CurrentMovement&
   const auto weights = b.CreateVector(m.weights);
   const auto names = b.CreateVector(m.parameter_names);
   const auto sites = b.CreateVector(m.sites);
+  std::vector<wire::Landing> landings;
+  for (const Landing& l : m.landings) {
+    landings.emplace_back(ToWire(l.position_m), l.heading_rad, static_cast<wire::Foot>(l.foot));
+  }
+  const auto landing_offset = landings.empty() ? Offset<flatbuffers::Vector<const wire::Landing*>>()
+                                               : b.CreateVectorOfStructs(landings);
   return wire::CreateCurrentMovement(b, m.request_id, static_cast<wire::MovementKind>(m.kind),
                                      m.group, m.started_s, keytimes, m.generic_time, m.ease_out_s,
                                      requested, applied, m.extrapolated, m.clamped, weights, names,
-                                     sites);
+                                     sites, landing_offset);
 }
 
 Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
@@ -272,10 +278,19 @@ Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
   for (const RequestItem& item : m.queue) queue.push_back(Build(b, item));
   const auto queue_offset = queue.empty() ? Offset<flatbuffers::Vector<Offset<wire::RequestItem>>>()
                                           : b.CreateVector(queue);
+  std::vector<Offset<wire::PlayingLayer>> layers;
+  for (const PlayingLayer& layer : m.layers) {
+    const auto name = Text(b, layer.layer);
+    layers.push_back(wire::CreatePlayingLayer(b, name, layer.weight, layer.time_s, layer.speed,
+                                              layer.is_ending));
+  }
+  const auto layers_offset = layers.empty()
+                                 ? Offset<flatbuffers::Vector<Offset<wire::PlayingLayer>>>()
+                                 : b.CreateVector(layers);
   const wire::Vec3 base = ToWire(m.base.position_m);
   return wire::CreateAvatarState(b, m.nonce, m.world, m.avatar, ToWire(m.code), text, m.tick,
                                  m.server_time_s, &base, m.base.heading_rad, movement, m.queue_size,
-                                 queue_offset, m.is_planting_off);
+                                 queue_offset, m.is_planting_off, layers_offset);
 }
 
 Offset<wire::Terrain> Build(FlatBufferBuilder& b, const std::optional<TerrainInfo>& terrain) {

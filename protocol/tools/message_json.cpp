@@ -273,6 +273,12 @@ Json Fields(const Pong& m) {
 }
 
 Json Movement(const CurrentMovement& m) {
+  Json landings = Json::array();
+  for (const Landing& landing : m.landings) {
+    landings.push_back({{"foot", Number(landing.foot)},
+                        {"position_m", Vector(landing.position_m)},
+                        {"heading_rad", landing.heading_rad}});
+  }
   return {{"request_id", Wide(m.request_id)},
           {"kind", Number(m.kind)},
           {"group", m.group},
@@ -286,10 +292,19 @@ Json Movement(const CurrentMovement& m) {
           {"clamped", m.clamped},
           {"weights", m.weights},
           {"parameter_names", m.parameter_names},
-          {"sites", m.sites}};
+          {"sites", m.sites},
+          {"landings", landings}};
 }
 
 Json Fields(const AvatarState& m) {
+  Json layers = Json::array();
+  for (const PlayingLayer& layer : m.layers) {
+    layers.push_back({{"layer", layer.layer},
+                      {"weight", layer.weight},
+                      {"time_s", layer.time_s},
+                      {"speed", layer.speed},
+                      {"ending", layer.is_ending}});
+  }
   return {{"nonce", Wide(m.nonce)},
           {"world", m.world},
           {"avatar", m.avatar},
@@ -302,7 +317,8 @@ Json Fields(const AvatarState& m) {
           {"movement", m.movement ? Movement(*m.movement) : Json(nullptr)},
           {"queue_size", m.queue_size},
           {"queue", Items(m.queue)},
-          {"planting_off", m.is_planting_off}};
+          {"planting_off", m.is_planting_off},
+          {"layers", layers}};
 }
 
 Json Terrain(const std::optional<TerrainInfo>& terrain) {

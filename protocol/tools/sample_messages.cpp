@@ -199,13 +199,16 @@ std::vector<SampleMessage> SampleMessages() {
                       .clamped = true,
                       .weights = {0.625f, 0.5f, -0.125f},
                       .parameter_names = {2, 5},
-                      .sites = {-0.5f, 0.5f, -0.25f, 0.25f, -0.75f, 0.75f}};
+                      .sites = {-0.5f, 0.5f, -0.25f, 0.25f, -0.75f, 0.75f},
+                      .landings = {{FootSide::kRight, DVec3(0.125, 0.0, 1.5), -0.25}}};
+    state.layers = {{"wave", 0.75, 1.25, 1.0, false}, {"carry", 0.125, 0.5, 1.5, true}};
     state.queue.push_back({41, 1002, StepMovement{FootChoice::kLeft, 0.5, 0.125, 0.15, -0.3}});
     state.queue.push_back({41, 1003, StandMovement{1.5}});
     add("avatar_state", state);
     state.movement.reset();
     state.queue.clear();
     state.queue_size = 0;
+    state.layers.clear();
     state.is_planting_off = true;
     add("avatar_state_unplanted", state);
     add("avatar_state_refused", AvatarState{.nonce = 2,

@@ -135,6 +135,9 @@ export class App {
       live: () => this.playback.live && this.client.state === 'ready',
       goLive: () => this.playback.goLive(),
       inspected: () => this.inspector.state,
+      mustBeMet: () => this.drive.mustBeMet,
+      tellsLayers: () => this.client.serverHas('planting'),
+      tellsLandings: () => this.client.serverHas('planting'),
       viewAt: (x: number, y: number) => this.viewAt(x, y),
       drivenAvatars: () => this.driver.avatars(),
       say: (text: string) => this.say(text),
@@ -271,6 +274,7 @@ export class App {
       ours: new Set()};
     world.on('event', (event) => {
       if (event.type === 'removed') shown.ours.delete(event.avatar);
+      this.footprints.onEvent(shown, event);
       if (!this.walks.onEvent(shown, event) && event.type === 'rejected') {
         this.say(`Avatar ${event.avatar}: ${event.reason}`);
       }
@@ -535,10 +539,10 @@ export class App {
     const avatars = this.driver.avatars();
     const where = this.driven();
     this.drive.offer(this.client.serverHas('footprints'), this.client.serverHas('walks'),
-      this.client.serverHas('terrain'));
+      this.client.serverHas('terrain'), this.client.serverHas('refusals'));
     const state = this.playback.live ? this.inspector.state : null;
     if (state && this.chosen && state.avatar === this.chosen.avatar) {
-      this.driver.hearPlanting(this.chosen.shown.world, state.avatar, state.plantingOff);
+      this.driver.hear(this.chosen.shown.world, state);
     }
     this.drive.offerPlanting(this.client.serverHas('planting'), this.driver.plants());
     this.drive.offerLayers(where?.world.layers ?? [], (layer) => this.driver.plays(layer));

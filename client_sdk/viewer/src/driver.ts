@@ -1,6 +1,6 @@
 // What the Drive panel and keys command, and whom: the chosen avatar, or everybody of a world.
 
-import type {MovementRequest, World} from './sdk.js';
+import type {AvatarState, MovementRequest, World} from './sdk.js';
 import type {Chosen, Shown} from './shown.js';
 import {makeTerrain} from './terrain.js';
 import type {TerrainName} from './terrain.js';
@@ -18,6 +18,8 @@ export interface DriverHost {
   say(text: string): void;
   /** They have nothing more to do. */
   cancelled(shown: Shown, avatars: readonly number[]): void;
+  /** Whether the server tells what avatars play. */
+  tellsLayers(): boolean;
   /** The ground is one that has no name here. */
   forgetGround(): void;
 }
@@ -29,7 +31,7 @@ export class Driver {
   /** The world whose ground is about to change as we asked. */
   private groundAsked: World | null = null;
   private groundOf: World | null = null;
-  /** Layers that this page has started, "avatar layer"; nobody tells what others did. */
+  /** Layers that this page has started or heard of, "avatar layer". */
   private readonly playing = new WeakMap<World, Set<string>>();
   /** Whose planting this page has switched off, or has heard to be off. */
   private readonly sliding = new WeakMap<World, Set<number>>();
@@ -110,6 +112,7 @@ export class Driver {
     const playing = this.playing.get(world) ?? new Set<string>();
     this.playing.set(world, playing);
     this.host.goLive();
+    ++this.switching;
     void world.setLayers(avatars.map((avatar) => ({avatar, layer, off}))).then((reply) => {
       if (!reply.ok || reply.accepted === 0) {
         this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
@@ -120,7 +123,7 @@ export class Driver {
         if (off) playing.delete(`${avatar} ${layer}`);
         else if (!refused.has(avatar)) playing.add(`${avatar} ${layer}`);
       }
-    });
+    }).finally(() => this.settle());
   }
 
   /** Whether the feet of all whom commands go to are planted, as far as this page knows. */
@@ -130,11 +133,18 @@ export class Driver {
     return !sliding || !this.avatars().some((avatar) => sliding.has(avatar));
   }
 
-  /** The server has told of it. */
-  hearPlanting(world: World, avatar: number, off: boolean): void {
+  /** The server has told of one. */
+  hear(world: World, {avatar, plantingOff, layers}: AvatarState): void {
     if (this.switching > 0) return;
-    if (off) this.slidingIn(world).add(avatar);
+    if (plantingOff) this.slidingIn(world).add(avatar);
     else this.sliding.get(world)?.delete(avatar);
+    if (!this.host.tellsLayers()) return;
+    const playing = this.playing.get(world) ?? new Set<string>();
+    this.playing.set(world, playing);
+    for (const name of world.layers) {
+      if (layers.some(({layer, ending}) => layer === name && !ending)) playing.add(`${avatar} ${name}`);
+      else playing.delete(`${avatar} ${name}`);
+    }
   }
 
   private slidingIn(world: World): Set<number> {
@@ -168,10 +178,12 @@ export class Driver {
         if (on) sliding.delete(avatar);
         else if (!refused.has(avatar)) sliding.add(avatar);
       }
-    }).finally(() => {
-      // What was asked before and is answered now does not count.
-      setTimeout(() => --this.switching, 1000);
-    });
+    }).finally(() => this.settle());
+  }
+
+  /** What was asked before a switch and is answered after it does not count. */
+  private settle(): void {
+    setTimeout(() => --this.switching, 1000);
   }
 
   cancel(): void {

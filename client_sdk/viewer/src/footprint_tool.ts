@@ -2,7 +2,7 @@
 
 import type {Inspector} from './panels/inspector.js';
 import {nextRequestId} from './request_ids.js';
-import type {MovementRequest, QueuedRequest, Vec3} from './sdk.js';
+import type {MovementRequest, QueuedRequest, Vec3, WorldEvent} from './sdk.js';
 import type {Chosen, Shown} from './shown.js';
 
 /** What the tool needs of the page. */
@@ -12,8 +12,12 @@ export interface FootprintHost {
   /** Whether what is drawn is what is now. */
   live(): boolean;
   inspected(): Inspector['state'];
+  /** Whether the server tells where feet are about to land. */
+  tellsLandings(): boolean;
   driven(): Shown | null;
   drivenAvatars(): number[];
+  /** Whether a step is to land where it is asked to or not to begin. */
+  mustBeMet(): boolean;
   viewAt(x: number, y: number): Shown | null;
   goLive(): void;
   say(text: string): void;
@@ -23,6 +27,8 @@ export interface FootprintHost {
 const grabPx = 18;
 /** Places of steps that are remembered until their feet are there. */
 const mostRemembered = 64;
+/** How long the nearest in reach of a footprint that was refused is marked. */
+const nearestMs = 8000;
 
 export class FootprintTool {
   private placingNow = false;
@@ -33,6 +39,12 @@ export class FootprintTool {
     readonly shown: Shown; readonly avatar: number; readonly requestId: bigint;
     atM: readonly [number, number, number]; moved: boolean;
   } | null = null;
+
+  /** The nearest in reach of the last that was refused here. */
+  private nearest: {readonly shown: Shown; readonly atM: Vec3; readonly headingRad: number; readonly untilMs: number} | null =
+    null;
+  /** Asked for here, and to be met. */
+  private readonly strict = new Set<bigint>();
 
   constructor(private readonly host: FootprintHost) {}
 
@@ -61,11 +73,27 @@ export class FootprintTool {
     const from = shown.view.place(avatar);
     const requestId = nextRequestId();
     this.remember(requestId, atM, from ? Math.atan2(atM[0] - from.x, atM[2] - from.z) : 0);
-    void shown.world.request([{avatar, type: 'step', requestId, foot: 'auto', atM}]).then((reply) => {
+    this.nearest = null;
+    const mustBeMet = this.host.mustBeMet();
+    if (mustBeMet) this.strict.add(requestId);
+    void shown.world.request([
+      {avatar, type: 'step', requestId, foot: 'auto', atM, ...(mustBeMet ? {mustBeMet} : {})},
+    ]).then((reply) => {
       const [dx, dz] = [atM[0].toFixed(2), atM[2].toFixed(2)];
       this.host.say(reply.ok ? `Asked for a foot at x ${dx}, z ${dz} m.` :
         `Refused: ${reply.items[0]?.text || reply.text}`);
     });
+  }
+
+  /** One that had to be met and is not: the nearest in reach is marked for a while. */
+  onEvent(shown: Shown, event: WorldEvent): void {
+    if (event.type === 'finished') this.strict.delete(event.requestId);
+    if (event.type !== 'rejected' || !this.strict.delete(event.requestId)) return;
+    if (event.positionM.every((x) => x === 0)) return;  // None is told, as where feet are not planted.
+    // Asked for without a heading: the body's.
+    this.nearest = {shown, atM: event.positionM, headingRad: event.baseHeadingRad,
+                    untilMs: performance.now() + nearestMs};
+    this.show();
   }
 
   private remember(requestId: bigint, atM: Vec3, headingRad: number): void {
@@ -74,12 +102,16 @@ export class FootprintTool {
     if (this.remembered.size > mostRemembered) this.remembered.delete(this.remembered.keys().next().value!);
   }
 
-  /** The footprint that a foot of the one looked at is on its way to. */
-  private underWay(shown: Shown): {readonly atM: Vec3; readonly headingRad: number} | null {
+  /** The footprints that feet of the one looked at are on their way to: as planned, or as asked for where nobody tells. */
+  private underWay(shown: Shown): {readonly atM: Vec3; readonly headingRad: number}[] {
     const chosen = this.host.chosen();
     const state = chosen?.shown === shown && this.host.live() ? this.host.inspected() : null;
-    return state?.movement && state.avatar === chosen!.avatar ?
-      this.remembered.get(state.movement.requestId) ?? null : null;
+    if (!state?.movement || state.avatar !== chosen!.avatar) return [];
+    if (this.host.tellsLandings()) {
+      return state.movement.landings.map(({positionM, headingRad}) => ({atM: positionM, headingRad}));
+    }
+    const asked = this.remembered.get(state.movement.requestId);
+    return asked ? [asked] : [];
   }
 
   /** Footprints that wait in the queue of the one looked at. */
@@ -95,7 +127,8 @@ export class FootprintTool {
     for (const shown of this.host.shown) {
       const {x = 0, z = 0} = shown.view.place(shown.view.chosen) ?? {};
       const next = this.underWay(shown);
-      let from = next ? [next.atM[0], next.atM[2]] : [x, z];
+      const last = next.at(-1);
+      let from = last ? [last.atM[0], last.atM[2]] : [x, z];
       const waiting = this.waiting(shown).map(({atM, headingRad, requestId}) => {
         const held = this.dragged?.shown === shown && this.dragged.requestId === requestId;
         const place = held ? this.dragged!.atM : atM!;
@@ -104,7 +137,8 @@ export class FootprintTool {
         if (!held) this.remember(requestId, place, heading);
         return {atM: place, headingRad: heading};
       });
-      shown.view.plan(next ? [next, ...waiting] : waiting);
+      if (this.nearest && performance.now() > this.nearest.untilMs) this.nearest = null;
+      shown.view.plan([...next, ...waiting, ...(this.nearest?.shown === shown ? [this.nearest] : [])]);
     }
   }
 
@@ -158,6 +192,7 @@ export class FootprintTool {
         return {
           avatar, requestId: item.requestId, type, foot, lengthM, heightM, turnRad, seconds, waypointsM,
           ...(place === null ? {} : {atM: place}),
+          ...(item.mustBeMet ? {mustBeMet: true} : {}),
           ...(item.sideM === null ? {} : {sideM: item.sideM}),
           ...(item.headingRad === null ? {} : {headingRad: item.headingRad}),
           ...(item.speedMPerS === null ? {} : {speedMPerS: item.speedMPerS}),

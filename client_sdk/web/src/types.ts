@@ -182,6 +182,28 @@ export interface AvatarState {
   readonly queue: readonly QueuedRequest[];
   /** Feet are not planted, as `World.setPlanting` left it. */
   readonly plantingOff: boolean;
+  /** Those in play, later ones over earlier; at most four. */
+  readonly layers: readonly PlayingLayer[];
+}
+
+export interface PlayingLayer {
+  /** One of World.layers. */
+  readonly layer: string;
+  /** Now. */
+  readonly weight: number;
+  /** In its clip. */
+  readonly timeS: number;
+  readonly speed: number;
+  /** On its way out. */
+  readonly ending: boolean;
+}
+
+/** Where a foot of a movement under way is about to stand. */
+export interface Landing {
+  readonly foot: Foot;
+  /** Of its ball, on the ground. */
+  readonly positionM: Vec3;
+  readonly headingRad: number;
 }
 
 /** A requested stand has no group, keytimes or weights. */
@@ -208,6 +230,8 @@ export interface CurrentMovement {
   readonly parameterNames: readonly ParameterName[];
   /** Parameters of the examples: a row of `parameterNames.length` for each weight, or empty. */
   readonly sites: Float32Array;
+  /** Of feet that are not there yet; none while feet are not planted. */
+  readonly landings: readonly Landing[];
 }
 
 export interface Observation {

@@ -29,6 +29,16 @@ protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEv
   const std::size_t weight_count = std::min(movement->weights.size(), protocol::kMaxWeights);
   current.weights.assign(movement->weights.begin(),
                          movement->weights.begin() + static_cast<std::ptrdiff_t>(weight_count));
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const FootTrack& track = movement->feet.foot(foot);
+    if (!movement->feet.is_active || track.land_s == FootTrack::kNever ||
+        avatar.movement_time_s() >= track.land_s) {
+      continue;
+    }
+    current.landings.push_back(
+        {foot == Foot::kLeft ? protocol::FootSide::kLeft : protocol::FootSide::kRight,
+         track.to.position_m, track.to.heading_rad});
+  }
   const MotionGroup& group = avatar.library().group(movement->group);
   const std::size_t parameter_count = std::min(group.parameters.size(), protocol::kMaxParameters);
   for (std::size_t p = 0; p < parameter_count; ++p) {
@@ -53,6 +63,15 @@ protocol::AvatarState Inspect(const Avatar& avatar, std::size_t max_site_bytes) 
     state.movement = CurrentMovementOf(avatar, *started, max_site_bytes);
   }
   state.is_planting_off = !avatar.foot_planting();
+  for (const LayerStack::Playing& playing : avatar.layers().playing()) {
+    state.layers.push_back(
+        {.layer =
+             std::string(avatar.library().layers()[static_cast<std::size_t>(playing.layer)].name),
+         .weight = playing.weight,
+         .time_s = playing.time_s,
+         .speed = playing.speed,
+         .is_ending = playing.is_ending});
+  }
   const std::span<const MovementRequest> queue = avatar.queue();
   state.queue_size = static_cast<std::uint32_t>(queue.size());
   for (const MovementRequest& request :

@@ -842,6 +842,29 @@ TEST(ServerSession, LayersForWhoKnowsOfThem) {
                                                                {4, StatusCode::kOutOfRange},
                                                                {5, StatusCode::kOutOfRange}}));
 
+  // Who walks tells where its foot is about to stand, and what it plays.
+  const protocol::WalkMovement walk{DVec3(0.0, 0.0, 3.0), 0.0, {}, std::nullopt};
+  EXPECT_EQ(client.Request(world->world, {{3, 7, walk}})->accepted, 1u);
+  const auto inspect = [&](protocol::AvatarNumber avatar) {
+    client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
+    return client.Await<protocol::AvatarState>();
+  };
+  auto state = inspect(3);
+  while (state && (!state->movement || state->movement->landings.empty())) state = inspect(3);
+  ASSERT_TRUE(state);
+  ASSERT_EQ(state->movement->landings.size(), 1u);
+  EXPECT_GT(state->movement->landings[0].position_m.z, 0.05);
+  EXPECT_LT(state->movement->landings[0].position_m.z, 1.2);
+  EXPECT_EQ(state->movement->landings[0].foot,
+            state->movement->kind == protocol::MovementKind::kStepLeft
+                ? protocol::FootSide::kLeft
+                : protocol::FootSide::kRight);
+  ASSERT_EQ(state->layers.size(), 1u);
+  EXPECT_EQ(state->layers[0].layer, "carry");
+  EXPECT_GE(state->layers[0].weight, 0.0);
+  EXPECT_LE(state->layers[0].weight, 1.0);
+  EXPECT_FALSE(state->layers[0].is_ending);
+
   RawClient observer = server.Connect();
   ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
   const auto not_allowed = set(observer, world->world, {{1, "wave"}});

@@ -38,7 +38,9 @@ AvatarState GoodState() {
                     .generic_time = 3.0,
                     .weights = {0.5f, 0.5f},
                     .parameter_names = {2, 5},
-                    .sites = {1.0f, 2.0f, 3.0f, 4.0f}};
+                    .sites = {1.0f, 2.0f, 3.0f, 4.0f},
+                    .landings = {{FootSide::kRight, DVec3(1.0), 0.5}}};
+  state.layers = {{"wave"}, {"carry"}};
   state.queue = {{3, 1, StepMovement{}}, {3, 2, StandMovement{}}};
   return state;
 }
@@ -539,6 +541,35 @@ TEST(Check, Terrain) {
   Refused<T>(
       good, [](T& m) { m.terrain->boxes.resize(kMaxTerrainBoxes + 1, m.terrain->boxes[0]); },
       ErrorCode::kLimitExceeded, "Terrain.boxes");
+}
+
+TEST(Check, AvatarStateLandingsAndLayers) {
+  using S = AvatarState;
+  const S good = GoodState();
+  Refused<S>(
+      good, [](S& m) { m.movement->landings.resize(kMaxLandings + 1); }, ErrorCode::kLimitExceeded,
+      "AvatarState.movement.landings");
+  Refused<S>(
+      good, [](S& m) { m.movement->landings[0].foot = static_cast<FootSide>(2); },
+      ErrorCode::kMalformed, "AvatarState.movement.landings", 0);
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.movement->landings[0].position_m.y; },
+      "AvatarState.movement.landings", 0);
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.movement->landings[0].heading_rad; },
+      "AvatarState.movement.landings", 0);
+  Refused<S>(
+      good, [](S& m) { m.layers.resize(kMaxPlayingLayers + 1, m.layers[0]); },
+      ErrorCode::kLimitExceeded, "AvatarState.layers");
+  RefusedTexts<S>(
+      good, [](S& m) -> std::string& { return m.layers[1].layer; }, kMaxNameBytes, false,
+      "AvatarState.layers.layer", 1);
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.layers[1].weight; }, "AvatarState.layers.weight", 1);
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.layers[1].time_s; }, "AvatarState.layers.time_s", 1);
+  RefusedWhenNotFinite<S>(
+      good, [](S& m) -> double& { return m.layers[1].speed; }, "AvatarState.layers.speed", 1);
 }
 
 TEST(Check, AvatarStateMovement) {

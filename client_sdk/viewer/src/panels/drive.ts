@@ -47,6 +47,9 @@ export class DrivePanel {
   private readonly one: HTMLButtonElement[] = [];
   private readonly tools: Readonly<Record<GroundTool, HTMLButtonElement>>;
   private readonly toolsRow: HTMLElement;
+  private readonly exact = h('input', {type: 'checkbox', id: 'drive-must'});
+  private readonly exactRow: HTMLElement;
+  private canRefuse = false;
   private readonly walkX = h('input', {type: 'number', id: 'walk-x', step: 'any', value: '0'});
   private readonly walkZ = h('input', {type: 'number', id: 'walk-z', step: 'any', value: '2'});
   private readonly walkHeading = h('input',
@@ -90,6 +93,9 @@ export class DrivePanel {
     this.toolsRow = h('div', {class: 'tool-row', role: 'group', 'aria-label': 'Clicks on the ground'},
       h('span', {}, 'Clicks on the ground'),
       h('div', {class: 'buttons two'}, this.tools.feet, this.tools.walk));
+    this.exactRow = h('label', {class: 'check', for: this.exact.id, title: 'A foot that cannot land there stays'},
+      this.exact, 'There or not at all');
+    this.exactRow.hidden = true;
     const field = (input: HTMLInputElement, label: string) => {
       input.addEventListener('keydown', (e) => {
         if (e.key === 'Enter') this.walk();
@@ -112,7 +118,7 @@ export class DrivePanel {
     this.element = h('div', {class: 'panel-body'},
       this.target,
       h('label', {class: 'check', for: 'drive-all'}, all, 'Command everybody here'),
-      this.toolsRow, this.length.element, this.turn.element,
+      this.toolsRow, this.exactRow, this.length.element, this.turn.element,
       h('div', {class: 'buttons three'},
         make('Left foot', 'A', () => this.step('left')),
         make('Step', 'W', () => this.step('auto'), {class: 'primary'}),
@@ -128,7 +134,9 @@ export class DrivePanel {
   }
 
   /** What the server can do is offered. */
-  offer(footprints: boolean, walks: boolean, terrain: boolean): void {
+  offer(footprints: boolean, walks: boolean, terrain: boolean, refusals: boolean): void {
+    this.canRefuse = refusals;
+    this.exactRow.hidden = !refusals || this.tool !== 'feet';
     this.tools.feet.hidden = !footprints;
     this.tools.walk.hidden = this.walkRow.hidden = !walks;
     this.toolsRow.hidden = !footprints && !walks;
@@ -161,7 +169,12 @@ export class DrivePanel {
     if (this.tools[tool].hidden && this.tool !== tool) return;
     this.tool = this.tool === tool ? null : tool;
     for (const name of ['feet', 'walk'] as const) press(this.tools[name], this.tool === name);
+    this.exactRow.hidden = !this.canRefuse || this.tool !== 'feet';
     this.actions.tool(this.tool);
+  }
+  /** A foot that cannot land where it is asked to is not to step at all. */
+  get mustBeMet(): boolean {
+    return this.canRefuse && this.exact.checked;
   }
   /** A walk was asked for on the ground. */
   showGoal(atM: Vec3, headingRad: number | null): void {

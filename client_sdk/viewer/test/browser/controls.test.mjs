@@ -438,6 +438,36 @@ test('every control does what its label says', async () => {
     ['drive: Stand', async () => assert.equal((await adds(() => inDrive('Stand'))).type, 'stand')],
     ['drive: Clear queue', () => queueIsEmpty(() => inDrive('Clear queue'))],
     ['drive: drive-place', () => places(() => page.locator('#drive-place').click())],
+    ['drive: drive-must', async () => {
+      assert.equal(await page.locator('#drive-must').isVisible(), false);
+      await stands();
+      await cameraRests(page);
+      await page.locator('#drive-place').click();
+      await page.locator('#drive-must').check();
+      const planned = (n) => eventually(`${n} prints are outlined`, (count) =>
+        window.stridewire.sampled()[0].planned === count, n);
+      const rejected = [];
+      const off = alpha.on('event', (event) => event.type === 'rejected' && rejected.push(event));
+      // Half a metre to the side and further on than any step: it stays, and what it reaches is outlined.
+      const [far] = await beside([0.2, 1.6]);
+      await page.mouse.click(far.x, far.y);
+      await until('it is refused', () => rejected.length === 1);
+      off();
+      const {avatar, positionM, reason} = rejected[0];
+      assert.equal(avatar, driven);
+      assert.match(reason, /out of reach/);
+      assert.ok(Math.hypot(positionM[0] - far.at[0], positionM[2] - far.at[2]) > 0.2, `${positionM}`);
+      await planned(1);
+      await page.locator('#drive-must').uncheck();
+      await page.locator('#drive-place').click();
+      await planned(0);
+      // A walk shows where its foot lands next.
+      const {basePositionM: [x, , z]} = await alpha.inspect(driven);
+      await alpha.request([{avatar: driven, type: 'walk', atM: [x, 0, z + 2], headingRad: 0}]);
+      await planned(1);
+      await stands();
+      await planned(0);
+    }],
     ['drive: drive-walk', () => sends(() => page.locator('#drive-walk').click())],
     ['drive: walk-x', async () => near((await walkTo('walk-x', -1.25)).atM[0], -1.25)],
     ['drive: walk-z', async () => near((await walkTo('walk-z', 0.75)).atM[2], 0.75)],

@@ -2,13 +2,14 @@ import {ByteBuffer, Encoding} from 'flatbuffers';
 import {tableNumbers} from '../../generated/layout';
 import * as wire from '../../generated/wire';
 import type {
-  CurrentMovement, EndSite, FootChoice, Leg, MovementKind, MovementType, ParameterName, Parameters,
-  PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
+  CurrentMovement, EndSite, Foot, FootChoice, Landing, Leg, MovementKind, MovementType, ParameterName, Parameters,
+  PlayingLayer, PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
 } from '../types';
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
-  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLayerNames, maxNameBytes, maxParameters,
+  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames, maxNameBytes, maxParameters,
+  maxPlayingLayers,
   maxReasonBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
   minResumeTokenBytes
 } from './limits';
@@ -26,6 +27,7 @@ export const poseModes: readonly (PoseMode | 'movement')[] = ['full', 'quantised
 export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand', 'walk'];
 export const takeovers: readonly Takeover[] = ['none', 'afterMovement', 'now'];
 export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
+const feet: readonly Foot[] = ['left', 'right'];
 export const movementKinds: readonly MovementKind[] = ['stepLeft', 'stepRight', 'jump', 'stand'];
 export const eventTypes: readonly WorldEventType[] = [
   'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned', 'removed'
@@ -497,6 +499,17 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       m.queue(i, item);
       queue.push(request(item, i));
     }
+    const layers: PlayingLayer[] = [];
+    for (let l = 0; l < count(m.layersLength(), 0, maxPlayingLayers, 'AvatarState.layers'); ++l) {
+      const layer = m.layers(l)!;
+      layers.push({
+        layer: name(layer.layer(asBytes), 'AvatarState.layers.layer', l),
+        weight: finite(layer.weight(), 'AvatarState.layers.weight', l),
+        timeS: finite(layer.timeS(), 'AvatarState.layers.timeS', l),
+        speed: finite(layer.speed(), 'AvatarState.layers.speed', l),
+        ending: layer.ending(),
+      });
+    }
     const current = m.movement();
     return {
       type: 'AvatarState',
@@ -514,6 +527,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
         queueSize,
         queue,
         plantingOff: m.plantingOff(),
+        layers,
       },
     };
   },
@@ -652,6 +666,16 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
   if (sites.length !== 0 && sites.length !== weights.length * names.length) {
     throw new Malformed('is not one row a weight', `${field}.sites`);
   }
+  const landings: Landing[] = [];
+  const landing = new wire.Landing();
+  for (let l = 0; l < count(m.landingsLength(), 0, maxLandings, `${field}.landings`); ++l) {
+    m.landings(l, landing);
+    landings.push({
+      foot: known(feet, landing.foot(), `${field}.landings`, l),
+      positionM: vector(landing.positionM(), `${field}.landings`, l),
+      headingRad: finite(landing.headingRad(), `${field}.landings`, l),
+    });
+  }
   const startTimeS = finite(m.startedS(), `${field}.startedS`);
   return {
     requestId: m.requestId(),
@@ -670,6 +694,7 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
     weights,
     parameterNames: names,
     sites,
+    landings,
   };
 }
 

@@ -77,6 +77,8 @@ function movement(m: CurrentMovement): Json {
     extrapolated: m.extrapolated, clamped: m.clamped, weights: [...m.weights],
     parameter_names: m.parameterNames.map((name) => parameterNames.indexOf(name)),
     sites: [...m.sites],
+    landings: m.landings.map((l) => ({
+      foot: l.foot === 'right' ? 1 : 0, position_m: vec3(l.positionM), heading_rad: l.headingRad})),
   };
 }
 
@@ -208,6 +210,8 @@ export function toJson(m: Message): {[name: string]: Json} {
         movement: state.movement === null ? null : movement(state.movement),
         queue_size: state.queueSize, queue: state.queue.map(request),
         planting_off: state.plantingOff,
+        layers: state.layers.map((l) => ({
+          layer: l.layer, weight: l.weight, time_s: l.timeS, speed: l.speed, ending: l.ending})),
       };
     }
   }

@@ -494,6 +494,24 @@ struct Pong {
   bool operator==(const Pong&) const = default;
 };
 
+/// Where a foot of the movement under way is about to stand.
+struct Landing {
+  FootSide foot = FootSide::kLeft;
+  DVec3 position_m = DVec3(0.0);  ///< Of its ball, on the ground
+  double heading_rad = 0.0;       ///< As a Footprint's
+  bool operator==(const Landing&) const = default;
+};
+
+/// A layer an avatar plays.
+struct PlayingLayer {
+  std::string layer;       ///< One of WorldInfo::layers
+  double weight = 0.0;     ///< Now
+  double time_s = 0.0;     ///< In its clip
+  double speed = 1.0;      ///< Now
+  bool is_ending = false;  ///< On its way out
+  bool operator==(const PlayingLayer&) const = default;
+};
+
 /// What an avatar does just now. A requested stand has no group, keytimes or weights.
 struct CurrentMovement {
   RequestId request_id = 0;
@@ -509,7 +527,8 @@ struct CurrentMovement {
   bool clamped = false;
   std::vector<float> weights;                 ///< [example], at most kMaxWeights.
   std::vector<std::uint8_t> parameter_names;  ///< As in ParameterSet.
-  std::vector<float> sites;  ///< [example][parameter]: where the examples lie; may be empty.
+  std::vector<float> sites;       ///< [example][parameter]: where the examples lie; may be empty.
+  std::vector<Landing> landings;  ///< Of feet not there yet; at most kMaxLandings.
   bool operator==(const CurrentMovement&) const = default;
 };
 
@@ -526,8 +545,9 @@ struct AvatarState {
   Placement base;
   std::optional<CurrentMovement> movement;
   std::uint32_t queue_size = 0;
-  std::vector<RequestItem> queue;  ///< The first kMaxInspectedRequests of it.
-  bool is_planting_off = false;    ///< As SetPlanting left it.
+  std::vector<RequestItem> queue;    ///< The first kMaxInspectedRequests of it.
+  bool is_planting_off = false;      ///< As SetPlanting left it.
+  std::vector<PlayingLayer> layers;  ///< At most kMaxPlayingLayers, those above later.
   bool operator==(const AvatarState&) const = default;
 };
 
