@@ -6,6 +6,7 @@
 #include "stridewire/protocol/pose_codec.h"
 
 #undef HWY_TARGET_INCLUDE
+// NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "quantise_kernel.cpp"
 #include "hwy/foreach_target.h"
 // Behind foreach_target.h, which includes this file once for each instruction set.

@@ -131,6 +131,14 @@ void WholePose(benchmark::State& state, const Library& library) {
   Count(state, steps, count);
 }
 
+// The same crowd spread over shards: threads that share nothing but the library. Items count for all of them.
+void EvaluateOnShards(benchmark::State& state, const Library& library) {
+  const int count = static_cast<int>(state.range(0)) / state.threads();
+  Steps steps(library, count, true);
+  for (auto _ : state) steps.Evaluate();
+  Count(state, steps, count);
+}
+
 // Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty frames.
 void MakeSteps(benchmark::State& state, const Library& library) {
   constexpr std::size_t kSteps = 16;
@@ -245,6 +253,13 @@ void RegisterCrowd(const std::string& name, const Library& library) {
   Register(name + "/crowd/evaluate", EvaluateCrowd, library, false);
   Register(name + "/crowd/evaluate_and_plant", EvaluateCrowd, library, true);
   Register(name + "/crowd/whole_pose", WholePose, library);
+  benchmark::RegisterBenchmark((name + "/shards/evaluate_and_plant").c_str(), EvaluateOnShards,
+                               library)
+      ->Arg(10000)
+      ->Threads(1)
+      ->Threads(2)
+      ->UseRealTime()
+      ->Unit(benchmark::kMicrosecond);
   benchmark::RegisterBenchmark((name + "/crowd/steps").c_str(), MakeSteps, library)
       ->Unit(benchmark::kMicrosecond);
   for (const bool samples : {false, true}) {

@@ -62,9 +62,15 @@ csv=$out/$(date -u +%Y%m%dT%H%M%SZ)-$commit.csv
 
 raw=$(mktemp)
 trap 'rm -f "$raw"' EXIT
-# One core: what else runs on this machine is told by its load average in the CSV.
-taskset -c 0 "$bin/stridewire-bench" --benchmark_min_time="$min_time" \
-  --benchmark_filter="$filter" --benchmark_format=json "${libraries[@]}" >"$raw"
+# One core, but for what measures several (shards): what else runs on this machine is told by its load average in the CSV.
+bench() { "$@" --benchmark_min_time="$min_time" --benchmark_format=json "${libraries[@]}" >>"$raw"; }
+all_names=$("$bin/stridewire-bench" --benchmark_list_tests "${libraries[@]}" | grep -E -- "$filter" || true)
+one_of() { sed 's/[][\.*^$+?(){}|]/\\&/g' | paste -sd '|'; }
+one_core=$({ grep -v '/shards/' <<<"$all_names" || true; } | one_of)
+several=$({ grep '/shards/' <<<"$all_names" || true; } | one_of)
+[[ -n $one_core$several ]] || bad_usage "no benchmark's name matches '$filter'"
+[[ -z $one_core ]] || bench taskset -c 0 "$bin/stridewire-bench" --benchmark_filter="^($one_core)\$"
+[[ -z $several ]] || bench "$bin/stridewire-bench" --benchmark_filter="^($several)\$"
 
 # One benchmark is one object; its keys stand one a line.
 awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v csv="$csv" '

@@ -19,6 +19,8 @@ constexpr double kClosingGainM = 0.03;
 // Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end or a refusal, and the
 // next started.
 constexpr std::size_t kEventReserve = 7;
+// Of a tick: finished, started, foot-strike. Room for more is made when there are more.
+constexpr std::size_t kUsualEvents = 3;
 
 // Room for any movement of a library.
 void MakeRoom(const MotionLibrary& library, Movement& movement) {
@@ -35,9 +37,9 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
     : library_(std::move(library)), options_(options), cache_(library_->layout()) {
   const int joint_count = library_->skeleton().joint_count();
   pose_ = Pose(joint_count);
-  layered_pose_ = Pose(joint_count);
   earlier_pose_ = Pose(joint_count);
   MakeRoom(*library_, movement_);
+  events_.reserve(kUsualEvents);
   weight_scratch_.resize(static_cast<std::size_t>(library_->max_example_count()));
   stand_feet_.left_from_right_m =
       FootVector(library_->skeleton(), library_->stand_pose(), Foot::kLeft, 0.0);
@@ -80,9 +82,11 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
   }
   if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->must_be_met) {
     if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
-    if (kept_pose_.rotations.empty()) {
-      kept_pose_ = Pose(library_->skeleton().joint_count());
-      MakeRoom(*library_, kept_movement_);
+    if (kept_.empty()) {
+      kept_.resize(1);
+      kept_.front().pose = Pose(library_->skeleton().joint_count());
+      MakeRoom(*library_, kept_.front().movement);
+      events_.reserve(kMaxEventsPerAdvance);  // refusals may come many at once
     }
   }
   const double held_until_s = hold_until_s_;
@@ -101,6 +105,12 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
     queue_head_ = 0;
   }
   queue_.push_back(request);
+  return {};
+}
+
+Status Avatar::SetLayer(const LayerRequest& request) {
+  if (Status status = layers_.Set(*library_, request); !status) return status;
+  layered_pose_.rotations.resize(pose_.rotations.size());
   return {};
 }
 
@@ -123,11 +133,10 @@ int Avatar::CancelQueue() {
 }
 
 void Avatar::AddEvent(const AvatarEvent& event) {
-  STRIDEWIRE_CHECK(event_count_ < events_.size());
-  events_[event_count_] = event;
-  events_[event_count_].time_s = time_s_;
-  if (event.type == AvatarEventType::kStarted) started_ = events_[event_count_];
-  ++event_count_;
+  STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
+  events_.push_back(event);
+  events_.back().time_s = time_s_;
+  if (event.type == AvatarEventType::kStarted) started_ = events_.back();
 }
 
 FootState Avatar::MeasureFeet() const {
@@ -194,13 +203,13 @@ void Avatar::PrefetchState() const {
 // All of Advance but the pose at its end.
 void Avatar::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
-  event_count_ = 0;
+  events_.clear();
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   for (;;) {
     // Movements shorter than a tick could otherwise outrun the event list; the rest of the time
     // is then spent in the next tick.
-    const bool may_change = event_count_ + kEventReserve <= events_.size();
+    const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
     if (is_moving_) {
       const double before_s = movement_time_s_;
       if (may_change && RedirectsSwing()) {

@@ -60,8 +60,8 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
               .reason = kNotPlanted});
     return false;
   }
-  kept_pose_ = pose_;  // of the same size: no allocation
-  std::swap(movement_, kept_movement_);
+  kept_.front().pose = pose_;  // of the same size: no allocation
+  std::swap(movement_, kept_.front().movement);
   PlanMovement(plan, swing_part);
   FootprintMiss missed = MissOf(*plan.exact);
   if (IsMet(missed)) return true;
@@ -74,9 +74,9 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
             .code = ErrorCode::kOutOfRange,
             .reason = "the footprint is out of reach",
             .missed = missed});
-  std::swap(movement_, kept_movement_);
+  std::swap(movement_, kept_.front().movement);
   cache_.Clear();
-  pose_ = kept_pose_;
+  pose_ = kept_.front().pose;
   return false;
 }
 

@@ -6,6 +6,7 @@
 #include "stridewire/runtime/foot_plan.h"
 
 #undef HWY_TARGET_INCLUDE
+// NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "pose_kernels.cpp"
 #include "hwy/foreach_target.h"
 // Behind foreach_target.h, which includes this file once for each instruction set.

@@ -496,7 +496,7 @@ TEST(ServerMemory, AnAvatarCostsWhatTheServersPageSays) {
   const std::size_t walking = counted_memory::LiveBytes() - before - parts;
   std::printf("an avatar of %d joints: %zu bytes standing, %zu walking with 8 requests queued\n",
               (*library)->skeleton().joint_count(), standing / kAvatars, walking / kAvatars);
-  EXPECT_LT(walking / kAvatars, 16u << 10);
+  EXPECT_LT(walking / kAvatars, 11u << 10);
 }
 
 // ---- slow readers

@@ -78,12 +78,12 @@ struct AvatarOptions {
 ///
 /// Time is an argument; `Advance` is the only thing that moves it. Given library, start, requests
 /// and the sizes of the steps in time, the poses are the same bytes on every machine. Not
-/// thread-safe; one owner. After construction only `Enqueue` may allocate (its queue, up to
-/// kMaxQueue entries).
+/// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries) and
+/// `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
 class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
-  static constexpr int kMaxEventsPerAdvance = 16;
+  static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
   /// Stands at `start` in the library's stand pose.
   Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
@@ -103,10 +103,8 @@ class Avatar {
   int CancelQueue();
 
   /// Plays a layer over the movement, or ends it, from the next Advance on. Legs, root and all that
-  /// movements do are bit by bit what they are without. Errors as LayerStack::Set. Never allocates.
-  [[nodiscard]] Status SetLayer(const LayerRequest& request) {
-    return layers_.Set(*library_, request);
-  }
+  /// movements do are bit by bit what they are without. Errors as LayerStack::Set.
+  [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
   void Teleport(const BaseFrame& start);
@@ -137,9 +135,7 @@ class Avatar {
   void PrefetchWhereShown() const;
   void PrefetchShown() const;
   [[nodiscard]] const LayerStack& layers() const { return layers_; }
-  [[nodiscard]] std::span<const AvatarEvent> events() const {
-    return std::span(events_).first(event_count_);
-  }
+  [[nodiscard]] std::span<const AvatarEvent> events() const { return events_; }
   [[nodiscard]] const BaseFrame& base() const { return base_; }
   [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
   /// Standing, nothing queued.
@@ -208,7 +204,7 @@ class Avatar {
   BaseFrame base_;
   Pose pose_;  // displayed, but for layers
   LayerStack layers_;
-  Pose layered_pose_;  // with layers, if there are any
+  Pose layered_pose_;  // with layers, if there are any; of no size before the first
   bool has_layers_ = false;
   Pose blended_pose_;  // where a movement ended or gave way: the same before feet were planted
   // What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
@@ -218,7 +214,6 @@ class Avatar {
   double moved_until_s_ = -1.0;  // avatar time
   double time_s_ = 0.0;          // avatar time
   double movement_time_s_ = 0.0;
-  std::size_t event_count_ = 0;
 
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
@@ -240,8 +235,11 @@ class Avatar {
   std::vector<double> weight_scratch_;
   // What is put back when a movement that was planned is not played. Has its size from the first request on
   // that may be refused.
-  Movement kept_movement_;
-  Pose kept_pose_;
+  struct Kept {
+    Movement movement;
+    Pose pose;
+  };
+  std::vector<Kept> kept_;  // one, or none before; an avatar can be copied
 
   FootState stand_feet_;  // of the library's stand pose
   FootState feet_;
@@ -251,7 +249,7 @@ class Avatar {
   WalkProgress walk_;           // of the walk at the queue's head
   std::vector<MovementRequest> queue_;  // live from queue_head_ on
   std::size_t queue_head_ = 0;
-  std::array<AvatarEvent, kMaxEventsPerAdvance> events_{};
+  std::vector<AvatarEvent> events_;
 };
 
 }  // namespace stridewire
