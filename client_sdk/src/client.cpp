@@ -597,6 +597,25 @@ stridewire_status stridewire_client_get_skeleton(stridewire_client* client, stri
   });
 }
 
+stridewire_status stridewire_client_list_layers(stridewire_client* client, stridewire_world world,
+                                                stridewire_layer_name* names, size_t capacity,
+                                                size_t* count) {
+  if (count == nullptr || (names == nullptr && capacity > 0)) return STRIDEWIRE_INVALID_ARGUMENT;
+  *count = 0;
+  return Query(client, [&](Session& session) {
+    const WorldView* view = session.FindWorld(world);
+    if (view == nullptr) return STRIDEWIRE_NO_SUCH_WORLD;
+    if (!view->has_info()) return STRIDEWIRE_NOT_READY;
+    const std::vector<std::string>& layers = view->layers();
+    *count = layers.size();
+    for (std::size_t i = 0; i < std::min(capacity, layers.size()); ++i) {
+      names[i] = stridewire_layer_name{};
+      CopyName(layers[i], names[i].name);
+    }
+    return layers.size() <= capacity ? STRIDEWIRE_OK : STRIDEWIRE_BUFFER_TOO_SMALL;
+  });
+}
+
 stridewire_status stridewire_client_get_terrain(stridewire_client* client, stridewire_world world,
                                                 stridewire_terrain* terrain, float* heights_m,
                                                 size_t height_capacity,

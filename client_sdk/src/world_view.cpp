@@ -9,6 +9,7 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
   has_info_ = true;
   skeleton_ = info.skeleton;
   library_hash_ = info.library_hash;
+  layers_ = info.layers;
   scratch_.assign(skeleton_.joints.size(), kIdentityQuat);
 }
 
@@ -22,6 +23,7 @@ void WorldView::Clear() {
   has_info_ = false;
   skeleton_ = {};
   library_hash_.clear();
+  layers_.clear();
 }
 
 void WorldView::SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter) {

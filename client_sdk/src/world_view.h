@@ -46,6 +46,7 @@ class WorldView {
   [[nodiscard]] bool has_info() const { return has_info_; }
   [[nodiscard]] const protocol::SkeletonInfo& skeleton() const { return skeleton_; }
   [[nodiscard]] const std::string& library_hash() const { return library_hash_; }
+  [[nodiscard]] const std::vector<std::string>& layers() const { return layers_; }
 
   /// Forgets figure and poses.
   void Clear();
@@ -97,6 +98,7 @@ class WorldView {
   bool has_info_ = false;
   protocol::SkeletonInfo skeleton_;
   std::string library_hash_;
+  std::vector<std::string> layers_;
   std::optional<std::set<protocol::AvatarNumber>> filter_;
   Tracks tracks_;
   std::map<std::pair<std::uint16_t, protocol::PoseMode>, Shard> shards_;

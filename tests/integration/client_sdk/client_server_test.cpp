@@ -552,6 +552,8 @@ TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
   client::Skeleton skeleton;
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_REPLY));
   ASSERT_TRUE(user.client.GetSkeleton(user.world, skeleton));
+  EXPECT_EQ(user.client.ListLayers(user.world), (std::vector<std::string>{"wave", "carry"}));
+  EXPECT_TRUE(user.client.ListLayers(user.world + 1).empty());
   const auto joint = [&](const std::string& name) {
     std::size_t j = 0;
     while (j < skeleton.joints.size() && name != skeleton.joints[j].name) ++j;

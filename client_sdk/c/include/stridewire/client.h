@@ -301,8 +301,8 @@ stridewire_status stridewire_client_set_terrain(stridewire_client* client, strid
                                                 const stridewire_terrain_box* boxes,
                                                 size_t box_count, uint64_t* command);
 
-/// A clip of the library over what an avatar does (waving, carrying); legs do what they do without. Its
-/// names are those of `stridewire-library inspect`.
+/// A clip of the library over what an avatar does (waving, carrying); legs do what they do without.
+/// stridewire_client_list_layers tells which there are.
 typedef struct stridewire_layer {
   uint32_t avatar;   ///< Not 0.
   const char* name;  ///< 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
@@ -477,6 +477,18 @@ stridewire_status stridewire_client_get_skeleton(stridewire_client* client, stri
                                                  stridewire_joint* joints, size_t joint_capacity,
                                                  stridewire_end_site* end_sites,
                                                  size_t end_site_capacity);
+
+/// One of the layers of a world's library, for stridewire_client_set_layers.
+typedef struct stridewire_layer_name {
+  char name[STRIDEWIRE_MAX_NAME_BYTES + 1];
+} stridewire_layer_name;
+
+/// The layers of a world's library; none where the server knows no layers. Writes at most `capacity` names
+/// (`names` may be NULL with capacity 0); `count` gets how many there are, at most 64. BUFFER_TOO_SMALL when there are
+/// more. NOT_READY until STRIDEWIRE_EVENT_WORLD_JOINED.
+stridewire_status stridewire_client_list_layers(stridewire_client* client, stridewire_world world,
+                                                stridewire_layer_name* names, size_t capacity,
+                                                size_t* count);
 
 typedef struct stridewire_terrain {
   double origin_m[2];

@@ -260,6 +260,18 @@ class Client {
       if (status == STRIDEWIRE_OK) return status;
     }
   }
+  /// Names of the layers of a world's library; none before the world is joined.
+  std::vector<std::string> ListLayers(stridewire_world world) const {
+    std::vector<stridewire_layer_name> names;
+    std::size_t count = 0;
+    while (stridewire_client_list_layers(handle_, world, names.data(), names.size(), &count) ==
+           STRIDEWIRE_BUFFER_TOO_SMALL) {
+      names.resize(count);
+    }
+    std::vector<std::string> layers;
+    for (std::size_t i = 0; i < count; ++i) layers.emplace_back(names[i].name);
+    return layers;
+  }
   Result GetTerrain(stridewire_world world, Terrain& terrain) const {
     for (;;) {
       const stridewire_status status = stridewire_client_get_terrain(
