@@ -1,6 +1,7 @@
 // Layers over walks: what legs and root do is bit by bit what they do without, what arms do is the
 // clip's, weights come and go without a kink.
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include "stridewire/offline/layers.h"
 #include "stridewire/offline/library_writer.h"
 #include "stridewire/offline/refine.h"
+#include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/terrain.h"
 
@@ -229,6 +231,8 @@ TEST(LayerRequests, NoTickAllocates) {
   const Library library = LibraryOf({});
   Avatar avatar(library, {});
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+  // Only an avatar's first layer makes room for its pose with layers.
+  ASSERT_TRUE(avatar.SetLayer({.layer = 0}).has_value());
   avatar.Advance(kTickS);
   const std::size_t before = counted_memory::LiveBytes();
   counted_memory::ResetPeak();
@@ -340,6 +344,54 @@ TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
   EXPECT_FLOAT_EQ(of("LowerBack"), 0.25f);
   EXPECT_FLOAT_EQ(of("Spine1"), 0.75f);
   EXPECT_FLOAT_EQ(of("RightHand"), 1.0f);
+}
+
+TEST(LayersInChoreographies, BeginAndEndWithMovementsAndLeaveLegsAlone) {
+  const auto library = OpenLibrary("builtin").value();
+  const std::vector<MovementRequest> requests = {{1, StepRequest{.length_m = 0.5}},
+                                                 {3, StepRequest{.length_m = 0.5}},
+                                                 {4, StepRequest{.length_m = 0.5}},
+                                                 {6, StepRequest{.length_m = 0.5}}};
+  const std::vector<LayerCue> cues = {
+      {.before = 1, .layer = "wave", .blend_s = 0.1},
+      {.before = 3, .layer = "wave", .is_off = true, .blend_s = 0.1}};
+  const auto plain = Synthesize(library, {}, requests, 60.0).value();
+  const auto waving = Synthesize(library, {}, requests, 60.0, {}, cues).value();
+  ASSERT_EQ(plain.clip.frame_count(), waving.clip.frame_count());
+  const auto joint = [&](std::string_view name) {
+    std::size_t j = 0;
+    while (library->skeleton().joints[j].name != name) ++j;
+    return j;
+  };
+  const std::size_t arm = joint("RightArm");
+  const double from_s = plain.movements[1].start_s;
+  const double to_s = plain.movements[3].start_s;
+  for (int frame = 0; frame < plain.clip.frame_count(); ++frame) {
+    const ConstPoseSpan a = plain.clip.frame(frame);
+    const ConstPoseSpan b = waving.clip.frame(frame);
+    const double at_s = frame / 60.0;
+    EXPECT_EQ(a.root_position_m, b.root_position_m);
+    for (const char* leg : {"LeftUpLeg", "RightLeg", "LeftFoot"}) {
+      EXPECT_EQ(a.rotations[joint(leg)], b.rotations[joint(leg)]) << leg << frame;
+    }
+    const bool is_same = a.rotations[arm] == b.rotations[arm];
+    if (at_s <= from_s || at_s > to_s + 0.15) {
+      EXPECT_TRUE(is_same) << at_s;
+    }
+    if (at_s > from_s + 0.1 && at_s < to_s) {
+      EXPECT_FALSE(is_same) << at_s;
+    }
+  }
+
+  const auto error = [&](LayerCue cue) {
+    return Describe(Synthesize(library, {}, requests, 60.0, {}, std::vector{cue}).error());
+  };
+  EXPECT_EQ(error({.before = 2, .layer = "dance"}),
+            "movements[2].layer: the library has no such layer");
+  std::vector<MovementRequest> bad = requests;
+  bad[2].movement = StepRequest{.length_m = 50.0};
+  EXPECT_THAT(Describe(Synthesize(library, {}, bad, 60.0, {}, cues).error()),
+              testing::HasSubstr("movements[3]."));
 }
 
 }  // namespace

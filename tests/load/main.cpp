@@ -42,6 +42,11 @@ int Run(int argc, char** argv) {
       return (step != nullptr && step->at.has_value()) ||
              std::holds_alternative<WalkRequest>(request.movement);
     });
+    if (!read->layers.empty()) {
+      std::fprintf(stderr, "stridewire-load: --choreography %s: layers are not played by a load\n",
+                   options.choreography.c_str());
+      return 2;
+    }
     if (is_fixed || read->terrain != nullptr) {
       std::fprintf(stderr,
                    "stridewire-load: --choreography %s: at_m, walk_to and terrain belong to one "

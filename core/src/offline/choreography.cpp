@@ -23,6 +23,9 @@ constexpr JsonLimit kTurn = {-kMaxRequestTurnRad, kMaxRequestTurnRad,
 constexpr JsonLimit kSeconds = {0.0, kMaxStandS, "is not a number from 0 to 3600 s"};
 constexpr JsonLimit kSpeed = {kMinWalkSpeedMPerS, kMaxWalkSpeedMPerS,
                               "is not a number from 0.05 to 5 m/s"};
+constexpr JsonLimit kWeight = {0.0, 1.0, "is not a number from 0 to 1"};
+constexpr JsonLimit kBlend = {0.0, kMaxLayerBlendS, "is not a number from 0 to 10 s"};
+constexpr JsonLimit kLayerSpeed = {kMinLayerSpeed, kMaxLayerSpeed, "is not a number from 0.1 to 4"};
 constexpr JsonLimit kPosition = {-kMaxChoreographyPositionM, kMaxChoreographyPositionM,
                                  "is not a number within 100000 m"};
 constexpr JsonLimit kHeading = {-kMaxChoreographyHeadingRad, kMaxChoreographyHeadingRad,
@@ -59,11 +62,11 @@ Status ReadFootprint(const JsonField& field, FootprintRequest& at) {
   return ReadNumber(field, "heading_rad", kHeading, at.heading_rad.emplace());
 }
 
-Status ReadMustBeMet(const JsonField& field, bool& out) {
-  const json* value = field.Find("must_be_met");
+Status ReadFlag(const JsonField& field, const char* key, bool& out) {
+  const json* value = field.Find(key);
   if (value == nullptr) return {};
   if (!value->is_boolean()) {
-    return Fail(ErrorCode::kMalformed, "is neither true nor false", field.WhereOf("must_be_met"));
+    return Fail(ErrorCode::kMalformed, "is neither true nor false", field.WhereOf(key));
   }
   out = value->get<bool>();
   return {};
@@ -86,7 +89,7 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
     }
   }
   if (field.Find("at_m") != nullptr) {
-    if (auto ok = ReadMustBeMet(field, step.must_be_met); !ok) return ok;
+    if (auto ok = ReadFlag(field, "must_be_met", step.must_be_met); !ok) return ok;
     return ReadFootprint(field, step.at.emplace());
   }
   for (const char* key : {"heading_rad", "must_be_met"}) {
@@ -143,12 +146,21 @@ Status ReadStand(const JsonField& field, StandRequest& stand) {
   return ReadRequiredNumber(field, "seconds", kSeconds, stand.seconds);
 }
 
-Status ReadMovement(const JsonField& field, MovementRequest& request) {
-  if (auto ok = CheckKeys(field, {"step", "walk_to", "jump", "stand"}); !ok) return ok;
-  if (field.value.size() != 1) {
-    return Fail(ErrorCode::kMalformed, "needs exactly one of step, walk_to, jump and stand",
-                field.where);
+Status ReadLayer(const JsonField& field, LayerCue& cue) {
+  if (auto ok = CheckKeys(field, {"name", "off", "weight", "blend_s", "speed"}); !ok) return ok;
+  const json* name = field.Find("name");
+  if (name == nullptr) return Fail(ErrorCode::kMalformed, "is missing", field.WhereOf("name"));
+  if (!name->is_string() || name->get<std::string>().empty()) {
+    return Fail(ErrorCode::kMalformed, "is not the name of a layer", field.WhereOf("name"));
   }
+  cue.layer = name->get<std::string>();
+  if (auto ok = ReadFlag(field, "off", cue.is_off); !ok) return ok;
+  if (auto ok = ReadNumber(field, "weight", kWeight, cue.weight); !ok) return ok;
+  if (auto ok = ReadNumber(field, "blend_s", kBlend, cue.blend_s); !ok) return ok;
+  return ReadNumber(field, "speed", kLayerSpeed, cue.speed);
+}
+
+Status ReadMovement(const JsonField& field, MovementRequest& request) {
   const auto item = field.value.begin();
   const JsonField inner{item.value(), field.WhereOf(item.key())};
   if (item.key() == "step") return ReadStep(inner, request.movement.emplace<StepRequest>());
@@ -197,14 +209,30 @@ Expected<Choreography> ParseChoreography(std::string_view text, std::string_view
   if (movements->size() > kMaxChoreographyMovements) {
     return Fail(ErrorCode::kLimitExceeded, "holds more than 65536 movements", where);
   }
-  choreography.movements.resize(movements->size());
+  choreography.movements.reserve(movements->size());
   for (std::size_t i = 0; i < movements->size(); ++i) {
-    MovementRequest& request = choreography.movements[i];
-    request.id = i + 1;
-    if (auto ok = ReadMovement({(*movements)[i], where + "[" + std::to_string(i) + "]"}, request);
-        !ok) {
+    const JsonField field{(*movements)[i], where + "[" + std::to_string(i) + "]"};
+    if (auto ok = CheckKeys(field, {"step", "walk_to", "jump", "stand", "layer"}); !ok) {
       return std::unexpected(ok.error());
     }
+    if (field.value.size() != 1) {
+      return Fail(ErrorCode::kMalformed,
+                  "needs exactly one of step, walk_to, jump, stand and layer", field.where);
+    }
+    if (const json* layer = field.Find("layer")) {
+      LayerCue& cue = choreography.layers.emplace_back();
+      cue.before = choreography.movements.size();
+      if (auto ok = ReadLayer({*layer, field.WhereOf("layer")}, cue); !ok) {
+        return std::unexpected(ok.error());
+      }
+      continue;
+    }
+    MovementRequest& request = choreography.movements.emplace_back();
+    request.id = i + 1;
+    if (auto ok = ReadMovement(field, request); !ok) return std::unexpected(ok.error());
+  }
+  if (choreography.movements.empty()) {
+    return Fail(ErrorCode::kOutOfRange, "holds no movement", where);
   }
   return choreography;
 }

@@ -93,11 +93,38 @@ bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
           (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand));
 }
 
+// Where a movement stands in a choreography, among layers.
+std::string PlaceOf(std::size_t request, std::span<const LayerCue> layers) {
+  const auto before =
+      std::ranges::count_if(layers, [&](const LayerCue& cue) { return cue.before <= request; });
+  return "movements[" + std::to_string(request + static_cast<std::size_t>(before)) + "]";
+}
+
 // A step or jump that no way leads to when its turn comes.
-Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests) {
+Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests,
+               std::span<const LayerCue> layers) {
   const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);
   return {event.code, event.reason, -1,
-          "movements[" + std::to_string(request - requests.begin()) + "]"};
+          PlaceOf(static_cast<std::size_t>(request - requests.begin()), layers)};
+}
+
+// Sets the layers that go before a movement, and those left of earlier ones.
+Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
+                 Avatar& avatar) {
+  for (; next < layers.size() && layers[next].before <= before; ++next) {
+    const LayerCue& cue = layers[next];
+    const Status status = avatar.SetLayer({.layer = avatar.library().FindLayer(cue.layer),
+                                           .is_on = !cue.is_off,
+                                           .weight = cue.weight,
+                                           .blend_s = cue.blend_s,
+                                           .speed = cue.speed});
+    if (status) continue;
+    Error error = status.error();
+    error.where = "movements[" + std::to_string(cue.before + next) + "].layer";
+    error.index = -1;
+    return std::unexpected(std::move(error));
+  }
+  return {};
 }
 
 // How far a step's foot, when it first stands, is from where it was asked to.
@@ -136,14 +163,14 @@ void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
 
 Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
                                std::span<const MovementRequest> requests, double fps,
-                               const AvatarOptions& options) {
+                               const AvatarOptions& options, std::span<const LayerCue> layers) {
   if (!(fps >= 10.0 && fps <= 1000.0)) {
     return Fail(ErrorCode::kOutOfRange, "frames a second must be from 10 to 1000");
   }
   for (std::size_t i = 0; i < requests.size(); ++i) {
     if (Status status = ValidateRequest(*library, requests[i]); !status) {
       Error error = status.error();
-      error.where = "movements[" + std::to_string(i) + "]." + error.where;
+      error.where = PlaceOf(i, layers) + "." + error.where;
       error.index = -1;
       return std::unexpected(error);
     }
@@ -169,12 +196,17 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
   for (const MovementRequest& request : requests) {
     if (std::holds_alternative<WalkRequest>(request.movement)) walks.insert(request.id);
   }
+  std::size_t next_cue = 0;
+  if (Status status = SetLayers(layers, 0, next_cue, avatar); !status) {
+    return std::unexpected(status.error());
+  }
   std::size_t next = 0;
   while (next < requests.size() || !avatar.idle()) {
     while (next < requests.size() && avatar.queue_size() < Avatar::kMaxQueue) {
       if (Status status = avatar.Enqueue(requests[next]); !status) {
         Error error = status.error();
-        error.index = static_cast<std::int64_t>(next);
+        error.where = PlaceOf(next, layers) + (error.where.empty() ? "" : "." + error.where);
+        error.index = -1;
         return std::unexpected(std::move(error));
       }
       ++next;
@@ -185,6 +217,13 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
     avatar.Advance(1.0 / fps);
     record_pose();
     for (const AvatarEvent& event : avatar.events()) {
+      const auto about = std::ranges::find(requests, event.request_id, &MovementRequest::id);
+      if (next_cue < layers.size() && about != requests.end()) {
+        const auto before = static_cast<std::size_t>(about - requests.begin());
+        if (Status status = SetLayers(layers, before, next_cue, avatar); !status) {
+          return std::unexpected(status.error());
+        }
+      }
       if (event.type == AvatarEventType::kStarted) {
         asked.emplace_back();
         MovementRecord record;
@@ -218,7 +257,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
         result.refusals.push_back(
             {event.request_id, DescribeRejection(event), event.time_s, *event.missed});
       } else if (event.type == AvatarEventType::kRejected) {
-        return std::unexpected(Rejected(event, requests));
+        return std::unexpected(Rejected(event, requests, layers));
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
         result.movements.back().end_s = event.time_s;
         result.movements.back().base = event.base;

@@ -64,7 +64,8 @@ int RunSynthesize(const SynthesizeCommand& command) {
   auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps,
                               {.run_time_correction = !command.no_correction,
                                .foot_planting = !command.no_planting,
-                               .terrain = choreography->terrain});
+                               .terrain = choreography->terrain},
+                              choreography->layers);
   if (!synthesis) {
     Error error = synthesis.error();
     std::string where = command.choreography;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
+#include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/terrain.h"
@@ -29,6 +30,8 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 ///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0,"must_be_met":true}},
 ///                 {"walk_to":{"position_m":[3,0,5],"heading_rad":1.6,"waypoints_m":[[0,0,4]],"speed_m_s":1}},
 ///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
+///                 {"layer":{"name":"wave","weight":0.8,"blend_s":0.5,"speed":1}},
+///                 {"layer":{"name":"wave","off":true}},
 ///                 {"stand":{"seconds":1.5}}]}
 ///
 /// `start` and what is in it may be left out (the origin, heading 0), and so may `terrain` (flat at
@@ -36,11 +39,14 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 /// that is not listed here is an error, so is one that stands twice. A step's `at_m`, where the ball
 /// of its foot lands in the world, stands instead of length, side, height and turn; the `heading_rad`
 /// of that footprint may be left out, and so may `must_be_met`, with which the step is left out if that is out of
-/// reach. A `walk_to` needs position and heading.
+/// reach. A `walk_to` needs position and heading. A `layer` takes no time: it begins, changes or (`off`) ends when the
+/// movement after it begins; it needs a `name`.
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground.
-  std::vector<MovementRequest> movements;  ///< 1 to kMaxChoreographyMovements, ids 1, 2, 3, …
+  /// 1 to kMaxChoreographyMovements with the layers; an id is 1 more than the place in the list: 1, 2, 3, … without.
+  std::vector<MovementRequest> movements;
+  std::vector<LayerCue> layers;
 };
 
 /// Reads a choreography. Numbers are checked against the limits of requests (movement_request.h);

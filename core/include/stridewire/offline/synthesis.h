@@ -59,6 +59,17 @@ struct RefusalRecord {
   FootprintMiss missed;
 };
 
+/// A layer that begins, changes or ends when a movement of the list begins.
+struct LayerCue {
+  std::size_t before =
+      0;  ///< Which, from 0; as many as there are: after all of them, which shows nothing
+  std::string layer;  ///< Its name
+  bool is_off = false;
+  double weight = 1.0;
+  double blend_s = 0.3;
+  double speed = 1.0;
+};
+
 struct Synthesis {
   Clip clip;  ///< World poses; frame 0 is the stand before the first tick
   std::vector<MovementRecord> movements;
@@ -70,10 +81,13 @@ inline constexpr int kMaxSynthesisFrames = 1 << 20;
 
 /// Runs an avatar through requests, without a server: what `fps` ticks a second would show, until it
 /// stands idle. kUnsupported, kOutOfRange: a request is refused or no way leads to it (`where`); kLimitExceeded:
-/// more than kMaxSynthesisFrames.
+/// more than kMaxSynthesisFrames. `layers` in the order of `before`: each is on its way from the frame after the one its
+/// movement (or a step inserted for it) begins in; kNotFound, kOutOfRange, kLimitExceeded as LayerStack::Set. Errors name
+/// movements by their place in a choreography, where layers count among them.
 [[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
                                              const BaseFrame& start,
                                              std::span<const MovementRequest> requests, double fps,
-                                             const AvatarOptions& options = {});
+                                             const AvatarOptions& options = {},
+                                             std::span<const LayerCue> layers = {});
 
 }  // namespace stridewire

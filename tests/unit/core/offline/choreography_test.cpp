@@ -1,5 +1,6 @@
 #include "stridewire/offline/choreography.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -52,6 +53,45 @@ TEST(ParseChoreography, ReadsEveryMovement) {
   EXPECT_EQ(jump.height_m, 0.125);
   EXPECT_EQ(jump.turn_rad, -1.0);
   EXPECT_EQ(std::get<StandRequest>(read->movements[4].movement).seconds, 1.5);
+}
+
+TEST(ParseChoreography, LayersStandBetweenMovements) {
+  const Expected<Choreography> read = ParseChoreography(
+      R"({"movements":[{"layer":{"name":"wave"}},{"step":{"length_m":0.5}},
+          {"layer":{"name":"carry","weight":0.5,"blend_s":0.75,"speed":2}},
+          {"layer":{"name":"wave","off":true}},{"stand":{"seconds":1}}]})",
+      "c.json");
+  ASSERT_TRUE(read.has_value()) << Describe(read.error());
+  ASSERT_EQ(read->movements.size(), 2u);
+  EXPECT_EQ(read->movements[0].id, 2u);  // its place in the list and 1
+  EXPECT_EQ(read->movements[1].id, 5u);
+  ASSERT_EQ(read->layers.size(), 3u);
+  EXPECT_EQ(read->layers[0].before, 0u);
+  EXPECT_EQ(read->layers[0].layer, "wave");
+  EXPECT_EQ(read->layers[0].weight, 1.0);
+  EXPECT_EQ(read->layers[1].before, 1u);
+  EXPECT_EQ(read->layers[1].weight, 0.5);
+  EXPECT_EQ(read->layers[1].blend_s, 0.75);
+  EXPECT_EQ(read->layers[1].speed, 2.0);
+  EXPECT_FALSE(read->layers[1].is_off);
+  EXPECT_EQ(read->layers[2].before, 1u);
+  EXPECT_TRUE(read->layers[2].is_off);
+
+  const auto refused = [](const char* layer) {
+    const std::string text =
+        R"({"movements":[{"stand":{"seconds":1}},{"layer":)" + std::string(layer) + "}]}";
+    return Describe(ParseChoreography(text, "c.json").error());
+  };
+  EXPECT_THAT(refused("{}"), testing::HasSubstr("c.json: movements[1].layer.name: is missing"));
+  EXPECT_THAT(refused(R"({"name":3})"),
+              testing::HasSubstr("layer.name: is not the name of a layer"));
+  EXPECT_THAT(refused(R"({"name":"a","weight":1.5})"),
+              testing::HasSubstr("layer.weight: is not a number from 0 to 1"));
+  EXPECT_THAT(refused(R"({"name":"a","off":1})"),
+              testing::HasSubstr("layer.off: is neither true nor false"));
+  EXPECT_THAT(refused(R"({"name":"a","mask":1})"), testing::HasSubstr("mask"));
+  EXPECT_EQ(ParseChoreography(R"({"movements":[{"layer":{"name":"a"}}]})", "c.json").error().code,
+            ErrorCode::kOutOfRange);
 }
 
 TEST(ParseChoreography, StartsAtTheOriginUnlessToldOtherwise) {
@@ -158,9 +198,9 @@ const BadText kBadTexts[] = {
      "c.json: start.heading_rad: is not a number within 10000 rad"},
     {R"({"movements":[1]})", ErrorCode::kMalformed, "c.json: movements[0]: is not an object"},
     {R"({"movements":[{}]})", ErrorCode::kMalformed,
-     "c.json: movements[0]: needs exactly one of step, walk_to, jump and stand"},
+     "c.json: movements[0]: needs exactly one of step, walk_to, jump, stand and layer"},
     {R"({"movements":[{"stand":{"seconds":1},"jump":{"length_m":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0]: needs exactly one of step, walk_to, jump and stand"},
+     "c.json: movements[0]: needs exactly one of step, walk_to, jump, stand and layer"},
     {R"({"movements":[{"stand":{"seconds":1}},{"hop":{}}]})", ErrorCode::kMalformed,
      "c.json: movements[1].hop: is not a key known here"},
     {R"({"movements":[{"walk_to":{"heading_rad":1}}]})", ErrorCode::kMalformed,
