@@ -166,11 +166,9 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
-      const Correction corrected =
-          CorrectParameters(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group),
-                            scratch, caches[i], measured, movements[i]);
-      StartMovement(group, 0, std::span(corrected.parameters.values).first(d), {}, scratch,
-                    movements[i]);
+      CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
+                     caches[i], measured, movements[i]);
+      StartWeighted(group, {}, movements[i]);
       caches[i].Clear();
       jobs[i] = {&movements[i], 0.0, &caches[i], &poses[i]};
     }

@@ -86,10 +86,9 @@ void StartCorrected(benchmark::State& state, const Library& library, int group_i
     ParameterValues values{.count = group.parameter_count()};
     std::copy(wanted.begin(), wanted.end(), values.values.begin());
     const Correction correction =
-        CorrectParameters(*library, group_index, values, DefaultCorrectionLimits(group), scratch,
-                          cache, pose, movement);
-    StartMovement(group, group_index, std::span(correction.parameters.values).first(wanted.size()),
-                  {}, scratch, movement);
+        CorrectWeights(*library, group_index, values, DefaultCorrectionLimits(group), scratch,
+                       cache, pose, movement);
+    StartWeighted(group, {}, movement);
     iterations += correction.iterations;
     benchmark::DoNotOptimize(movement.weights.data());
   }

@@ -87,13 +87,13 @@ struct Foothold {
 };
 
 // Ground of stairs along z: treads begin 14 cm behind the ball of whoever climbs onto them, but ahead of
-// the toes of whoever stands below, and end 1 cm ahead of the ball of whoever goes down from them.
+// the toes of whoever stands below (by 1 cm: they are 9 cm ahead of the ball), and end 1 cm ahead of the ball of whoever goes down from them.
 double GroundAt(const std::vector<Foothold>& holds, double z_m) {
   double height = holds.front().height_m;
   for (std::size_t i = 1; i < holds.size(); ++i) {
     const Foothold &a = holds[i - 1], &b = holds[i];
     const double edge =
-        a.height_m < b.height_m ? std::max(b.z_m - 0.14, a.z_m + 0.09) : a.z_m + 0.01;
+        a.height_m < b.height_m ? std::max(b.z_m - 0.14, a.z_m + 0.10) : a.z_m + 0.01;
     if (z_m > (a.height_m == b.height_m ? b.z_m : edge)) height = b.height_m;
   }
   return height;

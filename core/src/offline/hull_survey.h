@@ -33,6 +33,11 @@ class GroupProbe {
   [[nodiscard]] Correction Correct(const MotionGroup& group, const ParameterValues& wanted,
                                    const CorrectionLimits& limits);
 
+  // Of the last that was corrected [n].
+  [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) const {
+    return std::span(scratch_).first(static_cast<std::size_t>(group.example_count));
+  }
+
  private:
   const Skeleton& skeleton_;
   GridLayout layout_;

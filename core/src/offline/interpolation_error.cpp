@@ -1,6 +1,7 @@
 #include "stridewire/offline/interpolation_error.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "hull_survey.h"
@@ -24,16 +25,30 @@ InterpolationError MeasureInterpolationError(const MotionLibrary& library, int g
   const CorrectionLimits limits = DefaultCorrectionLimits(group);
   error.iterations = limits.max_iterations;
   for (const HullPoint& peak : survey.peaks) points.push_back(peak.p);
-  std::vector<double> corrected(points.size());
-  ParallelFor(
-      static_cast<int>(points.size()), 16, static_cast<int>(probes.size()), [&](int i, int thread) {
-        const auto at = static_cast<std::size_t>(i);
-        corrected[at] =
-            probes[static_cast<std::size_t>(thread)].Correct(group, points[at], limits).error_m;
-      });
-  error.corrected_max_m = *std::max_element(corrected.begin(), corrected.end());
+  struct Corrected {
+    double error_m = 0.0;
+    double in_3_m = 0.0;
+    double weight_sum = 0.0;
+  };
+  std::vector<Corrected> corrected(points.size());
+  ParallelFor(static_cast<int>(points.size()), 16, static_cast<int>(probes.size()),
+              [&](int i, int thread) {
+                const auto at = static_cast<std::size_t>(i);
+                GroupProbe& probe = probes[static_cast<std::size_t>(thread)];
+                Corrected& point = corrected[at];
+                point.in_3_m = probe.Correct(group, points[at], {.max_iterations = 3}).error_m;
+                point.error_m = probe.Correct(group, points[at], limits).error_m;
+                for (const double weight : probe.Weights(group)) {
+                  point.weight_sum += std::fabs(weight);
+                }
+              });
+  for (const Corrected& point : corrected) {
+    error.corrected_max_m = std::max(error.corrected_max_m, point.error_m);
+    error.corrected_in_3_max_m = std::max(error.corrected_in_3_max_m, point.in_3_m);
+    error.corrected_weight_sum_max = std::max(error.corrected_weight_sum_max, point.weight_sum);
+  }
   for (int i = 0; i < error.samples; ++i) {
-    error.corrected_mean_m += corrected[static_cast<std::size_t>(i)] / error.samples;
+    error.corrected_mean_m += corrected[static_cast<std::size_t>(i)].error_m / error.samples;
   }
   return error;
 }

@@ -179,7 +179,7 @@ class Comparer {
           std::span(others.sites).subspan(c * wanted.size(), wanted.size());
       if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch, cache_,
                            pose_, movement_)) {
-        std::copy(scratch.begin(), scratch.end(), share.begin());
+        std::copy_n(scratch.begin(), n, share.begin());
       }
     }
     const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
@@ -190,11 +190,8 @@ class Comparer {
     applied.count = group_.parameter_count();
     ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
-    const Correction corrected =
-        CorrectParameters(library_.skeleton(), library_.layout(), fitted->group, applied,
-                          DefaultCorrectionLimits(group_), scratch, cache_, pose_, movement_);
-    SetWeights(fitted->group, -1, std::span(corrected.parameters.values).first(wanted.size()),
-               scratch, movement_);
+    CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
+                   DefaultCorrectionLimits(group_), scratch, cache_, pose_, movement_);
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 

@@ -310,10 +310,7 @@ class GroupRefiner {
     const Correction solved = probes_[0].Correct(current.group, wanted, kSolve);
     if (solved.error_m > kMaxResidualM) return std::nullopt;
     const std::size_t d = original_.parameters.size();
-    std::vector<double> weights(static_cast<std::size_t>(original_.example_count));
-    EvaluateWeights({current.basis.centres, current.basis.scales, current.basis.sites,
-                     current.basis.dilations, current.basis.linear, current.basis.radial},
-                    std::span(solved.parameters.values).first(d), weights);
+    const std::span<const double> weights = probes_[0].Weights(current.group);
     Sites sites = current.sites;
     sites.parameters.insert(sites.parameters.end(), wanted.values.begin(),
                             wanted.values.begin() + static_cast<std::ptrdiff_t>(d));

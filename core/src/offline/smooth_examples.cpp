@@ -151,10 +151,8 @@ bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const
   wanted.count = static_cast<int>(parameters.size());
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
   const Correction solved =
-      CorrectParameters(skeleton, layout, smooth.group, wanted,
-                        {.max_iterations = kSolveIterations}, scratch, cache, pose, movement);
-  SetWeights(smooth.group, -1, std::span(solved.parameters.values).first(parameters.size()),
-             scratch, movement);
+      CorrectWeights(skeleton, layout, smooth.group, wanted, {.max_iterations = kSolveIterations},
+                     scratch, cache, pose, movement);
   return solved.error_m <= kMaxMissM;
 }
 

@@ -143,6 +143,18 @@ void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footpr
   record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - asked.heading_rad));
 }
 
+// The examples' own, by their weights: what cardinal weights that are the same were asked for.
+ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> weights) {
+  ParameterValues mean;
+  mean.count = group.parameter_count();
+  for (std::size_t e = 0; e < weights.size(); ++e) {
+    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+      mean.values[l] += static_cast<double>(weights[e]) * group.site(static_cast<int>(e))[l];
+    }
+  }
+  return mean;
+}
+
 // Without planting: how far the measured end is from what was requested, in the parameters the group has.
 void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
   double squared = 0.0;
@@ -236,7 +248,9 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
         record.extrapolated = event.extrapolated;
         record.clamped = event.clamped;
         if (const Movement* movement = avatar.movement(); movement != nullptr && event.group >= 0) {
-          record.corrected = movement->parameters;
+          record.corrected = options.run_time_correction
+                                 ? MeanParameters(library->group(event.group), movement->weights)
+                                 : movement->parameters;
           record.weights = movement->weights;
           for (int i = 0; i <= movement->interval_count; ++i) {
             record.keytimes_s.push_back(event.time_s +

@@ -413,18 +413,17 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
 // part of its own swing.
 void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = library_->group(plan.group);
-  ParameterValues parameters = plan.applied;
   if (options_.run_time_correction) {
     // The difference pose is made below: until then it is room to measure in.
-    parameters =
-        CorrectParameters(*library_, plan.group, plan.applied, DefaultCorrectionLimits(next),
-                          weight_scratch_, cache_, movement_.difference, movement_)
-            .parameters;
+    CorrectWeights(*library_, plan.group, plan.applied, DefaultCorrectionLimits(next),
+                   weight_scratch_, cache_, movement_.difference, movement_);
+  } else {
+    SetWeights(next, plan.group,
+               std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
+               weight_scratch_, movement_);
   }
   cache_.Clear();
-  StartMovement(next, plan.group,
-                std::span(parameters.values).first(static_cast<std::size_t>(parameters.count)),
-                base_, weight_scratch_, movement_);
+  StartWeighted(next, base_, movement_);
   if (swing_part > 0.0) {
     const SwingTimes swing = SwingTimesOf(next.kind, movement_);
     movement_.entered_s = swing.release_s + swing_part * (swing.land_s - swing.release_s);

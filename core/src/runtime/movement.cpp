@@ -120,9 +120,13 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
                      group.dilations, group.linear, group.radial},
                     parameters, weights);
   }
-  movement.weights.resize(n);
+  TakeWeights(group, weights, movement);
+}
+
+void TakeWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
+  movement.weights.resize(weights.size());
   movement.heading_change_rad = 0.0;
-  for (std::size_t e = 0; e < n; ++e) {
+  for (std::size_t e = 0; e < weights.size(); ++e) {
     movement.weights[e] = static_cast<float>(weights[e]);
     movement.heading_change_rad += weights[e] * group.heading_change_rad[e];
   }
@@ -131,6 +135,10 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement) {
   SetWeights(group, group_index, parameters, weight_scratch, movement);
+  StartWeighted(group, base, movement);
+}
+
+void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement) {
   movement.base = base;
   movement.steer_rad = 0.0;
   movement.entered_s = 0.0;

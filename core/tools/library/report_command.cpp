@@ -28,7 +28,9 @@ Json ReportToJson(const Report& report, const ReportCommand& command) {
     Json group = RefinementToJson(report.refinement.library->groups()[g],
                                   report.refinement.groups[g], RefineOptions{}.samples);
     group["corrected_error_m"] = {{"max", report.plain[g].corrected_max_m},
+                                  {"max_in_3", report.plain[g].corrected_in_3_max_m},
                                   {"mean", report.plain[g].corrected_mean_m},
+                                  {"weight_sum_max", report.plain[g].corrected_weight_sum_max},
                                   {"iterations", report.plain[g].iterations}};
     json["groups"].push_back(std::move(group));
   }

@@ -131,20 +131,26 @@ class Bench {
                            std::span(nearest.values).first(d));
   }
 
-  stridewire::Correction Correct(const ParameterValues& p) {
-    return CorrectParameters(library_, group_index_, p, DefaultCorrectionLimits(group_), scratch_,
-                             cache_, pose_, movement_);
+  // Weighs the movement by its parameters, or corrects that as an avatar does. Iterations it took.
+  int Weigh(const ParameterValues& p, bool is_corrected) {
+    if (is_corrected) {
+      return CorrectWeights(library_, group_index_, p, DefaultCorrectionLimits(group_), scratch_,
+                            cache_, pose_, movement_)
+          .iterations;
+    }
+    SetWeights(group_, group_index_, Span(p), scratch_, movement_);
+    return 0;
   }
 
-  ParameterValues Start(const ParameterValues& p) {
-    StartMovement(group_, group_index_, Span(p), BaseFrame{}, scratch_, movement_);
+  // Starts what was weighed; its parameters.
+  ParameterValues Start() {
+    StartWeighted(group_, BaseFrame{}, movement_);
     cache_.Clear();
     return MeasureMovement(library_, movement_, cache_, pose_);
   }
 
   double Error(const ParameterValues& p, bool is_corrected) {
-    if (is_corrected) return Correct(p).error_m;
-    SetWeights(group_, group_index_, Span(p), scratch_, movement_);
+    Weigh(p, is_corrected);
     cache_.Clear();
     return LargestDifference(group_, p, MeasureMovement(library_, movement_, cache_, pose_));
   }
@@ -251,15 +257,9 @@ HttpAnswer StepPage(const MotionLibrary& library, int group_index, std::string_v
   ParameterValues inside;
   bench.Project(*wanted, kHullGrowth, applied);
   const bool extrapolated = bench.Project(*wanted, 0.0, inside) > 1e-6;
-  ParameterValues taken = applied;
-  int iterations = 0;
-  if (*is_corrected) {
-    const auto correction = bench.Correct(applied);
-    taken = correction.parameters;
-    iterations = correction.iterations;
-  }
   const double uncorrected_m = bench.Error(applied, false);
-  const ParameterValues measured = bench.Start(taken);
+  const int iterations = bench.Weigh(applied, *is_corrected);
+  const ParameterValues measured = bench.Start();
   Json json = {{"requested", List(Span(*wanted))},
                {"applied", List(Span(applied))},
                {"measured", List(Span(measured))},
@@ -279,7 +279,8 @@ HttpAnswer ExamplePage(const MotionLibrary& library, int group_index, std::strin
   p.count = group.parameter_count();
   std::ranges::copy(group.site(*index), p.values.begin());
   Bench bench(library, group_index);
-  const ParameterValues measured = bench.Start(p);
+  bench.Weigh(p, false);
+  const ParameterValues measured = bench.Start();
   Json json = {{"applied", List(Span(p))}, {"measured", List(Span(measured))}};
   json.update(bench.Frames());
   return Say(json);

@@ -13,10 +13,12 @@ struct InterpolationError {
   double mean_m = 0.0;
   double max_m = 0.0;
   double corrected_mean_m = 0.0;
-  double corrected_max_m = 0.0;  ///< After CorrectParameters, as when a movement starts.
-  double weight_sum_max = 0.0;   ///< Of |w|, uncorrected
-  int samples = 0;               ///< What the means are over.
-  int iterations = 0;            ///< The most a correction takes.
+  double corrected_max_m = 0.0;           ///< After CorrectWeights, as when a movement starts.
+  double corrected_in_3_max_m = 0.0;      ///< The same after three rounds at most
+  double corrected_weight_sum_max = 0.0;  ///< Of |w|, corrected
+  double weight_sum_max = 0.0;            ///< Of |w|, uncorrected
+  int samples = 0;                        ///< What the means are over.
+  int iterations = 0;                     ///< The most a correction takes.
 };
 
 /// Samples the hull by seeded convex combinations (Dirichlet weighted, so that faces and corners are

@@ -79,7 +79,7 @@ struct Refinement {
 /// what is asked (paper, Section 4):
 ///
 ///   repeat: p^ = argmax e over the hull V of the examples: samples, then steepest ascent
-///           p* with a(p*) = p^ (CorrectParameters); add the site p^ with the weights w(p*); refit
+///           p* with a(p*) = p^ (CorrectWeights); add the site p^ with the weights w(p*); refit
 ///   until max e < max_error_m, or enough of them are there
 ///
 /// The bare rule shrinks every radius near a new site, and now and then the largest error grows. The

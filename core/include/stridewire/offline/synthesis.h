@@ -28,9 +28,10 @@ struct MovementRecord {
   double end_s = 0.0;
   std::vector<double> keytimes_s;
   ParameterValues requested;
-  ParameterValues applied;    ///< After clamping to what the examples span
-  ParameterValues corrected;  ///< What the weights were taken at, so that `measured` is `applied`
-  ParameterValues measured;   ///< a(p) of the synthesized movement
+  ParameterValues applied;  ///< After clamping to what the examples span
+  ParameterValues
+      corrected;  ///< sum w_i p_i, p_i of the examples: not `applied`, so that `measured` is
+  ParameterValues measured;  ///< a(p) of the synthesized movement
   bool extrapolated = false;
   bool clamped = false;
   std::vector<float> weights;

@@ -63,7 +63,7 @@ struct AvatarEvent {
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
 struct AvatarOptions {
-  /// Movements start with corrected parameters (CorrectParameters), so that they have those applied.
+  /// Movements start with corrected weights (CorrectWeights), so that they have those applied.
   bool run_time_correction = true;
   /// Feet stand still where they land (PlanFeet); off, they are where the blend has them. See SetFootPlanting.
   bool foot_planting = true;

@@ -43,8 +43,8 @@ struct PoseVelocity {
 /// this value, its group and the time.
 struct Movement {
   int group = -1;
-  ParameterValues parameters;  ///< What the weights were taken at: corrected ones, if they were.
-  std::vector<float> weights;  ///< [example], sum 1
+  ParameterValues parameters;                          ///< What was asked of it
+  std::vector<float> weights;                          ///< [example], sum 1
   std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
   int interval_count = 0;
   TimeWarp warp;
@@ -99,6 +99,12 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 /// The part of StartMovement that decides the poses at both ends: group, weights and heading change.
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement);
+
+/// Gives the movement other weights [n] of its group, and the heading change that follows.
+void TakeWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
+
+/// The rest of StartMovement, for a movement that has group, parameters and weights.
+void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement);
 
 /// The blended pose at a grid point, which EvaluateBlend interpolates between. Never allocates.
 void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,

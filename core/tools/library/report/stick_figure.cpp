@@ -75,12 +75,12 @@ void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   wanted.count = group.parameter_count();
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
   if (corrected) {
-    wanted = CorrectParameters(library_, group_index_, wanted, DefaultCorrectionLimits(group),
-                               scratch_, cache_, pose_, movement_)
-                 .parameters;
+    CorrectWeights(library_, group_index_, wanted, DefaultCorrectionLimits(group), scratch_, cache_,
+                   pose_, movement_);
+  } else {
+    SetWeights(group, group_index_, parameters, scratch_, movement_);
   }
-  StartMovement(group, group_index_, std::span(wanted.values).first(parameters.size()), {},
-                scratch_, movement_);
+  StartWeighted(group, {}, movement_);
   cache_.Clear();
 }
 

@@ -138,8 +138,8 @@ TEST_P(RefineInDimensions, LeavesRunTimeCorrectionWhatItWas) {
   Pose pose(7);
   for (int i = 0; i < 100; ++i) {
     const Correction correction =
-        CorrectParameters(*refined->library, 0, PointInHull(group, random), {.max_iterations = 8},
-                          scratch, cache, pose, movement);
+        CorrectWeights(*refined->library, 0, PointInHull(group, random), {.max_iterations = 8},
+                       scratch, cache, pose, movement);
     EXPECT_LT(correction.error_m, 1e-4) << i;
   }
 }

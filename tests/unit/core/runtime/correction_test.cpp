@@ -25,18 +25,22 @@ struct Scratch {
       : weights(static_cast<std::size_t>(library.max_example_count())),
         cache(library.layout()),
         pose(library.skeleton().joint_count()) {
-    movement.weights.reserve(weights.size());
+    movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
   }
   Correction Correct(const MotionLibrary& library, const ParameterValues& wanted,
                      const CorrectionLimits& limits) {
-    return CorrectParameters(library, 0, wanted, limits, weights, cache, pose, movement);
+    return CorrectWeights(library, 0, wanted, limits, weights, cache, pose, movement);
   }
   // A movement of these parameters, measured as anybody would.
   ParameterValues Measure(const MotionLibrary& library, const ParameterValues& parameters,
-                          const BaseFrame& base = {}) {
-    StartMovement(library.group(0), 0,
+                          int group = 0) {
+    StartMovement(library.group(group), group,
                   std::span(parameters.values).first(static_cast<std::size_t>(parameters.count)),
-                  base, weights, movement);
+                  {}, weights, movement);
+    return MeasureAsIs(library);
+  }
+  // The movement as it is, measured as anybody would.
+  ParameterValues MeasureAsIs(const MotionLibrary& library) {
     cache.Clear();
     return MeasureMovement(library, movement, cache, pose);
   }
@@ -73,10 +77,11 @@ TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
     EXPECT_NEAR(correction.initial_error_m, miss_m, 1e-6);
     EXPECT_LE(correction.iterations, d <= 2 ? 3 : 8);
     EXPECT_LT(correction.error_m, 1e-4) << "point " << i;
-    EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
     // What it says is what is measured.
-    const ParameterValues measured = scratch.Measure(*library, correction.parameters);
-    EXPECT_NEAR(LargestDifference(group, wanted, measured), correction.error_m, 1e-6);
+    EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)), correction.error_m,
+                1e-6);
+    EXPECT_EQ(scratch.movement.parameters.values, wanted.values);
+    EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
   }
   // Else nothing was there to correct.
   EXPECT_GT(largest_m, 4e-4);
@@ -104,9 +109,86 @@ TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
     const Correction correction =
         scratch.Correct(*library, wanted, {.max_iterations = static_cast<int>(random() % 12)});
     EXPECT_LE(correction.error_m, correction.initial_error_m);
-    EXPECT_LE(LargestDifference(group, wanted, correction.parameters), kMaxCorrectionM + 1e-9);
-    static_cast<void>(scratch.Measure(*library, correction.parameters));
+    EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)), correction.error_m,
+                1e-6);
     EXPECT_LE(scratch.WeightSum(), std::max(kMaxCorrectedWeightSum, weight_sum) + 1e-6);
+  }
+}
+
+// J is what differences say, at weights that are a blend and beyond the hull.
+TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
+  const int d = GetParam();
+  const std::uint32_t seed = Seed();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  const auto library = MakeDistortedLibrary(d, 3 * d + 3, 0.6, seed);
+  const MotionGroup& group = library->group(0);
+  const auto n = static_cast<std::size_t>(group.example_count);
+  std::mt19937 random(seed);
+  Scratch scratch(*library);
+  std::vector<double> weights(n);
+  std::vector<double> slopes(n * static_cast<std::size_t>(d));
+  constexpr double kStep = 1e-2;
+  for (int i = 0; i < 5; ++i) {
+    static_cast<void>(scratch.Measure(*library, PointInHull(group, random)));
+    std::copy_n(scratch.weights.begin(), n, weights.begin());
+    MeasureSlopes(library->skeleton(), library->layout(), group, weights, slopes);
+    for (std::size_t e = 1; e < n; ++e) {
+      // From the first example to this one: the sum stays.
+      const auto measured = [&](double by) {
+        std::vector<double> w = weights;
+        w[e] += by;
+        w[0] -= by;
+        TakeWeights(group, w, scratch.movement);
+        return scratch.MeasureAsIs(*library);
+      };
+      const ParameterValues more = measured(kStep);
+      const ParameterValues less = measured(-kStep);
+      for (std::size_t l = 0; l < static_cast<std::size_t>(d); ++l) {
+        EXPECT_NEAR(slopes[l * n + e] - slopes[l * n],
+                    (more.values[l] - less.values[l]) / (2.0 * kStep), 2e-3)
+            << l << " " << e;
+      }
+    }
+  }
+}
+
+// Requests next to each other get weights next to each other, wherever they lie.
+TEST_P(InDimensions, IsContinuousInWhatIsAsked) {
+  const int d = GetParam();
+  const std::uint32_t seed = Seed();
+  SCOPED_TRACE(testing::Message() << "seed " << seed);
+  const auto library = MakeDistortedLibrary(d, d == 1 ? 5 : 6 * d + 4, 0.6, seed);
+  const MotionGroup& group = library->group(0);
+  std::mt19937 random(seed);
+  Scratch scratch(*library);
+  const auto weights = [&](const ParameterValues& wanted) {
+    scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
+    return scratch.movement.weights;
+  };
+  constexpr int kSteps = 100;
+  for (int i = 0; i < 10; ++i) {
+    const ParameterValues from = PointInHull(group, random);
+    const ParameterValues to = PointInHull(group, random);
+    std::vector<float> before;
+    std::vector<float> uncorrected_before;
+    for (int s = 0; s <= kSteps; ++s) {
+      ParameterValues wanted = from;
+      for (std::size_t l = 0; l < static_cast<std::size_t>(d); ++l) {
+        wanted.values[l] += (to.values[l] - from.values[l]) * s / kSteps;
+      }
+      static_cast<void>(scratch.Measure(*library, wanted));
+      const std::vector<float> uncorrected = scratch.movement.weights;
+      const std::vector<float> now = weights(wanted);
+      double moved = 0.0;
+      double uncorrected_moved = 0.0;
+      for (std::size_t e = 0; s > 0 && e < now.size(); ++e) {
+        moved += std::fabs(static_cast<double>(now[e] - before[e]));
+        uncorrected_moved += std::fabs(static_cast<double>(uncorrected[e] - uncorrected_before[e]));
+      }
+      EXPECT_LT(moved, 3.0 * uncorrected_moved + 0.03) << i << " " << s;
+      before = now;
+      uncorrected_before = uncorrected;
+    }
   }
 }
 
@@ -117,8 +199,11 @@ TEST(Correction, WithoutIterationsChangesNothing) {
   std::mt19937 random(1);
   Scratch scratch(*library);
   const ParameterValues wanted = PointInHull(library->group(0), random);
+  const ParameterValues uncorrected = scratch.Measure(*library, wanted);
+  const std::vector<float> weights = scratch.movement.weights;
   const Correction correction = scratch.Correct(*library, wanted, {.max_iterations = 0});
-  EXPECT_EQ(correction.parameters.values, wanted.values);
+  EXPECT_EQ(scratch.movement.weights, weights);
+  EXPECT_EQ(correction.error_m, LargestDifference(library->group(0), wanted, uncorrected));
   EXPECT_EQ(correction.error_m, correction.initial_error_m);
   EXPECT_EQ(correction.iterations, 0);
 }
@@ -131,7 +216,9 @@ TEST(Correction, LeavesAnExampleAlone) {
     ParameterValues wanted{.count = 4};
     std::copy_n(group.site(e).begin(), 4, wanted.values.begin());
     const Correction correction = scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
-    EXPECT_LT(LargestDifference(group, correction.parameters, wanted), 1e-5) << e;
+    EXPECT_EQ(correction.iterations, 0) << e;
+    EXPECT_NEAR(static_cast<double>(scratch.movement.weights[static_cast<std::size_t>(e)]), 1.0,
+                1e-6);
   }
 }
 
@@ -186,7 +273,7 @@ TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
       ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = length_m}}));
     }
     double largest_m = 0.0;
-    double moved_m = 0.0;
+    bool is_moved = false;
     Scratch scratch(*library);
     int steps = 0;
     while (!avatar.idle()) {
@@ -199,17 +286,20 @@ TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
             MeasureMovement(*library, movement, scratch.cache, scratch.pose);
         const MotionGroup& group = library->group(movement.group);
         largest_m = std::max(largest_m, LargestDifference(group, event.applied, measured));
-        moved_m = std::max(moved_m, LargestDifference(group, event.applied, movement.parameters));
+        EXPECT_EQ(event.applied.values, movement.parameters.values);
+        const std::vector<float> weights = movement.weights;
+        static_cast<void>(scratch.Measure(*library, event.applied, movement.group));
+        is_moved = is_moved || scratch.movement.weights != weights;
         ++steps;
       }
     }
     EXPECT_EQ(steps, 5);
     if (corrected) {
       EXPECT_LT(largest_m, 1e-4);
-      EXPECT_GT(moved_m, 1e-4);
+      EXPECT_TRUE(is_moved);
     } else {
       EXPECT_GT(largest_m, 1e-3);
-      EXPECT_EQ(moved_m, 0.0);
+      EXPECT_FALSE(is_moved);
     }
   }
 }
