@@ -41,18 +41,18 @@ struct Correction {
 /// most; the best w is kept, so that the result is never worse than no correction. Some error is left
 /// where nothing within the bound reaches p^.
 ///
-/// `weights` [n] or more gets the weights, as they are before floats; `cache` and `pose` (one rotation a
+/// `weight_scratch` [n] or more gets the weights, as they are before floats; `cache` and `pose` (one rotation a
 /// joint) are scratch. Takes 400 KB of stack, touched by 72 bytes an example; never allocates once
 /// `movement.weights` has room for the group. Same bytes on every machine.
 Correction CorrectWeights(const MotionLibrary& library, int group_index,
                           const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weights, GridCache& cache, PoseSpan pose,
+                          std::span<double> weight_scratch, GridCache& cache, PoseSpan pose,
                           Movement& movement);
 
 /// The same in a group that is in no library yet.
 Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
                           const MotionGroup& group, const ParameterValues& wanted,
-                          const CorrectionLimits& limits, std::span<double> weights,
+                          const CorrectionLimits& limits, std::span<double> weight_scratch,
                           GridCache& cache, PoseSpan pose, Movement& movement);
 
 }  // namespace stridewire
