@@ -110,7 +110,7 @@ TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
   const PlantFigures figures = MeasurePlanting(skeleton, clip, synthesis->movements);
   const PlantFigures before = MeasurePlanting(skeleton, unplanted->clip, unplanted->movements);
 
-  const VelocityStep examples = LargestStepOfExamples(*library, kFps);
+  const VelocityStep examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps);
 
   // Landings: where the ball is and the foot points when it is said to stand.
   const FootCurves curves = CurvesOf(skeleton, clip);

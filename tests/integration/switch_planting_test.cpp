@@ -165,7 +165,7 @@ TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
   const Library library = LibraryOf(walker.subjects);
   const unsigned seed = 20261122;
   const Figures figures = SwitchAll(walker, library, 60.0, seed);
-  const VelocityStep examples = LargestStepOfExamples(*library, kFps);
+  const VelocityStep examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps);
   std::printf(
       "%s: seed %u; %d movements began planted or not as before, %d no more, %d again; "
       "velocities step by at most %.2f rad/s %.2f m/s, %.2f %.2f, %.2f %.2f there (%.2f "

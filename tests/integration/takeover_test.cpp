@@ -162,7 +162,7 @@ TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
   const unsigned seed = 20261122;
   const char* asked = std::getenv("STRIDEWIRE_AVATARS");
   const int avatars = asked == nullptr ? kAvatars : std::atoi(asked);
-  const double examples = LargestStepOfExamples(*library, kFps).joint_rad_s;
+  const double examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps).joint_rad_s;
   for (const JoinKind join : {JoinKind::kCubic, JoinKind::kInertial}) {
     const Figures figures = InterruptAll(walker, library, join, avatars, 60.0, seed);
     ASSERT_GT(figures.at_cuts.size(), 5u * static_cast<unsigned>(avatars));

@@ -69,6 +69,13 @@ inline std::shared_ptr<const MotionLibrary> LibraryOf(const std::vector<std::str
   return BuildFromTakes(TakesOf(subjects));
 }
 
+/// The same with every movement as it was captured: nothing selected, averaged or made smooth. What made movements are
+/// compared with.
+inline std::shared_ptr<const MotionLibrary> LibraryOfAll(const std::vector<std::string>& subjects) {
+  if (subjects.empty()) return OpenLibrary("builtin").value();
+  return BuildFromTakes(TakesOf(subjects), LibraryBuilder{});
+}
+
 }  // namespace stridewire
 
 /// Skips a test of subjects of which one or more have no takes here; never one that names none.
