@@ -207,61 +207,55 @@ stridewire_status Session::LeaveWorld(stridewire_world world, std::uint64_t& com
   return STRIDEWIRE_OK;
 }
 
-stridewire_status Session::Spawn(stridewire_world world, protocol::Spawn message,
-                                 std::uint64_t& command) {
-  const std::size_t bytes = message.items.size() * sizeof(protocol::SpawnItem);
+template <typename Message>
+stridewire_status Session::SendCommand(stridewire_world world, Message message, std::size_t bytes,
+                                       std::uint64_t& command) {
   const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
   Pump();
   return status;
+}
+
+stridewire_status Session::Spawn(stridewire_world world, protocol::Spawn message,
+                                 std::uint64_t& command) {
+  const std::size_t bytes = message.items.size() * sizeof(protocol::SpawnItem);
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::Remove(stridewire_world world, protocol::Remove message,
                                   std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::Request(stridewire_world world, protocol::Request message,
                                    std::uint64_t& command) {
   const std::size_t bytes = message.items.size() * sizeof(protocol::RequestItem);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::Cancel(stridewire_world world, protocol::CancelQueue message,
                                   std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::SetTerrain(stridewire_world world, protocol::SetTerrain message,
                                       std::uint64_t& command) {
   const std::size_t bytes = TerrainBytes(message.terrain);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::SetLayers(stridewire_world world, protocol::SetLayers message,
                                      std::uint64_t& command) {
   const std::size_t bytes =
       message.items.size() * (sizeof(protocol::LayerItem) + protocol::kMaxNameBytes);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::SetPlanting(stridewire_world world, protocol::SetPlanting message,
                                        std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
-  const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
-  Pump();
-  return status;
+  return SendCommand(world, std::move(message), bytes, command);
 }
 
 stridewire_status Session::Observe(stridewire_world world, protocol::Observe message,

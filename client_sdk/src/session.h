@@ -174,6 +174,10 @@ class Session {
   /// Refuses a call, remembering why.
   stridewire_status Refuse(stridewire_status status, std::string_view text);
   [[nodiscard]] bool IsOpen() const;
+  /// Enqueue, and what can be sent is.
+  template <typename Message>
+  stridewire_status SendCommand(stridewire_world world, Message message, std::size_t bytes,
+                                std::uint64_t& command);
   template <typename Message>
   stridewire_status Enqueue(stridewire_world world, Message message, std::size_t bytes,
                             std::uint64_t& command);

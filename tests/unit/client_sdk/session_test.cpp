@@ -50,6 +50,23 @@ class SessionTest : public testing::Test {
     return world;
   }
 
+  /// Joined() with a new session and a server that does not know of a feature; nothing waits to be seen.
+  stridewire_world JoinedWithout(std::uint64_t feature) {
+    Use({});
+    EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
+    Connect();
+    protocol::Welcome welcome = toy::Welcome();
+    welcome.features &= ~feature;
+    Tell(welcome);
+    stridewire_world world = 0;
+    EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, world, command_),
+              STRIDEWIRE_OK);
+    LetIn();
+    (void)Events();
+    (void)Sent();
+    return world;
+  }
+
   /// Answers the JoinWorld that has been sent.
   void LetIn(protocol::WorldId server_id = 5) {
     const auto sent = Sent();
@@ -488,17 +505,7 @@ TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(std::get<protocol::Request>(sent[0]).items, request.items);
 
-  Use({});
-  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
-  Connect();
-  protocol::Welcome welcome = toy::Welcome();
-  welcome.features &= ~protocol::kFeatureRefusals;
-  Tell(welcome);
-  stridewire_world old = 0;
-  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
-  LetIn();
-  (void)Events();
-  (void)Sent();
+  const stridewire_world old = JoinedWithout(protocol::kFeatureRefusals);
   EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
   EXPECT_TRUE(Sent().empty());
   const auto events = Events();
@@ -519,17 +526,7 @@ TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
             (std::vector<protocol::AvatarNumber>{4, 5}));
   EXPECT_TRUE(std::get<protocol::SetPlanting>(sent[0]).is_off);
 
-  Use({});
-  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
-  Connect();
-  protocol::Welcome welcome = toy::Welcome();
-  welcome.features &= ~protocol::kFeaturePlanting;
-  Tell(welcome);
-  stridewire_world old = 0;
-  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
-  LetIn();
-  (void)Events();
-  (void)Sent();
+  const stridewire_world old = JoinedWithout(protocol::kFeaturePlanting);
   EXPECT_EQ(session_->SetPlanting(old, {0, 0, {4}, true}, command_), STRIDEWIRE_OK);
   EXPECT_TRUE(Sent().empty());
   const auto events = Events();
