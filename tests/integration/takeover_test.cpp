@@ -10,6 +10,7 @@
 
 #include "captured_library.h"
 #include "random.h"
+#include "restless_walker.h"
 #include "stridewire/runtime/avatar.h"
 #include "velocity_steps.h"
 
@@ -19,20 +20,8 @@ namespace {
 using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-constexpr int kAvatars = 3;  // one thread, twenty times as slow
-#else
-constexpr int kAvatars = 15;
-#endif
 
-struct Walker {
-  const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
-  double longest_m;
-};
-void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
-
-MovementRequest RandomRequest(const Walker& walker, const Avatar& avatar, std::uint64_t id,
+MovementRequest RandomRequest(const RestlessWalker& walker, const Avatar& avatar, std::uint64_t id,
                               Random& random) {
   MovementRequest request{
       id, {}, random.Draw(0, 1) < 0.8 ? Takeover::kNow : Takeover::kAfterMovement};
@@ -125,8 +114,8 @@ class Observer {
   bool stood_[2] = {false, false};
 };
 
-Figures InterruptAll(const Walker& walker, const Library& library, JoinKind join, int avatars,
-                     double seconds, unsigned seed) {
+Figures InterruptAll(const RestlessWalker& walker, const Library& library, JoinKind join,
+                     int avatars, double seconds, unsigned seed) {
   Figures figures;
   for (int i = 0; i < avatars; ++i) {
     Random random(seed + static_cast<unsigned>(i));
@@ -148,20 +137,20 @@ Figures InterruptAll(const Walker& walker, const Library& library, JoinKind join
   return figures;
 }
 
-class TakeOver : public testing::TestWithParam<Walker> {};
+class TakeOver : public testing::TestWithParam<RestlessWalker> {};
 INSTANTIATE_TEST_SUITE_P(Libraries, TakeOver,
-                         testing::Values(Walker{"Builtin", {}, 0.75},
-                                         Walker{"Subject16", {"16"}, 0.75},
-                                         Walker{"Subject01", {"01"}, 0.58}),
+                         testing::Values(RestlessWalker{"Builtin", {}, 0.75},
+                                         RestlessWalker{"Subject16", {"16"}, 0.75},
+                                         RestlessWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
 TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
-  const Walker& walker = GetParam();
+  const RestlessWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
   const unsigned seed = 20261122;
   const char* asked = std::getenv("STRIDEWIRE_AVATARS");
-  const int avatars = asked == nullptr ? kAvatars : std::atoi(asked);
+  const int avatars = asked == nullptr ? kRestlessWalkers : std::atoi(asked);
   const double examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps).joint_rad_s;
   for (const JoinKind join : {JoinKind::kCubic, JoinKind::kInertial}) {
     const Figures figures = InterruptAll(walker, library, join, avatars, 60.0, seed);
