@@ -1,7 +1,9 @@
 #include "stridewire/offline/assemble.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "statistics.h"
@@ -11,6 +13,7 @@ namespace stridewire {
 namespace {
 
 constexpr std::size_t kExamplesPerParameter = 3;
+constexpr std::size_t kLeastForAnArea = std::size(kStraightStepParameters) + 1;
 constexpr std::size_t kOutlierFreeMin = 4;  // examples from which on extremes are not counted
 
 // Examples of one kind with all their parameters, on their way into a group.
@@ -148,29 +151,37 @@ class Assembler {
   }
 
   void AddStepGroups(RawLibrary& library) const {
+    constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};
     const auto all = [](const ExtractedExample&) { return true; };
     const auto level = [](const ExtractedExample& e) { return e.level; };
-    std::size_t straight_count[2] = {0, 0};
-    std::size_t level_count[2] = {0, 0};
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      Pool pool = Gather(StepKind(foot), kStraightStepParameters, &Extraction::straight_steps, all);
-      straight_count[static_cast<int>(foot)] = pool.examples.size();
+    std::array<Pool, 2> straight_steps;  // by foot
+    std::array<Pool, 2> level_steps;
+    std::array<Pool, 2> all_steps;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const MovementKind kind = StepKind(kFeet[f]);
+      straight_steps[f] = Gather(kind, kStraightStepParameters, &Extraction::straight_steps, all);
+      level_steps[f] = Gather(kind, kGeneralStepParameters, &Extraction::general_steps, level);
+      all_steps[f] = Gather(kind, kGeneralStepParameters, &Extraction::general_steps, all);
+      const std::size_t straight_count = straight_steps[f].examples.size();
+      const std::size_t level_count = level_steps[f].examples.size();
+      if (all_steps[f].examples.size() <= level_count) all_steps[f].examples.clear();
+      if (level_count <= straight_count) level_steps[f].examples.clear();
+      // Fewer span no area: what is asked beside their line would be met by no weights.
+      const bool all_hold_them = !all_steps[f].examples.empty();
+      if (all_hold_them && level_count < kLeastForAnArea) level_steps[f].examples.clear();
+      if ((all_hold_them || !level_steps[f].examples.empty()) && straight_count < kLeastForAnArea) {
+        straight_steps[f].examples.clear();
+      }
+    }
+    for (Pool& pool : straight_steps) {
       if (!pool.examples.empty()) library.groups.push_back(MakeGroup(std::move(pool), {0, 1}));
     }
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      Pool pool = Gather(StepKind(foot), kGeneralStepParameters, &Extraction::general_steps, level);
-      level_count[static_cast<int>(foot)] = pool.examples.size();
-      if (pool.examples.size() <= straight_count[static_cast<int>(foot)]) continue;
-      AddGeneral(std::move(pool), false, library);
-    }
-    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      Pool pool = Gather(StepKind(foot), kGeneralStepParameters, &Extraction::general_steps, all);
-      if (pool.examples.size() <= level_count[static_cast<int>(foot)]) continue;
-      AddGeneral(std::move(pool), true, library);
-    }
+    for (Pool& pool : level_steps) AddGeneral(std::move(pool), false, library);
+    for (Pool& pool : all_steps) AddGeneral(std::move(pool), true, library);
   }
 
   void AddGeneral(Pool pool, bool with_height, RawLibrary& library) const {
+    if (pool.examples.empty()) return;
     const std::vector<std::size_t> spanned =
         SpannedParameters(pool, kStraightStepParameters, with_height, options_);
     library.groups.push_back(MakeGroup(std::move(pool), spanned));

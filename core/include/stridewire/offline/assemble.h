@@ -30,7 +30,8 @@ struct AssembleOptions {
 ///   general step_left, step_right    those of all seven spanned     all steps; if some are not level
 ///   jump                             length, and what is spanned
 ///
-/// A group that would hold nothing another does not hold is left out. The first capture gives the
+/// A group that would hold nothing another does not hold is left out, and so are fewer than three straight or
+/// level steps, which span no area, where another group has them. The first capture gives the
 /// skeleton; those with other bone lengths are fitted to it, those with another joint tree are left
 /// out and say so in `Extraction::error`, which names both captures' joints. Recordings differ by centimetres in where their floor
 /// is: each is shifted so that balls rest at the same height all over the library.
