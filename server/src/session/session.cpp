@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -425,7 +424,7 @@ void Session::Leave(WorldId id) {
   const std::shared_ptr<World> world = it->second.world;
   const bool is_controller = it->second.role == protocol::Role::kController;
   worlds_.erase(it);
-  std::erase_if(subscriptions_, [&](const auto& item) { return item.second.world == world; });
+  subscriptions_.RemoveWorld(id);
   if (connection_ != nullptr) {
     connection_->DropPoses(id, PoseMode::kFull);
     connection_->DropPoses(id, PoseMode::kQuantised);
@@ -699,7 +698,7 @@ void Session::Execute(protocol::Observe&& command) {
     Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
     return;
   }
-  if (subscriptions_.contains(command.subscription)) {
+  if (subscriptions_.Contains(command.subscription)) {
     Answer(command.seq, StatusCode::kSubscriptionExists, "a subscription has that number already");
     return;
   }
@@ -718,28 +717,23 @@ void Session::Execute(protocol::Observe&& command) {
            "the feature 'quantised poses' was not agreed on in the handshake");
     return;
   }
-  const std::shared_ptr<World> world = it->second.world;
-  subscriptions_.emplace(command.subscription, Subscription{.world = world,
-                                                            .mode = command.mode,
-                                                            .every_n_ticks = command.every_n_ticks,
-                                                            .with_events = command.with_events});
-  host_.InterestChanged(world);
+  subscriptions_.Add(command.subscription, {.world = command.world,
+                                            .mode = command.mode,
+                                            .every_n_ticks = command.every_n_ticks,
+                                            .with_events = command.with_events});
+  host_.InterestChanged(it->second.world);
   Answer(command.seq, StatusCode::kOk);
 }
 
 void Session::Execute(protocol::StopObserving&& command) {
-  const auto it = subscriptions_.find(command.subscription);
-  if (it == subscriptions_.end()) {
+  const auto stopped = subscriptions_.Remove(command.subscription);
+  if (!stopped) {
     Answer(command.seq, StatusCode::kNoSuchSubscription, "no subscription of that number");
     return;
   }
-  const Subscription stopped = std::move(it->second);
-  subscriptions_.erase(it);
-  const bool is_last = std::ranges::none_of(subscriptions_, [&](const auto& item) {
-    return item.second.world == stopped.world && item.second.mode == stopped.mode;
-  });
-  if (is_last && connection_ != nullptr) connection_->DropPoses(stopped.world->id, stopped.mode);
-  host_.InterestChanged(stopped.world);
+  const bool is_last = !subscriptions_.Watches(stopped->world, stopped->mode);
+  if (is_last && connection_ != nullptr) connection_->DropPoses(stopped->world, stopped->mode);
+  host_.InterestChanged(worlds_.at(stopped->world).world);
   Answer(command.seq, StatusCode::kOk);
 }
 
@@ -807,30 +801,15 @@ bool Session::WantsEvents(WorldId world) const {
   const auto it = worlds_.find(world);
   if (it == worlds_.end()) return false;
   if (it->second.role == protocol::Role::kController) return true;
-  return std::ranges::any_of(subscriptions_, [&](const auto& item) {
-    return item.second.world->id == world && item.second.with_events;
-  });
+  return subscriptions_.WithEvents(world);
 }
 
 std::uint16_t Session::Every(WorldId world, PoseMode mode) const {
-  std::uint16_t every = 0;
-  if (connection_ == nullptr) return every;
-  for (const auto& [id, subscription] : subscriptions_) {
-    if (subscription.world->id == world && subscription.mode == mode) {
-      every = std::gcd(every, subscription.every_n_ticks);
-    }
-  }
-  return every;
+  return connection_ == nullptr ? 0 : subscriptions_.Every(world, mode);
 }
 
 void Session::OnPoses(const PoseDelivery& delivery) {
-  if (connection_ == nullptr) return;
-  const bool is_wanted = std::ranges::any_of(subscriptions_, [&](const auto& item) {
-    const Subscription& subscription = item.second;
-    return subscription.world->id == delivery.world && subscription.mode == delivery.mode &&
-           delivery.tick % subscription.every_n_ticks == 0;
-  });
-  if (!is_wanted) return;
+  if (connection_ == nullptr || !subscriptions_.Wants(delivery)) return;
   const std::size_t dropped = connection_->SendPoses(delivery);
   if (dropped == 0) return;
   worlds_.at(delivery.world).dropped_batches += dropped;

@@ -12,6 +12,7 @@
 #include "session/refusal.h"
 #include "session/reply_memory.h"
 #include "session/session_host.h"
+#include "session/subscriptions.h"
 #include "session/token_bucket.h"
 
 namespace stridewire::server {
@@ -102,12 +103,6 @@ class Session : private ConnectionHandler {
     std::uint64_t dropped_events = 0;
     std::uint64_t told_dropped = 0;  // sum of the two when Lagging was last sent
   };
-  struct Subscription {
-    std::shared_ptr<World> world;
-    protocol::PoseMode mode = protocol::PoseMode::kFull;
-    std::uint16_t every_n_ticks = 1;
-    bool with_events = false;
-  };
   struct Pending {
     int outstanding = 0;  // shards that have not answered
     std::size_t item_count = 0;
@@ -172,7 +167,7 @@ class Session : private ConnectionHandler {
   Clock::time_point detached_since_;
 
   std::map<WorldId, Membership> worlds_;
-  std::map<protocol::SubscriptionId, Subscription> subscriptions_;
+  Subscriptions subscriptions_;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t pending_items_ = 0;
   int pending_questions_ = 0;
