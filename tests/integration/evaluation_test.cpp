@@ -1,7 +1,6 @@
 // The fast evaluation beside the plain one, and on every instruction set this machine has.
 
 #include <gtest/gtest.h>
-#include <hwy/highway.h>
 
 #include <cstring>
 #include <map>
@@ -9,8 +8,10 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "instruction_sets.h"
 #include "pose_kernels.h"
 #include "random.h"
+#include "rough_ground.h"
 #include "stridewire/base/trig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/runtime/avatar.h"
@@ -28,41 +29,6 @@ struct Source {
   std::vector<std::string> subjects;  // captured; none: the generated library
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
-
-// Does something with this program's kernels limited to one instruction set.
-class OnlyInstructionSet {
- public:
-  explicit OnlyInstructionSet(std::int64_t target) { Choose(target); }
-  ~OnlyInstructionSet() { Choose(0); }
-  OnlyInstructionSet(const OnlyInstructionSet&) = delete;
-  OnlyInstructionSet& operator=(const OnlyInstructionSet&) = delete;
-
- private:
-  static void Choose(std::int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-// Those compiled in that this machine has; the last is plain C++.
-std::vector<std::int64_t> InstructionSets() {
-  std::vector<std::int64_t> sets;
-  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_NEON}) {
-    if ((hwy::SupportedTargets() & target) != 0) sets.push_back(target);
-  }
-  sets.push_back(HWY_SCALAR);
-  return sets;
-}
-
-std::shared_ptr<const Terrain> RoughGround(Random& random) {
-  TerrainData data;
-  for (int i = 0; i < 200; ++i) {
-    const double x = random.Draw(-20.0, 80.0);
-    const double z = random.Draw(-60.0, 60.0);
-    data.boxes.push_back({{x, z}, {x + 1.0, z + 1.0}, random.Draw(0.0, 0.15)});
-  }
-  return Terrain::Make(std::move(data)).value();
-}
 
 // A crowd that is sent here and there, steps and jumps; what it does depends on `seed` alone.
 class Crowd {

@@ -22,61 +22,50 @@ constexpr std::size_t kEventReserve = 7;
 // Of a tick: finished, started, foot-strike. Room for more is made when there are more.
 constexpr std::size_t kUsualEvents = 3;
 
-// Room for any movement of a library.
-void MakeRoom(const MotionLibrary& library, Movement& movement) {
-  const int joint_count = library.skeleton().joint_count();
-  movement.difference = Pose(joint_count);
-  movement.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
-  movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
-}
-
 }  // namespace
 
 Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
                const AvatarOptions& options)
-    : library_(std::move(library)), options_(options), cache_(library_->layout()) {
-  const int joint_count = library_->skeleton().joint_count();
-  pose_ = Pose(joint_count);
-  earlier_pose_ = Pose(joint_count);
-  MakeRoom(*library_, movement_);
+    : options_(options), body_(std::move(library)) {
   events_.reserve(kUsualEvents);
-  weight_scratch_.resize(static_cast<std::size_t>(library_->max_example_count()));
+  weight_scratch_.resize(static_cast<std::size_t>(body_.library->max_example_count()));
   stand_feet_.left_from_right_m =
-      FootVector(library_->skeleton(), library_->stand_pose(), Foot::kLeft, 0.0);
+      FootVector(body_.library->skeleton(), body_.library->stand_pose(), Foot::kLeft, 0.0);
   Teleport(start);
 }
 
 void Avatar::Teleport(const BaseFrame& start) {
   base_ = start;
-  const Pose& stand = library_->stand_pose();
-  pose_ = stand;
-  pose_.root_position_m =
+  const Pose& stand = body_.library->stand_pose();
+  body_.pose = stand;
+  body_.pose.root_position_m =
       Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
-  pose_.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
+  body_.pose.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
   closing_steps_ = 0;
-  blended_pose_ = pose_;
+  body_.blended_pose = body_.pose;
   moved_until_s_ = -1.0;
-  plants_feet_ = foot_planting();
-  begins_planting_ = false;
-  if (PlantsFeet()) {
-    holds_ = HoldsOf(library_->skeleton(), library_->leg_rig(), pose_, start.position_m.y,
-                     options_.terrain.get());
-    StandOn(holds_, movement_);
-    earlier_feet_[0] =
-        CorrectFeet(library_->skeleton(), library_->leg_rig(), movement_, 0.0, blended_pose_);
-    PlantFeet(library_->leg_rig(), movement_, 0.0, pose_);
+  body_.plants_feet = foot_planting();
+  body_.begins_planting = false;
+  if (body_.plants_feet) {
+    body_.holds = HoldsOf(body_.library->skeleton(), body_.library->leg_rig(), body_.pose,
+                          start.position_m.y, options_.terrain.get());
+    StandOn(body_.holds, body_.movement);
+    body_.earlier_feet[0] = CorrectFeet(body_.library->skeleton(), body_.library->leg_rig(),
+                                        body_.movement, 0.0, body_.blended_pose);
+    PlantFeet(body_.library->leg_rig(), body_.movement, 0.0, body_.pose);
   }
   feet_ = stand_feet_;
-  last_group_ = library_->groups().size();
+  last_group_ = body_.library->groups().size();
   last_moved_ = Foot::kRight;
   CancelQueue();
-  ShowLayers();
+  body_.ShowLayers();
+  next_change_.is_any = true;
 }
 
 Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
   STRIDEWIRE_CHECK(hold_s >= 0.0);
-  if (Status status = ValidateRequest(*library_, request); !status) return status;
+  if (Status status = ValidateRequest(*body_.library, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
   }
@@ -84,8 +73,8 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
     if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
     if (kept_.empty()) {
       kept_.resize(1);
-      kept_.front().pose = Pose(library_->skeleton().joint_count());
-      MakeRoom(*library_, kept_.front().movement);
+      kept_.front().pose = Pose(body_.library->skeleton().joint_count());
+      MakeRoom(*body_.library, kept_.front().movement);
       events_.reserve(kMaxEventsPerAdvance);  // refusals may come many at once
     }
   }
@@ -109,13 +98,14 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
 }
 
 Status Avatar::SetLayer(const LayerRequest& request) {
-  if (Status status = layers_.Set(*library_, request); !status) return status;
-  layered_pose_.rotations.resize(pose_.rotations.size());
+  if (Status status = body_.layers.Set(*body_.library, request); !status) return status;
+  body_.layered_pose.rotations.resize(body_.pose.rotations.size());
+  next_change_.has_layers = true;
   return {};
 }
 
 Status Avatar::SetFootPlanting(bool is_on) {
-  if (is_on && !library_->leg_rig().is_usable) {
+  if (is_on && !body_.library->leg_rig().is_usable) {
     return Fail(ErrorCode::kUnsupported, "the library's legs are not such as can be planted");
   }
   options_.foot_planting = is_on;
@@ -140,13 +130,7 @@ void Avatar::AddEvent(const AvatarEvent& event) {
 }
 
 FootState Avatar::MeasureFeet() const {
-  return {FootVector(library_->skeleton(), pose_, Foot::kLeft, base_.heading_rad)};
-}
-
-// Shows a time of the movement, and keeps what the blend has then.
-void Avatar::Evaluate(double time_s) {
-  const PoseJob job{&movement_, time_s, &cache_, &pose_, &blended_pose_};
-  EvaluatePoses(*library_, std::span(&job, 1));
+  return {FootVector(body_.library->skeleton(), body_.pose, Foot::kLeft, base_.heading_rad)};
 }
 
 void Avatar::Advance(double dt_s) {
@@ -160,30 +144,30 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
   std::array<PoseJob, kAtOnce> jobs;
   while (!avatars.empty()) {
     const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), kAtOnce));
-    const MotionLibrary& library = *block.front()->library_;
+    const MotionLibrary& library = *block.front()->body_.library;
     std::size_t moving = 0;
     std::size_t ahead = block.size();
     for (Avatar* avatar : block) {
-      STRIDEWIRE_CHECK(avatar->library_.get() == &library);
+      STRIDEWIRE_CHECK(avatar->body_.library.get() == &library);
       if (ahead < avatars.size()) avatars[ahead++]->PrefetchState();
       avatar->AdvanceState(dt_s);
       if (avatar->is_moving_) {
-        jobs[moving++] = {&avatar->movement_, avatar->movement_time_s_, &avatar->cache_,
-                          &avatar->pose_};
+        jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.cache,
+                          &avatar->body_.pose};
       }
     }
     EvaluatePoses(library, std::span(jobs).first(moving));
     for (Avatar* avatar : block) {
-      avatar->layers_.Advance(library, dt_s);
-      avatar->ShowLayers();
+      avatar->body_.layers.Advance(library, dt_s);
+      avatar->body_.ShowLayers();
     }
     avatars = avatars.subspan(block.size());
   }
 }
 
 void Avatar::PrefetchWhereShown() const {
-  PrefetchBytes(&pose_, sizeof(pose_));
-  PrefetchBytes(&has_layers_, sizeof(has_layers_));
+  PrefetchBytes(&body_.pose, sizeof(body_.pose));
+  PrefetchBytes(&body_.has_layers, sizeof(body_.has_layers));
   PrefetchBytes(&is_moving_, sizeof(is_moving_));
 }
 
@@ -195,15 +179,16 @@ void Avatar::PrefetchShown() const {
 // What AdvanceState reads of an avatar that goes on walking.
 void Avatar::PrefetchState() const {
   PrefetchBytes(&time_s_, 2 * kCacheLineBytes);
-  PrefetchBytes(&movement_, kCacheLineBytes);
-  PrefetchBytes(&movement_.keytimes_s, sizeof(movement_.keytimes_s));
-  PrefetchBytes(&movement_.feet.is_active, 1);
+  PrefetchBytes(&body_.movement, kCacheLineBytes);
+  PrefetchBytes(&body_.movement.keytimes_s, sizeof(body_.movement.keytimes_s));
+  PrefetchBytes(&body_.movement.feet.is_active, 1);
 }
 
 // All of Advance but the pose at its end.
 void Avatar::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   events_.clear();
+  change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   for (;;) {
@@ -239,17 +224,11 @@ void Avatar::AdvanceState(double dt_s) {
     if (!may_change || !StartNext()) break;
   }
   time_s_ = end_s;
-}
-
-void Avatar::ShowLayers() {
-  has_layers_ = !layers_.empty();
-  if (!has_layers_) return;
-  layered_pose_ = pose_;  // of the same size: no allocation
-  layers_.Apply(*library_, layered_pose_);
+  change_.is_idle_other = idle() != std::exchange(was_idle_, idle());
 }
 
 bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
-  const int end_z = library_->group(plan.group).FindParameter(ParameterName::kEndZ);
+  const int end_z = body_.library->group(plan.group).FindParameter(ParameterName::kEndZ);
   if (end_z < 0) return false;
   return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
          std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
@@ -263,7 +242,7 @@ bool Avatar::StartNext() {
     // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
     is_walking_ = false;
     SwitchPlanting();
-    const auto plan = PlanStep(*library_, StepRequest{}, feet_, last_moved_, false);
+    const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
     if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
       StartInserted(*plan);
       return true;
@@ -273,11 +252,11 @@ bool Avatar::StartNext() {
     if (!std::exchange(is_idle_reported_, true)) {
       AddEvent({.type = AvatarEventType::kIdle, .base = base_});
     }
-    last_group_ = library_->groups().size();
+    last_group_ = body_.library->groups().size();
     return false;
   }
 
-  if (IsHeld() && last_group_ == library_->groups().size()) return false;
+  if (IsHeld() && last_group_ == body_.library->groups().size()) return false;
   hold_until_s_ = 0.0;
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
@@ -302,7 +281,7 @@ void Avatar::StartOnTheWay() {
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue saw to it that the library has the kind
   const Way way =
-      FindWay(*library_, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
+      FindWay(*body_.library, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
   if (way.is_inserted) {
     StartInserted(*way.plan);
   } else if (way.plan) {
@@ -313,7 +292,7 @@ void Avatar::StartOnTheWay() {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
               .base = base_,
-              .reason = NoWayReason(group().kind, library_->group(direct->group).kind)});
+              .reason = NoWayReason(group().kind, body_.library->group(direct->group).kind)});
   }
 }
 
@@ -335,15 +314,16 @@ void Avatar::GoOnWalking() {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    stance.feet[f] = PlantsFeet() ? holds_[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+    stance.feet[f] =
+        body_.plants_feet ? body_.holds[f].print : Footprint{StandsAt(foot), base_.heading_rad};
   }
   stance.heading_rad = base_.heading_rad;
   stance.last_moved = last_moved_;
   stance.vector = feet_;
-  stance.last_step_s = is_walking_ ? movement_.duration_s() : 0.0;
-  stance.is_exact = PlantsFeet();
+  stance.last_step_s = is_walking_ ? body_.movement.duration_s() : 0.0;
+  stance.is_exact = body_.plants_feet;
   const WalkDecision decision =
-      PlanWalkStep(*library_, options_.terrain.get(),
+      PlanWalkStep(*body_.library, options_.terrain.get(),
                    std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
   if (decision.outcome == WalkOutcome::kStep) {
     StartPlan(decision.plan, queue_[queue_head_].id);
@@ -363,8 +343,8 @@ void Avatar::GoOnWalking() {
 
 // Where the ball of a foot is between two movements.
 DVec3 Avatar::StandsAt(Foot foot) const {
-  return PlantsFeet() ? holds_[static_cast<std::size_t>(foot)].print.position_m
-                      : DVec3(BallPosition(library_->skeleton(), pose_, foot));
+  return body_.plants_feet ? body_.holds[static_cast<std::size_t>(foot)].print.position_m
+                           : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
 // How much higher than the standing foot the ground is where a step would land.
@@ -373,7 +353,7 @@ double Avatar::RiseAhead(const StepRequest& step) const {
   const auto f = static_cast<std::size_t>(foot);
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
   const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
-  const DVec3 stands = holds_[1 - f].print.position_m;
+  const DVec3 stands = body_.holds[1 - f].print.position_m;
   const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
                                          DVec3(outward * side_m, 0.0, step.length_m));
   return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
@@ -381,12 +361,12 @@ double Avatar::RiseAhead(const StepRequest& step) const {
 
 std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) const {
   if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
-    return PlanJump(*library_, *jump);
+    return PlanJump(*body_.library, *jump);
   }
   StepRequest step = std::get<StepRequest>(request.movement);
   if (!step.at) {
-    if (options_.terrain != nullptr && PlantsFeet()) step.height_m = RiseAhead(step);
-    return PlanStep(*library_, step, feet_, last_moved_, !is_walking_);
+    if (options_.terrain != nullptr && body_.plants_feet) step.height_m = RiseAhead(step);
+    return PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
   }
 
   // By footprint: the same as seen from the foot that stays.
@@ -401,7 +381,8 @@ std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) c
     const double aside_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
     foot = aside_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
-  return PlanFootprint(*library_, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad, feet_);
+  return PlanFootprint(*body_.library, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad,
+                       feet_);
 }
 
 void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
@@ -412,61 +393,41 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
 // The movement goes on from where both feet stand or, for one that takes over in mid-swing, from the same
 // part of its own swing.
 void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
-  const MotionGroup& next = library_->group(plan.group);
+  const MotionGroup& next = body_.library->group(plan.group);
   if (options_.run_time_correction) {
     // The difference pose is made below: until then it is room to measure in.
-    CorrectWeights(*library_, plan.group, plan.applied, DefaultCorrectionLimits(next),
-                   weight_scratch_, cache_, movement_.difference, movement_);
+    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next),
+                   weight_scratch_, body_.cache, body_.movement.difference, body_.movement);
   } else {
     SetWeights(next, plan.group,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
-               weight_scratch_, movement_);
+               weight_scratch_, body_.movement);
   }
-  cache_.Clear();
-  StartWeighted(next, base_, movement_);
+  body_.StartWeighted(base_);
   if (swing_part > 0.0) {
-    const SwingTimes swing = SwingTimesOf(next.kind, movement_);
-    movement_.entered_s = swing.release_s + swing_part * (swing.land_s - swing.release_s);
-    movement_.ease_out_s = std::min(kEaseOutS, movement_.duration_s() - movement_.entered_s);
+    const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
+    body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // Who stood has no speed to keep.
-  const bool keeps_speed = moved_until_s_ == time_s_;
-  std::optional<ConstPoseSpan> earlier;
-  if (keeps_speed) earlier.emplace(earlier_pose_);
-  if (PlantsFeet()) {
-    PlanFeet(*library_, holds_, {plan, options_.terrain.get(), base_.position_m},
-             {blended_pose_, earlier}, cache_, pose_, movement_);
-    KeepFeetGoing(keeps_speed);
-    if (begins_planting_) {
-      SettleFrom(library_->leg_rig(), blended_pose_, movement_, pose_);
-    }
-    movement_.feet.packed = PackFootPlan(movement_);
-  } else {
-    // D = P - M, with P what is displayed.
-    movement_.feet.is_active = false;
-    EvaluateBlend(next, library_->layout(), movement_, movement_.entered_s, cache_,
-                  movement_.difference);
-    Subtract(pose_, movement_.difference, movement_.difference);
-    if (earlier) {
-      SetDifferenceVelocity(next, library_->layout(), blended_pose_, *earlier, cache_, pose_,
-                            movement_);
-    }
-  }
+  body_.Join(LandingWish{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
 }
 
 // What was planned is under way.
 void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = group();
   // A footprint that planting reaches is met, whatever the examples span.
-  const bool is_met = plan.exact && movement_.feet.is_active &&
-                      movement_.feet.missed_m == DVec3(0.0) && movement_.feet.missed_rad == 0.0;
+  const bool is_met = plan.exact && body_.movement.feet.is_active &&
+                      body_.movement.feet.missed_m == DVec3(0.0) &&
+                      body_.movement.feet.missed_rad == 0.0;
 
+  change_.has_begun = true;
+  change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;
-  begins_planting_ = false;
+  body_.begins_planting = false;
   is_exact_ = plan.exact.has_value();
   closing_steps_ = 0;
   is_idle_reported_ = false;
-  movement_time_s_ = movement_.entered_s;
+  movement_time_s_ = body_.movement.entered_s;
   request_id_ = request_id;
   const int rise =
       next.FindParameter(IsStep(next.kind) ? ParameterName::kEndY : ParameterName::kHeight);
@@ -486,31 +447,29 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
 // say, on the body's own line.
 void Avatar::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
-  const double heading_rad = movement_.base.heading_rad;
-  const DVec3 root = DVec3(blended_pose_.root_position_m);
-  const double aside_m = RotateYaw(-heading_rad, root - movement_.base.position_m).x +
+  const double heading_rad = body_.movement.base.heading_rad;
+  const DVec3 root = DVec3(body_.blended_pose.root_position_m);
+  const double aside_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
                          RotateYaw(-heading_rad, line_m - base_.position_m).x;
   base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
 }
 
 void Avatar::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
-  const bool has_moved = at_s > SwingTimesOf(finished.kind, movement_).release_s;
+  const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
   KeepJoin(at_s);
+  Leave(at_s, false);
   movement_time_s_ = at_s;
   // Without planting the base is the root's own and rises by what the library says.
   const BaseFrame before = base_;
-  base_ = BaseAfter(movement_, pose_);
+  base_ = BaseAfter(body_.movement, body_.pose);
   base_.position_m.y = before.position_m.y + (has_moved ? ground_rise_m_ : 0.0);
   if (!has_moved) base_.heading_rad = before.heading_rad;
-  if (movement_.feet.is_active) {
+  if (body_.movement.feet.is_active) {
     if (!is_exact_) KeepToLine(before.position_m);
-    holds_ = HoldsAt(*library_, movement_, at_s, blended_pose_);
-    if (begins_planting_) {
-      for (FootHold& hold : holds_) hold.height_m = hold.turn_rad = 0.0;
-    }
-    const auto& left = holds_[0].print.position_m;
-    const auto& right = holds_[1].print.position_m;
+    body_.KeepHolds(at_s);
+    const auto& left = body_.holds[0].print.position_m;
+    const auto& right = body_.holds[1].print.position_m;
     if (IsStep(finished.kind)) {
       const Foot landed = has_moved ? MovingFoot(finished.kind) : last_moved_;
       base_.position_m.y = (landed == Foot::kLeft ? left : right).y;
@@ -519,7 +478,7 @@ void Avatar::FinishMovement(double at_s) {
     }
   }
   feet_ = MeasureFeet();
-  last_group_ = static_cast<std::size_t>(movement_.group);
+  last_group_ = static_cast<std::size_t>(body_.movement.group);
   is_moving_ = false;
   is_walking_ = false;
   if (IsStep(finished.kind)) {
@@ -529,35 +488,36 @@ void Avatar::FinishMovement(double at_s) {
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,
             .kind = finished.kind,
-            .group = movement_.group,
-            .is_cut_short = at_s < movement_.duration_s(),
+            .group = body_.movement.group,
+            .is_cut_short = at_s < body_.movement.duration_s(),
             .base = base_});
 }
 
 void Avatar::FinishStand() {
   is_in_stand_ = false;
-  last_group_ = library_->groups().size();
+  last_group_ = body_.library->groups().size();
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
 }
 
 Vec3 Avatar::LandingBall(Foot foot) const {
-  if (!movement_.feet.is_active) return BallPosition(library_->skeleton(), pose_, foot);
-  const DVec3 print = movement_.feet.foot(foot).to.position_m;
-  return Vec3(print.x, print.y + library_->leg_rig().side(foot).ball_height_m, print.z);
+  if (!body_.movement.feet.is_active)
+    return BallPosition(body_.library->skeleton(), body_.pose, foot);
+  const DVec3 print = body_.movement.feet.foot(foot).to.position_m;
+  return Vec3(print.x, print.y + body_.library->leg_rig().side(foot).ball_height_m, print.z);
 }
 
 void Avatar::ReportFootStrikes(double before_s, double after_s) {
   const MotionGroup& moving = group();
   const double strike_s =
-      movement_.keytimes_s[ContactKeytimesOf(moving.kind, moving.interval_count()).landing];
+      body_.movement.keytimes_s[ContactKeytimesOf(moving.kind, moving.interval_count()).landing];
   if (!(before_s < strike_s && strike_s <= after_s)) return;
-  if (!movement_.feet.is_active) Evaluate(strike_s);
+  if (!body_.movement.feet.is_active) body_.Evaluate(strike_s);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     if (IsStep(moving.kind) && foot != MovingFoot(moving.kind)) continue;
     AddEvent({.type = AvatarEventType::kFootStrike,
               .request_id = request_id_,
               .kind = moving.kind,
-              .group = movement_.group,
+              .group = body_.movement.group,
               .foot = foot,
               .position_m = LandingBall(foot)});
   }

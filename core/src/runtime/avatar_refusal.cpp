@@ -53,15 +53,15 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
     PlanMovement(plan, swing_part);
     return true;
   }
-  if (!PlantsFeet()) {
+  if (!body_.plants_feet) {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = request.id,
               .base = base_,
               .reason = kNotPlanted});
     return false;
   }
-  kept_.front().pose = pose_;  // of the same size: no allocation
-  std::swap(movement_, kept_.front().movement);
+  kept_.front().pose = body_.pose;  // of the same size: no allocation
+  std::swap(body_.movement, kept_.front().movement);
   PlanMovement(plan, swing_part);
   FootprintMiss missed = MissOf(*plan.exact);
   if (IsMet(missed)) return true;
@@ -74,9 +74,9 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
             .code = ErrorCode::kOutOfRange,
             .reason = "the footprint is out of reach",
             .missed = missed});
-  std::swap(movement_, kept_.front().movement);
-  cache_.Clear();
-  pose_ = kept_.front().pose;
+  std::swap(body_.movement, kept_.front().movement);
+  body_.cache.Clear();
+  body_.pose = kept_.front().pose;
   return false;
 }
 
@@ -105,8 +105,8 @@ FootprintMiss Avatar::NearestInReach(const Footprint& asked, const FootprintMiss
 // step up or down shows in the pose only. If there the other foot gives way instead, the one would have landed as
 // far off had the other stayed.
 FootprintMiss Avatar::MissOf(const Footprint& asked) {
-  const Skeleton& skeleton = library_->skeleton();
-  const LegRig& rig = library_->leg_rig();
+  const Skeleton& skeleton = body_.library->skeleton();
+  const LegRig& rig = body_.library->leg_rig();
   const Foot moving = MovingFoot(group().kind);
   const auto m = static_cast<std::size_t>(moving);
   const auto x = 1 - m;
@@ -114,30 +114,31 @@ FootprintMiss Avatar::MissOf(const Footprint& asked) {
     std::array<BlendedFoot, 2> feet;
     LegPose leg;
     for (std::size_t f = 0; f < 2; ++f) {
-      EvaluateLeg(skeleton, rig, pose_, static_cast<Foot>(f), leg);
-      feet[f] = FootOf(rig, static_cast<Foot>(f), DVec3(pose_.root_position_m), leg);
+      EvaluateLeg(skeleton, rig, body_.pose, static_cast<Foot>(f), leg);
+      feet[f] = FootOf(rig, static_cast<Foot>(f), DVec3(body_.pose.root_position_m), leg);
     }
     return feet;
   };
 
   FootprintMiss worst{asked};
-  const double land_s = movement_.feet.foot(moving).land_s;
-  const double stands_s = movement_.duration_s() - land_s;
+  const double land_s = body_.movement.feet.foot(moving).land_s;
+  const double stands_s = body_.movement.duration_s() - land_s;
   const int looks = stands_s > 0.0 ? kLooks : 1;
   for (int look = 0; look < looks; ++look) {
     const double time_s = land_s + stands_s * look / std::max(looks - 1, 1);
-    EvaluateMovement(group(), library_->layout(), movement_, time_s, cache_, pose_);
+    EvaluateMovement(group(), body_.library->layout(), body_.movement, time_s, body_.cache,
+                     body_.pose);
     std::array<BlendedFoot, 2> planned = feet_of_pose();
     for (std::size_t f = 0; f < 2; ++f) {
       planned[f].ball_m +=
-          CorrectFoot(movement_, static_cast<Foot>(f), time_s, planned[f]).offset_m;
+          CorrectFoot(body_.movement, static_cast<Foot>(f), time_s, planned[f]).offset_m;
     }
-    PlantFeet(rig, movement_, time_s, pose_);
+    PlantFeet(rig, body_.movement, time_s, body_.pose);
     const std::array<BlendedFoot, 2> lands = feet_of_pose();
     DVec3 off_m = lands[m].ball_m - planned[m].ball_m;
     const DVec3 from_other_m = off_m - (lands[x].ball_m - planned[x].ball_m);
     if (glm::dot(from_other_m, from_other_m) > glm::dot(off_m, off_m)) off_m = from_other_m;
-    if (movement_.feet.keeps_above_ground && std::fabs(off_m.y) < kLiftedM) off_m.y = 0.0;
+    if (body_.movement.feet.keeps_above_ground && std::fabs(off_m.y) < kLiftedM) off_m.y = 0.0;
     // Heights of balls follow the blend, so they are compared with what was planned.
     const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - off_m.x, -off_m.y,
                        asked.position_m.z - planned[m].ball_m.z - off_m.z);

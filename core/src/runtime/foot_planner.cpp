@@ -48,6 +48,12 @@ double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }
 
+double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
+               double otherwise) {
+  const int l = group.FindParameter(name);
+  return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
+}
+
 class Planner {
  public:
   Planner(const MotionLibrary& library, GridCache& cache, PoseSpan pose, Movement& movement)
@@ -98,6 +104,77 @@ class Planner {
                         stands.z - start[f].ball_m.z);
     }
     movement_.base.position_m = position / static_cast<double>(staying.size());
+  }
+
+  // Where and how the moving foot of a step lands; where the eased pose has the feet then.
+  FeetAt ChooseLanding(const FootHolds& holds, const LandingWish& wish, Foot moving) {
+    const RequestPlan& request = wish.request;
+    FootPlan& plan = movement_.feet;
+    const auto m = static_cast<std::size_t>(moving);
+    const std::size_t x = 1 - m;
+    const double end_heading_rad =
+        movement_.base.heading_rad + movement_.heading_change_rad + movement_.steer_rad;
+    const FeetAt end = Blended(movement_.duration_s());
+    const DVec3 blended = RotateYaw(-end_heading_rad, end[m].ball_m - end[x].ball_m);
+    // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
+    const double aside_m =
+        std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement_.base.position_m).x,
+                   -kMaxAsideM, kMaxAsideM);
+    DVec3 vector{ValueOr(group_, request.applied, ParameterName::kEndX, blended.x + aside_m),
+                 GroundRise(ValueOr(group_, request.applied, ParameterName::kEndY, 0.0)),
+                 ValueOr(group_, request.applied, ParameterName::kEndZ, blended.z)};
+    if (!request.is_side_given) {
+      const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+      vector.x = outward * std::max(outward * vector.x, kLandApartM);
+    }
+    FootTrack& track = plan.feet[m];
+    const double rise_m = vector.y;
+    track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
+    double turn_rad = 0.0;
+    const FeetAt landing = Eased(track.land_s);
+    const double landing_rad = landing[m].heading_rad;
+    if (request.exact) {
+      DVec3 residual = request.exact->position_m - track.to.position_m;
+      const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
+      const double part =
+          std::min(1.0, request.most_residual_m / std::max(length_m, request.most_residual_m));
+      plan.missed_m = (1.0 - part) * DVec3(residual.x, 0.0, residual.z);
+      residual.x *= part;
+      residual.z *= part;
+      track.to.position_m += residual;
+      const double wanted_rad = WrapAngle(request.exact->heading_rad - landing_rad);
+      turn_rad = std::clamp(wanted_rad, -kMaxFootTurnRad, kMaxFootTurnRad);
+      plan.missed_rad = wanted_rad - turn_rad;
+    } else {
+      const auto missed = [&](ParameterName name) {
+        return ValueOr(group_, request.requested, name, 0.0) -
+               ValueOr(group_, request.applied, name, 0.0);
+      };
+      plan.missed_m = RotateYaw(
+          end_heading_rad, DVec3(missed(ParameterName::kEndX), 0.0, missed(ParameterName::kEndZ)));
+      const double turned_rad = movement_.heading_change_rad + movement_.steer_rad;
+      plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
+    }
+    track.to.heading_rad = landing_rad + turn_rad;
+    track.turn_rad[2] = turn_rad;
+    if (wish.terrain != nullptr) StandOnGround(moving, *wish.terrain, track);
+    track.height_m[2] = track.to.position_m.y - holds[x].print.position_m.y - rise_m +
+                        SlopeRise(rig_.sides[m], track.normals[1]) -
+                        SlopeRise(rig_.sides[x], holds[x].normal);
+    return landing;
+  }
+
+  // Where the feet of a jump land.
+  std::array<DVec3, 2> ChooseJumpLanding(const FootHolds& holds, const RequestPlan& request) {
+    const FeetAt end = Blended(movement_.duration_s());
+    const DVec3 centre =
+        0.5 * (holds[0].print.position_m + holds[1].print.position_m) +
+        RotateYaw(movement_.base.heading_rad,
+                  DVec3(0.0, ValueOr(group_, request.applied, ParameterName::kHeight, 0.0),
+                        ValueOr(group_, request.applied, ParameterName::kLength, 0.0)));
+    const DVec3 apart = 0.5 * (end[0].ball_m - end[1].ball_m);
+    const DVec3 flat(apart.x, 0.0, apart.z);
+    return {centre + 1.0 * flat, centre + -1.0 * flat};
   }
 
   // Offsets and their velocities at release and landing, so that the way between is smooth.
@@ -203,12 +280,6 @@ class Planner {
   Movement& movement_;
 };
 
-double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
-               double otherwise) {
-  const int l = group.FindParameter(name);
-  return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
-}
-
 }  // namespace
 
 SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
@@ -265,11 +336,14 @@ void StandOn(const FootHolds& holds, Movement& movement) {
   }
 }
 
-void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
-              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
-  const RequestPlan& request = wish.request;
+namespace {
+
+// A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
+// so that whoever is told what was chosen has the same plan.
+void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWish* wish,
+          const LandingChoice& chosen, const JoinFrom& join, GridCache& cache, PoseSpan pose,
+          Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
-  const LegRig& rig = library.leg_rig();
   Planner planner(library, cache, pose, movement);
   const bool is_step = IsStep(group.kind);
   const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
@@ -277,12 +351,12 @@ void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const Landin
   const auto m = static_cast<std::size_t>(moving);
   const auto x = static_cast<std::size_t>(fixed);
   const SwingTimes times = SwingTimesOf(group.kind, movement);
-  if (request.turn_rad) {
-    movement.steer_rad =
-        std::clamp(*request.turn_rad - movement.heading_change_rad, -kMaxSteerRad, kMaxSteerRad);
+  if (wish == nullptr) {
+    movement.steer_rad = chosen.steer_rad;
+  } else if (wish->request.turn_rad) {
+    movement.steer_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
+                                    -kMaxSteerRad, kMaxSteerRad);
   }
-  const double end_heading_rad =
-      movement.base.heading_rad + movement.heading_change_rad + movement.steer_rad;
 
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
   const std::array<Foot, 1> stays{fixed};
@@ -305,7 +379,7 @@ void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const Landin
   FootPlan& plan = movement.feet;
   plan = {};
   plan.is_active = true;
-  plan.keeps_above_ground = wish.terrain != nullptr;
+  plan.keeps_above_ground = wish == nullptr ? chosen.is_on_terrain : wish->terrain != nullptr;
   for (std::size_t f = 0; f < 2; ++f) {
     FootTrack& track = plan.feet[f];
     const FootHold& hold = holds[f];
@@ -321,85 +395,82 @@ void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const Landin
     track.height_m[2] = track.height_m[1];
     track.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
   }
+  for (const Foot foot : kBoth) {
+    if (is_step && foot != moving) continue;
+    plan.foot(foot).release_s = times.release_s;
+    plan.foot(foot).land_s = times.land_s;
+  }
 
-  const Planner::FeetAt end = planner.Blended(movement.duration_s());
   if (is_step) {
-    const DVec3 blended = RotateYaw(-end_heading_rad, end[m].ball_m - end[x].ball_m);
-    // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
-    const double aside_m =
-        std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement.base.position_m).x,
-                   -kMaxAsideM, kMaxAsideM);
-    DVec3 vector{ValueOr(group, request.applied, ParameterName::kEndX, blended.x + aside_m),
-                 GroundRise(ValueOr(group, request.applied, ParameterName::kEndY, 0.0)),
-                 ValueOr(group, request.applied, ParameterName::kEndZ, blended.z)};
-    if (!request.is_side_given) {
-      const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
-      vector.x = outward * std::max(outward * vector.x, kLandApartM);
-    }
     FootTrack& track = plan.feet[m];
-    const double rise_m = vector.y;
-    track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
-    track.release_s = times.release_s;
-    track.land_s = times.land_s;
-    double turn_rad = 0.0;
-    const Planner::FeetAt landing = planner.Eased(times.land_s);
-    const double landing_rad = landing[m].heading_rad;
-    if (request.exact) {
-      DVec3 residual = request.exact->position_m - track.to.position_m;
-      const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
-      const double part =
-          std::min(1.0, request.most_residual_m / std::max(length_m, request.most_residual_m));
-      plan.missed_m = (1.0 - part) * DVec3(residual.x, 0.0, residual.z);
-      residual.x *= part;
-      residual.z *= part;
-      track.to.position_m += residual;
-      const double wanted_rad = WrapAngle(request.exact->heading_rad - landing_rad);
-      turn_rad = std::clamp(wanted_rad, -kMaxFootTurnRad, kMaxFootTurnRad);
-      plan.missed_rad = wanted_rad - turn_rad;
+    Planner::FeetAt landing;
+    if (wish == nullptr) {
+      landing = planner.Eased(times.land_s);
+      track.to.position_m = chosen.to_m[m];
+      track.to.heading_rad = landing[m].heading_rad + chosen.turn_rad;
+      track.turn_rad[2] = chosen.turn_rad;
+      if (chosen.is_on_terrain) track.normals[1] = chosen.normal;
+      track.height_m[2] = chosen.height_m;
     } else {
-      const auto missed = [&](ParameterName name) {
-        return ValueOr(group, request.requested, name, 0.0) -
-               ValueOr(group, request.applied, name, 0.0);
-      };
-      plan.missed_m = RotateYaw(
-          end_heading_rad, DVec3(missed(ParameterName::kEndX), 0.0, missed(ParameterName::kEndZ)));
-      const double turned_rad = movement.heading_change_rad + movement.steer_rad;
-      plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
+      landing = planner.ChooseLanding(holds, *wish, moving);
     }
-    track.to.heading_rad = landing_rad + turn_rad;
-    track.turn_rad[2] = turn_rad;
-    if (wish.terrain != nullptr) planner.StandOnGround(moving, *wish.terrain, track);
-    track.height_m[2] = track.to.position_m.y - holds[x].print.position_m.y - rise_m +
-                        SlopeRise(rig.sides[m], track.normals[1]) -
-                        SlopeRise(rig.sides[x], holds[x].normal);
     planner.JoinSwing(moving, landing, track);
+    if (wish == nullptr) {
+      track.lift_m = chosen.lift_m;
+      track.aside_m = chosen.aside_m;
+      track.root_shift_m = chosen.root_shift_m;
+      return;
+    }
     const double push_m = planner.PushAside(moving);
-    if (wish.terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish.terrain);
-    track.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
-                              DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
-    if (request.root_m) track.root_shift_m = planner.RootShift(*request.root_m);
+    if (wish->terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish->terrain);
+    if (push_m > 0.0) {
+      track.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                                DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+    }
+    if (wish->request.root_m) track.root_shift_m = planner.RootShift(*wish->request.root_m);
     return;
   }
 
-  const DVec3 centre =
-      0.5 * (holds[0].print.position_m + holds[1].print.position_m) +
-      RotateYaw(movement.base.heading_rad,
-                DVec3(0.0, ValueOr(group, request.applied, ParameterName::kHeight, 0.0),
-                      ValueOr(group, request.applied, ParameterName::kLength, 0.0)));
-  const DVec3 apart = 0.5 * (end[0].ball_m - end[1].ball_m);
+  std::array<DVec3, 2> to_m = chosen.to_m;
+  if (wish != nullptr) to_m = planner.ChooseJumpLanding(holds, wish->request);
   const Planner::FeetAt landing = planner.Eased(times.land_s);
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
     FootTrack& track = plan.feet[f];
-    const double sign = foot == Foot::kLeft ? 1.0 : -1.0;
-    track.to.position_m = centre + sign * DVec3(apart.x, 0.0, apart.z);
+    track.to.position_m = to_m[f];
     track.to.heading_rad = landing[f].heading_rad;
     track.turn_rad[2] = 0.0;
     track.height_m[2] = 0.0;
-    track.release_s = times.release_s;
-    track.land_s = times.land_s;
     planner.JoinSwing(foot, landing, track);
   }
+}
+
+}  // namespace
+
+void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
+              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
+  Plan(library, holds, &wish, {}, join, cache, pose, movement);
+}
+
+void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingChoice& choice,
+              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
+  Plan(library, holds, nullptr, choice, join, cache, pose, movement);
+}
+
+LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {
+  const FootPlan& plan = movement.feet;
+  LandingChoice choice{.steer_rad = movement.steer_rad,
+                       .is_on_terrain = plan.keeps_above_ground,
+                       .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
+  if (!IsStep(kind)) return choice;
+  const FootTrack& track = plan.foot(MovingFoot(kind));
+  choice.turn_rad = track.turn_rad[2];
+  choice.height_m = track.height_m[2];
+  choice.normal = track.normals[1];
+  choice.lift_m = track.lift_m;
+  choice.aside_m = track.aside_m;
+  choice.root_shift_m = track.root_shift_m;
+  return choice;
 }
 
 FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement, double time_s,

@@ -126,4 +126,24 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
   }
 }
 
+Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
+  constexpr double kLongestS = 1e6;  // a clip is no longer than ten minutes
+  const auto could_be = [&](const Playing& p) {
+    const auto is_part = [](double value) { return IsWithin(value, 0.0, 1.0); };
+    const auto is_time = [](double value) { return IsWithin(value, 0.0, kLongestS); };
+    const auto is_speed = [](double value) { return IsWithin(value, 0.0, kMaxLayerSpeed); };
+    return p.layer >= 0 && static_cast<std::size_t>(p.layer) < library.layers().size() &&
+           is_time(p.time_s) && is_part(p.weight) && is_part(p.from_weight) &&
+           is_part(p.to_weight) && is_speed(p.speed) && is_speed(p.from_speed) &&
+           is_speed(p.to_speed) && std::isfinite(p.slope) && is_time(p.slope_s) &&
+           is_time(p.elapsed_s) && is_time(p.ease_s) && is_time(p.blend_s);
+  };
+  if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, could_be)) {
+    return Fail(ErrorCode::kOutOfRange, "no stack has these layers in play");
+  }
+  std::ranges::copy(playing, playing_.begin());
+  count_ = playing.size();
+  return {};
+}
+
 }  // namespace stridewire

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/evaluate_poses.h"
-#include "stridewire/runtime/foot_planner.h"
+#include "stridewire/runtime/avatar_body.h"
 #include "stridewire/runtime/layer_stack.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement.h"
@@ -30,6 +29,20 @@ enum class AvatarEventType : std::uint8_t {
   /// A request turned out impossible: code and reason; for a footprint that had to be met also the nearest in
   /// reach and the foot. What is queued behind it goes on.
   kRejected,
+};
+
+/// What has become of an avatar's movement in a call of Advance, for who shows the avatar elsewhere (MovementRecord).
+struct AvatarChange {
+  bool is_any = false;             ///< More than the rest tells: only the whole state does
+  bool has_left = false;           ///< The movement before ended or gave way
+  bool has_begun = false;          ///< One began, and goes on
+  bool has_layers = false;         ///< Layers were asked for
+  bool is_idle_other = false;      ///< idle() is not what it was
+  bool is_left_at_end = false;     ///< The one before ended, and did not give way
+  bool is_redirected = false;      ///< The other began in mid-swing of the one before
+  bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::KeepJoin)
+  bool begun_keeps_speed = false;  ///< How the other was joined (AvatarBody::Join)
+  double left_s = 0.0;             ///< When the one before was left, its own time
 };
 
 /// By what a step would have missed the footprint it had to meet.
@@ -115,7 +128,7 @@ class Avatar {
   [[nodiscard]] Status SetFootPlanting(bool is_on);
   /// As last set; false where the library's legs can not.
   [[nodiscard]] bool foot_planting() const {
-    return options_.foot_planting && library_->leg_rig().is_usable;
+    return options_.foot_planting && body_.library->leg_rig().is_usable;
   }
 
   /// Changes the ground. Feet that stand stay where they are until their next step.
@@ -130,20 +143,27 @@ class Avatar {
   static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s);
 
   /// Displayed, in the world.
-  [[nodiscard]] ConstPoseSpan pose() const { return has_layers_ ? layered_pose_ : pose_; }
+  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
   /// For who reads the poses of many: asks for the memory of pose() and idle(), and before that for where it is.
   void PrefetchWhereShown() const;
   void PrefetchShown() const;
-  [[nodiscard]] const LayerStack& layers() const { return layers_; }
+  [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
+  /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or SetLayer it is that of
+  /// pose().
+  [[nodiscard]] const AvatarBody& body() const { return body_; }
+  /// What changed in the last Advance, and by Teleport and SetLayer before it.
+  [[nodiscard]] const AvatarChange& change() const { return change_; }
+  /// Of who stands: what begins next may keep the speed there was, if it begins at once.
+  [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }
   [[nodiscard]] std::span<const AvatarEvent> events() const { return events_; }
   [[nodiscard]] const BaseFrame& base() const { return base_; }
   [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
   /// Standing, nothing queued.
   [[nodiscard]] bool idle() const { return !is_moving_ && !is_in_stand_ && queue_size() == 0; }
-  [[nodiscard]] const MotionLibrary& library() const { return *library_; }
+  [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
   /// The movement under way, null while standing; valid until the next Advance.
-  [[nodiscard]] const Movement* movement() const { return is_moving_ ? &movement_ : nullptr; }
+  [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// The kStarted event of the movement or requested stand under way, null while just standing.
   [[nodiscard]] const AvatarEvent* started() const {
@@ -160,14 +180,10 @@ class Avatar {
   void AddEvent(const AvatarEvent& event);
   // Times are sums of ticks: a hold of whole ticks ends with the last of them.
   [[nodiscard]] bool IsHeld() const { return time_s_ + 1e-6 < hold_until_s_; }
-  [[nodiscard]] const MotionGroup& group() const { return library_->group(movement_.group); }
-  /// What is displayed has planted feet, or would.
-  [[nodiscard]] bool PlantsFeet() const { return plants_feet_; }
+  [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
   [[nodiscard]] FootState MeasureFeet() const;
-  void Evaluate(double time_s);
   void AdvanceState(double dt_s);
   void PrefetchState() const;
-  void ShowLayers();
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
   void GoOnWalking();
@@ -189,9 +205,8 @@ class Avatar {
   [[nodiscard]] bool RedirectsSwing() const;
   void RedirectSwing();
   void SwitchPlanting();
-  void TakeForBlended(double time_s);
   void KeepJoin(double time_s);
-  void KeepFeetGoing(bool keeps_speed);
+  void Leave(double time_s, bool is_redirected);
   void FinishMovement(double at_s);
   void KeepToLine(const DVec3& line_m);
   void FinishStand();
@@ -199,39 +214,29 @@ class Avatar {
   [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   void ReportFootStrikes(double before_s, double after_s);
 
-  std::shared_ptr<const MotionLibrary> library_;
   AvatarOptions options_;
   BaseFrame base_;
-  Pose pose_;  // displayed, but for layers
-  LayerStack layers_;
-  Pose layered_pose_;  // with layers, if there are any; of no size before the first
-  bool has_layers_ = false;
-  Pose blended_pose_;  // where a movement ended or gave way: the same before feet were planted
-  // What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
-  // begins then and keeps their speed, kJoinStepS before, as well as the blended pose.
-  std::array<FeetCorrection, 2> earlier_feet_;
-  Pose earlier_pose_;
+  AvatarBody body_;
   double moved_until_s_ = -1.0;  // avatar time
   double time_s_ = 0.0;          // avatar time
   double movement_time_s_ = 0.0;
+  AvatarChange change_;       // of the last Advance
+  AvatarChange next_change_;  // told with the next
 
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
+  bool was_idle_ = false;         // after the Advance before
   bool is_walking_ = false;       // a step left the feet apart: close before standing
   bool takes_over_ = false;       // the request at the queue's head does not wait for the end
-  bool plants_feet_ = false;      // as foot_planting() when the movement under way began
-  bool begins_planting_ = false;  // the movement that begins next is the first planted
   bool is_exact_ = false;         // the step under way lands where it was sent
   int closing_steps_ = 0;         // of our own in a row, the movement under way included
   double hold_until_s_ = 0.0;     // avatar time
   std::uint64_t request_id_ = 0;  // of the movement or stand under way
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
-  Movement movement_;
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
-  GridCache cache_;
   std::vector<double> weight_scratch_;
   // What is put back when a movement that was planned is not played. Has its size from the first request on
   // that may be refused.
@@ -243,7 +248,6 @@ class Avatar {
 
   FootState stand_feet_;  // of the library's stand pose
   FootState feet_;
-  FootHolds holds_;  // where the feet stood when the movement began
   Foot last_moved_ = Foot::kRight;
   std::size_t last_group_ = 0;  // of the movement before; as many as there are groups: a stand
   WalkProgress walk_;           // of the walk at the queue's head

@@ -59,6 +59,29 @@ inline constexpr double kMaxRootShiftM = 0.4;
 void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
               const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement);
 
+/// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
+/// needed to make it again.
+struct LandingChoice {
+  double steer_rad = 0.0;  ///< Movement::steer_rad
+  bool is_on_terrain = false;
+  std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};  ///< Where feet that move land, by Foot
+  // The rest is a step's.
+  double turn_rad = 0.0;  ///< Of the foot where it lands, further than the step has it
+  double height_m = 0.0;  ///< What is added to the blend's height there
+  Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Of the ground there, if it is terrain
+  double lift_m = 0.0;                   ///< FootTrack::lift_m, 0 if it is none
+  DVec3 aside_m = DVec3(0.0);            ///< FootTrack::aside_m
+  DVec3 root_shift_m = DVec3(0.0);       ///< FootTrack::root_shift_m
+};
+
+/// What was chosen for a movement whose feet are planned.
+[[nodiscard]] LandingChoice ChoiceOf(MovementKind kind, const Movement& movement);
+
+/// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
+/// change is not needed.
+void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingChoice& choice,
+              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement);
+
 /// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
 [[nodiscard]] FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement,
                                 double time_s, ConstPoseSpan pose);

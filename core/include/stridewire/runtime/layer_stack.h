@@ -67,6 +67,9 @@ class LayerStack {
   }
   [[nodiscard]] bool empty() const { return count_ == 0; }
 
+  /// Goes on from what another stack of the library had in play. kOutOfRange: what no stack has; nothing changes then.
+  [[nodiscard]] Status Restore(const MotionLibrary& library, std::span<const Playing> playing);
+
  private:
   [[nodiscard]] Playing* Find(int layer, bool is_ending);
 

@@ -1,0 +1,125 @@
+#include "stridewire/runtime/avatar_body.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace stridewire {
+
+void MakeRoom(const MotionLibrary& library, Movement& movement) {
+  const int joint_count = library.skeleton().joint_count();
+  movement.difference = Pose(joint_count);
+  movement.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
+  movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
+}
+
+AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of)
+    : library(std::move(of)),
+      pose(library->skeleton().joint_count()),
+      blended_pose(library->skeleton().joint_count()),
+      earlier_pose(library->skeleton().joint_count()),
+      cache(library->layout()) {
+  MakeRoom(*library, movement);
+}
+
+void AvatarBody::Evaluate(double time_s) {
+  const PoseJob job{&movement, time_s, &cache, &pose, &blended_pose};
+  EvaluatePoses(*library, std::span(&job, 1));
+}
+
+void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
+  const auto corrections = [&](double at_s) {
+    return movement.feet.is_active
+               ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended_pose)
+               : FeetCorrection{};
+  };
+  if (keeps_speed) {
+    Evaluate(time_s - kJoinStepS);
+    earlier_pose = blended_pose;
+    earlier_feet[1] = corrections(time_s - kJoinStepS);
+  }
+  Evaluate(time_s);
+  earlier_feet[0] = corrections(time_s);
+  // Planting that has not set in yet sets in anew.
+  begins_planting = movement.feet.is_active && time_s < movement.entered_s + movement.feet.settle_s;
+  if (begins_planting) TakeForBlended(time_s, keeps_speed);
+}
+
+void AvatarBody::TakeForBlended(double time_s, bool keeps_speed) {
+  if (keeps_speed) {
+    Evaluate(time_s - kJoinStepS);
+    earlier_pose = pose;
+    Evaluate(time_s);
+  }
+  blended_pose = pose;
+  earlier_feet = {};
+}
+
+void AvatarBody::KeepHolds(double time_s) {
+  holds = HoldsAt(*library, movement, time_s, blended_pose);
+  if (!begins_planting) return;
+  for (FootHold& hold : holds) hold.height_m = hold.turn_rad = 0.0;
+}
+
+void AvatarBody::StartWeighted(const BaseFrame& base) {
+  cache.Clear();
+  stridewire::StartWeighted(group(), base, movement);
+}
+
+void AvatarBody::EnterAt(double time_s) {
+  movement.entered_s = time_s;
+  movement.ease_out_s = std::min(kEaseOutS, movement.duration_s() - time_s);
+}
+
+template <typename Landing>
+void AvatarBody::JoinTo(const Landing& landing, bool keeps_speed) {
+  std::optional<ConstPoseSpan> earlier;
+  if (keeps_speed) earlier.emplace(earlier_pose);
+  if (plants_feet) {
+    PlanFeet(*library, holds, landing, {blended_pose, earlier}, cache, pose, movement);
+    KeepFeetGoing(keeps_speed);
+    if (begins_planting) SettleFrom(library->leg_rig(), blended_pose, movement, pose);
+    movement.feet.packed = PackFootPlan(movement);
+    return;
+  }
+  // D = P - M, with P what is displayed.
+  movement.feet.is_active = false;
+  EvaluateBlend(group(), library->layout(), movement, movement.entered_s, cache,
+                movement.difference);
+  Subtract(pose, movement.difference, movement.difference);
+  if (earlier) {
+    SetDifferenceVelocity(group(), library->layout(), blended_pose, *earlier, cache, pose,
+                          movement);
+  }
+}
+
+void AvatarBody::Join(const LandingWish& wish, bool keeps_speed) { JoinTo(wish, keeps_speed); }
+
+void AvatarBody::Join(const LandingChoice& choice, bool keeps_speed) {
+  JoinTo(choice, keeps_speed);
+}
+
+// The corrections of the movement just planned go on from those before it.
+void AvatarBody::KeepFeetGoing(bool keeps_speed) {
+  const auto corrections = [&](double time_s) {
+    EvaluateMovement(group(), library->layout(), movement, time_s, cache, pose);
+    return CorrectFeet(library->skeleton(), library->leg_rig(), movement, time_s, pose);
+  };
+  const double entered_s = movement.entered_s;
+  std::array<FeetCorrection, 2> planned{corrections(entered_s)};
+  if (keeps_speed) {
+    planned[1] = corrections(entered_s + kJoinStepS);
+  } else {
+    planned[1] = planned[0];
+    earlier_feet[1] = earlier_feet[0];
+  }
+  GoOnFrom(earlier_feet, planned, movement);
+}
+
+void AvatarBody::ShowLayers() {
+  has_layers = !layers.empty();
+  if (!has_layers) return;
+  layered_pose = pose;  // of the same size: no allocation
+  layers.Apply(*library, layered_pose);
+}
+
+}  // namespace stridewire

@@ -1,0 +1,178 @@
+#pragma once
+
+// What records of movements are made of: read and written by the same description, so that neither knows a field
+// that the other does not. A stream has F64, F32, Index and Bool for a value each, and tells by kReads whether the
+// value is set. Bytes are little-endian, without padding.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "stridewire/runtime/avatar_body.h"
+
+namespace stridewire::record {
+
+enum Flag : std::uint16_t {
+  kIsState = 1 << 0,
+  kMoves = 1 << 1,   // change: a movement began; state: one is under way
+  kIsIdle = 1 << 2,  // Avatar::idle()
+  kPlants = 1 << 3,  // AvatarBody::plants_feet
+  kLayers = 1 << 4,  // layers follow; in a state without there are none
+  // Of a change.
+  kLeft = 1 << 5,            // the movement before was left
+  kLeftAtEnd = 1 << 6,       // at its end: the time is not told
+  kIsRedirected = 1 << 7,    // in mid-swing: feet stand where they stood
+  kLeftKeepsSpeed = 1 << 8,  // as told to AvatarBody::KeepJoin
+  // Of a change; of the state of who stands, whether what was kept keeps a speed.
+  kKeepsSpeed = 1 << 9,  // as told to AvatarBody::Join
+  // Of a movement that began.
+  kIsEntered = 1 << 10,  // later than at its beginning
+  kIsSteered = 1 << 11,
+  kOnTerrain = 1 << 12,
+  kAside = 1 << 13,
+  kRootShift = 1 << 14,
+  // Of the state of who stands.
+  kBeginsPlanting = 1 << 15,
+};
+
+template <typename Stream, typename V>
+void Vector(Stream& stream, V& v) {
+  if constexpr (sizeof(v.x) == sizeof(double)) {
+    stream.F64(v.x), stream.F64(v.y), stream.F64(v.z);
+  } else {
+    stream.F32(v.x), stream.F32(v.y), stream.F32(v.z);
+  }
+}
+
+template <typename Stream, typename Q>
+void Rotation(Stream& stream, Q& q) {
+  stream.F32(q.x), stream.F32(q.y), stream.F32(q.z), stream.F32(q.w);
+  stream.CheckUnit(q);
+}
+
+template <typename Stream, typename P>
+void PoseFields(Stream& stream, P& pose) {
+  Vector(stream, pose.root_position_m);
+  for (auto& rotation : pose.rotations) Rotation(stream, rotation);
+}
+
+template <typename Stream, typename P>
+void PrintFields(Stream& stream, P& print) {
+  Vector(stream, print.position_m);
+  stream.F64(print.heading_rad);
+}
+
+template <typename Stream, typename L>
+void ChoiceFields(Stream& stream, unsigned flags, MovementKind kind, L& choice) {
+  if ((flags & kIsSteered) != 0) stream.F64(choice.steer_rad);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    if (IsStep(kind) && foot != MovingFoot(kind)) continue;
+    Vector(stream, choice.to_m[static_cast<std::size_t>(foot)]);
+  }
+  if (!IsStep(kind)) return;
+  stream.F64(choice.turn_rad);
+  stream.F64(choice.height_m);
+  if ((flags & kOnTerrain) != 0) {
+    stream.F64(choice.lift_m);
+    Vector(stream, choice.normal);
+    stream.CheckUnit(choice.normal);
+  }
+  if ((flags & kAside) != 0) stream.F64(choice.aside_m.x), stream.F64(choice.aside_m.z);
+  if ((flags & kRootShift) != 0) {
+    stream.F64(choice.root_shift_m.x), stream.F64(choice.root_shift_m.z);
+  }
+}
+
+template <typename Stream, typename C>
+void CorrectionFields(Stream& stream, C& feet) {
+  for (auto& foot : feet.feet) {
+    Vector(stream, foot.offset_m);
+    stream.F64(foot.turn_rad);
+    stream.F64(foot.free_turn_rad);
+    Vector(stream, foot.normal);
+    stream.F64(foot.root_weight);
+    Vector(stream, foot.root_shift_m);
+  }
+  Vector(stream, feet.root_m);
+}
+
+template <typename Stream, typename H>
+void HoldFields(Stream& stream, H& holds) {
+  for (auto& hold : holds) {
+    PrintFields(stream, hold.print);
+    stream.F64(hold.height_m);
+    stream.F64(hold.turn_rad);
+    Vector(stream, hold.normal);
+    stream.CheckUnit(hold.normal);
+    stream.F64(hold.root_weight);
+  }
+}
+
+// A plan but for what its movement's kind and times say.
+template <typename Stream, typename P>
+void PlanFields(Stream& stream, P& plan) {
+  stream.Bool(plan.keeps_above_ground);
+  for (std::size_t f = 0; f < 2; ++f) {
+    auto& track = plan.feet[f];
+    PrintFields(stream, track.from);
+    PrintFields(stream, track.to);
+    Vector(stream, track.release_offset_m);
+    stream.F64(track.release_turn_rad);
+    Vector(stream, track.release_velocity_m_s);
+    Vector(stream, track.land_offset_m);
+    Vector(stream, track.land_velocity_m_s);
+    for (auto& height : track.height_m) stream.F64(height);
+    for (auto& turn : track.turn_rad) stream.F64(turn);
+    for (auto& normal : track.normals) {
+      Vector(stream, normal);
+      stream.CheckUnit(normal);
+    }
+    stream.F64(track.lift_m);
+    Vector(stream, track.aside_m);
+    Vector(stream, track.root_shift_m);
+    auto& rest = plan.rests[f];
+    Vector(stream, rest.offset_m);
+    Vector(stream, rest.offset_m_s);
+    stream.F64(rest.turn_rad);
+    stream.F64(rest.turn_rad_s);
+    stream.F64(rest.over_s);
+  }
+  Vector(stream, plan.root_rest_m);
+  Vector(stream, plan.root_rest_m_s);
+  bool settles = plan.settle_s > 0.0;
+  stream.Bool(settles);
+  if (!settles) return;
+  stream.F64(plan.settle_s);
+  Vector(stream, plan.settle_root_m);
+  for (auto& leg : plan.settle_rotations) {
+    for (auto& rotation : leg) Rotation(stream, rotation);
+  }
+}
+
+// Whether something of the difference pose may still be asked for.
+inline bool NeedsDifference(const Movement& movement, double movement_time_s) {
+  // Twice the step that a join looks back by: no rounding decides.
+  return movement_time_s - 2.0 * kJoinStepS < movement.entered_s + movement.ease_out_s;
+}
+
+template <typename Stream, typename M>
+void DifferenceFields(Stream& stream, M& movement) {
+  PoseFields(stream, movement.difference);
+  stream.Bool(movement.is_inertial);
+  if (!movement.is_inertial) return;
+  Vector(stream, movement.difference_velocity.root_m_s);
+  for (auto& velocity : movement.difference_velocity.joints_rad_s) Vector(stream, velocity);
+}
+
+template <typename Stream, typename P>
+void LayerFields(Stream& stream, P& playing) {
+  stream.Index(playing.layer);
+  stream.Bool(playing.is_ending);
+  for (auto* value : {&playing.time_s, &playing.weight, &playing.speed, &playing.from_weight,
+                      &playing.to_weight, &playing.from_speed, &playing.to_speed, &playing.slope,
+                      &playing.slope_s, &playing.elapsed_s, &playing.ease_s, &playing.blend_s}) {
+    stream.F64(*value);
+  }
+}
+
+}  // namespace stridewire::record

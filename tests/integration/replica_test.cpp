@@ -1,0 +1,391 @@
+// Who is told what an avatar begins shows the same bytes in every tick, on whatever instruction set.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "captured_library.h"
+#include "counted_memory.h"
+#include "instruction_sets.h"
+#include "random.h"
+#include "rough_ground.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/avatar_replica.h"
+#include "stridewire/runtime/movement_record.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+using Bytes = std::vector<std::byte>;
+
+std::string BytesOf(ConstPoseSpan pose) {
+  std::string bytes(reinterpret_cast<const char*>(&pose.root_position_m), sizeof(Vec3));
+  bytes.append(reinterpret_cast<const char*>(pose.rotations.data()), pose.rotations.size_bytes());
+  return bytes;
+}
+
+bool IsSame(ConstPoseSpan a, ConstPoseSpan b) {
+  return std::memcmp(&a.root_position_m, &b.root_position_m, sizeof(Vec3)) == 0 &&
+         std::memcmp(a.rotations.data(), b.rotations.data(), a.rotations.size_bytes()) == 0;
+}
+
+struct Manner {
+  const char* name;
+  std::vector<std::string> subjects;  // captured; none: the generated library
+  double tick_s;
+  int movements;  // as many at least
+};
+void PrintTo(const Manner& manner, std::ostream* out) { *out << manner.name; }
+
+// An avatar to which all that can happen to one happens, as `random` has it.
+class Restless {
+ public:
+  Restless(Library library, Random& random)
+      : random_(random),
+        avatar_(std::move(library), Anywhere(),
+                {.run_time_correction = Draws(0.7),
+                 .foot_planting = Draws(0.8),
+                 .join = Draws(0.8) ? JoinKind::kInertial : JoinKind::kCubic,
+                 .terrain = Draws(0.5) ? RoughGround(random) : nullptr}) {}
+
+  // What is done to it between two ticks.
+  void Stir() {
+    if (Draws(avatar_.queue_size() == 0 ? 0.2 : 0.02)) Ask();
+    if (Draws(0.002)) (void)avatar_.SetFootPlanting(!avatar_.foot_planting());
+    if (Draws(0.002)) avatar_.SetTerrain(Draws(0.5) ? RoughGround(random_) : nullptr);
+    if (Draws(0.0005)) avatar_.Teleport(Anywhere());
+    if (Draws(0.002)) avatar_.CancelQueue();
+    if (Draws(0.01) && !avatar_.library().layers().empty()) {
+      const auto layers = static_cast<double>(avatar_.library().layers().size());
+      (void)avatar_.SetLayer({.layer = static_cast<int>(random_.Draw(0.0, layers)),
+                              .is_on = Draws(0.6),
+                              .weight = random_.Draw(0.1, 1.0),
+                              .blend_s = random_.Draw(0.0, 1.0),
+                              .speed = random_.Draw(0.2, 3.0)});
+    }
+  }
+
+  [[nodiscard]] Avatar& avatar() { return avatar_; }
+
+ private:
+  bool Draws(double likely) { return random_.Draw(0.0, 1.0) < likely; }
+  BaseFrame Anywhere() {
+    return {DVec3(random_.Draw(-50.0, 50.0), random_.Draw(0.0, 3.0), random_.Draw(-50.0, 50.0)),
+            random_.Draw(-20.0, 20.0)};
+  }
+  DVec3 Near() {
+    return avatar_.base().position_m + DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0));
+  }
+
+  void Ask() {
+    MovementRequest request{.id = 1};
+    const double kind = random_.Draw(0.0, 1.0);
+    if (kind < 0.4) {
+      request.movement = StepRequest{.length_m = random_.Draw(0.0, 0.9),
+                                     .turn_rad = Draws(0.5) ? random_.Draw(-0.5, 0.5) : 0.0};
+    } else if (kind < 0.6) {
+      request.movement = StepRequest{
+          .at =
+              FootprintRequest{
+                  avatar_.base().position_m +
+                      RotateYaw(avatar_.base().heading_rad,
+                                DVec3(random_.Draw(-0.4, 0.4), 0.0, random_.Draw(-0.1, 0.9))),
+                  Draws(0.5) ? std::optional(avatar_.base().heading_rad + random_.Draw(-0.5, 0.5))
+                             : std::nullopt},
+          .must_be_met = Draws(0.5)};
+    } else if (kind < 0.8) {
+      request.movement = WalkRequest{.position_m = Near(), .heading_rad = random_.Draw(-3.0, 3.0)};
+    } else if (kind < 0.9) {
+      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
+    } else {
+      request.movement = StandRequest{Draws(0.3) ? 0.0 : random_.Draw(0.0, 0.5)};
+    }
+    if (Draws(0.4)) request.takeover = Draws(0.7) ? Takeover::kNow : Takeover::kAfterMovement;
+    (void)avatar_.Enqueue(request, Draws(0.1) ? random_.Draw(0.0, 0.5) : 0.0);
+  }
+
+  Random& random_;
+  Avatar avatar_;
+};
+
+std::string Refusal(AvatarReplica& replica, const Bytes& record) {
+  const Status status = replica.Apply(record);
+  return status ? "" : Describe(status.error());
+}
+
+struct Figures {
+  int movements = 0;
+  std::size_t records = 0;
+  std::size_t states = 0;  // of records
+  std::size_t poses = 0;
+};
+
+void Advance(AvatarReplica& replica, double dt_s) {
+  AvatarReplica* one = &replica;
+  AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s);
+}
+
+int Begun(const Avatar& avatar) {
+  return static_cast<int>(std::ranges::count_if(avatar.events(), [](const AvatarEvent& event) {
+    return event.type == AvatarEventType::kStarted && event.group >= 0;
+  }));
+}
+
+class Replica : public testing::TestWithParam<Manner> {
+ protected:
+  void SetUp() override {
+    STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
+    library_ = LibraryOf(GetParam().subjects);
+  }
+  Library library_;
+};
+
+// One is told from the beginning, another from some tick on.
+TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
+  const Manner& manner = GetParam();
+  constexpr unsigned kSeed = 20261123;
+  Random random(kSeed);
+  Figures figures;
+  constexpr int kTicks = 3000;
+  for (int round = 0; figures.movements < manner.movements; ++round) {
+    Restless restless(library_, random);
+    Avatar& avatar = restless.avatar();
+    AvatarReplica first(library_);
+    std::optional<AvatarReplica> late;
+    int joins_at = 0;
+    for (int tick = 0; tick < kTicks; ++tick) {
+      restless.Stir();
+      avatar.Advance(manner.tick_s);
+      figures.movements += Begun(avatar);
+      Bytes record;
+      if (AppendChange(avatar, record)) {
+        ++figures.records;
+        figures.states += avatar.change().is_any;
+        ASSERT_EQ(Refusal(first, record), "") << "tick " << tick << " of " << round;
+        if (late) {
+          ASSERT_EQ(Refusal(*late, record), "") << "tick " << tick << " of " << round;
+        }
+      }
+      if (tick == joins_at) {
+        late.emplace(library_);
+        Bytes state;
+        AppendState(avatar, state);
+        ASSERT_EQ(Refusal(*late, state), "") << "tick " << tick << " of " << round;
+        joins_at = tick + static_cast<int>(random.Draw(1.0, 200.0));
+      }
+      Advance(first, manner.tick_s);
+      Advance(*late, manner.tick_s);
+      ASSERT_TRUE(IsSame(first.pose(), avatar.pose()))
+          << "tick " << tick << " of " << round << ", seed " << kSeed;
+      ASSERT_TRUE(IsSame(late->pose(), avatar.pose()))
+          << "tick " << tick << " of " << round << " who came late, seed " << kSeed;
+      ASSERT_EQ(first.idle(), avatar.idle()) << "tick " << tick << " of " << round;
+      figures.poses += 2;
+    }
+  }
+  std::printf("%s: seed %u; %d movements, %zu records, %zu of them states; %zu poses compared\n",
+              manner.name, kSeed, figures.movements, figures.records, figures.states,
+              figures.poses);
+  EXPECT_GT(figures.records, figures.states);
+}
+
+// Walking, as most avatars do most of the time.
+TEST_P(Replica, AStepTakesFewBytes) {
+  const Manner& manner = GetParam();
+  constexpr unsigned kSeed = 20261124;
+  Random random(kSeed);
+  std::size_t steps = 0;
+  std::size_t bytes = 0;
+  std::size_t largest = 0;
+  std::size_t states = 0;
+  std::size_t state_bytes = 0;
+  std::size_t largest_state = 0;
+  for (int walker = 0; walker < 10; ++walker) {
+    Avatar avatar(library_, BaseFrame{},
+                  {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
+    for (int tick = 0; tick < 3000; ++tick) {
+      if (avatar.idle()) {
+        (void)avatar.Enqueue({1, WalkRequest{.position_m = DVec3(random.Draw(0.0, 50.0), 0.0,
+                                                                 random.Draw(-25.0, 25.0)),
+                                             .heading_rad = random.Draw(-3.0, 3.0)}});
+      }
+      avatar.Advance(manner.tick_s);
+      Bytes record;
+      if (tick > 0 && AppendChange(avatar, record)) {
+        steps += static_cast<std::size_t>(Begun(avatar));
+        bytes += record.size();
+        largest = std::max(largest, record.size());
+      }
+      if (tick % 7 != 0) continue;
+      Bytes state;
+      AppendState(avatar, state);
+      ++states;
+      state_bytes += state.size();
+      largest_state = std::max(largest_state, state.size());
+    }
+  }
+  std::printf("%s: seed %u; %zu steps, %.1f bytes a step, at most %zu; a state %.0f, at most %zu\n",
+              manner.name, kSeed, steps, static_cast<double>(bytes) / static_cast<double>(steps),
+              largest, static_cast<double>(state_bytes) / static_cast<double>(states),
+              largest_state);
+  ASSERT_GT(steps, 100u);
+  EXPECT_LE(bytes, 400 * steps);
+  EXPECT_LE(largest_state, 3072u);
+}
+
+// What one machine's avatar did is shown by others, whose vectors are of another width.
+TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
+  const Manner& manner = GetParam();
+  constexpr unsigned kSeed = 20261125;
+  constexpr int kTicks = 400;
+  constexpr std::size_t kAvatars = 20;
+  struct Tick {
+    std::vector<Bytes> records;
+    std::vector<std::string> poses;
+  };
+  const std::vector<std::int64_t> sets = InstructionSets();
+  std::printf("instruction sets compared:");
+  for (const std::int64_t told_on : sets) {
+    std::printf(" %s", hwy::TargetName(told_on));
+    std::vector<Tick> ticks(kTicks);
+    {
+      const OnlyInstructionSet only(told_on);
+      Random random(kSeed);
+      std::vector<std::unique_ptr<Restless>> crowd;
+      for (std::size_t i = 0; i < kAvatars; ++i) {
+        crowd.push_back(std::make_unique<Restless>(library_, random));
+      }
+      for (Tick& tick : ticks) {
+        for (const auto& restless : crowd) {
+          restless->Stir();
+          restless->avatar().Advance(manner.tick_s);
+          (void)AppendChange(restless->avatar(), tick.records.emplace_back());
+          tick.poses.push_back(BytesOf(restless->avatar().pose()));
+        }
+      }
+    }
+    for (const std::int64_t shown_on : sets) {
+      const OnlyInstructionSet only(shown_on);
+      std::vector<AvatarReplica> replicas(kAvatars, AvatarReplica(library_));
+      std::vector<AvatarReplica*> all;
+      for (AvatarReplica& replica : replicas) all.push_back(&replica);
+      for (std::size_t t = 0; t < ticks.size(); ++t) {
+        for (std::size_t i = 0; i < kAvatars; ++i) {
+          const Bytes& record = ticks[t].records[i];
+          if (record.empty()) continue;
+          ASSERT_EQ(Refusal(replicas[i], record), "");
+        }
+        AvatarReplica::AdvanceAll(all, manner.tick_s);
+        for (std::size_t i = 0; i < kAvatars; ++i) {
+          ASSERT_TRUE(BytesOf(replicas[i].pose()) == ticks[t].poses[i])
+              << hwy::TargetName(told_on) << " shown on " << hwy::TargetName(shown_on) << ", tick "
+              << t << ", seed " << kSeed;
+        }
+      }
+    }
+  }
+  std::printf("\n");
+}
+
+INSTANTIATE_TEST_SUITE_P(Libraries, Replica,
+                         testing::Values(Manner{"Builtin", {}, 1.0 / 60.0, 10'000},
+                                         Manner{"BuiltinAtFiveTicks", {}, 0.2, 2'000},
+                                         Manner{"Subject01", {kDebianTakes}, 1.0 / 60.0, 2'000},
+                                         Manner{"Subject16", {"16"}, 1.0 / 60.0, 2'000}),
+                         [](const auto& tested) { return tested.param.name; });
+
+TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
+  constexpr unsigned kSeed = 20261127;
+  Random random(kSeed);
+  const Library library = LibraryOf({});
+  Restless restless(library, random);
+  AvatarReplica replica(library);
+  Bytes record;
+  for (int tick = 0; tick < 3000; ++tick) {
+    restless.Stir();
+    restless.avatar().Advance(1.0 / 60.0);
+    record.clear();
+    const bool is_changed = AppendChange(restless.avatar(), record);
+    const std::size_t before = counted_memory::LiveBytes();
+    counted_memory::ResetPeak();
+    const bool is_taken = !is_changed || replica.Apply(record).has_value();
+    Advance(replica, 1.0 / 60.0);
+    ASSERT_TRUE(is_taken);
+    ASSERT_LE(counted_memory::PeakBytes(), before) << "tick " << tick << ", seed " << kSeed;
+  }
+}
+
+// Bytes that were damaged, and foreign ones: refused, or shown as something.
+TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
+  constexpr unsigned kSeed = 20261126;
+  Random random(kSeed);
+  const Library library = LibraryOf({});
+  const auto below = [&](std::size_t n) {
+    return static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(n)));
+  };
+  int refused = 0;
+  int shown = 0;
+  for (int round = 0; round < 20; ++round) {
+    Restless restless(library, random);
+    AvatarReplica replica(library);
+    for (int tick = 0; tick < 600; ++tick) {
+      restless.Stir();
+      restless.avatar().Advance(1.0 / 60.0);
+      Bytes record;
+      const bool is_changed = AppendChange(restless.avatar(), record);
+      if (!is_changed) {
+        if (tick % 10 != 0) continue;
+        AppendState(restless.avatar(), record);
+      }
+      Bytes damaged = record;
+      const std::size_t count = 1 + below(4);
+      for (std::size_t i = 0; i < count; ++i) {
+        damaged[below(damaged.size())] = static_cast<std::byte>(below(256));
+      }
+      if (below(4) == 0) damaged.resize(below(damaged.size()));
+      if (below(8) == 0) damaged.insert(damaged.end(), 1 + below(9), std::byte{1});
+      AvatarReplica other = replica;
+      const bool is_taken = other.Apply(damaged).has_value();
+      (is_taken ? shown : refused) += 1;
+      EXPECT_EQ(other.is_known(), is_taken);
+      Advance(other, 1.0 / 60.0);
+      // What was cut short or is too long is never taken.
+      Bytes shorter = record;
+      shorter.resize(below(record.size()));
+      EXPECT_FALSE(AvatarReplica(replica).Apply(shorter).has_value()) << "seed " << kSeed;
+      Bytes longer = record;
+      longer.push_back(std::byte{0});
+      EXPECT_FALSE(AvatarReplica(replica).Apply(longer).has_value()) << "seed " << kSeed;
+      (void)replica.Apply(record);
+      Advance(replica, 1.0 / 60.0);
+    }
+  }
+  std::printf("seed %u; %d refused, %d shown\n", kSeed, refused, shown);
+  EXPECT_GT(refused, 100);
+  EXPECT_GT(shown, 100);
+}
+
+TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
+  const Library library = LibraryOf({});
+  Avatar avatar(library, BaseFrame{});
+  avatar.Advance(1.0 / 60.0);
+  ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
+  avatar.Advance(1.0 / 60.0);
+  Bytes change;
+  ASSERT_TRUE(AppendChange(avatar, change));
+  AvatarReplica replica(library);
+  EXPECT_FALSE(replica.is_known());
+  EXPECT_EQ(replica.Apply(change).error().code, ErrorCode::kNotFound);
+  Advance(replica, 1.0 / 60.0);
+  EXPECT_FALSE(replica.is_known());
+}
+
+}  // namespace
+}  // namespace stridewire

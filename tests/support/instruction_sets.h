@@ -1,0 +1,35 @@
+#pragma once
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace stridewire {
+
+/// Does something with this program's kernels limited to one instruction set.
+class OnlyInstructionSet {
+ public:
+  explicit OnlyInstructionSet(std::int64_t target) { Choose(target); }
+  ~OnlyInstructionSet() { Choose(0); }
+  OnlyInstructionSet(const OnlyInstructionSet&) = delete;
+  OnlyInstructionSet& operator=(const OnlyInstructionSet&) = delete;
+
+ private:
+  static void Choose(std::int64_t target) {
+    hwy::SetSupportedTargetsForTest(target);
+    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+  }
+};
+
+/// Those compiled in that this machine has; the last is plain C++.
+inline std::vector<std::int64_t> InstructionSets() {
+  std::vector<std::int64_t> sets;
+  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_NEON}) {
+    if ((hwy::SupportedTargets() & target) != 0) sets.push_back(target);
+  }
+  sets.push_back(HWY_SCALAR);
+  return sets;
+}
+
+}  // namespace stridewire
