@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "quantise_kernel.h"
+#include "smallest_three.h"
 
 namespace stridewire::protocol {
 namespace {
@@ -15,7 +16,6 @@ static_assert(std::endian::native == std::endian::little);
 static_assert(offsetof(Quat, x) == 0 && offsetof(Quat, w) == 12, "x, y, z, w in memory");
 
 constexpr float kComponentSteps = 16383.0f;
-constexpr float kSqrt2 = 1.41421356237309505f;
 constexpr int kZero = 16384;
 constexpr std::uint16_t kComponentMask = 0x7fff;
 constexpr std::uint16_t kHighBit = 0x8000;
@@ -33,9 +33,6 @@ bool IsUnit(const Quat& q) {
   return squared >= (1.0f - kUnitTolerance) * (1.0f - kUnitTolerance) &&
          squared <= (1.0f + kUnitTolerance) * (1.0f + kUnitTolerance);
 }
-
-// The components that stay when one is left out.
-constexpr std::size_t kStaying[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
 
 // False for bits that no encoder writes.
 bool DecodeSmallestThree(const std::byte* in, Quat& q) {
@@ -103,6 +100,20 @@ Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Qu
   return {};
 }
 
+Status DecodeRoot(std::span<const std::byte, 12> in, Vec3& root_position_m) {
+  std::array<std::int32_t, 3> root;
+  std::memcpy(root.data(), in.data(), 12);
+  for (int i = 0; i < 3; ++i) {
+    const double metres = static_cast<double>(root[static_cast<std::size_t>(i)]) /
+                          static_cast<double>(kRootStepsPerM);
+    if (std::abs(metres) > static_cast<double>(kMaxRootM)) {
+      return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
+    }
+    root_position_m[i] = static_cast<float>(metres);
+  }
+  return {};
+}
+
 Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
                   std::span<Quat> rotations) {
   if (mode != PoseMode::kFull && mode != PoseMode::kQuantised) {
@@ -128,16 +139,7 @@ Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_posit
     }
     return {};
   }
-  std::array<std::int32_t, 3> root;
-  std::memcpy(root.data(), in.data(), 12);
-  for (int i = 0; i < 3; ++i) {
-    const double metres = static_cast<double>(root[static_cast<std::size_t>(i)]) /
-                          static_cast<double>(kRootStepsPerM);
-    if (std::abs(metres) > static_cast<double>(kMaxRootM)) {
-      return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
-    }
-    root_position_m[i] = static_cast<float>(metres);
-  }
+  if (const Status status = DecodeRoot(in.first<12>(), root_position_m); !status) return status;
   for (std::size_t j = 0; j < rotations.size(); ++j) {
     if (!DecodeSmallestThree(in.data() + 12 + 6 * j, rotations[j])) {
       return Fail(ErrorCode::kMalformed, "rotation has bits that no encoder writes",

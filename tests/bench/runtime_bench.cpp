@@ -16,11 +16,13 @@
 #include "bench_libraries.h"
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
+#include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/movement.h"
+#include "stridewire/runtime/pose_code.h"
 
 namespace stridewire {
 namespace {
@@ -268,6 +270,67 @@ void DecodePose(benchmark::State& state, const Library& library, PoseMode mode) 
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(bytes[0].size()));
 }
 
+protocol::CompactCodec CompactCodecOf(const Library& library) {
+  std::vector<std::int16_t> parents;
+  for (const Joint& joint : library->skeleton().joints) {
+    parents.push_back(static_cast<std::int16_t>(joint.parent));
+  }
+  return protocol::CompactCodec::Make(ChoosePoseCode(*library).joints, parents).value();
+}
+
+/// Poses as a batch encodes them: so many at once, copied in and their bytes out.
+void EncodeCompactPose(benchmark::State& state, const Library& library) {
+  constexpr auto kBlock = protocol::CompactCodec::kBlock;
+  const Crowd crowd(library, 64);
+  const protocol::CompactCodec codec = CompactCodecOf(library);
+  protocol::CompactCodec::Block block;
+  std::vector<std::byte> bytes(kBlock * codec.pose_bytes());
+  std::size_t i = 0;
+  for (auto _ : state) {
+    block.Clear();
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      const ConstPoseSpan pose = crowd.avatars()[i++ % 64].pose();
+      block.Add(pose.root_position_m, pose.rotations);
+    }
+    codec.Encode(block);
+    for (std::size_t k = 0; k < kBlock; ++k) {
+      if (!block.fits(k)) return state.SkipWithError("a pose cannot be encoded");
+      block.CopyBytes(k, std::span(bytes).subspan(k * codec.pose_bytes(), codec.pose_bytes()));
+    }
+    benchmark::DoNotOptimize(bytes.data());
+  }
+  const auto poses = state.iterations() * static_cast<std::int64_t>(kBlock);
+  state.SetItemsProcessed(poses);
+  state.SetBytesProcessed(poses * static_cast<std::int64_t>(codec.pose_bytes()));
+}
+
+void DecodeCompactPose(benchmark::State& state, const Library& library) {
+  constexpr auto kBlock = protocol::CompactCodec::kBlock;
+  const Crowd crowd(library, kBlock);
+  const protocol::CompactCodec codec = CompactCodecOf(library);
+  protocol::CompactCodec::Block block;
+  for (const Avatar& avatar : crowd.avatars()) {
+    block.Add(avatar.pose().root_position_m, avatar.pose().rotations);
+  }
+  codec.Encode(block);
+  std::vector<std::byte> bytes(kBlock * codec.pose_bytes());
+  for (std::size_t k = 0; k < kBlock; ++k) {
+    block.CopyBytes(k, std::span(bytes).subspan(k * codec.pose_bytes(), codec.pose_bytes()));
+  }
+  Pose pose(static_cast<int>(codec.joint_count()));
+  std::size_t i = 0;
+  for (auto _ : state) {
+    const auto one =
+        std::span(bytes).subspan(i++ % kBlock * codec.pose_bytes(), codec.pose_bytes());
+    if (!codec.Decode(one, pose.root_position_m, pose.rotations)) {
+      return state.SkipWithError("a pose cannot be decoded");
+    }
+    benchmark::DoNotOptimize(pose.rotations.data());
+  }
+  state.SetItemsProcessed(state.iterations());
+  state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(codec.pose_bytes()));
+}
+
 /// What a tick encodes for a crowd: one frame, to be shared by all observers.
 void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   const Crowd crowd(library, kCrowd);
@@ -356,6 +419,8 @@ void RegisterAll(const std::string& path, const Library& library) {
     Register(name + "/encode_batch/" + mode_name, EncodeBatch, library, mode);
     Register(name + "/decode_pose/" + mode_name, DecodePose, library, mode);
   }
+  Register(name + "/encode_16_poses/compact", EncodeCompactPose, library);
+  Register(name + "/decode_pose/compact", DecodeCompactPose, library);
 }
 
 int Run(int argc, char** argv) {

@@ -54,4 +54,7 @@ inline constexpr float kUnitTolerance = 1e-3f;
 [[nodiscard]] Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
                                 std::span<Quat> rotations);
 
+/// The root of a quantised or compact pose, the first 12 bytes of it. kOutOfRange: beyond kMaxRootM.
+[[nodiscard]] Status DecodeRoot(std::span<const std::byte, 12> in, Vec3& root_position_m);
+
 }  // namespace stridewire::protocol

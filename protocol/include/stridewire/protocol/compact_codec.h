@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "stridewire/base/error.h"
+#include "stridewire/base/math.h"
+#include "stridewire/base/rotation_code.h"
+
+namespace stridewire::protocol {
+
+/// Whether codes can be told and decoded: references unit, numbers finite, bits within RotationCode's limits, a root
+/// that turns every way. kOutOfRange, kMalformed; `index` is the joint. None at all is allowed: a world without.
+[[nodiscard]] Status CheckRotationCodes(std::span<const RotationCode> codes);
+
+/// A RotationCode as the codec takes it.
+struct CompactJoint {
+  float reference[4] = {};  ///< x, y, z, w
+  float low[3] = {};
+  float step[3] = {};   ///< Of a free joint the first: of each of the three
+  float steps[3] = {};  ///< 1 / step
+  std::int32_t bits[3] = {};
+  std::int32_t free_bits = 0;  ///< 0: not free
+  float least_w = 0.0f;
+  std::int32_t parent = -1;  ///< -1: none
+  bool bears_others = false;
+};
+
+/// PoseMode::kCompact (STANDARD.md, "Poses"): the root as in kQuantised, then every joint's bits behind one another, the
+/// first of a number in the lowest bits, in little-endian words of 32 bits. What is left of the last word is 0.
+///
+/// Joints are encoded from the root on, each relative to what its parent is decoded to, so that it makes up for the errors
+/// of those above: its own error is all that is left of its rotation in the world.
+class CompactCodec {
+ public:
+  /// Poses that are encoded together.
+  static constexpr std::size_t kBlock = 16;
+
+  /// `parents` has one entry a joint, -1 for the first, then below its own index. Errors as CheckRotationCodes,
+  /// kShapeMismatch: not as many parents; kOutOfRange: a parent.
+  [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationCode> codes,
+                                                   std::span<const std::int16_t> parents);
+
+  [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
+  /// Bytes of a pose.
+  [[nodiscard]] std::size_t pose_bytes() const { return 4 * word_count_; }
+
+  /// Up to kBlock poses on their way to be encoded, and what came of it. Keep one: only Encode of a codec with more
+  /// joints than any before allocates.
+  class Block {
+   public:
+    [[nodiscard]] std::size_t size() const { return size_; }
+    /// Forgets them.
+    void Clear() { size_ = 0; }
+    /// Copies a pose in; there is room for kBlock.
+    void Add(const Vec3& root_position_m, std::span<const Quat> rotations);
+    /// The pose as it was added.
+    void Get(std::size_t i, Vec3& root_position_m, std::span<Quat> rotations) const;
+    /// After Encode: the pose is one that these codes can tell.
+    [[nodiscard]] bool fits(std::size_t i) const { return fits_[i] != 0; }
+    /// After Encode: its bytes, pose_bytes() of them; without meaning unless it fits.
+    void CopyBytes(std::size_t i, std::span<std::byte> out) const;
+
+   private:
+    friend class CompactCodec;
+    std::size_t size_ = 0;
+    std::size_t joint_count_ = 0;
+    float roots_m_[3][kBlock] = {};
+    std::vector<float> rotations_;      // [joint][pose][x y z w]
+    std::vector<float> errors_;         // [joint][x y z][pose]
+    std::vector<std::uint32_t> words_;  // [word / 4][pose][word % 4]
+    std::uint32_t fits_[kBlock] = {};
+  };
+
+  /// Encodes what was added, all of joint_count() joints. Not every pose fits: one whose joints turn out of the codes'
+  /// ranges, whose root is beyond kMaxRootM, or with a number that is not finite or a quaternion not unit within 1e-5.
+  void Encode(Block& block) const;
+
+  /// Reads one pose of pose_bytes() bytes, of any alignment; `rotations` has joint_count() entries and come back unit to
+  /// float32. kShapeMismatch: another size; kOutOfRange: the root; kMalformed: bits that no encoder writes.
+  [[nodiscard]] Status Decode(std::span<const std::byte> in, Vec3& root_position_m,
+                              std::span<Quat> rotations) const;
+
+ private:
+  CompactCodec() = default;
+
+  std::vector<CompactJoint> joints_;
+  std::size_t word_count_ = 0;  // with the root's three
+};
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,243 @@
+#include "stridewire/protocol/compact_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "compact_kernel.h"
+#include "smallest_three.h"
+#include "stridewire/base/check.h"
+#include "stridewire/protocol/limits.h"
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire::protocol {
+namespace {
+
+// The sum of the squares of the three smaller components is at most 3/4 and, with the fewest bits, a little more.
+constexpr float kMostThreeSquared = 0.77f;
+// What is told may have a smaller w than what was to be told: by half a step of each component.
+constexpr float kLeastToldW = 0.9f;
+
+constexpr std::size_t kRootWords = 3;
+
+// Reads what the kernel's BitWriter wrote.
+class BitReader {
+ public:
+  explicit BitReader(std::span<const std::byte> words) : words_(words) {}
+
+  // Up to 16 bits; there are as many.
+  std::uint32_t Take(int bits) {
+    if (bits > held_) {
+      std::uint32_t word = 0;
+      std::memcpy(&word, words_.data() + at_, 4);
+      at_ += 4;
+      window_ |= std::uint64_t{word} << held_;
+      held_ += 32;
+    }
+    const auto value = static_cast<std::uint32_t>(window_ & ((std::uint64_t{1} << bits) - 1));
+    window_ >>= bits;
+    held_ -= bits;
+    return value;
+  }
+  [[nodiscard]] bool RestIsZero() const { return window_ == 0; }
+
+ private:
+  std::span<const std::byte> words_;
+  std::size_t at_ = 0;
+  std::uint64_t window_ = 0;
+  int held_ = 0;
+};
+
+bool TakeFree(BitReader& reader, const CompactJoint& joint, Quat& q) {
+  const std::uint32_t largest = reader.Take(2);
+  const int zero = 1 << (joint.free_bits - 1);
+  float c[4] = {};
+  float squared = 0.0f;
+  bool is_good = true;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto bits = static_cast<int>(reader.Take(joint.free_bits));
+    is_good &= bits != 0;
+    const float value = static_cast<float>(bits - zero) * joint.step[0];
+    c[kStaying[largest][k]] = value;
+    squared += value * value;
+  }
+  if (!is_good || squared > kMostThreeSquared) return false;
+  c[largest] = std::sqrt(1.0f - squared);
+  q = Quat(c[3], c[0], c[1], c[2]);
+  return true;
+}
+
+bool TakeRanged(BitReader& reader, const CompactJoint& joint, Quat& q) {
+  float v[3];
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::uint32_t bits = joint.bits[c] > 0 ? reader.Take(joint.bits[c]) : 0;
+    v[c] = joint.low[c] + static_cast<float>(bits) * joint.step[c];
+  }
+  const float w_squared = 1.0f - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  const float least = kLeastToldW * joint.least_w;
+  if (!(w_squared >= least * least)) return false;
+  const Quat reference(joint.reference[3], joint.reference[0], joint.reference[1],
+                       joint.reference[2]);
+  q = reference * Quat(std::sqrt(w_squared), v[0], v[1], v[2]);
+  return true;
+}
+
+}  // namespace
+
+Status CheckRotationCodes(std::span<const RotationCode> codes) {
+  const auto wrong = [](ErrorCode code, const char* text, std::size_t joint) {
+    return Fail(code, text, static_cast<std::int64_t>(joint));
+  };
+  if (codes.size() > kMaxJoints) {
+    return wrong(ErrorCode::kLimitExceeded, "too many rotation codes", codes.size());
+  }
+  for (std::size_t j = 0; j < codes.size(); ++j) {
+    const RotationCode& code = codes[j];
+    if (code.free_bits != 0) {
+      if (code.free_bits < RotationCode::kMinFreeBits ||
+          code.free_bits > RotationCode::kMaxFreeBits) {
+        return wrong(ErrorCode::kOutOfRange, "not 8 to 15 free bits, or 0", j);
+      }
+    } else if (j == 0) {
+      return wrong(ErrorCode::kMalformed, "the root does not turn every way", j);
+    }
+    const float squared = Dot(code.reference, code.reference);
+    if (!(std::abs(squared - 1.0f) <= 1e-5f)) {
+      return wrong(ErrorCode::kOutOfRange, "reference is not a unit quaternion", j);
+    }
+    if (!(code.least_w >= RotationCode::kMinLeastW && code.least_w <= 1.0f)) {
+      return wrong(ErrorCode::kOutOfRange, "least w is not 0.3 to 1", j);
+    }
+    for (int c = 0; c < 3; ++c) {
+      if (!(std::abs(code.low[c]) <= 1.0f)) {
+        return wrong(ErrorCode::kOutOfRange, "component begins outside -1 to 1", j);
+      }
+      if (!(code.step[c] >= RotationCode::kMinStep && code.step[c] <= 2.0f)) {
+        return wrong(ErrorCode::kOutOfRange, "step is not 2^-20 to 2", j);
+      }
+      if (code.bits[static_cast<std::size_t>(c)] > RotationCode::kMaxBits) {
+        return wrong(ErrorCode::kOutOfRange, "more than 16 bits", j);
+      }
+    }
+  }
+  return {};
+}
+
+Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
+                                          std::span<const std::int16_t> parents) {
+  if (const Status status = CheckRotationCodes(codes); !status) {
+    return std::unexpected(status.error());
+  }
+  if (codes.empty() || codes.size() != parents.size()) {
+    return std::unexpected(Error{ErrorCode::kShapeMismatch, "not one rotation code a joint",
+                                 static_cast<std::int64_t>(codes.size())});
+  }
+  CompactCodec codec;
+  codec.joints_.resize(codes.size());
+  std::size_t bits = 0;
+  for (std::size_t j = 0; j < codes.size(); ++j) {
+    const RotationCode& code = codes[j];
+    CompactJoint& joint = codec.joints_[j];
+    joint.parent = parents[j];
+    if (j == 0 ? joint.parent != -1
+               : joint.parent < 0 || joint.parent >= static_cast<std::int32_t>(j)) {
+      return std::unexpected(Error{ErrorCode::kOutOfRange, "parent is not a joint before it",
+                                   static_cast<std::int64_t>(j)});
+    }
+    if (joint.parent >= 0)
+      codec.joints_[static_cast<std::size_t>(joint.parent)].bears_others = true;
+    joint.reference[0] = code.reference.x;
+    joint.reference[1] = code.reference.y;
+    joint.reference[2] = code.reference.z;
+    joint.reference[3] = code.reference.w;
+    joint.least_w = code.least_w;
+    joint.free_bits = code.free_bits;
+    if (code.free_bits > 0) {
+      joint.steps[0] = kSqrt2 * static_cast<float>((1 << (code.free_bits - 1)) - 1);
+      joint.step[0] = 1.0f / joint.steps[0];
+      bits += 2 + 3 * std::size_t{code.free_bits};
+      continue;
+    }
+    for (std::size_t c = 0; c < 3; ++c) {
+      joint.low[c] = code.low[static_cast<int>(c)];
+      joint.step[c] = code.step[static_cast<int>(c)];
+      joint.steps[c] = 1.0f / joint.step[c];
+      joint.bits[c] = code.bits[c];
+      bits += code.bits[c];
+    }
+  }
+  codec.word_count_ = kRootWords + (bits + 31) / 32;
+  return codec;
+}
+
+void CompactCodec::Block::Add(const Vec3& root_position_m, std::span<const Quat> rotations) {
+  STRIDEWIRE_CHECK(size_ < kBlock);
+  if (rotations_.size() < 4 * kBlock * rotations.size())
+    rotations_.resize(4 * kBlock * rotations.size());
+  joint_count_ = rotations.size();
+  for (int c = 0; c < 3; ++c) roots_m_[c][size_] = root_position_m[c];
+  float* to = rotations_.data() + 4 * size_;
+  for (const Quat& q : rotations) {
+    std::memcpy(to, &q.x, 16);
+    to += 4 * kBlock;
+  }
+  ++size_;
+}
+
+void CompactCodec::Block::Get(std::size_t i, Vec3& root_position_m,
+                              std::span<Quat> rotations) const {
+  for (int c = 0; c < 3; ++c) root_position_m[c] = roots_m_[c][i];
+  const float* from = rotations_.data() + 4 * i;
+  for (Quat& q : rotations) {
+    std::memcpy(&q.x, from, 16);
+    from += 4 * kBlock;
+  }
+}
+
+void CompactCodec::Block::CopyBytes(std::size_t i, std::span<std::byte> out) const {
+  const std::uint32_t* from = words_.data() + 4 * i;
+  std::size_t at = 0;
+  for (; at + 16 <= out.size(); at += 16, from += 4 * kBlock)
+    std::memcpy(out.data() + at, from, 16);
+  std::memcpy(out.data() + at, from, out.size() - at);
+}
+
+void CompactCodec::Encode(Block& block) const {
+  STRIDEWIRE_CHECK(block.size_ == 0 || block.joint_count_ == joints_.size());
+  // Lanes without a pose hold one from before, or zeros.
+  block.rotations_.resize(std::max(block.rotations_.size(), 4 * kBlock * joints_.size()));
+  block.errors_.resize(std::max(block.errors_.size(), 3 * kBlock * joints_.size()));
+  block.words_.resize(std::max(block.words_.size(), (word_count_ + 3) / 4 * 4 * kBlock));
+  EncodeCompact(joints_.data(), joints_.size(),
+                {&block.roots_m_[0][0], block.rotations_.data(), block.errors_.data(),
+                 block.words_.data(), block.fits_});
+}
+
+Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m,
+                            std::span<Quat> rotations) const {
+  if (rotations.size() != joints_.size()) {
+    return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints",
+                static_cast<std::int64_t>(rotations.size()));
+  }
+  if (in.size() != pose_bytes()) {
+    return Fail(ErrorCode::kShapeMismatch, "bytes of a pose have another size",
+                static_cast<std::int64_t>(in.size()));
+  }
+  if (const Status status = DecodeRoot(in.first<4 * kRootWords>(), root_position_m); !status) {
+    return status;
+  }
+  BitReader reader(in.subspan(4 * kRootWords));
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    const CompactJoint& joint = joints_[j];
+    const bool is_good = joint.free_bits > 0 ? TakeFree(reader, joint, rotations[j])
+                                             : TakeRanged(reader, joint, rotations[j]);
+    if (!is_good) {
+      return Fail(ErrorCode::kMalformed, "rotation has bits that no encoder writes",
+                  static_cast<std::int64_t>(j));
+    }
+  }
+  if (!reader.RestIsZero()) return Fail(ErrorCode::kMalformed, "pose has bits behind its last");
+  return {};
+}
+
+}  // namespace stridewire::protocol

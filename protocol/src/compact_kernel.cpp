@@ -1,0 +1,265 @@
+#include "compact_kernel.h"
+
+#include "stridewire/base/rotation_code.h"
+#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/pose_codec.h"
+
+#undef HWY_TARGET_INCLUDE
+// NOLINTNEXTLINE(readability-identifier-naming): Highway's
+#define HWY_TARGET_INCLUDE "compact_kernel.cpp"
+#include "hwy/foreach_target.h"
+// Behind foreach_target.h, which includes this file once for each instruction set.
+#include "hwy/highway.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace stridewire::protocol::HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr std::size_t kBlock = CompactCodec::kBlock;
+using D = hn::CappedTag<float, kBlock>;
+using DI = hn::RebindToSigned<D>;
+using DU = hn::RebindToUnsigned<D>;
+using V = hn::Vec<D>;
+using VI = hn::Vec<DI>;
+using VU = hn::Vec<DU>;
+
+// Adding it rounds a float to the nearest integer, the even one of two, on every machine; the integer is then in the
+// low bits.
+constexpr float kRounder = 12582912.0f;  // 1.5 2^23
+constexpr std::int32_t kRounderBits = 0x4b400000;
+
+// How far from 1 the square of a quaternion's length may be for it to be taken as unit here.
+constexpr float kUnitSquared = 2e-5f;
+
+struct Rotation {
+  V x, y, z, w;
+};
+
+HWY_INLINE V Sum3(V a, V b, V c) { return hn::Add(hn::Add(a, b), c); }
+
+// Numbers of some bits behind one another, a pose a lane; words leave in fours.
+class BitWriter {
+ public:
+  BitWriter(std::uint32_t* words, std::size_t lane) : to_(words + 4 * lane) {
+    word_ = hn::Zero(DU());
+  }
+
+  HWY_INLINE void Put(VI value, int bits) {
+    const DU du;
+    const VU u = hn::BitCast(du, value);
+    word_ = hn::Or(word_, hn::ShiftLeftSame(u, fill_));
+    fill_ += bits;
+    if (fill_ < 32) return;
+    fill_ -= 32;
+    PutWord(word_);
+    word_ = fill_ > 0 ? hn::ShiftRightSame(u, bits - fill_) : hn::Zero(du);
+  }
+
+  HWY_INLINE void PutWord(VU word) {
+    const DU du;
+    const std::size_t width = hn::Lanes(du);
+    hn::Store(word, du, pending_ + count_ * width);
+    if (++count_ < 4) return;
+    hn::StoreInterleaved4(hn::Load(du, pending_), hn::Load(du, pending_ + width),
+                          hn::Load(du, pending_ + 2 * width), hn::Load(du, pending_ + 3 * width),
+                          du, to_);
+    to_ += 4 * kBlock;
+    count_ = 0;
+  }
+
+  HWY_INLINE void Finish() {
+    if (fill_ > 0) PutWord(word_);
+    while (count_ != 0) PutWord(hn::Zero(DU()));
+  }
+
+ private:
+  HWY_ALIGN std::uint32_t pending_[4 * kBlock];
+  std::uint32_t* to_;
+  VU word_;
+  int fill_ = 0;
+  std::size_t count_ = 0;
+};
+
+// |value| below 2^22 of a component told in steps, as float and as integer.
+struct Steps {
+  V number;
+  VI integer;
+};
+HWY_INLINE Steps RoundToSteps(V value) {
+  const D d;
+  const DI di;
+  const V rounded = hn::Add(value, hn::Set(d, kRounder));
+  return {hn::Sub(rounded, hn::Set(d, kRounder)),
+          hn::Sub(hn::BitCast(di, rounded), hn::Set(di, kRounderBits))};
+}
+
+// Half away from zero, as std::round; exact, since a float times a power of two is.
+HWY_INLINE VI RootSteps(V metres) {
+  const D d;
+  const V scaled = hn::Mul(metres, hn::Set(d, kRootStepsPerM));
+  const V size = hn::Abs(scaled);
+  const V whole = hn::Trunc(size);
+  const V up = hn::IfThenElseZero(hn::Ge(hn::Sub(size, whole), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
+  return hn::ConvertTo(DI(), hn::CopySign(hn::Add(whole, up), scaled));
+}
+
+void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const CompactWork& work) {
+  const D d;
+  const DI di;
+  const std::size_t width = hn::Lanes(d);
+  const V one = hn::Set(d, 1.0f);
+  for (std::size_t lane = 0; lane < kBlock; lane += width) {
+    BitWriter writer(work.words, lane);
+    auto fits = hn::Eq(one, one);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const V metres = hn::LoadU(d, work.roots_m + c * kBlock + lane);
+      // False for what is no number as well.
+      fits = hn::And(fits, hn::Le(hn::Abs(metres), hn::Set(d, kMaxRootM)));
+      writer.PutWord(hn::BitCast(DU(), RootSteps(hn::IfThenElseZero(fits, metres))));
+    }
+    // Not 0 where a number needs more bits than it has.
+    VI excess = hn::Zero(di);
+    V ex = hn::Zero(d);  // what is left to make up for of the joint before
+    V ey = ex;
+    V ez = ex;
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      const CompactJoint& joint = joints[j];
+      Rotation q;
+      hn::LoadInterleaved4(d, work.rotations + 4 * (j * kBlock + lane), q.x, q.y, q.z, q.w);
+      const V squared =
+          hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)), hn::Mul(q.w, q.w));
+      fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
+      if (joint.parent >= 0) {
+        // e q, where e = (ex, ey, ez, 1): an angle of a thousandth or two.
+        if (static_cast<std::size_t>(joint.parent) + 1 != j) {
+          const float* error =
+              work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
+          ex = hn::LoadU(d, error);
+          ey = hn::LoadU(d, error + kBlock);
+          ez = hn::LoadU(d, error + 2 * kBlock);
+        }
+        const Rotation p = q;
+        q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
+        q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
+        q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
+        q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
+      }
+      Rotation told;
+      if (joint.free_bits > 0) {
+        // The smallest three, as quantise_kernel.cpp has them with 15 bits.
+        V largest = q.x;
+        VI index = hn::Zero(di);
+        const auto take = [&](V component, int number) HWY_ATTR {
+          const auto is_larger = hn::Gt(hn::Abs(component), hn::Abs(largest));
+          largest = hn::IfThenElse(is_larger, component, largest);
+          index = hn::IfThenElse(hn::RebindMask(di, is_larger), hn::Set(di, number), index);
+        };
+        take(q.y, 1);
+        take(q.z, 2);
+        take(q.w, 3);
+        const V sign = hn::CopySign(one, largest);
+        q.x = hn::Mul(q.x, sign);
+        q.y = hn::Mul(q.y, sign);
+        q.z = hn::Mul(q.z, sign);
+        q.w = hn::Mul(q.w, sign);
+        const auto is_0 = hn::RebindMask(d, hn::Eq(index, hn::Zero(di)));
+        const auto is_1 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 1)));
+        const auto is_2 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 2)));
+        const auto is_3 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 3)));
+        const auto is_0_or_1 = hn::RebindMask(d, hn::Lt(index, hn::Set(di, 2)));
+        const int most = (1 << (joint.free_bits - 1)) - 1;
+        const V to_steps = hn::Set(d, joint.steps[0]);
+        const V to_number = hn::Set(d, joint.step[0]);
+        writer.Put(index, 2);
+        const auto tell = [&](V component) HWY_ATTR {
+          Steps steps = RoundToSteps(hn::Mul(component, to_steps));
+          const V limit = hn::Set(d, static_cast<float>(most));
+          steps.number = hn::Max(hn::Min(steps.number, limit), hn::Neg(limit));
+          steps.integer = hn::Max(hn::Min(steps.integer, hn::Set(di, most)), hn::Set(di, -most));
+          writer.Put(hn::Add(steps.integer, hn::Set(di, most + 1)), joint.free_bits);
+          return hn::Mul(steps.number, to_number);
+        };
+        const V a = tell(hn::IfThenElse(is_0, q.y, q.x));
+        const V b = tell(hn::IfThenElse(is_0_or_1, q.z, q.y));
+        const V c = tell(hn::IfThenElse(is_3, q.z, q.w));
+        const V left = hn::Sqrt(
+            hn::Max(hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(a, a), hn::Mul(b, b), hn::Mul(c, c)))));
+        told.x = hn::IfThenElse(is_0, left, a);
+        told.y = hn::IfThenElse(is_1, left, hn::IfThenElse(is_0, a, b));
+        told.z = hn::IfThenElse(is_2, left, hn::IfThenElse(is_3, c, b));
+        told.w = hn::IfThenElse(is_3, left, c);
+      } else {
+        const V rx = hn::Set(d, joint.reference[0]);
+        const V ry = hn::Set(d, joint.reference[1]);
+        const V rz = hn::Set(d, joint.reference[2]);
+        const V rw = hn::Set(d, joint.reference[3]);
+        const Rotation p = q;
+        // conj(reference) q
+        q.w = hn::Add(hn::Mul(rw, p.w), Sum3(hn::Mul(rx, p.x), hn::Mul(ry, p.y), hn::Mul(rz, p.z)));
+        const V sign = hn::CopySign(one, q.w);
+        const auto component = [&](V u, V v, V w, V ru, V rv, V r) HWY_ATTR {
+          // rw u - ru w - (rv w' - rw' v) along one axis
+          return hn::Mul(sign, hn::Sub(hn::Sub(hn::Mul(rw, u), hn::Mul(ru, p.w)),
+                                       hn::Sub(hn::Mul(rv, w), hn::Mul(r, v))));
+        };
+        q.x = component(p.x, p.y, p.z, rx, ry, rz);
+        q.y = component(p.y, p.z, p.x, ry, rz, rx);
+        q.z = component(p.z, p.x, p.y, rz, rx, ry);
+        q.w = hn::Mul(q.w, sign);
+        fits = hn::And(fits, hn::Ge(q.w, hn::Set(d, joint.least_w)));
+        const auto tell = [&](V value, std::size_t c) HWY_ATTR {
+          const V low = hn::Set(d, joint.low[c]);
+          const Steps steps =
+              RoundToSteps(hn::Mul(hn::Sub(value, low), hn::Set(d, joint.steps[c])));
+          excess = hn::Or(excess, hn::ShiftRightSame(steps.integer, joint.bits[c]));
+          if (joint.bits[c] > 0) writer.Put(steps.integer, joint.bits[c]);
+          return hn::Add(low, hn::Mul(steps.number, hn::Set(d, joint.step[c])));
+        };
+        told.x = tell(q.x, 0);
+        told.y = tell(q.y, 1);
+        told.z = tell(q.z, 2);
+        if (joint.bears_others) {
+          told.w = hn::Sqrt(hn::Max(
+              hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(told.x, told.x), hn::Mul(told.y, told.y),
+                                             hn::Mul(told.z, told.z)))));
+        }
+      }
+      if (!joint.bears_others) continue;
+      // conj(told) q: from what is told to what is.
+      ex = hn::Sub(hn::Sub(hn::Mul(told.w, q.x), hn::Mul(told.x, q.w)),
+                   hn::Sub(hn::Mul(told.y, q.z), hn::Mul(told.z, q.y)));
+      ey = hn::Sub(hn::Sub(hn::Mul(told.w, q.y), hn::Mul(told.y, q.w)),
+                   hn::Sub(hn::Mul(told.z, q.x), hn::Mul(told.x, q.z)));
+      ez = hn::Sub(hn::Sub(hn::Mul(told.w, q.z), hn::Mul(told.z, q.w)),
+                   hn::Sub(hn::Mul(told.x, q.y), hn::Mul(told.y, q.x)));
+      float* error = work.errors + j * 3 * kBlock + lane;
+      hn::StoreU(ex, d, error);
+      hn::StoreU(ey, d, error + kBlock);
+      hn::StoreU(ez, d, error + 2 * kBlock);
+    }
+    writer.Finish();
+    const auto is_exact = hn::RebindMask(d, hn::Eq(excess, hn::Zero(di)));
+    const VI told = hn::IfThenElseZero(hn::RebindMask(di, hn::And(fits, is_exact)), hn::Set(di, 1));
+    hn::StoreU(hn::BitCast(DU(), told), DU(), work.fits + lane);
+  }
+}
+
+}  // namespace
+}  // namespace stridewire::protocol::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+
+namespace stridewire::protocol {
+
+HWY_EXPORT(EncodeCompact);
+
+void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const CompactWork& work) {
+  HWY_DYNAMIC_DISPATCH(EncodeCompact)(joints, joint_count, work);
+}
+
+}  // namespace stridewire::protocol
+
+#endif  // HWY_ONCE

@@ -1,0 +1,382 @@
+// Compact poses: how many bytes they take and how far anything in them is from where it should be, over every frame of
+// every capture there is and over avatars that do all that avatars do; on every instruction set this machine has.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <iostream>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "captured_library.h"
+#include "instruction_sets.h"
+#include "random.h"
+#include "rough_ground.h"
+#include "stridewire/offline/open_library.h"
+#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/pose_codec.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/pose_code.h"
+
+namespace stridewire {
+namespace {
+
+using Library = std::shared_ptr<const MotionLibrary>;
+using protocol::CompactCodec;
+using protocol::PoseMode;
+
+constexpr double kLargestErrorM = 0.001;
+constexpr double kMostBytes31Joints = 120.0;
+
+std::vector<std::int16_t> ParentsOf(const Skeleton& skeleton) {
+  std::vector<std::int16_t> parents;
+  for (const Joint& joint : skeleton.joints) {
+    parents.push_back(static_cast<std::int16_t>(joint.parent));
+  }
+  return parents;
+}
+
+CompactCodec CodecOf(const Skeleton& skeleton, const PoseCode& code) {
+  return CompactCodec::Make(code.joints, ParentsOf(skeleton)).value();
+}
+
+// Puts poses through their codes, in double precision but for those, and keeps what came of them.
+class Passage {
+ public:
+  Passage(const Skeleton& skeleton, const CompactCodec& codec)
+      : skeleton_(skeleton), codec_(codec), in_(skeleton.joints.size()), back_(in_) {
+    bytes_.resize(
+        std::max(codec.pose_bytes(), protocol::PoseBytes(PoseMode::kQuantised, in_.size())));
+  }
+
+  void Send(ConstPoseSpan pose) {
+    block_.Add(pose.root_position_m, pose.rotations);
+    if (block_.size() == CompactCodec::kBlock) Flush();
+  }
+
+  void Flush() {
+    codec_.Encode(block_);
+    for (std::size_t i = 0; i < block_.size(); ++i) {
+      Vec3 root;
+      Vec3 root_back;
+      block_.Get(i, root, in_);
+      Status status;
+      std::span<std::byte> bytes = bytes_;
+      if (block_.fits(i)) {
+        bytes = bytes.first(codec_.pose_bytes());
+        block_.CopyBytes(i, bytes);
+        status = codec_.Decode(bytes, root_back, back_);
+      } else {
+        ++wide_;
+        bytes = bytes.first(protocol::PoseBytes(PoseMode::kQuantised, in_.size()));
+        ASSERT_TRUE(protocol::EncodePose(PoseMode::kQuantised, root, in_, bytes));
+        status = protocol::DecodePose(PoseMode::kQuantised, bytes, root_back, back_);
+      }
+      ASSERT_TRUE(status) << Describe(status.error());
+      total_bytes_ += bytes.size();
+      ++poses_;
+      Measure(root, root_back);
+    }
+    block_.Clear();
+  }
+
+  [[nodiscard]] std::size_t poses() const { return poses_; }
+  [[nodiscard]] std::size_t wide() const { return wide_; }
+  [[nodiscard]] double mean_bytes() const {
+    return static_cast<double>(total_bytes_) / static_cast<double>(poses_);
+  }
+  [[nodiscard]] double mean_error_m() const { return sum_m_ / static_cast<double>(points_); }
+  [[nodiscard]] double largest_error_m() const { return largest_m_; }
+
+  void Print(const std::string& what) const {
+    std::cout << what << ": " << skeleton_.joints.size() << " joints, " << poses_ << " poses of "
+              << mean_bytes() << " bytes on average, " << codec_.pose_bytes() << " but for "
+              << wide_ << "; off by " << 1e3 * mean_error_m() << " mm on average, "
+              << 1e3 * largest_m_ << " at most\n";
+  }
+
+ private:
+  struct Frame {
+    std::vector<DVec3> positions;
+    std::vector<DQuat> rotations;
+  };
+
+  void Place(const Vec3& root, std::span<const Quat> rotations, Frame& frame) const {
+    frame.positions.resize(rotations.size());
+    frame.rotations.resize(rotations.size());
+    for (std::size_t j = 0; j < rotations.size(); ++j) {
+      const Joint& joint = skeleton_.joints[j];
+      const DQuat local = glm::normalize(DQuat(rotations[j]));
+      if (joint.parent < 0) {
+        frame.positions[j] = DVec3(root);
+        frame.rotations[j] = local;
+        continue;
+      }
+      const auto parent = static_cast<std::size_t>(joint.parent);
+      frame.positions[j] =
+          frame.positions[parent] + frame.rotations[parent] * DVec3(joint.offset_m);
+      frame.rotations[j] = frame.rotations[parent] * local;
+    }
+  }
+
+  void Measure(const Vec3& root, const Vec3& root_back) {
+    Place(root, in_, true_);
+    Place(root_back, back_, told_);
+    const auto take = [&](const DVec3& a, const DVec3& b) {
+      const double error_m = glm::length(a - b);
+      sum_m_ += error_m;
+      ++points_;
+      largest_m_ = std::max(largest_m_, error_m);
+    };
+    for (std::size_t j = 0; j < in_.size(); ++j) take(true_.positions[j], told_.positions[j]);
+    for (const EndSite& site : skeleton_.end_sites) {
+      const auto j = static_cast<std::size_t>(site.joint);
+      const DVec3 offset(site.offset_m);
+      take(true_.positions[j] + true_.rotations[j] * offset,
+           told_.positions[j] + told_.rotations[j] * offset);
+    }
+  }
+
+  const Skeleton& skeleton_;
+  const CompactCodec& codec_;
+  CompactCodec::Block block_;
+  std::vector<Quat> in_;
+  std::vector<Quat> back_;
+  std::vector<std::byte> bytes_;
+  Frame true_;
+  Frame told_;
+  std::size_t poses_ = 0;
+  std::size_t wide_ = 0;
+  std::size_t total_bytes_ = 0;
+  std::size_t points_ = 0;
+  double sum_m_ = 0.0;
+  double largest_m_ = 0.0;
+};
+
+// Avatars that step, turn, walk, jump, stand and take over, every second one on rough ground, with layers.
+class Crowd {
+ public:
+  Crowd(Library library, int size, unsigned seed) : library_(std::move(library)), random_(seed) {
+    const auto ground = RoughGround(random_);
+    for (int i = 0; i < size; ++i) {
+      const BaseFrame start{DVec3(3.0 * i, 0.0, random_.Draw(-50.0, 50.0)),
+                            random_.Draw(-20.0, 20.0)};
+      avatars_.emplace_back(library_, start,
+                            AvatarOptions{.terrain = i % 2 == 0 ? nullptr : ground});
+    }
+    for (Avatar& avatar : avatars_) all_.push_back(&avatar);
+  }
+
+  void Advance() {
+    const auto layers = static_cast<double>(library_->layers().size());
+    for (Avatar& avatar : avatars_) {
+      if (layers > 0.0 && Chance(0.01)) {
+        (void)avatar.SetLayer(
+            {.layer = static_cast<int>(random_.Draw(0.0, layers)), .is_on = Chance(0.6)});
+      }
+      if (avatar.queue_size() == 0 && Chance(0.2)) Ask(avatar);
+    }
+    Avatar::AdvanceAll(all_, 1.0 / 60.0);
+  }
+
+  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+
+ private:
+  bool Chance(double of_one) { return random_.Draw(0.0, 1.0) < of_one; }
+
+  void Ask(Avatar& avatar) {
+    MovementRequest request{.id = ++id_};
+    const double kind = random_.Draw(0.0, 1.0);
+    if (kind < 0.5) {
+      request.movement =
+          StepRequest{.length_m = random_.Draw(0.1, 0.8), .turn_rad = random_.Draw(-0.4, 0.4)};
+    } else if (kind < 0.8) {
+      request.movement =
+          WalkRequest{.position_m = avatar.base().position_m +
+                                    DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0)),
+                      .heading_rad = random_.Draw(-3.0, 3.0)};
+    } else {
+      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
+    }
+    if (Chance(0.2)) request.takeover = Takeover::kNow;
+    (void)avatar.Enqueue(request);
+  }
+
+  Library library_;
+  Random random_;
+  std::uint64_t id_ = 0;
+  std::vector<Avatar> avatars_;
+  std::vector<Avatar*> all_;
+};
+
+struct Source {
+  const char* name;
+  std::vector<std::string> subjects;  // captured; none: the generated library
+};
+void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
+
+class CompactPosesOf : public testing::TestWithParam<Source> {
+ protected:
+  void SetUp() override {
+    STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
+    library_ = LibraryOf(GetParam().subjects);
+    code_ = ChoosePoseCode(*library_);
+  }
+  [[nodiscard]] const Skeleton& skeleton() const { return library_->skeleton(); }
+
+  Library library_;
+  PoseCode code_;
+};
+constexpr auto kNameOf = [](const auto& source) { return source.param.name; };
+// Subject 01 is Debian's.
+const auto kCaptured = testing::Values(
+    Source{"DebianTakes", {kDebianTakes}}, Source{"Subject03", {"03"}}, Source{"Subject05", {"05"}},
+    Source{"Subject06", {"06"}}, Source{"Subject09", {"09"}}, Source{"Subject14", {"14"}},
+    Source{"Subject16", {"16"}}, Source{"Subject29", {"29"}}, Source{"Subject32", {"32"}});
+INSTANTIATE_TEST_SUITE_P(Generated, CompactPosesOf, testing::Values(Source{"Builtin", {}}),
+                         kNameOf);
+INSTANTIATE_TEST_SUITE_P(Captured, CompactPosesOf, kCaptured, kNameOf);
+
+class CompactCapturesOf : public CompactPosesOf {};
+INSTANTIATE_TEST_SUITE_P(Captured, CompactCapturesOf, kCaptured, kNameOf);
+
+TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
+  EXPECT_LE(code_.largest_error_m, kLargestErrorM);
+  const CompactCodec codec = CodecOf(skeleton(), code_);
+  Passage passage(skeleton(), codec);
+  for (const auto& take : TakesOf(GetParam().subjects)) {
+    const Capture capture = ReadBvh(take).value();
+    for (int f = 0; f < capture.clip.frame_count(); ++f) passage.Send(capture.clip.frame(f));
+  }
+  passage.Flush();
+  passage.Print(GetParam().name);
+  ASSERT_GT(passage.poses(), 0u);
+  EXPECT_LE(passage.largest_error_m(), kLargestErrorM);
+  EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
+}
+
+TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
+  const CompactCodec codec = CodecOf(skeleton(), code_);
+  Passage passage(skeleton(), codec);
+  Crowd crowd(library_, 20, 5);
+  for (int tick = 0; tick < 1200; ++tick) {
+    crowd.Advance();
+    for (const Avatar& avatar : crowd.avatars()) passage.Send(avatar.pose());
+  }
+  passage.Flush();
+  passage.Print(std::string("avatars of ") + GetParam().name);
+  EXPECT_LE(passage.largest_error_m(), kLargestErrorM);
+  EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
+}
+
+TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
+  const CompactCodec codec = CodecOf(skeleton(), code_);
+  Crowd crowd(library_, 7, 6);  // the last block is not full
+  std::vector<CompactCodec::Block> blocks;
+  for (int tick = 0; tick < 120; ++tick) {
+    crowd.Advance();
+    for (const Avatar& avatar : crowd.avatars()) {
+      if (blocks.empty() || blocks.back().size() == CompactCodec::kBlock) blocks.emplace_back();
+      blocks.back().Add(avatar.pose().root_position_m, avatar.pose().rotations);
+    }
+  }
+  std::vector<std::vector<std::byte>> all;
+  for (const std::int64_t set : InstructionSets()) {
+    const OnlyInstructionSet only(set);
+    std::vector<std::byte>& bytes = all.emplace_back();
+    std::vector<std::byte> pose(codec.pose_bytes());
+    for (CompactCodec::Block& block : blocks) {
+      codec.Encode(block);
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        bytes.push_back(static_cast<std::byte>(block.fits(i)));
+        block.CopyBytes(i, pose);
+        bytes.insert(bytes.end(), pose.begin(), pose.end());
+      }
+    }
+    EXPECT_TRUE(bytes == all.front()) << hwy::TargetName(set);
+  }
+}
+
+// Any tree of joints that turn any way within any ranges: what is stated is kept.
+TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
+  const unsigned seed = std::random_device{}();
+  std::cout << "seed " << seed << '\n';
+  Random random(seed);
+  double closest = 0.0;
+  for (int round = 0; round < 60; ++round) {
+    Skeleton skeleton;
+    const int joints = 1 + static_cast<int>(random.Draw(0.0, 60.0));
+    const auto offset = [&] {
+      return Vec3(random.Draw(-0.3, 0.3), random.Draw(-0.3, 0.3), random.Draw(-0.3, 0.3));
+    };
+    std::vector<RotationRange> ranges;
+    for (int j = 0; j < joints; ++j) {
+      const int parent = j == 0 ? -1 : j - 1 - static_cast<int>(random.Draw(0.0, 0.2) * j);
+      skeleton.joints.push_back({std::to_string(j), parent, offset()});
+      RotationRange range;
+      const auto normal = [&] { return static_cast<float>(random.Draw(-1.0, 1.0)); };
+      range.reference = Normalise(Quat(normal() + 2.0f, normal(), normal(), normal()));
+      // Some turn every way; others within a box of up to 0.5 a side.
+      if (j > 0 && random.Draw(0.0, 1.0) < 0.9) {
+        double squared = 0.0;
+        for (int c = 0; c < 3; ++c) {
+          range.low[c] = static_cast<float>(random.Draw(-0.5, 0.0));
+          range.high[c] = static_cast<float>(random.Draw(0.01, 0.5));
+          const double most = std::max(-range.low[c], range.high[c]);
+          squared += most * most;
+        }
+        range.least_w = std::sqrt(1.0 - squared);
+      }
+      ranges.push_back(range);
+    }
+    skeleton.end_sites.push_back({joints - 1, offset()});
+    const PoseCode code = ChoosePoseCode(skeleton, ranges, kLargestErrorM);
+    const CompactCodec codec = CodecOf(skeleton, code);
+    Passage passage(skeleton, codec);
+    Pose pose(joints);
+    for (int i = 0; i < 200; ++i) {
+      for (int j = 0; j < joints; ++j) {
+        Quat& q = pose.rotations[static_cast<std::size_t>(j)];
+        const RotationRange& range = ranges[static_cast<std::size_t>(j)];
+        if (range.least_w < static_cast<double>(RotationCode::kMinLeastW)) {
+          const auto normal = [&] { return static_cast<float>(random.Draw(-1.0, 1.0)); };
+          q = Normalise(Quat(normal() + 0.1f, normal(), normal(), normal()));
+          continue;
+        }
+        // Less what it has to make up for of the joint above.
+        Vec3 v;
+        for (int c = 0; c < 3; ++c) {
+          v[c] = static_cast<float>(random.Draw(0.99, 1.0) *
+                                    random.Draw(static_cast<double>(range.low[c]) + 0.0025,
+                                                static_cast<double>(range.high[c]) - 0.0025));
+        }
+        const float w = std::sqrt(1.0f - (v.x * v.x + v.y * v.y + v.z * v.z));
+        q = Normalise(range.reference * Quat(w, v.x, v.y, v.z));
+      }
+      passage.Send(pose);
+    }
+    passage.Flush();
+    EXPECT_EQ(passage.wide(), 0u) << "seed " << seed << ", round " << round;
+    EXPECT_LE(passage.largest_error_m(), code.largest_error_m + 1e-5)
+        << "seed " << seed << ", round " << round;
+    EXPECT_LE(code.largest_error_m, kLargestErrorM) << "seed " << seed << ", round " << round;
+    closest = std::max(closest, passage.largest_error_m() / kLargestErrorM);
+  }
+  // The bound is no idle one.
+  EXPECT_GT(closest, 0.3) << "seed " << seed;
+}
+
+TEST(CompactPoses, BonesOfManyMetresGetAllBitsAndSaySo) {
+  Skeleton skeleton;
+  skeleton.joints = {{"root", -1, Vec3(0.0f)}, {"far", 0, Vec3(0.0f, 100.0f, 0.0f)}};
+  const std::vector<RotationRange> ranges(2);
+  const PoseCode code = ChoosePoseCode(skeleton, ranges, kLargestErrorM);
+  EXPECT_EQ(code.joints[0].free_bits, RotationCode::kMaxFreeBits);
+  EXPECT_GT(code.largest_error_m, kLargestErrorM);
+  EXPECT_TRUE(protocol::CheckRotationCodes(code.joints));
+}
+
+}  // namespace
+}  // namespace stridewire

@@ -1,0 +1,236 @@
+#include "stridewire/protocol/compact_codec.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire::protocol {
+namespace {
+
+constexpr std::array<std::int16_t, 3> kParents = {-1, 0, 1};
+
+// A root, a joint that turns about three axes and one that turns about one: 2 + 36 + 30 + 12 bits.
+std::vector<RotationCode> Codes() {
+  std::vector<RotationCode> codes(3);
+  codes[0].free_bits = 12;
+  codes[1].reference = YawRotation(0.5);
+  codes[1].low = Vec3(-0.5f);
+  codes[1].step = Vec3(1.0f / 1024.0f);
+  codes[1].bits = {10, 10, 10};
+  codes[1].least_w = 0.5f;
+  codes[2].low = Vec3(-0.25f, 0.0f, 0.0f);
+  codes[2].step = Vec3(1.0f / 8192.0f, 0.004f, 0.004f);
+  codes[2].bits = {12, 0, 0};
+  codes[2].least_w = 0.9f;
+  return codes;
+}
+
+CompactCodec Codec() { return CompactCodec::Make(Codes(), kParents).value(); }
+
+std::vector<Quat> SomePose() {
+  return {YawRotation(2.0), YawRotation(0.7), glm::normalize(Quat(1.0f, 0.1f, 0.0f, 0.0f))};
+}
+
+std::vector<std::byte> BytesOf(const CompactCodec& codec, const Vec3& root,
+                               const std::vector<Quat>& rotations) {
+  CompactCodec::Block block;
+  block.Add(root, rotations);
+  codec.Encode(block);
+  if (!block.fits(0)) return {};
+  std::vector<std::byte> bytes(codec.pose_bytes());
+  block.CopyBytes(0, bytes);
+  return bytes;
+}
+
+TEST(CompactCodec, BytesAreThoseOfTheStandard) {
+  const CompactCodec codec = Codec();
+  EXPECT_EQ(codec.joint_count(), 3u);
+  ASSERT_EQ(codec.pose_bytes(), 12u + 12u);
+  // Exact in their codes, so that no joint has anything to make up for.
+  const Quat bent = Quat(std::sqrt(0.984375f), 0.125f, 0.0f, 0.0f);
+  const Quat turned = Codes()[1].reference * Quat(std::sqrt(0.6875f), 0.25f, -0.5f, 0.0f);
+  const auto bytes = BytesOf(codec, Vec3(1.0f, -0.5f, 0.00002f), {Quat(0, 0, -1, 0), turned, bent});
+  ASSERT_EQ(bytes.size(), 24u);
+  std::array<std::int32_t, 3> root;
+  std::array<std::uint32_t, 3> words;
+  std::memcpy(root.data(), bytes.data(), 12);
+  std::memcpy(words.data(), bytes.data() + 12, 12);
+  EXPECT_EQ(root, (std::array<std::int32_t, 3>{16384, -8192, 0}));
+  // Root: y (1) is left out; x, z, w are 0, which is 2048.
+  EXPECT_EQ(words[0], 1u | 2048u << 2 | 2048u << 14 | (2048u & 63u) << 26);
+  // The rest of w, then 0.25, -0.5 and 0 from -0.5 on in steps of 2^-10: 768, 0, 512.
+  EXPECT_EQ(words[1], 2048u >> 6 | 768u << 6 | 0u << 16 | (512u & 63u) << 26);
+  // The rest of that, then 0.125 from -0.25 on in steps of 2^-13: 3072.
+  EXPECT_EQ(words[2], 512u >> 6 | 3072u << 4);
+}
+
+TEST(CompactCodec, GivesBackWhatItWasGiven) {
+  const CompactCodec codec = Codec();
+  const auto bytes = BytesOf(codec, Vec3(1.0f, 2.0f, 3.0f), SomePose());
+  ASSERT_EQ(bytes.size(), codec.pose_bytes());
+  Vec3 root;
+  std::vector<Quat> back(3);
+  ASSERT_TRUE(codec.Decode(bytes, root, back));
+  EXPECT_EQ(root, Vec3(1.0f, 2.0f, 3.0f));
+  const std::vector<Quat> given = SomePose();
+  for (std::size_t j = 0; j < 3; ++j) {
+    EXPECT_NEAR(std::abs(Dot(back[j], given[j])), 1.0f, 1e-5) << j;
+    EXPECT_NEAR(Dot(back[j], back[j]), 1.0f, 1e-6) << j;
+  }
+}
+
+TEST(CompactCodec, AJointMakesUpForTheErrorsOfThoseAbove) {
+  std::vector<RotationCode> codes = Codes();
+  codes[0].free_bits = RotationCode::kMinFreeBits;  // 19 thousandths of a radian
+  codes[1].bits = {16, 16, 16};
+  codes[1].step = Vec3(1.0f / 65536.0f);
+  const CompactCodec codec = CompactCodec::Make(codes, kParents).value();
+  const unsigned seed = std::random_device{}();
+  std::mt19937 random(seed);
+  std::normal_distribution<float> normal;
+  double largest_root = 0.0;
+  for (int i = 0; i < 1000; ++i) {
+    std::vector<Quat> pose = SomePose();
+    pose[0] = glm::normalize(Quat(normal(random), normal(random), normal(random), normal(random)));
+    const auto bytes = BytesOf(codec, Vec3(0.0f), pose);
+    ASSERT_FALSE(bytes.empty()) << "seed " << seed;
+    Vec3 root;
+    std::vector<Quat> back(3);
+    ASSERT_TRUE(codec.Decode(bytes, root, back));
+    const auto angle = [](const Quat& a, const Quat& b) { return AngleBetween(a, b); };
+    largest_root = std::max(largest_root, angle(pose[0], back[0]));
+    ASSERT_LE(angle(pose[0], back[0]), std::sqrt(6.0) / 127.0);
+    ASSERT_LE(angle(pose[0] * pose[1], back[0] * back[1]), 1e-4) << "seed " << seed;
+  }
+  EXPECT_GT(largest_root, 0.005) << "seed " << seed;
+}
+
+TEST(CompactCodec, WhatItCannotTellDoesNotFit) {
+  const CompactCodec codec = Codec();
+  const auto fits = [&](const Vec3& root, const std::vector<Quat>& pose) {
+    return !BytesOf(codec, root, pose).empty();
+  };
+  ASSERT_TRUE(fits(Vec3(0.0f), SomePose()));
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const float bad : {nan, infinity, -infinity, 131'072.0f}) {
+    EXPECT_FALSE(fits(Vec3(0.0f, bad, 0.0f), SomePose()));
+  }
+  EXPECT_TRUE(fits(Vec3(kMaxRootM), SomePose()));
+  for (std::size_t joint = 0; joint < 3; ++joint) {
+    for (const Quat& bad : {Quat(nan, 0, 0, 0), Quat(1, infinity, 0, 0), Quat(0, 0, 0, 0),
+                            Quat(1.001f, 0, 0, 0), Quat(0.999f, 0, 0, 0)}) {
+      std::vector<Quat> pose = SomePose();
+      pose[joint] = bad;
+      EXPECT_FALSE(fits(Vec3(0.0f), pose)) << joint;
+    }
+  }
+  std::vector<Quat> pose = SomePose();
+  pose[0] = Quat(0, 1, 0, 0);  // the root turns every way
+  EXPECT_TRUE(fits(Vec3(0.0f), pose));
+  pose[1] = YawRotation(0.5 + 1.3);  // y = sin 0.65 = 0.61
+  EXPECT_FALSE(fits(Vec3(0.0f), pose));
+  pose = SomePose();
+  pose[2] = YawRotation(0.02);  // about an axis that it is not told about
+  EXPECT_FALSE(fits(Vec3(0.0f), pose));
+}
+
+TEST(CompactCodec, PosesOfABlockDoNotMind) {
+  const CompactCodec codec = Codec();
+  CompactCodec::Block block;
+  for (std::size_t i = 0; i < CompactCodec::kBlock; ++i) {
+    std::vector<Quat> pose = SomePose();
+    pose[1] = YawRotation(i % 3 == 1 ? 3.0 : 0.5 + 0.03 * static_cast<double>(i));
+    block.Add(Vec3(static_cast<float>(i), 0.0f, 0.0f), pose);
+  }
+  codec.Encode(block);
+  for (std::size_t i = 0; i < CompactCodec::kBlock; ++i) {
+    Vec3 root;
+    std::vector<Quat> pose(3);
+    block.Get(i, root, pose);
+    EXPECT_EQ(root.x, static_cast<float>(i));
+    ASSERT_EQ(block.fits(i), i % 3 != 1) << i;
+    if (!block.fits(i)) continue;
+    std::vector<std::byte> bytes(codec.pose_bytes());
+    block.CopyBytes(i, bytes);
+    EXPECT_EQ(bytes, BytesOf(codec, root, pose)) << i;
+  }
+}
+
+TEST(CompactCodec, DecodeRefusesBitsNoEncoderWrites) {
+  const CompactCodec codec = Codec();
+  const auto good = BytesOf(codec, Vec3(0.0f), SomePose());
+  ASSERT_FALSE(good.empty());
+  const auto decode = [&](std::span<const std::byte> bytes) {
+    Vec3 root;
+    std::vector<Quat> back(3);
+    return codec.Decode(bytes, root, back);
+  };
+  ASSERT_TRUE(decode(good));
+  EXPECT_EQ(decode(std::span(good).first(23)).error().code, ErrorCode::kShapeMismatch);
+  auto longer = good;
+  longer.resize(28);
+  EXPECT_EQ(decode(longer).error().code, ErrorCode::kShapeMismatch);
+  const auto with_word = [&](std::size_t word, std::uint32_t value) {
+    auto bytes = good;
+    std::memcpy(bytes.data() + 4 * word, &value, 4);
+    return decode(bytes);
+  };
+  EXPECT_EQ(with_word(1, 0x8000'0000).error().code, ErrorCode::kOutOfRange);
+  EXPECT_EQ(with_word(3, 0).error().code, ErrorCode::kMalformed);            // no component is 0
+  EXPECT_EQ(with_word(3, 0xffff'fffc).error().code, ErrorCode::kMalformed);  // a root too long
+  EXPECT_EQ(with_word(5, 0x8000'0000).error().code, ErrorCode::kMalformed);  // behind the last bit
+  // -0.5, -0.5 and 0 leave 0.71 for w, where 0.9 is the least.
+  auto codes = Codes();
+  codes[1].least_w = 0.9f;
+  const CompactCodec strict = CompactCodec::Make(codes, kParents).value();
+  auto bytes = good;
+  const std::uint32_t low = 2048u >> 6;
+  std::memcpy(bytes.data() + 16, &low, 4);
+  Vec3 root;
+  std::vector<Quat> back(3);
+  EXPECT_EQ(strict.Decode(bytes, root, back).error().code, ErrorCode::kMalformed);
+}
+
+TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
+  const auto code = [](const std::vector<RotationCode>& codes) {
+    const auto codec = CompactCodec::Make(codes, kParents);
+    return codec ? ErrorCode::kIo : codec.error().code;
+  };
+  ASSERT_EQ(code(Codes()), ErrorCode::kIo);
+  const auto with = [&](const auto& change, std::size_t joint = 1) {
+    std::vector<RotationCode> codes = Codes();
+    change(codes[joint]);
+    return code(codes);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(with([](RotationCode& c) { c.free_bits = 0; }, 0), ErrorCode::kMalformed);
+  for (const std::uint8_t bits : {1, 7, 16, 255}) {
+    EXPECT_EQ(with([&](RotationCode& c) { c.free_bits = bits; }), ErrorCode::kOutOfRange);
+  }
+  EXPECT_EQ(with([](RotationCode& c) { c.bits[2] = 17; }), ErrorCode::kOutOfRange);
+  for (const float bad : {nan, -2.0f, 0.0f}) {
+    EXPECT_EQ(with([&](RotationCode& c) { c.step.y = bad; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationCode& c) { c.reference.x = bad == 0.0f ? 1.0f : bad; }),
+              ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationCode& c) { c.least_w = bad; }), ErrorCode::kOutOfRange);
+  }
+  EXPECT_EQ(with([&](RotationCode& c) { c.low.z = nan; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([&](RotationCode& c) { c.low.z = 1.5f; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([&](RotationCode& c) { c.least_w = 1.5f; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(CompactCodec::Make({}, {}).error().code, ErrorCode::kShapeMismatch);
+  EXPECT_EQ(CompactCodec::Make(Codes(), std::array<std::int16_t, 2>{-1, 0}).error().code,
+            ErrorCode::kShapeMismatch);
+  EXPECT_EQ(CompactCodec::Make(Codes(), std::array<std::int16_t, 3>{-1, 0, 2}).error().code,
+            ErrorCode::kOutOfRange);
+}
+
+}  // namespace
+}  // namespace stridewire::protocol
