@@ -167,7 +167,7 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
       CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
-                     caches[i], measured, movements[i]);
+                     movements[i]);
       StartWeighted(group, {}, movements[i]);
       caches[i].Clear();
       jobs[i] = {&movements[i], 0.0, &caches[i], &poses[i]};

@@ -87,9 +87,8 @@ void StartCorrected(benchmark::State& state, const Library& library, int group_i
     const std::vector<double>& wanted = parameters[i++ % kVariations];
     ParameterValues values{.count = group.parameter_count()};
     std::copy(wanted.begin(), wanted.end(), values.values.begin());
-    const Correction correction =
-        CorrectWeights(*library, group_index, values, DefaultCorrectionLimits(group), scratch,
-                       cache, pose, movement);
+    const Correction correction = CorrectWeights(*library, group_index, values,
+                                                 DefaultCorrectionLimits(group), scratch, movement);
     StartWeighted(group, {}, movement);
     iterations += correction.iterations;
     benchmark::DoNotOptimize(movement.weights.data());

@@ -126,8 +126,7 @@ HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
 
 Correction GroupProbe::Correct(const MotionGroup& group, const ParameterValues& wanted,
                                const CorrectionLimits& limits) {
-  return CorrectWeights(skeleton_, layout_, group, wanted, limits, scratch_, cache_, pose_,
-                        movement_);
+  return CorrectWeights(skeleton_, layout_, group, wanted, limits, scratch_, movement_);
 }
 
 std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {

@@ -177,8 +177,8 @@ class Comparer {
       if (smooth == nullptr) continue;
       const std::span<const double> site =
           std::span(others.sites).subspan(c * wanted.size(), wanted.size());
-      if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch, cache_,
-                           pose_, movement_)) {
+      if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch,
+                           movement_)) {
         std::copy_n(scratch.begin(), n, share.begin());
       }
     }
@@ -191,7 +191,7 @@ class Comparer {
     ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
     CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
-                   DefaultCorrectionLimits(group_), scratch, cache_, pose_, movement_);
+                   DefaultCorrectionLimits(group_), scratch, movement_);
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 

@@ -146,13 +146,12 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
 
 bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const Skeleton& skeleton,
                       std::span<const double> parameters, std::span<double> scratch,
-                      GridCache& cache, PoseSpan pose, Movement& movement) {
+                      Movement& movement) {
   ParameterValues wanted;
   wanted.count = static_cast<int>(parameters.size());
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
-  const Correction solved =
-      CorrectWeights(skeleton, layout, smooth.group, wanted, {.max_iterations = kSolveIterations},
-                     scratch, cache, pose, movement);
+  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, wanted,
+                                           {.max_iterations = kSolveIterations}, scratch, movement);
   return solved.error_m <= kMaxMissM;
 }
 
@@ -250,8 +249,7 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   Movement movement;
   const auto row_floats = static_cast<std::ptrdiff_t>(layout.row_floats);
   for (GridExample& example : examples) {
-    if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, cache, pose,
-                          movement)) {
+    if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, movement)) {
       continue;
     }
     cache.Clear();

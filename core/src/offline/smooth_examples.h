@@ -44,8 +44,7 @@ struct SmoothGroup {
 // false, whatever they then are, if it misses them by more than 0.1 mm. `scratch` [n] gets the weights.
 [[nodiscard]] bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout,
                                     const Skeleton& skeleton, std::span<const double> parameters,
-                                    std::span<double> scratch, GridCache& cache, PoseSpan pose,
-                                    Movement& movement);
+                                    std::span<double> scratch, Movement& movement);
 
 // Of the movements of a group: <X_i, X_k> [n][n], X_i the joint positions of example i over its grid points; the
 // mean over points and joints, so that <X_i - X_k, X_i - X_k> is a mean squared distance, square metres.

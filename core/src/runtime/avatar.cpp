@@ -395,9 +395,8 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
 void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = body_.library->group(plan.group);
   if (options_.run_time_correction) {
-    // The difference pose is made below: until then it is room to measure in.
     CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next),
-                   weight_scratch_, body_.cache, body_.movement.difference, body_.movement);
+                   weight_scratch_, body_.movement);
   } else {
     SetWeights(next, plan.group,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "end_poses.h"
 #include "stridewire/runtime/measure.h"
 
 namespace stridewire {
@@ -127,11 +128,10 @@ CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
 
 Correction CorrectWeights(const MotionLibrary& library, int group_index,
                           const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weight_scratch, GridCache& cache, PoseSpan pose,
-                          Movement& movement) {
+                          std::span<double> weight_scratch, Movement& movement) {
   const Correction correction =
       CorrectWeights(library.skeleton(), library.layout(), library.group(group_index), wanted,
-                     limits, weight_scratch, cache, pose, movement);
+                     limits, weight_scratch, movement);
   movement.group = group_index;
   return correction;
 }
@@ -139,7 +139,7 @@ Correction CorrectWeights(const MotionLibrary& library, int group_index,
 Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
                           const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, std::span<double> weight_scratch,
-                          GridCache& cache, PoseSpan pose, Movement& movement) {
+                          Movement& movement) {
   const std::size_t d = group.parameters.size();
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::span<double> weights = weight_scratch.first(n);
@@ -154,7 +154,7 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   for (std::size_t l = 0; l < d; ++l) {
     unit[l] = group.parameters[l].name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
   }
-  movement.base = {};  // near the origin floats are finest
+  EndPoses ends(skeleton, layout, group);
 
   struct Miss {
     Vector missing{};  // p^ - a(w)
@@ -162,9 +162,8 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   };
   const auto measure = [&](std::span<const double> w) {
     TakeWeights(group, w, movement);
-    cache.Clear();
-    const ParameterValues measured =
-        MeasureMovement(skeleton, layout, group, movement, cache, pose);
+    ends.Blend(movement);
+    const ParameterValues measured = ends.Measure();
     Miss error;
     for (std::size_t l = 0; l < d; ++l) {
       error.missing[l] = unit[l] * (wanted.values[l] - measured.values[l]);
@@ -180,7 +179,7 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   const double most = std::max(kMaxCorrectedWeightSum, SumOfSizes(weights));
   while (correction.iterations < limits.max_iterations && best.largest_m > limits.tolerance_m) {
     ++correction.iterations;
-    MeasureSlopes(skeleton, layout, group, weights, slopes);
+    ends.MeasureSlopes(slopes);
     for (std::size_t l = 0; l < d; ++l) {
       for (std::size_t e = 0; e < n; ++e) slopes[l * n + e] *= unit[l];
     }

@@ -20,9 +20,8 @@ namespace {
 
 constexpr float kSmallestNorm = 0.1f;
 
-std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
-                       std::size_t count, std::size_t row_floats, std::size_t padded,
-                       std::size_t joint_count, float* HWY_RESTRICT row) {
+void SumRows(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
+             std::size_t count, std::size_t row_floats, float* HWY_RESTRICT row) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
   std::size_t i = 0;
@@ -50,7 +49,14 @@ std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_REST
     }
     hn::StoreU(sum, d, row + i);
   }
+}
 
+std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
+                       std::size_t count, std::size_t row_floats, std::size_t padded,
+                       std::size_t joint_count, float* HWY_RESTRICT row) {
+  const FloatTag d;
+  const std::size_t width = hn::Lanes(d);
+  SumRows(examples, weights, count, row_floats, row);
   std::uint32_t degenerate = 0;
   for (std::size_t j = 0; j < padded; j += width) {
     Quat4 q = LoadParts(row + j, padded);
@@ -69,7 +75,13 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
   const std::size_t padded = blend.padded;
-  for (std::size_t j = 0; j < blend.joint_count; j += width) {
+  std::size_t next = 0;
+  while (next < blend.joint_count) {
+    // The last ones go with some before them, which come out the same again: no vector is part empty.
+    const std::size_t j = next + width > blend.joint_count && blend.joint_count >= width
+                              ? blend.joint_count - width
+                              : next;
+    next = j + width;
     const Quat4 first = LoadParts(blend.rows[1] + j, padded);
     Quat4 q = {Float(0.0f), Float(0.0f), Float(0.0f), Float(0.0f)};
     for (std::size_t k = 0; k < 4; ++k) {
@@ -116,10 +128,16 @@ HWY_AFTER_NAMESPACE();
 
 namespace stridewire::kernels {
 
+HWY_EXPORT(SumRows);
 HWY_EXPORT(BlendRow);
 HWY_EXPORT(BlendRotations);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(PlantPoses);
+
+void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
+             float* row) {
+  HWY_DYNAMIC_DISPATCH(SumRows)(examples, weights, count, row_floats, row);
+}
 
 std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
                        std::size_t row_floats, std::size_t padded, std::size_t joint_count,

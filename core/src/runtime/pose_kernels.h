@@ -14,8 +14,11 @@ namespace stridewire::kernels {
 /// Rows have a multiple of so many floats; batches have so many avatars at most.
 inline constexpr std::size_t kBlock = 16;
 
-/// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order; then each of the first
-/// `joint_count` quaternions made unit. `padded` joints lie component by component, as in GridLayout. Returns how
+/// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order.
+void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
+             float* row);
+
+/// SumRows, then each of the first `joint_count` quaternions made unit. `padded` joints lie component by component, as in GridLayout. Returns how
 /// many norms fell below 0.1: their components are left as they were summed. All pointers 4-byte aligned.
 [[nodiscard]] std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
                                      std::size_t row_floats, std::size_t padded,

@@ -135,7 +135,7 @@ class Bench {
   int Weigh(const ParameterValues& p, bool is_corrected) {
     if (is_corrected) {
       return CorrectWeights(library_, group_index_, p, DefaultCorrectionLimits(group_), scratch_,
-                            cache_, pose_, movement_)
+                            movement_)
           .iterations;
     }
     SetWeights(group_, group_index_, Span(p), scratch_, movement_);

@@ -35,24 +35,23 @@ struct Correction {
 ///   D = diag(|w| + half of its mean)
 ///
 /// the change that is least in proportion to how much examples are used, of those right in all
-/// parameters to first order. a(w) takes the first and last pose only, and so does J (MeasureSlopes).
+/// parameters to first order. a(w) takes the first and last pose only, and so does J.
 /// Where the sum of |w| would come within 0.1 of its bound, what J does not see of w shrinks as far as
 /// that takes. A step that makes the error larger or the weights too large is halved, three times at
 /// most; the best w is kept, so that the result is never worse than no correction. Some error is left
 /// where nothing within the bound reaches p^.
 ///
-/// `weight_scratch` [n] or more gets the weights, as they are before floats; `cache` and `pose` (one rotation a
-/// joint) are scratch. Takes 400 KB of stack, touched by 72 bytes an example; never allocates once
+/// `weight_scratch` [n] or more gets the weights, as they are before floats. Takes 500 KB of stack, touched by 72
+/// bytes an example and 0.4 KB a joint of the legs; never allocates once
 /// `movement.weights` has room for the group. Same bytes on every machine.
 Correction CorrectWeights(const MotionLibrary& library, int group_index,
                           const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weight_scratch, GridCache& cache, PoseSpan pose,
-                          Movement& movement);
+                          std::span<double> weight_scratch, Movement& movement);
 
 /// The same in a group that is in no library yet.
 Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
                           const MotionGroup& group, const ParameterValues& wanted,
                           const CorrectionLimits& limits, std::span<double> weight_scratch,
-                          GridCache& cache, PoseSpan pose, Movement& movement);
+                          Movement& movement);
 
 }  // namespace stridewire

@@ -20,13 +20,6 @@ namespace stridewire {
                                               const MotionGroup& group, const Movement& movement,
                                               GridCache& cache, PoseSpan pose);
 
-/// J = a'(w): how MeasureMovement's parameters change with the weights [n] the group's movement has, into `slopes`
-/// [d][n], metres or radians a weight. Weights change without their sum here as well, so that only changes whose sum
-/// is 0 mean something. From the chains of joints between root and balls alone. The base is the origin. Never
-/// allocates. Same bytes on every machine.
-void MeasureSlopes(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group,
-                   std::span<const double> weights, std::span<double> slopes);
-
 /// Largest difference of two parameter vectors of a group, metres; a radian counts
 /// kMetresPerRadian. The norm of the paper's interpolation error e(p) = |p - a(p)|.
 [[nodiscard]] double LargestDifference(const MotionGroup& group, const ParameterValues& a,

@@ -75,8 +75,8 @@ void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   wanted.count = group.parameter_count();
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
   if (corrected) {
-    CorrectWeights(library_, group_index_, wanted, DefaultCorrectionLimits(group), scratch_, cache_,
-                   pose_, movement_);
+    CorrectWeights(library_, group_index_, wanted, DefaultCorrectionLimits(group), scratch_,
+                   movement_);
   } else {
     SetWeights(group, group_index_, parameters, scratch_, movement_);
   }

@@ -134,12 +134,9 @@ TEST_P(RefineInDimensions, LeavesRunTimeCorrectionWhatItWas) {
   std::mt19937 random(seed);
   std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
   Movement movement;
-  GridCache cache(refined->library->layout());
-  Pose pose(7);
   for (int i = 0; i < 100; ++i) {
-    const Correction correction =
-        CorrectWeights(*refined->library, 0, PointInHull(group, random), {.max_iterations = 8},
-                       scratch, cache, pose, movement);
+    const Correction correction = CorrectWeights(*refined->library, 0, PointInHull(group, random),
+                                                 {.max_iterations = 8}, scratch, movement);
     EXPECT_LT(correction.error_m, 1e-4) << i;
   }
 }
