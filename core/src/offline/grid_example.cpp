@@ -61,7 +61,6 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
   result.mirrored = example.mirrored;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   const auto padded = static_cast<std::size_t>(layout.padded_joints);
-  const auto root = static_cast<std::size_t>(layout.root());
   result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
 
   Pose pose(clip.joint_count);
@@ -76,10 +75,7 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
       SetQuat(row, padded, j, Normalise(pose.rotations[j]));
     }
-    row[root] = pose.root_position_m.x;
-    row[root + 1] = pose.root_position_m.y;
-    row[root + 2] = pose.root_position_m.z;
-    row[root + 3] = static_cast<float>(yaw_rad);
+    layout.SetRoot(row, {DVec3(pose.root_position_m), yaw_rad});
   }
   return result;
 }
@@ -109,13 +105,13 @@ void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layo
 
 Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count) {
   const auto padded = static_cast<std::size_t>(layout.padded_joints);
-  const auto root = static_cast<std::size_t>(layout.root());
   Pose pose(joint_count);
   for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
     pose.rotations[j] = QuatOf(row.data(), padded, j);
   }
-  pose.root_position_m = {row[root], row[root + 1], row[root + 2]};
-  pose.rotations[0] = YawRotation(row[root + 3]) * pose.rotations[0];
+  const auto [position, yaw_rad] = layout.RootOf(row.data());
+  pose.root_position_m = Vec3(position);
+  pose.rotations[0] = YawRotation(yaw_rad) * pose.rotations[0];
   return pose;
 }
 

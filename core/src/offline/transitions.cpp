@@ -89,9 +89,9 @@ class MomentReader {
     for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
       pose_.rotations[j] = Quat(x[3 * padded + j], x[j], x[padded + j], x[2 * padded + j]);
     }
-    const float* root = x + layout_.root();
-    pose_.root_position_m = Vec3(root[0], root[1], root[2]);
-    pose_.rotations[0] = YawRotation(root[3]) * pose_.rotations[0];
+    const auto [position, yaw_rad] = layout_.RootOf(x);
+    pose_.root_position_m = Vec3(position);
+    pose_.rotations[0] = YawRotation(yaw_rad) * pose_.rotations[0];
     return PointsOf(pose_);
   }
 

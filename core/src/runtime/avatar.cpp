@@ -28,7 +28,6 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
                const AvatarOptions& options)
     : options_(options), body_(std::move(library)) {
   events_.reserve(kUsualEvents);
-  weight_scratch_.resize(static_cast<std::size_t>(body_.library->max_example_count()));
   stand_feet_.left_from_right_m =
       FootVector(body_.library->skeleton(), body_.library->stand_pose(), Foot::kLeft, 0.0);
   Teleport(start);
@@ -394,13 +393,14 @@ void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
 // part of its own swing.
 void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = body_.library->group(plan.group);
+  std::array<double, MotionLibrary::kMaxExamples> weights;  // of which the first ones are touched
   if (options_.run_time_correction) {
-    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next),
-                   weight_scratch_, body_.movement);
+    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next), weights,
+                   body_.movement);
   } else {
     SetWeights(next, plan.group,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
-               weight_scratch_, body_.movement);
+               weights, body_.movement);
   }
   body_.StartWeighted(base_);
   if (swing_part > 0.0) {

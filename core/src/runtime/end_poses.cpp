@@ -19,13 +19,12 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 class EndPoses::Gradient {
  public:
-  // The rows hold `padded` joints, the root behind them.
-  Gradient(std::size_t padded) : padded_(padded) {}
+  explicit Gradient(std::size_t padded) : padded_(padded) {}
 
-  // By the four parts of a joint's quaternion.
-  void AddJoint(int joint, const DVec3& by_xyz, double by_w) {
+  // By the four parts of a joint's quaternion, or of the root behind them.
+  void Add(int joint, const DVec3& by_xyz, double by_w) {
     const auto j = static_cast<std::size_t>(joint);
-    // The root is the last of both chains.
+    // Chains share where they come from.
     std::size_t i = 0;
     while (i < joint_count_ && joints_[i].joint != j) ++i;
     if (i == joint_count_) joints_[joint_count_++] = {j, {}};
@@ -35,18 +34,9 @@ class EndPoses::Gradient {
     parts.by[2] += by_xyz.z;
     parts.by[3] += by_w;
   }
-  void AddRoot(const DVec3& by_position, double by_yaw) {
-    root_[0] += by_position.x;
-    root_[1] += by_position.y;
-    root_[2] += by_position.z;
-    root_[3] += by_yaw;
-  }
-
   // The change with an example's weight.
   [[nodiscard]] double Of(const float* row) const {
-    const float* root = row + 4 * padded_;
-    std::array<double, 4> sums;
-    for (std::size_t c = 0; c < 4; ++c) sums[c] = root_[c] * root[c];
+    std::array<double, 4> sums{};
     for (std::size_t i = 0; i < joint_count_; ++i) {
       const float* at = row + joints_[i].joint;
       for (std::size_t c = 0; c < 4; ++c) sums[c] += joints_[i].by[c] * at[c * padded_];
@@ -61,8 +51,7 @@ class EndPoses::Gradient {
   };
   std::size_t padded_;
   std::size_t joint_count_ = 0;
-  std::array<double, 4> root_{};
-  std::array<Parts, 2 * static_cast<std::size_t>(kMaxJoints)> joints_;
+  std::array<Parts, 2 * static_cast<std::size_t>(kMaxJoints) + 1> joints_;
 };
 
 EndPoses::EndPoses(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group)
@@ -100,10 +89,10 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
   kernels::SumRows(rows, movement.weights.data(), movement.weights.size(), row_floats, sum.data());
 
   End& end = ends_[is_end ? 1 : 0];
-  const float* root = &sum[static_cast<std::size_t>(layout_.root())];
-  end.root_m = DVec3(root[0], root[1], root[2]);
-  end.sine = Sin(root[3]);
-  end.cosine = Cos(root[3]);
+  const auto [position, yaw_rad] = layout_.RootOf(sum.data());
+  end.root_m = position;
+  end.sine = Sin(yaw_rad);
+  end.cosine = Cos(yaw_rad);
   for (std::size_t f = 0; f < 2; ++f) {
     DVec3 arm(skeleton_.legs[f].ball_offset_m);
     for (std::size_t i = 0; i < lengths_[f]; ++i) {
@@ -165,7 +154,7 @@ ParameterValues EndPoses::Measure() const {
 void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
                            Gradient& gradient) const {
   const DVec3& arm = end.arms_m[foot];
-  gradient.AddRoot(along, along.x * arm.z - along.z * arm.x);
+  gradient.Add(layout_.joint_count, along, along.x * arm.z - along.z * arm.x);
   DVec3 g = Turn(-end.sine, end.cosine, along);
   for (std::size_t i = lengths_[foot]; i-- > 0;) {
     const Link& link = end.links[foot][i];
@@ -177,9 +166,9 @@ void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
     const double uv = glm::dot(u, v);
     const double longer = glm::dot(link.ball, g);
     const double scale = 2.0 * link.per_norm;
-    gradient.AddJoint(chains_[foot][i],
-                      scale * (v * ug - u * (vg + longer) + g * uv + w * glm::cross(v, g)),
-                      scale * (w * (vg - longer) + glm::dot(glm::cross(u, v), g)));
+    gradient.Add(chains_[foot][i],
+                 scale * (v * ug - u * (vg + longer) + g * uv + w * glm::cross(v, g)),
+                 scale * (w * (vg - longer) + glm::dot(glm::cross(u, v), g)));
     g = glm::conjugate(link.rotation) * g;
   }
 }

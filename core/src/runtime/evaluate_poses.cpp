@@ -31,7 +31,6 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
   std::array<double, 2 * kernels::kBlock> sines;
   std::array<double, 2 * kernels::kBlock> cosines;
   std::array<double, kernels::kBlock> eased;
-  const auto root = static_cast<std::size_t>(layout.root());
   for (std::size_t i = 0; i < count; ++i) {
     const BlendJob& job = blends[i].emplace(job_at(i));
     const Movement& movement = job.movement;
@@ -49,8 +48,9 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
       blend.rows[k] = row;
       blend.weights[k] = cell.weights[k];
       const double weight = cell.weights[k];
-      position += weight * DVec3(row[root], row[root + 1], row[root + 2]);
-      yaw_rad += weight * row[root + 3];
+      const GridLayout::Root root = layout.RootOf(row);
+      position += weight * root.position_m;
+      yaw_rad += weight * root.yaw_rad;
     }
     yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.duration_s()));
     positions[i] = position;

@@ -272,9 +272,9 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
   }
   for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
     const float* x = &group.grid[row];
-    const float* root = x + layout.root();
-    if (!(std::fabs(root[0]) <= kMaxRootM && std::fabs(root[1]) <= kMaxRootM &&
-          std::fabs(root[2]) <= kMaxRootM && std::fabs(root[3]) <= kMaxYawRad)) {
+    const auto [position, yaw_rad] = layout.RootOf(x);
+    if (!(std::fabs(position.x) <= kMaxRootM && std::fabs(position.y) <= kMaxRootM &&
+          std::fabs(position.z) <= kMaxRootM && std::fabs(yaw_rad) <= kMaxYawRad)) {
       return Fail(ErrorCode::kMalformed, "a stored root is out of range",
                   static_cast<std::int64_t>(row / row_floats));
     }

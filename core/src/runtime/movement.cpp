@@ -158,11 +158,10 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
   for (std::size_t j = 0; j < out.rotations.size(); ++j) {
     out.rotations[j] = Quat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
   }
-  const float* root = &row[static_cast<std::size_t>(layout.root())];
+  const auto [position, yaw_rad] = layout.RootOf(row.data());
   out.root_position_m =
-      Vec3(movement.base.position_m +
-           RotateYaw(movement.base.heading_rad, DVec3(root[0], root[1], root[2])));
-  out.rotations[0] = YawRotation(movement.base.heading_rad + root[3]) * out.rotations[0];
+      Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, position));
+  out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
 }
 
 BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {

@@ -58,15 +58,15 @@ std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_REST
   const std::size_t width = hn::Lanes(d);
   SumRows(examples, weights, count, row_floats, row);
   std::uint32_t degenerate = 0;
-  for (std::size_t j = 0; j < padded; j += width) {
-    Quat4 q = LoadParts(row + j, padded);
+  for (std::size_t j = 0; j < joint_count; j += width) {
+    const hn::Mask<FloatTag> is_joint =
+        hn::FirstN(d, joint_count - j < width ? joint_count - j : width);
+    const Quat4 q = LoadParts(row + j, padded);
     const Float norm = Sqrt(Dot(q, q));
     const Mask is_sound = norm >= Float(kSmallestNorm);
     const Float scale = Select(is_sound, Float(1.0f) / norm, Float(1.0f));
-    StoreParts(q * scale, row + j, padded);
-    const std::size_t joints = joint_count > j ? joint_count - j : 0;
-    degenerate += static_cast<std::uint32_t>(
-        hn::CountTrue(d, hn::AndNot(is_sound.m, hn::FirstN(d, joints < width ? joints : width))));
+    StoreParts(q * scale, row + j, padded, is_joint);
+    degenerate += static_cast<std::uint32_t>(hn::CountTrue(d, hn::AndNot(is_sound.m, is_joint)));
   }
   return degenerate;
 }

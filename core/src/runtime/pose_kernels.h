@@ -18,18 +18,20 @@ inline constexpr std::size_t kBlock = 16;
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row);
 
-/// SumRows, then each of the first `joint_count` quaternions made unit. `padded` joints lie component by component, as in GridLayout. Returns how
-/// many norms fell below 0.1: their components are left as they were summed. All pointers 4-byte aligned.
+/// SumRows, then each of the first `joint_count` quaternions made unit. `padded` joints lie component by component, as
+/// in GridLayout. Returns how many norms fell below 0.1: their components are left as they were summed. All pointers
+/// 4-byte aligned; up to kBlock floats beyond the row are read.
 [[nodiscard]] std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
                                      std::size_t row_floats, std::size_t padded,
                                      std::size_t joint_count, float* row);
 
 /// Local rotations between four grid rows and, while the movement before is eased out, the difference to it.
 struct RotationBlend {
-  const float* rows[4] = {};    ///< Blended rows around the cell; signs are taken along rows[1]
-  float weights[4] = {};        ///< Of the rows, 0 for one that is not there
-  std::size_t padded = 0;       ///< Joints in a row
-  std::size_t joint_count = 0;  ///< Joints written
+  const float* rows[4] =
+      {};  ///< Blended rows around the cell; signs are taken along rows[1]. Read as BlendRow's
+  float weights[4] = {};              ///< Of the rows, 0 for one that is not there
+  std::size_t padded = 0;             ///< Joints in a row
+  std::size_t joint_count = 0;        ///< Joints written
   const float* difference = nullptr;  ///< [joint] x y z w, or null; see slerp below
   float fraction = 0.0f;              ///< r := r slerp(1, difference, fraction), in [0, 1]
   const float* velocity = nullptr;    ///< [joint] x y z rotation vectors a second, or null

@@ -19,11 +19,8 @@ struct Row {
     const auto padded = static_cast<std::size_t>(layout.padded_joints);
     return {floats[3 * padded + j], floats[j], floats[padded + j], floats[2 * padded + j]};
   }
-  [[nodiscard]] DVec3 position() const {
-    const float* root = floats + layout.root();
-    return {root[0], root[1], root[2]};
-  }
-  [[nodiscard]] double yaw() const { return floats[layout.root() + 3]; }
+  [[nodiscard]] DVec3 position() const { return layout.RootOf(floats).position_m; }
+  [[nodiscard]] double yaw() const { return layout.RootOf(floats).yaw_rad; }
 };
 
 // A pose in the base frame, the root's yaw apart.

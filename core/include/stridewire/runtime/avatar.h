@@ -237,7 +237,6 @@ class Avatar {
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
-  std::vector<double> weight_scratch_;
   // What is put back when a movement that was planned is not played. Has its size from the first request on
   // that may be refused.
   struct Kept {

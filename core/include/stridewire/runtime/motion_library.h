@@ -65,8 +65,8 @@ struct Parameter {
 };
 
 /// Grid row: one example's pose at one grid point, as floats
-///   x[padded] y[padded] z[padded] w[padded]  root x, y, z, root yaw, 12 zeros
-/// `padded` is the joint count rounded up to 16. Joint 0's quaternion is the root rotation with
+///   x[joints] root x, zeros   y[joints] root y, zeros   z[joints] root z, zeros   w[joints] root yaw, zeros
+/// of `padded` floats each: the joint count and one, rounded up to 8. Joint 0's quaternion is the root rotation with
 /// its yaw taken off on the left (r = q_yaw * rest); the yaw is an unwrapped scalar, so examples
 /// may differ by more than half a turn. Positions and yaw are relative to the base frame.
 struct GridLayout {
@@ -74,10 +74,22 @@ struct GridLayout {
   int padded_joints = 0;
   int row_floats = 0;
   explicit constexpr GridLayout(int joints = 0)
-      : joint_count(joints),
-        padded_joints((joints + 15) / 16 * 16),
-        row_floats(padded_joints * 4 + 16) {}
-  [[nodiscard]] constexpr int root() const { return padded_joints * 4; }
+      : joint_count(joints), padded_joints((joints + 8) / 8 * 8), row_floats(padded_joints * 4) {}
+  struct Root {
+    DVec3 position_m;
+    double yaw_rad;
+  };
+  [[nodiscard]] Root RootOf(const float* row) const {
+    const float* x = row + joint_count;
+    return {DVec3(x[0], x[padded_joints], x[2 * padded_joints]), x[3 * padded_joints]};
+  }
+  void SetRoot(float* row, const Root& root) const {
+    float* x = row + joint_count;
+    x[0] = static_cast<float>(root.position_m.x);
+    x[padded_joints] = static_cast<float>(root.position_m.y);
+    x[2 * padded_joints] = static_cast<float>(root.position_m.z);
+    x[3 * padded_joints] = static_cast<float>(root.yaw_rad);
+  }
 };
 
 /// Examples that can be blended with each other: one kind, one set of parameters, the same number
@@ -119,7 +131,7 @@ struct MotionGroup {
 /// FlatBuffers table (`core/schema/motion_library.fbs`) whose float arrays are 64-byte aligned.
 class MotionLibrary {
  public:
-  static constexpr int kFormatVersion = 1;
+  static constexpr int kFormatVersion = 2;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
   static constexpr int kMaxGroups = 256;
   static constexpr int kMaxExamples = 4096;    ///< A group.

@@ -69,7 +69,7 @@ struct Movement {
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
-      : layout_(layout), rows_(static_cast<std::size_t>(4 * layout.row_floats)) {}
+      : layout_(layout), rows_(static_cast<std::size_t>(4 * layout.row_floats) + kSlackFloats) {}
 
   /// Forgets the rows: the movement changed.
   void Clear() { points_.fill(-1); }
@@ -85,8 +85,10 @@ class GridCache {
   [[nodiscard]] std::uint64_t degenerate_count() const { return degenerate_count_; }
 
  private:
+  static constexpr std::size_t kSlackFloats = 16;  // a vector may be read, not used, beyond a row
+
   GridLayout layout_;
-  std::vector<float> rows_;  // four rows, point p in slot p % 4
+  std::vector<float> rows_;  // four rows, point p in slot p % 4, and slack
   std::array<int, 4> points_{-1, -1, -1, -1};
   std::uint64_t degenerate_count_ = 0;
 };

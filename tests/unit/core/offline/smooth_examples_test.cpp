@@ -44,8 +44,10 @@ class SmoothExamples : public testing::Test {
     for (std::size_t e = 0; e < n; ++e) {
       manner_m_.push_back(height(random_));
       for (std::size_t p = 0; p < static_cast<std::size_t>(group.grid_point_count); ++p) {
-        grid_[(p * n + e) * row + static_cast<std::size_t>(layout().root()) + 1] +=
-            static_cast<float>(manner_m_.back());
+        float* floats = &grid_[(p * n + e) * row];
+        GridLayout::Root root = layout().RootOf(floats);
+        root.position_m.y += manner_m_.back();
+        layout().SetRoot(floats, root);
       }
     }
     group.grid = grid_;
@@ -168,7 +170,7 @@ TEST_F(SmoothExamples, LoseTheirMannerAndKeepTheirParameters) {
       EXPECT_NEAR(examples[e].parameters[l], were[e].parameters[l], 1.1e-4);
     }
     const auto height = [&](const GridExample& example) {
-      return static_cast<double>(example.rows[static_cast<std::size_t>(layout().root()) + 1]);
+      return layout().RootOf(example.rows.data()).position_m.y;
     };
     before += manner_m_[e] * manner_m_[e];
     after += std::pow(height(examples[e]) - height(were[e]), 2);

@@ -71,7 +71,7 @@ TEST(MotionLibrary, DamageTruncationAndForeignFilesAreNamed) {
   bytes[0] = std::byte{'X'};
   EXPECT_EQ(CodeOf(bytes), "malformed");
   bytes = good;
-  bytes[8] = std::byte{2};
+  bytes[8] = std::byte{MotionLibrary::kFormatVersion + 1};
   EXPECT_EQ(CodeOf(bytes), "version_mismatch");
   bytes = good;
   bytes[bytes.size() / 2] ^= std::byte{1};
