@@ -100,18 +100,20 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
       ++counts.refused;
     }
     t.shard = info.shard;
+    t.mode = info.mode;
     t.seen_tick = info.tick;
   }
-  if (shard.parts_seen >= info.parts) Sweep(info.shard, info.tick, info.server_time_s);
+  if (shard.parts_seen >= info.parts) Sweep(info);
   return {};
 }
 
-void WorldView::Sweep(std::uint16_t shard, std::uint64_t tick, double time_s) {
+void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     Track& t = track->second;
-    if (t.shard == shard && t.seen_tick < tick) t.gone = true;
-    const bool forget = t.gone && t.history->size() > 0 &&
-                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
+    if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
+    const bool forget =
+        t.gone && t.history->size() > 0 &&
+        info.server_time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
     track = forget ? Erase(track) : std::next(track);
   }
 }

@@ -77,6 +77,7 @@ class WorldView {
   struct Track {
     std::unique_ptr<PoseHistory> history;
     std::uint16_t shard = 0;
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint64_t seen_tick = 0;
     std::uint64_t epoch = 0;
     bool gone = false;
@@ -89,8 +90,8 @@ class WorldView {
   };
   using Tracks = std::map<protocol::AvatarNumber, Track>;
 
-  /// After the last part of a shard's batch: who was not in it is gone.
-  void Sweep(std::uint16_t shard, std::uint64_t tick, double time_s);
+  /// After the last part of a shard's batch: who was not in it, but in one before, is gone.
+  void Sweep(const protocol::PoseBatchInfo& info);
   Tracks::iterator Erase(Tracks::iterator track);
 
   std::size_t pose_history_;

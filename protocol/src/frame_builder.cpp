@@ -20,16 +20,23 @@ Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType ty
   return {};
 }
 
-flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(flatbuffers::FlatBufferBuilder& builder,
-                                                    const PoseBatch& batch) {
-  const auto* poses = reinterpret_cast<const std::uint8_t*>(batch.poses.data());
-  const auto poses_offset = builder.CreateVector(poses, batch.poses.size());
-  const auto flags = builder.CreateVector(batch.flags.data(), batch.flags.size());
-  const auto avatars = builder.CreateVector(batch.avatars.data(), batch.avatars.size());
-  const PoseBatchInfo& info = batch.info;
+flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
+    flatbuffers::FlatBufferBuilder& builder, const PoseBatchInfo& info,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint32_t>> avatars,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> flags,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> poses) {
   return wire::CreatePoseBatch(builder, info.world, info.shard, info.part, info.parts, info.tick,
                                info.server_time_s, static_cast<wire::PoseMode>(info.mode),
-                               info.joint_count, avatars, flags, poses_offset);
+                               info.joint_count, avatars, flags, poses);
+}
+
+flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(flatbuffers::FlatBufferBuilder& builder,
+                                                    const PoseBatch& batch) {
+  const auto* bytes = reinterpret_cast<const std::uint8_t*>(batch.poses.data());
+  const auto poses = builder.CreateVector(bytes, batch.poses.size());
+  const auto flags = builder.CreateVector(batch.flags.data(), batch.flags.size());
+  const auto avatars = builder.CreateVector(batch.avatars.data(), batch.avatars.size());
+  return BuildPoseBatch(builder, batch.info, avatars, flags, poses);
 }
 
 }  // namespace stridewire::protocol

@@ -12,6 +12,16 @@ namespace stridewire::protocol {
 [[nodiscard]] Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
                                  const FrameLimits& limits, std::vector<std::byte>& frame);
 
+/// Table, vtable, vector lengths and padding of a batch stay below this.
+inline constexpr std::size_t kPoseBatchOverheadBytes = 128;
+
+/// The table of a batch whose lists are in `builder` already.
+[[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
+    flatbuffers::FlatBufferBuilder& builder, const PoseBatchInfo& info,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint32_t>> avatars,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> flags,
+    flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> poses);
+
 /// The table of a batch; the spans are copied into `builder`.
 [[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
     flatbuffers::FlatBufferBuilder& builder, const PoseBatch& batch);

@@ -26,12 +26,10 @@ PoseBatchEncoder::PoseBatchEncoder(PoseBatchEncoder&&) noexcept = default;
 PoseBatchEncoder& PoseBatchEncoder::operator=(PoseBatchEncoder&&) noexcept = default;
 
 std::size_t PoseBatchEncoder::MaxAvatars(PoseMode mode, std::size_t joint_count) const {
-  // Table, vtable, vector lengths and padding of a batch stay below this.
-  constexpr std::size_t kOverheadBytes = 128;
   const std::size_t bytes = MaxPayloadBytes(MessageType::kPoseBatch, impl_->limits);
-  if (bytes <= kOverheadBytes) return 0;
+  if (bytes <= kPoseBatchOverheadBytes) return 0;
   const std::size_t avatar_bytes = PoseBytes(mode, joint_count) + sizeof(AvatarNumber) + 1;
-  return std::min(kMaxItems, (bytes - kOverheadBytes) / avatar_bytes);
+  return std::min(kMaxItems, (bytes - kPoseBatchOverheadBytes) / avatar_bytes);
 }
 
 Status PoseBatchEncoder::Begin(const PoseBatchInfo& info) {

@@ -19,6 +19,7 @@
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/protocol/pose_codec.h"
+#include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/movement.h"
@@ -356,6 +357,39 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(frame.size()));
 }
 
+/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such observers
+/// take turns, so that the rows are as cold as in a tick.
+void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
+  constexpr std::size_t kRows = 10'000;
+  constexpr std::size_t kPicked = 100;
+  const Crowd crowd(library, kCrowd);
+  std::vector<protocol::AvatarNumber> numbers(kRows);
+  for (std::size_t i = 0; i < kRows; ++i) numbers[i] = static_cast<protocol::AvatarNumber>(i + 1);
+  protocol::PoseRows rows;
+  const auto joints = static_cast<std::uint16_t>(library->skeleton().joint_count());
+  Status status = rows.Begin({1, 0, 0, 1, 1, 0.0, mode, joints},
+                             std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers));
+  for (std::size_t i = 0; i < kRows && status; ++i) {
+    const ConstPoseSpan pose = crowd.avatars()[i % kCrowd].pose();
+    status = rows.Add(0, pose.root_position_m, pose.rotations);
+  }
+  std::vector<std::vector<std::uint32_t>> picked(50);
+  for (std::size_t observer = 0; observer < picked.size(); ++observer) {
+    for (std::size_t i = 0; i < kPicked; ++i) {
+      picked[observer].push_back(static_cast<std::uint32_t>(i * (kRows / kPicked) + observer));
+    }
+  }
+  protocol::PoseBatchComposer composer;
+  std::size_t turn = 0;
+  for (auto _ : state) {
+    std::vector<std::byte> frame;
+    if (status) status = composer.Compose(rows, picked[turn++ % picked.size()], 0, 1, frame);
+    if (!status) return state.SkipWithError(status.error().text);
+    benchmark::DoNotOptimize(frame.data());
+  }
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kPicked));
+}
+
 /// How large a library is: no time, only counters.
 void MeasureLibrary(benchmark::State& state, const Library& library) {
   int examples = 0;
@@ -416,6 +450,7 @@ void RegisterAll(const std::string& path, const Library& library) {
     const std::string mode_name = mode == PoseMode::kFull ? "full" : "quantised";
     Register(name + "/encode_pose/" + mode_name, EncodePose, library, mode);
     Register(name + "/encode_batch/" + mode_name, EncodeBatch, library, mode);
+    Register(name + "/compose_batch/" + mode_name, ComposeBatch, library, mode);
     Register(name + "/decode_pose/" + mode_name, DecodePose, library, mode);
   }
   Register(name + "/encode_16_poses/compact", EncodeCompactPose, library);

@@ -28,7 +28,8 @@ export interface PoseCounts {
 interface Track {
   readonly avatar: number;
   history: PoseHistory;
-  shard: number;
+  /** Which shard and mode it was last seen in. */
+  stream: number;
   seenTick: number;
   epoch: number;
   gone: boolean;
@@ -38,6 +39,11 @@ interface Shard {
   tick: number;
   partsSeen: number;
   epoch: number;
+}
+
+/** A shard's batches of one mode, which are about the same avatars. */
+function streamOf(batch: PoseBatch): number {
+  return 2 * batch.shard + (batch.mode === 'full' ? 0 : 1);
 }
 
 /** What is seen of a world: the poses of its avatars. */
@@ -110,6 +116,7 @@ export class WorldView {
       throw new Malformed('is not that of the figure', 'PoseBatch.jointCount');
     }
     ++this.counts.batches;
+    const stream = streamOf(batch);
     const shard = this.followShard(batch, everyNTicks);
     this.newestS = Math.max(this.newestS, batch.serverTimeS);
 
@@ -118,7 +125,7 @@ export class WorldView {
     for (let i = 0; i < batch.avatars.length; ++i) {
       const avatar = batch.avatars[i]!;
       if (this.filter !== null && !this.filter.has(avatar)) continue;
-      const track = this.tracks.get(avatar) ?? this.begin(avatar, batch.shard);
+      const track = this.tracks.get(avatar) ?? this.begin(avatar, stream);
       if (track === null) {
         ++this.counts.refused;
         continue;
@@ -142,11 +149,11 @@ export class WorldView {
       } else if (batch.tick !== track.seenTick) {  // Equal ticks are a second subscription's.
         ++this.counts.refused;
       }
-      track.shard = batch.shard;
+      track.stream = stream;
       track.seenTick = batch.tick;
     }
     this.counts.decodeMs += this.now() - startedMs;
-    if (shard.partsSeen >= batch.parts) this.sweep(batch.shard, batch.tick, batch.serverTimeS);
+    if (shard.partsSeen >= batch.parts) this.sweep(stream, batch.tick, batch.serverTimeS);
   }
 
   /** The server said that the avatar is gone. */
@@ -214,7 +221,7 @@ export class WorldView {
   }
 
   private followShard(batch: PoseBatch, everyNTicks: number): Shard {
-    const key = 2 * batch.shard + (batch.mode === 'full' ? 0 : 1);
+    const key = streamOf(batch);
     let shard = this.shards.get(key);
     if (shard === undefined) {
       if (this.shards.size === maxShards) {
@@ -240,21 +247,21 @@ export class WorldView {
     return shard;
   }
 
-  private begin(avatar: number, shard: number): Track | null {
+  private begin(avatar: number, stream: number): Track | null {
     const bytes = PoseHistory.bytes(this.poseHistory, this.jointCount);
     if (this.budget.usedBytes + bytes > this.budget.limitBytes) return null;
     this.budget.usedBytes += bytes;
     const history = new PoseHistory(this.poseHistory, this.jointCount);
-    const track = {avatar, history, shard, seenTick: -1, epoch: 0, gone: false};
+    const track = {avatar, history, stream, seenTick: -1, epoch: 0, gone: false};
     this.tracks.set(avatar, track);
     this.changeList();
     return track;
   }
 
-  /** After the last part of a shard's batch: who was not in it is gone. */
-  private sweep(shard: number, tick: number, timeS: number): void {
+  /** After the last part of a shard's batch: who was not in it, but in one before, is gone. */
+  private sweep(stream: number, tick: number, timeS: number): void {
     for (const track of this.tracks.values()) {
-      if (track.shard === shard && track.seenTick < tick && !track.gone) {
+      if (track.stream === stream && track.seenTick < tick && !track.gone) {
         track.gone = true;
         this.changeList();
       }

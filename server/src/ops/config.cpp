@@ -217,6 +217,8 @@ std::vector<ConfigKey> MakeKeys() {
   limit("max_worlds_per_session", "Worlds one session is in", &Limits::max_worlds_per_session, 1,
         65'536);
   limit("max_subscriptions", "Subscriptions of one session", &Limits::max_subscriptions, 1, 65'536);
+  limit("max_named_avatars", "Avatars that subscriptions of one session name",
+        &Limits::max_named_avatars, 0, 10'000'000);
   limit("max_avatars", "Avatars in all worlds", &Limits::max_avatars, 1, 10'000'000);
   limit("max_avatars_per_world", "Avatars in one world", &Limits::max_avatars_per_world, 1,
         10'000'000);

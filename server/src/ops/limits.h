@@ -28,7 +28,8 @@ struct Limits {
   // Worlds and avatars.
   int max_worlds = 256;
   int max_worlds_per_session = 64;
-  int max_subscriptions = 64;  ///< Of one session.
+  int max_subscriptions = 64;      ///< Of one session.
+  int max_named_avatars = 65'536;  ///< In the lists of all its subscriptions.
   int max_avatars = 65'536;
   int max_avatars_per_world = 16'384;
   int max_queue = 256;  ///< Requests waiting, per avatar.
@@ -63,6 +64,7 @@ enum class Limit : std::uint8_t {
   kWorlds,
   kWorldsPerSession,
   kSubscriptions,
+  kNamedAvatars,
   kAvatars,
   kAvatarsPerWorld,
   kQueue,
@@ -91,6 +93,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Limit::kC
      "max_worlds",
      "max_worlds_per_session",
      "max_subscriptions",
+     "max_named_avatars",
      "max_avatars",
      "max_avatars_per_world",
      "max_queue",

@@ -140,6 +140,9 @@ std::string Metrics::Text() {
           &ThreadMetrics::poses_sent);
   counter("stridewire_pose_errors_total", "Poses that could not be encoded.",
           &ThreadMetrics::pose_errors);
+  counter("stridewire_batches_composed_total",
+          "Pose batches made of encoded poses for sessions that name avatars.",
+          &ThreadMetrics::batches_composed);
   counter("stridewire_batches_sent_total", "Pose batches handed to observers' sockets.",
           &ThreadMetrics::batches_sent);
   counter("stridewire_batches_dropped_total", "Pose batches slow observers lost.",

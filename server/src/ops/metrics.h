@@ -58,6 +58,7 @@ struct ThreadMetrics {
   TimeHistogram tick_late;  ///< From when a tick was due to its start.
   Count poses_encoded;
   Count poses_sent;
+  Count batches_composed;  ///< Of rows, for one session.
   Count batches_sent;
   Count batches_dropped;
   Count pose_errors;

@@ -9,6 +9,7 @@
 #include "stridewire/base/check.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
+#include "world/pose_frames.h"
 
 namespace stridewire::server {
 
@@ -139,6 +140,7 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
     SendGround(*membership.world, true);
   }
 
+  subscriptions_.TellAnew();
   // Whatever was on its way when the connection broke goes out again.
   event_replay_.ForEachAfter(hello.last_events_number, [this](EventReplay::Kept& kept) {
     kept.was_sent = connection_->SendEvents(kept.frame);
@@ -717,10 +719,19 @@ void Session::Execute(protocol::Observe&& command) {
            "the feature 'quantised poses' was not agreed on in the handshake");
     return;
   }
+  const auto max_named = static_cast<std::size_t>(host_.config().limits.max_named_avatars);
+  if (subscriptions_.named_count() + command.avatars.size() > max_named) {
+    host_.metrics().Reached(Limit::kNamedAvatars);
+    Answer(command.seq, StatusCode::kLimitReached,
+           "the session's subscriptions name as many avatars as they may");
+    return;
+  }
+  if (!Affords(command.seq, command.avatars.size())) return;
   subscriptions_.Add(command.subscription, {.world = command.world,
                                             .mode = command.mode,
                                             .every_n_ticks = command.every_n_ticks,
-                                            .with_events = command.with_events});
+                                            .with_events = command.with_events,
+                                            .avatars = std::move(command.avatars)});
   host_.InterestChanged(it->second.world);
   Answer(command.seq, StatusCode::kOk);
 }
@@ -731,9 +742,10 @@ void Session::Execute(protocol::StopObserving&& command) {
     Answer(command.seq, StatusCode::kNoSuchSubscription, "no subscription of that number");
     return;
   }
-  const bool is_last = !subscriptions_.Watches(stopped->world, stopped->mode);
-  if (is_last && connection_ != nullptr) connection_->DropPoses(stopped->world, stopped->mode);
-  host_.InterestChanged(worlds_.at(stopped->world).world);
+  const auto [world, mode] = *stopped;
+  const bool is_last = !subscriptions_.Watches(world, mode);
+  if (is_last && connection_ != nullptr) connection_->DropPoses(world, mode);
+  host_.InterestChanged(worlds_.at(world).world);
   Answer(command.seq, StatusCode::kOk);
 }
 
@@ -804,12 +816,41 @@ bool Session::WantsEvents(WorldId world) const {
   return subscriptions_.WithEvents(world);
 }
 
-std::uint16_t Session::Every(WorldId world, PoseMode mode) const {
-  return connection_ == nullptr ? 0 : subscriptions_.Every(world, mode);
+PoseInterest::Every Session::EveryOf(WorldId world, PoseMode mode) const {
+  return connection_ == nullptr ? PoseInterest::Every{} : subscriptions_.EveryOf(world, mode);
+}
+
+std::span<const AvatarNumber> Session::Named(WorldId world, PoseMode mode) const {
+  return connection_ == nullptr ? std::span<const AvatarNumber>()
+                                : subscriptions_.Named(world, mode);
 }
 
 void Session::OnPoses(const PoseDelivery& delivery) {
-  if (connection_ == nullptr || !subscriptions_.Wants(delivery)) return;
+  if (connection_ == nullptr) return;
+  switch (subscriptions_.ShareOf(delivery)) {
+    case Subscriptions::Share::kNone: return;
+    case Subscriptions::Share::kWhole:
+      // None: the shard has not heard yet that a whole batch is wanted.
+      if (!delivery.parts.empty()) SendPoses(delivery);
+      return;
+    case Subscriptions::Share::kSome:
+      if (const auto picked = subscriptions_.Pick(delivery)) {
+        PoseDelivery some{
+            .world = delivery.world,
+            .mode = delivery.mode,
+            .from_shard = delivery.from_shard,
+            .tick = delivery.tick,
+            .avatar_count = static_cast<std::uint32_t>(picked->size()),
+            .parts = ComposeFrames(host_.composer(), *delivery.rows, *picked, host_.metrics()),
+            .rows = nullptr};
+        host_.metrics().batches_composed.Add(some.parts.size());
+        SendPoses(some);
+      }
+      return;
+  }
+}
+
+void Session::SendPoses(const PoseDelivery& delivery) {
   const std::size_t dropped = connection_->SendPoses(delivery);
   if (dropped == 0) return;
   worlds_.at(delivery.world).dropped_batches += dropped;

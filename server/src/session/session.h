@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -92,8 +93,8 @@ class Session : private ConnectionHandler {
 
   // What this session wants of a world, for the shard to sum up.
   [[nodiscard]] bool WantsEvents(WorldId world) const;
-  /// Greatest common divisor of the ticks wanted, 0: none.
-  [[nodiscard]] std::uint16_t Every(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
 
  private:
   struct Membership {
@@ -151,6 +152,7 @@ class Session : private ConnectionHandler {
   /// The world's ground, if it has one or if it is wanted all the same.
   void SendGround(const World& world, bool also_flat);
   void SendLagging(Membership& membership);
+  void SendPoses(const PoseDelivery& delivery);
   template <typename Message>
   void Send(const Message& message);
   /// Says why and lets the connection go; the session waits for its client.

@@ -6,6 +6,7 @@
 #include "ops/config.h"
 #include "ops/metrics.h"
 #include "stridewire/protocol/encoder.h"
+#include "stridewire/protocol/pose_rows.h"
 #include "world/mail.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
@@ -27,6 +28,7 @@ class SessionHost {
   [[nodiscard]] virtual AvatarBudget& avatar_budget() = 0;
   [[nodiscard]] virtual ThreadMetrics& metrics() = 0;
   [[nodiscard]] virtual protocol::Encoder& encoder() = 0;
+  [[nodiscard]] virtual protocol::PoseBatchComposer& composer() = 0;
 
   /// Passes a command to the shard its avatars live on; Session::OnResult hears of it.
   virtual void Submit(int shard, WorldCommand&& command) = 0;

@@ -8,26 +8,62 @@ namespace stridewire::server {
 using protocol::PoseMode;
 using protocol::SubscriptionId;
 
-void Subscriptions::Add(SubscriptionId id, const Subscription& subscription) {
-  all_.emplace(id, subscription);
+void Subscriptions::Add(SubscriptionId id, Subscription&& subscription) {
+  const Key key(subscription.world, subscription.mode);
+  std::ranges::sort(subscription.avatars);
+  const auto twice = std::ranges::unique(subscription.avatars);
+  subscription.avatars.erase(twice.begin(), twice.end());
+  all_.emplace(id, std::move(subscription));
+  SumUp(key);
 }
 
-std::optional<Subscriptions::Subscription> Subscriptions::Remove(SubscriptionId id) {
+std::optional<std::pair<WorldId, PoseMode>> Subscriptions::Remove(SubscriptionId id) {
   const auto it = all_.find(id);
   if (it == all_.end()) return std::nullopt;
-  const Subscription removed = it->second;
+  const Key key(it->second.world, it->second.mode);
   all_.erase(it);
-  return removed;
+  SumUp(key);
+  return key;
 }
 
 void Subscriptions::RemoveWorld(WorldId world) {
   std::erase_if(all_, [&](const auto& item) { return item.second.world == world; });
+  std::erase_if(watches_, [&](const auto& item) { return item.first.first == world; });
+  CountNamed();
 }
 
-bool Subscriptions::Watches(WorldId world, PoseMode mode) const {
-  return std::ranges::any_of(all_, [&](const auto& item) {
-    return item.second.world == world && item.second.mode == mode;
-  });
+void Subscriptions::TellAnew() {
+  for (auto& [key, watch] : watches_) {
+    for (auto& [shard, lane] : watch.lanes) lane.is_empty_told = false;
+  }
+}
+
+void Subscriptions::CountNamed() {
+  named_count_ = 0;
+  for (const auto& [id, subscription] : all_) named_count_ += subscription.avatars.size();
+}
+
+void Subscriptions::SumUp(const Key& key) {
+  CountNamed();
+  Watch watch;
+  bool is_whole = false;
+  std::uint16_t every = 0;
+  for (const auto& [id, subscription] : all_) {
+    if (Key(subscription.world, subscription.mode) != key) continue;
+    every = std::gcd(every, subscription.every_n_ticks);
+    is_whole |= subscription.avatars.empty();
+    std::vector<AvatarNumber> named;
+    named.reserve(watch.named.size() + subscription.avatars.size());
+    std::ranges::set_union(watch.named, subscription.avatars, std::back_inserter(named));
+    watch.named = std::move(named);
+  }
+  if (is_whole) watch.named.clear();
+  (is_whole ? watch.every.whole : watch.every.some) = every;
+  if (every == 0) {
+    watches_.erase(key);
+  } else {
+    watches_[key] = std::move(watch);
+  }
 }
 
 bool Subscriptions::WithEvents(WorldId world) const {
@@ -36,22 +72,48 @@ bool Subscriptions::WithEvents(WorldId world) const {
   });
 }
 
-std::uint16_t Subscriptions::Every(WorldId world, PoseMode mode) const {
-  std::uint16_t every = 0;
-  for (const auto& [id, subscription] : all_) {
-    if (subscription.world == world && subscription.mode == mode) {
-      every = std::gcd(every, subscription.every_n_ticks);
-    }
-  }
-  return every;
+PoseInterest::Every Subscriptions::EveryOf(WorldId world, PoseMode mode) const {
+  const auto it = watches_.find({world, mode});
+  return it == watches_.end() ? PoseInterest::Every{} : it->second.every;
 }
 
-bool Subscriptions::Wants(const PoseDelivery& delivery) const {
-  return std::ranges::any_of(all_, [&](const auto& item) {
+std::span<const AvatarNumber> Subscriptions::Named(WorldId world, PoseMode mode) const {
+  const auto it = watches_.find({world, mode});
+  return it == watches_.end() ? std::span<const AvatarNumber>() : it->second.named;
+}
+
+Subscriptions::Share Subscriptions::ShareOf(const PoseDelivery& delivery) const {
+  const auto watch = watches_.find({delivery.world, delivery.mode});
+  if (watch == watches_.end()) return Share::kNone;
+  const bool is_due = std::ranges::any_of(all_, [&](const auto& item) {
     const Subscription& subscription = item.second;
     return subscription.world == delivery.world && subscription.mode == delivery.mode &&
            delivery.tick % subscription.every_n_ticks == 0;
   });
+  if (!is_due) return Share::kNone;
+  return watch->second.every.whole > 0 ? Share::kWhole : Share::kSome;
+}
+
+std::optional<std::span<const std::uint32_t>> Subscriptions::Pick(const PoseDelivery& delivery) {
+  Watch& watch = watches_.at({delivery.world, delivery.mode});
+  Lane& lane = watch.lanes[delivery.from_shard];
+  const protocol::PoseRows& rows = *delivery.rows;
+  if (lane.avatars != rows.avatars()) {
+    lane.avatars = rows.avatars();
+    lane.rows.clear();
+    const std::vector<AvatarNumber>& avatars = *lane.avatars;
+    auto from = avatars.begin();
+    for (const AvatarNumber number : watch.named) {
+      from = std::lower_bound(from, avatars.end(), number);
+      if (from == avatars.end()) break;
+      if (*from == number) lane.rows.push_back(static_cast<std::uint32_t>(from - avatars.begin()));
+    }
+  }
+  const bool is_empty =
+      std::ranges::none_of(lane.rows, [&](std::uint32_t row) { return rows.has_pose(row); });
+  if (is_empty && lane.is_empty_told) return std::nullopt;
+  lane.is_empty_told = is_empty;
+  return lane.rows;
 }
 
 }  // namespace stridewire::server

@@ -4,12 +4,18 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <span>
+#include <utility>
+#include <vector>
 
 #include "world/mail.h"
 
 namespace stridewire::server {
 
 /// What a session watches, by the numbers its client chose.
+///
+/// Subscriptions of one world and mode share batches. If one of them is about all avatars, the session gets
+/// whole batches, otherwise such as hold exactly those that any of them names.
 class Subscriptions {
  public:
   struct Subscription {
@@ -17,26 +23,58 @@ class Subscriptions {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint16_t every_n_ticks = 1;
     bool with_events = false;
+    std::vector<AvatarNumber> avatars;  ///< Empty: all.
   };
+  enum class Share : std::uint8_t { kNone, kWhole, kSome };
 
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
+  /// Sum over all of how many avatars each names.
+  [[nodiscard]] std::size_t named_count() const { return named_count_; }
 
-  void Add(protocol::SubscriptionId id, const Subscription& subscription);
-  /// Returns what it was; empty: there is none of that number.
-  std::optional<Subscription> Remove(protocol::SubscriptionId id);
+  void Add(protocol::SubscriptionId id, Subscription&& subscription);
+  /// Returns the world and mode it was about; empty: there is none of that number.
+  std::optional<std::pair<WorldId, protocol::PoseMode>> Remove(protocol::SubscriptionId id);
   void RemoveWorld(WorldId world);
+  /// The client may have missed what it was sent: what is empty is told anew.
+  void TellAnew();
 
-  /// Some subscription is about these poses.
-  [[nodiscard]] bool Watches(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] bool WithEvents(WorldId world) const;
-  /// Greatest common divisor of the ticks wanted, 0: none.
-  [[nodiscard]] std::uint16_t Every(WorldId world, protocol::PoseMode mode) const;
-  /// Some subscription is about these poses at this tick.
-  [[nodiscard]] bool Wants(const PoseDelivery& delivery) const;
+  /// Some subscription is about these poses.
+  [[nodiscard]] bool Watches(WorldId world, protocol::PoseMode mode) const {
+    return watches_.contains({world, mode});
+  }
+  /// How often, as whole batches or as others.
+  [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
+  /// Avatars whose poses suffice, growing. Empty: whole batches are wanted, or nothing is.
+  [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
+
+  [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;
+  /// The rows of a delivery that Share::kSome is about; without value: none has a pose and the client knows
+  /// already. They hold until the next call of anything here.
+  [[nodiscard]] std::optional<std::span<const std::uint32_t>> Pick(const PoseDelivery& delivery);
 
  private:
+  using Key = std::pair<WorldId, protocol::PoseMode>;
+  /// What is sent of one shard.
+  struct Lane {
+    protocol::PoseRows::Avatars avatars;  // for which `rows` holds
+    std::vector<std::uint32_t> rows;
+    bool is_empty_told = false;
+  };
+  /// The subscriptions of one world and mode together.
+  struct Watch {
+    PoseInterest::Every every;
+    std::vector<AvatarNumber> named;  // growing; empty: all
+    std::map<int, Lane> lanes;
+  };
+
+  void SumUp(const Key& key);
+  void CountNamed();
+
   std::map<protocol::SubscriptionId, Subscription> all_;
+  std::map<Key, Watch> watches_;
+  std::size_t named_count_ = 0;
 };
 
 }  // namespace stridewire::server

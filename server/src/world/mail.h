@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -8,6 +9,7 @@
 
 #include "net/shared_frame.h"
 #include "stridewire/protocol/messages.h"
+#include "stridewire/protocol/pose_rows.h"
 #include "world/world.h"
 
 /// What shards send each other. Values only; the receiver owns what it gets.
@@ -100,23 +102,43 @@ struct InspectionResult {
   protocol::AvatarState state;
 };
 
+/// Modes in which poses are sent, in the order of their numbers.
+inline constexpr std::array kSentModes{protocol::PoseMode::kFull, protocol::PoseMode::kQuantised};
+[[nodiscard]] constexpr std::size_t ModeIndex(protocol::PoseMode mode) {
+  return static_cast<std::size_t>(mode);
+}
+
+/// What the sessions of a shard want of the poses of a world in one mode.
+struct PoseInterest {
+  /// Of the ticks wanted those that this divides, 0: none.
+  struct Every {
+    std::uint16_t whole = 0;  ///< By sessions that want all avatars.
+    std::uint16_t some = 0;   ///< By sessions that name theirs.
+    bool operator==(const Every&) const = default;
+  };
+  Every every;
+  /// Avatars named by any session, growing; null: none. Of who wants all there are none in it.
+  std::shared_ptr<const std::vector<AvatarNumber>> named;
+};
+
 /// What the sessions of a shard want of a world; replaces what that shard said before.
 struct Interest {
   std::shared_ptr<World> world;
-  int shard = 0;                 ///< Whose.
-  std::uint16_t every_full = 0;  ///< Ticks that this divides, 0: none.
-  std::uint16_t every_quantised = 0;
+  int shard = 0;  ///< Whose.
+  std::array<PoseInterest, kSentModes.size()> poses;
   bool events = false;
 };
 
-/// Poses of one world, shard, mode and tick: the parts of a batch.
+/// Poses of one world, shard, mode and tick.
 struct PoseDelivery {
   WorldId world = 0;
   protocol::PoseMode mode = protocol::PoseMode::kFull;
   int from_shard = 0;
   std::uint64_t tick = 0;
-  std::uint32_t avatar_count = 0;
-  std::vector<SharedFrame> parts;
+  std::uint32_t avatar_count = 0;  ///< In `parts`.
+  std::vector<SharedFrame> parts;  ///< A whole batch; none if nobody wants one.
+  /// What batches with some of them are made of: at least those that are named.
+  std::shared_ptr<const protocol::PoseRows> rows;
 };
 
 /// Events of one world, shard and tick.

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
+#include "world/number_union.h"
 
 namespace stridewire::server {
 namespace {
@@ -33,7 +34,7 @@ Shard::Shard(int index, const Config& config, AvatarBudget& budget, ThreadMetric
       tick_timer_(context_),
       housekeeping_timer_(context_),
       encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}),
-      batch_encoder_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}) {}
+      composer_({config.limits.max_control_bytes, config.limits.max_bulk_bytes}) {}
 
 Shard::~Shard() { Stop(); }
 
@@ -98,6 +99,7 @@ void Shard::Tick() {
   metrics_.ticks_slipped.Add(missed - caught_up);
   tick_ = tick;
 
+  TellNamed();
   for (const WorldCommand& command : inbox_) {
     CommandResult result = WorldOf(command.world).Execute(command, tick);
     if (command.seq == 0) continue;
@@ -133,14 +135,20 @@ void Shard::Publish() {
         outgoing_[shard].events.push_back({id, tick_, events});
       }
     }
-    for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+    for (const PoseMode mode : kSentModes) {
+      WorldShard::Wish any;
+      for (int shard = 0; shard < shard_count(); ++shard) {
+        const WorldShard::Wish wish = world->WishOf(shard, mode, tick_);
+        any.whole |= wish.whole;
+        any.some |= wish.some;
+      }
+      if (!any.whole && !any.some) continue;
       PoseDelivery delivery;
-      bool is_encoded = false;
-      for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
-        if (!world->WantsPoses(static_cast<int>(shard), mode, tick_)) continue;
-        if (!is_encoded && !world->Encode(mode, tick_, batch_encoder_, delivery)) break;
-        is_encoded = true;
-        outgoing_[shard].poses.push_back(delivery);
+      if (!world->Encode(mode, tick_, any.whole, composer_, delivery)) continue;
+      for (int shard = 0; shard < shard_count(); ++shard) {
+        const WorldShard::Wish wish = world->WishOf(shard, mode, tick_);
+        if (!wish.whole && !wish.some) continue;
+        outgoing_[static_cast<std::size_t>(shard)].poses.push_back(delivery);
       }
     }
   }
@@ -207,34 +215,62 @@ void Shard::Ask(int shard, Inspection&& question) {
 }
 
 void Shard::InterestChanged(const std::shared_ptr<World>& world) {
-  Interest interest{.world = world, .shard = index_};
+  Interest interest{.world = world, .shard = index_, .poses = {}};
   std::vector<Session*>& watchers = watchers_[world->id];
   watchers.clear();
   for (const auto& [id, session] : sessions_) {
-    const std::uint16_t every_full = session->Every(world->id, PoseMode::kFull);
-    const std::uint16_t every_quantised = session->Every(world->id, PoseMode::kQuantised);
-    const bool events = session->WantsEvents(world->id);
-    if (every_full == 0 && every_quantised == 0 && !events) continue;
-    watchers.push_back(session.get());
-    interest.every_full = std::gcd(interest.every_full, every_full);
-    interest.every_quantised = std::gcd(interest.every_quantised, every_quantised);
-    interest.events |= events;
+    bool watches = session->WantsEvents(world->id);
+    interest.events |= watches;
+    for (const PoseMode mode : kSentModes) {
+      const PoseInterest::Every every = session->EveryOf(world->id, mode);
+      PoseInterest::Every& all = interest.poses[ModeIndex(mode)].every;
+      watches |= every != PoseInterest::Every{};
+      all.whole = std::gcd(all.whole, every.whole);
+      all.some = std::gcd(all.some, every.some);
+    }
+    if (watches) watchers.push_back(session.get());
   }
   const bool is_none = watchers.empty();
   if (is_none) watchers_.erase(world->id);
   const auto told = told_interest_.find(world->id);
   const bool is_told = told != told_interest_.end();
-  if (is_told ? told->second.every_full == interest.every_full &&
-                    told->second.every_quantised == interest.every_quantised &&
-                    told->second.events == interest.events
-              : is_none) {
-    return;
+  // Which avatars are named is told once a tick, however many sessions begin in it: until then the last list
+  // holds, which has all that anyone has seen so far.
+  if (is_told || !is_none) named_anew_.insert(world->id);
+  bool is_same = is_told ? told->second.events == interest.events : is_none;
+  for (std::size_t mode = 0; is_told && mode < kSentModes.size(); ++mode) {
+    interest.poses[mode].named = told->second.poses[mode].named;
+    is_same &= told->second.poses[mode].every == interest.poses[mode].every;
   }
+  if (is_same) return;
   if (is_none) {
+    interest.poses = {};
     told_interest_.erase(told);
   } else {
     told_interest_[world->id] = interest;
   }
+  Tell(interest);
+}
+
+void Shard::TellNamed() {
+  for (const WorldId world : std::exchange(named_anew_, {})) {
+    const auto told = told_interest_.find(world);
+    if (told == told_interest_.end()) continue;
+    bool is_same = true;
+    for (const PoseMode mode : kSentModes) {
+      NumberUnion numbers;
+      for (const Session* session : WatchersOf(world)) numbers.Add(session->Named(world, mode));
+      std::vector<AvatarNumber> named = numbers.Take();
+      auto& known = told->second.poses[ModeIndex(mode)].named;
+      if (known == nullptr ? named.empty() : *known == named) continue;
+      is_same = false;
+      known = std::make_shared<const std::vector<AvatarNumber>>(std::move(named));
+    }
+    if (!is_same) Tell(told->second);
+  }
+}
+
+void Shard::Tell(const Interest& interest) {
   for (Shard* shard : shards_) {
     if (shard == this) {
       OnInterest(interest);

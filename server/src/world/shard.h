@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <thread>
@@ -32,8 +33,9 @@ class ShardPeers {
 
 /// One thread with one io_context: some of every world's avatars, and some sessions.
 ///
-///   tick n:  drain the inbox of commands -> advance each avatar -> results, events, and batches
+///   tick n:  drain the inbox of commands -> advance each avatar -> results, events, and poses
 ///            (each encoded once) -> one post to every shard that wants some of them
+///   there:   whole batches go out as they are; for sessions that name avatars theirs are copied out
 ///
 /// Sockets only put commands into inboxes. Shards send each other values by post and share nothing
 /// else but the counters of World and AvatarBudget.
@@ -83,6 +85,7 @@ class Shard : public SessionHost {
   AvatarBudget& avatar_budget() override { return budget_; }
   ThreadMetrics& metrics() override { return metrics_; }
   protocol::Encoder& encoder() override { return encoder_; }
+  protocol::PoseBatchComposer& composer() override { return composer_; }
   void Submit(int shard, WorldCommand&& command) override;
   void Ask(int shard, Inspection&& question) override;
   void JoinWorld(SessionId session, protocol::Seq seq, std::string name) override;
@@ -97,6 +100,8 @@ class Shard : public SessionHost {
   void Publish();
   void Receive(TickMail&& mail);
   void OnInterest(const Interest& interest);
+  void Tell(const Interest& interest);
+  void TellNamed();
   std::span<Session* const> WatchersOf(WorldId world) const;
   WorldShard& WorldOf(const std::shared_ptr<World>& world);
   void DoAdopt(Arrival&& arrival);
@@ -124,8 +129,9 @@ class Shard : public SessionHost {
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::map<WorldId, std::vector<Session*>> watchers_;  // sessions that want poses or events
   std::map<WorldId, Interest> told_interest_;          // what the other shards know of this one's
+  std::set<WorldId> named_anew_;  // whose avatars named are told at the next tick
   protocol::Encoder encoder_;
-  protocol::PoseBatchEncoder batch_encoder_;
+  protocol::PoseBatchComposer composer_;
   std::vector<TickMail> outgoing_;  // by shard
   std::vector<std::weak_ptr<Connection>> connections_;
   bool is_draining_ = false;

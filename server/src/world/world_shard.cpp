@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "stridewire/base/check.h"
 #include "world/convert.h"
 #include "world/inspect.h"
+#include "world/number_union.h"
 
 namespace stridewire::server {
 
@@ -16,8 +18,6 @@ using protocol::ReplyItem;
 using protocol::StatusCode;
 
 namespace {
-
-std::size_t ModeIndex(PoseMode mode) { return mode == PoseMode::kFull ? 0 : 1; }
 
 bool IsSpawnable(const protocol::Placement& start) {
   return std::abs(start.position_m.x) <= kMaxSpawnM && std::abs(start.position_m.y) <= kMaxSpawnM &&
@@ -261,11 +261,18 @@ std::span<const WorldShard::InOrder> WorldShard::AvatarsInOrder() {
   if (!is_order_known_) {
     in_order_.clear();
     advancing_.clear();
+    std::vector<AvatarNumber> numbers;
+    numbers.reserve(avatars_.size());
     for (auto& [number, entry] : avatars_) {
       in_order_.push_back({number, &entry});
       advancing_.push_back(&entry.avatar);
+      numbers.push_back(number);
     }
+    numbers_ = std::make_shared<const std::vector<AvatarNumber>>(std::move(numbers));
+    all_rows_.resize(avatars_.size());
+    std::iota(all_rows_.begin(), all_rows_.end(), 0u);
     is_order_known_ = true;
+    are_named_rows_known_ = false;
   }
   return in_order_;
 }
@@ -290,20 +297,23 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
 }
 
 void WorldShard::SetInterest(const Interest& interest) {
-  interests_[static_cast<std::size_t>(interest.shard)] = {
-      {interest.every_full, interest.every_quantised}, interest.events};
+  interests_[static_cast<std::size_t>(interest.shard)] = interest;
   events_wanted_ = false;
   max_every_ = 1;
-  std::array<bool, 2> observed{};
-  for (const ShardInterest& shard : interests_) {
+  are_named_rows_known_ = false;
+  std::array<bool, kSentModes.size()> observed{};
+  for (const Interest& shard : interests_) {
     events_wanted_ |= shard.events;
-    for (std::size_t mode = 0; mode < 2; ++mode) {
-      observed[mode] |= shard.every[mode] > 0;
-      max_every_ = std::max(max_every_, shard.every[mode]);
+    for (std::size_t mode = 0; mode < observed.size(); ++mode) {
+      const PoseInterest::Every& every = shard.poses[mode].every;
+      observed[mode] |= every.whole > 0 || every.some > 0;
+      max_every_ = std::max({max_every_, every.whole, every.some});
     }
   }
-  for (std::size_t mode = 0; mode < 2; ++mode) {
-    if (!observed[mode]) last_batch_had_avatars_[mode] = false;
+  for (std::size_t mode = 0; mode < observed.size(); ++mode) {
+    // Who names avatars that are not here, or not any more, is told once.
+    last_had_poses_[mode] =
+        observed[mode] && (last_had_poses_[mode] || interest.poses[mode].every.some > 0);
   }
 }
 
@@ -311,14 +321,18 @@ bool WorldShard::WantsEvents(int shard) const {
   return interests_[static_cast<std::size_t>(shard)].events;
 }
 
-bool WorldShard::WantsPoses(int shard, PoseMode mode, std::uint64_t tick) const {
-  const std::uint16_t every = interests_[static_cast<std::size_t>(shard)].every[ModeIndex(mode)];
-  return every > 0 && tick % every == 0;
+WorldShard::Wish WorldShard::WishOf(int shard, PoseMode mode, std::uint64_t tick) const {
+  const PoseInterest::Every& every =
+      interests_[static_cast<std::size_t>(shard)].poses[ModeIndex(mode)].every;
+  return {.whole = every.whole > 0 && tick % every.whole == 0,
+          .some = every.some > 0 && tick % every.some == 0};
 }
 
 bool WorldShard::HasInterest() const {
-  return std::ranges::any_of(interests_, [](const ShardInterest& shard) {
-    return shard.events || shard.every[0] > 0 || shard.every[1] > 0;
+  return std::ranges::any_of(interests_, [](const Interest& shard) {
+    return shard.events || std::ranges::any_of(shard.poses, [](const PoseInterest& poses) {
+             return poses.every != PoseInterest::Every{};
+           });
   });
 }
 
@@ -349,63 +363,73 @@ protocol::AvatarState WorldShard::Inspect(AvatarNumber avatar, std::uint64_t tic
   return state;
 }
 
-bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, protocol::PoseBatchEncoder& encoder,
-                        PoseDelivery& delivery) {
-  bool& had_avatars = last_batch_had_avatars_[ModeIndex(mode)];
-  if (avatars_.empty() && !had_avatars) return false;
-  had_avatars = !avatars_.empty();
+std::span<const std::uint32_t> WorldShard::NamedRows(PoseMode mode) {
+  if (!are_named_rows_known_) {
+    are_named_rows_known_ = true;
+    for (std::size_t m = 0; m < named_rows_.size(); ++m) {
+      NumberUnion named;
+      for (const Interest& shard : interests_) {
+        if (shard.poses[m].named != nullptr) named.Add(*shard.poses[m].named);
+      }
+      named_rows_[m].clear();
+      auto from = numbers_->begin();
+      for (const AvatarNumber number : named.Take()) {
+        from = std::lower_bound(from, numbers_->end(), number);
+        if (from == numbers_->end()) break;
+        if (*from == number) {
+          named_rows_[m].push_back(static_cast<std::uint32_t>(from - numbers_->begin()));
+        }
+      }
+    }
+  }
+  return named_rows_[ModeIndex(mode)];
+}
 
-  const auto joint_count = static_cast<std::size_t>(world_->library->skeleton().joint_count());
-  const std::size_t max_avatars = encoder.MaxAvatars(mode, joint_count);
-  STRIDEWIRE_CHECK(max_avatars > 0);  // the smallest frame limit holds several of kMaxJoints
-  const std::size_t parts = std::clamp<std::size_t>(
-      (avatars_.size() + max_avatars - 1) / max_avatars, 1, protocol::kMaxBatchParts);
-  // Only a frame limit far below the default leaves some that fit in no part.
-  metrics_.pose_errors.Add(avatars_.size() - std::min(avatars_.size(), parts * max_avatars));
-  protocol::PoseBatchInfo info{.world = world_->id,
-                               .shard = static_cast<std::uint16_t>(shard_),
-                               .parts = static_cast<std::uint16_t>(parts),
-                               .tick = tick,
-                               .server_time_s = clock_.TickTime(tick),
-                               .mode = mode,
-                               .joint_count = static_cast<std::uint16_t>(joint_count)};
+bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
+                        protocol::PoseBatchComposer& composer, PoseDelivery& delivery) {
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  const std::span<const std::uint32_t> wanted = whole ? all_rows_ : NamedRows(mode);
+  bool& had_poses = last_had_poses_[ModeIndex(mode)];
+  if (wanted.empty() && !had_poses) return false;
+  had_poses = !wanted.empty();
+
+  protocol::PoseRows& rows = rows_[ModeIndex(mode)].Take();
+  const Status begun = rows.Begin(
+      {.world = world_->id,
+       .shard = static_cast<std::uint16_t>(shard_),
+       .tick = tick,
+       .server_time_s = clock_.TickTime(tick),
+       .mode = mode,
+       .joint_count = static_cast<std::uint16_t>(world_->library->skeleton().joint_count())},
+      numbers_);
+  STRIDEWIRE_CHECK(begun.has_value());
+  constexpr std::size_t kAhead = 4;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    const Entry& entry = *in_order[wanted[i]].entry;
+    // In two strides: where a pose lies is told by the avatar.
+    if (i + 2 * kAhead < wanted.size()) {
+      in_order[wanted[i + 2 * kAhead]].entry->avatar.PrefetchWhereShown();
+    }
+    if (i + kAhead < wanted.size()) in_order[wanted[i + kAhead]].entry->avatar.PrefetchShown();
+    std::uint8_t flags = 0;
+    // Long enough to stand in a batch of the observer who takes the fewest.
+    if (tick < entry.spawn_tick + max_every_) flags |= protocol::kPoseDiscontinuity;
+    if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
+    const ConstPoseSpan pose = entry.avatar.pose();
+    rows.SkipTo(wanted[i]);
+    if (!rows.Add(flags, pose.root_position_m, pose.rotations)) metrics_.pose_errors.Add();
+  }
+  rows.SkipTo(in_order.size());
+  metrics_.poses_encoded.Add(rows.pose_count());
+
   delivery.world = world_->id;
   delivery.mode = mode;
   delivery.from_shard = shard_;
   delivery.tick = tick;
-  delivery.avatar_count = static_cast<std::uint32_t>(avatars_.size());
-  constexpr std::size_t kAhead = 4;
-  const std::span<const InOrder> in_order = AvatarsInOrder();
-  std::size_t next = 0;
-  for (std::size_t part = 0; part < parts; ++part) {
-    info.part = static_cast<std::uint16_t>(part);
-    const Status begun = encoder.Begin(info);
-    STRIDEWIRE_CHECK(begun.has_value());
-    for (std::size_t i = 0; i < max_avatars && next < in_order.size(); ++i, ++next) {
-      const auto& [number, avatar_entry] = in_order[next];
-      const Entry& entry = *avatar_entry;
-      // In two strides: where a pose lies is told by the avatar.
-      if (next + 2 * kAhead < in_order.size()) {
-        in_order[next + 2 * kAhead].entry->avatar.PrefetchWhereShown();
-      }
-      if (next + kAhead < in_order.size()) in_order[next + kAhead].entry->avatar.PrefetchShown();
-      std::uint8_t flags = 0;
-      // Long enough to stand in a batch of the observer who takes the fewest.
-      if (tick < entry.spawn_tick + max_every_) flags |= protocol::kPoseDiscontinuity;
-      if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
-      const ConstPoseSpan pose = entry.avatar.pose();
-      if (!encoder.Add(number, flags, pose.root_position_m, pose.rotations)) {
-        metrics_.pose_errors.Add();
-      }
-    }
-    metrics_.poses_encoded.Add(encoder.size());
-    auto frame = std::make_shared<std::vector<std::byte>>();
-    // Room for headers, numbers and flags beside the poses: grown once, never again.
-    frame->reserve(encoder.size() * (protocol::PoseBytes(mode, joint_count) + 5) + 256);
-    const Status finished = encoder.Finish(*frame);
-    STRIDEWIRE_CHECK(finished.has_value());
-    delivery.parts.push_back(std::move(frame));
-  }
+  delivery.avatar_count = static_cast<std::uint32_t>(rows.pose_count());
+  delivery.parts.clear();
+  if (whole) delivery.parts = ComposeFrames(composer, rows, wanted, metrics_);
+  delivery.rows = rows_[ModeIndex(mode)].Share();
   return true;
 }
 

@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "ops/metrics.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "world/mail.h"
+#include "world/pose_frames.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
 
@@ -42,15 +43,20 @@ class WorldShard {
 
   void SetInterest(const Interest& interest);
   [[nodiscard]] bool WantsEvents(int shard) const;
-  [[nodiscard]] bool WantsPoses(int shard, protocol::PoseMode mode, std::uint64_t tick) const;
+  /// Whether a shard wants whole batches of `tick`, and whether it wants poses of avatars it names.
+  struct Wish {
+    bool whole = false;
+    bool some = false;
+  };
+  [[nodiscard]] Wish WishOf(int shard, protocol::PoseMode mode, std::uint64_t tick) const;
 
   /// Events since this was last called, null if there were none.
   [[nodiscard]] std::shared_ptr<const std::vector<protocol::Event>> TakeEvents();
 
-  /// The poses of `tick`. False when nobody would miss it: no avatars, and none in the batch
-  /// before.
-  [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick,
-                            protocol::PoseBatchEncoder& encoder, PoseDelivery& delivery);
+  /// The poses of `tick`: of all avatars and with a whole batch, or of those that are named. False when
+  /// nobody would miss it: no poses, and none in the delivery before.
+  [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
+                            protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
   /// What an avatar is doing after `tick`, the answer to InspectAvatar.
   [[nodiscard]] protocol::AvatarState Inspect(AvatarNumber avatar, std::uint64_t tick,
@@ -75,11 +81,6 @@ class WorldShard {
     AvatarNumber number;
     Entry* entry;
   };
-  struct ShardInterest {
-    std::array<std::uint16_t, 2> every{};  // by mode, 0: none
-    bool events = false;
-  };
-
   void Spawn(const WorldCommand& command, const SpawnPart& part, std::uint64_t tick,
              CommandResult& result);
   void Request(const RequestPart& part, std::uint64_t tick, CommandResult& result);
@@ -91,6 +92,7 @@ class WorldShard {
   void ChangeGround(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
   std::span<const InOrder> AvatarsInOrder();
+  std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
   protocol::Event& AddEvent(protocol::EventType type, AvatarNumber avatar, std::uint64_t tick);
 
   std::shared_ptr<World> world_;
@@ -103,14 +105,21 @@ class WorldShard {
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
   std::vector<Avatar*> advancing_;
+  protocol::PoseRows::Avatars numbers_;
+  std::vector<std::uint32_t> all_rows_;
   bool is_order_known_ = false;
-  std::vector<ShardInterest> interests_;  // by shard
+  std::vector<Interest> interests_;  // by shard
+  // By mode: rows of avatars that are named by any shard, worked out when they or the order change.
+  std::array<std::vector<std::uint32_t>, kSentModes.size()> named_rows_;
+  bool are_named_rows_known_ = false;
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;
   std::shared_ptr<const Ground> ground_;  // null: flat
   std::deque<GroundPart> grounds_;        // from later ticks on
-  std::array<bool, 2> last_batch_had_avatars_{};
+  // By mode.
+  std::array<bool, kSentModes.size()> last_had_poses_{};
+  std::array<RowsPool, kSentModes.size()> rows_;
 };
 
 }  // namespace stridewire::server

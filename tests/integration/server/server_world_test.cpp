@@ -268,6 +268,63 @@ TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
   } while (!batch->avatars.empty());
 }
 
+// A session that names avatars gets exactly those, whichever shard they live on, for as long as none of its
+// subscriptions is about all.
+TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
+  TestServer server(TestConfig(2));
+  RawClient controller = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  std::vector<protocol::SpawnItem> items;
+  for (AvatarNumber avatar = 1; avatar <= 20; ++avatar)
+    items.push_back({.avatar = avatar, .start = {}});
+  ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 20u);
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  ASSERT_TRUE(client.Join("w", protocol::Role::kObserver));
+  std::map<std::uint16_t, std::vector<AvatarNumber>> last;  // by shard
+  const auto observe = [&](protocol::SubscriptionId id, std::vector<AvatarNumber> avatars) {
+    client.Send(protocol::Observe{.seq = client.NextSeq(),
+                                  .world = world->world,
+                                  .subscription = id,
+                                  .mode = PoseMode::kQuantised,
+                                  .avatars = std::move(avatars)});
+    const auto reply = client.Await<Reply>();
+    return reply ? reply->code : StatusCode::kInternal;
+  };
+  // Batches come until each shard's says this.
+  const auto shows = [&](std::vector<AvatarNumber> even, std::vector<AvatarNumber> odd) {
+    for (int i = 0; i < 200; ++i) {
+      const auto batch = client.Await<protocol::PoseBatch>();
+      if (!batch) return false;
+      last[batch->info.shard].assign(batch->avatars.begin(), batch->avatars.end());
+      if (last[0] == even && last[1] == odd) return true;
+    }
+    return false;
+  };
+  ASSERT_EQ(observe(1, {4, 6, 99}), StatusCode::kOk);
+  EXPECT_TRUE(shows({4, 6}, {}));
+  ASSERT_EQ(observe(2, {6, 7, 2}), StatusCode::kOk);
+  EXPECT_TRUE(shows({2, 4, 6}, {7}));
+  EXPECT_GT(server.metrics().Sum(&ThreadMetrics::batches_composed), 0u);
+  // One that is spawned later, and one that goes.
+  ASSERT_EQ(controller.Spawn(world->world, {{.avatar = 99, .start = {}}})->accepted, 1u);
+  EXPECT_TRUE(shows({2, 4, 6}, {7, 99}));
+  controller.Send(
+      protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {7, 99, 4}});
+  EXPECT_TRUE(shows({2, 6}, {}));
+  client.Send(protocol::StopObserving{.seq = client.NextSeq(), .subscription = 1});
+  ASSERT_EQ(client.Await<Reply>()->code, StatusCode::kOk);
+  EXPECT_TRUE(shows({2, 6}, {}));
+  // One that is about all.
+  ASSERT_EQ(observe(3, {}), StatusCode::kOk);
+  EXPECT_TRUE(shows({2, 6, 8, 10, 12, 14, 16, 18, 20}, {1, 3, 5, 9, 11, 13, 15, 17, 19}));
+  client.Send(protocol::StopObserving{.seq = client.NextSeq(), .subscription = 3});
+  ASSERT_EQ(client.Await<Reply>()->code, StatusCode::kOk);
+  EXPECT_TRUE(shows({2, 6}, {}));
+}
+
 TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {
   TestServer server;
   RawClient controller = server.Connect();
@@ -326,7 +383,8 @@ TEST(ServerLimits, EachIsKeptAndCounted) {
   config.limits.max_avatars_per_world = 3;
   config.limits.max_avatars = 4;
   config.limits.max_queue = 2;
-  config.limits.max_subscriptions = 1;
+  config.limits.max_subscriptions = 2;
+  config.limits.max_named_avatars = 3;
   config.limits.max_sessions_per_address = 2;
   TestServer server(config);
   const auto reached = [&](Limit limit) { return server.metrics().Sum(limit); };
@@ -361,7 +419,12 @@ TEST(ServerLimits, EachIsKeptAndCounted) {
   EXPECT_EQ(reached(Limit::kQueue), 6u);
 
   ASSERT_EQ(client.Observe(a->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
-  EXPECT_EQ(client.Observe(a->world, 2, PoseMode::kFull)->code, StatusCode::kLimitReached);
+  client.Send(protocol::Observe{
+      .seq = client.NextSeq(), .world = a->world, .subscription = 2, .avatars = {1, 2, 3, 4}});
+  EXPECT_EQ(client.Await<Reply>()->code, StatusCode::kLimitReached);
+  EXPECT_EQ(reached(Limit::kNamedAvatars), 1u);
+  ASSERT_EQ(client.Observe(a->world, 2, PoseMode::kFull)->code, StatusCode::kOk);
+  EXPECT_EQ(client.Observe(a->world, 3, PoseMode::kFull)->code, StatusCode::kLimitReached);
   EXPECT_EQ(reached(Limit::kSubscriptions), 1u);
 
   RawClient second = server.Connect();

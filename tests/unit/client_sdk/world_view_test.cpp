@@ -13,8 +13,8 @@ class WorldViewTest : public testing::Test {
   WorldViewTest() { view_.SetInfo(toy::WorldInfo(1, 1, "plaza")); }
 
   Status Take(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars,
-              std::uint16_t shard = 0) {
-    const auto frame = toy::PoseFrame(1, tick, avatars, protocol::PoseMode::kFull, shard);
+              std::uint16_t shard = 0, protocol::PoseMode mode = protocol::PoseMode::kFull) {
+    const auto frame = toy::PoseFrame(1, tick, avatars, mode, shard);
     const auto message =
         protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
     return view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
@@ -34,6 +34,19 @@ TEST_F(WorldViewTest, KnowsWhoIsThere) {
   EXPECT_NE(view_.Find(2), nullptr);  // It can still be shown at a time when it was there.
   view_.Remove(1);
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{3}));
+}
+
+// Subscriptions of different modes may name different avatars.
+TEST_F(WorldViewTest, AvatarsOfOneModeAreNotMissedInAnother) {
+  constexpr auto kQuantised = protocol::PoseMode::kQuantised;
+  for (std::uint64_t tick = 1; tick <= 3; ++tick) {
+    ASSERT_TRUE(Take(tick, {{1}}));
+    EXPECT_EQ(view_.Avatars().size(), tick == 1 ? 1u : 2u);
+    ASSERT_TRUE(Take(tick, {{2}}, 0, kQuantised));
+    EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 2}));
+  }
+  ASSERT_TRUE(Take(4, {}, 0, kQuantised));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1}));
 }
 
 TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {

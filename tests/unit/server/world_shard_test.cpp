@@ -65,8 +65,8 @@ struct Bench {
   void Watch(std::uint16_t every_full, std::uint16_t every_quantised = 0, bool events = true) {
     shard.SetInterest({.world = world,
                        .shard = 0,
-                       .every_full = every_full,
-                       .every_quantised = every_quantised,
+                       .poses = {{{.every = {.whole = every_full}, .named = {}},
+                                  {.every = {.whole = every_quantised}, .named = {}}}},
                        .events = events});
   }
   std::vector<protocol::Event> Events() {
@@ -192,9 +192,9 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
       for (const auto& shard : shards) shard->Advance(tick, 1);
       for (Avatar& avatar : alone) avatar.Advance(kClock.tick_s());
       for (const auto& shard : shards) {
-        protocol::PoseBatchEncoder encoder;
+        protocol::PoseBatchComposer composer;
         PoseDelivery delivery;
-        ASSERT_TRUE(shard->Encode(PoseMode::kFull, tick, encoder, delivery));
+        ASSERT_TRUE(shard->Encode(PoseMode::kFull, tick, true, composer, delivery));
         const Decoded decoded(delivery.parts.at(0));
         for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
           const ConstPoseSpan expected = alone[decoded.batch.avatars[i] - 1].pose();
@@ -217,13 +217,13 @@ TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
     bench->Spawn({1});
     bench->Walk(1, 3);
   }
-  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchComposer composer;
   for (std::uint64_t tick = 10; tick <= 100; ++tick) punctual.shard.Advance(tick, 1);
   for (std::uint64_t tick = 16; tick <= 100; tick += 7) late.shard.Advance(tick, 7);
   PoseDelivery a;
   PoseDelivery b;
-  ASSERT_TRUE(punctual.shard.Encode(PoseMode::kFull, 100, encoder, a));
-  ASSERT_TRUE(late.shard.Encode(PoseMode::kFull, 100, encoder, b));
+  ASSERT_TRUE(punctual.shard.Encode(PoseMode::kFull, 100, true, composer, a));
+  ASSERT_TRUE(late.shard.Encode(PoseMode::kFull, 100, true, composer, b));
   EXPECT_EQ(*a.parts[0], *b.parts[0]);
   // Events say when they happened, not when the tick came.
   const auto punctual_events = punctual.Events();
@@ -252,10 +252,10 @@ TEST(WorldShard, ListsAvatarsInOrderAndFlagsTheNewOnes) {
   Bench bench;
   bench.Watch(1);
   bench.Spawn({9, 2, 5});
-  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
   bench.shard.Advance(bench.tick, 1);
-  ASSERT_TRUE(bench.shard.Encode(PoseMode::kQuantised, bench.tick, encoder, delivery));
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kQuantised, bench.tick, true, composer, delivery));
   const Decoded decoded(delivery.parts.at(0));
   EXPECT_EQ(decoded.batch.info.world, 3u);
   EXPECT_EQ(decoded.batch.info.tick, bench.tick);
@@ -268,12 +268,12 @@ TEST(WorldShard, KeepsTheFlagUntilTheRarestObserverHasSeenIt) {
   bench.Watch(1, 5);
   bench.Spawn({1});
   const std::uint64_t spawned = bench.tick;
-  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchComposer composer;
   int flagged = 0;
   for (std::uint64_t tick = spawned; tick < spawned + 20; ++tick) {
     bench.shard.Advance(tick, 1);
     PoseDelivery delivery;
-    ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, tick, encoder, delivery));
+    ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, tick, true, composer, delivery));
     flagged += Decoded(delivery.parts[0]).batch.flags[0] & protocol::kPoseDiscontinuity;
   }
   EXPECT_EQ(flagged, 5);
@@ -286,9 +286,9 @@ TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
   for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<AvatarNumber>(i + 1);
   bench.Spawn(numbers);
   bench.shard.Advance(bench.tick, 1);
-  protocol::PoseBatchEncoder encoder({1 << 20, 4096});  // 31 of these avatars a frame
+  protocol::PoseBatchComposer composer({1 << 20, 4096});  // 31 of these avatars a frame
   PoseDelivery delivery;
-  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, encoder, delivery));
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, true, composer, delivery));
   ASSERT_GT(delivery.parts.size(), 2u);
   std::vector<AvatarNumber> seen;
   for (std::size_t part = 0; part < delivery.parts.size(); ++part) {
@@ -304,16 +304,16 @@ TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
 TEST(WorldShard, SaysOnceThatItIsEmpty) {
   Bench bench;
   bench.Watch(1);
-  protocol::PoseBatchEncoder encoder;
+  protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
-  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 1, encoder, delivery));
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 1, true, composer, delivery));
   bench.Spawn({1});
-  EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, 2, encoder, delivery));
+  EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, 2, true, composer, delivery));
   bench.Do(RemovePart{{{0, 1}}});
   delivery = {};
-  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, 3, encoder, delivery));
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, 3, true, composer, delivery));
   EXPECT_TRUE(Decoded(delivery.parts[0]).batch.avatars.empty());
-  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 4, encoder, delivery));
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 4, true, composer, delivery));
 }
 
 TEST(WorldShard, ReleasesWhatASessionSpawnedUnlessTheWorldIsPersistent) {
@@ -383,14 +383,14 @@ std::map<AvatarNumber, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int sh
     }
     if (is_reversed) std::ranges::reverse(request.items);
     (void)shard.Execute({.world = world, .session = 1, .seq = 1, .part = spawn}, 1);
-    protocol::PoseBatchEncoder encoder;
+    protocol::PoseBatchComposer composer;
     for (std::uint64_t tick = 1; tick <= 30; ++tick) {
       if (tick == 2) {
         (void)shard.Execute({.world = world, .session = 1, .seq = 2, .part = request}, tick);
       }
       shard.Advance(tick, 1);
       PoseDelivery delivery;
-      EXPECT_TRUE(shard.Encode(PoseMode::kFull, tick, encoder, delivery));
+      EXPECT_TRUE(shard.Encode(PoseMode::kFull, tick, true, composer, delivery));
       const Decoded decoded(delivery.parts.at(0));
       for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
         const auto pose = decoded.batch.pose(i);
@@ -437,13 +437,60 @@ TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
   for (AvatarNumber avatar = 1; avatar <= 1000; ++avatar) EXPECT_EQ(StartTickOf(avatar, 1), 0u);
 }
 
-TEST(WorldShard, AnsweresOnlyTicksItsObserversWant) {
+TEST(WorldShard, AnswersOnlyTicksItsObserversWant) {
   Bench bench(2);
-  bench.shard.SetInterest({.world = bench.world, .shard = 1, .every_quantised = 3});
-  EXPECT_TRUE(bench.shard.WantsPoses(1, PoseMode::kQuantised, 6));
-  EXPECT_FALSE(bench.shard.WantsPoses(1, PoseMode::kQuantised, 7));
-  EXPECT_FALSE(bench.shard.WantsPoses(1, PoseMode::kFull, 6));
-  EXPECT_FALSE(bench.shard.WantsPoses(0, PoseMode::kQuantised, 6));
+  bench.shard.SetInterest({.world = bench.world,
+                           .shard = 1,
+                           .poses = {{{}, {.every = {.whole = 3, .some = 2}, .named = {}}}}});
+  const auto wish = [&](int shard, PoseMode mode, std::uint64_t tick) {
+    const WorldShard::Wish wished = bench.shard.WishOf(shard, mode, tick);
+    return std::pair(wished.whole, wished.some);
+  };
+  EXPECT_EQ(wish(1, PoseMode::kQuantised, 6), std::pair(true, true));
+  EXPECT_EQ(wish(1, PoseMode::kQuantised, 9), std::pair(true, false));
+  EXPECT_EQ(wish(1, PoseMode::kQuantised, 8), std::pair(false, true));
+  EXPECT_EQ(wish(1, PoseMode::kQuantised, 7), std::pair(false, false));
+  EXPECT_EQ(wish(1, PoseMode::kFull, 6), std::pair(false, false));
+  EXPECT_EQ(wish(0, PoseMode::kQuantised, 6), std::pair(false, false));
+}
+
+TEST(WorldShard, EncodesNobodyThatIsNotWanted) {
+  Bench bench(2);
+  protocol::PoseBatchComposer composer;
+  PoseDelivery delivery;
+  const auto name = [&](int shard, std::vector<AvatarNumber> named) {
+    bench.shard.SetInterest(
+        {.world = bench.world,
+         .shard = shard,
+         .poses = {{{.every = {.some = 1},
+                     .named = std::make_shared<const std::vector<AvatarNumber>>(named)},
+                    {}}}});
+  };
+  const auto encoded = [&] {
+    EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, false, composer, delivery));
+    EXPECT_TRUE(delivery.parts.empty());
+    std::vector<AvatarNumber> avatars;
+    for (std::size_t row = 0; row < delivery.rows->size(); ++row) {
+      if (delivery.rows->has_pose(row)) avatars.push_back((*delivery.rows->avatars())[row]);
+    }
+    return avatars;
+  };
+  bench.Spawn({1, 2, 3, 4, 5});
+  name(0, {2, 4, 77});
+  name(1, {4, 5});
+  EXPECT_THAT(encoded(), ElementsAre(2, 4, 5));
+  EXPECT_EQ(bench.metrics.poses_encoded.value(), 3u);
+  bench.Spawn({77});
+  bench.Do(RemovePart{{{0, 4}}});
+  EXPECT_THAT(encoded(), ElementsAre(2, 5, 77));
+  name(0, {});
+  EXPECT_THAT(encoded(), ElementsAre(5));
+  name(1, {});
+  // Once more for who had some of them, then nothing.
+  EXPECT_THAT(encoded(), ElementsAre());
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, false, composer, delivery));
+  EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, true, composer, delivery));
+  EXPECT_THAT(Decoded(delivery.parts.at(0)).batch.avatars, ElementsAre(1, 2, 3, 5, 77));
 }
 
 TEST(World, NumbersNeverMeet) {

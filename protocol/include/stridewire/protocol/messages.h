@@ -246,7 +246,7 @@ struct Observe {
   WorldId world = 0;
   SubscriptionId subscription = 0;  ///< Not 0.
   PoseMode mode = PoseMode::kFull;
-  std::vector<AvatarNumber> avatars;  ///< Empty: all. A batch may hold more than was asked for.
+  std::vector<AvatarNumber> avatars;  ///< Empty: all. Numbers nobody has yet may be among them.
   std::uint16_t every_n_ticks = 1;    ///< 1 to kMaxEveryNTicks
   bool with_events = false;           ///< Events of the world, too.
   bool operator==(const Observe&) const = default;

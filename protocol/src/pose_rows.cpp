@@ -1,0 +1,129 @@
+#include "stridewire/protocol/pose_rows.h"
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "frame_builder.h"
+#include "stridewire/base/check.h"
+#include "stridewire/protocol/check.h"
+
+namespace stridewire::protocol {
+
+Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars) {
+  STRIDEWIRE_CHECK(avatars != nullptr);
+  info_ = info;
+  avatars_ = std::move(avatars);
+  flags_.clear();
+  flags_.reserve(avatars_->size());
+  begins_.reserve(avatars_->size() + 1);
+  begins_.assign(1, 0);
+  pose_count_ = 0;
+  return Check(PoseBatch{info, {}, {}, {}});
+}
+
+Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
+                     std::span<const Quat> rotations) {
+  STRIDEWIRE_CHECK(size() < avatars_->size());
+  const std::size_t begin = begins_.back();
+  flags_.push_back(flags);
+  begins_.push_back(begin);
+  if (rotations.size() != info_.joint_count) {
+    return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints", "PoseBatch.poses",
+                static_cast<std::int64_t>(rotations.size()));
+  }
+  const std::size_t length = PoseBytes(info_.mode, rotations.size());
+  if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
+  const Status status =
+      EncodePose(info_.mode, root_position_m, rotations, std::span(bytes_).subspan(begin, length));
+  if (!status) return status;
+  begins_.back() = begin + length;
+  ++pose_count_;
+  return {};
+}
+
+void PoseRows::SkipTo(std::size_t row) {
+  STRIDEWIRE_CHECK(row <= avatars_->size());
+  if (row <= size()) return;
+  flags_.resize(row);
+  begins_.resize(row + 1, begins_.back());
+}
+
+struct PoseBatchComposer::Impl {
+  FrameLimits limits;
+  flatbuffers::FlatBufferBuilder builder;
+};
+
+PoseBatchComposer::PoseBatchComposer(const FrameLimits& limits) : impl_(std::make_unique<Impl>()) {
+  impl_->limits = limits;
+}
+PoseBatchComposer::~PoseBatchComposer() = default;
+PoseBatchComposer::PoseBatchComposer(PoseBatchComposer&&) noexcept = default;
+PoseBatchComposer& PoseBatchComposer::operator=(PoseBatchComposer&&) noexcept = default;
+
+std::size_t PoseBatchComposer::Fitting(const PoseRows& rows,
+                                       std::span<const std::uint32_t> picked) const {
+  const std::size_t room = MaxPayloadBytes(MessageType::kPoseBatch, impl_->limits);
+  std::size_t used = kPoseBatchOverheadBytes;
+  std::size_t poses = 0;
+  for (std::size_t i = 0; i < picked.size(); ++i) {
+    if (!rows.has_pose(picked[i])) continue;
+    used += rows.poses(picked[i], picked[i]).size() + sizeof(AvatarNumber) + 1;
+    if (used > room || ++poses > kMaxItems) return i;
+  }
+  return picked.size();
+}
+
+Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uint32_t> picked,
+                                  std::size_t part, std::size_t parts,
+                                  std::vector<std::byte>& frame) {
+  PoseBatchInfo info = rows.info();
+  info.part = static_cast<std::uint16_t>(part);
+  info.parts = static_cast<std::uint16_t>(parts);
+  if (const Status status = Check(PoseBatch{info, {}, {}, {}}); !status) return status;
+  std::size_t count = 0;
+  std::size_t length = 0;
+  for (const std::uint32_t row : picked) {
+    count += rows.has_pose(row) ? 1 : 0;
+    length += rows.poses(row, row).size();
+  }
+
+  flatbuffers::FlatBufferBuilder& builder = impl_->builder;
+  builder.Clear();
+  std::uint8_t* poses = nullptr;
+  const auto poses_offset = builder.CreateUninitializedVector<std::uint8_t>(length, &poses);
+  // Rows that follow each other are copied at once. The processor fetches ahead within them, not to the next
+  // one picked.
+  constexpr std::size_t kAhead = 4;
+  for (std::size_t i = 0; i < picked.size();) {
+    std::size_t last = i;
+    while (last + 1 < picked.size() && picked[last + 1] == picked[last] + 1) ++last;
+    if (last + kAhead < picked.size()) {
+      const std::span<const std::byte> later =
+          rows.poses(picked[last + kAhead], picked[last + kAhead]);
+      for (std::size_t byte = 0; byte < later.size(); byte += 64) {
+        __builtin_prefetch(later.data() + byte);
+      }
+    }
+    const std::span<const std::byte> run = rows.poses(picked[i], picked[last]);
+    if (!run.empty()) std::memcpy(poses, run.data(), run.size());
+    poses += run.size();
+    i = last + 1;
+  }
+  std::uint8_t* flags = nullptr;
+  const auto flags_offset = builder.CreateUninitializedVector<std::uint8_t>(count, &flags);
+  for (const std::uint32_t row : picked) {
+    if (rows.has_pose(row)) *flags++ = rows.flags(row);
+  }
+  AvatarNumber* avatars = nullptr;
+  const auto avatars_offset = builder.CreateUninitializedVector<AvatarNumber>(count, &avatars);
+  for (const std::uint32_t row : picked) {
+    if (rows.has_pose(row)) {
+      *avatars++ = flatbuffers::EndianScalar((*rows.avatars())[row]);
+    }
+  }
+  builder.Finish(BuildPoseBatch(builder, info, avatars_offset, flags_offset, poses_offset));
+  return AppendFrame(builder, MessageType::kPoseBatch, impl_->limits, frame);
+}
+
+}  // namespace stridewire::protocol

@@ -1,0 +1,126 @@
+#include "stridewire/protocol/pose_rows.h"
+
+#include <gmock/gmock.h>
+
+#include <numeric>
+
+#include "protocol_testing.h"
+#include "stridewire/protocol/pose_batch_encoder.h"
+
+namespace stridewire::protocol {
+namespace {
+
+using testing::ElementsAre;
+
+constexpr std::size_t kJoints = 5;
+
+PoseBatchInfo Info(PoseMode mode) { return {5, 1, 0, 1, 99, 1.5, mode, kJoints}; }
+
+Vec3 RootOf(AvatarNumber avatar) { return {0.25f * static_cast<float>(avatar), 1.0f, 0.0f}; }
+
+/// Avatars 10, 20, 30, ..., flagged by their row.
+void Fill(PoseRows& rows, PoseMode mode, std::size_t count) {
+  std::vector<AvatarNumber> avatars(count);
+  for (std::size_t i = 0; i < count; ++i) avatars[i] = static_cast<AvatarNumber>(10 * (i + 1));
+  ASSERT_TRUE(rows.Begin(Info(mode), std::make_shared<const std::vector<AvatarNumber>>(avatars)));
+  const std::vector<Quat> rotations(kJoints, YawRotation(0.25));
+  for (std::size_t i = 0; i < count; ++i) {
+    ASSERT_TRUE(rows.Add(static_cast<std::uint8_t>(i), RootOf(avatars[i]), rotations));
+  }
+}
+
+/// What a batch decodes to, whose bytes it keeps.
+struct Decoded {
+  Decoded(PoseBatchComposer& composer, const PoseRows& rows,
+          const std::vector<std::uint32_t>& picked) {
+    EXPECT_TRUE(composer.Compose(rows, picked, 0, 1, frame));
+    auto message = Decode(frame, MessageType::kPoseBatch);
+    EXPECT_TRUE(message);
+    batch = std::get<PoseBatch>(*message);
+  }
+  std::vector<std::byte> frame;
+  PoseBatch batch;
+};
+
+TEST(PoseBatchComposer, MakesOfAllRowsTheBytesOfTheEncoder) {
+  for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+    PoseRows rows;
+    PoseBatchComposer composer;
+    for (const std::size_t count : {20u, 7u}) {  // the second with the first one's memory
+      Fill(rows, mode, count);
+      PoseBatchEncoder encoder;
+      ASSERT_TRUE(encoder.Begin(Info(mode)));
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto avatar = static_cast<AvatarNumber>(10 * (i + 1));
+        ASSERT_TRUE(encoder.Add(avatar, static_cast<std::uint8_t>(i), RootOf(avatar),
+                                std::vector<Quat>(kJoints, YawRotation(0.25))));
+      }
+      std::vector<std::byte> expected;
+      ASSERT_TRUE(encoder.Finish(expected));
+      std::vector<std::uint32_t> all(count);
+      std::iota(all.begin(), all.end(), 0u);
+      EXPECT_EQ(Decoded(composer, rows, all).frame, expected);
+    }
+  }
+}
+
+TEST(PoseBatchComposer, HoldsExactlyTheRowsPicked) {
+  PoseRows rows;
+  Fill(rows, PoseMode::kQuantised, 40);
+  PoseBatchComposer composer;
+  const Decoded decoded(composer, rows, {0, 3, 4, 5, 20, 39});
+  EXPECT_EQ(decoded.batch.info, Info(PoseMode::kQuantised));
+  EXPECT_THAT(decoded.batch.avatars, ElementsAre(10, 40, 50, 60, 210, 400));
+  EXPECT_THAT(decoded.batch.flags, ElementsAre(0, 3, 4, 5, 20, 39));
+  for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
+    Vec3 root;
+    std::vector<Quat> rotations(kJoints);
+    ASSERT_TRUE(DecodePose(PoseMode::kQuantised, decoded.batch.pose(i), root, rotations));
+    EXPECT_EQ(root.x, RootOf(decoded.batch.avatars[i]).x);
+  }
+  EXPECT_TRUE(Decoded(composer, rows, {}).batch.avatars.empty());
+}
+
+TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
+  PoseRows rows;
+  ASSERT_TRUE(rows.Begin(
+      Info(PoseMode::kQuantised),
+      std::make_shared<const std::vector<AvatarNumber>>(std::vector<AvatarNumber>{1, 2, 3, 4, 5})));
+  const std::vector<Quat> rotations(kJoints, kIdentityQuat);
+  rows.SkipTo(1);
+  ASSERT_TRUE(rows.Add(7, RootOf(2), rotations));
+  EXPECT_FALSE(rows.Add(0, RootOf(3), std::vector<Quat>(kJoints, Quat(2.0f, 0, 0, 0))));
+  EXPECT_EQ(rows.Add(0, RootOf(4), std::vector<Quat>(kJoints - 1)).error().code,
+            ErrorCode::kShapeMismatch);
+  ASSERT_TRUE(rows.Add(8, RootOf(5), rotations));
+  EXPECT_EQ(rows.pose_count(), 2u);
+  EXPECT_FALSE(rows.has_pose(0));
+  EXPECT_TRUE(rows.has_pose(1));
+  EXPECT_FALSE(rows.has_pose(2));
+  PoseBatchComposer composer;
+  EXPECT_THAT(Decoded(composer, rows, {0, 1, 2, 3, 4}).batch.avatars, ElementsAre(2, 5));
+  EXPECT_THAT(Decoded(composer, rows, {0, 1, 2, 3, 4}).batch.flags, ElementsAre(7, 8));
+  EXPECT_THAT(Decoded(composer, rows, {0, 3}).batch.avatars, ElementsAre());
+}
+
+TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
+  PoseRows rows;
+  Fill(rows, PoseMode::kFull, 100);
+  const FrameLimits limits{1 << 20, 4096};
+  PoseBatchComposer composer(limits);
+  std::vector<std::uint32_t> picked(100);
+  std::iota(picked.begin(), picked.end(), 0u);
+  const std::size_t fitting = composer.Fitting(rows, picked);
+  EXPECT_EQ(fitting, PoseBatchEncoder(limits).MaxAvatars(PoseMode::kFull, kJoints));
+  std::vector<std::byte> frame;
+  ASSERT_TRUE(composer.Compose(rows, std::span(picked).first(fitting), 3, 4, frame));
+  const auto message = Decode(frame, MessageType::kPoseBatch);
+  ASSERT_TRUE(message);
+  EXPECT_EQ(std::get<PoseBatch>(*message).info.part, 3);
+  EXPECT_EQ(std::get<PoseBatch>(*message).info.parts, 4);
+  EXPECT_EQ(composer.Compose(rows, picked, 0, 1, frame).error().code, ErrorCode::kLimitExceeded);
+  EXPECT_FALSE(composer.Compose(rows, std::span(picked).first(1), 4, 4, frame));
+}
+
+}  // namespace
+}  // namespace stridewire::protocol
