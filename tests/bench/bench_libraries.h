@@ -10,4 +10,7 @@ namespace stridewire {
 /// Benchmarks of whole crowds on a library.
 void RegisterCrowd(const std::string& name, const std::shared_ptr<const MotionLibrary>& library);
 
+/// What crowds cost with other numbers of examples and joints.
+void RegisterScaledCrowds();
+
 }  // namespace stridewire

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "bench_libraries.h"
+#include "scaled_library.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
@@ -266,6 +267,25 @@ void RegisterCrowd(const std::string& name, const Library& library) {
         ->Arg(1000)
         ->Unit(benchmark::kMicrosecond);
   }
+}
+
+void RegisterScaledCrowds() {
+  const auto add = [](const std::string& name, int examples, int joints) {
+    const Library library = MakeScaledLibrary(examples, joints);
+    for (const int count : {1000, 10000}) {
+      const auto set = [&](benchmark::internal::Benchmark* bench) {
+        bench->Arg(count)->Unit(benchmark::kMicrosecond);
+      };
+      set(benchmark::RegisterBenchmark((name + "/crowd/floor").c_str(), Floor, library));
+      set(benchmark::RegisterBenchmark((name + "/crowd/evaluate").c_str(), EvaluateCrowd, library,
+                                       false));
+      set(benchmark::RegisterBenchmark((name + "/crowd/whole_pose").c_str(), WholePose, library));
+    }
+  };
+  for (const int examples : {4, 8, 15, 30, 60}) {
+    add("examples_" + std::to_string(examples), examples, 31);
+  }
+  for (const int joints : {64, 128}) add("joints_" + std::to_string(joints), 15, joints);
 }
 
 }  // namespace stridewire

@@ -470,6 +470,7 @@ int Run(int argc, char** argv) {
     }
     RegisterAll(name, *library);
   }
+  RegisterScaledCrowds();
   benchmark::RunSpecifiedBenchmarks();
   return 0;
 }
