@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kFooter = R"(
 What is measured
   poses_expected   avatars x observers x ticks of the measured window, however many of these ticks
-                   the server did or sent. The window opens when all observers see all avatars.
+                   the server did or sent; of partial observers what they watch. The window opens when all observers see all avatars.
   tick_ms          how long the server's ticks took, from its own histogram: p50 and p99 are
                    interpolated within its bins. ticks_missed is the server's count, over all shards.
   step_latency_ms  from when a step was to be sent by the plan (not from when it was) to the arrival
@@ -28,6 +28,8 @@ that fails its checks, a --fail-if that holds.
 Examples:
   stridewire-load --connect 127.0.0.1:7420 --avatars 1000 --observers 4 --seconds 30
   stridewire-load --connect 127.0.0.1:7420 --avatars 200 --observers 50 --seconds 60 --churn 5
+  stridewire-load --connect 127.0.0.1:7420 --avatars 10000 --observers 1 --partial-observers 100 \
+                  --partial-avatars 100 --seconds 60
   stridewire-load --connect 127.0.0.1:7420 --worlds 4 --avatars 100 --observers 1 --seconds 20 \
                   --choreography walk.json --mode full
   stridewire-load --connect 127.0.0.1:7420 --avatars 1000 --observers 4 --seconds 30 --json \
@@ -82,6 +84,8 @@ Status CheckRanges(const LoadOptions& options) {
       CheckRange("--avatars", options.avatars, 1, kMaxAvatars),
       CheckRange("--worlds", options.worlds, 1, kMaxWorlds),
       CheckRange("--observers", options.observers, 0, kMaxObservers),
+      CheckRange("--partial-observers", options.partial_observers, 0, kMaxObservers),
+      CheckRange("--partial-avatars", options.partial_avatars, 1, kMaxAvatars),
       CheckRange("--seconds", options.seconds, 0.1, kMaxSeconds),
       CheckRange("--churn", options.churn_per_s, 0.0, kMaxChurnPerS),
       CheckRange("--threads", options.threads, 1, kMaxThreads),
@@ -94,7 +98,11 @@ Status CheckRanges(const LoadOptions& options) {
     return Fail(ErrorCode::kInvalidArgument, "leaves worlds without an avatar",
                 Given("--worlds", options.worlds));
   }
-  if (options.churn_per_s > 0.0 && options.observers == 0) {
+  if (options.partial_observers > 0 && options.partial_avatars > options.avatars) {
+    return Fail(ErrorCode::kInvalidArgument, "is more than there are",
+                Given("--partial-avatars", options.partial_avatars));
+  }
+  if (options.churn_per_s > 0.0 && options.observers + options.partial_observers == 0) {
     return Fail(ErrorCode::kInvalidArgument, "has no observers to drop and bring back",
                 Given("--churn", options.churn_per_s));
   }
@@ -135,6 +143,10 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
                  "Avatars 1 to N, spread over the worlds in turn (1 to 100000)")
       ->required();
   app.add_option("--observers", options.observers, "Sessions that watch (0 to 10000)")->required();
+  app.add_option("--partial-observers", options.partial_observers,
+                 "Beside those, sessions that watch some avatars only (0 to 10000) [0]");
+  app.add_option("--partial-avatars", options.partial_avatars,
+                 "How many each of these watches, spread over the crowd, not the same ones [100]");
   app.add_option("--seconds", options.seconds, "Length of the measured window (0.1 to 3600)")
       ->required();
   app.add_option("--mode", mode, "How poses are sent: full or quantised [quantised]");

@@ -35,6 +35,8 @@ struct LoadOptions {
   int worlds = 1;
   int avatars = 0;
   int observers = 0;
+  int partial_observers = 0;  ///< Beside them, such as name avatars.
+  int partial_avatars = 100;  ///< How many each of those names.
   double seconds = 10.0;
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   std::string choreography;  ///< A file; empty: the avatars wander.

@@ -60,7 +60,9 @@ ordered_json ToDocument(const LoadReport& report) {
            {{"threads", report.threads},
             {"cpu_s", Rounded(report.own_cpu_s)},
             {"loop_late_ms", ToValue(report.own_loop_late_ms)},
-            {"send_late_ms", ToValue(report.own_send_late_ms)}}}};
+            {"send_late_ms", ToValue(report.own_send_late_ms)}}},
+          {"partial_observers", report.partial_observers},
+          {"partial_avatars", report.partial_avatars}};
 }
 
 /// "tick_ms.p99" -> the value there.
@@ -115,7 +117,11 @@ std::string ToText(const LoadReport& report) {
              report.avatars, report.worlds, report.observers,
              report.mode == protocol::PoseMode::kFull ? "full" : "quantised", report.seconds,
              count(report.seed));
-  if (report.observers > 0) {
+  if (report.partial_observers > 0) {
+    text += Format("                %d observers of %d avatars each\n", report.partial_observers,
+                   report.partial_avatars);
+  }
+  if (report.observers + report.partial_observers > 0) {
     const double share = report.poses_expected == 0
                              ? 0.0
                              : 100.0 * static_cast<double>(report.poses_received) /

@@ -21,11 +21,13 @@ struct LoadReport {
   int avatars = 0;
   int worlds = 0;
   int observers = 0;
+  int partial_observers = 0;
+  int partial_avatars = 0;  ///< That each of these watches.
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   std::uint64_t seed = 0;
   double seconds = 0.0;               ///< Of the measured window.
   std::uint64_t poses_received = 0;   ///< Of our avatars, at ticks of the window, by all observers.
-  std::uint64_t poses_expected = 0;   ///< Avatars x observers x ticks of the window.
+  std::uint64_t poses_expected = 0;   ///< Avatars watched, of all observers, x ticks of the window.
   std::uint64_t poses_invalid = 0;    ///< Received, but failed a check.
   std::uint64_t bytes_received = 0;   ///< Frames of the window's batches, headers included.
   std::uint64_t batches_dropped = 0;  ///< By the server for slow observers, as it told them.

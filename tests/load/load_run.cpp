@@ -232,8 +232,8 @@ void LoadRun::MakeSessions() {
                                                         world, is_watched ? &*probes_ : nullptr));
     workers_[0]->Add(*controllers_.back());
   }
-  for (int i = 0; i < options_.observers; ++i) {
-    const bool is_measuring = i < measuring_count;
+  for (int i = 0; i < options_.observers + options_.partial_observers; ++i) {
+    const bool is_measuring = i < std::min(measuring_count, options_.observers);
     Worker& worker =
         is_measuring ? *workers_[0] : *workers_[static_cast<std::size_t>(i % options_.threads)];
     observers_.push_back(std::make_unique<Observer>(worker.context(), server_, run_, i,
@@ -265,7 +265,9 @@ bool LoadRun::OpenObservers() {
 
 bool LoadRun::SetUp() {
   constexpr std::size_t kOtherFiles = 64;
-  if (!MayOpenFiles(static_cast<std::size_t>(options_.worlds + options_.observers) + kOtherFiles)) {
+  if (!MayOpenFiles(static_cast<std::size_t>(options_.worlds + options_.observers +
+                                             options_.partial_observers) +
+                    kOtherFiles)) {
     run_.Problem("the system does not let this program open so many connections (ulimit -n)");
     return false;
   }
@@ -380,6 +382,8 @@ LoadReport LoadRun::Report() {
   report.avatars = options_.avatars;
   report.worlds = options_.worlds;
   report.observers = options_.observers;
+  report.partial_observers = options_.partial_observers;
+  report.partial_avatars = options_.partial_observers > 0 ? options_.partial_avatars : 0;
   report.mode = options_.mode;
   report.seed = options_.seed;
   report.seconds = seconds_;

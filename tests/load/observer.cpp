@@ -21,6 +21,37 @@ Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint&
     added.seen.resize(layout.CountIn(world));
     avatar_count_ += added.seen.size();
   }
+  if (index >= run.options.observers) {
+    WatchSome(static_cast<std::size_t>(index - run.options.observers));
+  }
+}
+
+// Each as far from the next one as the last of them, and one further than those of the observer before.
+void Observer::WatchSome(std::size_t which) {
+  const std::size_t all = avatar_count_;
+  const std::size_t some = std::min(static_cast<std::size_t>(run_.options.partial_avatars), all);
+  for (std::size_t i = 0; i < some; ++i) {
+    std::size_t place = (which + i * all / some) % all;
+    auto world = worlds_.begin();
+    for (; place >= world->seen.size(); ++world) place -= world->seen.size();
+    world->watched.push_back(run_.layout.Number(world->index, place));
+  }
+  std::erase_if(worlds_, [](const World& world) { return world.watched.empty(); });
+  for (World& world : worlds_) {
+    std::ranges::sort(world.watched);
+    world.seen.assign(world.watched.size(), {});
+  }
+  avatar_count_ = some;
+}
+
+std::optional<std::size_t> Observer::IndexIn(const World& world,
+                                             protocol::AvatarNumber number) const {
+  if (!run_.layout.IsOurs(world.index, number))
+    return std::nullopt;  // Somebody else's, in our world.
+  if (world.watched.empty()) return run_.layout.IndexIn(number);
+  const auto found = std::ranges::lower_bound(world.watched, number);
+  if (found == world.watched.end() || *found != number) return std::nullopt;
+  return static_cast<std::size_t>(found - world.watched.begin());
 }
 
 void Observer::OnWelcome() {
@@ -66,7 +97,7 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
                          .world = info.world,
                          .subscription = static_cast<protocol::SubscriptionId>(pending->second + 1),
                          .mode = run_.options.mode,
-                         .avatars = {},
+                         .avatars = world.watched,
                          .every_n_ticks = 1,
                          .with_events = false});
 }
@@ -116,8 +147,9 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber number = batch.avatars[i];
-    if (!run_.layout.IsOurs(world.index, number)) continue;  // Somebody else's, in our world.
-    Seen& seen = world.seen[run_.layout.IndexIn(number)];
+    const std::optional<std::size_t> index = IndexIn(world, number);
+    if (!index) continue;
+    Seen& seen = world.seen[*index];
     if (seen.tick >= tick) {
       Invalid(world, tick, "avatar " + std::to_string(number) + " came twice, or too late");
       continue;
@@ -152,7 +184,7 @@ bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
   stream->tick = tick;
   stream->avatar_count = 0;
   for (const protocol::AvatarNumber number : batch.avatars) {
-    if (run_.layout.IsOurs(world.index, number)) ++stream->avatar_count;
+    if (IndexIn(world, number)) ++stream->avatar_count;
   }
   return true;
 }
@@ -208,7 +240,8 @@ void Observer::UpdateProgress() {
   for (const World& world : worlds_) {
     for (const Stream& stream : world.streams) {
       newest = std::max(newest, stream.tick);
-      saw_last = saw_last && stream.tick >= run_.window.last();
+      // A shard that has none of them says so once.
+      saw_last = saw_last && (stream.tick >= run_.window.last() || stream.avatar_count == 0);
     }
   }
   latest_tick_ = newest;

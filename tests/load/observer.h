@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ class Observer final : public Session {
   static constexpr double kMaxSpeedMPerS = 15.0;
   static constexpr double kSpeedSlackM = 0.05;
 
-  /// `probes` not null: this one's poses measure the latency; it lives on the probes' thread.
+  /// The first of them, `observers` of the options, watch all avatars, the others some.
+  /// `probes` not null: this one's poses measure the latency; it lives on the probes' thread, and watches all.
   Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
            int index, LatencyProbes* probes);
 
@@ -65,7 +67,8 @@ class Observer final : public Session {
   struct World {
     int index = 0;
     std::size_t joint_count = 0;
-    std::vector<Seen> seen;
+    std::vector<protocol::AvatarNumber> watched;  ///< Growing; empty: all
+    std::vector<Seen> seen;                       ///< Of each of them
     std::vector<std::byte> last_poses;  ///< Only to measure latency: all poses, as they came
     std::size_t pose_bytes = 0;
     std::vector<Stream> streams;
@@ -76,6 +79,10 @@ class Observer final : public Session {
   void OnMessage(protocol::Message& message, std::size_t frame_bytes, std::int64_t now_ns) override;
   void OnLost(const std::string& why, bool by_us) override;
 
+  void WatchSome(std::size_t which);
+  /// Where a pose of that avatar is counted; empty: it is not ours, or not watched.
+  [[nodiscard]] std::optional<std::size_t> IndexIn(const World& world,
+                                                   protocol::AvatarNumber number) const;
   void OnWorldInfo(const protocol::WorldInfo& info);
   void OnReply(const protocol::Reply& reply);
   void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);

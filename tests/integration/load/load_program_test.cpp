@@ -146,6 +146,22 @@ TEST(LoadProgram, CountsEveryPoseOfFiftyWanderingAvatars) {
   EXPECT_EQ(server.AvatarCount(), 0);
 }
 
+TEST(LoadProgram, CountsThePosesOfObserversThatWatchSome) {
+  const RealServer server;
+  const ProgramResult result =
+      server.Load({"--avatars", "50", "--observers", "1", "--partial-observers", "3",
+                   "--partial-avatars", "7", "--worlds", "2", "--seconds", "2"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report["poses_expected"], (50 + 3 * 7) * 120);
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+  EXPECT_EQ(report["partial_observers"], 3);
+  EXPECT_EQ(report["partial_avatars"], 7);
+  // Were they sent all avatars, it would be twice that.
+  EXPECT_LT(report["bytes_per_pose"], 200.0);
+}
+
 TEST(LoadProgram, SpreadsAChoreographyOverWorldsAndThreads) {
   const test::ScratchFolder scratch;
   const std::string file =

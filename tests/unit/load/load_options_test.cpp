@@ -55,11 +55,33 @@ TEST(LoadOptions, NeedLittle) {
 }
 
 TEST(LoadOptions, TakeEverything) {
-  const Expected<LoadCommandLine> line =
-      Read(With({"--http",         "[::1]:80",  "--worlds",        "3",         "--mode",  "full",
-                 "--choreography", "c.json",    "--observe",       "one",       "--churn", "2.5",
-                 "--threads",      "2",         "--verify-one-in", "7",         "--seed",  "42",
-                 "--json",         "--fail-if", "ticks_missed>0",  "--fail-if", "errors>1"}));
+  const Expected<LoadCommandLine> line = Read(With({"--http",
+                                                    "[::1]:80",
+                                                    "--worlds",
+                                                    "3",
+                                                    "--mode",
+                                                    "full",
+                                                    "--choreography",
+                                                    "c.json",
+                                                    "--observe",
+                                                    "one",
+                                                    "--churn",
+                                                    "2.5",
+                                                    "--threads",
+                                                    "2",
+                                                    "--verify-one-in",
+                                                    "7",
+                                                    "--seed",
+                                                    "42",
+                                                    "--json",
+                                                    "--fail-if",
+                                                    "ticks_missed>0",
+                                                    "--fail-if",
+                                                    "errors>1",
+                                                    "--partial-observers",
+                                                    "5",
+                                                    "--partial-avatars",
+                                                    "9"}));
   ASSERT_TRUE(line.has_value()) << Describe(line.error());
   const LoadOptions& options = line->options;
   EXPECT_EQ(options.http, (Address{"::1", 80}));
@@ -72,6 +94,8 @@ TEST(LoadOptions, TakeEverything) {
   EXPECT_EQ(options.threads, 2);
   EXPECT_EQ(options.verify_one_in, 7);
   EXPECT_EQ(options.seed, 42u);
+  EXPECT_EQ(options.partial_observers, 5);
+  EXPECT_EQ(options.partial_avatars, 9);
   EXPECT_TRUE(options.json);
   ASSERT_EQ(options.fail_ifs.size(), 2u);
   EXPECT_EQ(options.fail_ifs[1].name(), "errors");
@@ -119,6 +143,11 @@ TEST(LoadOptions, NameTheOptionThatIsWrong) {
             "--wander: excludes --choreography");
   EXPECT_NE(ErrorOf(With({"--seed", "x"})).find("--seed"), std::string::npos);
   EXPECT_TRUE(ErrorOf(With({"--fail-if", "tick>0"})).starts_with("--fail-if 'tick>0': "));
+
+  EXPECT_EQ(ErrorOf(With({"--partial-observers", "-1"})), "--partial-observers -1" + range);
+  EXPECT_EQ(ErrorOf(With({"--partial-avatars", "0"})), "--partial-avatars 0" + range);
+  EXPECT_EQ(ErrorOf(With({"--partial-observers", "1", "--partial-avatars", "11"})),
+            "--partial-avatars 11: is more than there are");
 
   Arguments alone = Changed("--observers", "0");
   alone.insert(alone.end(), {"--churn", "1"});

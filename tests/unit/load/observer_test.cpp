@@ -136,6 +136,51 @@ TEST_F(ObserverTest, CountsThePosesOfTheWindow) {
   EXPECT_THAT(run_.errors.Texts(), IsEmpty());
 }
 
+// Each names others, spread over the crowd, and of every world it watches some.
+TEST(PartialObserver, WatchesAsManyAsItIsTold) {
+  LoadOptions options = Options();
+  options.avatars = 10;
+  options.worlds = 2;
+  options.partial_observers = 2;
+  options.partial_avatars = 4;
+  RunState run{options, nullptr};
+  FakeServer server;
+  for (int which = 0; which < options.partial_observers; ++which) {
+    ThreadContext context;
+    Observer observer(context,
+                      tcp::endpoint(boost::asio::ip::address_v4::loopback(), server.port()), run,
+                      options.observers + which, nullptr);
+    EXPECT_EQ(observer.avatar_count(), 4u);
+    observer.Open();
+    auto work = boost::asio::make_work_guard(context.io);
+    std::thread thread([&] { context.io.run(); });
+    FakeConnection connection = server.Accept();
+    EXPECT_TRUE(connection.Expect<protocol::Hello>().has_value());
+    connection.Send(toy::Welcome());
+    std::vector<std::vector<protocol::AvatarNumber>> named;
+    for (protocol::WorldId world = 1; world <= 2; ++world) {
+      const auto join = connection.Expect<protocol::JoinWorld>();
+      ASSERT_TRUE(join.has_value());
+      connection.Send(toy::WorldInfo(join->seq, world, join->name));
+      connection.Send(toy::Ok(join->seq));
+    }
+    for (int world = 0; world < 2; ++world) {
+      const auto observe = connection.Expect<protocol::Observe>();
+      ASSERT_TRUE(observe.has_value());
+      named.push_back(observe->avatars);
+      connection.Send(toy::Ok(observe->seq));
+    }
+    // The crowd in order of worlds: 1 3 5 7 9, 2 4 6 8 10. The second begins one further.
+    if (which == 0) {
+      EXPECT_THAT(named, ElementsAre(ElementsAre(1, 5), ElementsAre(2, 6)));
+    } else {
+      EXPECT_THAT(named, ElementsAre(ElementsAre(3, 7), ElementsAre(4, 8)));
+    }
+    context.io.stop();
+    thread.join();
+  }
+}
+
 TEST_F(ObserverTest, SeesNotAllWhileOneIsMissing) {
   Greet();
   SendTick(kFirstTick, {{1}, {3}});
