@@ -86,26 +86,26 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   const std::size_t d = metric.size();
   STRIDEWIRE_CHECK(d >= 1 && d <= kMaxParameters && points.size() >= d && points.size() % d == 0);
   const std::size_t count = points.size() / d;
+  STRIDEWIRE_CHECK(count <= MotionLibrary::kMaxExamples);
 
-  Point mean{};
+  Point sum{};
   for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t l = 0; l < d; ++l) mean[l] += points[i * d + l] / static_cast<double>(count);
+    for (std::size_t l = 0; l < d; ++l) sum[l] += points[i * d + l];
   }
   // Vertices relative to the target, in the metric.
-  const auto vertex = [&](std::size_t i) {
-    Point v{};
-    for (std::size_t l = 0; l < d; ++l) {
-      const double grown = mean[l] + (1.0 + growth) * (points[i * d + l] - mean[l]);
-      v[l] = (grown - target[l]) * metric[l];
+  std::array<Point, MotionLibrary::kMaxExamples> vertices;  // of which the first ones are touched
+  for (std::size_t l = 0; l < d; ++l) {
+    const double mean = sum[l] / static_cast<double>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double grown = mean + (1.0 + growth) * (points[i * d + l] - mean);
+      vertices[i][l] = (grown - target[l]) * metric[l];
     }
-    return v;
-  };
+  }
 
   std::size_t start = 0;
   double start_norm = HUGE_VAL;
   for (std::size_t i = 0; i < count; ++i) {
-    const Point v = vertex(i);
-    const double norm = DotProduct(v, v, d);
+    const double norm = DotProduct(vertices[i], vertices[i], d);
     if (norm < start_norm) {
       start_norm = norm;
       start = i;
@@ -113,7 +113,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   }
   Corral corral;
   corral.size = 1;
-  corral.points[0] = vertex(start);
+  corral.points[0] = vertices[start];
   corral.lambda[0] = 1.0;
   Point x = corral.points[0];
 
@@ -121,13 +121,12 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     const double norm = DotProduct(x, x, d);
     if (norm < kInside * kInside) break;
     double least = HUGE_VAL;
-    Point candidate{};
+    std::size_t candidate = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      const Point v = vertex(i);
-      const double along = DotProduct(x, v, d);
+      const double along = DotProduct(x, vertices[i], d);
       if (along < least) {
         least = along;
-        candidate = v;
+        candidate = i;
       }
     }
     if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // no vertex is nearer to the origin
@@ -136,7 +135,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
           corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
       corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));
     }
-    corral.points[corral.size] = candidate;
+    corral.points[corral.size] = vertices[candidate];
     corral.lambda[corral.size] = 0.0;
     ++corral.size;
 

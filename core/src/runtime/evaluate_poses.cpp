@@ -104,6 +104,15 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 
 namespace {
 
+// Where what is read of a job lies, which Prefetch reads.
+void PrefetchPlaces(const PoseJob& job) {
+  const Movement& movement = *job.movement;
+  PrefetchBytes(&movement, offsetof(Movement, feet));
+  PrefetchBytes(&movement.feet.is_active, 1);
+  PrefetchBytes(job.cache, sizeof(*job.cache));
+  PrefetchBytes(job.shown, sizeof(*job.shown));
+}
+
 // What is read of a job, into the nearest cache: its memory lies in several places, each of which would be waited for.
 void Prefetch(const PoseJob& job) {
   const Movement& movement = *job.movement;
@@ -125,11 +134,13 @@ void EvaluatePoses(const MotionLibrary& library, std::span<const PoseJob> jobs) 
   constexpr std::size_t kAhead = 3;
   const GridLayout& layout = library.layout();
   std::array<kernels::PlantJob, kernels::kBlock> plants;
+  for (std::size_t i = 0; i < std::min(2 * kAhead, jobs.size()); ++i) PrefetchPlaces(jobs[i]);
   for (std::size_t i = 0; i < std::min(kAhead, jobs.size()); ++i) Prefetch(jobs[i]);
   while (!jobs.empty()) {
     const std::size_t count = std::min(jobs.size(), kernels::kBlock);
     std::size_t planted = 0;
     BlendPoses(layout, count, [&](std::size_t i) {
+      if (i + 2 * kAhead < jobs.size()) PrefetchPlaces(jobs[i + 2 * kAhead]);
       if (i + kAhead < jobs.size()) Prefetch(jobs[i + kAhead]);
       const PoseJob& job = jobs[i];
       return BlendJob{library.group(job.movement->group),

@@ -84,8 +84,12 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
   const double outside_m = ProjectOntoHull(examples, std::span(metric).first(d), 0.0, target,
                                            std::span(inside).first(d));
   plan.extrapolated = outside_m > kChangeM;
-  plan.distance_m = ProjectOntoHull(examples, std::span(metric).first(d), kHullGrowth, target,
-                                    std::span(plan.applied.values).first(d));
+  if (outside_m == 0.0) {
+    std::ranges::copy(target, plan.applied.values.begin());
+  } else {
+    plan.distance_m = ProjectOntoHull(examples, std::span(metric).first(d), kHullGrowth, target,
+                                      std::span(plan.applied.values).first(d));
+  }
   for (std::size_t l = 0; l < d; ++l) {
     const auto name = static_cast<std::size_t>(group.parameters[l].name);
     if (!wishes[name].given) plan.requested.values[l] = plan.applied.values[l];
