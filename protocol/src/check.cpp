@@ -541,4 +541,51 @@ Status Check(const WorldTerrain& m) {
   return found.Result();
 }
 
+Status Check(const FetchLibrary& m) {
+  Findings found;
+  found.That(m.length >= 1 && m.length <= kMaxPieceBytes, ErrorCode::kOutOfRange,
+             "not 1 byte to 1 MiB", "FetchLibrary.length", m.length);
+  found.Name(m.hash, "FetchLibrary.hash");
+  found.That(m.offset < kMaxLibraryBytes, ErrorCode::kOutOfRange, "not below 1 GiB",
+             "FetchLibrary.offset", static_cast<std::int64_t>(m.offset));
+  return found.Result();
+}
+
+Status Check(const Movements& m) {
+  Findings found;
+  found.Id(m.world, "Movements.world");
+  found.That(m.parts >= 1 && m.parts <= kMaxBatchParts && m.part < m.parts, ErrorCode::kOutOfRange,
+             "not part 0 to parts - 1 of 1 to 1024", "Movements.part", m.part);
+  found.Finite(m.server_time_s, "Movements.server_time_s");
+  found.Avatars(m.avatars, 0, "Movements.avatars");
+  found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
+             "not one flag an avatar", "Movements.flags",
+             static_cast<std::int64_t>(m.flags.size()));
+  found.That(m.ends.size() == m.avatars.size(), ErrorCode::kShapeMismatch, "not one end an avatar",
+             "Movements.ends", static_cast<std::int64_t>(m.ends.size()));
+  std::uint32_t before = 0;
+  for (std::size_t i = 0; i < m.ends.size(); ++i) {
+    found.That(m.ends[i] >= before && m.ends[i] - before <= kMaxRecordBytes, ErrorCode::kOutOfRange,
+               "a record's end lies before it or too far behind", "Movements.ends",
+               static_cast<std::int64_t>(i));
+    before = m.ends[i];
+  }
+  found.That(before == m.records.size(), ErrorCode::kShapeMismatch,
+             "records do not end where the last one does", "Movements.records",
+             static_cast<std::int64_t>(m.records.size()));
+  return found.Result();
+}
+
+Status Check(const LibraryPiece& m) {
+  Findings found;
+  found.Text(m.text, kMaxReasonBytes, "LibraryPiece.text");
+  found.Text(m.hash, kMaxNameBytes, "LibraryPiece.hash");
+  found.Count(m.bytes.size(), 0, kMaxPieceBytes, "LibraryPiece.bytes");
+  found.That(m.total_bytes <= kMaxLibraryBytes && m.offset <= m.total_bytes &&
+                 m.bytes.size() <= m.total_bytes - m.offset,
+             ErrorCode::kOutOfRange, "a piece lies outside of its library", "LibraryPiece.offset",
+             static_cast<std::int64_t>(m.offset));
+  return found.Result();
+}
+
 }  // namespace stridewire::protocol

@@ -481,6 +481,39 @@ void Unpack(Unpacker& u, const wire::WorldTerrain& w, WorldTerrain& m) {
   Unpack(u, w.terrain(), m.terrain);
 }
 
+void Unpack(Unpacker& u, const wire::FetchLibrary& w, FetchLibrary& m) {
+  m.nonce = w.nonce();
+  u.Text(w.hash(), kMaxNameBytes, m.hash, "FetchLibrary.hash");
+  m.offset = w.offset();
+  m.length = w.length();
+}
+
+void Unpack(Unpacker& u, const wire::Movements& w, Movements& m) {
+  m.world = w.world();
+  m.shard = w.shard();
+  m.part = w.part();
+  m.parts = w.parts();
+  m.more_steps = w.more_steps();
+  m.step = w.step();
+  m.tick = w.tick();
+  m.server_time_s = w.server_time_s();
+  m.states = w.states();
+  u.Avatars(w.avatars(), "Movements.avatars", m.avatars);
+  u.Numbers(w.flags(), kMaxItems, "Movements.flags", m.flags);
+  u.Numbers(w.ends(), kMaxItems, "Movements.ends", m.ends);
+  u.Bytes(w.records(), kMaxBulkBytes, "Movements.records", m.records);
+}
+
+void Unpack(Unpacker& u, const wire::LibraryPiece& w, LibraryPiece& m) {
+  m.nonce = w.nonce();
+  m.code = static_cast<StatusCode>(w.code());
+  u.Text(w.text(), kMaxReasonBytes, m.text, "LibraryPiece.text");
+  u.Text(w.hash(), kMaxNameBytes, m.hash, "LibraryPiece.hash");
+  m.total_bytes = w.total_bytes();
+  m.offset = w.offset();
+  u.Bytes(w.bytes(), kMaxPieceBytes, "LibraryPiece.bytes", m.bytes);
+}
+
 template <typename Wire, typename T>
 Expected<Message> Decode(std::span<const std::byte> payload) {
   flatbuffers::Verifier::Options options;
@@ -540,6 +573,9 @@ Expected<Message> DecodeMessage(const FrameView& frame) {
     case MessageType::kSetLayers: return Decode<wire::SetLayers, SetLayers>(frame.payload);
     case MessageType::kSetPlanting: return Decode<wire::SetPlanting, SetPlanting>(frame.payload);
     case MessageType::kWorldTerrain: return Decode<wire::WorldTerrain, WorldTerrain>(frame.payload);
+    case MessageType::kFetchLibrary: return Decode<wire::FetchLibrary, FetchLibrary>(frame.payload);
+    case MessageType::kMovements: return Decode<wire::Movements, Movements>(frame.payload);
+    case MessageType::kLibraryPiece: return Decode<wire::LibraryPiece, LibraryPiece>(frame.payload);
   }
   return Fail(ErrorCode::kUnsupported, "unknown message type", "frame.type",
               static_cast<std::int64_t>(frame.type));

@@ -336,6 +336,27 @@ Offset<wire::WorldTerrain> Build(FlatBufferBuilder& b, const WorldTerrain& m) {
   return wire::CreateWorldTerrain(b, m.world, Build(b, m.terrain));
 }
 
+Offset<wire::FetchLibrary> Build(FlatBufferBuilder& b, const FetchLibrary& m) {
+  return wire::CreateFetchLibrary(b, m.nonce, Text(b, m.hash), m.offset, m.length);
+}
+
+Offset<wire::Movements> Build(FlatBufferBuilder& b, const Movements& m) {
+  const auto records = Bytes(b, m.records);
+  const auto ends = b.CreateVector(m.ends);
+  const auto flags = b.CreateVector(m.flags);
+  const auto avatars = b.CreateVector(m.avatars);
+  return wire::CreateMovements(b, m.world, m.shard, m.part, m.parts, m.more_steps, m.step, m.tick,
+                               m.server_time_s, m.states, avatars, flags, ends, records);
+}
+
+Offset<wire::LibraryPiece> Build(FlatBufferBuilder& b, const LibraryPiece& m) {
+  const auto text = Text(b, m.text);
+  const auto hash = Text(b, m.hash);
+  const auto bytes = Bytes(b, m.bytes);
+  return wire::CreateLibraryPiece(b, m.nonce, ToWire(m.code), text, hash, m.total_bytes, m.offset,
+                                  bytes);
+}
+
 }  // namespace
 
 struct Encoder::Impl {
@@ -386,6 +407,9 @@ Status Encoder::Encode(const SetTerrain& m, Frame& frame) { return impl_->Encode
 Status Encoder::Encode(const SetLayers& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const SetPlanting& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const WorldTerrain& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const FetchLibrary& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const Movements& m, Frame& frame) { return impl_->Encode(m, frame); }
+Status Encoder::Encode(const LibraryPiece& m, Frame& frame) { return impl_->Encode(m, frame); }
 Status Encoder::Encode(const Message& m, Frame& frame) {
   return std::visit([&](const auto& alternative) { return impl_->Encode(alternative, frame); }, m);
 }

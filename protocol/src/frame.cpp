@@ -46,6 +46,9 @@ std::string_view MessageTypeName(MessageType type) {
     case MessageType::kWorldTerrain: return "WorldTerrain";
     case MessageType::kSetLayers: return "SetLayers";
     case MessageType::kSetPlanting: return "SetPlanting";
+    case MessageType::kFetchLibrary: return "FetchLibrary";
+    case MessageType::kMovements: return "Movements";
+    case MessageType::kLibraryPiece: return "LibraryPiece";
   }
   return "unknown";
 }
@@ -71,7 +74,9 @@ bool IsBulk(MessageType type) {
     case MessageType::kSetTerrain:
     case MessageType::kSetLayers:
     case MessageType::kSetPlanting:
-    case MessageType::kWorldTerrain: return true;
+    case MessageType::kWorldTerrain:
+    case MessageType::kMovements:
+    case MessageType::kLibraryPiece: return true;
     default: return false;
   }
 }

@@ -362,6 +362,37 @@ Json Fields(const SetPlanting& m) {
   return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}, {"off", m.is_off}};
 }
 
+Json Fields(const FetchLibrary& m) {
+  return {
+      {"nonce", Wide(m.nonce)}, {"hash", m.hash}, {"offset", Wide(m.offset)}, {"length", m.length}};
+}
+
+Json Fields(const Movements& m) {
+  return {{"world", m.world},
+          {"shard", m.shard},
+          {"part", m.part},
+          {"parts", m.parts},
+          {"more_steps", m.more_steps},
+          {"step", Wide(m.step)},
+          {"tick", Wide(m.tick)},
+          {"server_time_s", m.server_time_s},
+          {"states", m.states},
+          {"avatars", m.avatars},
+          {"flags", m.flags},
+          {"ends", m.ends},
+          {"records", Hex(m.records)}};
+}
+
+Json Fields(const LibraryPiece& m) {
+  return {{"nonce", Wide(m.nonce)},
+          {"code", Number(m.code)},
+          {"text", m.text},
+          {"hash", m.hash},
+          {"total_bytes", Wide(m.total_bytes)},
+          {"offset", Wide(m.offset)},
+          {"bytes", Hex(m.bytes)}};
+}
+
 Json Fields(const WorldTerrain& m) { return {{"world", m.world}, {"terrain", Terrain(m.terrain)}}; }
 
 }  // namespace

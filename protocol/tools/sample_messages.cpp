@@ -264,6 +264,32 @@ std::vector<SampleMessage> SampleMessages() {
                                  {41, "wave", true, 1.0, 0.0, 1.0}}});
     add("set_planting", SetPlanting{19, 3, {41, 42}, false});
     add("set_planting_off", SetPlanting{20, 3, {41}, true});
+    add("observe_movements", Observe{21, 3, 4, PoseMode::kMovement, {}, 1, false});
+    add("fetch_library",
+        FetchLibrary{0x0123456789abcdefu, "0f1e2d3c4b5a69788796a5b4c3d2e1f0", 1 << 20, 1 << 16});
+    add("library_piece",
+        LibraryPiece{0x0123456789abcdefu, StatusCode::kOk, "", "0f1e2d3c4b5a69788796a5b4c3d2e1f0",
+                     4'200'000, 1 << 20, Token(40)});
+    add("library_piece_refused", LibraryPiece{.nonce = 2,
+                                              .code = StatusCode::kNotJoined,
+                                              .text = "no world joined has that library",
+                                              .hash = "0f1e2d3c4b"});
+    add("movements", Movements{3,
+                               1,
+                               0,
+                               2,
+                               1,
+                               7654,
+                               123'457,
+                               2057.625,
+                               false,
+                               {41, 42, 44},
+                               {1, 4, 0},
+                               {24, 24, 50},
+                               Token(50)});
+    add("movements_states",
+        Movements{3, 1, 0, 1, 0, 7654, 123'457, 2057.625, true, {43}, {0}, {16}, Token(16)});
+    add("movements_none", Movements{.world = 3, .shard = 1, .step = 7655, .tick = 123'458});
     WorldInfo with_layers{17,           3,          "plaza",          Role::kController, 123'000,
                           "0f1e2d3c4b", Skeleton(), {"wave", "carry"}};
     add("world_info_layers", with_layers);

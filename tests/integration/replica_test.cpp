@@ -167,6 +167,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
       Bytes record;
       if (AppendChange(avatar, record)) {
         ++figures.records;
+        EXPECT_LE(record.size(), MaxRecordBytes(*library_));
         figures.states += avatar.change().is_any;
         ASSERT_EQ(Refusal(first, record), "") << "tick " << tick << " of " << round;
         if (late) {
@@ -238,6 +239,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
   ASSERT_GT(steps, 100u);
   EXPECT_LE(bytes, 400 * steps);
   EXPECT_LE(largest_state, 3072u);
+  EXPECT_LT(largest_state, MaxRecordBytes(*library_));
 }
 
 // What one machine's avatar did is shown by others, whose vectors are of another width.

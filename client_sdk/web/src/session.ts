@@ -727,6 +727,8 @@ export class Session {
       case 'Pong': return this.onPong(message, nowS);
       case 'AvatarState': return this.onAvatarState(message);
       case 'WorldTerrain': return this.onTerrain(message);
+      case 'Movements':
+      case 'LibraryPiece': throw new Malformed('was not agreed on', message.type);
       default: throw new Malformed("is a client's message", message.type);
     }
   }

@@ -147,6 +147,10 @@ AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
   body_.layered_pose = body_.pose;
 }
 
+bool AvatarReplica::IsState(std::span<const std::byte> record) {
+  return !record.empty() && (std::to_integer<unsigned>(record[0]) & record::kIsState) != 0;
+}
+
 Status AvatarReplica::Apply(std::span<const std::byte> record) {
   Reader reader(record);
   const unsigned flags = reader.Flags();

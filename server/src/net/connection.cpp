@@ -161,6 +161,13 @@ void Connection::SendGround(WorldId world, SharedFrame frame) {
   ScheduleFlush();
 }
 
+std::size_t Connection::SendMovements(WorldId world, int shard, SharedFrame frame) {
+  if (is_closed_ || is_closing_) return 0;
+  const std::size_t dropped = queue_.PushMovements(world, shard, std::move(frame));
+  ScheduleFlush();
+  return dropped;
+}
+
 std::size_t Connection::SendPoses(const PoseDelivery& delivery) {
   if (is_closed_ || is_closing_) return 0;
   const std::size_t dropped = queue_.PushPoses(delivery);

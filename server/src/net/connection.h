@@ -52,6 +52,9 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   [[nodiscard]] bool SendEvents(SharedFrame frame);
   /// Returns how many frames a slow peer lost by it.
   [[nodiscard]] std::size_t SendPoses(const PoseDelivery& delivery);
+  /// As SendQueue::PushMovements.
+  [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame);
+  void DropMovements(WorldId world) { queue_.DropMovements(world); }
   void SendGround(WorldId world, SharedFrame frame);
   void DropGround(WorldId world) { queue_.DropGround(world); }
   void DropPoses(WorldId world, protocol::PoseMode mode) { queue_.DropPoses(world, mode); }

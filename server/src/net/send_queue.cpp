@@ -49,6 +49,29 @@ std::size_t SendQueue::PushPoses(const PoseDelivery& delivery) {
   return dropped;
 }
 
+template <typename IsIt>
+std::size_t SendQueue::EraseMovements(IsIt&& is_it) {
+  return std::erase_if(movements_, [&](const Told& told) {
+    if (!is_it(told)) return false;
+    movement_bytes_ -= told.frame->size();
+    return true;
+  });
+}
+
+std::size_t SendQueue::PushMovements(WorldId world, int shard, SharedFrame frame) {
+  if (movement_bytes_ + frame->size() > control_budget_bytes_) {
+    return 1 + EraseMovements(
+                   [&](const Told& told) { return told.world == world && told.shard == shard; });
+  }
+  movement_bytes_ += frame->size();
+  movements_.push_back({world, shard, std::move(frame)});
+  return 0;
+}
+
+void SendQueue::DropMovements(WorldId world) {
+  EraseMovements([&](const Told& told) { return told.world == world; });
+}
+
 void SendQueue::DropPoses(WorldId world, protocol::PoseMode mode) {
   std::erase_if(lanes_, [&](const auto& item) {
     if (item.first.world != world || item.first.mode != mode) return false;
@@ -75,6 +98,15 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     out.frames.push_back(std::move(grounds_.begin()->second));
     grounds_.erase(grounds_.begin());
   }
+  std::size_t told_bytes = 0;
+  for (std::size_t i = 0; !movements_.empty() && told_bytes < max_bytes && i < kMaxGatheredFrames;
+       ++i) {
+    told_bytes += movements_.front().frame->size();
+    out.frames.push_back(std::move(movements_.front().frame));
+    movements_.pop_front();
+  }
+  movement_bytes_ -= told_bytes;
+  out.bytes += told_bytes;
   std::size_t pose_bytes = 0;
   std::size_t pose_frames = 0;
   auto lane = lanes_.upper_bound(last_lane_);

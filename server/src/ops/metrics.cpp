@@ -136,6 +136,8 @@ std::string Metrics::Text() {
             &ThreadMetrics::tick_late);
 
   counter("stridewire_poses_encoded_total", "Poses encoded.", &ThreadMetrics::poses_encoded);
+  counter("stridewire_movements_encoded_total", "Records of movements encoded.",
+          &ThreadMetrics::movements_encoded);
   counter("stridewire_poses_sent_total", "Poses handed to observers' sockets.",
           &ThreadMetrics::poses_sent);
   counter("stridewire_pose_errors_total", "Poses that could not be encoded.",

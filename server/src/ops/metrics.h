@@ -57,6 +57,7 @@ struct ThreadMetrics {
   TimeHistogram tick;       ///< From draining requests to publishing batches.
   TimeHistogram tick_late;  ///< From when a tick was due to its start.
   Count poses_encoded;
+  Count movements_encoded;
   Count poses_sent;
   Count batches_composed;  ///< Of rows, for one session.
   Count batches_sent;

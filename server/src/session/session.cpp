@@ -150,7 +150,11 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
     membership.told_dropped = 0;
     SendLagging(membership);
   }
-  for (auto& [id, membership] : worlds_) host_.InterestChanged(membership.world);
+  movement_feeds_.clear();
+  for (auto& [id, membership] : worlds_) {
+    host_.InterestChanged(membership.world);
+    if (subscriptions_.Watches(id, PoseMode::kMovement)) BeginMovements(membership.world);
+  }
   spdlog::info("session {:016x} of '{}' ({}{}) {}", identity_.id, client_name_, identity_.address,
                connection_->kind() == TransportKind::kWebSocket ? ", WebSocket" : "",
                resumed ? "goes on" : "begins");
@@ -287,6 +291,8 @@ void Session::OnMessage(protocol::Message&& message) {
                               .tick = host_.tick()});
         } else if constexpr (std::is_same_v<Arrived, protocol::InspectAvatar>) {
           Inspect(arrived);
+        } else if constexpr (std::is_same_v<Arrived, protocol::FetchLibrary>) {
+          Fetch(arrived);
         } else if constexpr (std::is_same_v<Arrived, protocol::Goodbye>) {
           spdlog::info("session {:016x}: its client says goodbye", identity_.id);
           End();
@@ -427,6 +433,7 @@ void Session::Leave(WorldId id) {
   const bool is_controller = it->second.role == protocol::Role::kController;
   worlds_.erase(it);
   subscriptions_.RemoveWorld(id);
+  EndMovements(id);
   if (connection_ != nullptr) {
     connection_->DropPoses(id, PoseMode::kFull);
     connection_->DropPoses(id, PoseMode::kQuantised);
@@ -710,8 +717,9 @@ void Session::Execute(protocol::Observe&& command) {
            "the session has as many subscriptions as it may");
     return;
   }
-  if (command.mode == PoseMode::kMovement) {
-    Answer(command.seq, StatusCode::kUnsupported, "the mode 'movement' does not exist yet");
+  if (command.mode == PoseMode::kMovement && (features_ & protocol::kFeatureMovementMode) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'movement mode' was not agreed on in the handshake");
     return;
   }
   if (command.mode == PoseMode::kQuantised && (features_ & protocol::kFeatureQuantised) == 0) {
@@ -734,6 +742,7 @@ void Session::Execute(protocol::Observe&& command) {
                                             .avatars = std::move(command.avatars)});
   host_.InterestChanged(it->second.world);
   Answer(command.seq, StatusCode::kOk);
+  if (command.mode == PoseMode::kMovement) BeginMovements(it->second.world);
 }
 
 void Session::Execute(protocol::StopObserving&& command) {
@@ -744,7 +753,11 @@ void Session::Execute(protocol::StopObserving&& command) {
   }
   const auto [world, mode] = *stopped;
   const bool is_last = !subscriptions_.Watches(world, mode);
-  if (is_last && connection_ != nullptr) connection_->DropPoses(world, mode);
+  if (is_last && mode == PoseMode::kMovement) {
+    EndMovements(world);
+  } else if (is_last && connection_ != nullptr) {
+    connection_->DropPoses(world, mode);
+  }
   host_.InterestChanged(worlds_.at(world).world);
   Answer(command.seq, StatusCode::kOk);
 }
@@ -758,6 +771,7 @@ void Session::Send(const Message& message) {
     connection_->SendControl(std::move(frame));
   }
 }
+template void Session::Send(const protocol::LibraryPiece& message);
 
 void Session::Answer(Seq seq, StatusCode code, std::string text) {
   Answer(Reply{.seq = seq, .code = code, .text = std::move(text)});

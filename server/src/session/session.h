@@ -23,7 +23,7 @@ inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
     protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
     protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-    protocol::kFeatureRefusals | protocol::kFeaturePlanting;
+    protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {
@@ -72,6 +72,8 @@ class Session : private ConnectionHandler {
   /// The ground of a world has changed.
   void OnGround(WorldId world, const SharedFrame& frame);
   void OnPoses(const PoseDelivery& delivery);
+  void OnMovements(const MovementDelivery& delivery);
+  void OnStates(const StatesAnswer& answer);
   void OnEvents(SharedEvents& events);
 
   /// Now and then: what is due by time.
@@ -93,6 +95,9 @@ class Session : private ConnectionHandler {
 
   // What this session wants of a world, for the shard to sum up.
   [[nodiscard]] bool WantsEvents(WorldId world) const;
+  [[nodiscard]] bool WantsMovements(WorldId world) const {
+    return connection_ != nullptr && subscriptions_.Watches(world, protocol::PoseMode::kMovement);
+  }
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
 
@@ -104,6 +109,13 @@ class Session : private ConnectionHandler {
     std::uint64_t dropped_events = 0;
     std::uint64_t told_dropped = 0;  // sum of the two when Lagging was last sent
   };
+  // How far the client has the states that movements go on from, of the avatars of one world and shard.
+  struct MovementFeed {
+    std::shared_ptr<World> world;
+    AvatarNumber next = 1;    // avatars from here on are still to be told; 0: none
+    std::uint32_t asked = 0;  // nonce of the question under way, 0: none
+    bool is_lost = false;  // movements were dropped: from the beginning, once the queue has drained
+  };
   struct Pending {
     int outstanding = 0;  // shards that have not answered
     std::size_t item_count = 0;
@@ -113,7 +125,7 @@ class Session : private ConnectionHandler {
 
   void OnMessage(protocol::Message&& message) override;
   void OnBadFrame(const Error& error) override;
-  void OnSent() override { UpdatePause(); }
+  void OnSent() override;
   void OnIdle() override;
   void OnStuck() override;
   void OnClosed() override;
@@ -133,6 +145,12 @@ class Session : private ConnectionHandler {
   void Execute(protocol::StopObserving&& command);
 
   void Inspect(const protocol::InspectAvatar& question);
+  void Fetch(const protocol::FetchLibrary& question);
+
+  void BeginMovements(const std::shared_ptr<World>& world);
+  void EndMovements(WorldId world);
+  void AskForStates();
+  void SendMovements(WorldId world, int shard, const SharedFrame& frame);
 
   /// The membership a controller's command needs; answers and returns null if there is none.
   Membership* Commanding(protocol::Seq seq, WorldId world);
@@ -170,6 +188,8 @@ class Session : private ConnectionHandler {
 
   std::map<WorldId, Membership> worlds_;
   Subscriptions subscriptions_;
+  std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;  // by world and avatars' shard
+  std::uint32_t states_nonce_ = 0;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t pending_items_ = 0;
   int pending_questions_ = 0;

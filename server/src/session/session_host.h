@@ -34,6 +34,8 @@ class SessionHost {
   virtual void Submit(int shard, WorldCommand&& command) = 0;
   /// Asks the shard an avatar lives on; Session::OnInspected hears of it.
   virtual void Ask(int shard, Inspection&& question) = 0;
+  /// Asks a shard for states of its avatars; Session::OnStates hears of it.
+  virtual void Ask(int shard, StatesQuestion&& question) = 0;
   /// Session::OnJoined hears of it.
   virtual void JoinWorld(SessionId session, protocol::Seq seq, std::string name) = 0;
   virtual void LeaveWorld(WorldId world) = 0;

@@ -102,6 +102,24 @@ struct InspectionResult {
   protocol::AvatarState state;
 };
 
+/// A session's question for the states of avatars it is to be told the movements of: some, from a number on, after the
+/// next tick.
+struct StatesQuestion {
+  std::shared_ptr<World> world;
+  int from_shard = 0;  ///< The session's shard.
+  SessionId session = 0;
+  std::uint32_t nonce = 0;
+  AvatarNumber first = 0;
+};
+struct StatesAnswer {
+  WorldId world = 0;
+  int from_shard = 0;  ///< The avatars'.
+  SessionId session = 0;
+  std::uint32_t nonce = 0;
+  AvatarNumber next = 0;  ///< Where to go on; 0: these were all.
+  SharedFrame frame;      ///< Null: none.
+};
+
 /// Modes in which poses are sent, in the order of their numbers.
 inline constexpr std::array kSentModes{protocol::PoseMode::kFull, protocol::PoseMode::kQuantised};
 [[nodiscard]] constexpr std::size_t ModeIndex(protocol::PoseMode mode) {
@@ -127,6 +145,7 @@ struct Interest {
   int shard = 0;  ///< Whose.
   std::array<PoseInterest, kSentModes.size()> poses;
   bool events = false;
+  bool movements = false;
 };
 
 /// Poses of one world, shard, mode and tick.
@@ -139,6 +158,13 @@ struct PoseDelivery {
   std::vector<SharedFrame> parts;  ///< A whole batch; none if nobody wants one.
   /// What batches with some of them are made of: at least those that are named.
   std::shared_ptr<const protocol::PoseRows> rows;
+};
+
+/// What the avatars of one world and shard began in a tick: Movements of its steps, in order.
+struct MovementDelivery {
+  WorldId world = 0;
+  int from_shard = 0;
+  std::vector<SharedFrame> frames;
 };
 
 /// Events of one world, shard and tick.
@@ -154,9 +180,12 @@ struct TickMail {
   std::vector<EventDelivery> events;
   std::vector<PoseDelivery> poses;
   std::vector<InspectionResult> inspections;
+  std::vector<MovementDelivery> movements;
+  std::vector<StatesAnswer> states;  ///< After the movements of the same tick.
 
   [[nodiscard]] bool empty() const {
-    return results.empty() && events.empty() && poses.empty() && inspections.empty();
+    return results.empty() && events.empty() && poses.empty() && inspections.empty() &&
+           movements.empty() && states.empty();
   }
 };
 

@@ -125,6 +125,13 @@ void Shard::AnswerQuestions() {
         {question.session, std::move(state)});
   }
   questions_.clear();
+  for (const StatesQuestion& question : states_questions_) {
+    StatesAnswer answer = WorldOf(question.world).States(question.first, encoder_);
+    answer.session = question.session;
+    answer.nonce = question.nonce;
+    outgoing_[static_cast<std::size_t>(question.from_shard)].states.push_back(std::move(answer));
+  }
+  states_questions_.clear();
 }
 
 void Shard::Publish() {
@@ -133,6 +140,12 @@ void Shard::Publish() {
       for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
         if (!world->WantsEvents(static_cast<int>(shard))) continue;
         outgoing_[shard].events.push_back({id, tick_, events});
+      }
+    }
+    if (const std::vector<SharedFrame> frames = world->TakeMovements(encoder_); !frames.empty()) {
+      for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
+        if (!world->WantsMovements(static_cast<int>(shard))) continue;
+        outgoing_[shard].movements.push_back({id, index_, frames});
       }
     }
     for (const PoseMode mode : kSentModes) {
@@ -175,6 +188,13 @@ void Shard::Receive(TickMail&& mail) {
     SharedEvents events(delivery, encoder_);
     for (Session* session : WatchersOf(delivery.world)) session->OnEvents(events);
   }
+  for (const MovementDelivery& delivery : mail.movements) {
+    for (Session* session : WatchersOf(delivery.world)) session->OnMovements(delivery);
+  }
+  for (const StatesAnswer& answer : mail.states) {
+    const auto it = sessions_.find(answer.session);
+    if (it != sessions_.end()) it->second->OnStates(answer);
+  }
   for (const PoseDelivery& delivery : mail.poses) {
     for (Session* session : WatchersOf(delivery.world)) session->OnPoses(delivery);
   }
@@ -189,7 +209,7 @@ WorldShard& Shard::WorldOf(const std::shared_ptr<World>& world) {
   std::unique_ptr<WorldShard>& entry = worlds_[world->id];
   if (entry == nullptr) {
     entry = std::make_unique<WorldShard>(world, index_, shard_count(), config_.limits.max_queue,
-                                         clock_, budget_, metrics_);
+                                         clock_, budget_, metrics_, config_.limits.max_bulk_bytes);
   }
   return *entry;
 }
@@ -214,6 +234,17 @@ void Shard::Ask(int shard, Inspection&& question) {
   });
 }
 
+void Shard::Ask(int shard, StatesQuestion&& question) {
+  if (shard == index_) {
+    states_questions_.push_back(std::move(question));
+    return;
+  }
+  Shard* receiver = shards_[static_cast<std::size_t>(shard)];
+  asio::post(receiver->context_, [receiver, question = std::move(question)]() mutable {
+    receiver->states_questions_.push_back(std::move(question));
+  });
+}
+
 void Shard::InterestChanged(const std::shared_ptr<World>& world) {
   Interest interest{.world = world, .shard = index_, .poses = {}};
   std::vector<Session*>& watchers = watchers_[world->id];
@@ -228,6 +259,9 @@ void Shard::InterestChanged(const std::shared_ptr<World>& world) {
       all.whole = std::gcd(all.whole, every.whole);
       all.some = std::gcd(all.some, every.some);
     }
+    const bool movements = session->WantsMovements(world->id);
+    interest.movements |= movements;
+    watches |= movements;
     if (watches) watchers.push_back(session.get());
   }
   const bool is_none = watchers.empty();
@@ -237,7 +271,9 @@ void Shard::InterestChanged(const std::shared_ptr<World>& world) {
   // Which avatars are named is told once a tick, however many sessions begin in it: until then the last list
   // holds, which has all that anyone has seen so far.
   if (is_told || !is_none) named_anew_.insert(world->id);
-  bool is_same = is_told ? told->second.events == interest.events : is_none;
+  bool is_same = is_told ? told->second.events == interest.events &&
+                               told->second.movements == interest.movements
+                         : is_none;
   for (std::size_t mode = 0; is_told && mode < kSentModes.size(); ++mode) {
     interest.poses[mode].named = told->second.poses[mode].named;
     is_same &= told->second.poses[mode].every == interest.poses[mode].every;

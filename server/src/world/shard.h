@@ -88,6 +88,7 @@ class Shard : public SessionHost {
   protocol::PoseBatchComposer& composer() override { return composer_; }
   void Submit(int shard, WorldCommand&& command) override;
   void Ask(int shard, Inspection&& question) override;
+  void Ask(int shard, StatesQuestion&& question) override;
   void JoinWorld(SessionId session, protocol::Seq seq, std::string name) override;
   void LeaveWorld(WorldId world) override;
   void SetTerrain(TerrainChange&& change) override;
@@ -125,6 +126,7 @@ class Shard : public SessionHost {
   std::uint64_t tick_ = 0;
   std::vector<WorldCommand> inbox_;
   std::vector<Inspection> questions_;
+  std::vector<StatesQuestion> states_questions_;
   std::map<WorldId, std::unique_ptr<WorldShard>> worlds_;
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::map<WorldId, std::vector<Session*>> watchers_;  // sessions that want poses or events

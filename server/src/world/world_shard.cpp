@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
+#include "stridewire/runtime/movement_record.h"
 #include "world/convert.h"
 #include "world/inspect.h"
 #include "world/number_union.h"
@@ -32,7 +33,8 @@ ReplyItem NoSuchAvatar(std::uint32_t index, AvatarNumber avatar, protocol::Reque
 }  // namespace
 
 WorldShard::WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
-                       const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics)
+                       const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
+                       std::size_t max_bulk_bytes)
     : world_(std::move(world)),
       shard_(shard),
       max_queue_(max_queue),
@@ -40,6 +42,7 @@ WorldShard::WorldShard(std::shared_ptr<World> world, int shard, int shard_count,
       budget_(budget),
       metrics_(metrics),
       interests_(static_cast<std::size_t>(shard_count)),
+      max_bulk_bytes_(max_bulk_bytes),
       ground_(world_->ground.Get()) {}
 
 WorldShard::~WorldShard() { budget_.Release(*world_, static_cast<std::int64_t>(avatars_.size())); }
@@ -157,6 +160,7 @@ void WorldShard::Remove(const RemovePart& part, std::uint64_t tick, CommandResul
     }
     is_order_known_ = false;
     ++result.accepted;
+    Gone(ref.avatar);
     if (events_wanted_) AddEvent(EventType::kRemoved, ref.avatar, tick);
   }
   budget_.Release(*world_, result.accepted);
@@ -226,6 +230,7 @@ void WorldShard::Release(SessionId session, std::uint64_t tick) {
   if (world_->persistent) return;
   const std::size_t removed = std::erase_if(avatars_, [&](const auto& item) {
     if (item.second.owner != session) return false;
+    Gone(item.first);
     if (events_wanted_) AddEvent(EventType::kRemoved, item.first, tick);
     return true;
   });
@@ -242,6 +247,8 @@ void WorldShard::ChangeGround(std::uint64_t tick) {
 }
 
 void WorldShard::Advance(std::uint64_t tick, int steps) {
+  tick_ = tick;
+  more_steps_ = static_cast<std::uint16_t>(steps);
   // Ticks that are made up for have the ground of their own time.
   while (steps > 1 && !grounds_.empty() && grounds_.front().tick <= tick) {
     const std::uint64_t first = tick - static_cast<std::uint64_t>(steps) + 1;
@@ -282,6 +289,9 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
     Avatar::AdvanceAll(advancing_, step_s);
+    ++step_;
+    --more_steps_;
+    if (movements_wanted_) TellMovements();
     const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
     for (const auto& [number, entry] : in_order) {
       entry->time_s += step_s;
@@ -299,11 +309,13 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
 void WorldShard::SetInterest(const Interest& interest) {
   interests_[static_cast<std::size_t>(interest.shard)] = interest;
   events_wanted_ = false;
+  movements_wanted_ = false;
   max_every_ = 1;
   are_named_rows_known_ = false;
   std::array<bool, kSentModes.size()> observed{};
   for (const Interest& shard : interests_) {
     events_wanted_ |= shard.events;
+    movements_wanted_ |= shard.movements;
     for (std::size_t mode = 0; mode < observed.size(); ++mode) {
       const PoseInterest::Every& every = shard.poses[mode].every;
       observed[mode] |= every.whole > 0 || every.some > 0;
@@ -321,6 +333,10 @@ bool WorldShard::WantsEvents(int shard) const {
   return interests_[static_cast<std::size_t>(shard)].events;
 }
 
+bool WorldShard::WantsMovements(int shard) const {
+  return interests_[static_cast<std::size_t>(shard)].movements;
+}
+
 WorldShard::Wish WorldShard::WishOf(int shard, PoseMode mode, std::uint64_t tick) const {
   const PoseInterest::Every& every =
       interests_[static_cast<std::size_t>(shard)].poses[ModeIndex(mode)].every;
@@ -330,7 +346,8 @@ WorldShard::Wish WorldShard::WishOf(int shard, PoseMode mode, std::uint64_t tick
 
 bool WorldShard::HasInterest() const {
   return std::ranges::any_of(interests_, [](const Interest& shard) {
-    return shard.events || std::ranges::any_of(shard.poses, [](const PoseInterest& poses) {
+    return shard.events || shard.movements ||
+           std::ranges::any_of(shard.poses, [](const PoseInterest& poses) {
              return poses.every != PoseInterest::Every{};
            });
   });
@@ -339,6 +356,99 @@ bool WorldShard::HasInterest() const {
 std::shared_ptr<const std::vector<protocol::Event>> WorldShard::TakeEvents() {
   if (events_.empty()) return nullptr;
   return std::make_shared<const std::vector<protocol::Event>>(std::exchange(events_, {}));
+}
+
+void WorldShard::Gone(AvatarNumber avatar) {
+  if (movements_wanted_) gone_.push_back(avatar);
+}
+
+protocol::Movements WorldShard::EmptyMovements() const {
+  return {.world = world_->id,
+          .shard = static_cast<std::uint16_t>(shard_),
+          .more_steps = more_steps_,
+          .step = step_,
+          .tick = tick_,
+          .server_time_s = clock_.TickTime(tick_)};
+}
+
+// Whether another record, however long, might be more than a frame takes.
+bool WorldShard::IsFull(const protocol::Movements& message) const {
+  constexpr std::size_t kOverheadBytes = 256;
+  constexpr std::size_t kAvatarBytes = 9;  // number, flags, end
+  return message.avatars.size() == protocol::kMaxItems ||
+         message.records.size() + (message.avatars.size() + 1) * kAvatarBytes + kOverheadBytes +
+                 MaxRecordBytes(*world_->library) >
+             max_bulk_bytes_;
+}
+
+// What the step just gone brought.
+void WorldShard::TellMovements() {
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  if (in_order.empty() && gone_.empty() && !last_step_had_avatars_) return;
+  last_step_had_avatars_ = !in_order.empty();
+  const std::size_t first = movements_.size();
+  movements_.push_back(EmptyMovements());
+  const auto add = [&](AvatarNumber number, std::uint8_t flags) {
+    protocol::Movements& message = movements_.back();
+    message.avatars.push_back(number);
+    message.flags.push_back(flags);
+    message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
+    if (IsFull(message)) movements_.push_back(EmptyMovements());
+  };
+  for (const AvatarNumber number : gone_) add(number, protocol::kMovementGone);
+  gone_.clear();
+  for (const auto& [number, entry] : in_order) {
+    if (!AppendChange(entry->avatar, movements_.back().records)) continue;
+    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().is_any;
+    add(number, is_new ? protocol::kPoseDiscontinuity : 0);
+  }
+  const std::size_t parts = movements_.size() - first;
+  // Only a frame limit far below the default lets it come to that: who is told sees a gap, and knows of nobody.
+  if (parts > protocol::kMaxBatchParts) {
+    metrics_.pose_errors.Add(in_order.size());
+    movements_.resize(first);
+    return;
+  }
+  for (std::size_t part = 0; part < parts; ++part) {
+    movements_[first + part].part = static_cast<std::uint16_t>(part);
+    movements_[first + part].parts = static_cast<std::uint16_t>(parts);
+  }
+}
+
+std::vector<SharedFrame> WorldShard::TakeMovements(protocol::Encoder& encoder) {
+  std::vector<SharedFrame> frames;
+  for (const protocol::Movements& message : movements_) {
+    auto frame = std::make_shared<std::vector<std::byte>>();
+    const Status status = encoder.Encode(message, *frame);
+    STRIDEWIRE_CHECK(status.has_value());
+    metrics_.movements_encoded.Add(message.avatars.size());
+    frames.push_back(std::move(frame));
+  }
+  movements_.clear();
+  return frames;
+}
+
+StatesAnswer WorldShard::States(AvatarNumber first, protocol::Encoder& encoder) const {
+  constexpr std::size_t kEnoughBytes = 100'000;
+  StatesAnswer answer{.world = world_->id, .from_shard = shard_};
+  protocol::Movements message = EmptyMovements();
+  message.states = true;
+  auto it = avatars_.lower_bound(first);
+  for (; it != avatars_.end(); ++it) {
+    if (message.records.size() > kEnoughBytes || IsFull(message)) break;
+    // One that came with this tick is told with it; its state is the same.
+    AppendState(it->second.avatar, message.records);
+    message.avatars.push_back(it->first);
+    message.flags.push_back(0);
+    message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
+  }
+  if (it != avatars_.end()) answer.next = it->first;
+  if (message.avatars.empty()) return answer;
+  auto frame = std::make_shared<std::vector<std::byte>>();
+  const Status status = encoder.Encode(message, *frame);
+  STRIDEWIRE_CHECK(status.has_value());
+  answer.frame = std::move(frame);
+  return answer;
 }
 
 protocol::AvatarState WorldShard::Inspect(AvatarNumber avatar, std::uint64_t tick,

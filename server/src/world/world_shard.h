@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ops/metrics.h"
+#include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "world/mail.h"
@@ -29,7 +30,8 @@ class WorldShard {
  public:
   /// Borrows budget and metrics.
   WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
-             const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics);
+             const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
+             std::size_t max_bulk_bytes = protocol::kMaxBulkBytes);
   ~WorldShard();
   WorldShard(const WorldShard&) = delete;
   WorldShard& operator=(const WorldShard&) = delete;
@@ -43,6 +45,7 @@ class WorldShard {
 
   void SetInterest(const Interest& interest);
   [[nodiscard]] bool WantsEvents(int shard) const;
+  [[nodiscard]] bool WantsMovements(int shard) const;
   /// Whether a shard wants whole batches of `tick`, and whether it wants poses of avatars it names.
   struct Wish {
     bool whole = false;
@@ -57,6 +60,12 @@ class WorldShard {
   /// nobody would miss it: no poses, and none in the delivery before.
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
+
+  /// What avatars began since this was last called, as frames; empty if nobody would miss it.
+  [[nodiscard]] std::vector<SharedFrame> TakeMovements(protocol::Encoder& encoder);
+
+  /// The states of avatars from a number on after the last tick, some 100 KB of them.
+  [[nodiscard]] StatesAnswer States(AvatarNumber first, protocol::Encoder& encoder) const;
 
   /// What an avatar is doing after `tick`, the answer to InspectAvatar.
   [[nodiscard]] protocol::AvatarState Inspect(AvatarNumber avatar, std::uint64_t tick,
@@ -93,6 +102,10 @@ class WorldShard {
   void AdvanceAvatars(std::uint64_t tick, int steps);
   std::span<const InOrder> AvatarsInOrder();
   std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
+  void TellMovements();
+  [[nodiscard]] protocol::Movements EmptyMovements() const;
+  [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
+  void Gone(AvatarNumber avatar);
   protocol::Event& AddEvent(protocol::EventType type, AvatarNumber avatar, std::uint64_t tick);
 
   std::shared_ptr<World> world_;
@@ -115,8 +128,16 @@ class WorldShard {
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;
-  std::shared_ptr<const Ground> ground_;  // null: flat
-  std::deque<GroundPart> grounds_;        // from later ticks on
+  bool movements_wanted_ = false;
+  bool last_step_had_avatars_ = false;
+  std::uint64_t step_ = 0;  // of its avatars
+  std::uint64_t tick_ = 0;  // to which they go on
+  std::uint16_t more_steps_ = 0;
+  std::size_t max_bulk_bytes_;
+  std::vector<AvatarNumber> gone_;              // since the last step
+  std::vector<protocol::Movements> movements_;  // of steps not taken yet
+  std::shared_ptr<const Ground> ground_;        // null: flat
+  std::deque<GroundPart> grounds_;              // from later ticks on
   // By mode.
   std::array<bool, kSentModes.size()> last_had_poses_{};
   std::array<RowsPool, kSentModes.size()> rows_;

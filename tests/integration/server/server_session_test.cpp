@@ -396,12 +396,6 @@ TEST(ServerSession, RefusesCommandsThatDoNotFitItsState) {
   EXPECT_EQ(code(protocol::JoinWorld{.seq = seq(), .name = "w"}), StatusCode::kAlreadyJoined);
   EXPECT_EQ(code(protocol::Spawn{.seq = seq(), .world = world->world, .items = {{}}}),
             StatusCode::kNotAllowed);
-  EXPECT_EQ(code(protocol::Observe{.seq = seq(),
-                                   .world = world->world,
-                                   .subscription = 1,
-                                   .mode = PoseMode::kMovement,
-                                   .avatars = {}}),
-            StatusCode::kUnsupported);
   EXPECT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
   EXPECT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code,
             StatusCode::kSubscriptionExists);

@@ -507,6 +507,65 @@ TEST(Check, Layers) {
       good, [](L& m) -> double& { return m.items[0].speed; }, "SetLayers.speed");
 }
 
+TEST(Check, Movements) {
+  using M = Movements;
+  const M good{.world = 2,
+               .avatars = {41, 42, 43},
+               .flags = {0, kMovementGone, 1},
+               .ends = {4, 4, 10},
+               .records = std::vector<std::byte>(10)};
+  constexpr auto kRange = ErrorCode::kOutOfRange;
+  constexpr auto kShape = ErrorCode::kShapeMismatch;
+  EXPECT_EQ(good.record(0).size(), 4u);
+  EXPECT_EQ(good.record(1).size(), 0u);
+  EXPECT_EQ(good.record(2).data(), good.records.data() + 4);
+  Refused<M>(good, [](M& m) { m.world = 0; }, kRange, "Movements.world");
+  Refused<M>(good, [](M& m) { m.part = 1; }, kRange, "Movements.part");
+  Refused<M>(good, [](M& m) { m.parts = 0; }, kRange, "Movements.part");
+  RefusedWhenNotFinite<M>(
+      good, [](M& m) -> double& { return m.server_time_s; }, "Movements.server_time_s");
+  Refused<M>(good, [](M& m) { m.avatars[1] = 0; }, kRange, "Movements.avatars", 1);
+  Refused<M>(good, [](M& m) { m.flags.pop_back(); }, kShape, "Movements.flags", 2);
+  Refused<M>(good, [](M& m) { m.ends.pop_back(); }, kShape, "Movements.ends", 2);
+  Refused<M>(good, [](M& m) { m.ends[1] = 3; }, kRange, "Movements.ends", 1);
+  Refused<M>(good, [](M& m) { m.records.pop_back(); }, kShape, "Movements.records", 9);
+  Refused<M>(
+      good,
+      [](M& m) {
+        m.ends[2] = 4 + kMaxRecordBytes + 1;
+        m.records.resize(m.ends[2]);
+      },
+      kRange, "Movements.ends", 2);
+}
+
+TEST(Check, PiecesOfLibraries) {
+  using F = FetchLibrary;
+  const F asked{1, "0f1e", 0, 1};
+  constexpr auto kRange = ErrorCode::kOutOfRange;
+  Refused<F>(asked, [](F& m) { m.length = 0; }, kRange, "FetchLibrary.length", 0);
+  Refused<F>(asked, [](F& m) { m.length = (1u << 20) + 1; }, kRange, "FetchLibrary.length");
+  Refused<F>(asked, [](F& m) { m.offset = 1u << 30; }, kRange, "FetchLibrary.offset");
+  RefusedTexts<F>(
+      asked, [](F& m) -> std::string& { return m.hash; }, kMaxNameBytes, false,
+      "FetchLibrary.hash");
+  using P = LibraryPiece;
+  const P piece{.hash = "0f1e", .total_bytes = 8, .offset = 5, .bytes = std::vector<std::byte>(3)};
+  Refused<P>(piece, [](P& m) { m.bytes.resize(4); }, kRange, "LibraryPiece.offset", 5);
+  Refused<P>(piece, [](P& m) { m.offset = 9; }, kRange, "LibraryPiece.offset", 9);
+  Refused<P>(
+      piece, [](P& m) { m.total_bytes = kMaxLibraryBytes + 1; }, kRange, "LibraryPiece.offset");
+  Refused<P>(
+      piece,
+      [](P& m) {
+        m.total_bytes = kMaxLibraryBytes;
+        m.bytes.resize(kMaxPieceBytes + 1);
+      },
+      ErrorCode::kLimitExceeded, "LibraryPiece.bytes");
+  RefusedTexts<P>(
+      piece, [](P& m) -> std::string& { return m.text; }, kMaxReasonBytes, true,
+      "LibraryPiece.text");
+}
+
 TEST(Check, Terrain) {
   using T = SetTerrain;
   T good{1, 2, TerrainInfo{}};

@@ -65,7 +65,10 @@ TEST(Decode, EveryTypeIsChecked) {
       {MessageType::kSetTerrain, "SetTerrain.seq"},
       {MessageType::kWorldTerrain, "WorldTerrain.world"},
       {MessageType::kSetLayers, "SetLayers.seq"},
-      {MessageType::kSetPlanting, "SetPlanting.seq"}};
+      {MessageType::kSetPlanting, "SetPlanting.seq"},
+      {MessageType::kFetchLibrary, "FetchLibrary.length"},
+      {MessageType::kMovements, "Movements.world"},
+      {MessageType::kLibraryPiece, ""}};
   EXPECT_EQ(first_wrong.size(), std::variant_size_v<Message>);
   FlatBufferBuilder builder;
   const auto empty = Finished(builder, wire::CreatePing(builder));

@@ -54,7 +54,7 @@ TEST(Frame, AnotherVersionIsRefused) {
 }
 
 TEST(Frame, UnknownTypeIsRefused) {
-  for (const int type : {0, 15, 31, 33, 63, 74, 0x100 + 10, 65535}) {
+  for (const int type : {0, 16, 31, 33, 63, 76, 0x100 + 10, 65535}) {
     const auto bytes = Header(static_cast<MessageType>(type), 8);
     EXPECT_EQ(CodeOf(bytes, Sender::kClient), ErrorCode::kUnsupported) << type;
     EXPECT_EQ(CodeOf(bytes, Sender::kServer), ErrorCode::kUnsupported) << type;

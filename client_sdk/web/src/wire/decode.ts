@@ -8,9 +8,9 @@ import type {
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
-  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames, maxNameBytes, maxParameters,
-  maxPlayingLayers,
-  maxReasonBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
+  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames, maxLibraryBytes, maxNameBytes, maxParameters,
+  maxPieceBytes, maxPlayingLayers,
+  maxReasonBytes, maxRecordBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
   minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
@@ -65,6 +65,11 @@ function notNegative(value: number, field: string): number {
 function id<T extends number | bigint>(value: T, field: string, index = -1): T {
   if (value == 0) throw new Malformed('is zero', field, index);
   return value;
+}
+
+function below(value: bigint, most: bigint, field: string): number {
+  if (value > most) throw new Malformed('is too large', field);
+  return Number(value);
 }
 
 function known<T>(values: readonly T[], value: number, field: string, index = -1): T {
@@ -583,6 +588,87 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       type: 'WorldTerrain',
       world: id(m.world(), 'WorldTerrain.world'),
       terrain: terrain(m.terrain()),
+    };
+  },
+
+  FetchLibrary(bytes) {
+    const m = wire.FetchLibrary.getRootAsFetchLibrary(bytes);
+    const length = m.length();
+    if (length < 1 || length > maxPieceBytes) {
+      throw new Malformed('is not 1 byte to 1 MiB', 'FetchLibrary.length');
+    }
+    return {
+      type: 'FetchLibrary',
+      nonce: m.nonce(),
+      hash: name(m.hash(asBytes), 'FetchLibrary.hash'),
+      offset: below(m.offset(), BigInt(maxLibraryBytes) - 1n, 'FetchLibrary.offset'),
+      length,
+    };
+  },
+
+  Movements(bytes) {
+    const m = wire.Movements.getRootAsMovements(bytes);
+    const part = m.part();
+    const parts = m.parts();
+    if (parts < 1 || parts > maxBatchParts || part >= parts) {
+      throw new Malformed('is not 0 to parts - 1 of 1 to 1024', 'Movements.part');
+    }
+    const avatars = avatarList(m.avatarsArray(), 0, 'Movements.avatars');
+    const flags = m.flagsArray() ?? new Uint8Array(0);
+    if (flags.length !== avatars.length) {
+      throw new Malformed('is not one an avatar', 'Movements.flags');
+    }
+    const ends = m.endsArray() ?? new Uint32Array(0);
+    if (ends.length !== avatars.length) {
+      throw new Malformed('is not one an avatar', 'Movements.ends');
+    }
+    const records = m.recordsArray() ?? new Uint8Array(0);
+    let before = 0;
+    ends.forEach((end, i) => {
+      if (end < before || end - before > maxRecordBytes) {
+        throw new Malformed('lies before its record or too far behind', 'Movements.ends', i);
+      }
+      before = end;
+    });
+    if (before !== records.length) {
+      throw new Malformed('do not end where the last one does', 'Movements.records');
+    }
+    return {
+      type: 'Movements',
+      world: id(m.world(), 'Movements.world'),
+      shard: m.shard(),
+      part,
+      parts,
+      moreSteps: m.moreSteps(),
+      step: m.step(),
+      tick: Number(m.tick()),
+      serverTimeS: finite(m.serverTimeS(), 'Movements.serverTimeS'),
+      states: m.states(),
+      avatars,
+      flags,
+      ends,
+      records,
+    };
+  },
+
+  LibraryPiece(bytes) {
+    const m = wire.LibraryPiece.getRootAsLibraryPiece(bytes);
+    const piece = m.bytesArray() ?? new Uint8Array(0);
+    count(piece.length, 0, maxPieceBytes, 'LibraryPiece.bytes');
+    const totalBytes = below(m.totalBytes(), BigInt(maxLibraryBytes), 'LibraryPiece.totalBytes');
+    const offset = below(m.offset(), BigInt(totalBytes), 'LibraryPiece.offset');
+    if (piece.length > totalBytes - offset) {
+      throw new Malformed('lies outside of its library', 'LibraryPiece.bytes');
+    }
+    return {
+      type: 'LibraryPiece',
+      nonce: m.nonce(),
+      code: m.code(),
+      text: text(m.text(asBytes), maxReasonBytes, 'LibraryPiece.text'),
+      hash: text(m.hash(asBytes), maxNameBytes, 'LibraryPiece.hash'),
+      totalBytes,
+      offset,
+      bytes: piece,
     };
   },
 };

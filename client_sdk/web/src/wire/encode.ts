@@ -157,6 +157,9 @@ function build(b: Builder, m: ClientMessage): number {
     case 'Ping': return wire.Ping.createPing(b, m.nonce, m.timeS);
     case 'InspectAvatar':
       return wire.InspectAvatar.createInspectAvatar(b, m.nonce, m.world, m.avatar);
+    case 'FetchLibrary':
+      return wire.FetchLibrary.createFetchLibrary(
+          b, m.nonce, b.createString(m.hash), BigInt(m.offset), m.length);
     case 'Goodbye': return wire.Goodbye.createGoodbye(b, m.code, b.createString(m.text));
   }
 }

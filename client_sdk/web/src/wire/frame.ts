@@ -17,6 +17,7 @@ export const MessageType = {
   SetTerrain: 12,
   SetLayers: 13,
   SetPlanting: 14,
+  FetchLibrary: 15,
   Goodbye: 32,
   Welcome: 64,
   WorldInfo: 65,
@@ -28,6 +29,8 @@ export const MessageType = {
   Pong: 71,
   AvatarState: 72,
   WorldTerrain: 73,
+  Movements: 74,
+  LibraryPiece: 75,
 } as const;
 export type MessageName = keyof typeof MessageType;
 export type Sender = 'client' | 'server';
@@ -39,7 +42,7 @@ const names = new Map<number, MessageName>(
     Object.entries(MessageType).map(([name, type]) => [type, name as MessageName]));
 const bulk = new Set<MessageName>([
   'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe', 'Reply', 'PoseBatch', 'Events',
-  'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting'
+  'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'Movements', 'LibraryPiece'
 ]);
 
 export function isBulk(name: MessageName): boolean {

@@ -226,11 +226,47 @@ export interface WorldTerrain {
   terrain: Terrain | null;
 }
 
+/** A question for a piece of a library's file. */
+export interface FetchLibrary {
+  type: 'FetchLibrary';
+  nonce: bigint;
+  hash: string;
+  offset: number;
+  length: number;
+}
+export interface LibraryPiece {
+  type: 'LibraryPiece';
+  nonce: bigint;
+  code: number;
+  text: string;
+  hash: string;
+  totalBytes: number;
+  offset: number;
+  bytes: Uint8Array;
+}
+/** What avatars begin, for who evaluates their poses, which this library does not. */
+export interface Movements {
+  type: 'Movements';
+  world: number;
+  shard: number;
+  part: number;
+  parts: number;
+  moreSteps: number;
+  step: bigint;
+  tick: number;
+  serverTimeS: number;
+  states: boolean;
+  avatars: Uint32Array;
+  flags: Uint8Array;
+  ends: Uint32Array;
+  records: Uint8Array;
+}
+
 export type CommandMessage =
     JoinWorld | LeaveWorld | Spawn | Remove | Request | CancelQueue | Observe | StopObserving |
     SetTerrain | SetLayers | SetPlanting;
-export type ClientMessage = Hello | CommandMessage | Ping | InspectAvatar | Goodbye;
+export type ClientMessage = Hello | CommandMessage | Ping | InspectAvatar | FetchLibrary | Goodbye;
 export type ServerMessage =
     Welcome | WorldInfo | ReplyMessage | PoseBatch | Events | Lagging | ErrorNotice | Pong |
-    AvatarStateMessage | WorldTerrain | Goodbye;
+    AvatarStateMessage | WorldTerrain | Movements | LibraryPiece | Goodbye;
 export type Message = ClientMessage | ServerMessage;

@@ -5,7 +5,7 @@ import {PoseReader} from '../../src/wire/pose_codec';
 const texts = new Set([
   'Hello', 'JoinWorld', 'LeaveWorld', 'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe',
   'StopObserving', 'Ping', 'InspectAvatar', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch',
-  'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'controller', 'observer', 'full',
+  'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
   'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
   'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
   'removed', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
@@ -13,7 +13,7 @@ const texts = new Set([
 /** Fields whose texts are free; all others are enumerators. */
 const free = new Set([
   'text', 'reason', 'name', 'clientName', 'authToken', 'serverName', 'serverVersion', 'libraryHash',
-  'layer', 'layers'
+  'layer', 'layers', 'hash'
 ]);
 
 /** Every number finite, every enumerator one that is known, every text clean and short. */

@@ -112,6 +112,19 @@ export function toJson(m: Message): {[name: string]: Json} {
     case 'StopObserving': return {seq: u64(m.seq), subscription: m.subscription};
     case 'Ping': return {nonce: u64(m.nonce), time_s: m.timeS};
     case 'InspectAvatar': return {nonce: u64(m.nonce), world: m.world, avatar: m.avatar};
+    case 'FetchLibrary':
+      return {nonce: u64(m.nonce), hash: m.hash, offset: u64(m.offset), length: m.length};
+    case 'LibraryPiece':
+      return {
+        nonce: u64(m.nonce), code: m.code, text: m.text, hash: m.hash, total_bytes: u64(m.totalBytes),
+        offset: u64(m.offset), bytes: token(m.bytes),
+      };
+    case 'Movements':
+      return {
+        world: m.world, shard: m.shard, part: m.part, parts: m.parts, more_steps: m.moreSteps,
+        step: u64(m.step), tick: u64(m.tick), server_time_s: m.serverTimeS, states: m.states,
+        avatars: [...m.avatars], flags: [...m.flags], ends: [...m.ends], records: token(m.records),
+      };
     case 'Goodbye': return {code: m.code, text: m.text};
     case 'Welcome':
       return {

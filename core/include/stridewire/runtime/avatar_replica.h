@@ -19,6 +19,9 @@ class AvatarReplica {
   /// Nothing is known of the avatar until a state comes. The library is that of the avatar.
   explicit AvatarReplica(std::shared_ptr<const MotionLibrary> library);
 
+  /// Whether a record tells a state, and not a change.
+  [[nodiscard]] static bool IsState(std::span<const std::byte> record);
+
   /// Takes the record of a tick. Of the changes none may be left out; a state may come at any time.
   /// kMalformed: bytes that are none, or do not fit the library or what is known; kNotFound: a change, and no state was
   /// there before. `index`: where in the record. Nothing is known then until the next state.

@@ -22,4 +22,7 @@ bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out);
 /// Appends the state after the last Advance, which must be the last thing that was done to the avatar.
 void AppendState(const Avatar& avatar, std::vector<std::byte>& out);
 
+/// No record of an avatar of this library is longer.
+[[nodiscard]] std::size_t MaxRecordBytes(const MotionLibrary& library);
+
 }  // namespace stridewire

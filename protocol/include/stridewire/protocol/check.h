@@ -34,5 +34,8 @@ namespace stridewire::protocol {
 [[nodiscard]] Status Check(const SetLayers& m);
 [[nodiscard]] Status Check(const SetPlanting& m);
 [[nodiscard]] Status Check(const WorldTerrain& m);
+[[nodiscard]] Status Check(const FetchLibrary& m);
+[[nodiscard]] Status Check(const Movements& m);
+[[nodiscard]] Status Check(const LibraryPiece& m);
 
 }  // namespace stridewire::protocol

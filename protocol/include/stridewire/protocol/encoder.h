@@ -49,6 +49,9 @@ class Encoder {
   [[nodiscard]] Status Encode(const SetLayers& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const SetPlanting& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const WorldTerrain& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const FetchLibrary& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const Movements& m, std::vector<std::byte>& frame);
+  [[nodiscard]] Status Encode(const LibraryPiece& m, std::vector<std::byte>& frame);
   [[nodiscard]] Status Encode(const Message& m, std::vector<std::byte>& frame);
 
  private:

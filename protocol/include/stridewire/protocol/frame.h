@@ -28,6 +28,7 @@ enum class MessageType : std::uint16_t {
   kSetTerrain = 12,
   kSetLayers = 13,
   kSetPlanting = 14,
+  kFetchLibrary = 15,
   // Both ways.
   kGoodbye = 32,
   // Server to client.
@@ -41,6 +42,8 @@ enum class MessageType : std::uint16_t {
   kPong = 71,
   kAvatarState = 72,
   kWorldTerrain = 73,
+  kMovements = 74,
+  kLibraryPiece = 75,
 };
 
 /// Who sent it.

@@ -266,6 +266,17 @@ struct Ping {
   bool operator==(const Ping&) const = default;
 };
 
+/// Asks for a piece of the library of a world joined; LibraryPiece answers. A question, like InspectAvatar. Needs
+/// kFeatureMovementMode.
+struct FetchLibrary {
+  static constexpr MessageType kType = MessageType::kFetchLibrary;
+  std::uint64_t nonce = 0;   ///< Comes back in LibraryPiece.
+  std::string hash;          ///< WorldInfo::library_hash
+  std::uint64_t offset = 0;  ///< Where in its file
+  std::uint32_t length = 0;  ///< 1 to kMaxPieceBytes; less may come
+  bool operator==(const FetchLibrary&) const = default;
+};
+
 /// Asks what an avatar is doing; AvatarState answers. A question, like Ping: it changes nothing, and
 /// what was under way when a connection broke is not answered. Needs kFeatureInspect.
 struct InspectAvatar {
@@ -560,9 +571,54 @@ struct WorldTerrain {
   bool operator==(const WorldTerrain&) const = default;
 };
 
-using Message = std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue,
-                             Observe, StopObserving, Ping, InspectAvatar, Goodbye, Welcome,
-                             WorldInfo, Reply, PoseBatch, Events, Lagging, ErrorNotice, Pong,
-                             AvatarState, SetTerrain, WorldTerrain, SetLayers, SetPlanting>;
+/// Flag of an avatar in Movements, beside kPoseDiscontinuity: it is gone, and has no record.
+inline constexpr std::uint8_t kMovementGone = 4;
+
+/// What avatars of a shard begin, for who evaluates their poses (STANDARD.md, "Movement records"). Avatars go on in steps of
+/// one tick; every step has a message, in order, with the changes in it. Other messages have the states after a step, of avatars
+/// that the receiver knows nothing of yet.
+struct Movements {
+  static constexpr MessageType kType = MessageType::kMovements;
+  WorldId world = 0;
+  std::uint16_t shard = 0;
+  std::uint16_t part = 0;
+  std::uint16_t parts = 1;
+  std::uint16_t more_steps = 0;  ///< That follow until poses of `tick` are to be shown.
+  std::uint64_t step =
+      0;  ///< Of this shard's avatars; one more each. A gap: what is known is no more.
+  std::uint64_t tick = 0;
+  double server_time_s = 0.0;         ///< The server's clock at that tick.
+  bool states = false;                ///< After `step`, which came before; else the changes in it.
+  std::vector<AvatarNumber> avatars;  ///< 0 to kMaxItems, none 0
+  std::vector<std::uint8_t> flags;    ///< One an avatar.
+  std::vector<std::uint32_t>
+      ends;  ///< Where in `records` each one's ends; it begins where the one before ends.
+  std::vector<std::byte> records;
+  bool operator==(const Movements&) const = default;
+
+  [[nodiscard]] std::span<const std::byte> record(std::size_t i) const {
+    const std::size_t begin = i == 0 ? 0 : ends[i - 1];
+    return std::span(records).subspan(begin, ends[i] - begin);
+  }
+};
+
+/// The answer to FetchLibrary.
+struct LibraryPiece {
+  static constexpr MessageType kType = MessageType::kLibraryPiece;
+  std::uint64_t nonce = 0;
+  StatusCode code = StatusCode::kOk;  ///< If not kOk, nothing below `text` is set but `hash`.
+  std::string text;
+  std::string hash;
+  std::uint64_t total_bytes = 0;  ///< Of the file.
+  std::uint64_t offset = 0;
+  std::vector<std::byte> bytes;  ///< At most kMaxPieceBytes; none at the end of the file.
+  bool operator==(const LibraryPiece&) const = default;
+};
+
+using Message =
+    std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue, Observe,
+                 StopObserving, Ping, InspectAvatar, Goodbye, Welcome, WorldInfo, Reply, PoseBatch,
+                 Events, Lagging, ErrorNotice, Pong, AvatarState, SetTerrain, WorldTerrain,
+                 SetLayers, SetPlanting, FetchLibrary, Movements, LibraryPiece>;
 
 }  // namespace stridewire::protocol

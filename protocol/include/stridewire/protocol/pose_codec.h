@@ -13,7 +13,7 @@ namespace stridewire::protocol {
 enum class PoseMode : std::uint8_t {
   kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
   kQuantised = 1,  ///< Root in fixed point, 3 x int32; 48 bits a joint ("smallest three").
-  kMovement = 2,   ///< Reserved: what a movement is made of, once a step. No pose is sent.
+  kMovement = 2,   ///< What a movement was decided to be, once a step (Movements). No pose is sent.
 };
 
 /// Quantised root: multiples of 2^-14 m (0.061 mm), so the error is at most 2^-15 m = 0.031 mm as

@@ -1,0 +1,267 @@
+// Observers that evaluate the poses themselves, over real sockets: the same bytes as in full poses, by whatever way they came
+// to know of the avatars; and their library, fetched piece by piece.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <string>
+
+#include "movement_view.h"
+#include "random.h"
+#include "stridewire/offline/open_library.h"
+#include "test_server.h"
+
+namespace stridewire {
+namespace {
+
+using protocol::AvatarNumber;
+using protocol::PoseMode;
+using server::Limit;
+using server::ThreadMetrics;
+
+using PoseBytes = std::vector<std::byte>;
+using Shown = std::map<std::pair<std::uint64_t, AvatarNumber>, PoseBytes>;  // by tick and avatar
+
+class Keeper : public client::PoseScreen {
+ public:
+  void Show(AvatarNumber avatar, std::uint16_t, const client::PoseStamp& stamp,
+            ConstPoseSpan pose) override {
+    PoseBytes bytes(protocol::PoseBytes(PoseMode::kFull, pose.rotations.size()));
+    ASSERT_TRUE(protocol::EncodePose(PoseMode::kFull, pose.root_position_m, pose.rotations, bytes));
+    shown[{stamp.tick, avatar}] = std::move(bytes);
+    gone.erase(avatar);
+  }
+  void Gone(AvatarNumber avatar) override { gone[avatar] = true; }
+
+  Shown shown;
+  std::map<AvatarNumber, bool> gone;
+};
+
+server::Config BuiltinConfig(int shards) {
+  server::Config config = TestConfig(shards);
+  config.library = "builtin";
+  config.max_catch_up_ticks = 1000;
+  config.limits.observer_backlog_ticks = 1000;
+  return config;
+}
+
+// One session that takes poses and movements of the same world.
+class BothWays {
+ public:
+  BothWays(TestServer& server, const std::string& world, int receive_buffer_bytes = 0)
+      : client_(server.Connect(receive_buffer_bytes)),
+        view_(OpenLibrary("builtin").value(), 1.0 / 60.0, 10'000) {
+    EXPECT_TRUE(client_.SayHello());
+    world_ = client_.Join(world, protocol::Role::kObserver)->world;
+  }
+
+  void Observe(PoseMode mode, protocol::SubscriptionId id) {
+    client_.Send(protocol::Observe{
+        .seq = client_.NextSeq(), .world = world_, .subscription = id, .mode = mode});
+  }
+
+  // Takes what comes until `is_enough`.
+  template <typename IsEnough>
+  void TakeUntil(IsEnough&& is_enough) {
+    while (!is_enough()) {
+      const auto message = client_.Receive();
+      ASSERT_TRUE(message);
+      if (const auto* movements = std::get_if<protocol::Movements>(&*message)) {
+        const Status taken = view_.Take(*movements, told_);
+        ASSERT_TRUE(taken) << Describe(taken.error());
+        states_ += movements->states;
+      } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+        for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
+          const auto pose = batch->pose(i);
+          full_[{batch->info.tick, batch->avatars[i]}].assign(pose.begin(), pose.end());
+        }
+        last_tick_ = batch->info.tick;
+      }
+    }
+  }
+
+  // Compares where both are; how many that were.
+  int Compare() const {
+    int compared = 0;
+    for (const auto& [key, bytes] : told_.shown) {
+      const auto full = full_.find(key);
+      if (full == full_.end()) continue;
+      EXPECT_TRUE(full->second == bytes) << "tick " << key.first << ", avatar " << key.second;
+      ++compared;
+    }
+    return compared;
+  }
+
+  RawClient& client() { return client_; }
+  const Keeper& told() const { return told_; }
+  const client::MovementView& view() const { return view_; }
+  const Shown& full() const { return full_; }
+  int states() const { return states_; }
+  std::uint64_t last_tick() const { return last_tick_; }
+
+ private:
+  RawClient client_;
+  protocol::WorldId world_ = 0;
+  client::MovementView view_;
+  Keeper told_;
+  Shown full_;
+  int states_ = 0;
+  std::uint64_t last_tick_ = 0;
+};
+
+class Crowd {
+ public:
+  Crowd(TestServer& server, const std::string& world, std::size_t size)
+      : client_(server.Connect()), size_(size) {
+    EXPECT_TRUE(client_.SayHello());
+    world_ = client_.Join(world)->world;
+    std::vector<protocol::SpawnItem> spawns;
+    for (AvatarNumber i = 1; i <= size; ++i) spawns.push_back({i, {DVec3(2.0 * i, 0.0, 0.0), 0.1}});
+    EXPECT_EQ(client_.Spawn(world_, spawns)->accepted, size);
+    Walk();
+  }
+
+  void Walk() {
+    std::vector<protocol::RequestItem> walk;
+    for (AvatarNumber avatar = 1; avatar <= size_; ++avatar) {
+      std::ranges::copy(Steps(avatar, 60, 0.3 + 0.004 * avatar), std::back_inserter(walk));
+    }
+    EXPECT_TRUE(client_.Request(world_, walk));
+  }
+  // Sends some elsewhere in mid-step, and lets some wave.
+  void Stir(AvatarNumber avatar) {
+    EXPECT_TRUE(client_.Request(world_, {{.avatar = avatar,
+                                          .request_id = 7,
+                                          .movement = protocol::StepMovement{.length_m = 0.6},
+                                          .takeover = protocol::Takeover::kNow}}));
+    client_.Send(protocol::SetLayers{
+        .seq = client_.NextSeq(), .world = world_, .items = {{avatar, "wave"}}});
+    client_.Send(protocol::SetPlanting{
+        .seq = client_.NextSeq(), .world = world_, .avatars = {avatar}, .is_off = true});
+    ASSERT_TRUE(client_.Await<protocol::Reply>());
+    ASSERT_TRUE(client_.Await<protocol::Reply>());
+  }
+  void Remove(AvatarNumber avatar) {
+    client_.Send(protocol::Remove{.seq = client_.NextSeq(), .world = world_, .avatars = {avatar}});
+    ASSERT_TRUE(client_.Await<protocol::Reply>());
+  }
+
+ private:
+  RawClient client_;
+  protocol::WorldId world_ = 0;
+  std::size_t size_;
+};
+
+TEST(ServerMovement, ShowsTheBytesOfFullPoses) {
+  TestServer server(BuiltinConfig(2));
+  Crowd crowd(server, "w", 40);
+  BothWays both(server, "w");
+  both.Observe(PoseMode::kFull, 1);
+  both.Observe(PoseMode::kMovement, 2);
+  both.TakeUntil([&] { return both.told().shown.size() > 40 * 60; });
+  for (const AvatarNumber avatar : {3u, 4u, 9u, 12u}) crowd.Stir(avatar);
+  crowd.Remove(7);
+  both.TakeUntil([&] { return both.told().shown.size() > 40 * 200; });
+  const int compared = both.Compare();
+  std::printf("%d poses compared, %d messages of states\n", compared, both.states());
+  EXPECT_GT(compared, 40 * 190);
+  EXPECT_EQ(both.view().avatar_count(), 39u);
+  EXPECT_EQ(both.told().gone.size(), 1u);
+  EXPECT_TRUE(both.told().gone.contains(7));
+  // Later ones are told by those who are there.
+  Crowd more(server, "w2", 1);
+  BothWays other(server, "w2");
+  other.Observe(PoseMode::kMovement, 2);
+  other.TakeUntil([&] { return other.told().shown.size() > 30; });
+  EXPECT_EQ(other.view().avatar_count(), 1u);
+}
+
+TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) {
+  TestServer server(BuiltinConfig(2));
+  Crowd crowd(server, "w", 400);
+  BothWays both(server, "w");
+  both.Observe(PoseMode::kFull, 1);
+  for (const protocol::SubscriptionId id : {2u, 3u}) {
+    both.Observe(PoseMode::kMovement, id);
+    const std::size_t before = both.told().shown.size();
+    both.TakeUntil([&] { return both.told().shown.size() > before + 400 * 40; });
+    EXPECT_EQ(both.view().avatar_count(), 400u);
+    both.client().Send(protocol::StopObserving{.seq = both.client().NextSeq(), .subscription = id});
+    std::uint64_t from = both.last_tick();
+    both.TakeUntil([&] { return both.last_tick() > from + 20; });
+  }
+  EXPECT_GT(both.states(), 8);  // 400 states are some 500 KB
+  EXPECT_GT(both.Compare(), 400 * 70);
+}
+
+TEST(ServerMovement, WhoReadsTooSlowlyIsToldAnew) {
+  server::Config config = BuiltinConfig(1);
+  config.limits.socket_send_buffer_bytes = 16 << 10;
+  config.limits.control_buffer_bytes = 256 << 10;
+  TestServer server(config);
+  Crowd crowd(server, "w", 300);
+  BothWays both(server, "w", 16 << 10);
+  both.Observe(PoseMode::kFull, 1);
+  both.Observe(PoseMode::kMovement, 2);
+  both.TakeUntil([&] { return both.view().avatar_count() == 300; });
+  const int states = both.states();
+  // Reads nothing until movements were dropped.
+  for (AvatarNumber avatar = 1; server.metrics().Sum(Limit::kObserverBacklog) == 0; ++avatar) {
+    crowd.Stir(1 + avatar % 300);
+  }
+  const std::size_t before = both.told().shown.size();
+  both.TakeUntil([&] { return both.states() > states; });
+  both.TakeUntil([&] { return both.told().shown.size() > before + 300 * 60; });
+  EXPECT_GT(server.metrics().Sum(&ThreadMetrics::batches_dropped), 0u);
+  EXPECT_EQ(both.view().avatar_count(), 300u);
+  EXPECT_GT(both.Compare(), 300 * 30);
+}
+
+TEST(ServerMovement, NeedsItsFeature) {
+  TestServer server(BuiltinConfig(1));
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello(~protocol::kFeatureMovementMode));
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  const auto reply = client.Observe(world->world, 1, PoseMode::kMovement);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, protocol::StatusCode::kUnsupported);
+  client.Send(protocol::FetchLibrary{1, world->library_hash, 0, 1000});
+  const auto error = client.Await<protocol::ErrorNotice>();
+  ASSERT_TRUE(error);
+  EXPECT_EQ(error->code, protocol::StatusCode::kUnexpectedMessage);
+}
+
+TEST(ServerMovement, GivesOutItsLibraryPieceByPiece) {
+  TestServer server(BuiltinConfig(1));
+  RawClient client = server.Connect();
+  ASSERT_TRUE(client.SayHello());
+  const auto builtin = OpenLibrary("builtin").value();
+  client.Send(protocol::FetchLibrary{1, builtin->hash(), 0, 1000});
+  EXPECT_EQ(client.Await<protocol::LibraryPiece>()->code, protocol::StatusCode::kNotJoined);
+  const auto world = client.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_EQ(world->library_hash, builtin->hash());
+  std::vector<std::byte> file;
+  for (std::uint64_t nonce = 2;; ++nonce) {
+    client.Send(protocol::FetchLibrary{nonce, world->library_hash, file.size(), 1 << 20});
+    const auto piece = client.Await<protocol::LibraryPiece>();
+    ASSERT_TRUE(piece);
+    ASSERT_EQ(piece->code, protocol::StatusCode::kOk);
+    EXPECT_EQ(piece->nonce, nonce);
+    EXPECT_EQ(piece->offset, file.size());
+    EXPECT_EQ(piece->total_bytes, builtin->bytes().size());
+    file.insert(file.end(), piece->bytes.begin(), piece->bytes.end());
+    if (file.size() >= piece->total_bytes || piece->bytes.empty()) break;
+  }
+  ASSERT_EQ(file.size(), builtin->bytes().size());
+  EXPECT_EQ(std::memcmp(file.data(), builtin->bytes().data(), file.size()), 0);
+  EXPECT_EQ(MotionLibrary::FromBytes(file).value()->hash(), world->library_hash);
+  client.Send(protocol::FetchLibrary{99, world->library_hash, file.size() + 1, 1});
+  EXPECT_EQ(client.Await<protocol::LibraryPiece>()->code, protocol::StatusCode::kOutOfRange);
+}
+
+}  // namespace
+}  // namespace stridewire
