@@ -56,20 +56,37 @@ bool IsGeneral(const MotionGroup& group) {
   return false;
 }
 
-RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wishes& wishes,
-                        double natural_side_m) {
+// How far outside the range of a group's examples, grown by `growth`, a target is: no more than outside their hull.
+double OutsideRange(const MotionGroup& group, std::span<const double> metric,
+                    std::span<const double> target, double growth) {
+  constexpr double kSlack = 1e-6;  // ranges are told in other digits than examples
+  double sum = 0.0;
+  for (std::size_t l = 0; l < target.size(); ++l) {
+    const Parameter& parameter = group.parameters[l];
+    const double more = growth * (parameter.max - parameter.min) + kSlack;
+    const double outside = metric[l] * std::max({0.0, parameter.min - more - target[l],
+                                                 target[l] - parameter.max - more});
+    sum += outside * outside;
+  }
+  return std::sqrt(sum);
+}
+
+// Null if it would cost as much as `best_cost_m` or more.
+std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
+                                       const Wishes& wishes, double natural_side_m,
+                                       double best_cost_m) {
   const MotionGroup& group = library.group(group_index);
   const std::size_t d = group.parameters.size();
   RequestPlan plan;
   plan.group = group_index;
   plan.requested.count = plan.applied.count = static_cast<int>(d);
-  std::array<double, kMaxParameters> metric{};
+  std::array<double, kMaxParameters> metric_room{};
   std::array<bool, kParameterNameCount> is_spanned{};
   for (std::size_t l = 0; l < d; ++l) {
     const auto name = static_cast<std::size_t>(group.parameters[l].name);
     const Wish& wish = wishes[name];
     is_spanned[name] = true;
-    metric[l] = wish.given ? wish.weight : kFreeWeight;
+    metric_room[l] = wish.given ? wish.weight : kFreeWeight;
     plan.requested.values[l] = wish.given ? wish.value : group.parameters[l].centre;
     if (wish.natural) {
       plan.requested.values[l] =
@@ -77,17 +94,44 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
     }
   }
 
+  // What the group has no parameter for is missed by as much as was asked.
+  double missed_m = 0.0;
+  for (const ParameterName name :
+       {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kEndX ? natural_side_m : 0.0;
+    const double missed = wishes[i].weight * std::fabs(wishes[i].value - natural);
+    if (missed > kChangeM) plan.clamped = true;
+    missed_m += missed;
+  }
+  double beside_m = 0.0;
+  for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kStartX ? natural_side_m : 0.0;
+    beside_m += wishes[i].weight *
+                std::max(0.0, std::fabs(wishes[i].value - natural) -
+                                  (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
+  }
+
+  const std::span<const double> target = std::span(plan.requested.values).first(d);
+  const std::span<const double> metric = std::span(metric_room).first(d);
+  // Most groups are out of the question before hulls, which take their time, are looked at.
+  const double least_m = OutsideRange(group, metric, target, kHullGrowth) +
+                         kOutsideWeight * OutsideRange(group, metric, target, 0.0);
+  if (least_m + missed_m + beside_m >= best_cost_m) return std::nullopt;
+
   const std::span<const double> examples =
       group.sites.first(static_cast<std::size_t>(group.example_count) * d);
-  const std::span<const double> target = std::span(plan.requested.values).first(d);
   std::array<double, kMaxParameters> inside{};
-  const double outside_m = ProjectOntoHull(examples, std::span(metric).first(d), 0.0, target,
-                                           std::span(inside).first(d));
+  const double outside_m =
+      ProjectOntoHull(examples, metric, 0.0, target, std::span(inside).first(d));
   plan.extrapolated = outside_m > kChangeM;
   if (outside_m == 0.0) {
     std::ranges::copy(target, plan.applied.values.begin());
   } else {
-    plan.distance_m = ProjectOntoHull(examples, std::span(metric).first(d), kHullGrowth, target,
+    plan.distance_m = ProjectOntoHull(examples, metric, kHullGrowth, target,
                                       std::span(plan.applied.values).first(d));
   }
   for (std::size_t l = 0; l < d; ++l) {
@@ -97,44 +141,26 @@ RequestPlan PlanInGroup(const MotionLibrary& library, int group_index, const Wis
       plan.clamped = true;
     }
   }
-
-  // What the group has no parameter for is missed by as much as was asked.
-  for (const ParameterName name :
-       {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
-    const auto i = static_cast<std::size_t>(name);
-    if (!wishes[i].given || is_spanned[i]) continue;
-    const double natural = name == ParameterName::kEndX ? natural_side_m : 0.0;
-    const double missed = wishes[i].weight * std::fabs(wishes[i].value - natural);
-    if (missed > kChangeM) plan.clamped = true;
-    plan.distance_m += missed;
-  }
-  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m;
-  for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
-    const auto i = static_cast<std::size_t>(name);
-    if (!wishes[i].given || is_spanned[i]) continue;
-    const double natural = name == ParameterName::kStartX ? natural_side_m : 0.0;
-    plan.cost_m +=
-        wishes[i].weight *
-        std::max(0.0, std::fabs(wishes[i].value - natural) -
-                          (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
-  }
+  plan.distance_m += missed_m;
+  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + beside_m;
+  if (plan.cost_m >= best_cost_m) return std::nullopt;
   return plan;
 }
 
 std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
                                     const Wishes& wishes, double natural_side_m, bool is_plain) {
   std::optional<RequestPlan> best;
-  double best_cost = HUGE_VAL;
+  double best_cost_m = HUGE_VAL;
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
-    const RequestPlan plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m);
-    double cost = plan.cost_m + kPerParameterM * group.parameter_count();
-    if (is_plain && IsGeneral(group)) cost += kPlainPreferenceM;
-    if (cost < best_cost) {
-      best_cost = cost;
-      best = plan;
-    }
+    double for_itself_m = kPerParameterM * group.parameter_count();
+    if (is_plain && IsGeneral(group)) for_itself_m += kPlainPreferenceM;
+    const auto plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m,
+                                  best_cost_m - for_itself_m);
+    if (!plan) continue;
+    best_cost_m = plan->cost_m + for_itself_m;
+    best = plan;
   }
   return best;
 }
