@@ -71,10 +71,10 @@ double OutsideRange(const MotionGroup& group, std::span<const double> metric,
   return std::sqrt(sum);
 }
 
-// Null if it would cost as much as `best_cost_m` or more.
+// Null if it costs, with `for_itself_m`, as much as `best_cost_m` or more.
 std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
                                        const Wishes& wishes, double natural_side_m,
-                                       double best_cost_m) {
+                                       double for_itself_m, double best_cost_m) {
   const MotionGroup& group = library.group(group_index);
   const std::size_t d = group.parameters.size();
   RequestPlan plan;
@@ -120,7 +120,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   // Most groups are out of the question before hulls, which take their time, are looked at.
   const double least_m = OutsideRange(group, metric, target, kHullGrowth) +
                          kOutsideWeight * OutsideRange(group, metric, target, 0.0);
-  if (least_m + missed_m + beside_m >= best_cost_m) return std::nullopt;
+  if (least_m + missed_m + beside_m + for_itself_m >= best_cost_m) return std::nullopt;
 
   const std::span<const double> examples =
       group.sites.first(static_cast<std::size_t>(group.example_count) * d);
@@ -143,7 +143,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   }
   plan.distance_m += missed_m;
   plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + beside_m;
-  if (plan.cost_m >= best_cost_m) return std::nullopt;
+  if (plan.cost_m + for_itself_m >= best_cost_m) return std::nullopt;
   return plan;
 }
 
@@ -157,7 +157,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     double for_itself_m = kPerParameterM * group.parameter_count();
     if (is_plain && IsGeneral(group)) for_itself_m += kPlainPreferenceM;
     const auto plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m,
-                                  best_cost_m - for_itself_m);
+                                  for_itself_m, best_cost_m);
     if (!plan) continue;
     best_cost_m = plan->cost_m + for_itself_m;
     best = plan;
