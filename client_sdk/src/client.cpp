@@ -220,6 +220,9 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
     s.connect_timeout_s = o.connect_timeout_s;
     s.ping_interval_s = o.ping_interval_s;
     s.respawn = o.respawn != 0;
+    constexpr std::size_t kMaxFolderBytes = 4096;
+    s.library_folder = o.library_folder != nullptr ? o.library_folder : "";
+    if (s.library_folder.size() > kMaxFolderBytes) return STRIDEWIRE_INVALID_ARGUMENT;
     s.seed = o.seed;
     if (s.seed == 0) {
       std::random_device device;

@@ -64,12 +64,14 @@ struct NetworkThread::Impl {
   void Step() {
     ConnectionPtr to_start;
     ConnectionPtr to_write;
+    std::optional<LibraryTask> task;
     std::string host;
     std::uint16_t port = 0;
     {
       const std::lock_guard lock(mutex);
       const double now_s = Now();
       session.AdvanceTime(now_s);
+      task = session.TakeLibraryTask();
       if (connection &&
           !(session.NeedsSocket() && session.connection_number() == connection->number)) {
         CloseSocket();
@@ -90,6 +92,17 @@ struct NetworkThread::Impl {
     changed.notify_all();
     if (to_start) Start(to_start, host, port);
     if (to_write) Write(to_write);
+    if (task) DoTask(*task);
+  }
+
+  /// May wait for a disk: without the lock.
+  void DoTask(const LibraryTask& task) {
+    auto done = Do(task);
+    {
+      const std::lock_guard lock(mutex);
+      session.OnLibraryTask(task.hash, std::move(done));
+    }
+    asio::post(io, [this] { Step(); });
   }
 
   void CloseSocket() {

@@ -13,6 +13,8 @@ namespace stridewire::client {
 namespace {
 
 constexpr std::size_t kMaxSubscriptions = 256;  // Of one world.
+// Of an avatar whose poses are evaluated here: its part of the memory that all may have besides their histories.
+constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 constexpr std::size_t kMaxAskedPings = 64;
 constexpr std::size_t kMaxRtts = 16;
 
@@ -70,7 +72,10 @@ std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain) {
 }  // namespace
 
 Session::Session(const SessionOptions& options)
-    : options_(options), backoff_(options.seed), events_(options.max_events) {
+    : options_(options),
+      backoff_(options.seed),
+      events_(options.max_events),
+      libraries_(options.library_folder) {
   pose_budget_.limit_bytes = options.max_pose_bytes;
 }
 
@@ -260,9 +265,6 @@ stridewire_status Session::SetPlanting(stridewire_world world, protocol::SetPlan
 
 stridewire_status Session::Observe(stridewire_world world, protocol::Observe message,
                                    std::uint32_t& subscription, std::uint64_t& command) {
-  if (message.mode == protocol::PoseMode::kMovement) {
-    return Refuse(STRIDEWIRE_UNSUPPORTED, "mode \"movement\" is not supported yet");
-  }
   if (const auto found = worlds_.find(world);
       found != worlds_.end() && found->second.subscriptions.size() >= kMaxSubscriptions) {
     return Refuse(STRIDEWIRE_LIMIT_REACHED, "too many subscriptions of one world");
@@ -291,6 +293,7 @@ stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64
     }
     world.subscriptions.erase(found);
     if (world.subscriptions.empty()) world.view->ClearPoses();
+    if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.evaluated.reset();
     UpdateFilter(world);
     Pump();
     return STRIDEWIRE_OK;
@@ -384,6 +387,7 @@ void Session::StartConnecting(double now_s) {
 void Session::OnConnected(double now_s) {
   if (state_ != State::kConnecting) return;
   state_ = State::kGreeting;
+  libraries_.OnConnectionLost();
   deadline_s_ = now_s + options_.connect_timeout_s;
   heard_s_ = now_s;
   reader_.emplace(protocol::Sender::kServer);
@@ -392,11 +396,11 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features = protocol::kFeatureResume | protocol::kFeatureEventReplay |
-                   protocol::kFeatureQuantised | protocol::kFeatureTerrain |
-                   protocol::kFeatureFootprints | protocol::kFeatureWalks |
-                   protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-                   protocol::kFeatureRefusals | protocol::kFeaturePlanting;
+  hello.features =
+      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
+      protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
+      protocol::kFeatureTakeovers | protocol::kFeatureLayers | protocol::kFeatureRefusals |
+      protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -525,11 +529,64 @@ void Session::Pump() {
                    protocol::JoinWorld{0, world.name, world.role}});
     }
     while (world.server_id != 0 && !world.unsent.empty() && MaySend()) {
+      const Readiness readiness = PrepareMovements(world, world.unsent.front());
+      if (readiness == Readiness::kWaits) break;
+      if (readiness == Readiness::kRefused) {
+        world.unsent.pop_front();
+        continue;
+      }
       Command command = std::move(world.unsent.front());
       world.unsent.pop_front();
       Send(std::move(command));
     }
   }
+  AskForLibraries();
+}
+
+Session::Readiness Session::PrepareMovements(World& world, const Command& command) {
+  const auto* observe = std::get_if<protocol::Observe>(&command.message);
+  if (observe == nullptr || observe->mode != protocol::PoseMode::kMovement ||
+      !world.subscriptions.contains(observe->subscription) || !Understands(command.message)) {
+    return Readiness::kReady;
+  }
+  auto library = libraries_.Want(world.view->library_hash());
+  if (!library) {
+    world.subscriptions.erase(observe->subscription);
+    UpdateFilter(world);
+    const ErrorCode code = library.error().code;
+    Answer(command,
+           code == ErrorCode::kUnsupported       ? STRIDEWIRE_UNSUPPORTED
+           : code == ErrorCode::kVersionMismatch ? STRIDEWIRE_VERSION_MISMATCH
+                                                 : STRIDEWIRE_MALFORMED,
+           library.error().text);
+    return Readiness::kRefused;
+  }
+  if (*library == nullptr) return Readiness::kWaits;
+  if (world.evaluated == nullptr) {
+    world.evaluated = std::make_unique<MovementView>(*library, 1.0 / tick_hz_,
+                                                     options_.max_pose_bytes / kReplicaBytes);
+  }
+  return Readiness::kReady;
+}
+
+void Session::AskForLibraries() {
+  if (state_ != State::kReady || (features_ & protocol::kFeatureMovementMode) == 0) return;
+  const auto may_ask = [&](const std::string& hash) {
+    return std::ranges::any_of(worlds_, [&](const auto& item) {
+      const World& world = item.second;
+      return world.server_id != 0 && world.view->library_hash() == hash;
+    });
+  };
+  if (const auto question = libraries_.TakeQuestion(may_ask)) {
+    const Status status = encoder_.Encode(*question, output_);
+    if (!status) last_text_ = Describe(status.error());
+  }
+}
+
+void Session::OnLibraryTask(const std::string& hash,
+                            Expected<std::shared_ptr<const MotionLibrary>> result) {
+  libraries_.OnTask(hash, std::move(result));
+  Pump();
 }
 
 bool Session::Understands(const CommandMessage& message) const {
@@ -541,6 +598,10 @@ bool Session::Understands(const CommandMessage& message) const {
   }
   if (std::holds_alternative<protocol::SetPlanting>(message)) {
     return (features_ & protocol::kFeaturePlanting) != 0;
+  }
+  if (const auto* observe = std::get_if<protocol::Observe>(&message)) {
+    return observe->mode != protocol::PoseMode::kMovement ||
+           (features_ & protocol::kFeatureMovementMode) != 0;
   }
   const auto* request = std::get_if<protocol::Request>(&message);
   if (request == nullptr) return true;
@@ -559,6 +620,11 @@ bool Session::Understands(const CommandMessage& message) const {
 
 void Session::Send(Command command) {
   if (!Understands(command.message)) {
+    if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
+      World& refused = worlds_.at(command.world);
+      refused.subscriptions.erase(observe->subscription);
+      UpdateFilter(refused);
+    }
     Answer(command, STRIDEWIRE_UNSUPPORTED, "this server does not know of it");
     return;
   }
@@ -709,6 +775,7 @@ void Session::StartAnew() {
     world.told_dropped_batches = 0;
     world.view->Clear();
     world.view->Break();
+    world.evaluated.reset();
     TakeTerrain(handle, std::nullopt);
 
     std::deque<Command> first;
@@ -898,6 +965,29 @@ void Session::Handle(const protocol::PoseBatch& message, double now_s) {
   if (Status status = world->view->Take(message, every_n_ticks, counts_); !status) {
     BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }
+}
+
+void Session::Handle(const protocol::Movements& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "movements before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  World* world = FindByServerId(message.world, handle);
+  if (world == nullptr || world->evaluated == nullptr) return;
+  clock_.AddSample(now_s, message.server_time_s);
+  const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
+  if (Status status = world->view->Take(message, *world->evaluated, every_n_ticks, counts_);
+      !status) {
+    BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
+  }
+}
+
+void Session::Handle(const protocol::LibraryPiece& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a library before the welcome", now_s);
+  }
+  libraries_.OnPiece(message);
+  Pump();
 }
 
 void Session::Handle(const protocol::Events& message, double now_s) {

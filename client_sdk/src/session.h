@@ -16,6 +16,7 @@
 #include "backoff.h"
 #include "clock_map.h"
 #include "event_queue.h"
+#include "library_fetch.h"
 #include "stridewire/client.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/frame_reader.h"
@@ -36,6 +37,7 @@ struct SessionOptions {
   double ping_interval_s = 1.0;
   double render_delay_s = 0.1;
   bool respawn = false;
+  std::string library_folder;  ///< Empty: libraries are fetched anew by every client.
   std::uint64_t seed = 1;
 };
 
@@ -130,6 +132,10 @@ class Session {
   [[nodiscard]] bool NeedsSocket() const;
   /// Grows with every connection, so that late bytes of an old one are told apart.
   [[nodiscard]] std::uint64_t connection_number() const { return connection_number_; }
+  /// Work on libraries for who holds no lock (Do), and what came of it.
+  [[nodiscard]] std::optional<LibraryTask> TakeLibraryTask() { return libraries_.TakeTask(); }
+  void OnLibraryTask(const std::string& hash,
+                     Expected<std::shared_ptr<const MotionLibrary>> result);
   /// Takes what is to be written, in place of `bytes`' content; false: nothing.
   [[nodiscard]] bool TakeOutput(std::vector<std::byte>& bytes);
   /// What TakeOutput gave has been written.
@@ -168,6 +174,7 @@ class Session {
     std::map<protocol::AvatarNumber, protocol::Placement> spawned;  ///< Ours, and where they are.
     std::uint64_t told_dropped_batches = 0;                         ///< By the last Lagging.
     std::unique_ptr<WorldView> view;
+    std::unique_ptr<MovementView> evaluated;  ///< While movements are observed.
     std::optional<protocol::TerrainInfo> terrain;
   };
 
@@ -189,6 +196,10 @@ class Session {
   void Pump();
   [[nodiscard]] bool MaySend() const;
   void Send(Command command);
+  /// Whether an Observe may go out; it waits for the library its movements are of, or ends here.
+  enum class Readiness : std::uint8_t { kReady, kWaits, kRefused };
+  Readiness PrepareMovements(World& world, const Command& command);
+  void AskForLibraries();
   /// Whether this server knows what it is asked.
   [[nodiscard]] bool Understands(const CommandMessage& message) const;
   void TakeTerrain(stridewire_world handle, const std::optional<protocol::TerrainInfo>& terrain);
@@ -207,6 +218,8 @@ class Session {
   void Handle(const protocol::ErrorNotice& message, double now_s);
   void Handle(const protocol::Pong& message, double now_s);
   void Handle(const protocol::WorldTerrain& message, double now_s);
+  void Handle(const protocol::Movements& message, double now_s);
+  void Handle(const protocol::LibraryPiece& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
   template <typename Message>
   void Handle(const Message& message, double now_s);  ///< What a server may not send.
@@ -234,6 +247,7 @@ class Session {
   EventQueue events_;
   ClockMap clock_;
   PoseBudget pose_budget_;
+  LibraryFetch libraries_;
 
   std::map<stridewire_world, World> worlds_;
   stridewire_world next_world_ = 1;

@@ -1,5 +1,6 @@
 #include "world_view.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace stridewire::client {
@@ -75,47 +76,87 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
         !status) {
       return status;
     }
-    auto track = tracks_.find(avatar);
-    if (track == tracks_.end()) {
-      const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
-      if (budget_.used_bytes + bytes > budget_.limit_bytes) {
-        ++counts.refused;
-        continue;
-      }
-      budget_.used_bytes += bytes;
-      track = tracks_.emplace(avatar, Track{}).first;
-      track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
-    }
-    Track& t = track->second;
-    const PoseStamp stamp{
-        .tick = info.tick,
-        .time_s = info.server_time_s,
-        .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0 || t.epoch != epoch_,
-        .standing = (batch.flags[i] & protocol::kPoseStanding) != 0};
-    if (t.history->Push(stamp, root_position_m, scratch_)) {
-      ++counts.poses;
-      t.epoch = epoch_;
-      t.gone = false;
-    } else if (info.tick != t.seen_tick) {  // Equal ticks are a second subscription's.
+    Track* track = TrackOf(avatar);
+    if (track == nullptr) {
       ++counts.refused;
+      continue;
     }
-    t.shard = info.shard;
-    t.mode = info.mode;
-    t.seen_tick = info.tick;
+    const PoseStamp stamp{.tick = info.tick,
+                          .time_s = info.server_time_s,
+                          .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0,
+                          .standing = (batch.flags[i] & protocol::kPoseStanding) != 0};
+    Push(*track, {info.shard, info.mode}, stamp, root_position_m, scratch_, counts);
   }
   if (shard.parts_seen >= info.parts) Sweep(info);
   return {};
 }
 
-void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
+WorldView::Track* WorldView::TrackOf(protocol::AvatarNumber avatar) {
+  auto track = tracks_.find(avatar);
+  if (track == tracks_.end()) {
+    const std::size_t joints = skeleton_.joints.size();
+    const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
+    if (budget_.used_bytes + bytes > budget_.limit_bytes) return nullptr;
+    budget_.used_bytes += bytes;
+    track = tracks_.emplace(avatar, Track{}).first;
+    track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
+  }
+  return &track->second;
+}
+
+void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
+                     std::span<const Quat> rotations, Counts& counts) {
+  stamp.discontinuity |= track.epoch != epoch_;
+  if (track.history->Push(stamp, root_position_m, rotations)) {
+    ++counts.poses;
+    track.epoch = epoch_;
+    track.gone = false;
+  } else if (stamp.tick != track.seen_tick) {  // Equal ticks are a second subscription's.
+    ++counts.refused;
+  }
+  track.shard = lane.first;
+  track.mode = lane.second;
+  track.seen_tick = stamp.tick;
+}
+
+void WorldView::Show(protocol::AvatarNumber avatar, std::uint16_t shard, const PoseStamp& stamp,
+                     ConstPoseSpan pose) {
+  if (stamp.tick % shown_every_ != 0 || !Wants(avatar)) return;
+  if (Track* track = TrackOf(avatar); track != nullptr) {
+    Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose.root_position_m,
+         pose.rotations, *shown_counts_);
+  } else {
+    ++shown_counts_->refused;
+  }
+}
+
+Status WorldView::Take(const protocol::Movements& movements, MovementView& evaluated,
+                       std::uint64_t every_n_ticks, Counts& counts) {
+  if (evaluated.library().skeleton().joints.size() != skeleton_.joints.size()) {
+    return Fail(ErrorCode::kShapeMismatch, "the library has another number of joints than told");
+  }
+  ++counts.batches;
+  shown_every_ = std::max<std::uint64_t>(every_n_ticks, 1);
+  shown_counts_ = &counts;
+  const Status status = evaluated.Take(movements, *this);
+  Forget(movements.server_time_s);
+  return status;
+}
+
+void WorldView::Forget(double time_s) {
   for (auto track = tracks_.begin(); track != tracks_.end();) {
-    Track& t = track->second;
-    if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
-    const bool forget =
-        t.gone && t.history->size() > 0 &&
-        info.server_time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
+    const Track& t = track->second;
+    const bool forget = t.gone && t.history->size() > 0 &&
+                        time_s - t.history->stamp(t.history->size() - 1).time_s > kKeepGone_s;
     track = forget ? Erase(track) : std::next(track);
   }
+}
+
+void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
+  for (auto& [avatar, t] : tracks_) {
+    if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
+  }
+  Forget(info.server_time_s);
 }
 
 void WorldView::Remove(protocol::AvatarNumber avatar) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "movement_view.h"
 #include "pose_history.h"
 #include "stridewire/protocol/messages.h"
 
@@ -21,7 +22,7 @@ struct PoseBudget {
 };
 
 /// What is seen of a world: its figure, and the poses of its avatars.
-class WorldView {
+class WorldView : public PoseScreen {
  public:
   /// Poses of an avatar that is gone can still be sampled for this long.
   static constexpr double kKeepGone_s = 2.0;
@@ -37,7 +38,7 @@ class WorldView {
 
   WorldView(std::size_t pose_history, PoseBudget& budget)
       : pose_history_(pose_history), budget_(budget) {}
-  ~WorldView() { Clear(); }
+  ~WorldView() override { Clear(); }
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
@@ -62,6 +63,10 @@ class WorldView {
   /// Takes in one batch. `every_n_ticks` is the rate asked for, to count gaps. kMalformed and others:
   /// a pose that is none, or another figure than announced; what came before it is kept.
   Status Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
+
+  /// Poses that are evaluated here, of every `every_n_ticks`th tick: Show and Gone until `tick` is over.
+  Status Take(const protocol::Movements& movements, MovementView& evaluated,
+              std::uint64_t every_n_ticks, Counts& counts);
 
   /// The server said that the avatar is gone.
   void Remove(protocol::AvatarNumber avatar);
@@ -88,10 +93,24 @@ class WorldView {
     std::uint64_t epoch = 0;
     protocol::PoseMode mode = protocol::PoseMode::kFull;
   };
+  using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
   using Tracks = std::map<protocol::AvatarNumber, Track>;
+
+  void Show(protocol::AvatarNumber avatar, std::uint16_t shard, const PoseStamp& stamp,
+            ConstPoseSpan pose) override;
+  void Gone(protocol::AvatarNumber avatar) override { Remove(avatar); }
+  [[nodiscard]] bool Wants(protocol::AvatarNumber avatar) const override {
+    return !filter_ || filter_->contains(avatar);
+  }
+  /// The track to add a pose to; null: there is no memory for it.
+  Track* TrackOf(protocol::AvatarNumber avatar);
+  void Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
+            std::span<const Quat> rotations, Counts& counts);
 
   /// After the last part of a shard's batch: who was not in it, but in one before, is gone.
   void Sweep(const protocol::PoseBatchInfo& info);
+  /// Those who are gone for long.
+  void Forget(double time_s);
   Tracks::iterator Erase(Tracks::iterator track);
 
   std::size_t pose_history_;
@@ -102,9 +121,11 @@ class WorldView {
   std::vector<std::string> layers_;
   std::optional<std::set<protocol::AvatarNumber>> filter_;
   Tracks tracks_;
-  std::map<std::pair<std::uint16_t, protocol::PoseMode>, Shard> shards_;
+  std::map<Lane, Shard> shards_;
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
+  std::uint64_t shown_every_ = 1;   // while movements are taken in
+  Counts* shown_counts_ = nullptr;  // the same
 };
 
 }  // namespace stridewire::client

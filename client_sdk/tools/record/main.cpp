@@ -86,6 +86,8 @@ int Run(int argc, char** argv) {
   app.add_option("--out", out, "The BVH file to write")->required();
   app.add_option("--mode", mode, "How poses travel: full, quantised or movement")
       ->capture_default_str();
+  app.add_option("--library-folder", options.library_folder,
+                 "Where the libraries that --mode movement fetches are kept");
   app.add_option("--timeout-s", options.timeout_s,
                  "Longest wait for the server, the avatar and each pose (0.1 to 600)")
       ->capture_default_str();
@@ -120,7 +122,7 @@ int Run(int argc, char** argv) {
   } else if (mode == "quantised") {
     options.mode = STRIDEWIRE_QUANTISED;
   } else if (mode == "movement") {
-    return Complain("--mode: movement is not supported yet", kExitBadUsage);
+    options.mode = STRIDEWIRE_MOVEMENT;
   } else {
     return Complain("--mode: \"" + mode + "\" is not full, quantised or movement", kExitBadUsage);
   }

@@ -221,6 +221,8 @@ Expected<Recording> Record(const Options& options, const std::function<void(doub
   client::Options client_options;
   client_options.client_name = "stridewire-record";
   client_options.auth_token = options.token.empty() ? nullptr : options.token.c_str();
+  client_options.library_folder =
+      options.library_folder.empty() ? nullptr : options.library_folder.c_str();
   client_options.pose_history = 2048;
   client_options.connect_timeout_s = options.timeout_s;
   stridewire_status status = STRIDEWIRE_OK;

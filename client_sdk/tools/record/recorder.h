@@ -22,6 +22,7 @@ struct Options {
   stridewire_pose_mode mode = STRIDEWIRE_FULL;
   double timeout_s = 10.0;  ///< Longest wait for the connection, the avatar, and the next pose.
   std::string token;
+  std::string library_folder;  ///< Empty: none
 };
 
 /// Frames that were not received.

@@ -424,12 +424,12 @@ TEST(Record, AnswersBadUsageWithTwoAndASentence) {
   expect(9, folder.File("no/such/a.bvh"), "--out");
   expect(9, folder.path().string(), "--out");
   expect(11, "0", "--timeout-s");
-  for (const char* mode : {"movement", "wrong"}) {
+  {
     auto arguments = RecordArguments("127.0.0.1:1", out);
-    arguments.insert(arguments.end(), {"--mode", mode});
+    arguments.insert(arguments.end(), {"--mode", "wrong"});
     const auto result = RecordTool(arguments);
     EXPECT_EQ(result.exit_code, 2);
-    EXPECT_THAT(result.err, HasSubstr(mode));
+    EXPECT_THAT(result.err, HasSubstr("wrong"));
   }
   EXPECT_EQ(RecordTool({}).exit_code, 2);
   EXPECT_EQ(RecordTool({"--nonsense"}).exit_code, 2);

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -174,6 +175,78 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
               truth->clip.frame_count(), largest_rad * kDegrees, static_cast<double>(largest_m));
   EXPECT_LE(largest_rad * kDegrees, 0.05);
   EXPECT_LE(largest_m, 0.001f);
+}
+
+// Poses evaluated by the recorder are those the server sends another; the library comes over the connection first, and
+// out of its folder the second time.
+TEST(RecordMovements, AreTheFullPosesBitByBit) {
+  test::ChildProcess server(STRIDEWIRE_STRIDEWIRED,
+                            {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards", "2",
+                             "--max-catch-up-ticks", "1000"});
+  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
+  const std::string before_port = "listen=127.0.0.1:";
+  const std::size_t at = ready.find(before_port);
+  ASSERT_NE(at, std::string::npos) << ready;
+  const auto port = static_cast<std::uint16_t>(std::stoi(ready.substr(at + before_port.size())));
+  RawClient game("127.0.0.1", port);
+  ASSERT_TRUE(game.SayHello());
+  const auto world = game.Join("w");
+  ASSERT_TRUE(world);
+  ASSERT_TRUE(game.Spawn(world->world, {{.avatar = 1}}));
+  const test::ScratchFolder folder;
+  const std::string libraries = folder.File("libraries");
+  const std::string library = libraries + "/" + world->library_hash + ".swl";
+  const auto start = [&](const std::string& mode) {
+    return test::ChildProcess(
+        STRIDEWIRE_RECORD, {"--connect", "127.0.0.1:" + std::to_string(port), "--world", "w",
+                            "--avatar", "1", "--seconds", "4", "--mode", mode, "--library-folder",
+                            libraries, "--out", folder.File(mode + ".bvh"), "--json"});
+  };
+  for (int round = 0; round < 3; ++round) {
+    SCOPED_TRACE(round);
+    if (round == 2) std::ofstream(library, std::ios::binary | std::ios::in).write("damage", 6);
+    test::ChildProcess full = start("full");
+    test::ChildProcess movement = start("movement");
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    ASSERT_TRUE(game.Request(world->world, OnTheWire(1)));
+    const auto told = nlohmann::json::parse(movement.ReadLine(60.0).value_or("{}"), nullptr, false);
+    const auto sent = nlohmann::json::parse(full.ReadLine(60.0).value_or("{}"), nullptr, false);
+    ASSERT_EQ(movement.Wait(), 0);
+    ASSERT_EQ(full.Wait(), 0);
+    EXPECT_TRUE(OpenLibrary(library).has_value());
+    const auto a = ReadBvh(folder.File("full.bvh"), {.unit_m = 1.0, .up = BvhAxis::kPlusY});
+    const auto b = ReadBvh(folder.File("movement.bvh"), {.unit_m = 1.0, .up = BvhAxis::kPlusY});
+    ASSERT_TRUE(a && b);
+    const auto first_a = sent["first_tick"].get<std::int64_t>();
+    const auto first_b = told["first_tick"].get<std::int64_t>();
+    const auto is_there = [](const nlohmann::json& report, int frame) {
+      return std::ranges::none_of(report["gaps"], [&](const auto& gap) {
+        const int begin = gap[0];
+        return frame >= begin && frame < begin + gap[1].template get<int>();
+      });
+    };
+    int compared = 0;
+    double largest_rad = 0.0;
+    float largest_m = 0.0f;
+    for (int f = 0; f < a->clip.frame_count(); ++f) {
+      const auto g = static_cast<int>(first_a + f - first_b);
+      if (g < 0 || g >= b->clip.frame_count() || !is_there(sent, f) || !is_there(told, g)) continue;
+      const ConstPoseSpan x = a->clip.frame(f);
+      const ConstPoseSpan y = b->clip.frame(g);
+      largest_rad = std::max(largest_rad, LargestJointAngle(x, y));
+      largest_m = std::max(largest_m, glm::length(x.root_position_m - y.root_position_m));
+      ++compared;
+    }
+    std::printf("%d frames compared; %d KB sent as poses, %d KB as movements\n", compared,
+                sent["bytes_received"].get<int>() / 1000, told["bytes_received"].get<int>() / 1000);
+    EXPECT_GT(compared, 100);
+    // The same bytes are written the same way, but for whole turns of the angles before them.
+    EXPECT_LE(largest_rad, 1e-6);
+    EXPECT_EQ(largest_m, 0.0f);
+    // What is fetched is 4 MB.
+    const auto bytes = told["bytes_received"].get<int>();
+    EXPECT_EQ(bytes > 1'000'000, round != 1) << bytes;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Shards, RecordTest, testing::Values(1, 4));

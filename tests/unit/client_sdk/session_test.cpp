@@ -534,6 +534,64 @@ TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
   EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
 }
 
+TEST_F(SessionTest, ObservesMovementsOnceItHasTheLibrary) {
+  const stridewire_world world = Joined();
+  (void)Events();
+  std::uint32_t subscription = 0;
+  // The toy world's library has no hash that a library may have.
+  EXPECT_EQ(session_->Observe(world, {.mode = protocol::PoseMode::kMovement, .avatars = {}},
+                              subscription, command_),
+            STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  auto events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].command, command_);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
+
+  protocol::WorldInfo info = toy::WorldInfo(0, 5, "plaza");
+  info.library_hash = std::string(32, 'a');
+  Tell(info);
+  EXPECT_EQ(session_->Observe(world, {.mode = protocol::PoseMode::kMovement, .avatars = {}},
+                              subscription, command_),
+            STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  auto task = session_->TakeLibraryTask();
+  ASSERT_TRUE(task);
+  EXPECT_EQ(task->hash, info.library_hash);
+  session_->OnLibraryTask(task->hash, Do(*task));
+  auto sent = Sent();
+  ASSERT_EQ(sent.size(), 1u);
+  const auto question = std::get<protocol::FetchLibrary>(sent[0]);
+  EXPECT_EQ(question.hash, info.library_hash);
+  EXPECT_EQ(question.offset, 0u);
+
+  // What is no library ends the Observe; movements that come all the same are nobody's.
+  Tell(protocol::LibraryPiece{.nonce = question.nonce,
+                              .hash = question.hash,
+                              .total_bytes = 100,
+                              .bytes = std::vector<std::byte>(100)});
+  task = session_->TakeLibraryTask();
+  ASSERT_TRUE(task);
+  EXPECT_TRUE(Events().empty());
+  session_->OnLibraryTask(task->hash, Do(*task));
+  EXPECT_TRUE(Sent().empty());
+  events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].command, command_);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_MALFORMED);
+  Tell(protocol::Movements{.world = 5, .step = 1});
+  EXPECT_EQ(session_->state(), State::kReady);
+
+  const stridewire_world old = JoinedWithout(protocol::kFeatureMovementMode);
+  EXPECT_EQ(session_->Observe(old, {.mode = protocol::PoseMode::kMovement, .avatars = {}},
+                              subscription, command_),
+            STRIDEWIRE_OK);
+  EXPECT_TRUE(Sent().empty());
+  events = Events();
+  ASSERT_EQ(events.size(), 1u);
+  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
+}
+
 TEST_F(SessionTest, CommandsAreBounded) {
   SessionOptions options;
   options.max_commands = 10;
@@ -584,9 +642,6 @@ TEST_F(SessionTest, BadArgumentsAreToldAtOnceAndNamed) {
   EXPECT_NE(session_->Spawn(world, {}, command_), STRIDEWIRE_OK);
   EXPECT_EQ(session_->Spawn(77, SpawnOf({1}), command_), STRIDEWIRE_NO_SUCH_WORLD);
   std::uint32_t subscription = 0;
-  protocol::Observe movement;
-  movement.mode = protocol::PoseMode::kMovement;
-  EXPECT_EQ(session_->Observe(world, movement, subscription, command_), STRIDEWIRE_UNSUPPORTED);
   protocol::Observe never;
   never.every_n_ticks = 0;
   EXPECT_EQ(session_->Observe(world, never, subscription, command_), STRIDEWIRE_OUT_OF_RANGE);

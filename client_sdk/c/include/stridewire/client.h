@@ -141,6 +141,9 @@ typedef struct stridewire_client_options {
   const char* auth_token;    ///< NULL or at most 4096 bytes.
   uint8_t respawn;  ///< 1: after a lost session spawn the avatars this client had spawned again, at
                     ///< the last base frame it heard of. 0.
+  const char*
+      library_folder;  ///< Where libraries fetched for STRIDEWIRE_MOVEMENT are kept for the next
+                       ///< time, made if it is not there; NULL: nowhere. At most 4096 bytes.
 } stridewire_client_options;
 
 /// Writes the defaults. `struct_bytes` is sizeof(stridewire_client_options).
@@ -328,7 +331,11 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,       ///< float32: as the server has them.
   STRIDEWIRE_QUANTISED = 1,  ///< 48 bits a joint: off by at most 0.00016 rad and 0.03 mm.
-  STRIDEWIRE_MOVEMENT = 2,   ///< Reserved; answered with UNSUPPORTED.
+  /// What avatars begin instead of their poses, which are evaluated here: those of STRIDEWIRE_FULL, bit by
+  /// bit, at some 150 bytes a step. The world's library is fetched first, if it is not in library_folder; the Observe and what
+  /// is asked of that world behind it wait meanwhile. UNSUPPORTED, MALFORMED: the server has not this mode, or no such library.
+  /// An avatar takes a microsecond a tick and up to 16 KiB, at most max_pose_bytes in all; others are left out.
+  STRIDEWIRE_MOVEMENT = 2,
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
 
