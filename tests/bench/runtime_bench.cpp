@@ -180,10 +180,10 @@ class Crowd {
   std::vector<Avatar*> all_;
 };
 
-void AdvanceCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
-  Crowd crowd(library, kCrowd, {.foot_planting = plants_feet});
+void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {
+  Crowd crowd(library, count, {.foot_planting = plants_feet});
   for (auto _ : state) crowd.Advance();
-  state.SetItemsProcessed(state.iterations() * kCrowd);
+  state.SetItemsProcessed(state.iterations() * count);
 }
 
 /// Walkers between two steps, at places all along their ways: what deciding on the next one costs.
@@ -436,8 +436,10 @@ void RegisterAll(const std::string& path, const Library& library) {
     Register(name + "/synthesize_step/" + kind, SynthesizeStep, library, i);
     Register(name + "/evaluate_pose/" + kind, EvaluatePose, library, i);
   }
-  Register(name + "/advance_avatar", AdvanceCrowd, library, true);
-  Register(name + "/advance_avatar_unplanted", AdvanceCrowd, library, false);
+  for (const int count : {1000, 10000}) {
+    Register(name + "/advance_crowd/" + std::to_string(count), AdvanceCrowd, library, count, true);
+  }
+  Register(name + "/advance_crowd_unplanted/1000", AdvanceCrowd, library, kCrowd, false);
   RegisterCrowd(name, library);
   Register(name + "/plan_walk_step/level", PlanWalkSteps, library, false);
   Register(name + "/plan_walk_step/slabs", PlanWalkSteps, library, true);
