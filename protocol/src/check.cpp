@@ -331,6 +331,33 @@ Status Check(const CancelQueue& m) {
   return found.Result();
 }
 
+namespace {
+
+void CheckRegion(Findings& found, const Observe& m) {
+  const Region& region = *m.region;
+  found.That(m.avatars.empty(), ErrorCode::kMalformed, "a region has no list beside it",
+             "Observe.avatars");
+  found.Finite(region.centre_m.x, "Region.centre_m");
+  found.Finite(region.centre_m.z, "Region.centre_m");
+  found.NotNegative(region.radius_m, "Region.radius_m");
+  found.That(region.radius_m != 0.0, ErrorCode::kOutOfRange, "nothing is in it", "Region.radius_m");
+  if (region.leave_m) found.NotNegative(*region.leave_m, "Region.leave_m");
+  found.Count(region.rings.size(), 0, kMaxRateRings, "Region.rings");
+  double before_m = 0.0;
+  for (std::size_t i = 0; i < region.rings.size(); ++i) {
+    const RateRing& ring = region.rings[i];
+    const auto index = static_cast<std::int64_t>(i);
+    found.Finite(ring.to_m, "RateRing.to_m", index);
+    found.That(ring.to_m > before_m, ErrorCode::kOutOfRange, "not beyond the ring before it",
+               "RateRing.to_m", index);
+    found.That(ring.every_n_ticks >= 1 && ring.every_n_ticks <= kMaxEveryNTicks,
+               ErrorCode::kOutOfRange, "not 1 to 3600 ticks", "RateRing.every_n_ticks", index);
+    before_m = ring.to_m;
+  }
+}
+
+}  // namespace
+
 Status Check(const Observe& m) {
   Findings found;
   found.Id(m.seq, "Observe.seq");
@@ -340,6 +367,9 @@ Status Check(const Observe& m) {
   found.Avatars(m.avatars, 0, "Observe.avatars");
   found.That(m.every_n_ticks >= 1 && m.every_n_ticks <= kMaxEveryNTicks, ErrorCode::kOutOfRange,
              "not 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
+  found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed,
+             "only a region takes another one's place", "Observe.replace");
+  if (m.region) CheckRegion(found, m);
   return found.Result();
 }
 
@@ -441,7 +471,7 @@ Status Check(const Events& m) {
   for (std::size_t i = 0; i < m.events.size(); ++i) {
     const Event& event = m.events[i];
     const auto index = static_cast<std::int64_t>(i);
-    found.Known(event.type, EventType::kRemoved, "Event.type", index);
+    found.Known(event.type, EventType::kLeft, "Event.type", index);
     found.Id(event.avatar, "Event.avatar", index);
     found.Known(event.kind, MovementKind::kStand, "Event.kind", index);
     found.That(event.group >= -1, ErrorCode::kOutOfRange, "group is below -1", "Event.group",

@@ -207,6 +207,18 @@ void Unpack(Unpacker& u, const wire::Observe& w, Observe& m) {
   u.Avatars(w.avatars(), "Observe.avatars", m.avatars);
   m.every_n_ticks = w.every_n_ticks();
   m.with_events = w.with_events();
+  m.replace = w.replace();
+  if (const wire::Region* from = w.region()) {
+    Region& region = m.region.emplace();
+    if (const auto* centre = from->centre_m()) region.centre_m = {centre->x(), centre->z()};
+    region.radius_m = from->radius_m();
+    if (const auto leave_m = from->leave_m()) region.leave_m = *leave_m;
+    region.rings.resize(u.Count(from->rings(), kMaxRateRings, "Region.rings"));
+    for (std::size_t i = 0; i < region.rings.size(); ++i) {
+      const wire::RateRing* ring = from->rings()->Get(static_cast<flatbuffers::uoffset_t>(i));
+      region.rings[i] = {ring->to_m(), ring->every_n_ticks()};
+    }
+  }
 }
 
 void Unpack(Unpacker&, const wire::StopObserving& w, StopObserving& m) {
@@ -316,7 +328,8 @@ void Unpack(Unpacker&, const wire::PoseBatch& w, PoseBatch& m) {
             w.tick(),
             w.server_time_s(),
             static_cast<PoseMode>(w.mode()),
-            w.joint_count()};
+            w.joint_count(),
+            w.partial()};
   if (const auto* avatars = w.avatars()) m.avatars = {avatars->data(), avatars->size()};
   if (const auto* flags = w.flags()) m.flags = {flags->data(), flags->size()};
   if (const auto* poses = w.poses()) {

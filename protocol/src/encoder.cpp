@@ -116,8 +116,22 @@ Offset<wire::CancelQueue> Build(FlatBufferBuilder& b, const CancelQueue& m) {
 Offset<wire::Observe> Build(FlatBufferBuilder& b, const Observe& m) {
   const auto avatars =
       m.avatars.empty() ? Offset<flatbuffers::Vector<std::uint32_t>>() : b.CreateVector(m.avatars);
+  Offset<wire::Region> region;
+  if (m.region) {
+    std::vector<wire::RateRing> rings;
+    for (const RateRing& ring : m.region->rings) rings.emplace_back(ring.to_m, ring.every_n_ticks);
+    const wire::GroundPoint centre(m.region->centre_m.x, m.region->centre_m.z);
+    const auto rings_offset = rings.empty() ? Offset<flatbuffers::Vector<const wire::RateRing*>>()
+                                            : b.CreateVectorOfStructs(rings);
+    wire::RegionBuilder builder(b);
+    builder.add_centre_m(&centre);
+    builder.add_radius_m(m.region->radius_m);
+    if (m.region->leave_m) builder.add_leave_m(*m.region->leave_m);
+    builder.add_rings(rings_offset);
+    region = builder.Finish();
+  }
   return wire::CreateObserve(b, m.seq, m.world, m.subscription, static_cast<wire::PoseMode>(m.mode),
-                             avatars, m.every_n_ticks, m.with_events);
+                             avatars, m.every_n_ticks, m.with_events, region, m.replace);
 }
 
 Offset<wire::StopObserving> Build(FlatBufferBuilder& b, const StopObserving& m) {

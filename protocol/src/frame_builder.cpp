@@ -27,7 +27,7 @@ flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
     flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> poses) {
   return wire::CreatePoseBatch(builder, info.world, info.shard, info.part, info.parts, info.tick,
                                info.server_time_s, static_cast<wire::PoseMode>(info.mode),
-                               info.joint_count, avatars, flags, poses);
+                               info.joint_count, avatars, flags, poses, info.is_partial);
 }
 
 flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(flatbuffers::FlatBufferBuilder& builder,

@@ -75,11 +75,11 @@ std::size_t PoseBatchComposer::Fitting(const PoseRows& rows,
 }
 
 Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uint32_t> picked,
-                                  std::size_t part, std::size_t parts,
-                                  std::vector<std::byte>& frame) {
+                                  const Slice& slice, std::vector<std::byte>& frame) {
   PoseBatchInfo info = rows.info();
-  info.part = static_cast<std::uint16_t>(part);
-  info.parts = static_cast<std::uint16_t>(parts);
+  info.part = static_cast<std::uint16_t>(slice.part);
+  info.parts = static_cast<std::uint16_t>(slice.parts);
+  info.is_partial = slice.is_partial;
   if (const Status status = Check(PoseBatch{info, {}, {}, {}}); !status) return status;
   std::size_t count = 0;
   std::size_t length = 0;

@@ -110,9 +110,22 @@ Json Fields(const CancelQueue& m) {
 }
 
 Json Fields(const Observe& m) {
-  return {{"seq", Wide(m.seq)},          {"world", m.world},     {"subscription", m.subscription},
-          {"mode", Number(m.mode)},      {"avatars", m.avatars}, {"every_n_ticks", m.every_n_ticks},
-          {"with_events", m.with_events}};
+  Json json = {
+      {"seq", Wide(m.seq)},          {"world", m.world},     {"subscription", m.subscription},
+      {"mode", Number(m.mode)},      {"avatars", m.avatars}, {"every_n_ticks", m.every_n_ticks},
+      {"with_events", m.with_events}};
+  if (!m.region) return json;
+  const Region& region = *m.region;
+  Json rings = Json::array();
+  for (const RateRing& ring : region.rings) {
+    rings.push_back({{"to_m", ring.to_m}, {"every_n_ticks", ring.every_n_ticks}});
+  }
+  json["region"] = {{"centre_m", {{"x", region.centre_m.x}, {"z", region.centre_m.z}}},
+                    {"radius_m", region.radius_m},
+                    {"leave_m", region.leave_m ? Json(*region.leave_m) : Json(nullptr)},
+                    {"rings", rings}};
+  json["replace"] = m.replace;
+  return json;
 }
 
 Json Fields(const StopObserving& m) {
@@ -210,15 +223,17 @@ Json Fields(const PoseBatch& m) {
                      {"root_position_m", Vector(root)},
                      {"rotations", quats}});
   }
-  return {{"world", m.info.world},
-          {"shard", m.info.shard},
-          {"part", m.info.part},
-          {"parts", m.info.parts},
-          {"tick", Wide(m.info.tick)},
-          {"server_time_s", m.info.server_time_s},
-          {"mode", Number(m.info.mode)},
-          {"joint_count", m.info.joint_count},
-          {"poses", poses}};
+  Json json = {{"world", m.info.world},
+               {"shard", m.info.shard},
+               {"part", m.info.part},
+               {"parts", m.info.parts},
+               {"tick", Wide(m.info.tick)},
+               {"server_time_s", m.info.server_time_s},
+               {"mode", Number(m.info.mode)},
+               {"joint_count", m.info.joint_count},
+               {"poses", poses}};
+  if (m.info.is_partial) json["partial"] = true;
+  return json;
 }
 
 Json Parameters(const ParameterSet& set) {

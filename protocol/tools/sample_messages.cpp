@@ -110,7 +110,9 @@ std::vector<Event> EveryEvent() {
         event.reason = "the library has no jump";
         break;
       case EventType::kAccepted:
-      case EventType::kRemoved: break;
+      case EventType::kRemoved:
+      case EventType::kEntered:
+      case EventType::kLeft: break;
     }
     events.push_back(event);
   }
@@ -154,6 +156,15 @@ std::vector<SampleMessage> SampleMessages() {
   add("cancel_queue", CancelQueue{5, 3, {41}});
   add("observe_all", Observe{6, 3, 1, PoseMode::kQuantised, {}, 1, true});
   add("observe_some", Observe{7, 3, 2, PoseMode::kFull, {41, 42}, 6, false});
+  {
+    Observe region{19, 3, 4, PoseMode::kQuantised, {}, 12, false};
+    region.region = Region{{-12.5, 40.0}, 30.0, 4.0, {{8.0, 1}, {20.0, 3}}};
+    add("observe_region", region);
+    region.seq = 20;
+    region.region = Region{{-11.75, 40.0}, 30.0, std::nullopt, {}};
+    region.replace = true;
+    add("observe_region_moved", region);
+  }
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});
   add("inspect_avatar", InspectAvatar{0x0123456789abcdefu, 3, 41});
@@ -174,7 +185,17 @@ std::vector<SampleMessage> SampleMessages() {
   add("pose_batch_full", full.view());
   add("pose_batch_quantised", quantised.view());
   add("pose_batch_empty", nobody.view());
+  PoseBatch partial = quantised.view();
+  partial.info.is_partial = true;
+  add("pose_batch_partial", partial);
   add("events", Events{3, 513, 6010, EveryEvent()});
+  {
+    Event entered{.type = EventType::kEntered, .avatar = 41, .tick = 123'456, .time_s = 2057.6};
+    Event left = entered;
+    left.type = EventType::kLeft;
+    left.avatar = 42;
+    add("events_regions", Events{3, 514, 123'456, {entered, left}});
+  }
   add("lagging", Lagging{3, 1200, 4});
   add("error", ErrorNotice{StatusCode::kBadSequence, "seq 12 leaves a gap after 9", true, 12});
   add("pong", Pong{0x0123456789abcdefu, 12.5, 2057.625, 123'457});

@@ -383,7 +383,7 @@ void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode
   std::size_t turn = 0;
   for (auto _ : state) {
     std::vector<std::byte> frame;
-    if (status) status = composer.Compose(rows, picked[turn++ % picked.size()], 0, 1, frame);
+    if (status) status = composer.Compose(rows, picked[turn++ % picked.size()], {}, frame);
     if (!status) return state.SkipWithError(status.error().text);
     benchmark::DoNotOptimize(frame.data());
   }

@@ -19,7 +19,7 @@ export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
 export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' | 'idle' |
-    'rejected' | 'spawned' | 'removed';
+    'rejected' | 'spawned' | 'removed' | 'entered' | 'left';
 export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
     'length' | 'height';
 /** `waiting`: for the next attempt; `greeting`: connected, not welcomed yet; `closed`: refused for
@@ -232,6 +232,20 @@ export interface CurrentMovement {
   readonly sites: Float32Array;
   /** Of feet that are not there yet; none while feet are not planted. */
   readonly landings: readonly Landing[];
+}
+
+/** A circle on the ground; who comes within its radius enters. */
+export interface Region {
+  /** Its centre. */
+  x: number;
+  z: number;
+  /** Above 0. */
+  radiusM: number;
+  /** Who is inside leaves when further than radius and this; absent: the server chooses. */
+  leaveM?: number;
+  /** Within `toM` of the centre poses come every so many ticks, beyond the last as the observation has it. At
+   * most 4, growing. */
+  rings?: readonly {toM: number; everyNTicks: number}[];
 }
 
 export interface Observation {

@@ -182,6 +182,8 @@ std::vector<ConfigKey> MakeKeys() {
            &Config::run_time_correction),
       Flag("foot_planting", "Keep feet still where they land, on the ground of the world",
            &Config::foot_planting),
+      Number("interest_cell_m", "Cells of the grid that regions observed are looked up in",
+             &Config::interest_cell_m, 1.0, 1000.0),
       Flag("allow_insecure", "Listen beyond this machine without tokens and TLS",
            &Config::allow_insecure),
       Flag("open_worlds", "Worlds the file does not name come into being when joined",

@@ -47,6 +47,7 @@ struct Config {
   int max_catch_up_ticks = 10;
   bool run_time_correction = true;  ///< Movements start with corrected parameters.
   bool foot_planting = true;        ///< Feet stand still where they land.
+  double interest_cell_m = 8.0;     ///< Of the grid that regions observed are looked up in.
   bool allow_insecure = false;
   bool open_worlds = true;  ///< Worlds the file does not name come into being when joined.
   bool persistent = false;  ///< Of worlds the file does not name.

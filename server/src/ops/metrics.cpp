@@ -104,6 +104,8 @@ std::string Metrics::Text() {
   gauge("stridewire_avatars", "Avatars that live.",
         static_cast<double>(Sum(&ThreadMetrics::avatars)));
   gauge("stridewire_worlds", "Worlds that exist.", static_cast<double>(worlds_.value()));
+  gauge("stridewire_regions", "Regions that sessions observe.",
+        static_cast<double>(Sum(&ThreadMetrics::regions)));
   const auto attached = static_cast<double>(Sum(&ThreadMetrics::sessions_attached));
   const auto detached = static_cast<double>(Sum(&ThreadMetrics::sessions_detached));
   gauge("stridewire_sessions", "Sessions, connected or waiting for their client.",
@@ -143,7 +145,7 @@ std::string Metrics::Text() {
   counter("stridewire_pose_errors_total", "Poses that could not be encoded.",
           &ThreadMetrics::pose_errors);
   counter("stridewire_batches_composed_total",
-          "Pose batches made of encoded poses for sessions that name avatars.",
+          "Pose batches made of encoded poses for sessions that name avatars or observe a region.",
           &ThreadMetrics::batches_composed);
   counter("stridewire_batches_sent_total", "Pose batches handed to observers' sockets.",
           &ThreadMetrics::batches_sent);

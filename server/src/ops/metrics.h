@@ -48,6 +48,7 @@ class TimeHistogram {
 /// What one thread (a shard, or the one that accepts connections) counts. It alone writes.
 struct ThreadMetrics {
   Count avatars;
+  Count regions;  ///< That sessions observe.
   Count sessions_attached;
   Count sessions_websocket;  ///< Of the attached ones.
   Count sessions_detached;

@@ -707,6 +707,19 @@ void Session::Execute(protocol::Observe&& command) {
     Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
     return;
   }
+  if (command.region && (features_ & protocol::kFeatureRegions) == 0) {
+    Answer(command.seq, StatusCode::kUnsupported,
+           "the feature 'regions' was not agreed on in the handshake");
+    return;
+  }
+  if (command.region && command.mode == PoseMode::kMovement) {
+    Answer(command.seq, StatusCode::kUnsupported, "movements are told of whole worlds");
+    return;
+  }
+  if (command.replace) {
+    MoveRegion(command, it->second.world);
+    return;
+  }
   if (subscriptions_.Contains(command.subscription)) {
     Answer(command.seq, StatusCode::kSubscriptionExists, "a subscription has that number already");
     return;
@@ -727,6 +740,12 @@ void Session::Execute(protocol::Observe&& command) {
            "the feature 'quantised poses' was not agreed on in the handshake");
     return;
   }
+  if (command.region ? subscriptions_.WatchesWorld(command.world)
+                     : subscriptions_.HasRegion(command.world)) {
+    Answer(command.seq, StatusCode::kNotAllowed,
+           "a region is all that a session observes of a world");
+    return;
+  }
   const auto max_named = static_cast<std::size_t>(host_.config().limits.max_named_avatars);
   if (subscriptions_.named_count() + command.avatars.size() > max_named) {
     host_.metrics().Reached(Limit::kNamedAvatars);
@@ -735,14 +754,36 @@ void Session::Execute(protocol::Observe&& command) {
     return;
   }
   if (!Affords(command.seq, command.avatars.size())) return;
+  std::optional<RegionMembers> region;
+  if (command.region) {
+    region.emplace().Move(*command.region, it->second.world->interest_cell_m,
+                          command.every_n_ticks);
+  }
   subscriptions_.Add(command.subscription, {.world = command.world,
                                             .mode = command.mode,
                                             .every_n_ticks = command.every_n_ticks,
                                             .with_events = command.with_events,
-                                            .avatars = std::move(command.avatars)});
+                                            .avatars = std::move(command.avatars),
+                                            .region = std::move(region)});
   host_.InterestChanged(it->second.world);
   Answer(command.seq, StatusCode::kOk);
   if (command.mode == PoseMode::kMovement) BeginMovements(it->second.world);
+}
+
+void Session::MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world) {
+  const PoseInterest::Every before = EveryOf(command.world, command.mode);
+  const bool had_events = WantsEvents(command.world);
+  if (!subscriptions_.MoveRegion(command.subscription, command, world->interest_cell_m)) {
+    Answer(command.seq, StatusCode::kNoSuchSubscription,
+           "no region of that number, world and mode is observed");
+    return;
+  }
+  if (EveryOf(command.world, command.mode) == before && WantsEvents(command.world) == had_events) {
+    host_.RegionMoved(command.world);
+  } else {
+    host_.InterestChanged(world);
+  }
+  Answer(command.seq, StatusCode::kOk);
 }
 
 void Session::Execute(protocol::StopObserving&& command) {
@@ -839,8 +880,33 @@ std::span<const AvatarNumber> Session::Named(WorldId world, PoseMode mode) const
                                 : subscriptions_.Named(world, mode);
 }
 
-void Session::OnPoses(const PoseDelivery& delivery) {
+std::optional<RegionReach> Session::ReachOf(WorldId world, PoseMode mode) const {
+  return connection_ == nullptr ? std::nullopt : subscriptions_.ReachOf(world, mode);
+}
+
+PoseDelivery SharedPoses::Compose(std::span<const std::uint32_t> rows, bool is_partial) {
+  PoseDelivery some{.world = delivery_.world,
+                    .mode = delivery_.mode,
+                    .from_shard = delivery_.from_shard,
+                    .tick = delivery_.tick,
+                    .avatar_count = static_cast<std::uint32_t>(rows.size()),
+                    .parts = ComposeFrames(composer_, *delivery_.rows, rows, is_partial, metrics_),
+                    .rows = nullptr,
+                    .places = nullptr};
+  metrics_.batches_composed.Add(some.parts.size());
+  return some;
+}
+
+const PoseDelivery& SharedPoses::ComposeShared(std::span<const std::uint32_t> rows) {
+  const auto [it, is_new] =
+      shared_.try_emplace(std::vector<std::uint32_t>(rows.begin(), rows.end()));
+  if (is_new) it->second = Compose(rows, true);
+  return it->second;
+}
+
+void Session::OnPoses(SharedPoses& poses) {
   if (connection_ == nullptr) return;
+  const PoseDelivery& delivery = poses.delivery();
   switch (subscriptions_.ShareOf(delivery)) {
     case Subscriptions::Share::kNone: return;
     case Subscriptions::Share::kWhole:
@@ -849,19 +915,39 @@ void Session::OnPoses(const PoseDelivery& delivery) {
       return;
     case Subscriptions::Share::kSome:
       if (const auto picked = subscriptions_.Pick(delivery)) {
-        PoseDelivery some{
-            .world = delivery.world,
-            .mode = delivery.mode,
-            .from_shard = delivery.from_shard,
-            .tick = delivery.tick,
-            .avatar_count = static_cast<std::uint32_t>(picked->size()),
-            .parts = ComposeFrames(host_.composer(), *delivery.rows, *picked, host_.metrics()),
-            .rows = nullptr};
-        host_.metrics().batches_composed.Add(some.parts.size());
-        SendPoses(some);
+        SendPoses(poses.Compose(*picked, false));
       }
       return;
+    case Subscriptions::Share::kRegion:
+      if (delivery.places == nullptr) return;  // the same
+      const RegionMembers::Change change = subscriptions_.UpdateRegion(delivery);
+      TellRegion(delivery, change);
+      if (!change.due.empty()) SendPoses(poses.ComposeShared(change.due));
+      return;
   }
+}
+
+void Session::TellRegion(const PoseDelivery& delivery, const RegionMembers::Change& change) {
+  const std::size_t count = change.left.size() + change.entered.size();
+  if (count == 0) return;
+  std::vector<protocol::Event> events;
+  events.reserve(count);
+  const auto add = [&](protocol::EventType type, std::span<const AvatarNumber> avatars) {
+    for (const AvatarNumber avatar : avatars) {
+      events.push_back({.type = type,
+                        .avatar = avatar,
+                        .tick = delivery.tick,
+                        .time_s = host_.clock().TickTime(delivery.tick)});
+    }
+  };
+  add(protocol::EventType::kLeft, change.left);
+  add(protocol::EventType::kEntered, change.entered);
+  const EventDelivery own{delivery.world, delivery.tick,
+                          std::make_shared<const std::vector<protocol::Event>>(std::move(events))};
+  std::uint64_t dropped = 0;
+  ForEachEventFrame(
+      own, [&](protocol::Events&& message) { dropped += SendNumbered(std::move(message)); });
+  CountDropped(delivery.world, dropped);
 }
 
 void Session::SendPoses(const PoseDelivery& delivery) {
@@ -883,28 +969,33 @@ void Session::OnEvents(SharedEvents& events) {
     }
     if (is_full) dropped = delivery.events->size();
   } else {
-    ForEachEventFrame(delivery, [&](protocol::Events&& message) {
-      message.number = ++events_number_;
-      const SharedFrame frame = EncodeFrame(host_.encoder(), message);
-      if (frame == nullptr) return;
-      const bool was_sent = connection_ != nullptr && connection_->SendEvents(frame);
-      // What a full connection did not take is lost: sent later it would be out of order.
-      if (connection_ != nullptr && !was_sent) {
-        dropped += message.events.size();
-        return;
-      }
-      event_replay_.Keep({message.number, message.events.size(), was_sent, frame});
-      if (const std::uint64_t forgotten = event_replay_.TakeForgotten(); forgotten > 0) {
-        dropped += forgotten;
-        host_.metrics().Reached(Limit::kEventReplay);
-      }
-    });
+    ForEachEventFrame(
+        delivery, [&](protocol::Events&& message) { dropped += SendNumbered(std::move(message)); });
   }
-  if (dropped == 0) return;
+  CountDropped(delivery.world, dropped);
+}
+
+std::uint64_t Session::SendNumbered(protocol::Events&& message) {
+  const bool is_replayed = (features_ & protocol::kFeatureEventReplay) != 0;
+  message.number = is_replayed ? ++events_number_ : 0;
+  const SharedFrame frame = EncodeFrame(host_.encoder(), message);
+  if (frame == nullptr) return 0;
+  const bool was_sent = connection_ != nullptr && connection_->SendEvents(frame);
+  // What a full connection did not take is lost: sent later it would be out of order.
+  if (connection_ != nullptr && !was_sent) return message.events.size();
+  if (!is_replayed) return 0;
+  event_replay_.Keep({message.number, message.events.size(), was_sent, frame});
+  const std::uint64_t forgotten = event_replay_.TakeForgotten();
+  if (forgotten > 0) host_.metrics().Reached(Limit::kEventReplay);
+  return forgotten;
+}
+
+void Session::CountDropped(WorldId world, std::uint64_t events) {
+  if (events == 0) return;
   if (connection_ != nullptr) host_.metrics().Reached(Limit::kControlBuffer);
   // Forgotten ones may have been of another of its worlds; their sum is what counts.
-  worlds_.at(delivery.world).dropped_events += dropped;
-  host_.metrics().events_dropped.Add(dropped);
+  worlds_.at(world).dropped_events += events;
+  host_.metrics().events_dropped.Add(events);
 }
 
 }  // namespace stridewire::server

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,7 +24,8 @@ inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
     protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
     protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-    protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
+    protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
+    protocol::kFeatureRegions;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {
@@ -44,6 +46,25 @@ class SharedEvents {
   const EventDelivery& delivery_;
   protocol::Encoder& encoder_;
   std::vector<SharedFrame> frames_;
+};
+
+/// Poses of one delivery and the batches made of them for several sessions.
+class SharedPoses {
+ public:
+  SharedPoses(const PoseDelivery& delivery, protocol::PoseBatchComposer& composer,
+              ThreadMetrics& metrics)
+      : delivery_(delivery), composer_(composer), metrics_(metrics) {}
+  [[nodiscard]] const PoseDelivery& delivery() const { return delivery_; }
+  /// A batch with those rows.
+  [[nodiscard]] PoseDelivery Compose(std::span<const std::uint32_t> rows, bool is_partial);
+  /// A partial one, the same for all who ask for the same.
+  [[nodiscard]] const PoseDelivery& ComposeShared(std::span<const std::uint32_t> rows);
+
+ private:
+  const PoseDelivery& delivery_;
+  protocol::PoseBatchComposer& composer_;
+  ThreadMetrics& metrics_;
+  std::map<std::vector<std::uint32_t>, PoseDelivery> shared_;
 };
 
 /// One client: worlds joined, subscriptions, commands under way and answered. Lives on one shard
@@ -71,7 +92,7 @@ class Session : private ConnectionHandler {
   void OnTerrainRefused(protocol::Seq seq, Refusal refusal);
   /// The ground of a world has changed.
   void OnGround(WorldId world, const SharedFrame& frame);
-  void OnPoses(const PoseDelivery& delivery);
+  void OnPoses(SharedPoses& poses);
   void OnMovements(const MovementDelivery& delivery);
   void OnStates(const StatesAnswer& answer);
   void OnEvents(SharedEvents& events);
@@ -100,6 +121,8 @@ class Session : private ConnectionHandler {
   }
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::size_t region_count() const { return subscriptions_.region_count(); }
 
  private:
   struct Membership {
@@ -171,6 +194,11 @@ class Session : private ConnectionHandler {
   void SendGround(const World& world, bool also_flat);
   void SendLagging(Membership& membership);
   void SendPoses(const PoseDelivery& delivery);
+  void MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world);
+  void TellRegion(const PoseDelivery& delivery, const RegionMembers::Change& change);
+  /// Numbers and sends it, or keeps it for a client that is away. Returns how many events were lost.
+  std::uint64_t SendNumbered(protocol::Events&& message);
+  void CountDropped(WorldId world, std::uint64_t events);
   template <typename Message>
   void Send(const Message& message);
   /// Says why and lets the connection go; the session waits for its client.

@@ -46,6 +46,8 @@ class SessionHost {
   virtual void SessionEnded(SessionId session) = 0;
   /// What a session wants of this world has changed.
   virtual void InterestChanged(const std::shared_ptr<World>& world) = 0;
+  /// Only where its region is has.
+  virtual void RegionMoved(WorldId world) = 0;
 };
 
 }  // namespace stridewire::server

@@ -50,8 +50,9 @@ void Subscriptions::SumUp(const Key& key) {
   std::uint16_t every = 0;
   for (const auto& [id, subscription] : all_) {
     if (Key(subscription.world, subscription.mode) != key) continue;
-    every = std::gcd(every, subscription.every_n_ticks);
-    is_whole |= subscription.avatars.empty();
+    every = std::gcd(
+        every, subscription.region ? subscription.region->every() : subscription.every_n_ticks);
+    is_whole |= subscription.avatars.empty() && !subscription.region;
     std::vector<AvatarNumber> named;
     named.reserve(watch.named.size() + subscription.avatars.size());
     std::ranges::set_union(watch.named, subscription.avatars, std::back_inserter(named));
@@ -82,9 +83,62 @@ std::span<const AvatarNumber> Subscriptions::Named(WorldId world, PoseMode mode)
   return it == watches_.end() ? std::span<const AvatarNumber>() : it->second.named;
 }
 
+bool Subscriptions::WatchesWorld(WorldId world) const {
+  return std::ranges::any_of(watches_, [&](const auto& item) { return item.first.first == world; });
+}
+
+bool Subscriptions::HasRegion(WorldId world) const {
+  return std::ranges::any_of(all_, [&](const auto& item) {
+    return item.second.world == world && item.second.region.has_value();
+  });
+}
+
+std::size_t Subscriptions::region_count() const {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(all_, [](const auto& item) { return item.second.region.has_value(); }));
+}
+
+bool Subscriptions::MoveRegion(SubscriptionId id, const protocol::Observe& moved, double leave_m) {
+  const auto it = all_.find(id);
+  if (it == all_.end()) return false;
+  Subscription& subscription = it->second;
+  if (!subscription.region || !moved.region || subscription.world != moved.world ||
+      subscription.mode != moved.mode) {
+    return false;
+  }
+  subscription.region->Move(*moved.region, leave_m, moved.every_n_ticks);
+  subscription.every_n_ticks = moved.every_n_ticks;
+  subscription.with_events = moved.with_events;
+  SumUp({moved.world, moved.mode});
+  return true;
+}
+
+const RegionMembers* Subscriptions::FindRegion(const Key& key) const {
+  const auto it = std::ranges::find_if(all_, [&](const auto& item) {
+    return item.second.region && Key(item.second.world, item.second.mode) == key;
+  });
+  return it == all_.end() ? nullptr : &*it->second.region;
+}
+
+std::optional<RegionReach> Subscriptions::ReachOf(WorldId world, PoseMode mode) const {
+  const RegionMembers* region = FindRegion({world, mode});
+  return region == nullptr ? std::nullopt : std::optional(region->reach());
+}
+
+RegionMembers::Change Subscriptions::UpdateRegion(const PoseDelivery& delivery) {
+  const auto it = std::ranges::find_if(all_, [&](const auto& item) {
+    return item.second.region && item.second.world == delivery.world &&
+           item.second.mode == delivery.mode;
+  });
+  return it->second.region->Update(delivery);
+}
+
 Subscriptions::Share Subscriptions::ShareOf(const PoseDelivery& delivery) const {
   const auto watch = watches_.find({delivery.world, delivery.mode});
   if (watch == watches_.end()) return Share::kNone;
+  if (const RegionMembers* region = FindRegion({delivery.world, delivery.mode})) {
+    return delivery.tick % region->every() == 0 ? Share::kRegion : Share::kNone;
+  }
   const bool is_due = std::ranges::any_of(all_, [&](const auto& item) {
     const Subscription& subscription = item.second;
     return subscription.world == delivery.world && subscription.mode == delivery.mode &&

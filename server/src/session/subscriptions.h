@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "session/region_members.h"
 #include "world/mail.h"
 
 namespace stridewire::server {
@@ -15,7 +16,7 @@ namespace stridewire::server {
 /// What a session watches, by the numbers its client chose.
 ///
 /// Subscriptions of one world and mode share batches. If one of them is about all avatars, the session gets
-/// whole batches, otherwise such as hold exactly those that any of them names.
+/// whole batches, otherwise such as hold exactly those that any of them names. A region is the only one of its world.
 class Subscriptions {
  public:
   struct Subscription {
@@ -23,9 +24,10 @@ class Subscriptions {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint16_t every_n_ticks = 1;
     bool with_events = false;
-    std::vector<AvatarNumber> avatars;  ///< Empty: all.
+    std::vector<AvatarNumber> avatars;  ///< Empty: all, or those of the region.
+    std::optional<RegionMembers> region;
   };
-  enum class Share : std::uint8_t { kNone, kWhole, kSome };
+  enum class Share : std::uint8_t { kNone, kWhole, kSome, kRegion };
 
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
@@ -40,6 +42,15 @@ class Subscriptions {
   void TellAnew();
 
   [[nodiscard]] bool WithEvents(WorldId world) const;
+  /// Some subscription is about that world, or some region.
+  [[nodiscard]] bool WatchesWorld(WorldId world) const;
+  [[nodiscard]] bool HasRegion(WorldId world) const;
+  [[nodiscard]] std::size_t region_count() const;
+  /// Gives a region another place; the members stay as long as that one has them. False: `id` is no region of that
+  /// world and mode.
+  [[nodiscard]] bool MoveRegion(protocol::SubscriptionId id, const protocol::Observe& moved,
+                                double leave_m);
+
   /// Some subscription is about these poses.
   [[nodiscard]] bool Watches(WorldId world, protocol::PoseMode mode) const {
     return watches_.contains({world, mode});
@@ -49,10 +60,15 @@ class Subscriptions {
   /// Avatars whose poses suffice, growing. Empty: whole batches are wanted, or nothing is.
   [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
 
+  /// What the region of that world and mode reaches; empty: there is none.
+  [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
+
   [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;
   /// The rows of a delivery that Share::kSome is about; without value: none has a pose and the client knows
   /// already. They hold until the next call of anything here.
   [[nodiscard]] std::optional<std::span<const std::uint32_t>> Pick(const PoseDelivery& delivery);
+  /// The same of Share::kRegion. The delivery has places.
+  [[nodiscard]] RegionMembers::Change UpdateRegion(const PoseDelivery& delivery);
 
  private:
   using Key = std::pair<WorldId, protocol::PoseMode>;
@@ -69,6 +85,7 @@ class Subscriptions {
     std::map<int, Lane> lanes;
   };
 
+  [[nodiscard]] const RegionMembers* FindRegion(const Key& key) const;
   void SumUp(const Key& key);
   void CountNamed();
 

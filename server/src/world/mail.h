@@ -10,6 +10,7 @@
 #include "net/shared_frame.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/protocol/pose_rows.h"
+#include "world/places.h"
 #include "world/world.h"
 
 /// What shards send each other. Values only; the receiver owns what it gets.
@@ -126,17 +127,27 @@ inline constexpr std::array kSentModes{protocol::PoseMode::kFull, protocol::Pose
   return static_cast<std::size_t>(mode);
 }
 
+/// A circle on the ground whose avatars are of interest.
+struct RegionReach {
+  double x = 0.0;
+  double z = 0.0;
+  double reach_m = 0.0;
+  bool operator==(const RegionReach&) const = default;
+};
+
 /// What the sessions of a shard want of the poses of a world in one mode.
 struct PoseInterest {
   /// Of the ticks wanted those that this divides, 0: none.
   struct Every {
     std::uint16_t whole = 0;  ///< By sessions that want all avatars.
-    std::uint16_t some = 0;   ///< By sessions that name theirs.
+    std::uint16_t some = 0;   ///< By sessions that name theirs or have a region.
     bool operator==(const Every&) const = default;
   };
   Every every;
   /// Avatars named by any session, growing; null: none. Of who wants all there are none in it.
   std::shared_ptr<const std::vector<AvatarNumber>> named;
+  /// Regions that any session observes; null: none.
+  std::shared_ptr<const std::vector<RegionReach>> regions;
 };
 
 /// What the sessions of a shard want of a world; replaces what that shard said before.
@@ -156,8 +167,10 @@ struct PoseDelivery {
   std::uint64_t tick = 0;
   std::uint32_t avatar_count = 0;  ///< In `parts`.
   std::vector<SharedFrame> parts;  ///< A whole batch; none if nobody wants one.
-  /// What batches with some of them are made of: at least those that are named.
+  /// What batches with some of them are made of: at least those that are named or in a region.
   std::shared_ptr<const protocol::PoseRows> rows;
+  /// Where all of them are; null: nobody has a region.
+  std::shared_ptr<const Places> places;
 };
 
 /// What the avatars of one world and shard began in a tick: Movements of its steps, in order.

@@ -9,12 +9,13 @@ namespace stridewire::server {
 
 std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
                                        const protocol::PoseRows& rows,
-                                       std::span<const std::uint32_t> picked,
+                                       std::span<const std::uint32_t> picked, bool is_partial,
                                        ThreadMetrics& metrics) {
   const auto compose = [&](std::span<const std::uint32_t> of_part, std::size_t part,
                            std::size_t parts) {
     auto frame = std::make_shared<std::vector<std::byte>>();
-    const Status composed = composer.Compose(rows, of_part, part, parts, *frame);
+    const Status composed = composer.Compose(
+        rows, of_part, {.part = part, .parts = parts, .is_partial = is_partial}, *frame);
     STRIDEWIRE_CHECK(composed.has_value());
     return SharedFrame(std::move(frame));
   };

@@ -14,11 +14,11 @@
 namespace stridewire::server {
 
 /// Frames with the picked rows (indices, growing), in as many parts as it takes; one if there are none. Poses that
-/// fit in no part, which needs a frame limit far below the default, are counted.
+/// fit in no part, which needs a frame limit far below the default, are counted. `is_partial` as in PoseBatchInfo.
 [[nodiscard]] std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
                                                      const protocol::PoseRows& rows,
                                                      std::span<const std::uint32_t> picked,
-                                                     ThreadMetrics& metrics);
+                                                     bool is_partial, ThreadMetrics& metrics);
 
 /// Rows that other threads read, filled again when they have done so. One thread takes and shares.
 class RowsPool {

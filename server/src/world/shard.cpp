@@ -196,7 +196,8 @@ void Shard::Receive(TickMail&& mail) {
     if (it != sessions_.end()) it->second->OnStates(answer);
   }
   for (const PoseDelivery& delivery : mail.poses) {
-    for (Session* session : WatchersOf(delivery.world)) session->OnPoses(delivery);
+    SharedPoses poses(delivery, composer_, metrics_);
+    for (Session* session : WatchersOf(delivery.world)) session->OnPoses(poses);
   }
 }
 
@@ -276,6 +277,7 @@ void Shard::InterestChanged(const std::shared_ptr<World>& world) {
                          : is_none;
   for (std::size_t mode = 0; is_told && mode < kSentModes.size(); ++mode) {
     interest.poses[mode].named = told->second.poses[mode].named;
+    interest.poses[mode].regions = told->second.poses[mode].regions;
     is_same &= told->second.poses[mode].every == interest.poses[mode].every;
   }
   if (is_same) return;
@@ -295,12 +297,19 @@ void Shard::TellNamed() {
     bool is_same = true;
     for (const PoseMode mode : kSentModes) {
       NumberUnion numbers;
-      for (const Session* session : WatchersOf(world)) numbers.Add(session->Named(world, mode));
-      std::vector<AvatarNumber> named = numbers.Take();
-      auto& known = told->second.poses[ModeIndex(mode)].named;
-      if (known == nullptr ? named.empty() : *known == named) continue;
-      is_same = false;
-      known = std::make_shared<const std::vector<AvatarNumber>>(std::move(named));
+      std::vector<RegionReach> regions;
+      for (const Session* session : WatchersOf(world)) {
+        numbers.Add(session->Named(world, mode));
+        if (const auto reach = session->ReachOf(world, mode)) regions.push_back(*reach);
+      }
+      const auto update = [&]<typename List>(std::shared_ptr<const List>& known, List&& list) {
+        if (known == nullptr ? list.empty() : *known == list) return;
+        is_same = false;
+        known = std::make_shared<const List>(std::move(list));
+      };
+      PoseInterest& poses = told->second.poses[ModeIndex(mode)];
+      update(poses.named, numbers.Take());
+      update(poses.regions, std::move(regions));
     }
     if (!is_same) Tell(told->second);
   }
@@ -412,11 +421,14 @@ void Shard::UpdateGauges() {
   for (const auto& [id, world] : worlds_) avatars += world->avatar_count();
   std::size_t attached = 0;
   std::size_t websockets = 0;
+  std::size_t regions = 0;
   for (const auto& [id, session] : sessions_) {
     attached += session->is_attached() ? 1 : 0;
+    regions += session->region_count();
     websockets += session->is_attached(TransportKind::kWebSocket) ? 1 : 0;
   }
   metrics_.avatars.Set(avatars);
+  metrics_.regions.Set(regions);
   metrics_.sessions_attached.Set(attached);
   metrics_.sessions_websocket.Set(websockets);
   metrics_.sessions_detached.Set(sessions_.size() - attached);

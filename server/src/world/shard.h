@@ -94,6 +94,7 @@ class Shard : public SessionHost {
   void SetTerrain(TerrainChange&& change) override;
   void SessionEnded(SessionId session) override;
   void InterestChanged(const std::shared_ptr<World>& world) override;
+  void RegionMoved(WorldId world) override { named_anew_.insert(world); }
 
   void ScheduleTick();
   void Tick();
@@ -131,7 +132,7 @@ class Shard : public SessionHost {
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::map<WorldId, std::vector<Session*>> watchers_;  // sessions that want poses or events
   std::map<WorldId, Interest> told_interest_;          // what the other shards know of this one's
-  std::set<WorldId> named_anew_;  // whose avatars named are told at the next tick
+  std::set<WorldId> named_anew_;  // whose avatars named and regions are told at the next tick
   protocol::Encoder encoder_;
   protocol::PoseBatchComposer composer_;
   std::vector<TickMail> outgoing_;  // by shard

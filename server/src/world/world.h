@@ -23,6 +23,7 @@ struct World {
   std::shared_ptr<const MotionLibrary> library;
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
   AvatarOptions avatar_options;
+  double interest_cell_m = 8.0;  ///< Of the grid that regions are looked up in.
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
   std::atomic<AvatarNumber> last_number{0};   ///< Largest avatar number ever asked for.

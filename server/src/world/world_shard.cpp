@@ -323,7 +323,7 @@ void WorldShard::SetInterest(const Interest& interest) {
     }
   }
   for (std::size_t mode = 0; mode < observed.size(); ++mode) {
-    // Who names avatars that are not here, or not any more, is told once.
+    // Who wants avatars that are not here, or not any more, is told once.
     last_had_poses_[mode] =
         observed[mode] && (last_had_poses_[mode] || interest.poses[mode].every.some > 0);
   }
@@ -495,10 +495,60 @@ std::span<const std::uint32_t> WorldShard::NamedRows(PoseMode mode) {
   return named_rows_[ModeIndex(mode)];
 }
 
+bool WorldShard::HasRegions(PoseMode mode) const {
+  return std::ranges::any_of(interests_, [&](const Interest& shard) {
+    const auto& regions = shard.poses[ModeIndex(mode)].regions;
+    return regions != nullptr && !regions->empty();
+  });
+}
+
+std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
+  if (places_ != nullptr && places_tick_ == tick) return places_;
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  auto places = std::make_shared<Places>();
+  places->Begin(world_->interest_cell_m, in_order.size());
+  constexpr std::size_t kAhead = 4;
+  for (std::size_t i = 0; i < in_order.size(); ++i) {
+    if (i + 2 * kAhead < in_order.size()) {
+      in_order[i + 2 * kAhead].entry->avatar.PrefetchWhereShown();
+    }
+    if (i + kAhead < in_order.size()) in_order[i + kAhead].entry->avatar.PrefetchShown();
+    const Vec3& root_m = in_order[i].entry->avatar.pose().root_position_m;
+    places->Add(static_cast<std::uint32_t>(i), root_m.x, root_m.z);
+  }
+  places->Sort();
+  places_ = std::move(places);
+  places_tick_ = tick;
+  return places_;
+}
+
+std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const Places& places) {
+  is_near_.resize(numbers_->size());
+  near_rows_.clear();
+  const auto take = [&](std::uint32_t row, float, float) {
+    if (std::exchange(is_near_[row], 1) == 0) near_rows_.push_back(row);
+  };
+  for (const std::uint32_t row : NamedRows(mode)) take(row, 0.0f, 0.0f);
+  for (const Interest& shard : interests_) {
+    const auto& regions = shard.poses[ModeIndex(mode)].regions;
+    if (regions == nullptr) continue;
+    for (const RegionReach& region : *regions) {
+      places.ForEachNear(region.x, region.z, region.reach_m, take);
+    }
+  }
+  for (const std::uint32_t row : near_rows_) is_near_[row] = 0;
+  std::ranges::sort(near_rows_);
+  return near_rows_;
+}
+
 bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
                         protocol::PoseBatchComposer& composer, PoseDelivery& delivery) {
   const std::span<const InOrder> in_order = AvatarsInOrder();
-  const std::span<const std::uint32_t> wanted = whole ? all_rows_ : NamedRows(mode);
+  delivery.places = HasRegions(mode) ? PlacesAt(tick) : nullptr;
+  const std::span<const std::uint32_t> wanted = whole ? std::span<const std::uint32_t>(all_rows_)
+                                                : delivery.places != nullptr
+                                                    ? NamedAndNearRows(mode, *delivery.places)
+                                                    : NamedRows(mode);
   bool& had_poses = last_had_poses_[ModeIndex(mode)];
   if (wanted.empty() && !had_poses) return false;
   had_poses = !wanted.empty();
@@ -538,7 +588,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
   delivery.tick = tick;
   delivery.avatar_count = static_cast<std::uint32_t>(rows.pose_count());
   delivery.parts.clear();
-  if (whole) delivery.parts = ComposeFrames(composer, rows, wanted, metrics_);
+  if (whole) delivery.parts = ComposeFrames(composer, rows, wanted, false, metrics_);
   delivery.rows = rows_[ModeIndex(mode)].Share();
   return true;
 }

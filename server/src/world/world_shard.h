@@ -102,6 +102,9 @@ class WorldShard {
   void AdvanceAvatars(std::uint64_t tick, int steps);
   std::span<const InOrder> AvatarsInOrder();
   std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
+  bool HasRegions(protocol::PoseMode mode) const;
+  std::shared_ptr<const Places> PlacesAt(std::uint64_t tick);
+  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const Places& places);
   void TellMovements();
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
@@ -125,6 +128,10 @@ class WorldShard {
   // By mode: rows of avatars that are named by any shard, worked out when they or the order change.
   std::array<std::vector<std::uint32_t>, kSentModes.size()> named_rows_;
   bool are_named_rows_known_ = false;
+  std::vector<std::uint32_t> near_rows_;  // those last asked for, by any mode
+  std::vector<std::uint8_t> is_near_;     // by row, all 0 between
+  std::shared_ptr<const Places> places_;  // of places_tick_
+  std::uint64_t places_tick_ = 0;
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;

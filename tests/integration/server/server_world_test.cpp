@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <fstream>
 #include <map>
+#include <set>
 
 #include "counted_memory.h"
 #include "stridewire/runtime/avatar.h"
@@ -323,6 +324,100 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   client.Send(protocol::StopObserving{.seq = client.NextSeq(), .subscription = 3});
   ASSERT_EQ(client.Await<Reply>()->code, StatusCode::kOk);
   EXPECT_TRUE(shows({2, 6}, {}));
+}
+
+// A player walks along a crowd that stands on a line, one avatar a metre.
+TEST(ServerWorld, ShowsARegionThatMoves) {
+  TestServer server(TestConfig(2));
+  RawClient controller = server.Connect();
+  ASSERT_TRUE(controller.SayHello());
+  const auto world = controller.Join("w");
+  ASSERT_TRUE(world);
+  std::vector<protocol::SpawnItem> items;
+  for (AvatarNumber avatar = 1; avatar <= 60; ++avatar) {
+    items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
+  }
+  ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 60u);
+
+  RawClient player = server.Connect();
+  ASSERT_TRUE(player.SayHello());
+  ASSERT_TRUE(player.Join("w", protocol::Role::kObserver));
+  std::set<AvatarNumber> inside;
+  std::map<AvatarNumber, std::uint64_t> seen;  // tick of the last pose
+  std::uint64_t last_number = 0;
+  const auto take = [&](const protocol::Message& message) {
+    if (const auto* events = std::get_if<protocol::Events>(&message)) {
+      EXPECT_EQ(events->number, ++last_number);
+      for (const protocol::Event& event : events->events) {
+        const bool was_inside = inside.contains(event.avatar);
+        EXPECT_EQ(event.type, was_inside ? EventType::kLeft : EventType::kEntered);
+        if (was_inside) {
+          inside.erase(event.avatar);
+        } else {
+          inside.insert(event.avatar);
+        }
+      }
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
+      EXPECT_TRUE(batch->info.is_partial);
+      EXPECT_FALSE(batch->avatars.empty());
+      for (const AvatarNumber avatar : batch->avatars) seen[avatar] = batch->info.tick;
+    }
+  };
+  const auto observe = [&](double x, bool replace, double radius_m = 5.4) {
+    protocol::Observe asked{.seq = player.NextSeq(),
+                            .world = world->world,
+                            .subscription = 1,
+                            .mode = PoseMode::kQuantised};
+    asked.region = protocol::Region{{x, 0.0}, radius_m, 3.0, {}};
+    asked.replace = replace;
+    player.Send(asked);
+    const auto reply = player.Await<Reply>(take);
+    return reply ? reply->code : StatusCode::kInternal;
+  };
+  const auto shows = [&](AvatarNumber first, AvatarNumber last) {
+    std::set<AvatarNumber> expected;
+    for (AvatarNumber avatar = first; avatar <= last; ++avatar) expected.insert(avatar);
+    for (int i = 0; i < 300 && inside != expected; ++i) {
+      const auto message = player.Receive();
+      if (!message) break;
+      take(*message);
+    }
+    EXPECT_EQ(inside, expected);
+    // Poses of all of them go on.
+    seen.clear();
+    for (int i = 0; i < 300 && seen.size() < expected.size(); ++i) {
+      const auto message = player.Receive();
+      if (!message) break;
+      take(*message);
+    }
+    return inside == expected && seen.size() >= expected.size();
+  };
+  EXPECT_EQ(observe(20.0, true), StatusCode::kNoSuchSubscription);
+  ASSERT_EQ(observe(20.0, false), StatusCode::kOk);
+  EXPECT_TRUE(shows(15, 25));
+  EXPECT_EQ(observe(20.0, false), StatusCode::kSubscriptionExists);
+  // Those behind stay for another 3 m.
+  ASSERT_EQ(observe(23.0, true), StatusCode::kOk);
+  EXPECT_TRUE(shows(15, 28));
+  ASSERT_EQ(observe(40.0, true), StatusCode::kOk);
+  EXPECT_TRUE(shows(35, 45));
+  EXPECT_NE(server.metrics().Text().find("stridewire_regions 1\n"), std::string::npos);
+  // Who is taken out of the world leaves as well.
+  controller.Send(
+      protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {45, 44}});
+  EXPECT_TRUE(shows(35, 43));
+  // A region is alone in its world.
+  player.Send(protocol::Observe{.seq = player.NextSeq(), .world = world->world, .subscription = 2});
+  EXPECT_EQ(player.Await<Reply>(take)->code, StatusCode::kNotAllowed);
+
+  // Who did not agree on the feature has none.
+  RawClient other = server.Connect();
+  ASSERT_TRUE(other.SayHello(protocol::kFeatureQuantised));
+  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
+  protocol::Observe without{.seq = other.NextSeq(), .world = world->world, .subscription = 1};
+  without.region = protocol::Region{{0.0, 0.0}, 1.0, {}, {}};
+  other.Send(without);
+  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
 }
 
 TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {

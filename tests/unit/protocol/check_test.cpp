@@ -693,7 +693,7 @@ TEST(Check, Events) {
       good, [](E& m) { m.events.resize(kMaxItems + 1, m.events[0]); }, ErrorCode::kLimitExceeded,
       "Events.events");
   Refused<E>(
-      good, [](E& m) { m.events[1].type = static_cast<EventType>(8); }, ErrorCode::kMalformed,
+      good, [](E& m) { m.events[1].type = static_cast<EventType>(10); }, ErrorCode::kMalformed,
       "Event.type", 1);
   Refused<E>(good, [](E& m) { m.events[1].avatar = 0; }, ErrorCode::kOutOfRange, "Event.avatar", 1);
   Refused<E>(

@@ -33,7 +33,7 @@ void Fill(PoseRows& rows, PoseMode mode, std::size_t count) {
 struct Decoded {
   Decoded(PoseBatchComposer& composer, const PoseRows& rows,
           const std::vector<std::uint32_t>& picked) {
-    EXPECT_TRUE(composer.Compose(rows, picked, 0, 1, frame));
+    EXPECT_TRUE(composer.Compose(rows, picked, {}, frame));
     auto message = Decode(frame, MessageType::kPoseBatch);
     EXPECT_TRUE(message);
     batch = std::get<PoseBatch>(*message);
@@ -113,13 +113,15 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
   const std::size_t fitting = composer.Fitting(rows, picked);
   EXPECT_EQ(fitting, PoseBatchEncoder(limits).MaxAvatars(PoseMode::kFull, kJoints));
   std::vector<std::byte> frame;
-  ASSERT_TRUE(composer.Compose(rows, std::span(picked).first(fitting), 3, 4, frame));
+  ASSERT_TRUE(composer.Compose(rows, std::span(picked).first(fitting),
+                               {.part = 3, .parts = 4, .is_partial = true}, frame));
   const auto message = Decode(frame, MessageType::kPoseBatch);
   ASSERT_TRUE(message);
   EXPECT_EQ(std::get<PoseBatch>(*message).info.part, 3);
   EXPECT_EQ(std::get<PoseBatch>(*message).info.parts, 4);
-  EXPECT_EQ(composer.Compose(rows, picked, 0, 1, frame).error().code, ErrorCode::kLimitExceeded);
-  EXPECT_FALSE(composer.Compose(rows, std::span(picked).first(1), 4, 4, frame));
+  EXPECT_TRUE(std::get<PoseBatch>(*message).info.is_partial);
+  EXPECT_EQ(composer.Compose(rows, picked, {}, frame).error().code, ErrorCode::kLimitExceeded);
+  EXPECT_FALSE(composer.Compose(rows, std::span(picked).first(1), {.part = 4, .parts = 4}, frame));
 }
 
 }  // namespace

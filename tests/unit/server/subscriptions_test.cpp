@@ -28,7 +28,12 @@ PoseDelivery DeliveryOf(const std::vector<AvatarNumber>& avatars, std::uint64_t 
     EXPECT_TRUE(rows->Add(0, Vec3(0.0f), std::array{kIdentityQuat}));
   }
   rows->SkipTo(avatars.size());
-  return {.world = kWorld, .from_shard = shard, .tick = tick, .parts = {}, .rows = rows};
+  return {.world = kWorld,
+          .from_shard = shard,
+          .tick = tick,
+          .parts = {},
+          .rows = rows,
+          .places = nullptr};
 }
 
 TEST(Subscriptions, WantTheUnionOfWhatTheyNameUnlessOneIsAboutAll) {

@@ -230,5 +230,7 @@ export function observe(observation: Observation): Observe {
     avatars: avatarList(observation.avatars ?? [], 0, 'avatars'),
     everyNTicks,
     withEvents: observation.withEvents === true,
+    region: null,
+    replace: false,
   };
 }

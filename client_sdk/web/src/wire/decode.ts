@@ -9,12 +9,12 @@ import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
   maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames, maxLibraryBytes, maxNameBytes, maxParameters,
-  maxPieceBytes, maxPlayingLayers,
+  maxPieceBytes, maxPlayingLayers, maxRateRings,
   maxReasonBytes, maxRecordBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
   minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
-import type {Joint, LayerEntry, Message, ReplyEntry, SpawnEntry} from './messages';
+import type {Joint, LayerEntry, Message, RegionEntry, ReplyEntry, SpawnEntry} from './messages';
 import {poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
@@ -30,7 +30,8 @@ export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
 const feet: readonly Foot[] = ['left', 'right'];
 export const movementKinds: readonly MovementKind[] = ['stepLeft', 'stepRight', 'jump', 'stand'];
 export const eventTypes: readonly WorldEventType[] = [
-  'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned', 'removed'
+  'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned', 'removed',
+  'entered', 'left'
 ];
 export const parameterNames: readonly ParameterName[] = [
   'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height'
@@ -217,9 +218,13 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
 
   Observe(bytes) {
     const m = wire.Observe.getRootAsObserve(bytes);
-    const everyNTicks = m.everyNTicks();
-    if (everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
-      throw new Malformed('is not 1 to 3600', 'Observe.everyNTicks');
+    const avatars = avatarList(m.avatarsArray(), 0, 'Observe.avatars');
+    const inRegion = region(m.region());
+    if (inRegion !== null && avatars.length > 0) {
+      throw new Malformed('a region has no list beside it', 'Observe.avatars');
+    }
+    if (inRegion === null && m.replace()) {
+      throw new Malformed("only a region takes another one's place", 'Observe.replace');
     }
     return {
       type: 'Observe',
@@ -227,9 +232,11 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       world: id(m.world(), 'Observe.world'),
       subscription: id(m.subscription(), 'Observe.subscription'),
       mode: known(poseModes, m.mode(), 'Observe.mode'),
-      avatars: avatarList(m.avatarsArray(), 0, 'Observe.avatars'),
-      everyNTicks,
+      avatars,
+      everyNTicks: everyNTicks(m.everyNTicks(), 'Observe.everyNTicks'),
       withEvents: m.withEvents(),
+      region: inRegion,
+      replace: m.replace(),
     };
   },
 
@@ -412,6 +419,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       avatars,
       flags,
       poses,
+      partial: m.partial(),
     };
   },
 
@@ -781,6 +789,36 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
     parameterNames: names,
     sites,
     landings,
+  };
+}
+
+function everyNTicks(value: number, field: string, index = -1): number {
+  if (value < 1 || value > maxEveryNTicks) throw new Malformed('is not 1 to 3600', field, index);
+  return value;
+}
+
+function region(m: wire.Region | null): RegionEntry | null {
+  if (m === null) return null;
+  const centre = m.centreM();
+  const radiusM = notNegative(m.radiusM(), 'Region.radiusM');
+  if (radiusM === 0) throw new Malformed('has nothing in it', 'Region.radiusM');
+  const leaveM = m.leaveM();
+  const rings: RegionEntry['rings'] = [];
+  const length = count(m.ringsLength(), 0, maxRateRings, 'Region.rings');
+  let beforeM = 0;
+  for (let i = 0; i < length; ++i) {
+    const ring = m.rings(i)!;
+    const toM = finite(ring.toM(), 'RateRing.toM', i);
+    if (!(toM > beforeM)) throw new Malformed('is not beyond the ring before it', 'RateRing.toM', i);
+    beforeM = toM;
+    rings.push({toM, everyNTicks: everyNTicks(ring.everyNTicks(), 'RateRing.everyNTicks', i)});
+  }
+  return {
+    x: finite(centre?.x() ?? 0, 'Region.centreM'),
+    z: finite(centre?.z() ?? 0, 'Region.centreM'),
+    radiusM,
+    leaveM: leaveM === null ? null : notNegative(leaveM, 'Region.leaveM'),
+    rings,
   };
 }
 

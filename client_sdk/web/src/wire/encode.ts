@@ -5,7 +5,7 @@ import {makeFrame, maxPayloadBytes} from './frame';
 import {maxBulkBytes, maxControlBytes} from './limits';
 import {Malformed} from './malformed';
 import type {Terrain} from '../types';
-import type {ClientMessage} from './messages';
+import type {ClientMessage, RegionEntry} from './messages';
 
 /** Makes frames of checked messages; sender's limits are those of the server it talks to. */
 export class Encoder {
@@ -50,6 +50,20 @@ function buildTerrain(b: Builder, terrain: Terrain): number {
   if (field !== 0) wire.Terrain.addHeightField(b, field);
   wire.Terrain.addBoxes(b, boxes);
   return wire.Terrain.endTerrain(b);
+}
+
+function buildRegion(b: Builder, region: RegionEntry): number {
+  wire.Region.startRingsVector(b, region.rings.length);
+  for (let i = region.rings.length - 1; i >= 0; --i) {  // Written from the end.
+    wire.RateRing.createRateRing(b, region.rings[i]!.toM, region.rings[i]!.everyNTicks);
+  }
+  const rings = b.endVector();
+  wire.Region.startRegion(b);
+  wire.Region.addCentreM(b, wire.GroundPoint.createGroundPoint(b, region.x, region.z));
+  wire.Region.addRadiusM(b, region.radiusM);
+  if (region.leaveM !== null) wire.Region.addLeaveM(b, region.leaveM);
+  wire.Region.addRings(b, rings);
+  return wire.Region.endRegion(b);
 }
 
 function build(b: Builder, m: ClientMessage): number {
@@ -128,9 +142,18 @@ function build(b: Builder, m: ClientMessage): number {
           b, m.seq, m.world, wire.CancelQueue.createAvatarsVector(b, m.avatars));
     case 'Observe': {
       const avatars = wire.Observe.createAvatarsVector(b, m.avatars);
-      return wire.Observe.createObserve(b, m.seq, m.world, m.subscription,
-                                        poseModes.indexOf(m.mode), avatars, m.everyNTicks,
-                                        m.withEvents);
+      const region = m.region === null ? 0 : buildRegion(b, m.region);
+      wire.Observe.startObserve(b);
+      wire.Observe.addSeq(b, m.seq);
+      wire.Observe.addWorld(b, m.world);
+      wire.Observe.addSubscription(b, m.subscription);
+      wire.Observe.addMode(b, poseModes.indexOf(m.mode));
+      wire.Observe.addAvatars(b, avatars);
+      wire.Observe.addEveryNTicks(b, m.everyNTicks);
+      wire.Observe.addWithEvents(b, m.withEvents);
+      if (region !== 0) wire.Observe.addRegion(b, region);
+      wire.Observe.addReplace(b, m.replace);
+      return wire.Observe.endObserve(b);
     }
     case 'SetTerrain': {
       const terrain = m.terrain === null ? 0 : buildTerrain(b, m.terrain);

@@ -13,6 +13,7 @@ export const featureTakeovers = 256n;
 export const featureLayers = 512n;
 export const featureRefusals = 1024n;
 export const featurePlanting = 2048n;
+export const featureRegions = 16_384n;
 
 export const maxHelloBytes = 16 << 10;
 export const maxControlBytes = 1 << 20;
@@ -26,6 +27,7 @@ export const minResumeTokenBytes = 16;
 export const maxResumeTokenBytes = 64;
 export const maxJoints = 256;
 export const maxEndSites = 256;
+export const maxRateRings = 4;
 export const maxParameters = 7;
 export const maxKeytimes = 9;
 export const maxWeights = 4096;

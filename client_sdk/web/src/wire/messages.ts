@@ -62,6 +62,15 @@ export interface Observe {
   avatars: Uint32Array;
   everyNTicks: number;
   withEvents: boolean;
+  region: RegionEntry | null;
+  replace: boolean;
+}
+export interface RegionEntry {
+  x: number;
+  z: number;
+  radiusM: number;
+  leaveM: number | null;
+  rings: {toM: number; everyNTicks: number}[];
 }
 export interface StopObserving {
   type: 'StopObserving';
@@ -155,6 +164,8 @@ export interface PoseBatch {
   avatars: Uint32Array;
   flags: Uint8Array;
   poses: Uint8Array;
+  /** Who is not in it may be there all the same. */
+  partial: boolean;
 }
 export interface Events {
   type: 'Events';

@@ -8,7 +8,7 @@ const texts = new Set([
   'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
   'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
   'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
-  'removed', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
+  'removed', 'entered', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
 ]);
 /** Fields whose texts are free; all others are enumerators. */
 const free = new Set([

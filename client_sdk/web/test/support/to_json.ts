@@ -108,6 +108,15 @@ export function toJson(m: Message): {[name: string]: Json} {
         seq: u64(m.seq), world: m.world, subscription: m.subscription,
         mode: poseModes.indexOf(m.mode), avatars: [...m.avatars], every_n_ticks: m.everyNTicks,
         with_events: m.withEvents,
+        ...(m.region === null ? {} : {
+          region: {
+            centre_m: {x: m.region.x, z: m.region.z}, radius_m: m.region.radiusM,
+            leave_m: m.region.leaveM,
+            rings: m.region.rings.map(({toM, everyNTicks}) => (
+                {to_m: toM, every_n_ticks: everyNTicks})),
+          },
+          replace: m.replace,
+        }),
       };
     case 'StopObserving': return {seq: u64(m.seq), subscription: m.subscription};
     case 'Ping': return {nonce: u64(m.nonce), time_s: m.timeS};
@@ -167,6 +176,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
         server_time_s: m.serverTimeS, mode: poseModes.indexOf(m.mode),
         joint_count: m.jointCount,
+        ...(m.partial ? {partial: true} : {}),
         poses: [...m.avatars].map((avatar, i) => {
           const rootM = new Float32Array(3);
           const rotations = new Float32Array(4 * m.jointCount);

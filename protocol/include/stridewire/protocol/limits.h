@@ -23,6 +23,8 @@ inline constexpr std::uint64_t kFeatureLayers = 512;      ///< SetLayers, WorldI
 inline constexpr std::uint64_t kFeatureRefusals = 1024;   ///< StepMovement::must_be_met.
 inline constexpr std::uint64_t kFeaturePlanting = 2048;   ///< SetPlanting.
 
+inline constexpr std::uint64_t kFeatureRegions = 16'384;  ///< Observe::region, kEntered, kLeft.
+
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
 inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;   ///< Payload of Hello.
 inline constexpr std::size_t kMaxControlBytes = std::size_t{1} << 20;  ///< Other small messages.
@@ -47,6 +49,7 @@ inline constexpr std::uint16_t kMaxTerrainColumns = 1024;  ///< Of a height fiel
 inline constexpr std::size_t kMaxTerrainBoxes = 65'536;
 inline constexpr std::size_t kMaxWaypoints = 64;   ///< Of a walk.
 inline constexpr std::size_t kMaxLayerNames = 64;  ///< Of a library.
+inline constexpr std::size_t kMaxRateRings = 4;    ///< Of a region.
 inline constexpr std::size_t kMaxRecordBytes = std::size_t{64}
                                                << 10;                ///< Of one avatar (Movements).
 inline constexpr std::size_t kMaxPieceBytes = std::size_t{1} << 20;  ///< Of a library.

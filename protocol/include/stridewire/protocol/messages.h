@@ -240,6 +240,23 @@ struct SetPlanting {
   bool operator==(const SetPlanting&) const = default;
 };
 
+/// Within `to_m` of a region's centre poses come every so many ticks.
+struct RateRing {
+  double to_m = 0.0;                ///< Above 0, and above that of the ring before.
+  std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
+  bool operator==(const RateRing&) const = default;
+};
+
+/// A circle on the ground. Avatars whose root comes within its radius enter; they leave where they are further than
+/// radius and `leave_m`.
+struct Region {
+  GroundPlace centre_m;
+  double radius_m = 0.0;          ///< Above 0.
+  std::optional<double> leave_m;  ///< At least 0; absent: the server chooses.
+  std::vector<RateRing> rings;    ///< At most kMaxRateRings. Beyond them: Observe::every_n_ticks.
+  bool operator==(const Region&) const = default;
+};
+
 struct Observe {
   static constexpr MessageType kType = MessageType::kObserve;
   Seq seq = 0;
@@ -249,6 +266,9 @@ struct Observe {
   std::vector<AvatarNumber> avatars;  ///< Empty: all. Numbers nobody has yet may be among them.
   std::uint16_t every_n_ticks = 1;    ///< 1 to kMaxEveryNTicks
   bool with_events = false;           ///< Events of the world, too.
+  /// Who is in it, instead of `avatars`, which is empty then. Only with kFeatureRegions.
+  std::optional<Region> region;
+  bool replace = false;  ///< Puts this region in place of that of the subscription of that number.
   bool operator==(const Observe&) const = default;
 };
 
@@ -407,6 +427,7 @@ struct PoseBatchInfo {
   double server_time_s = 0.0;       ///< The server's clock at that tick.
   PoseMode mode = PoseMode::kFull;  ///< kFull or kQuantised
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
+  bool is_partial = false;          ///< Who is not in it may be there all the same: of a region.
   bool operator==(const PoseBatchInfo&) const = default;
 };
 
@@ -435,6 +456,8 @@ enum class EventType : std::uint8_t {
   kRejected = 5,    ///< A request turned out impossible: code, reason
   kSpawned = 6,     ///< base
   kRemoved = 7,
+  kEntered = 8,  ///< The region this session observes. Only with kFeatureRegions.
+  kLeft = 9,     ///< That region, or the world. The same.
 };
 
 /// Values by parameter name: 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m, 4 end_y_m,

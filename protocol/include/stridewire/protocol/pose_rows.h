@@ -68,10 +68,16 @@ class PoseBatchComposer {
   [[nodiscard]] std::size_t Fitting(const PoseRows& rows,
                                     std::span<const std::uint32_t> picked) const;
 
-  /// Appends the frame of part `part` of `parts` with the picked rows that are not empty; there may be
-  /// none. Errors as Check(PoseBatch), or kLimitExceeded: more than one frame holds.
+  /// What a frame says about itself beside what all rows have in common.
+  struct Slice {
+    std::size_t part = 0;
+    std::size_t parts = 1;
+    bool is_partial = false;
+  };
+
+  /// Appends a frame with the picked rows that are not empty; there may be none. Errors as Check(PoseBatch), or kLimitExceeded: more than one frame holds.
   [[nodiscard]] Status Compose(const PoseRows& rows, std::span<const std::uint32_t> picked,
-                               std::size_t part, std::size_t parts, std::vector<std::byte>& frame);
+                               const Slice& slice, std::vector<std::byte>& frame);
 
  private:
   struct Impl;

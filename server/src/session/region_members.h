@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "world/mail.h"
+
+namespace stridewire::server {
+
+/// Who is in a region that a session observes: who came within its radius and has not gone further than radius and
+/// leave_m since. Worked out shard by shard, each time with poses of a tick.
+class RegionMembers {
+ public:
+  /// `leave_m` where the region says nothing; beyond its rings poses come every `every_n_ticks`.
+  void Move(const protocol::Region& region, double leave_m, std::uint16_t every_n_ticks);
+
+  /// Of the ticks wanted those that this divides.
+  [[nodiscard]] std::uint16_t every() const { return every_; }
+  [[nodiscard]] RegionReach reach() const {
+    return {region_.centre_m.x, region_.centre_m.z, leave_at_m_};
+  }
+
+  /// What came of a delivery, which has places. Holds until the next call.
+  struct Change {
+    std::span<const AvatarNumber> entered;  ///< Growing.
+    std::span<const AvatarNumber> left;     ///< The same. Also who is not in the world any more.
+    std::span<const std::uint32_t> due;     ///< Rows whose poses are to be sent.
+  };
+  [[nodiscard]] Change Update(const PoseDelivery& delivery);
+
+ private:
+  [[nodiscard]] std::uint16_t EveryAt(double distance_m) const;
+
+  protocol::Region region_;
+  double leave_at_m_ = 0.0;
+  std::uint16_t every_n_ticks_ = 1;
+  std::uint16_t every_ = 1;
+  std::map<int, std::vector<AvatarNumber>> inside_;  // by shard, growing
+  // What the last Change is about.
+  std::vector<std::pair<std::uint32_t, double>> near_;  // row, distance
+  std::vector<AvatarNumber> now_;
+  std::vector<AvatarNumber> entered_;
+  std::vector<AvatarNumber> left_;
+  std::vector<std::uint32_t> due_;
+};
+
+}  // namespace stridewire::server

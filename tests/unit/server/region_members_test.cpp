@@ -1,0 +1,179 @@
+// Who is in a region, against a search without grid or memory of its own.
+#include "session/region_members.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <iostream>
+#include <random>
+#include <set>
+
+#include "random.h"
+
+namespace stridewire::server {
+namespace {
+
+using testing::ElementsAre;
+
+/// Avatars at places; of those in `without` the shard made no pose.
+PoseDelivery DeliveryAt(const std::map<AvatarNumber, std::pair<float, float>>& at,
+                        std::uint64_t tick, int shard = 0,
+                        const std::set<AvatarNumber>& without = {}, double cell_m = 8.0) {
+  auto rows = std::make_shared<protocol::PoseRows>();
+  auto places = std::make_shared<Places>();
+  std::vector<AvatarNumber> numbers;
+  for (const auto& [number, place] : at) numbers.push_back(number);
+  EXPECT_TRUE(rows->Begin({1, 0, 0, 1, tick, 0.0, protocol::PoseMode::kFull, 1},
+                          std::make_shared<const std::vector<AvatarNumber>>(numbers)));
+  places->Begin(cell_m, numbers.size());
+  for (std::size_t row = 0; row < numbers.size(); ++row) {
+    const auto& [x, z] = at.at(numbers[row]);
+    places->Add(static_cast<std::uint32_t>(row), x, z);
+    if (without.contains(numbers[row])) continue;
+    rows->SkipTo(row);
+    EXPECT_TRUE(rows->Add(0, Vec3(x, 0.0f, z), std::array{kIdentityQuat}));
+  }
+  rows->SkipTo(numbers.size());
+  places->Sort();
+  return {.world = 1,
+          .from_shard = shard,
+          .tick = tick,
+          .parts = {},
+          .rows = std::move(rows),
+          .places = std::move(places)};
+}
+
+std::vector<AvatarNumber> NumbersOfRows(const PoseDelivery& delivery,
+                                        std::span<const std::uint32_t> rows) {
+  std::vector<AvatarNumber> numbers;
+  for (const std::uint32_t row : rows) numbers.push_back((*delivery.rows->avatars())[row]);
+  return numbers;
+}
+
+TEST(Places, FindsAllNearAPlaceHoweverLargeTheCells) {
+  const unsigned seed = std::random_device{}();
+  std::cout << "seed " << seed << "\n";
+  Random random(seed);
+  for (const double cell_m : {1.0, 8.0, 1000.0}) {
+    Places places;
+    places.Begin(cell_m, 300);
+    std::vector<std::pair<float, float>> at;
+    for (std::uint32_t row = 0; row < 300; ++row) {
+      const double scale = row % 10 == 0 ? 100'000.0 : 40.0;
+      at.emplace_back(static_cast<float>(random.Draw(-scale, scale)),
+                      static_cast<float>(random.Draw(-scale, scale)));
+      places.Add(row, at.back().first, at.back().second);
+    }
+    places.Sort();
+    for (int i = 0; i < 200; ++i) {
+      const double x = random.Draw(-60.0, 60.0);
+      const double z = random.Draw(-60.0, 60.0);
+      const double reach_m = i % 20 == 0 ? 1e300 : random.Draw(0.0, i % 3 == 0 ? 1e5 : 30.0);
+      std::set<std::uint32_t> expected;
+      for (std::uint32_t row = 0; row < at.size(); ++row) {
+        if (std::abs(at[row].first - x) <= reach_m && std::abs(at[row].second - z) <= reach_m) {
+          expected.insert(row);
+        }
+      }
+      std::multiset<std::uint32_t> found;
+      places.ForEachNear(x, z, reach_m,
+                         [&](std::uint32_t row, float, float) { found.insert(row); });
+      ASSERT_EQ(std::vector(found.begin(), found.end()),
+                std::vector(expected.begin(), expected.end()));
+    }
+    int nobody = 0;
+    places.ForEachNear(1e300, -1e300, 10.0, [&](std::uint32_t, float, float) { ++nobody; });
+    EXPECT_EQ(nobody, 0);
+  }
+}
+
+// Avatars walk, come and go on two shards while the region moves and changes.
+TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
+  const unsigned seed = std::random_device{}();
+  std::cout << "seed " << seed << "\n";
+  Random random(seed);
+  RegionMembers members;
+  protocol::Region region{{0.0, 0.0}, 20.0, 5.0, {{10.0, 1}, {18.0, 3}}};
+  constexpr std::uint16_t kEvery = 4;
+  members.Move(region, 8.0, kEvery);
+  EXPECT_EQ(members.every(), 1);
+  std::map<AvatarNumber, std::pair<float, float>> at[2];
+  std::set<AvatarNumber> inside;
+  std::size_t entered_count = 0;
+  std::size_t left_count = 0;
+  for (std::uint64_t tick = 1; tick <= 600; ++tick) {
+    if (tick % 7 == 0) {
+      region.centre_m.x += random.Draw(-4.0, 4.0);
+      region.centre_m.z += random.Draw(-4.0, 4.0);
+      region.radius_m = random.Draw(12.0, 25.0);
+      region.leave_m = tick % 14 == 0 ? std::nullopt : std::optional(random.Draw(0.0, 10.0));
+      members.Move(region, 8.0, kEvery);
+    }
+    const double leave_at_m = region.radius_m + region.leave_m.value_or(8.0);
+    for (int shard = 0; shard < 2; ++shard) {
+      for (AvatarNumber number = 1 + static_cast<AvatarNumber>(shard); number <= 60; number += 2) {
+        const auto found = at[shard].find(number);
+        if (found == at[shard].end()) {
+          if (random.Draw(0.0, 1.0) < 0.2) {
+            at[shard][number] = {static_cast<float>(random.Draw(-40.0, 40.0)),
+                                 static_cast<float>(random.Draw(-40.0, 40.0))};
+          }
+        } else if (random.Draw(0.0, 1.0) < 0.01) {
+          at[shard].erase(found);
+        } else {
+          found->second.first += static_cast<float>(random.Draw(-1.0, 1.0));
+          found->second.second += static_cast<float>(random.Draw(-1.0, 1.0));
+        }
+      }
+      const PoseDelivery delivery = DeliveryAt(at[shard], tick, shard);
+      const RegionMembers::Change change = members.Update(delivery);
+      std::vector<AvatarNumber> entered;
+      std::vector<AvatarNumber> left;
+      std::vector<AvatarNumber> due;
+      for (AvatarNumber number = 1 + static_cast<AvatarNumber>(shard); number <= 60; number += 2) {
+        const auto found = at[shard].find(number);
+        const bool was = inside.contains(number);
+        bool is = false;
+        if (found != at[shard].end()) {
+          const double distance_m = std::hypot(found->second.first - region.centre_m.x,
+                                               found->second.second - region.centre_m.z);
+          is = distance_m <= (was ? leave_at_m : region.radius_m);
+          const std::uint64_t every = distance_m <= 10.0 ? 1 : distance_m <= 18.0 ? 3 : kEvery;
+          if (is && (!was || tick % every == 0)) due.push_back(number);
+        }
+        if (is && !was) entered.push_back(number);
+        if (was && !is) left.push_back(number);
+        if (is) {
+          inside.insert(number);
+        } else {
+          inside.erase(number);
+        }
+      }
+      ASSERT_TRUE(std::ranges::equal(change.entered, entered)) << tick;
+      ASSERT_TRUE(std::ranges::equal(change.left, left)) << tick;
+      ASSERT_EQ(NumbersOfRows(delivery, change.due), due) << tick;
+      entered_count += entered.size();
+      left_count += left.size();
+    }
+  }
+  EXPECT_GT(entered_count, 50u);
+  EXPECT_GT(left_count, 50u);
+}
+
+TEST(RegionMembers, EnterWithTheirFirstPose) {
+  RegionMembers members;
+  members.Move({{0.0, 0.0}, 10.0, 0.0, {}}, 8.0, 1);
+  const std::map<AvatarNumber, std::pair<float, float>> at{{4, {1.0f, 1.0f}}, {5, {2.0f, 0.0f}}};
+  PoseDelivery delivery = DeliveryAt(at, 1, 0, {5});
+  RegionMembers::Change change = members.Update(delivery);
+  EXPECT_THAT(std::vector(change.entered.begin(), change.entered.end()), ElementsAre(4));
+  delivery = DeliveryAt(at, 2, 0, {4});
+  change = members.Update(delivery);
+  EXPECT_THAT(std::vector(change.entered.begin(), change.entered.end()), ElementsAre(5));
+  EXPECT_TRUE(change.left.empty());  // 4 is there, though there is no pose of it
+  EXPECT_THAT(NumbersOfRows(delivery, change.due), ElementsAre(5));
+}
+
+}  // namespace
+}  // namespace stridewire::server
