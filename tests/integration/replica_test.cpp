@@ -31,10 +31,7 @@ std::string BytesOf(ConstPoseSpan pose) {
   return bytes;
 }
 
-bool IsSame(ConstPoseSpan a, ConstPoseSpan b) {
-  return std::memcmp(&a.root_position_m, &b.root_position_m, sizeof(Vec3)) == 0 &&
-         std::memcmp(a.rotations.data(), b.rotations.data(), a.rotations.size_bytes()) == 0;
-}
+bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
 struct Manner {
   const char* name;

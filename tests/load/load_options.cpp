@@ -149,7 +149,11 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
                  "How many each of these watches, spread over the crowd, not the same ones [100]");
   app.add_option("--seconds", options.seconds, "Length of the measured window (0.1 to 3600)")
       ->required();
-  app.add_option("--mode", mode, "How poses are sent: full or quantised [quantised]");
+  app.add_option("--mode", mode,
+                 "How poses are sent: full or quantised; movement: evaluated here [quantised]");
+  app.add_option("--library", options.library,
+                 "What the server's worlds have, for --mode movement [builtin]")
+      ->type_name("FILE");
   app.add_option("--choreography", options.choreography,
                  "What each avatar does, over and over; repeated from where it stands then")
       ->type_name("C.json");
@@ -198,9 +202,10 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   if (mode == "full") {
     options.mode = protocol::PoseMode::kFull;
   } else if (mode == "movement") {
-    return Fail(ErrorCode::kUnsupported, "is not supported yet", "--mode movement");
+    options.mode = protocol::PoseMode::kMovement;
   } else if (mode != "quantised") {
-    return Fail(ErrorCode::kInvalidArgument, "is neither full nor quantised", "--mode " + mode);
+    return Fail(ErrorCode::kInvalidArgument, "is not full, quantised or movement",
+                "--mode " + mode);
   }
   if (observe != "all" && observe != "one") {
     return Fail(ErrorCode::kInvalidArgument, "is neither all nor one", "--observe " + observe);

@@ -39,8 +39,9 @@ struct LoadOptions {
   int partial_avatars = 100;  ///< How many each of those names.
   double seconds = 10.0;
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
-  std::string choreography;  ///< A file; empty: the avatars wander.
-  bool observe_all = true;   ///< Every observer watches every world; else one each, in turn.
+  std::string library = "builtin";  ///< The server's, in mode movement.
+  std::string choreography;         ///< A file; empty: the avatars wander.
+  bool observe_all = true;          ///< Every observer watches every world; else one each, in turn.
   double churn_per_s = 0.0;
   int threads = 1;
   int verify_one_in = 1;  ///< Observers decode and check each n-th batch.

@@ -7,6 +7,15 @@
 namespace stridewire::load {
 namespace {
 
+const char* ModeName(protocol::PoseMode mode) {
+  switch (mode) {
+    case protocol::PoseMode::kFull: return "full";
+    case protocol::PoseMode::kQuantised: return "quantised";
+    case protocol::PoseMode::kMovement: return "movement";
+  }
+  return "";
+}
+
 using nlohmann::ordered_json;
 
 /// Three decimals are more than any of these times is good for.
@@ -34,7 +43,7 @@ ordered_json ToDocument(const LoadReport& report) {
   }
   return {{"avatars", report.avatars},
           {"observers", report.observers},
-          {"mode", report.mode == protocol::PoseMode::kFull ? "full" : "quantised"},
+          {"mode", ModeName(report.mode)},
           {"seconds", Rounded(report.seconds)},
           {"poses_received", report.poses_received},
           {"poses_expected", report.poses_expected},
@@ -114,8 +123,7 @@ std::string ToText(const LoadReport& report) {
   const auto count = [](std::uint64_t n) { return static_cast<unsigned long long>(n); };
   std::string text =
       Format("load            %d avatars in %d worlds, %d observers, %s, %.1f s, seed %llu\n",
-             report.avatars, report.worlds, report.observers,
-             report.mode == protocol::PoseMode::kFull ? "full" : "quantised", report.seconds,
+             report.avatars, report.worlds, report.observers, ModeName(report.mode), report.seconds,
              count(report.seed));
   if (report.partial_observers > 0) {
     text += Format("                %d observers of %d avatars each\n", report.partial_observers,

@@ -132,8 +132,12 @@ bool MayOpenFiles(std::size_t count) {
 class LoadRun {
  public:
   LoadRun(const LoadOptions& options, const Choreography* choreography,
-          const std::atomic<bool>& stop, const std::function<void(const std::string&)>& progress)
-      : options_(options), run_(options, choreography), stop_(stop), progress_(progress) {}
+          std::shared_ptr<const MotionLibrary> library, const std::atomic<bool>& stop,
+          const std::function<void(const std::string&)>& progress)
+      : options_(options),
+        run_(options, choreography, std::move(library)),
+        stop_(stop),
+        progress_(progress) {}
 
   LoadReport Run() {
     if (SetUp()) Measure();
@@ -461,9 +465,9 @@ LoadReport LoadRun::Report() {
 }  // namespace
 
 LoadReport RunLoad(const LoadOptions& options, const Choreography* choreography,
-                   const std::atomic<bool>& stop,
+                   std::shared_ptr<const MotionLibrary> library, const std::atomic<bool>& stop,
                    const std::function<void(const std::string&)>& progress) {
-  return LoadRun(options, choreography, stop, progress).Run();
+  return LoadRun(options, choreography, std::move(library), stop, progress).Run();
 }
 
 }  // namespace stridewire::load

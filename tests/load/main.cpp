@@ -9,6 +9,7 @@
 
 #include "load_options.h"
 #include "load_run.h"
+#include "stridewire/offline/open_library.h"
 
 namespace {
 
@@ -56,12 +57,21 @@ int Run(int argc, char** argv) {
     }
     choreography = std::move(*read);
   }
+  std::shared_ptr<const MotionLibrary> library;
+  if (options.mode == protocol::PoseMode::kMovement) {
+    auto opened = OpenLibrary(options.library);
+    if (!opened) {
+      std::fprintf(stderr, "stridewire-load: --library %s\n", Describe(opened.error()).c_str());
+      return 2;
+    }
+    library = *std::move(opened);
+  }
   std::signal(SIGINT, OnSignal);
   std::signal(SIGTERM, OnSignal);
   std::signal(SIGPIPE, SIG_IGN);
   const bool tells_progress = isatty(STDERR_FILENO) != 0;
   const LoadReport report = RunLoad(options, options.choreography.empty() ? nullptr : &choreography,
-                                    stop, [tells_progress](const std::string& text) {
+                                    library, stop, [tells_progress](const std::string& text) {
                                       if (tells_progress)
                                         std::fprintf(stderr, "\r\033[K%s", text.c_str());
                                     });

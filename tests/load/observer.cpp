@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <glm/geometric.hpp>
 #include <utility>
 
@@ -71,6 +72,9 @@ void Observer::OnMessage(protocol::Message& message, std::size_t frame_bytes, st
   if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
     return OnBatch(*batch, frame_bytes, now_ns);
   }
+  if (const auto* movements = std::get_if<protocol::Movements>(&message)) {
+    return OnMovements(*movements, frame_bytes, now_ns);
+  }
   if (const auto* info = std::get_if<protocol::WorldInfo>(&message)) return OnWorldInfo(*info);
   if (const auto* reply = std::get_if<protocol::Reply>(&message)) return OnReply(*reply);
   if (const auto* lagging = std::get_if<protocol::Lagging>(&message)) {
@@ -87,7 +91,17 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
   if (pending == pending_joins_.end()) return Lose("a world that was not joined");
   World& world = worlds_[pending->second];
   world.joint_count = info.skeleton.joints.size();
-  world.pose_bytes = protocol::PoseBytes(run_.options.mode, world.joint_count);
+  // What is evaluated here is checked as if it had been sent in full.
+  const bool evaluates = run_.options.mode == protocol::PoseMode::kMovement;
+  world.pose_bytes = protocol::PoseBytes(evaluates ? protocol::PoseMode::kFull : run_.options.mode,
+                                         world.joint_count);
+  if (evaluates) {
+    if (info.library_hash != run_.library->hash()) {
+      return run_.Problem(name() + ": --library is not that of world " + info.name);
+    }
+    world.evaluated =
+        std::make_unique<client::MovementView>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
+  }
   if (probes_ != nullptr) world.last_poses.assign(world.seen.size() * world.pose_bytes, {});
   rotations_.resize(std::max(rotations_.size(), world.joint_count));
   world_by_id_[info.world] = pending->second;
@@ -131,6 +145,72 @@ void Observer::OnLost(const std::string& why, bool by_us) {
   if (!by_us && !run_.is_ending) run_.Problem(name() + ": " + why);
 }
 
+namespace {
+
+// The poses of one message of movements, as a batch would have them.
+class BatchScreen final : public client::PoseScreen {
+ public:
+  BatchScreen(std::size_t joint_count, std::function<bool(protocol::AvatarNumber)> wants)
+      : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),
+        wants_(std::move(wants)) {}
+
+  void Show(protocol::AvatarNumber avatar, std::uint16_t, const client::PoseStamp& stamp,
+            ConstPoseSpan pose) override {
+    const std::size_t begin = poses.size();
+    poses.resize(begin + bytes_);
+    const Status encoded = protocol::EncodePose(protocol::PoseMode::kFull, pose.root_position_m,
+                                                pose.rotations, std::span(poses).subspan(begin));
+    if (!encoded)
+      std::fill(poses.begin() + static_cast<std::ptrdiff_t>(begin), poses.end(), std::byte{255});
+    avatars.push_back(avatar);
+    flags.push_back(
+        static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
+                                  (stamp.standing ? protocol::kPoseStanding : 0)));
+  }
+  void Gone(protocol::AvatarNumber) override {}
+  [[nodiscard]] bool Wants(protocol::AvatarNumber avatar) const override { return wants_(avatar); }
+
+  std::vector<protocol::AvatarNumber> avatars;
+  std::vector<std::uint8_t> flags;
+  std::vector<std::byte> poses;
+
+ private:
+  std::size_t bytes_;
+  std::function<bool(protocol::AvatarNumber)> wants_;
+};
+
+}  // namespace
+
+void Observer::OnMovements(const protocol::Movements& movements, std::size_t frame_bytes,
+                           std::int64_t now_ns) {
+  const auto found = world_by_id_.find(movements.world);
+  if (found == world_by_id_.end() || worlds_[found->second].evaluated == nullptr) {
+    return Lose("movements of a world that is not observed");
+  }
+  World& world = worlds_[found->second];
+  BatchScreen screen(world.joint_count, [&](protocol::AvatarNumber avatar) {
+    return IndexIn(world, avatar).has_value();
+  });
+  if (const Status taken = world.evaluated->Take(movements, screen); !taken) {
+    return Invalid(world, movements.tick, Describe(taken.error()));
+  }
+  if (run_.window.Contains(movements.tick)) counts_.bytes_received += frame_bytes;
+  const bool is_shown = movements.more_steps == 0 && movements.part + 1 == movements.parts;
+  if (!is_shown) return;
+  const protocol::PoseBatch batch{{.world = movements.world,
+                                   .shard = movements.shard,
+                                   .tick = movements.tick,
+                                   .server_time_s = movements.server_time_s,
+                                   .mode = protocol::PoseMode::kFull,
+                                   .joint_count = static_cast<std::uint16_t>(world.joint_count)},
+                                  screen.avatars,
+                                  screen.flags,
+                                  screen.poses};
+  // States come beside what changed in their tick.
+  if (!movements.states && !AdvanceStream(world, batch)) return;
+  TakePoses(world, batch, now_ns);
+}
+
 void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes,
                        std::int64_t now_ns) {
   const auto found = world_by_id_.find(batch.info.world);
@@ -141,8 +221,13 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
     return Invalid(world, tick, "a batch of another mode or number of joints than agreed");
   }
   if (!AdvanceStream(world, batch)) return;
+  if (run_.window.Contains(tick)) counts_.bytes_received += frame_bytes;
+  TakePoses(world, batch, now_ns);
+}
+
+void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns) {
+  const std::uint64_t tick = batch.info.tick;
   const bool counts = run_.window.Contains(tick);
-  if (counts) counts_.bytes_received += frame_bytes;
   const bool verifies =
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {

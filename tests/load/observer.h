@@ -3,11 +3,13 @@
 #include <atomic>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "latency_probes.h"
+#include "movement_view.h"
 #include "run_state.h"
 #include "session.h"
 
@@ -72,7 +74,8 @@ class Observer final : public Session {
     std::vector<std::byte> last_poses;  ///< Only to measure latency: all poses, as they came
     std::size_t pose_bytes = 0;
     std::vector<Stream> streams;
-    std::uint64_t batches_dropped = 0;  ///< As the server told on this connection
+    std::unique_ptr<client::MovementView> evaluated;  ///< In mode movement.
+    std::uint64_t batches_dropped = 0;                ///< As the server told on this connection
   };
 
   void OnWelcome() override;
@@ -85,7 +88,10 @@ class Observer final : public Session {
                                                    protocol::AvatarNumber number) const;
   void OnWorldInfo(const protocol::WorldInfo& info);
   void OnReply(const protocol::Reply& reply);
+  void OnMovements(const protocol::Movements& movements, std::size_t frame_bytes,
+                   std::int64_t now_ns);
   void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);
+  void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
   /// False: the batch is not to be counted.
   bool AdvanceStream(World& world, const protocol::PoseBatch& batch);
   bool CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i);

@@ -4,11 +4,14 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "error_log.h"
 #include "load_options.h"
 #include "stridewire/offline/choreography.h"
+#include "stridewire/runtime/motion_library.h"
 
 namespace stridewire::load {
 
@@ -65,9 +68,11 @@ class TickWindow {
 
 /// What all sessions of a run share.
 struct RunState {
-  RunState(const LoadOptions& load_options, const Choreography* moves)
+  RunState(const LoadOptions& load_options, const Choreography* moves,
+           std::shared_ptr<const MotionLibrary> of_poses)
       : options(load_options),
         choreography(moves),
+        library(std::move(of_poses)),
         layout{load_options.avatars, load_options.worlds} {}
 
   /// Something went wrong that ends with exit code 1.
@@ -77,7 +82,8 @@ struct RunState {
   }
 
   const LoadOptions& options;
-  const Choreography* choreography;  ///< Null: the avatars wander.
+  const Choreography* choreography;                    ///< Null: the avatars wander.
+  const std::shared_ptr<const MotionLibrary> library;  ///< In mode movement.
   const Layout layout;
   TickWindow window;
   ErrorLog errors;

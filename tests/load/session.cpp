@@ -46,7 +46,7 @@ void Session::Open() {
     state_ = State::kGreeting;
     protocol::Hello hello;
     hello.client_name = name_;
-    hello.features = protocol::kFeatureQuantised;
+    hello.features = protocol::kFeatureQuantised | protocol::kFeatureMovementMode;
     WaitToRead();
     Send(hello);
   });

@@ -12,8 +12,8 @@ void MakeRoom(const MotionLibrary& library, Movement& movement) {
   movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
 }
 
-AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of)
-    : library(std::move(of)),
+AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
+    : library(std::move(of_library)),
       pose(library->skeleton().joint_count()),
       blended_pose(library->skeleton().joint_count()),
       earlier_pose(library->skeleton().joint_count()),

@@ -162,6 +162,21 @@ TEST(LoadProgram, CountsThePosesOfObserversThatWatchSome) {
   EXPECT_LT(report["bytes_per_pose"], 200.0);
 }
 
+TEST(LoadProgram, EvaluatesThePosesItselfInModeMovement) {
+  const RealServer server;
+  const ProgramResult result = server.Load(
+      {"--avatars", "50", "--observers", "2", "--partial-observers", "2", "--partial-avatars", "10",
+       "--seconds", "3", "--mode", "movement", "--churn", "1"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report["mode"], "movement");
+  EXPECT_EQ(report["poses_invalid"], 0);
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+  EXPECT_GE(report["steps_measured"], 10);
+  EXPECT_LT(report["bytes_per_pose"], 50.0);
+}
+
 TEST(LoadProgram, SpreadsAChoreographyOverWorldsAndThreads) {
   const test::ScratchFolder scratch;
   const std::string file =

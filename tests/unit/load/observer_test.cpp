@@ -105,7 +105,7 @@ class ObserverTest : public ::testing::Test {
   }
 
   const LoadOptions options_ = Options();
-  RunState run_{options_, nullptr};
+  RunState run_{options_, nullptr, nullptr};
   FakeServer server_;
   FakeConnection connection_;
   ThreadContext context_;
@@ -143,7 +143,7 @@ TEST(PartialObserver, WatchesAsManyAsItIsTold) {
   options.worlds = 2;
   options.partial_observers = 2;
   options.partial_avatars = 4;
-  RunState run{options, nullptr};
+  RunState run{options, nullptr, nullptr};
   FakeServer server;
   for (int which = 0; which < options.partial_observers; ++which) {
     ThreadContext context;

@@ -15,7 +15,7 @@ namespace stridewire {
 /// What can be seen of an avatar and what its next movement goes on from: the part that an Avatar, which decides what
 /// it does, and an AvatarReplica, which is told, have in common. Times are the movement's.
 struct AvatarBody {
-  explicit AvatarBody(std::shared_ptr<const MotionLibrary> library);
+  explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
   Pose pose;  ///< Displayed, but for layers
