@@ -507,9 +507,26 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
   });
 }
 
-stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
-                                            const stridewire_observation* observation,
-                                            uint32_t* subscription, uint64_t* command) {
+namespace {
+
+bool IsRegion(const stridewire_region* region) {
+  return region != nullptr && region->ring_count <= STRIDEWIRE_MAX_RATE_RINGS &&
+         (region->rings == nullptr) == (region->ring_count == 0);
+}
+
+protocol::Region ToRegion(const stridewire_region& region) {
+  protocol::Region out{{region.x, region.z}, region.radius_m, std::nullopt, {}};
+  if (!(region.leave_m < 0.0)) out.leave_m = region.leave_m;
+  for (std::size_t i = 0; i < region.ring_count; ++i) {
+    out.rings.push_back({region.rings[i].to_m, region.rings[i].every_n_ticks});
+  }
+  return out;
+}
+
+stridewire_status Observe(stridewire_client* client, stridewire_world world,
+                          const stridewire_observation* observation,
+                          const stridewire_region* region, std::uint32_t* subscription,
+                          std::uint64_t* command) {
   if (observation == nullptr || observation->mode < STRIDEWIRE_FULL ||
       observation->mode > STRIDEWIRE_MOVEMENT || observation->avatar_count > STRIDEWIRE_MAX_ITEMS ||
       (observation->avatars == nullptr) != (observation->avatar_count == 0)) {
@@ -521,10 +538,40 @@ stridewire_status stridewire_client_observe(stridewire_client* client, stridewir
     message.every_n_ticks = observation->every_n_ticks;
     message.with_events = observation->with_events != 0;
     message.avatars.assign(observation->avatars, observation->avatars + observation->avatar_count);
+    if (region != nullptr) message.region = ToRegion(*region);
     std::uint64_t id = 0;
     std::uint32_t number = 0;
     const auto status = session.Observe(world, std::move(message), number, id);
     if (subscription != nullptr) *subscription = number;
+    StoreCommand(command, id);
+    return status;
+  });
+}
+
+}  // namespace
+
+stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
+                                            const stridewire_observation* observation,
+                                            uint32_t* subscription, uint64_t* command) {
+  return Observe(client, world, observation, nullptr, subscription, command);
+}
+
+stridewire_status stridewire_client_observe_region(stridewire_client* client,
+                                                   stridewire_world world,
+                                                   const stridewire_observation* observation,
+                                                   const stridewire_region* region,
+                                                   uint32_t* subscription, uint64_t* command) {
+  if (!IsRegion(region)) return STRIDEWIRE_INVALID_ARGUMENT;
+  return Observe(client, world, observation, region, subscription, command);
+}
+
+stridewire_status stridewire_client_move_region(stridewire_client* client, uint32_t subscription,
+                                                const stridewire_region* region,
+                                                uint64_t* command) {
+  if (!IsRegion(region)) return STRIDEWIRE_INVALID_ARGUMENT;
+  return Command(client, [&](Session& session) {
+    std::uint64_t id = 0;
+    const auto status = session.MoveRegion(subscription, ToRegion(*region), id);
     StoreCommand(command, id);
     return status;
   });

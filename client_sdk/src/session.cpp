@@ -59,8 +59,8 @@ stridewire_parameters ToParameters(const protocol::ParameterSet& set) {
 stridewire_event_type ToEventType(protocol::EventType type) {
   return static_cast<stridewire_event_type>(STRIDEWIRE_EVENT_ACCEPTED + static_cast<int>(type));
 }
-static_assert(STRIDEWIRE_EVENT_REMOVED - STRIDEWIRE_EVENT_ACCEPTED ==
-              static_cast<int>(protocol::EventType::kRemoved));
+static_assert(STRIDEWIRE_EVENT_LEFT - STRIDEWIRE_EVENT_ACCEPTED ==
+              static_cast<int>(protocol::EventType::kLeft));
 
 std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain) {
   if (!terrain) return 0;
@@ -282,6 +282,24 @@ stridewire_status Session::Observe(stridewire_world world, protocol::Observe mes
   return STRIDEWIRE_OK;
 }
 
+stridewire_status Session::MoveRegion(std::uint32_t subscription, protocol::Region region,
+                                      std::uint64_t& command) {
+  for (auto& [handle, world] : worlds_) {
+    const auto found = world.subscriptions.find(subscription);
+    if (found == world.subscriptions.end() || !found->second.message.region) continue;
+    protocol::Observe message = found->second.message;
+    message.region = std::move(region);
+    message.replace = true;
+    if (stridewire_status status = Enqueue(handle, message, 0, command); status != STRIDEWIRE_OK) {
+      return status;
+    }
+    found->second.message.region = std::move(message.region);
+    Pump();
+    return STRIDEWIRE_OK;
+  }
+  return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this number");
+}
+
 stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64_t& command) {
   for (auto& [handle, world] : worlds_) {
     const auto found = world.subscriptions.find(subscription);
@@ -399,8 +417,8 @@ void Session::OnConnected(double now_s) {
   hello.features =
       protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
       protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
-      protocol::kFeatureTakeovers | protocol::kFeatureLayers | protocol::kFeatureRefusals |
-      protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
+      protocol::kFeatureRegions | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
+      protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -600,6 +618,7 @@ bool Session::Understands(const CommandMessage& message) const {
     return (features_ & protocol::kFeaturePlanting) != 0;
   }
   if (const auto* observe = std::get_if<protocol::Observe>(&message)) {
+    if (observe->region && (features_ & protocol::kFeatureRegions) == 0) return false;
     return observe->mode != protocol::PoseMode::kMovement ||
            (features_ & protocol::kFeatureMovementMode) != 0;
   }
@@ -745,6 +764,10 @@ void Session::StartAnew() {
       continue;
     }
     if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
+      if (observe->replace) {
+        Answer(command, STRIDEWIRE_OK);  // What is observed anew is there already.
+        continue;
+      }
       if (worlds_.at(command.world).subscriptions.contains(observe->subscription)) {
         observing.emplace(observe->subscription, std::move(command));
         continue;
@@ -783,6 +806,7 @@ void Session::StartAnew() {
       if (subscription.unsent) continue;  // Still waiting in its place.
       subscription.unsent = true;
       if (const auto found = observing.find(id); found != observing.end()) {
+        found->second.message = subscription.message;  // A region may have moved since.
         first.push_back(std::move(found->second));
       } else {
         first.push_back(Command{0, handle, true, 0, subscription.message});
@@ -943,6 +967,7 @@ void Session::OnRemoveReply(World& world, const protocol::Remove& remove,
 
 void Session::OnObserveReply(World& world, const protocol::Observe& observe,
                              const protocol::Reply& reply) {
+  if (observe.replace) return;
   if (reply.code != protocol::StatusCode::kOk) {
     world.subscriptions.erase(observe.subscription);
     UpdateFilter(world);
@@ -1040,6 +1065,7 @@ void Session::FollowSpawned(World& world, const protocol::Event& event) {
       world.spawned.erase(event.avatar);
       world.view->Remove(event.avatar);
       break;
+    case protocol::EventType::kLeft: world.view->Leave(event.avatar, event.tick); break;
     default: break;
   }
 }

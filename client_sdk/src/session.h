@@ -101,6 +101,8 @@ class Session {
                                 std::uint64_t& command);
   stridewire_status Observe(stridewire_world world, protocol::Observe message,
                             std::uint32_t& subscription, std::uint64_t& command);
+  stridewire_status MoveRegion(std::uint32_t subscription, protocol::Region region,
+                               std::uint64_t& command);
   stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
   stridewire_status Ping(double now_s);
 

@@ -17,6 +17,7 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
 void WorldView::ClearPoses() {
   for (auto track = tracks_.begin(); track != tracks_.end();) track = Erase(track);
   shards_.clear();
+  left_.clear();
 }
 
 void WorldView::Clear() {
@@ -58,7 +59,8 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   if (shard.epoch != epoch_) {
     shard = Shard{info.tick, 0, epoch_, info.mode};
   } else if (info.tick > shard.tick) {
-    if (every_n_ticks > 0 && info.tick - shard.tick > every_n_ticks) {
+    // Of a region nothing comes at ticks at which nobody is due.
+    if (!info.is_partial && every_n_ticks > 0 && info.tick - shard.tick > every_n_ticks) {
       counts.missing += (info.tick - shard.tick - 1) / every_n_ticks;
     }
     shard.tick = info.tick;
@@ -71,6 +73,9 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber avatar = batch.avatars[i];
     if (filter_ && !filter_->contains(avatar)) continue;
+    if (const auto left = left_.find(avatar); left != left_.end() && info.tick < left->second) {
+      continue;
+    }
     Vec3 root_position_m;
     if (Status status = protocol::DecodePose(info.mode, batch.pose(i), root_position_m, scratch_);
         !status) {
@@ -153,10 +158,20 @@ void WorldView::Forget(double time_s) {
 }
 
 void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
+  if (info.is_partial) {
+    std::erase_if(left_,
+                  [&](const auto& item) { return item.second + kKeepLeftTicks < info.tick; });
+    return Forget(info.server_time_s);
+  }
   for (auto& [avatar, t] : tracks_) {
     if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
   }
   Forget(info.server_time_s);
+}
+
+void WorldView::Leave(protocol::AvatarNumber avatar, std::uint64_t tick) {
+  Remove(avatar);
+  if (left_.contains(avatar) || left_.size() < protocol::kMaxItems) left_[avatar] = tick;
 }
 
 void WorldView::Remove(protocol::AvatarNumber avatar) {

@@ -26,6 +26,8 @@ class WorldView : public PoseScreen {
  public:
   /// Poses of an avatar that is gone can still be sampled for this long.
   static constexpr double kKeepGone_s = 2.0;
+  /// How long it is remembered that an avatar has left: batches wait for a few ticks at most.
+  static constexpr std::uint64_t kKeepLeftTicks = 600;
   /// More shards than this in one world are refused.
   static constexpr std::size_t kMaxShards = 1024;
 
@@ -70,6 +72,9 @@ class WorldView : public PoseScreen {
 
   /// The server said that the avatar is gone.
   void Remove(protocol::AvatarNumber avatar);
+  /// It has left the region observed at that tick; poses from before it that are still on their way do not
+  /// bring it back.
+  void Leave(protocol::AvatarNumber avatar, std::uint64_t tick);
 
   /// Nullptr if nothing is known of it.
   [[nodiscard]] const PoseHistory* Find(protocol::AvatarNumber avatar) const;
@@ -122,6 +127,8 @@ class WorldView : public PoseScreen {
   std::optional<std::set<protocol::AvatarNumber>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
+  std::map<protocol::AvatarNumber, std::uint64_t>
+      left_;  // since which tick; forgotten after a while
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
   std::uint64_t shown_every_ = 1;   // while movements are taken in

@@ -74,7 +74,8 @@ struct AvatarAt {
 inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t tick,
                                         const std::vector<AvatarAt>& avatars,
                                         protocol::PoseMode mode = protocol::PoseMode::kFull,
-                                        std::uint16_t shard = 0, int joints = kJoints) {
+                                        std::uint16_t shard = 0, int joints = kJoints,
+                                        bool is_partial = false) {
   protocol::PoseBatchEncoder encoder;
   protocol::PoseBatchInfo info;
   info.world = world;
@@ -83,6 +84,7 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   info.server_time_s = TickTime(tick);
   info.mode = mode;
   info.joint_count = static_cast<std::uint16_t>(joints);
+  info.is_partial = is_partial;
   std::vector<std::byte> frame;
   (void)encoder.Begin(info);
   auto rotations = RotationsAt(info.server_time_s);

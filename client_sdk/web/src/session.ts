@@ -5,14 +5,14 @@ import {Listeners} from './listeners';
 import {WorldRecording} from './recording';
 import {Status, statusName, statusText} from './status';
 import type {
-  AvatarState, ClientListeners, ClientOptions, ClientState, Feature, Observation, Reply, Role,
+  AvatarState, ClientListeners, ClientOptions, ClientState, Feature, Observation, Region, Reply, Role,
   Statistics, Subscription, WorldEvent
 } from './types';
 import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureResume,
+  featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
   featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
   maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
@@ -28,7 +28,7 @@ import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
 const featureBits: Record<Feature, bigint> = {
   inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
   takeovers: featureTakeovers, layers: featureLayers, refusals: featureRefusals,
-  planting: featurePlanting,
+  planting: featurePlanting, regions: featureRegions,
 };
 
 /** What the caller may set, filled in. */
@@ -280,7 +280,30 @@ export class Session {
       }
       this.tell();
     });
-    return {id, reply, stop: () => this.stopObserving(world, id)};
+    return {
+      id,
+      reply,
+      moveRegion: (region) => this.moveRegion(world, id, region),
+      stop: () => this.stopObserving(world, id),
+    };
+  }
+
+  private moveRegion(world: WorldHandle, id: number, region: Region): Promise<Reply> {
+    return new Promise((resolve) => {
+      try {
+        const wanted = world.subscriptions.get(id);
+        if (wanted === undefined || wanted.message.region === null) {
+          throw new StridewireError(Status.no_such_subscription, 'No region has this number.');
+        }
+        const entry = check.region(region);
+        this.enqueue(world, {...wanted.message, seq: 0n, region: entry, replace: true}, resolve);
+        wanted.message.region = entry;
+        this.pump();
+      } catch (error) {
+        resolve(refusal(error));
+      }
+      this.tell();
+    });
   }
 
   private stopObserving(world: WorldHandle, id: number): Promise<Reply> {
@@ -424,7 +447,7 @@ export class Session {
       clientName: this.options.clientName,
       features: featureResume | featureEventReplay | featureQuantised | featureInspect |
           featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
-          featureRefusals | featurePlanting,
+          featureRefusals | featureRegions | featurePlanting,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -596,6 +619,9 @@ export class Session {
   private sendCommand(command: Command): void {
     const {message, world} = command;
     if (!this.understands(message)) {
+      if (message.type === 'Observe' && world.subscriptions.delete(message.subscription)) {
+        world.updateFilter();
+      }
       this.answer(command, Status.unsupported, '');
       return;
     }
@@ -629,6 +655,7 @@ export class Session {
       case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
       case 'SetLayers': return (this.features & featureLayers) !== 0n;
       case 'SetPlanting': return (this.features & featurePlanting) !== 0n;
+      case 'Observe': return message.region === null || (this.features & featureRegions) !== 0n;
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
@@ -786,6 +813,10 @@ export class Session {
         case 'LeaveWorld':
         case 'StopObserving': this.answer(command, Status.ok, ''); break;  // Nothing to leave.
         case 'Observe':
+          if (message.replace) {  // What is observed anew is there already.
+            this.answer(command, Status.ok, '');
+            break;
+          }
           if (world.subscriptions.has(message.subscription)) {
             observing.set(message.subscription, command);
             break;
@@ -822,7 +853,8 @@ export class Session {
     for (const [id, wanted] of world.subscriptions) {
       if (wanted.unsent) continue;  // Still waiting in its place.
       wanted.unsent = true;
-      first.push(observing.get(id) ?? {world, message: {...wanted.message}, answer: null});
+      const asked = observing.get(id);  // Its region may have moved since.
+      first.push({world, message: {...wanted.message}, answer: asked?.answer ?? null});
     }
     // An own command that was still unsent when the session was lost again is among those anew.
     world.unsent = world.unsent.filter(
@@ -887,6 +919,7 @@ export class Session {
         }
         break;
       case 'Observe':
+        if (asked.replace) break;
         if (!done) {
           world.subscriptions.delete(asked.subscription);
           world.updateFilter();
@@ -1009,6 +1042,7 @@ export class Session {
         world.spawned.delete(event.avatar);
         world.view.remove(event.avatar);
         break;
+      case 'left': world.view.leave(event.avatar, event.tick); break;
       default: break;
     }
   }

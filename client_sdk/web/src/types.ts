@@ -14,7 +14,7 @@ export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
 export type Takeover = 'none' | 'afterMovement' | 'now';
 /** What servers may or may not know of. */
 export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals' |
-  'planting';
+  'planting' | 'regions';
 export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
@@ -252,6 +252,9 @@ export interface Observation {
   mode: PoseMode;
   /** Absent or empty: all. Poses of others are not kept. */
   avatars?: readonly number[];
+  /** Who is in it instead of a list; 'entered' and 'left' tell who. A region is all that is observed of a world.
+   * A recording has of each tick those that were due at it. */
+  region?: Region;
   /** 1 (default) to 3600. */
   everyNTicks?: number;
   /** Events of the world, too. Controllers get them anyway. */
@@ -262,6 +265,8 @@ export interface Subscription {
   readonly id: number;
   /** The server's answer to it. */
   readonly reply: Promise<Reply>;
+  /** Puts another region in the place of the one observed. Who is in both neither leaves nor enters. */
+  moveRegion(region: Region): Promise<Reply>;
   stop(): Promise<Reply>;
 }
 

@@ -1,12 +1,15 @@
 import {PoseHistory} from './pose_history';
 import {reserve} from './room';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
+import {maxItems} from './wire/limits';
 import {Malformed} from './wire/malformed';
 import type {PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** Poses of an avatar that is gone can still be sampled for this long. */
 const keepGoneS = 2;
+/** How long it is remembered that an avatar has left: batches wait for a few ticks at most. */
+const keepLeftTicks = 600;
 const maxShards = 1024;
 
 /** Memory that all pose histories of a client share. */
@@ -60,6 +63,8 @@ export class WorldView {
   /** Grows when `avatars` gives another list. */
   version = 0;
   private newestS = -Infinity;
+  /** Who has left the region observed, and since which tick; forgotten after a while. */
+  private readonly left = new Map<number, number>();
 
   constructor(private readonly poseHistory: number, private readonly budget: PoseBudget,
               private readonly counts: PoseCounts, private readonly now: () => number) {}
@@ -84,6 +89,7 @@ export class WorldView {
     for (const track of this.tracks.values()) this.release(track);
     this.tracks.clear();
     this.shards.clear();
+    this.left.clear();
     this.newestS = -Infinity;
   }
 
@@ -125,6 +131,8 @@ export class WorldView {
     for (let i = 0; i < batch.avatars.length; ++i) {
       const avatar = batch.avatars[i]!;
       if (this.filter !== null && !this.filter.has(avatar)) continue;
+      const leftTick = this.left.get(avatar);
+      if (leftTick !== undefined && batch.tick < leftTick) continue;
       const track = this.tracks.get(avatar) ?? this.begin(avatar, stream);
       if (track === null) {
         ++this.counts.refused;
@@ -153,7 +161,14 @@ export class WorldView {
       track.seenTick = batch.tick;
     }
     this.counts.decodeMs += this.now() - startedMs;
-    if (shard.partsSeen >= batch.parts) this.sweep(stream, batch.tick, batch.serverTimeS);
+    if (shard.partsSeen >= batch.parts) this.sweep(stream, batch);
+  }
+
+  /** It has left the region observed at that tick; poses from before it that are still on their way do not bring it
+   * back. */
+  leave(avatar: number, tick: number): void {
+    this.remove(avatar);
+    if (this.left.has(avatar) || this.left.size < maxItems) this.left.set(avatar, tick);
   }
 
   /** The server said that the avatar is gone. */
@@ -235,7 +250,8 @@ export class WorldView {
       shard.partsSeen = 0;
       shard.epoch = this.epochNumber;
     } else if (batch.tick > shard.tick) {
-      if (everyNTicks > 0 && batch.tick - shard.tick > everyNTicks) {
+      // Of a region nothing comes at ticks at which nobody is due.
+      if (!batch.partial && everyNTicks > 0 && batch.tick - shard.tick > everyNTicks) {
         this.counts.missing += Math.floor((batch.tick - shard.tick - 1) / everyNTicks);
       }
       shard.tick = batch.tick;
@@ -259,9 +275,12 @@ export class WorldView {
   }
 
   /** After the last part of a shard's batch: who was not in it, but in one before, is gone. */
-  private sweep(stream: number, tick: number, timeS: number): void {
+  private sweep(stream: number, {tick, serverTimeS: timeS, partial}: PoseBatch): void {
+    for (const [avatar, leftTick] of partial ? this.left : []) {
+      if (leftTick + keepLeftTicks < tick) this.left.delete(avatar);
+    }
     for (const track of this.tracks.values()) {
-      if (track.stream === stream && track.seenTick < tick && !track.gone) {
+      if (!partial && track.stream === stream && track.seenTick < tick && !track.gone) {
         track.gone = true;
         this.changeList();
       }

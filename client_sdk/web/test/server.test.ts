@@ -67,6 +67,45 @@ for (const mode of ['full', 'quantised'] as PoseMode[]) {
   });
 }
 
+test('a region shows who is in it, and moves', {skip}, async () => {
+  const server = await ServerProcess.start();
+  const client = makeClient(server);
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    const spawned = await world.spawn(Array.from({length: 30}, (_, i) => (
+        {avatar: i + 1, positionM: [i + 1, 0, 0] as const, headingRad: 0})));
+    assert.equal(spawned.accepted, 30);
+    const inside = new Set<number>();
+    world.on('event', (event: WorldEvent) => {
+      if (event.type === 'entered') inside.add(event.avatar);
+      if (event.type === 'left') inside.delete(event.avatar);
+    });
+    const bad = world.observe({mode: 'quantised', region: {x: 0, z: 0, radiusM: -1}});
+    assert.equal((await bad.reply).ok, false);
+    const watched = world.observe({
+      mode: 'quantised', everyNTicks: 3,
+      region: {x: 10, z: 0, radiusM: 4.4, leaveM: 1, rings: [{toM: 2, everyNTicks: 1}]}
+    });
+    assert.ok((await watched.reply).ok);
+    const shows = (first: number, last: number) => {
+      const all = Array.from({length: last - first + 1}, (_, i) => first + i);
+      return until(`${first} to ${last} are there`, () =>
+          String([...inside].sort((a, b) => a - b)) === String(all) &&
+          String([...world.avatars()]) === String(all));
+    };
+    await shows(6, 14);
+    assert.ok((await watched.moveRegion({x: 11, z: 0, radiusM: 4.4, leaveM: 1})).ok);
+    await shows(6, 15);
+    assert.ok((await watched.moveRegion({x: 25, z: 0, radiusM: 2.4})).ok);
+    await shows(23, 27);
+    assert.equal((await world.observe({mode: 'full'}).reply).ok, false);
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
+
 test('steps asked for are started, land and finish, and can be looked into', {skip}, async () => {
   const server = await ServerProcess.start();
   const client = makeClient(server);

@@ -158,6 +158,34 @@ TEST(ClientAndServer, AStepAskedForComesBackAsAWalkingAvatar) {
   EXPECT_EQ(server.Terminate(), 0);
 }
 
+TEST(ClientAndServer, ARegionShowsWhoIsInItAndMoves) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  User user(server.port());
+  user.Spawn(30);  // on a grid
+  stridewire_observation observation{};
+  observation.mode = STRIDEWIRE_QUANTISED;
+  observation.every_n_ticks = 1;
+  const stridewire_rate_ring ring{1.0, 2};
+  stridewire_region region{-1000.0, 0.0, 5.0, -1.0, &ring, 1};
+  std::uint32_t subscription = 0;
+  ASSERT_TRUE(user.client.ObserveRegion(user.world, observation, region, &subscription));
+  region.ring_count = 5;
+  EXPECT_FALSE(user.client.MoveRegion(subscription, region));
+  region.ring_count = 1;
+  EXPECT_FALSE(user.client.MoveRegion(subscription + 1, region));
+  const auto count = [&] { return user.client.ListAvatars(user.world).size(); };
+  region = {0.0, 0.0, 1000.0, 2.0, nullptr, 0};
+  ASSERT_TRUE(user.client.MoveRegion(subscription, region));
+  for (int i = 0; i < 30; ++i) ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_ENTERED)) << i;
+  EXPECT_TRUE(Eventually([&] { return count() == 30; }));
+  region.x = 5000.0;
+  ASSERT_TRUE(user.client.MoveRegion(subscription, region));
+  for (int i = 0; i < 30; ++i) ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_LEFT)) << i;
+  EXPECT_TRUE(Eventually([&] { return count() == 0; }));
+  EXPECT_EQ(server.Terminate(), 0);
+}
+
 TEST(ClientAndServer, AllObserversSeeTheSameAndQuantisedStaysWithinItsError) {
   Daemon server;
   ASSERT_NE(server.port(), 0);

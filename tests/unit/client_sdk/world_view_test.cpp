@@ -13,8 +13,9 @@ class WorldViewTest : public testing::Test {
   WorldViewTest() { view_.SetInfo(toy::WorldInfo(1, 1, "plaza")); }
 
   Status Take(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars,
-              std::uint16_t shard = 0, protocol::PoseMode mode = protocol::PoseMode::kFull) {
-    const auto frame = toy::PoseFrame(1, tick, avatars, mode, shard);
+              std::uint16_t shard = 0, protocol::PoseMode mode = protocol::PoseMode::kFull,
+              bool is_partial = false) {
+    const auto frame = toy::PoseFrame(1, tick, avatars, mode, shard, toy::kJoints, is_partial);
     const auto message =
         protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
     return view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
@@ -47,6 +48,25 @@ TEST_F(WorldViewTest, AvatarsOfOneModeAreNotMissedInAnother) {
   }
   ASSERT_TRUE(Take(4, {}, 0, kQuantised));
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1}));
+}
+
+// Of a region absence says nothing, leaving does; and a batch on its way then brings nobody back.
+TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
+  const auto partial = [&](std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars) {
+    return Take(tick, avatars, 0, protocol::PoseMode::kFull, true);
+  };
+  const auto avatars = [&] { return view_.Avatars(); };
+  ASSERT_TRUE(partial(1, {{1}, {2}, {3}}));
+  ASSERT_TRUE(partial(5, {{2}}));
+  EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 2, 3}));
+  EXPECT_EQ(counts_.missing, 0u);
+  view_.Leave(2, 8);
+  view_.Leave(4, 8);  // whose poses were still on their way
+  EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 3}));
+  ASSERT_TRUE(partial(7, {{2}, {3}, {4}}));
+  EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 3}));
+  ASSERT_TRUE(partial(9, {{2}, {4}}));
+  EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 2, 3, 4}));
 }
 
 TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {

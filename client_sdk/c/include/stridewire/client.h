@@ -353,6 +353,39 @@ stridewire_status stridewire_client_observe(stridewire_client* client, stridewir
                                             const stridewire_observation* observation,
                                             uint32_t* subscription, uint64_t* command);
 
+#define STRIDEWIRE_MAX_RATE_RINGS 4
+
+/// Within `to_m` of a region's centre poses come every so many ticks.
+typedef struct stridewire_rate_ring {
+  double to_m;             ///< Above 0 and above that of the ring before.
+  uint16_t every_n_ticks;  ///< 1 to 3600
+} stridewire_rate_ring;
+
+/// A circle on the ground. Avatars whose root comes within its radius enter.
+typedef struct stridewire_region {
+  double x, z;      ///< Its centre, in metres.
+  double radius_m;  ///< Above 0.
+  double
+      leave_m;  ///< Who is inside leaves when further than radius and this; negative: the server chooses.
+  const stridewire_rate_ring*
+      rings;          ///< From the inner one on; beyond them the observation's rate.
+  size_t ring_count;  ///< At most STRIDEWIRE_MAX_RATE_RINGS.
+} stridewire_region;
+
+/// As stridewire_client_observe, of who is in a region: `observation->avatars` is NULL. Who comes and goes is told
+/// by events. A region is all that a client observes of a world (NOT_ALLOWED). UNSUPPORTED, in the command's
+/// reply: an older server.
+stridewire_status stridewire_client_observe_region(stridewire_client* client,
+                                                   stridewire_world world,
+                                                   const stridewire_observation* observation,
+                                                   const stridewire_region* region,
+                                                   uint32_t* subscription, uint64_t* command);
+
+/// Puts another region in the place of the one that a subscription observes, as a player walks. Who is in both
+/// neither leaves nor enters.
+stridewire_status stridewire_client_move_region(stridewire_client* client, uint32_t subscription,
+                                                const stridewire_region* region, uint64_t* command);
+
 stridewire_status stridewire_client_stop_observing(stridewire_client* client, uint32_t subscription,
                                                    uint64_t* command);
 
@@ -389,7 +422,9 @@ typedef enum stridewire_event_type {
       37,  ///< request_id turned out impossible: status, text; when it must be met and
            ///< is out of reach also foot, kind, position_m: the nearest in reach
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
-  STRIDEWIRE_EVENT_REMOVED = 39
+  STRIDEWIRE_EVENT_REMOVED = 39,
+  STRIDEWIRE_EVENT_ENTERED = 40,  ///< the region observed, see stridewire_client_observe_region
+  STRIDEWIRE_EVENT_LEFT = 41      ///< that region, or the world
 } stridewire_event_type;
 
 typedef enum stridewire_movement_kind {

@@ -234,6 +234,16 @@ class Client {
     observation.every_n_ticks = every_n_ticks;
     return Observe(world, observation);
   }
+  Result ObserveRegion(stridewire_world world, const stridewire_observation& observation,
+                       const stridewire_region& region, std::uint32_t* subscription = nullptr,
+                       std::uint64_t* command = nullptr) {
+    return stridewire_client_observe_region(handle_, world, &observation, &region, subscription,
+                                            command);
+  }
+  Result MoveRegion(std::uint32_t subscription, const stridewire_region& region,
+                    std::uint64_t* command = nullptr) {
+    return stridewire_client_move_region(handle_, subscription, &region, command);
+  }
   Result StopObserving(std::uint32_t subscription, std::uint64_t* command = nullptr) {
     return stridewire_client_stop_observing(handle_, subscription, command);
   }

@@ -1,14 +1,14 @@
 import type {
-  LayerRequest, MovementRequest, Observation, QueuedRequest, Role, SpawnItem, Terrain, TerrainBox, Vec3
+  LayerRequest, MovementRequest, Observation, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox, Vec3
 } from '../types';
 import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
 import {
-  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxTerrainBoxes, maxTerrainColumns,
+  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes, maxTerrainColumns,
   maxWaypoints
 } from './limits';
 import {Malformed} from './malformed';
 import type {
-  CancelQueue, JoinWorld, LayerEntry, Observe, Remove, Request, SetLayers, SetPlanting, SetTerrain, Spawn
+  CancelQueue, JoinWorld, LayerEntry, Observe, RegionEntry, Remove, Request, SetLayers, SetPlanting, SetTerrain, Spawn
 } from './messages';
 import {checkName} from './text';
 
@@ -221,6 +221,10 @@ export function observe(observation: Observation): Observe {
   if (!Number.isInteger(everyNTicks) || everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
     throw new Malformed('is not 1 to 3600', 'everyNTicks');
   }
+  const inRegion = observation.region === undefined ? null : region(observation.region);
+  if (inRegion !== null && (observation.avatars?.length ?? 0) > 0) {
+    throw new Malformed('are not needed beside a region', 'avatars');
+  }
   return {
     type: 'Observe',
     seq: 0n,
@@ -230,7 +234,34 @@ export function observe(observation: Observation): Observe {
     avatars: avatarList(observation.avatars ?? [], 0, 'avatars'),
     everyNTicks,
     withEvents: observation.withEvents === true,
-    region: null,
+    region: inRegion,
     replace: false,
+  };
+}
+
+export function region(asked: Region): RegionEntry {
+  if (asked === null || typeof asked !== 'object') throw new Malformed('is none', 'region');
+  const radiusM = finite(asked.radiusM, 'radiusM', -1);
+  if (!(radiusM > 0)) throw new Malformed('is not above 0', 'radiusM');
+  const leaveM = asked.leaveM === undefined ? null : finite(asked.leaveM, 'leaveM', -1);
+  if (leaveM !== null && leaveM < 0) throw new Malformed('is below 0', 'leaveM');
+  const rings = asked.rings ?? [];
+  if (!Array.isArray(rings) || rings.length > maxRateRings) {
+    throw new Malformed('are not a list of up to 4', 'rings');
+  }
+  let beforeM = 0;
+  for (const {toM, everyNTicks} of rings) {
+    if (!Number.isFinite(toM) || toM <= beforeM) throw new Malformed('does not grow', 'toM');
+    if (!Number.isInteger(everyNTicks) || everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
+      throw new Malformed('is not 1 to 3600', 'everyNTicks');
+    }
+    beforeM = toM;
+  }
+  return {
+    x: finite(asked.x, 'x', -1),
+    z: finite(asked.z, 'z', -1),
+    radiusM,
+    leaveM,
+    rings: rings.map(({toM, everyNTicks}) => ({toM, everyNTicks})),
   };
 }
