@@ -355,10 +355,14 @@ Offset<wire::FetchLibrary> Build(FlatBufferBuilder& b, const FetchLibrary& m) {
 }
 
 Offset<wire::Movements> Build(FlatBufferBuilder& b, const Movements& m) {
-  const auto records = Bytes(b, m.records);
-  const auto ends = b.CreateVector(m.ends);
-  const auto flags = b.CreateVector(m.flags);
-  const auto avatars = b.CreateVector(m.avatars);
+  Offset<flatbuffers::Vector<std::uint8_t>> records, flags;
+  Offset<flatbuffers::Vector<std::uint32_t>> ends, avatars;
+  if (!m.avatars.empty()) {  // Most steps of a small crowd have none.
+    records = Bytes(b, m.records);
+    ends = b.CreateVector(m.ends);
+    flags = b.CreateVector(m.flags);
+    avatars = b.CreateVector(m.avatars);
+  }
   return wire::CreateMovements(b, m.world, m.shard, m.part, m.parts, m.more_steps, m.step, m.tick,
                                m.server_time_s, m.states, avatars, flags, ends, records);
 }

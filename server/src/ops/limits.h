@@ -42,7 +42,8 @@ struct Limits {
   int max_pending_commands = 256;  ///< Not answered yet; beyond, reading pauses.
 
   // Memory of one session.
-  std::size_t control_buffer_bytes = std::size_t{4} << 20;  ///< Waiting to be sent, poses apart.
+  std::size_t control_buffer_bytes =
+      std::size_t{4} << 20;        ///< Waiting to be sent, poses apart; movements as much again.
   int observer_backlog_ticks = 4;  ///< Batches a world, mode and shard keep for a slow observer.
   std::size_t reply_memory_bytes = std::size_t{4} << 20;
   std::size_t event_replay_bytes = std::size_t{1} << 20;  ///< Events kept for a lost connection.

@@ -70,7 +70,7 @@ class SharedPoses {
 /// One client: worlds joined, subscriptions, commands under way and answered. Lives on one shard
 /// and outlives its connection for the resume window (STATE_MACHINE.md).
 ///
-/// Memory: what Limits allow (reply_memory_bytes + event_replay_bytes + control_buffer_bytes + the
+/// Memory: what Limits allow (reply_memory_bytes + event_replay_bytes + twice control_buffer_bytes + the
 /// connection), whatever the client does.
 class Session : private ConnectionHandler {
  public:

@@ -10,8 +10,8 @@ using protocol::StatusCode;
 
 namespace {
 
-// States are asked for while less than this waits to be sent, so that they never are too much by themselves.
-constexpr std::size_t kLittleBytes = std::size_t{256} << 10;
+// States are asked for this much at a time, of each shard.
+constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace
 
@@ -32,20 +32,23 @@ void Session::EndMovements(WorldId world) {
 void Session::AskForStates() {
   if (connection_ == nullptr) return;
   const std::size_t waiting = connection_->queue().movement_bytes();
+  // States alone never are more than the budget.
+  const std::size_t little = host_.config().limits.control_buffer_bytes / 16;
   for (auto& [key, feed] : movement_feeds_) {
     if (feed.is_lost && waiting == 0) {
       feed.is_lost = false;
       feed.next = 1;
       feed.asked = 0;
     }
-    if (feed.is_lost || feed.next == 0 || feed.asked != 0 || waiting > kLittleBytes) continue;
+    if (feed.is_lost || feed.next == 0 || feed.asked != 0 || waiting > little) continue;
     if (++states_nonce_ == 0) ++states_nonce_;
     feed.asked = states_nonce_;
     host_.Ask(key.second, StatesQuestion{.world = feed.world,
                                          .from_shard = host_.shard_index(),
                                          .session = identity_.id,
                                          .nonce = feed.asked,
-                                         .first = feed.next});
+                                         .first = feed.next,
+                                         .enough_bytes = std::min(kStatesBytes, little)});
   }
 }
 

@@ -111,6 +111,7 @@ struct StatesQuestion {
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarNumber first = 0;
+  std::size_t enough_bytes = 0;  ///< Of states; the last may go beyond.
 };
 struct StatesAnswer {
   WorldId world = 0;

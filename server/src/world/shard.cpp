@@ -126,7 +126,8 @@ void Shard::AnswerQuestions() {
   }
   questions_.clear();
   for (const StatesQuestion& question : states_questions_) {
-    StatesAnswer answer = WorldOf(question.world).States(question.first, encoder_);
+    StatesAnswer answer =
+        WorldOf(question.world).States(question.first, question.enough_bytes, encoder_);
     answer.session = question.session;
     answer.nonce = question.nonce;
     outgoing_[static_cast<std::size_t>(question.from_shard)].states.push_back(std::move(answer));

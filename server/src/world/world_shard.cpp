@@ -428,14 +428,14 @@ std::vector<SharedFrame> WorldShard::TakeMovements(protocol::Encoder& encoder) {
   return frames;
 }
 
-StatesAnswer WorldShard::States(AvatarNumber first, protocol::Encoder& encoder) const {
-  constexpr std::size_t kEnoughBytes = 100'000;
+StatesAnswer WorldShard::States(AvatarNumber first, std::size_t enough_bytes,
+                                protocol::Encoder& encoder) const {
   StatesAnswer answer{.world = world_->id, .from_shard = shard_};
   protocol::Movements message = EmptyMovements();
   message.states = true;
   auto it = avatars_.lower_bound(first);
   for (; it != avatars_.end(); ++it) {
-    if (message.records.size() > kEnoughBytes || IsFull(message)) break;
+    if (message.records.size() > enough_bytes || IsFull(message)) break;
     // One that came with this tick is told with it; its state is the same.
     AppendState(it->second.avatar, message.records);
     message.avatars.push_back(it->first);

@@ -64,8 +64,9 @@ class WorldShard {
   /// What avatars began since this was last called, as frames; empty if nobody would miss it.
   [[nodiscard]] std::vector<SharedFrame> TakeMovements(protocol::Encoder& encoder);
 
-  /// The states of avatars from a number on after the last tick, some 100 KB of them.
-  [[nodiscard]] StatesAnswer States(AvatarNumber first, protocol::Encoder& encoder) const;
+  /// The states of avatars from a number on after the last tick, of one at least and until there are `enough_bytes`.
+  [[nodiscard]] StatesAnswer States(AvatarNumber first, std::size_t enough_bytes,
+                                    protocol::Encoder& encoder) const;
 
   /// What an avatar is doing after `tick`, the answer to InspectAvatar.
   [[nodiscard]] protocol::AvatarState Inspect(AvatarNumber avatar, std::uint64_t tick,

@@ -199,7 +199,7 @@ TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) 
 TEST(ServerMovement, WhoReadsTooSlowlyIsToldAnew) {
   server::Config config = BuiltinConfig(1);
   config.limits.socket_send_buffer_bytes = 16 << 10;
-  config.limits.control_buffer_bytes = 256 << 10;
+  config.limits.control_buffer_bytes = 64 << 10;
   TestServer server(config);
   Crowd crowd(server, "w", 300);
   BothWays both(server, "w", 16 << 10);

@@ -146,6 +146,33 @@ TEST(SendQueue, RefusesEventsBeyondTheBudgetButNeverReplies) {
   EXPECT_FALSE(queue.PushEvents(Frame(1)));
 }
 
+TEST(SendQueue, MovementsGoInOrderOrAllOfAShardAreForgotten) {
+  SendQueue queue(100, 4);
+  queue.PushControl(Frame(90, 1));  // its budget is another
+  EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 10)), 0u);
+  EXPECT_EQ(queue.PushMovements(1, 1, Frame(30, 20)), 0u);
+  EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 11)), 0u);
+  EXPECT_EQ(queue.movement_bytes(), 90u);
+  // One too many: it and the two before it of the same shard.
+  EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 12)), 3u);
+  EXPECT_EQ(queue.movement_bytes(), 30u);
+  EXPECT_EQ(queue.PushMovements(2, 0, Frame(30, 30)), 0u);
+  EXPECT_EQ(queue.PushMovements(1, 1, Frame(30, 21)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(50)), 0u);
+  SendQueue::Gathered out;
+  queue.Gather(1000, out);
+  EXPECT_THAT(Marks(out), ElementsAre(1, 20, 30, 21, 50));
+  EXPECT_EQ(out.bytes, 90u + 90u + 100u);
+  EXPECT_TRUE(queue.empty());
+  EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 13)), 0u);
+  EXPECT_EQ(queue.PushMovements(2, 0, Frame(30, 31)), 0u);
+  EXPECT_FALSE(queue.empty());
+  queue.DropMovements(1);
+  queue.Gather(1, out);
+  EXPECT_THAT(Marks(out), ElementsAre(31));
+  EXPECT_EQ(queue.movement_bytes(), 0u);
+}
+
 TEST(SendQueue, SharesFrames) {
   const PoseDelivery batch = Batch(1);
   SendQueue a(1000, 4);
