@@ -33,6 +33,12 @@ std::string BytesOf(ConstPoseSpan pose) {
 
 bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+constexpr int kFewer = 10;  // of all: twenty times as slow
+#else
+constexpr int kFewer = 1;
+#endif
+
 struct Manner {
   const char* name;
   std::vector<std::string> subjects;  // captured; none: the generated library
@@ -151,7 +157,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   Random random(kSeed);
   Figures figures;
   constexpr int kTicks = 3000;
-  for (int round = 0; figures.movements < manner.movements; ++round) {
+  for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
     Restless restless(library_, random);
     Avatar& avatar = restless.avatar();
     AvatarReplica first(library_);
@@ -243,7 +249,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
 TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261125;
-  constexpr int kTicks = 400;
+  constexpr int kTicks = 400 / kFewer;
   constexpr std::size_t kAvatars = 20;
   struct Tick {
     std::vector<Bytes> records;
