@@ -540,13 +540,16 @@ void Session::Execute(protocol::Request&& command) {
   const auto over_ticks = static_cast<std::uint32_t>((avatars + at_once - 1) / at_once);
   std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()),
                                  RequestPart{.items = {}, .over_ticks = over_ticks});
+  const std::size_t item_count = command.items.size();
+  // Numbers in a row are shared out evenly.
+  for (RequestPart& part : parts) part.items.reserve(item_count / parts.size() + 1);
   std::uint32_t index = 0;
-  for (const protocol::RequestItem& item : command.items) {
+  for (protocol::RequestItem& item : command.items) {
     parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(
-        {index++, item});
+        {index++, std::move(item)});
   }
   SubmitParts(command.seq, membership->world, std::move(parts),
-              Pending{.item_count = command.items.size(), .reply = {}});
+              Pending{.item_count = item_count, .reply = {}});
 }
 
 void Session::Execute(protocol::SetLayers&& command) {

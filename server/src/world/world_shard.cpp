@@ -118,9 +118,12 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
 
 void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandResult& result) {
   std::uint64_t held = 0;
+  auto it = avatars_.end();
   for (const RequestPart::Item& item : part.items) {
     const protocol::RequestItem& asked = item.request;
-    const auto it = avatars_.find(asked.avatar);
+    // A crowd is mostly listed in order, the movements of one avatar beside each other.
+    if (it != avatars_.end() && it->first != asked.avatar) ++it;
+    if (it == avatars_.end() || it->first != asked.avatar) it = avatars_.find(asked.avatar);
     if (it == avatars_.end()) {
       result.items.push_back(NoSuchAvatar(item.index, asked.avatar, asked.request_id));
       continue;
