@@ -346,6 +346,8 @@ void Session::UpdateFilter(World& world) {
 }
 
 std::uint64_t Session::EveryNTicks(const World& world, protocol::PoseMode mode) {
+  // What was asked for as quantised.
+  if (mode == protocol::PoseMode::kCompact) mode = protocol::PoseMode::kQuantised;
   std::uint64_t every = 0;
   for (const auto& [id, subscription] : world.subscriptions) {
     if (subscription.message.mode != mode) continue;
@@ -418,7 +420,8 @@ void Session::OnConnected(double now_s) {
       protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
       protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
       protocol::kFeatureRegions | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-      protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
+      protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
+      protocol::kFeatureCompact;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {

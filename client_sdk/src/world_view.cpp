@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "stridewire/protocol/pose_batch_reader.h"
+
 namespace stridewire::client {
 
 void WorldView::SetInfo(const protocol::WorldInfo& info) {
@@ -11,6 +13,15 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
   skeleton_ = info.skeleton;
   library_hash_ = info.library_hash;
   layers_ = info.layers;
+  codec_.reset();
+  if (!info.rotation_codes.empty()) {
+    std::vector<std::int16_t> parents;
+    for (const protocol::JointInfo& joint : skeleton_.joints) parents.push_back(joint.parent);
+    // A message that was decoded has codes and parents that make sense.
+    if (auto codec = protocol::CompactCodec::Make(info.rotation_codes, parents)) {
+      codec_ = *std::move(codec);
+    }
+  }
   scratch_.assign(skeleton_.joints.size(), kIdentityQuat);
 }
 
@@ -26,6 +37,7 @@ void WorldView::Clear() {
   skeleton_ = {};
   library_hash_.clear();
   layers_.clear();
+  codec_.reset();
 }
 
 void WorldView::SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter) {
@@ -70,17 +82,16 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   }
   ++shard.parts_seen;
 
+  protocol::PoseBatchReader reader(batch, codec_ ? &*codec_ : nullptr);
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber avatar = batch.avatars[i];
+    reader.Next();
     if (filter_ && !filter_->contains(avatar)) continue;
     if (const auto left = left_.find(avatar); left != left_.end() && info.tick < left->second) {
       continue;
     }
     Vec3 root_position_m;
-    if (Status status = protocol::DecodePose(info.mode, batch.pose(i), root_position_m, scratch_);
-        !status) {
-      return status;
-    }
+    if (Status status = reader.Decode(root_position_m, scratch_); !status) return status;
     Track* track = TrackOf(avatar);
     if (track == nullptr) {
       ++counts.refused;

@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "stridewire/protocol/compact_codec.h"
 #include "utf8.h"
 
 namespace stridewire::protocol {
@@ -424,6 +425,15 @@ Status Check(const WorldInfo& m) {
   for (std::size_t l = 0; l < m.layers.size(); ++l) {
     found.Name(m.layers[l], "WorldInfo.layers", static_cast<std::int64_t>(l));
   }
+  if (!m.rotation_codes.empty()) {
+    found.That(m.rotation_codes.size() == m.skeleton.joints.size(), ErrorCode::kShapeMismatch,
+               "not one code a joint, or none", "WorldInfo.rotation_codes",
+               static_cast<std::int64_t>(m.rotation_codes.size()));
+  }
+  if (const Status status = CheckRotationCodes(m.rotation_codes); !status) {
+    const Error& error = status.error();
+    found.Wrong(error.code, error.text, "WorldInfo.rotation_codes", error.index);
+  }
   return found.Result();
 }
 
@@ -441,6 +451,21 @@ Status Check(const Reply& m) {
   return found.Result();
 }
 
+std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch) {
+  const auto wide = static_cast<std::size_t>(std::ranges::count_if(
+      batch.flags, [](std::uint8_t flags) { return (flags & kPoseWide) != 0; }));
+  if (wide > batch.avatars.size()) return std::nullopt;
+  const std::size_t wide_bytes = wide * PoseBytes(PoseMode::kQuantised, batch.info.joint_count);
+  const std::size_t compact = batch.avatars.size() - wide;
+  if (compact == 0) {
+    return batch.poses.size() == wide_bytes ? std::optional<std::size_t>(0) : std::nullopt;
+  }
+  if (batch.poses.size() < wide_bytes) return std::nullopt;
+  const std::size_t bytes = (batch.poses.size() - wide_bytes) / compact;
+  const bool is_whole = bytes * compact + wide_bytes == batch.poses.size();
+  return is_whole ? std::optional(bytes) : std::nullopt;
+}
+
 Status Check(const PoseBatch& m) {
   Findings found;
   const PoseBatchInfo& info = m.info;
@@ -449,7 +474,7 @@ Status Check(const PoseBatch& m) {
              ErrorCode::kOutOfRange, "not part 0 to parts - 1 of 1 to 1024", "PoseBatch.part",
              info.part);
   found.Finite(info.server_time_s, "PoseBatch.server_time_s");
-  found.Known(info.mode, PoseMode::kMovement, "PoseBatch.mode");
+  found.Known(info.mode, PoseMode::kCompact, "PoseBatch.mode");
   found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
              "no pose is sent in this mode", "PoseBatch.mode");
   found.That(info.joint_count >= 1 && info.joint_count <= kMaxJoints, ErrorCode::kOutOfRange,
@@ -458,8 +483,11 @@ Status Check(const PoseBatch& m) {
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
              "not one flag an avatar", "PoseBatch.flags",
              static_cast<std::int64_t>(m.flags.size()));
-  found.That(m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count),
-             ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",
+  const bool has_all =
+      info.mode == PoseMode::kCompact
+          ? CompactPoseBytes(m).has_value()
+          : m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count);
+  found.That(has_all, ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",
              static_cast<std::int64_t>(m.poses.size()));
   return found.Result();
 }

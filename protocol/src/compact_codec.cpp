@@ -18,7 +18,7 @@ constexpr float kMostThreeSquared = 0.77f;
 // What is told may have a smaller w than what was to be told: by half a step of each component.
 constexpr float kLeastToldW = 0.9f;
 
-constexpr std::size_t kRootWords = 3;
+constexpr std::size_t kRootBytes = 12;
 
 // Reads what the kernel's BitWriter wrote.
 class BitReader {
@@ -28,13 +28,13 @@ class BitReader {
   // Up to 16 bits; there are as many.
   std::uint32_t Take(int bits) {
     if (bits > held_) {
-      std::uint32_t word = 0;
-      std::memcpy(&word, words_.data() + at_, 4);
-      at_ += 4;
-      window_ |= std::uint64_t{word} << held_;
-      held_ += 32;
+      std::uint16_t word = 0;
+      std::memcpy(&word, words_.data() + at_, 2);
+      at_ += 2;
+      window_ |= std::uint32_t{word} << held_;
+      held_ += 16;
     }
-    const auto value = static_cast<std::uint32_t>(window_ & ((std::uint64_t{1} << bits) - 1));
+    const std::uint32_t value = window_ & ((1u << bits) - 1);
     window_ >>= bits;
     held_ -= bits;
     return value;
@@ -44,7 +44,7 @@ class BitReader {
  private:
   std::span<const std::byte> words_;
   std::size_t at_ = 0;
-  std::uint64_t window_ = 0;
+  std::uint32_t window_ = 0;
   int held_ = 0;
 };
 
@@ -166,7 +166,7 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
       bits += code.bits[c];
     }
   }
-  codec.word_count_ = kRootWords + (bits + 31) / 32;
+  codec.pose_bytes_ = kRootBytes + 2 * ((bits + 15) / 16);
   return codec;
 }
 
@@ -207,7 +207,7 @@ void CompactCodec::Encode(Block& block) const {
   // Lanes without a pose hold one from before, or zeros.
   block.rotations_.resize(std::max(block.rotations_.size(), 4 * kBlock * joints_.size()));
   block.errors_.resize(std::max(block.errors_.size(), 3 * kBlock * joints_.size()));
-  block.words_.resize(std::max(block.words_.size(), (word_count_ + 3) / 4 * 4 * kBlock));
+  block.words_.resize(std::max(block.words_.size(), (pose_bytes_ + 15) / 16 * 4 * kBlock));
   EncodeCompact(joints_.data(), joints_.size(),
                 {&block.roots_m_[0][0], block.rotations_.data(), block.errors_.data(),
                  block.words_.data(), block.fits_});
@@ -223,10 +223,10 @@ Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m
     return Fail(ErrorCode::kShapeMismatch, "bytes of a pose have another size",
                 static_cast<std::int64_t>(in.size()));
   }
-  if (const Status status = DecodeRoot(in.first<4 * kRootWords>(), root_position_m); !status) {
+  if (const Status status = DecodeRoot(in.first<kRootBytes>(), root_position_m); !status) {
     return status;
   }
-  BitReader reader(in.subspan(4 * kRootWords));
+  BitReader reader(in.subspan(kRootBytes));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const CompactJoint& joint = joints_[j];
     const bool is_good = joint.free_bits > 0 ? TakeFree(reader, joint, rotations[j])

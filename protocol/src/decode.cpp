@@ -300,6 +300,19 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
     u.Text(w.layers()->Get(static_cast<flatbuffers::uoffset_t>(l))->name(), kMaxNameBytes,
            m.layers[l], "WorldInfo.layers", static_cast<std::int64_t>(l));
   }
+  m.rotation_codes.resize(u.Count(w.rotation_codes(), kMaxJoints, "WorldInfo.rotation_codes"));
+  for (std::size_t j = 0; j < m.rotation_codes.size(); ++j) {
+    const wire::RotationCode& from =
+        *w.rotation_codes()->Get(static_cast<flatbuffers::uoffset_t>(j));
+    const wire::Rotation& reference = from.reference();
+    m.rotation_codes[j] = {
+        .reference = Quat(reference.w(), reference.x(), reference.y(), reference.z()),
+        .low = FromWire(&from.low()),
+        .step = FromWire(&from.step()),
+        .bits = {from.bits_x(), from.bits_y(), from.bits_z()},
+        .free_bits = from.free_bits(),
+        .least_w = from.least_w()};
+  }
 }
 
 void Unpack(Unpacker& u, const wire::Reply& w, Reply& m) {

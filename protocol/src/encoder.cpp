@@ -196,8 +196,17 @@ Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
   }
   const auto layers = layer_list.empty() ? Offset<flatbuffers::Vector<Offset<wire::Layer>>>()
                                          : b.CreateVector(layer_list);
+  std::vector<wire::RotationCode> code_list;
+  code_list.reserve(m.rotation_codes.size());
+  for (const RotationCode& code : m.rotation_codes) {
+    const Quat& q = code.reference;
+    code_list.emplace_back(wire::Rotation(q.x, q.y, q.z, q.w), ToWire(code.low), ToWire(code.step),
+                           code.least_w, code.bits[0], code.bits[1], code.bits[2], code.free_bits);
+  }
+  const auto codes = code_list.empty() ? Offset<flatbuffers::Vector<const wire::RotationCode*>>()
+                                       : b.CreateVectorOfStructs(code_list);
   return wire::CreateWorldInfo(b, m.seq, m.world, name, static_cast<wire::Role>(m.role), m.tick,
-                               hash, skeleton, layers);
+                               hash, skeleton, layers, codes);
 }
 
 Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {

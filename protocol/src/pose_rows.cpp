@@ -10,8 +10,10 @@
 
 namespace stridewire::protocol {
 
-Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars) {
+Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars, const CompactCodec* codec) {
   STRIDEWIRE_CHECK(avatars != nullptr);
+  codec_ = codec;
+  block_.Clear();
   info_ = info;
   avatars_ = std::move(avatars);
   flags_.clear();
@@ -19,6 +21,11 @@ Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars) {
   begins_.reserve(avatars_->size() + 1);
   begins_.assign(1, 0);
   pose_count_ = 0;
+  if (info.mode == PoseMode::kCompact &&
+      (codec == nullptr || codec->joint_count() != info.joint_count)) {
+    return Fail(ErrorCode::kInvalidArgument, "compact poses without the codec of their joints",
+                "PoseBatch.mode");
+  }
   return Check(PoseBatch{info, {}, {}, {}});
 }
 
@@ -32,15 +39,56 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
     return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints", "PoseBatch.poses",
                 static_cast<std::int64_t>(rotations.size()));
   }
+  if (info_.mode == PoseMode::kCompact) {
+    block_rows_[block_.size()] = size() - 1;
+    block_.Add(root_position_m, rotations);
+    if (block_.size() == CompactCodec::kBlock) EncodeBlock();
+    return {};
+  }
   const std::size_t length = PoseBytes(info_.mode, rotations.size());
-  if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
-  const Status status =
-      EncodePose(info_.mode, root_position_m, rotations, std::span(bytes_).subspan(begin, length));
+  const Status status = EncodePose(info_.mode, root_position_m, rotations, Room(begin, length));
   if (!status) return status;
   begins_.back() = begin + length;
   ++pose_count_;
   return {};
 }
+
+std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
+  if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
+  return std::span(bytes_).subspan(begin, length);
+}
+
+void PoseRows::EncodeBlock() {
+  if (block_.size() == 0) return;
+  codec_->Encode(block_);
+  std::size_t row = block_rows_[0];
+  for (std::size_t i = 0; i < block_.size(); ++i) {
+    // Rows between that have no pose begin where the next does.
+    for (; row < block_rows_[i]; ++row) begins_[row + 1] = begins_[row];
+    const std::size_t begin = begins_[row];
+    std::size_t length = codec_->pose_bytes();
+    flags_[row] &= static_cast<std::uint8_t>(~kPoseWide);
+    if (block_.fits(i)) {
+      block_.CopyBytes(i, Room(begin, length));
+    } else {
+      length = PoseBytes(PoseMode::kQuantised, info_.joint_count);
+      Vec3 root_position_m;
+      scratch_.resize(info_.joint_count);
+      block_.Get(i, root_position_m, scratch_);
+      if (EncodePose(PoseMode::kQuantised, root_position_m, scratch_, Room(begin, length))) {
+        flags_[row] |= kPoseWide;
+      } else {
+        length = 0;
+      }
+    }
+    pose_count_ += length > 0 ? 1 : 0;
+    begins_[++row] = begin + length;
+  }
+  for (; row < size(); ++row) begins_[row + 1] = begins_[row];
+  block_.Clear();
+}
+
+void PoseRows::Finish() { EncodeBlock(); }
 
 void PoseRows::SkipTo(std::size_t row) {
   STRIDEWIRE_CHECK(row <= avatars_->size());

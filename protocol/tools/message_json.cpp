@@ -2,7 +2,9 @@
 
 #include <string>
 
+#include "sample_messages.h"
 #include "stridewire/base/check.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
 namespace {
@@ -170,6 +172,16 @@ Json Leg(const LegInfo& leg) {
           {"toe_tip_offset_m", Vector(leg.toe_tip_offset_m)}};
 }
 
+Json Fields(const RotationCode& code) {
+  const Quat& q = code.reference;
+  return {{"reference", Json::array({q.x, q.y, q.z, q.w})},
+          {"low", Vector(code.low)},
+          {"step", Vector(code.step)},
+          {"bits", code.bits},
+          {"free_bits", code.free_bits},
+          {"least_w", code.least_w}};
+}
+
 Json Fields(const WorldInfo& m) {
   Json joints = Json::array();
   for (const JointInfo& joint : m.skeleton.joints) {
@@ -180,6 +192,8 @@ Json Fields(const WorldInfo& m) {
   for (const EndSiteInfo& site : m.skeleton.end_sites) {
     end_sites.push_back({{"joint", site.joint}, {"offset_m", Vector(site.offset_m)}});
   }
+  Json codes = Json::array();
+  for (const RotationCode& code : m.rotation_codes) codes.push_back(Fields(code));
   return {{"seq", Wide(m.seq)},
           {"world", m.world},
           {"name", m.name},
@@ -191,7 +205,8 @@ Json Fields(const WorldInfo& m) {
             {"end_sites", end_sites},
             {"left_leg", Leg(m.skeleton.legs[0])},
             {"right_leg", Leg(m.skeleton.legs[1])}}},
-          {"layers", m.layers}};
+          {"layers", m.layers},
+          {"rotation_codes", codes}};
 }
 
 Json Fields(const Reply& m) {
@@ -213,9 +228,11 @@ Json Fields(const Reply& m) {
 Json Fields(const PoseBatch& m) {
   Json poses = Json::array();
   std::vector<Quat> rotations(m.info.joint_count);
+  PoseBatchReader reader(m, &SampleCodec());
   for (std::size_t i = 0; i < m.avatars.size(); ++i) {
     Vec3 root(0.0f);
-    STRIDEWIRE_CHECK(DecodePose(m.info.mode, m.pose(i), root, rotations));
+    reader.Next();
+    STRIDEWIRE_CHECK(reader.Decode(root, rotations));
     Json quats = Json::array();
     for (const Quat& q : rotations) quats.push_back(Json::array({q.x, q.y, q.z, q.w}));
     poses.push_back({{"avatar", m.avatars[i]},

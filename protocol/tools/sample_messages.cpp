@@ -34,6 +34,80 @@ SkeletonInfo Skeleton() {
   return skeleton;
 }
 
+// Root and hips turn every way, knees and the left ankle about one axis, the head never.
+std::vector<RotationCode> RotationCodes() {
+  std::vector<RotationCode> codes(8);
+  codes[0].free_bits = 11;
+  codes[1].free_bits = 13;
+  codes[4].free_bits = 15;
+  for (const std::size_t knee : {2u, 5u}) {
+    codes[knee].reference = Quat(0.9375f, 0.34798527f, 0.0f, 0.0f);
+    codes[knee].low = Vec3(-0.4375f, 0.0f, 0.0f);
+    codes[knee].step = Vec3(0x1p-12f, 0x1p-8f, 0x1p-8f);
+    codes[knee].bits = {12, 0, 0};
+    codes[knee].least_w = 0.75f;
+  }
+  codes[3] = codes[2];
+  codes[3].bits[2] = 1;
+  codes[6].low = Vec3(-0.25f, -0.125f, -0.0625f);
+  codes[6].step = Vec3(0x1p-10f, 0x1p-10f, 0x1p-16f);
+  codes[6].bits = {9, 8, 13};
+  codes[6].least_w = 0.875f;
+  codes[7].reference = YawRotation(-0.25);
+  codes[7].step = Vec3(0x1p-7f);
+  codes[7].least_w = 0.984375f;
+  return codes;
+}
+
+// What those can tell, but for the second avatar, whose left knee turns about another axis.
+struct CompactArrays {
+  PoseBatchInfo info{3, 1, 2, 4, 123'456, 2057.6, PoseMode::kCompact, 8};
+  std::vector<AvatarNumber> avatars = {1, 1001, 2001};
+  std::vector<std::uint8_t> flags = {kPoseStanding, kPoseWide, kPoseDiscontinuity};
+  std::vector<std::byte> poses;
+
+  CompactArrays() {
+    const std::vector<RotationCode> codes = RotationCodes();
+    CompactCodec::Block block;
+    for (int a = 0; a < 3; ++a) {
+      std::vector<Quat> rotations;
+      for (std::size_t j = 0; j < codes.size(); ++j) {
+        const double angle = 0.7 * a + 0.45 * static_cast<double>(j);
+        Vec3 v(Sin(angle), Cos(1.3 * angle), Sin(0.4 + 2.1 * angle));
+        if (codes[j].free_bits == 0) {
+          v *= 0.25f;
+          for (int c = 0; c < 3; ++c) {
+            if (codes[j].bits[static_cast<std::size_t>(c)] < 8) v[c] = 0.0f;
+          }
+          if (j == 6) v = Vec3(v.x, 0.4f * v.y, 0.2f * v.z);
+          if (a == 1 && j == 2) v.y = 0.25f;
+        }
+        rotations.push_back(
+            Normalise(codes[j].reference * Quat(static_cast<float>(Cos(0.3 * a)), v.x, v.y, v.z)));
+      }
+      block.Add(Vec3(-1.5f * static_cast<float>(a), 0.9375f, 70'000.25f), rotations);
+    }
+    SampleCodec().Encode(block);
+    for (std::size_t a = 0; a < 3; ++a) {
+      STRIDEWIRE_CHECK(block.fits(a) == (a != 1));
+      const std::size_t begin = poses.size();
+      if (block.fits(a)) {
+        poses.resize(begin + SampleCodec().pose_bytes());
+        block.CopyBytes(a, std::span(poses).subspan(begin));
+        continue;
+      }
+      poses.resize(begin + PoseBytes(PoseMode::kQuantised, 8));
+      Vec3 root_position_m;
+      std::vector<Quat> rotations(8);
+      block.Get(a, root_position_m, rotations);
+      STRIDEWIRE_CHECK(EncodePose(PoseMode::kQuantised, root_position_m, rotations,
+                                  std::span(poses).subspan(begin)));
+    }
+  }
+
+  [[nodiscard]] PoseBatch view() const { return {info, avatars, flags, poses}; }
+};
+
 /// Arrays of a batch. Rotations go through every index left out and both signs.
 struct BatchArrays {
   PoseBatchInfo info;
@@ -121,10 +195,20 @@ std::vector<Event> EveryEvent() {
 
 }  // namespace
 
+const CompactCodec& SampleCodec() {
+  static const CompactCodec codec = [] {
+    std::vector<std::int16_t> parents;
+    for (const JointInfo& joint : Skeleton().joints) parents.push_back(joint.parent);
+    return CompactCodec::Make(RotationCodes(), parents).value();
+  }();
+  return codec;
+}
+
 std::vector<SampleMessage> SampleMessages() {
   static const BatchArrays full(PoseMode::kFull, 8, 3);
   static const BatchArrays quantised(PoseMode::kQuantised, 8, 3);
   static const BatchArrays nobody(PoseMode::kQuantised, 31, 0);
+  static const CompactArrays compact;
 
   std::vector<SampleMessage> samples;
   const auto add = [&](const char* name, Message message) {
@@ -314,6 +398,10 @@ std::vector<SampleMessage> SampleMessages() {
     WorldInfo with_layers{17,           3,          "plaza",          Role::kController, 123'000,
                           "0f1e2d3c4b", Skeleton(), {"wave", "carry"}};
     add("world_info_layers", with_layers);
+    WorldInfo with_codes = with_layers;
+    with_codes.rotation_codes = RotationCodes();
+    add("world_info_compact", with_codes);
+    add("pose_batch_compact", compact.view());
     add("world_terrain_boxes", WorldTerrain{3, boxes});
     add("world_terrain_flat", WorldTerrain{3, std::nullopt});
   }

@@ -3,14 +3,19 @@
 
 #include <benchmark/benchmark.h>
 
+#include <memory>
+#include <numeric>
 #include <random>
+#include <span>
+#include <vector>
 
 #include "bench_libraries.h"
 #include "scaled_library.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/evaluate_poses.h"
+#include "stridewire/runtime/pose_code.h"
 #include "stridewire/runtime/reference_evaluation.h"
 
 namespace stridewire {
@@ -98,36 +103,48 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   Count(state, steps, count);
 }
 
-// All that a tick does for a pose: evaluated, planted, quantised into the frame that observers share.
+// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that observers share.
 void WholePose(benchmark::State& state, const Library& library) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, true);
-  protocol::PoseBatchEncoder encoder;
+  std::vector<std::int16_t> parents;
+  for (const Joint& joint : library->skeleton().joints) {
+    parents.push_back(static_cast<std::int16_t>(joint.parent));
+  }
+  const auto codec = protocol::CompactCodec::Make(ChoosePoseCode(*library).joints, parents).value();
+  std::vector<protocol::AvatarNumber> numbers(steps.walkers().size());
+  std::iota(numbers.begin(), numbers.end(), 1u);
+  const auto avatars = std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers);
+  std::vector<std::uint32_t> all(numbers.size());
+  std::iota(all.begin(), all.end(), 0u);
+  protocol::PoseRows rows;
+  protocol::PoseBatchComposer composer;
   protocol::PoseBatchInfo info;
   info.world = 1;
-  info.mode = protocol::PoseMode::kQuantised;
-  info.joint_count = static_cast<std::uint16_t>(library->skeleton().joint_count());
-  const std::size_t most = encoder.MaxAvatars(info.mode, info.joint_count);
+  info.mode = protocol::PoseMode::kCompact;
+  info.joint_count = static_cast<std::uint16_t>(parents.size());
   std::vector<std::byte> frame;
   for (auto _ : state) {
     ++info.tick;
-    std::size_t i = 0;
-    while (i < steps.walkers().size()) {
-      frame.clear();
-      Status status = encoder.Begin(info);
-      const std::size_t end = std::min(i + most, steps.walkers().size());
-      while (i < end && status) {
-        const std::size_t some = std::min(i + kAtOnce, end);
-        steps.Evaluate(i, some);
-        for (; i < some && status; ++i) {
-          const Pose& pose = steps.walkers()[i].shown;
-          status = encoder.Add(i + 1, 0, pose.root_position_m, pose.rotations);
-        }
+    Status status = rows.Begin(info, avatars, &codec);
+    for (std::size_t i = 0; i < steps.walkers().size() && status;) {
+      const std::size_t some = std::min(i + kAtOnce, steps.walkers().size());
+      steps.Evaluate(i, some);
+      for (; i < some && status; ++i) {
+        const Pose& pose = steps.walkers()[i].shown;
+        status = rows.Add(0, pose.root_position_m, pose.rotations);
       }
-      if (status) status = encoder.Finish(frame);
-      if (!status) return state.SkipWithError(status.error().text);
+    }
+    rows.Finish();
+    std::span<const std::uint32_t> left = all;
+    while (!left.empty() && status) {
+      const auto part = left.first(composer.Fitting(rows, left));
+      frame.clear();
+      status = composer.Compose(rows, part, {}, frame);
+      left = left.subspan(part.size());
       benchmark::DoNotOptimize(frame.data());
     }
+    if (!status) return state.SkipWithError(status.error().text);
   }
   Count(state, steps, count);
 }

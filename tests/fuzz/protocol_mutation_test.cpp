@@ -19,6 +19,7 @@
 #include "stridewire/protocol/decode.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/frame_reader.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
 namespace {
@@ -144,11 +145,15 @@ void ExpectMeaning(const Message& message, Sender sender) {
   ASSERT_TRUE(Same(message, *again));
   if (const auto* batch = std::get_if<PoseBatch>(&message)) {
     std::vector<Quat> rotations(batch->info.joint_count);
+    PoseBatchReader reader(*batch, &SampleCodec());
     for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
       Vec3 root;
-      if (!DecodePose(batch->info.mode, batch->pose(i), root, rotations)) continue;
-      Bytes pose(batch->pose(i).size());
-      ASSERT_TRUE(EncodePose(batch->info.mode, root, rotations, pose));
+      reader.Next();
+      if (!reader.Decode(root, rotations)) continue;
+      const PoseMode mode =
+          batch->info.mode == PoseMode::kFull ? PoseMode::kFull : PoseMode::kQuantised;
+      Bytes pose(PoseBytes(mode, rotations.size()));
+      ASSERT_TRUE(EncodePose(mode, root, rotations, pose));
     }
   }
 }
@@ -234,6 +239,41 @@ TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
   }
   std::cout << "decoded " << decoded << " of " << count << "\n";
   EXPECT_GT(decoded, 0u);
+
+  // Compact ones: a good pose with some bits changed.
+  const CompactCodec& codec = SampleCodec();
+  std::vector<Quat> rotations(codec.joint_count(), kIdentityQuat);
+  CompactCodec::Block block;
+  Bytes good(codec.pose_bytes());
+  for (const SampleMessage& sample : SampleMessages()) {
+    if (sample.name != "pose_batch_compact") continue;
+    PoseBatchReader reader(std::get<PoseBatch>(sample.message), &codec);
+    std::ranges::copy(reader.Next(), good.begin());
+  }
+  Vec3 root;
+  ASSERT_TRUE(codec.Decode(good, root, rotations));
+  std::uint64_t known = 0;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    Bytes pose = good;
+    for (std::uint64_t change = 1 + random() % 4; change > 0; --change) {
+      pose[random() % pose.size()] ^= static_cast<std::byte>(1u << random() % 8);
+    }
+    if (random() % 8 == 0) pose.resize(random() % (2 * pose.size()));
+    if (!codec.Decode(pose, root, rotations)) continue;
+    ++known;
+    for (const Quat& q : rotations) ASSERT_NEAR(Dot(q, q), 1.0f, 1e-5f) << "seed " << seed;
+    block.Clear();
+    block.Add(root, rotations);
+    codec.Encode(block);
+    if (!block.fits(0)) continue;  // at the very end of a range
+    Bytes again(codec.pose_bytes());
+    block.CopyBytes(0, again);
+    std::vector<Quat> back(rotations.size());
+    Vec3 root_back;
+    ASSERT_TRUE(codec.Decode(again, root_back, back)) << "seed " << seed << ", pose " << i;
+  }
+  EXPECT_GT(known, 0u);
+  EXPECT_LT(known, count);
 }
 
 }  // namespace

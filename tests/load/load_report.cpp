@@ -10,7 +10,8 @@ namespace {
 const char* ModeName(protocol::PoseMode mode) {
   switch (mode) {
     case protocol::PoseMode::kFull: return "full";
-    case protocol::PoseMode::kQuantised: return "quantised";
+    case protocol::PoseMode::kQuantised:
+    case protocol::PoseMode::kCompact: return "quantised";
     case protocol::PoseMode::kMovement: return "movement";
   }
   return "";

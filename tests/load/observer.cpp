@@ -93,8 +93,8 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
   world.joint_count = info.skeleton.joints.size();
   // What is evaluated here is checked as if it had been sent in full.
   const bool evaluates = run_.options.mode == protocol::PoseMode::kMovement;
-  world.pose_bytes = protocol::PoseBytes(evaluates ? protocol::PoseMode::kFull : run_.options.mode,
-                                         world.joint_count);
+  world.most_pose_bytes = protocol::PoseBytes(
+      evaluates ? protocol::PoseMode::kFull : run_.options.mode, world.joint_count);
   if (evaluates) {
     if (info.library_hash != run_.library->hash()) {
       return run_.Problem(name() + ": --library is not that of world " + info.name);
@@ -102,7 +102,19 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
     world.evaluated =
         std::make_unique<client::MovementView>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
   }
-  if (probes_ != nullptr) world.last_poses.assign(world.seen.size() * world.pose_bytes, {});
+  world.codec.reset();
+  if (SentMode() == protocol::PoseMode::kCompact) {
+    std::vector<std::int16_t> parents;
+    for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
+    auto codec = protocol::CompactCodec::Make(info.rotation_codes, parents);
+    if (!codec) return Lose("a world without codes for its compact poses");
+    world.codec = *std::move(codec);
+    world.most_pose_bytes = std::max(world.most_pose_bytes, world.codec->pose_bytes());
+  }
+  if (probes_ != nullptr) {
+    world.last_poses.assign(world.seen.size() * world.most_pose_bytes, {});
+    world.last_sizes.assign(world.seen.size(), 0);
+  }
   rotations_.resize(std::max(rotations_.size(), world.joint_count));
   world_by_id_[info.world] = pending->second;
   const protocol::Seq seq = NextSeq();
@@ -114,6 +126,12 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
                          .avatars = world.watched,
                          .every_n_ticks = 1,
                          .with_events = false});
+}
+
+protocol::PoseMode Observer::SentMode() const {
+  const bool is_compact = run_.options.mode == protocol::PoseMode::kQuantised &&
+                          (welcome().features & protocol::kFeatureCompact) != 0;
+  return is_compact ? protocol::PoseMode::kCompact : run_.options.mode;
 }
 
 void Observer::OnReply(const protocol::Reply& reply) {
@@ -217,7 +235,7 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
   if (found == world_by_id_.end()) return Lose("poses of a world that is not observed");
   World& world = worlds_[found->second];
   const std::uint64_t tick = batch.info.tick;
-  if (batch.info.mode != run_.options.mode || batch.info.joint_count != world.joint_count) {
+  if (batch.info.mode != SentMode() || batch.info.joint_count != world.joint_count) {
     return Invalid(world, tick, "a batch of another mode or number of joints than agreed");
   }
   if (!AdvanceStream(world, batch)) return;
@@ -230,8 +248,10 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
   const bool counts = run_.window.Contains(tick);
   const bool verifies =
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
+  protocol::PoseBatchReader reader(batch, world.codec ? &*world.codec : nullptr);
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber number = batch.avatars[i];
+    const std::span<const std::byte> pose = reader.Next();
     const std::optional<std::size_t> index = IndexIn(world, number);
     if (!index) continue;
     Seen& seen = world.seen[*index];
@@ -240,8 +260,8 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
-    if (probes_ != nullptr) Measure(world, batch, i, now_ns);
-    if (verifies) (void)CheckPose(world, seen, batch, i);
+    if (probes_ != nullptr) Measure(world, batch, i, pose, now_ns);
+    if (verifies) (void)CheckPose(world, seen, batch, i, reader);
     seen.tick = tick;
     if (!counts) continue;
     ++counts_.poses_received;
@@ -274,12 +294,11 @@ bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
   return true;
 }
 
-bool Observer::CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch,
-                         std::size_t i) {
+bool Observer::CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i,
+                         const protocol::PoseBatchReader& reader) {
   const std::uint64_t tick = batch.info.tick;
   Vec3 root_m(0.0f);
-  const Status decoded = protocol::DecodePose(batch.info.mode, batch.pose(i), root_m,
-                                              std::span(rotations_).first(world.joint_count));
+  const Status decoded = reader.Decode(root_m, std::span(rotations_).first(world.joint_count));
   if (!decoded) {
     Invalid(world, tick,
             "avatar " + std::to_string(batch.avatars[i]) + ": " + Describe(decoded.error()));
@@ -299,14 +318,18 @@ bool Observer::CheckPose(World& world, Seen& seen, const protocol::PoseBatch& ba
 }
 
 void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size_t i,
-                       std::int64_t now_ns) {
+                       std::span<const std::byte> pose, std::int64_t now_ns) {
   const protocol::AvatarNumber number = batch.avatars[i];
   const std::size_t index = run_.layout.IndexIn(number);
-  std::byte* const last = world.last_poses.data() + index * world.pose_bytes;
-  const std::span<const std::byte> pose = batch.pose(i);
-  const bool changed = std::memcmp(last, pose.data(), pose.size()) != 0;
+  if (pose.size() > world.most_pose_bytes) return;  // None that will decode.
+  std::byte* const last = world.last_poses.data() + index * world.most_pose_bytes;
+  const bool changed =
+      world.last_sizes[index] != pose.size() || std::memcmp(last, pose.data(), pose.size()) != 0;
   const bool is_first = world.seen[index].tick == 0;
-  if (changed) std::memcpy(last, pose.data(), pose.size());
+  if (changed) {
+    std::memcpy(last, pose.data(), pose.size());
+    world.last_sizes[index] = pose.size();
+  }
   // What was asked for while nobody watched, by our own doing, tells nothing of the server.
   if (is_first && was_dropped_) probes_->Abandon(number - 1);
   if (changed && !is_first) probes_->Pose(number - 1, batch.info.tick, now_ns, true);

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include "movement_view.h"
 #include "run_state.h"
 #include "session.h"
+#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::load {
 
@@ -71,8 +74,11 @@ class Observer final : public Session {
     std::size_t joint_count = 0;
     std::vector<protocol::AvatarNumber> watched;  ///< Growing; empty: all
     std::vector<Seen> seen;                       ///< Of each of them
-    std::vector<std::byte> last_poses;  ///< Only to measure latency: all poses, as they came
-    std::size_t pose_bytes = 0;
+    std::optional<protocol::CompactCodec> codec;  ///< Of compact poses, if the server tells them
+    /// Only to measure latency: all poses, as they came, each with room for the longest.
+    std::vector<std::byte> last_poses;
+    std::vector<std::size_t> last_sizes;
+    std::size_t most_pose_bytes = 0;
     std::vector<Stream> streams;
     std::unique_ptr<client::MovementView> evaluated;  ///< In mode movement.
     std::uint64_t batches_dropped = 0;                ///< As the server told on this connection
@@ -87,6 +93,8 @@ class Observer final : public Session {
   [[nodiscard]] std::optional<std::size_t> IndexIn(const World& world,
                                                    protocol::AvatarNumber number) const;
   void OnWorldInfo(const protocol::WorldInfo& info);
+  /// What poses come in.
+  [[nodiscard]] protocol::PoseMode SentMode() const;
   void OnReply(const protocol::Reply& reply);
   void OnMovements(const protocol::Movements& movements, std::size_t frame_bytes,
                    std::int64_t now_ns);
@@ -94,8 +102,10 @@ class Observer final : public Session {
   void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
   /// False: the batch is not to be counted.
   bool AdvanceStream(World& world, const protocol::PoseBatch& batch);
-  bool CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i);
-  void Measure(World& world, const protocol::PoseBatch& batch, std::size_t i, std::int64_t now_ns);
+  bool CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i,
+                 const protocol::PoseBatchReader& reader);
+  void Measure(World& world, const protocol::PoseBatch& batch, std::size_t i,
+               std::span<const std::byte> pose, std::int64_t now_ns);
   void Invalid(const World& world, std::uint64_t tick, const std::string& what);
   void UpdateProgress();
 

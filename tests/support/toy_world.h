@@ -1,12 +1,15 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
+#include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/messages.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/protocol/pose_rows.h"
 
 /// What a small, made-up server would say, for tests of clients.
 namespace stridewire::toy {
@@ -20,7 +23,7 @@ inline protocol::Welcome Welcome(bool resumed = false) {
       protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureWalks |
       protocol::kFeatureTakeovers | protocol::kFeatureQuantised | protocol::kFeatureTerrain |
       protocol::kFeatureFootprints | protocol::kFeatureLayers | protocol::kFeatureRefusals |
-      protocol::kFeaturePlanting | protocol::kFeatureMovementMode;
+      protocol::kFeaturePlanting | protocol::kFeatureMovementMode | protocol::kFeatureCompact;
   welcome.session = 7;
   welcome.resume_token = std::vector<std::byte>(16, std::byte{0x5a});
   welcome.resumed = resumed;
@@ -34,6 +37,19 @@ inline protocol::Welcome Welcome(bool resumed = false) {
   return welcome;
 }
 
+/// Hips and head turn every way, the spine never.
+inline std::vector<RotationCode> RotationCodes() {
+  std::vector<RotationCode> codes(kJoints);
+  codes[0].free_bits = 12;
+  codes[1].step = Vec3(0.02f);
+  codes[2].free_bits = 14;
+  return codes;
+}
+inline protocol::CompactCodec Codec() {
+  return protocol::CompactCodec::Make(RotationCodes(), std::array<std::int16_t, kJoints>{-1, 0, 1})
+      .value();
+}
+
 inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                                      const std::string& name) {
   protocol::WorldInfo info;
@@ -45,6 +61,7 @@ inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                           {"spine", 0, Vec3(0.0f, 0.2f, 0.0f)},
                           {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
   info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
+  info.rotation_codes = RotationCodes();
   return info;
 }
 
@@ -76,7 +93,6 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
                                         protocol::PoseMode mode = protocol::PoseMode::kFull,
                                         std::uint16_t shard = 0, int joints = kJoints,
                                         bool is_partial = false) {
-  protocol::PoseBatchEncoder encoder;
   protocol::PoseBatchInfo info;
   info.world = world;
   info.shard = shard;
@@ -84,15 +100,24 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   info.server_time_s = TickTime(tick);
   info.mode = mode;
   info.joint_count = static_cast<std::uint16_t>(joints);
-  info.is_partial = is_partial;
-  std::vector<std::byte> frame;
-  (void)encoder.Begin(info);
   auto rotations = RotationsAt(info.server_time_s);
   rotations.resize(static_cast<std::size_t>(joints), kIdentityQuat);
+  std::vector<protocol::AvatarNumber> numbers;
+  std::vector<std::uint32_t> all;
   for (const AvatarAt& a : avatars) {
-    (void)encoder.Add(a.avatar, a.flags, RootAt(info.server_time_s, a.avatar), rotations);
+    all.push_back(static_cast<std::uint32_t>(numbers.size()));
+    numbers.push_back(a.avatar);
   }
-  (void)encoder.Finish(frame);
+  const protocol::CompactCodec codec = Codec();
+  protocol::PoseRows rows;
+  (void)rows.Begin(info, std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
+                   &codec);
+  for (const AvatarAt& a : avatars) {
+    (void)rows.Add(a.flags, RootAt(info.server_time_s, a.avatar), rotations);
+  }
+  rows.Finish();
+  std::vector<std::byte> frame;
+  (void)protocol::PoseBatchComposer().Compose(rows, all, {.is_partial = is_partial}, frame);
   return frame;
 }
 

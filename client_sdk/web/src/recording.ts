@@ -1,7 +1,7 @@
 import {createKeys, copyPose, interpolate} from './interpolate';
 import {reserve} from './room';
-import {PoseFlag, type CrowdPose, type PoseMode, type Recording, type WorldEvent} from './types';
-import type {PoseBatch} from './wire/messages';
+import {PoseFlag, type CrowdPose, type Recording, type WorldEvent} from './types';
+import type {BatchMode, PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** After its last batch a shard's avatars are shown for this long. */
@@ -14,7 +14,7 @@ const eventBytes = 400;
 interface Moment {
   readonly tick: number;
   readonly timeS: number;
-  readonly mode: PoseMode;
+  readonly mode: BatchMode;
   readonly jointCount: number;
   /** Of another one than the moment before: does not continue it. */
   readonly epoch: number;
@@ -277,7 +277,7 @@ export class WorldRecording implements Recording {
     into.places.clear();
     let place = 0;
     for (const part of moment.parts) {
-      const reader = new PoseReader(part.poses, part.mode, jointCount);
+      const reader = new PoseReader(part);
       for (let i = 0; i < part.avatars.length; ++i) {
         // Those that nobody wanted were not looked at when they came, and may be none.
         if (!reader.read(i, into.roots, 3 * place, into.rotations, 4 * jointCount * place)) {

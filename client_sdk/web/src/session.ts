@@ -12,7 +12,7 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
+  featureCompact, featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
   featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
   maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
@@ -447,7 +447,7 @@ export class Session {
       clientName: this.options.clientName,
       features: featureResume | featureEventReplay | featureQuantised | featureInspect |
           featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
-          featureRefusals | featureRegions | featurePlanting,
+          featureRefusals | featureRegions | featurePlanting | featureCompact,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -988,6 +988,7 @@ export class Session {
     if (world === undefined || world.skeleton === null || world.subscriptions.size === 0) return;
     this.clock.addSample(nowS, message.serverTimeS);
     this.followJitter(nowS);
+    message.codec = world.codec;  // Recorded with it: a later server may tell others.
     world.view.take(message, world.everyNTicks(message.mode));
     world.record.addBatch(message, world.view.epoch);
   }

@@ -5,8 +5,8 @@
 
 /** May command avatars and hears all events of the world, or only watches. */
 export type Role = 'controller' | 'observer';
-/** `full`: float32, as the server has them. `quantised`: 2.5 times smaller, off by at most 0.00016
- * rad and 0.03 mm. */
+/** `full`: float32, as the server has them. `quantised`: a quarter of it, nothing off by more than 1 mm; from servers
+ * of before compact poses 2.5 times smaller. */
 export type PoseMode = 'full' | 'quantised';
 export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
 /** When a movement begins: after all that is queued; after the one under way, or as soon as feet allow, and

@@ -2,11 +2,12 @@ import {Listeners} from './listeners';
 import type {WorldRecording} from './recording';
 import type {Command, Session} from './session';
 import type {
-  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseKind, Recording, Reply, Role,
+  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseKind, PoseMode, Recording, Reply, Role,
   Skeleton, SpawnItem, Subscription, Terrain, World, WorldListeners, WorldState
 } from './types';
 import * as check from './wire/check';
-import type {Observe, SpawnEntry, WorldInfo} from './wire/messages';
+import {CompactCodec} from './wire/compact_codec';
+import type {BatchMode, Observe, SpawnEntry, WorldInfo} from './wire/messages';
 import type {WorldView} from './world_view';
 
 /** A subscription as it is wanted. */
@@ -22,6 +23,8 @@ export class WorldHandle implements World {
   skeleton: Skeleton | null = null;
   libraryHash = '';
   layers: readonly string[] = [];
+  /** Of compact poses, if the server tells them. */
+  codec: CompactCodec | null = null;
   terrain: Terrain | null = null;
   readonly joined: Promise<Reply>;
 
@@ -117,6 +120,7 @@ export class WorldHandle implements World {
     }
     this.libraryHash = info.libraryHash;
     this.layers = info.layers;
+    this.codec = info.rotationCodes.length > 0 ? new CompactCodec(info.rotationCodes) : null;
   }
 
   /** Nothing of it is known any more. */
@@ -130,6 +134,7 @@ export class WorldHandle implements World {
     this.skeleton = null;
     this.libraryHash = '';
     this.layers = [];
+    this.codec = null;
     this.terrain = null;
   }
 
@@ -144,7 +149,8 @@ export class WorldHandle implements World {
   }
 
   /** The rate asked for; 0: none of this mode. */
-  everyNTicks(mode: string): number {
+  everyNTicks(batchMode: BatchMode): number {
+    const mode: PoseMode = batchMode === 'compact' ? 'quantised' : batchMode;
     let every = 0;
     for (const {message} of this.subscriptions.values()) {
       if (message.mode !== mode) continue;

@@ -46,7 +46,7 @@ interface Shard {
 
 /** A shard's batches of one mode, which are about the same avatars. */
 function streamOf(batch: PoseBatch): number {
-  return 2 * batch.shard + (batch.mode === 'full' ? 0 : 1);
+  return 3 * batch.shard + ['full', 'quantised', 'compact'].indexOf(batch.mode);
 }
 
 /** What is seen of a world: the poses of its avatars. */
@@ -127,7 +127,7 @@ export class WorldView {
     this.newestS = Math.max(this.newestS, batch.serverTimeS);
 
     const startedMs = this.now();
-    const reader = new PoseReader(batch.poses, batch.mode, batch.jointCount);
+    const reader = new PoseReader(batch);
     for (let i = 0; i < batch.avatars.length; ++i) {
       const avatar = batch.avatars[i]!;
       if (this.filter !== null && !this.filter.has(avatar)) continue;

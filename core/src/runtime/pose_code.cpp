@@ -14,7 +14,7 @@ constexpr double kMargin = 0.12;
 // The same of joints that planting turns, where ground, reach and a swing sent elsewhere ask for it.
 constexpr double kPlantedMargin = 0.3;
 // A component that stays what it is: room for what it has to make up for of the joints above.
-constexpr double kStillMargin = 0.002;
+constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
 // Joints that come nearer to half a turn than this turn every way.
 constexpr double kMinSeenW = 0.4;
@@ -96,9 +96,9 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   }
   if (least_w < kMinSeenW) return range;
   const double widest = std::max({width.x, width.y, width.z});
-  const double sine =
-      std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
-      (widest < kStillWidth ? 2.0 * kStillMargin : kMarginOfWidth * widest + beside);
+  const bool is_rigid = widest < kStillWidth && !is_planted;
+  const double sine = std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
+                      (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + beside);
   constexpr auto kLeast = static_cast<double>(RotationCode::kMinLeastW);
   range.least_w = std::sqrt(std::max(kLeast * kLeast, 1.0 - sine * sine));
   return range;

@@ -26,6 +26,16 @@ Expected<Libraries> Libraries::Load(const Config& config) {
   return libraries;
 }
 
+void Libraries::Add(const std::string& name, std::shared_ptr<const MotionLibrary> library) {
+  codes_[name] = MakePoseCodes(*library);
+  libraries_[name] = std::move(library);
+}
+
+std::shared_ptr<const PoseCodes> Libraries::FindCodes(const std::string& name) const {
+  const auto it = codes_.find(name);
+  return it == codes_.end() ? nullptr : it->second;
+}
+
 std::shared_ptr<const MotionLibrary> Libraries::Find(const std::string& name) const {
   const auto it = libraries_.find(name);
   return it == libraries_.end() ? nullptr : it->second;

@@ -116,6 +116,8 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   std::uint64_t offered = kServerFeatures;
   if (limits.resume_window_s <= 0.0) offered &= ~protocol::kFeatureResume;
   features_ = hello.features & offered;
+  constexpr std::uint64_t kCompact = protocol::kFeatureQuantised | protocol::kFeatureCompact;
+  subscriptions_.SetCompact((features_ & kCompact) == kCompact);
 
   protocol::Welcome welcome;
   welcome.protocol = std::min(hello.protocol_max, protocol::kProtocolMax);
@@ -435,8 +437,7 @@ void Session::Leave(WorldId id) {
   subscriptions_.RemoveWorld(id);
   EndMovements(id);
   if (connection_ != nullptr) {
-    connection_->DropPoses(id, PoseMode::kFull);
-    connection_->DropPoses(id, PoseMode::kQuantised);
+    for (const PoseMode mode : kSentModes) connection_->DropPoses(id, mode);
     connection_->DropGround(id);
   }
   if (is_controller) {
@@ -705,6 +706,7 @@ void Session::OnResult(CommandResult&& result) {
 }
 
 void Session::Execute(protocol::Observe&& command) {
+  command.mode = subscriptions_.SentMode(command.mode);
   const auto it = worlds_.find(command.world);
   if (it == worlds_.end()) {
     Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
@@ -837,6 +839,8 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
   if ((features_ & protocol::kFeatureLayers) != 0) {
     for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
   }
+  std::vector<RotationCode> codes;
+  if ((features_ & protocol::kFeatureCompact) != 0) codes = world.codes->joints;
   Send(protocol::WorldInfo{.seq = seq,
                            .world = world.id,
                            .name = world.name,
@@ -844,7 +848,8 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
                            .tick = host_.tick(),
                            .library_hash = world.library->hash(),
                            .skeleton = ToWire(world.library->skeleton()),
-                           .layers = std::move(layers)});
+                           .layers = std::move(layers),
+                           .rotation_codes = std::move(codes)});
 }
 
 void Session::SendGround(const World& world, bool also_flat) {

@@ -8,6 +8,21 @@ namespace stridewire::server {
 using protocol::PoseMode;
 using protocol::SubscriptionId;
 
+PoseMode Subscriptions::SentMode(PoseMode asked) const {
+  if (asked != PoseMode::kQuantised && asked != PoseMode::kCompact) return asked;
+  return is_compact_ ? PoseMode::kCompact : PoseMode::kQuantised;
+}
+
+void Subscriptions::SetCompact(bool is_compact) {
+  if (is_compact == is_compact_) return;
+  is_compact_ = is_compact;
+  watches_.clear();
+  for (auto& [id, subscription] : all_) {
+    subscription.mode = SentMode(subscription.mode);
+    SumUp({subscription.world, subscription.mode});
+  }
+}
+
 void Subscriptions::Add(SubscriptionId id, Subscription&& subscription) {
   const Key key(subscription.world, subscription.mode);
   std::ranges::sort(subscription.avatars);

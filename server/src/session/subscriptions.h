@@ -29,6 +29,11 @@ class Subscriptions {
   };
   enum class Share : std::uint8_t { kNone, kWhole, kSome, kRegion };
 
+  /// Whether quantised poses, those subscribed to already as well, are sent as compact ones.
+  void SetCompact(bool is_compact);
+  /// The mode in which what is asked for is sent: that of everything here.
+  [[nodiscard]] protocol::PoseMode SentMode(protocol::PoseMode asked) const;
+
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
   /// Sum over all of how many avatars each names.
@@ -89,6 +94,7 @@ class Subscriptions {
   void SumUp(const Key& key);
   void CountNamed();
 
+  bool is_compact_ = false;
   std::map<protocol::SubscriptionId, Subscription> all_;
   std::map<Key, Watch> watches_;
   std::size_t named_count_ = 0;

@@ -123,9 +123,11 @@ struct StatesAnswer {
 };
 
 /// Modes in which poses are sent, in the order of their numbers.
-inline constexpr std::array kSentModes{protocol::PoseMode::kFull, protocol::PoseMode::kQuantised};
+inline constexpr std::array kSentModes{protocol::PoseMode::kFull, protocol::PoseMode::kQuantised,
+                                       protocol::PoseMode::kCompact};
+/// A mode's place among them.
 [[nodiscard]] constexpr std::size_t ModeIndex(protocol::PoseMode mode) {
-  return static_cast<std::size_t>(mode);
+  return mode == protocol::PoseMode::kCompact ? 2 : static_cast<std::size_t>(mode);
 }
 
 /// A circle on the ground whose avatars are of interest.

@@ -9,6 +9,7 @@
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/ground.h"
+#include "world/pose_codes.h"
 
 namespace stridewire::server {
 
@@ -21,7 +22,8 @@ struct World {
   WorldId id = 0;
   std::string name;
   std::shared_ptr<const MotionLibrary> library;
-  bool persistent = false;  ///< Avatars outlive the session that spawned them.
+  std::shared_ptr<const PoseCodes> codes;  ///< The library's
+  bool persistent = false;                 ///< Avatars outlive the session that spawned them.
   AvatarOptions avatar_options;
   double interest_cell_m = 8.0;  ///< Of the grid that regions are looked up in.
 

@@ -32,7 +32,9 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   world->interest_cell_m = config_.interest_cell_m;
   world->persistent = is_configured ? configured->second.persistent : config_.persistent;
   const bool has_library = is_configured && !configured->second.library.empty();
-  world->library = libraries_.Find(has_library ? configured->second.library : config_.library);
+  const std::string& library = has_library ? configured->second.library : config_.library;
+  world->library = libraries_.Find(library);
+  world->codes = libraries_.FindCodes(library);
   STRIDEWIRE_CHECK(world->library != nullptr);  // all that are configured were loaded at the start
   if (is_configured && !configured->second.terrain.empty()) {
     auto ground = MakeGround(world->id, terrains_.Find(configured->second.terrain), encoder_);

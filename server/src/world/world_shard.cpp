@@ -564,7 +564,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
        .server_time_s = clock_.TickTime(tick),
        .mode = mode,
        .joint_count = static_cast<std::uint16_t>(world_->library->skeleton().joint_count())},
-      numbers_);
+      numbers_, world_->codes == nullptr ? nullptr : &world_->codes->codec);
   STRIDEWIRE_CHECK(begun.has_value());
   constexpr std::size_t kAhead = 4;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -580,10 +580,12 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
     if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
     const ConstPoseSpan pose = entry.avatar.pose();
     rows.SkipTo(wanted[i]);
-    if (!rows.Add(flags, pose.root_position_m, pose.rotations)) metrics_.pose_errors.Add();
+    (void)rows.Add(flags, pose.root_position_m, pose.rotations);
   }
   rows.SkipTo(in_order.size());
+  rows.Finish();
   metrics_.poses_encoded.Add(rows.pose_count());
+  metrics_.pose_errors.Add(wanted.size() - rows.pose_count());
 
   delivery.world = world_->id;
   delivery.mode = mode;

@@ -131,9 +131,9 @@ TEST(LoadProgram, CountsEveryPoseOfFiftyWanderingAvatars) {
   EXPECT_EQ(report["requests"]["accepted"], report["requests"]["sent"]);
   EXPECT_EQ(report["requests"]["rejected"], 0);
   EXPECT_EQ(report["reconnects"], 0);
-  // 24 joints at 6 bytes, 12 for the root, and a little for what a batch says of itself.
-  EXPECT_GT(report["bytes_per_pose"], 156.0);
-  EXPECT_LT(report["bytes_per_pose"], 170.0);
+  // 23 joints in 84 bytes, 12 for the root, and a little for what a batch says of itself.
+  EXPECT_GT(report["bytes_per_pose"], 96.0);
+  EXPECT_LT(report["bytes_per_pose"], 110.0);
   EXPECT_GT(report["moving_share"], 0.2);
   // Every avatar begins at least one outing within the first two seconds.
   EXPECT_GE(report["steps_measured"], 25);

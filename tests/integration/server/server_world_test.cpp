@@ -11,6 +11,7 @@
 #include <set>
 
 #include "counted_memory.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 #include "stridewire/runtime/avatar.h"
 #include "test_server.h"
 #include "toy_library.h"
@@ -59,14 +60,18 @@ protocol::Placement Start(AvatarNumber avatar) {
 // Pose bytes by avatar and number of ticks since its first movement began.
 using PoseStreams = std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>>;
 
-PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
+// Of before compact poses.
+constexpr std::uint64_t kWithoutCompact = ~protocol::kFeatureCompact;
+
+PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
+                         std::uint64_t features = kWithoutCompact) {
   server::Config config = TestConfig(shards);
   config.max_catch_up_ticks = 1000;  // a busy machine may be late, but loses no time
   config.limits.observer_backlog_ticks = 1000;
   TestServer server(config);
   RawClient client = server.Connect();
   PoseStreams streams;
-  if (!client.SayHello()) return streams;
+  if (!client.SayHello(features)) return streams;
   const auto world = client.Join("stage");
   std::vector<protocol::SpawnItem> spawns;
   std::vector<protocol::RequestItem> requests;
@@ -94,8 +99,9 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
         if (event.type == EventType::kIdle && started.contains(event.avatar)) ++idle;
       }
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
+      protocol::PoseBatchReader reader(*batch, nullptr);
       for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
-        const auto pose = batch->pose(i);
+        const auto pose = reader.Next();
         by_tick[batch->avatars[i]][batch->info.tick].assign(pose.begin(), pose.end());
       }
     }
@@ -196,6 +202,70 @@ TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
   }
   const PoseStreams quantised = PlayOnServer(4, kAvatars, PoseMode::kQuantised);
   ExpectSameWhereBothHave(quantised, PlayAlone(kAvatars, PoseMode::kQuantised, quantised));
+  // Compact ones are encoded beside others, who they are by chance of the shards.
+  const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised, ~0ull);
+  ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised, ~0ull));
+}
+
+// What each of two observers of one avatar shows at the same ticks.
+TEST(ServerWorld, QuantisedPosesAreCompactForWhoAgreedOnThem) {
+  TestServer server(TestConfig(1));
+  RawClient with = server.Connect();
+  RawClient without = server.Connect();
+  const auto welcome = with.SayHello();
+  ASSERT_TRUE(welcome && without.SayHello(kWithoutCompact));
+  const auto world = with.Join("w");
+  const auto old_world = without.Join("w", protocol::Role::kObserver);
+  ASSERT_TRUE(world && old_world);
+  EXPECT_TRUE(old_world->rotation_codes.empty());
+  ASSERT_EQ(world->rotation_codes.size(), world->skeleton.joints.size());
+  std::vector<std::int16_t> parents;
+  for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
+  const auto codec = protocol::CompactCodec::Make(world->rotation_codes, parents).value();
+  ASSERT_LT(codec.pose_bytes(), protocol::PoseBytes(PoseMode::kQuantised, parents.size()));
+
+  ASSERT_TRUE(with.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(with.Request(world->world, Steps(1, 20, 0.6)));
+  ASSERT_EQ(with.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  ASSERT_EQ(without.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  std::map<std::uint64_t, std::vector<Quat>> seen;
+  std::size_t bytes = 0;
+  while (seen.size() < 30) {
+    const auto batch = with.Await<protocol::PoseBatch>();
+    ASSERT_TRUE(batch);
+    ASSERT_EQ(batch->info.mode, PoseMode::kCompact);
+    ASSERT_THAT(batch->avatars, ElementsAre(1u));
+    protocol::PoseBatchReader reader(*batch, &codec);
+    bytes += reader.Next().size();
+    Vec3 root;
+    std::vector<Quat>& rotations = seen[batch->info.tick];
+    rotations.resize(parents.size());
+    ASSERT_TRUE(reader.Decode(root, rotations));
+  }
+  EXPECT_LE(bytes, 30 * codec.pose_bytes() + 200);
+  int compared = 0;
+  while (compared < 5) {
+    const auto batch = without.Await<protocol::PoseBatch>();
+    ASSERT_TRUE(batch);
+    ASSERT_EQ(batch->info.mode, PoseMode::kQuantised);
+    if (!seen.contains(batch->info.tick)) continue;
+    ++compared;
+    Vec3 root;
+    std::vector<Quat> rotations(parents.size());
+    ASSERT_TRUE(protocol::DecodePose(PoseMode::kQuantised, batch->pose(0), root, rotations));
+    for (std::size_t j = 0; j < parents.size(); ++j) {
+      // Each joint makes up for those above it: by up to two of the 0.23 degrees that one may be off.
+      EXPECT_LE(AngleBetween(rotations[j], seen[batch->info.tick][j]), 0.009) << j;
+    }
+  }
+  // A client that comes back as one of before does not get what it did not agree on.
+  with.Abort();
+  with = server.Connect();
+  const auto back = with.SayHello(kWithoutCompact, welcome->resume_token);
+  ASSERT_TRUE(back && back->resumed);
+  const auto batch = with.Await<protocol::PoseBatch>();
+  ASSERT_TRUE(batch);
+  EXPECT_EQ(batch->info.mode, PoseMode::kQuantised);
 }
 
 // ---- watching
@@ -224,7 +294,7 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
     ASSERT_FALSE(std::holds_alternative<protocol::Events>(*message));
     const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
     if (batch == nullptr) continue;
-    EXPECT_EQ(batch->info.mode, PoseMode::kQuantised);
+    EXPECT_EQ(batch->info.mode, PoseMode::kCompact);
     EXPECT_EQ(batch->info.joint_count, 7);
     EXPECT_TRUE(batch->info.tick % 4 == 0 || batch->info.tick % 6 == 0);
     EXPECT_EQ((++seen[{batch->info.tick, batch->info.shard}]), 1);

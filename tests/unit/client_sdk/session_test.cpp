@@ -904,6 +904,7 @@ TEST_F(SessionTest, MutatedFramesOfAServerNeverHarm) {
   add(protocol::ErrorNotice{protocol::StatusCode::kInternal, "oh", false, 2});
   frames.push_back(toy::PoseFrame(5, 7, {{1}, {2}}));
   frames.push_back(toy::PoseFrame(5, 8, {{1}, {2}}, protocol::PoseMode::kQuantised));
+  frames.push_back(toy::PoseFrame(5, 9, {{1}, {2}}, protocol::PoseMode::kCompact));
   int survived = 0;
   (void)Joined();
   for (int i = 0; i < 20'000; ++i) {

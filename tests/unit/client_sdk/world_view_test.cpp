@@ -141,6 +141,50 @@ TEST_F(WorldViewTest, KeepsOnlyWhoIsWanted) {
   EXPECT_EQ(view_.Find(2)->size(), 2u);
 }
 
+protocol::Message Decoded(const std::vector<std::byte>& frame) {
+  return protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value())
+      .value();
+}
+
+TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
+  const protocol::CompactCodec codec = toy::Codec();
+  protocol::PoseRows rows;
+  protocol::PoseBatchInfo info{.world = 1, .tick = 1, .mode = protocol::PoseMode::kCompact};
+  info.joint_count = toy::kJoints;
+  const std::vector<std::uint32_t> avatars = {1, 2, 3};
+  ASSERT_TRUE(
+      rows.Begin(info, std::make_shared<const std::vector<std::uint32_t>>(avatars), &codec));
+  std::vector<Quat> pose = toy::RotationsAt(0.75);
+  ASSERT_TRUE(rows.Add(0, Vec3(1.0f), pose));
+  pose[1] = YawRotation(1.0);  // a spine that turns after all: told the wide way
+  ASSERT_TRUE(rows.Add(0, Vec3(2.0f), pose));
+  pose[1] = kIdentityQuat;
+  ASSERT_TRUE(rows.Add(0, Vec3(3.0f), pose));
+  rows.Finish();
+  std::vector<std::byte> frame;
+  ASSERT_TRUE(
+      protocol::PoseBatchComposer().Compose(rows, std::vector<std::uint32_t>{0, 1, 2}, {}, frame));
+  const protocol::Message message = Decoded(frame);
+  const auto& batch = std::get<protocol::PoseBatch>(message);
+  view_.SetFilter(std::set<std::uint32_t>{2, 3});
+  ASSERT_TRUE(view_.Take(batch, 1, counts_));
+  EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2, 3}));
+  for (const std::uint32_t avatar : {2u, 3u}) {
+    const PoseHistory& history = *view_.Find(avatar);
+    EXPECT_EQ(history.root_position_m(0).x, static_cast<float>(avatar));
+    EXPECT_LT(AngleBetween(history.rotations(0)[1], avatar == 2 ? YawRotation(1.0) : kIdentityQuat),
+              1e-3);
+    EXPECT_LT(AngleBetween(history.rotations(0)[2], YawRotation(0.75)), 2e-3);
+  }
+  // Of a world whose codes were not told they mean nothing.
+  protocol::WorldInfo uncoded = toy::WorldInfo(1, 1, "plaza");
+  uncoded.rotation_codes.clear();
+  view_.SetInfo(uncoded);
+  const Status status = view_.Take(batch, 1, counts_);
+  ASSERT_FALSE(status);
+  EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
+}
+
 TEST_F(WorldViewTest, RefusesAnotherFigureAndTicksThatRunBackwards) {
   const auto frame = toy::PoseFrame(1, 1, {{1}}, protocol::PoseMode::kFull, 0, 5);
   const auto message =

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "fake_server.h"
+#include "stridewire/protocol/pose_batch_encoder.h"
 #include "toy_world.h"
 
 namespace stridewire::load {

@@ -354,6 +354,22 @@ TEST(Check, WorldInfo) {
   Refused<W>(
       good, [&](W& m) { m.skeleton.legs[1].toe_tip_offset_m.x = nan; }, ErrorCode::kOutOfRange,
       "WorldInfo.leg.toe_tip_offset_m");
+  W with_codes = good;
+  with_codes.rotation_codes.resize(good.skeleton.joints.size());
+  with_codes.rotation_codes[0].free_bits = 12;
+  ASSERT_TRUE(Check(with_codes));
+  Refused<W>(
+      with_codes, [](W& m) { m.rotation_codes.pop_back(); }, ErrorCode::kShapeMismatch,
+      "WorldInfo.rotation_codes");
+  Refused<W>(
+      with_codes, [&](W& m) { m.rotation_codes[1].step.y = nan; }, ErrorCode::kOutOfRange,
+      "WorldInfo.rotation_codes", 1);
+  Refused<W>(
+      with_codes, [](W& m) { m.rotation_codes[0].free_bits = 0; }, ErrorCode::kMalformed,
+      "WorldInfo.rotation_codes", 0);
+  Refused<W>(
+      with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,
+      "WorldInfo.rotation_codes");
 }
 
 TEST(Check, Reply) {
@@ -389,7 +405,7 @@ TEST(Check, PoseBatch) {
   RefusedWhenNotFinite<B>(
       good, [](B& m) -> double& { return m.info.server_time_s; }, "PoseBatch.server_time_s");
   Refused<B>(
-      good, [](B& m) { m.info.mode = static_cast<PoseMode>(3); }, ErrorCode::kMalformed,
+      good, [](B& m) { m.info.mode = static_cast<PoseMode>(4); }, ErrorCode::kMalformed,
       "PoseBatch.mode");
   Refused<B>(
       good, [](B& m) { m.info.mode = PoseMode::kMovement; }, ErrorCode::kUnsupported,
@@ -411,6 +427,26 @@ TEST(Check, PoseBatch) {
   Refused<B>(
       good, [](B& m) { m.info.mode = PoseMode::kFull; }, ErrorCode::kShapeMismatch,
       "PoseBatch.poses");
+
+  // The second is wide: the first may have any length.
+  static const std::vector<std::uint8_t> one_wide = {kPoseStanding, kPoseWide};
+  static const std::vector<std::uint8_t> all_wide = {kPoseWide, kPoseWide};
+  const std::size_t wide = PoseBytes(PoseMode::kQuantised, 3);
+  const auto compact = [&](const std::vector<std::uint8_t>& of, std::size_t bytes) {
+    return B{
+        {1, 0, 0, 1, 0, 0.0, PoseMode::kCompact, 3}, avatars, of, std::span(poses).first(bytes)};
+  };
+  EXPECT_EQ(CompactPoseBytes(compact(one_wide, wide + 20)), 20u);
+  EXPECT_EQ(CompactPoseBytes(compact(all_wide, 2 * wide)), 0u);
+  EXPECT_EQ(CompactPoseBytes(compact(flags, 40)), 20u);
+  EXPECT_TRUE(Check(compact(one_wide, wide + 20)));
+  for (const B& bad : {compact(one_wide, wide - 1), compact(all_wide, 2 * wide - 1),
+                       compact(all_wide, wide), compact(flags, 41)}) {
+    const Status status = Check(bad);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().code, ErrorCode::kShapeMismatch);
+    EXPECT_EQ(status.error().where, "PoseBatch.poses");
+  }
 }
 
 TEST(Check, InspectAvatar) {

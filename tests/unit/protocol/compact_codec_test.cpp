@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::array<std::int16_t, 3> kParents = {-1, 0, 1};
 
-// A root, a joint that turns about three axes and one that turns about one: 2 + 36 + 30 + 12 bits.
+// A root, a joint that turns about three axes and one that turns about one: 2 + 36 + 30 + 13 bits.
 std::vector<RotationCode> Codes() {
   std::vector<RotationCode> codes(3);
   codes[0].free_bits = 12;
@@ -27,7 +27,7 @@ std::vector<RotationCode> Codes() {
   codes[1].least_w = 0.5f;
   codes[2].low = Vec3(-0.25f, 0.0f, 0.0f);
   codes[2].step = Vec3(1.0f / 8192.0f, 0.004f, 0.004f);
-  codes[2].bits = {12, 0, 0};
+  codes[2].bits = {13, 0, 0};
   codes[2].least_w = 0.9f;
   return codes;
 }

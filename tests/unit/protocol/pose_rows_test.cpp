@@ -2,10 +2,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
+#include <limits>
 #include <numeric>
 
 #include "protocol_testing.h"
 #include "stridewire/protocol/pose_batch_encoder.h"
+#include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
 namespace {
@@ -101,6 +105,76 @@ TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
   EXPECT_THAT(Decoded(composer, rows, {0, 1, 2, 3, 4}).batch.avatars, ElementsAre(2, 5));
   EXPECT_THAT(Decoded(composer, rows, {0, 1, 2, 3, 4}).batch.flags, ElementsAre(7, 8));
   EXPECT_THAT(Decoded(composer, rows, {0, 3}).batch.avatars, ElementsAre());
+}
+
+// A root and a joint that turns about y by up to half a radian.
+CompactCodec SmallCodec() {
+  std::vector<RotationCode> codes(2);
+  codes[0].free_bits = 12;
+  codes[1].low = Vec3(0.0f, -0.25f, 0.0f);
+  codes[1].step = Vec3(0.01f, 0x1p-10f, 0.01f);
+  codes[1].bits = {0, 9, 0};
+  codes[1].least_w = 0.9f;
+  return CompactCodec::Make(codes, std::array<std::int16_t, 2>{-1, 0}).value();
+}
+
+TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
+  const CompactCodec codec = SmallCodec();
+  const PoseBatchInfo info{5, 1, 0, 1, 99, 1.5, PoseMode::kCompact, 2};
+  std::vector<AvatarNumber> avatars(100);
+  std::iota(avatars.begin(), avatars.end(), 1u);
+  const auto numbers = std::make_shared<const std::vector<AvatarNumber>>(avatars);
+  const auto is_skipped = [](AvatarNumber a) { return a % 11 == 3 || a > 97; };
+  const auto is_bad = [](AvatarNumber a) { return a % 7 == 0; };
+  const auto turn = [](AvatarNumber a) { return a % 5 == 0 ? 2.0 : 0.02 * (a % 20); };
+  PoseRows rows;
+  PoseBatchComposer composer;
+  for (int round = 0; round < 2; ++round) {  // the second with the first one's memory
+    ASSERT_TRUE(rows.Begin(info, numbers, &codec));
+    std::vector<std::uint32_t> picked;
+    for (const AvatarNumber a : avatars) {
+      if (a % 3 > 0) picked.push_back(a - 1);
+      if (is_skipped(a)) {
+        rows.SkipTo(a);
+        continue;
+      }
+      const Vec3 root(is_bad(a) ? std::numeric_limits<float>::quiet_NaN() : 0.5f, 0.0f, 0.0f);
+      // The caller's flags do not say how a pose is told.
+      ASSERT_TRUE(rows.Add(a % 8, root, std::array{YawRotation(a), YawRotation(turn(a))}));
+    }
+    rows.SkipTo(100);
+    rows.Finish();
+    const auto has_pose = [&](AvatarNumber a) { return !is_skipped(a) && !is_bad(a); };
+    EXPECT_EQ(rows.pose_count(),
+              static_cast<std::size_t>(std::ranges::count_if(avatars, has_pose)));
+    const Decoded decoded(composer, rows, picked);
+    EXPECT_EQ(CompactPoseBytes(decoded.batch), codec.pose_bytes());
+    PoseBatchReader reader(decoded.batch, &codec);
+    std::size_t i = 0;
+    for (const std::uint32_t row : picked) {
+      const AvatarNumber a = row + 1;
+      ASSERT_EQ(rows.has_pose(row), has_pose(a)) << a;
+      if (!has_pose(a)) continue;
+      const int wide = a % 5 == 0 ? kPoseWide : 0;
+      ASSERT_EQ(decoded.batch.avatars[i], a);
+      ASSERT_EQ(decoded.batch.flags[i++], (a % 4) | wide);
+      ASSERT_EQ(reader.Next().size(), wide != 0 ? 24u : codec.pose_bytes());
+      Vec3 root;
+      std::vector<Quat> back(2);
+      ASSERT_TRUE(reader.Decode(root, back));
+      ASSERT_EQ(root.x, 0.5f);
+      ASSERT_LT(AngleBetween(back[1], YawRotation(turn(a))), 4e-3) << a;
+    }
+    EXPECT_EQ(i, decoded.batch.avatars.size());
+    PoseBatchReader without(decoded.batch, nullptr);
+    Vec3 root;
+    std::vector<Quat> back(2);
+    without.Next();
+    EXPECT_EQ(without.Decode(root, back).error().code, ErrorCode::kUnsupported);
+  }
+  EXPECT_EQ(rows.Begin(info, numbers).error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(rows.Begin(Info(PoseMode::kCompact), numbers, &codec).error().code,
+            ErrorCode::kInvalidArgument);
 }
 
 TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {

@@ -329,8 +329,9 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
                                                  uint64_t* command);
 
 typedef enum stridewire_pose_mode {
-  STRIDEWIRE_FULL = 0,       ///< float32: as the server has them.
-  STRIDEWIRE_QUANTISED = 1,  ///< 48 bits a joint: off by at most 0.00016 rad and 0.03 mm.
+  STRIDEWIRE_FULL = 0,  ///< float32: as the server has them.
+  /// No joint or end site is off by more than 1 mm (0.00016 rad a joint from servers of before compact poses).
+  STRIDEWIRE_QUANTISED = 1,
   /// What avatars begin instead of their poses, which are evaluated here: those of STRIDEWIRE_FULL, bit by
   /// bit, at some 150 bytes a step. The world's library is fetched first, if it is not in library_folder; the Observe and what
   /// is asked of that world behind it wait meanwhile. UNSUPPORTED, MALFORMED: the server has not this mode, or no such library.

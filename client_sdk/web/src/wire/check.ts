@@ -1,5 +1,5 @@
 import type {
-  LayerRequest, MovementRequest, Observation, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox, Vec3
+  LayerRequest, MovementRequest, Observation, PoseMode, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox, Vec3
 } from '../types';
 import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
 import {
@@ -230,7 +230,7 @@ export function observe(observation: Observation): Observe {
     seq: 0n,
     world: 0,
     subscription: 0,
-    mode: oneOf(poseModes.slice(0, 2), observation.mode, 'mode'),
+    mode: oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode'),
     avatars: avatarList(observation.avatars ?? [], 0, 'avatars'),
     everyNTicks,
     withEvents: observation.withEvents === true,

@@ -14,8 +14,11 @@ import {
   minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
-import type {Joint, LayerEntry, Message, RegionEntry, ReplyEntry, SpawnEntry} from './messages';
-import {poseBytes} from './pose_codec';
+import type {
+  Joint, LayerEntry, Message, RegionEntry, ReplyEntry, RotationCode, SpawnEntry
+} from './messages';
+import {checkRotationCodes} from './compact_codec';
+import {compactPoseBytes, poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
 
@@ -23,7 +26,9 @@ import {verify} from './verify';
 const asBytes = Encoding.UTF8_BYTES;
 
 export const roles: readonly Role[] = ['controller', 'observer'];
-export const poseModes: readonly (PoseMode | 'movement')[] = ['full', 'quantised', 'movement'];
+export const poseModes = ['full', 'quantised', 'movement', 'compact'] as const;
+/** Those that can be asked for. */
+const observedModes = poseModes.slice(0, 3) as (PoseMode | 'movement')[];
 export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand', 'walk'];
 export const takeovers: readonly Takeover[] = ['none', 'afterMovement', 'now'];
 export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
@@ -121,6 +126,24 @@ function parameters(length: number,
 }
 
 // ---- the messages
+
+function rotationCodes(m: wire.WorldInfo, jointCount: number): RotationCode[] {
+  const length = count(m.rotationCodesLength(), 0, maxJoints, 'WorldInfo.rotationCodes');
+  const codes = Array.from({length}, (_, j): RotationCode => {
+    const code = m.rotationCodes(j)!;
+    const q = code.reference()!;
+    return {
+      reference: [q.x(), q.y(), q.z(), q.w()],
+      low: vector(code.low(), 'WorldInfo.rotationCodes', j),
+      step: vector(code.step(), 'WorldInfo.rotationCodes', j),
+      bits: [code.bitsX(), code.bitsY(), code.bitsZ()],
+      freeBits: code.freeBits(),
+      leastW: code.leastW(),
+    };
+  });
+  checkRotationCodes(codes, jointCount);
+  return codes;
+}
 
 const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message} = {
   Hello(bytes) {
@@ -231,7 +254,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       seq: id(m.seq(), 'Observe.seq'),
       world: id(m.world(), 'Observe.world'),
       subscription: id(m.subscription(), 'Observe.subscription'),
-      mode: known(poseModes, m.mode(), 'Observe.mode'),
+      mode: known(observedModes, m.mode(), 'Observe.mode'),
       avatars,
       everyNTicks: everyNTicks(m.everyNTicks(), 'Observe.everyNTicks'),
       withEvents: m.withEvents(),
@@ -353,6 +376,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       layers: Array.from(
           {length: count(m.layersLength(), 0, maxLayerNames, 'WorldInfo.layers')},
           (_, l) => name(m.layers(l)!.name(asBytes), 'WorldInfo.layers', l)),
+      rotationCodes: rotationCodes(m, jointCount),
     };
   },
 
@@ -403,7 +427,9 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       throw new Malformed('is not one an avatar', 'PoseBatch.flags');
     }
     const poses = m.posesArray() ?? new Uint8Array(0);
-    if (poses.length !== avatars.length * poseBytes(mode, jointCount)) {
+    const compactBytes = mode === 'compact' ? compactPoseBytes(flags, poses.length, jointCount) : 0;
+    if (mode === 'compact' ? compactBytes < 0
+                           : poses.length !== avatars.length * poseBytes(mode, jointCount)) {
       throw new Malformed('is not one an avatar', 'PoseBatch.poses');
     }
     return {
@@ -420,6 +446,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       flags,
       poses,
       partial: m.partial(),
+      codec: null,
     };
   },
 

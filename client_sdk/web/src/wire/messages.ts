@@ -2,6 +2,7 @@
 import type {
   AvatarState, EndSite, Leg, PoseMode, QueuedRequest, Role, Terrain, Vec3, WorldEvent
 } from '../types';
+import type {CompactCodec} from './compact_codec';
 
 export interface Hello {
   type: 'Hello';
@@ -134,7 +135,21 @@ export interface WorldInfo {
   leftLeg: Leg;
   rightLeg: Leg;
   layers: string[];
+  /** How compact poses are told: one a joint, or none. */
+  rotationCodes: RotationCode[];
 }
+/** STANDARD.md, "Poses". */
+export interface RotationCode {
+  /** x, y, z, w. */
+  reference: readonly [number, number, number, number];
+  low: Vec3;
+  step: Vec3;
+  bits: Vec3;
+  freeBits: number;
+  leastW: number;
+}
+/** In which mode poses come: who asked for quantised ones gets compact ones from servers that have them. */
+export type BatchMode = PoseMode | 'compact';
 export interface ReplyEntry {
   index: number;
   avatar: number;
@@ -159,13 +174,15 @@ export interface PoseBatch {
   parts: number;
   tick: number;
   serverTimeS: number;
-  mode: PoseMode;
+  mode: BatchMode;
   jointCount: number;
   avatars: Uint32Array;
   flags: Uint8Array;
   poses: Uint8Array;
   /** Who is not in it may be there all the same. */
   partial: boolean;
+  /** That of the world, for compact poses; null as decoded, since the batch does not know. */
+  codec: CompactCodec | null;
 }
 export interface Events {
   type: 'Events';

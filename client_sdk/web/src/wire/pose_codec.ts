@@ -1,4 +1,6 @@
 import type {PoseMode} from '../types';
+import type {CompactCodec} from './compact_codec';
+import type {BatchMode} from './messages';
 
 const componentScale = 1 / (Math.SQRT2 * 16383);
 const zero = 16384;
@@ -8,34 +10,92 @@ const maxRootSteps = 131_071 * 16384;
 const leastSquared = (1 - 1e-3) ** 2;
 const mostSquared = (1 + 1e-3) ** 2;
 
+/** Flag of an avatar in a compact batch: its pose is quantised. */
+const wide = 4;
+
+/** Bytes of each pose of a compact batch that is not wide, 0 without any; -1: `length` is not that of so many. */
+export function compactPoseBytes(flags: Uint8Array, length: number, jointCount: number): number {
+  let wides = 0;
+  for (let i = 0; i < flags.length; ++i) wides += (flags[i]! & wide) >> 2;
+  const rest = length - wides * poseBytes('quantised', jointCount);
+  const compact = flags.length - wides;
+  if (compact === 0) return rest === 0 ? 0 : -1;
+  return rest >= 0 && rest % compact === 0 ? rest / compact : -1;
+}
+
 /** Bytes of one pose. */
 export function poseBytes(mode: PoseMode, jointCount: number): number {
   return 12 + (mode === 'full' ? 16 : 6) * jointCount;
 }
 
+/** What a reader needs of a batch. */
+interface Poses {
+  readonly mode: BatchMode;
+  readonly jointCount: number;
+  readonly flags: Uint8Array;
+  /** Begins on a multiple of 4 of its buffer, as a verified message's do. */
+  readonly poses: Uint8Array;
+  readonly codec: CompactCodec | null;
+}
+
 /** Reads the poses of one batch. Its memory is one view a batch, none a pose. */
 export class PoseReader {
+  private readonly jointCount: number;
   private full: Float32Array | null = null;
   private words: Uint16Array | null = null;
+  private readonly compactBytes: number;
+  /** A compact batch's pose where reading goes on, and where it is. */
+  private next = 0;
+  private nextAt = 0;
 
-  /** `poses` begins on a multiple of 4 of its buffer, as a verified message's do. */
-  constructor(poses: Uint8Array, private readonly mode: PoseMode,
-              private readonly jointCount: number) {
+  constructor(private readonly batch: Poses) {
+    const {mode, poses, flags, jointCount} = batch;
+    this.jointCount = jointCount;
     if (mode === 'full') {
       this.full = new Float32Array(poses.buffer, poses.byteOffset, poses.byteLength >> 2);
     } else {
       this.words = new Uint16Array(poses.buffer, poses.byteOffset, poses.byteLength >> 1);
     }
+    this.compactBytes = mode === 'compact' ? compactPoseBytes(flags, poses.length, jointCount) : 0;
   }
 
   /**
    * Pose number `index`: the root to `rootM[rootAt ...]`, x, y, z, w of each joint to
    * `rotations[rotationsAt ...]`. False: it is none; what was written then has no meaning.
+   * Those of a compact batch are quickest in growing order.
    */
   read(index: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
        rotationsAt: number): boolean {
-    return this.mode === 'full' ? this.readFull(index, rootM, rootAt, rotations, rotationsAt)
-                                : this.readQuantised(index, rootM, rootAt, rotations, rotationsAt);
+    switch (this.batch.mode) {
+      case 'full': return this.readFull(index, rootM, rootAt, rotations, rotationsAt);
+      case 'quantised':
+        return this.readQuantised(index * (6 + 3 * this.jointCount), rootM, rootAt, rotations,
+                                  rotationsAt);
+      default: return this.readCompact(index, rootM, rootAt, rotations, rotationsAt);
+    }
+  }
+
+  private readCompact(index: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
+                      rotationsAt: number): boolean {
+    const {flags, codec} = this.batch;
+    if (index < this.next) {
+      this.next = 0;
+      this.nextAt = 0;
+    }
+    const wideWords = 6 + 3 * this.jointCount;
+    const compactWords = this.compactBytes >> 1;
+    for (; this.next < index; ++this.next) {
+      this.nextAt += (flags[this.next]! & wide) !== 0 ? wideWords : compactWords;
+    }
+    if ((flags[index]! & wide) !== 0) {
+      return this.readQuantised(this.nextAt, rootM, rootAt, rotations, rotationsAt);
+    }
+    // Without its codes, or with others than were told, a pose means nothing.
+    if (codec === null || codec.jointCount !== this.jointCount ||
+        codec.poseBytes !== this.compactBytes) {
+      return false;
+    }
+    return codec.read(this.words!, this.nextAt, rootM, rootAt, rotations, rotationsAt);
   }
 
   private readFull(index: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
@@ -67,10 +127,9 @@ export class PoseReader {
     return good;
   }
 
-  private readQuantised(index: number, rootM: Float32Array, rootAt: number,
+  private readQuantised(at: number, rootM: Float32Array, rootAt: number,
                         rotations: Float32Array, rotationsAt: number): boolean {
     const from = this.words!;
-    let at = index * (6 + 3 * this.jointCount);
     let good = true;
     for (let i = 0; i < 3; ++i, at += 2) {
       const steps = from[at]! | (from[at + 1]! << 16);

@@ -1,11 +1,12 @@
 import assert from 'node:assert/strict';
 import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
+import {vectorCodec} from './vectors';
 
 const texts = new Set([
   'Hello', 'JoinWorld', 'LeaveWorld', 'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe',
   'StopObserving', 'Ping', 'InspectAvatar', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch',
-  'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
+  'compact', 'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
   'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
   'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
   'removed', 'entered', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
@@ -49,7 +50,8 @@ export function onlyKnown(value: unknown, field = ''): void {
 export function checkMessage(message: Message): 'known' | 'refused pose' {
   onlyKnown(message);
   if (message.type !== 'PoseBatch') return 'known';
-  const reader = new PoseReader(message.poses, message.mode, message.jointCount);
+  if (message.mode === 'compact') message.codec = vectorCodec();
+  const reader = new PoseReader(message);
   const rootM = new Float32Array(3);
   const rotations = new Float32Array(4 * message.jointCount);
   for (let i = 0; i < message.avatars.length; ++i) {

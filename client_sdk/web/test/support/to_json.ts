@@ -3,6 +3,7 @@ import {
 } from '../../src/wire/decode';
 import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
+import {vectorCodec} from './vectors';
 import type {
   CurrentMovement, Leg, Parameters, QueuedRequest, Terrain, Vec3
 } from '../../src/types';
@@ -161,6 +162,10 @@ export function toJson(m: Message): {[name: string]: Json} {
           left_leg: leg(m.leftLeg), right_leg: leg(m.rightLeg),
         },
         layers: [...m.layers],
+        rotation_codes: m.rotationCodes.map((code) => ({
+          reference: [...code.reference], low: vec3(code.low), step: vec3(code.step),
+          bits: vec3(code.bits), free_bits: code.freeBits, least_w: code.leastW,
+        })),
       };
     case 'Reply':
       return {
@@ -171,7 +176,8 @@ export function toJson(m: Message): {[name: string]: Json} {
         })),
       };
     case 'PoseBatch': {
-      const reader = new PoseReader(m.poses, m.mode, m.jointCount);
+      const reader = new PoseReader(
+          m.mode === 'compact' ? {...m, codec: vectorCodec()} : m);
       return {
         world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
         server_time_s: m.serverTimeS, mode: poseModes.indexOf(m.mode),

@@ -1,4 +1,6 @@
 import {readFileSync, readdirSync} from 'node:fs';
+import {CompactCodec} from '../../src/wire/compact_codec';
+import {decodeFrame} from '../../src/wire/decode';
 import {root} from './environment';
 
 export interface Vector {
@@ -23,4 +25,17 @@ export function readVectors(): Vector[] {
       fields: json.fields,
     };
   });
+}
+
+let codec: CompactCodec | null = null;
+
+/** Of the vectors' compact poses: told by `world_info_compact`. */
+export function vectorCodec(): CompactCodec {
+  if (codec === null) {
+    const vector = readVectors().find(({name}) => name === 'world_info_compact')!;
+    const info = decodeFrame(vector.frame, 'server');
+    if (info.type !== 'WorldInfo') throw new Error('world_info_compact is no WorldInfo');
+    codec = new CompactCodec(info.rotationCodes);
+  }
+  return codec;
 }

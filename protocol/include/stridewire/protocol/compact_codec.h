@@ -29,7 +29,7 @@ struct CompactJoint {
 };
 
 /// PoseMode::kCompact (STANDARD.md, "Poses"): the root as in kQuantised, then every joint's bits behind one another, the
-/// first of a number in the lowest bits, in little-endian words of 32 bits. What is left of the last word is 0.
+/// first of a number in the lowest bits, in little-endian words of 16 bits. What is left of the last word is 0.
 ///
 /// Joints are encoded from the root on, each relative to what its parent is decoded to, so that it makes up for the errors
 /// of those above: its own error is all that is left of its rotation in the world.
@@ -45,7 +45,7 @@ class CompactCodec {
 
   [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
   /// Bytes of a pose.
-  [[nodiscard]] std::size_t pose_bytes() const { return 4 * word_count_; }
+  [[nodiscard]] std::size_t pose_bytes() const { return pose_bytes_; }
 
   /// Up to kBlock poses on their way to be encoded, and what came of it. Keep one: only Encode of a codec with more
   /// joints than any before allocates.
@@ -87,7 +87,7 @@ class CompactCodec {
   CompactCodec() = default;
 
   std::vector<CompactJoint> joints_;
-  std::size_t word_count_ = 0;  // with the root's three
+  std::size_t pose_bytes_ = 0;
 };
 
 }  // namespace stridewire::protocol

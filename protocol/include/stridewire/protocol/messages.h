@@ -11,6 +11,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/base/math.h"
+#include "stridewire/base/rotation_code.h"
 #include "stridewire/protocol/frame.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/protocol/pose_codec.h"
@@ -389,6 +390,8 @@ struct WorldInfo {
   std::string library_hash;  ///< As `stridewire-library inspect` prints it.
   SkeletonInfo skeleton;
   std::vector<std::string> layers;  ///< Names for SetLayers; only with kFeatureLayers.
+  /// One a joint, for compact poses; only with kFeatureCompact, else none.
+  std::vector<RotationCode> rotation_codes;
   bool operator==(const WorldInfo&) const = default;
 };
 
@@ -415,6 +418,8 @@ struct Reply {
 /// Flags of an avatar in a batch. Unknown bits are ignored.
 inline constexpr std::uint8_t kPoseDiscontinuity = 1;  ///< Do not interpolate from the last pose.
 inline constexpr std::uint8_t kPoseStanding = 2;       ///< Standing, nothing queued.
+/// In a compact batch: this pose is quantised, since the world's codes cannot tell it.
+inline constexpr std::uint8_t kPoseWide = 4;
 
 /// What a batch says about itself. Nothing in it is a session's: a batch is encoded once and sent
 /// to every observer of that world and mode.
@@ -425,7 +430,7 @@ struct PoseBatchInfo {
   std::uint16_t parts = 1;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;       ///< The server's clock at that tick.
-  PoseMode mode = PoseMode::kFull;  ///< kFull or kQuantised
+  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or kCompact
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
   bool is_partial = false;          ///< Who is not in it may be there all the same: of a region.
   bool operator==(const PoseBatchInfo&) const = default;
@@ -439,13 +444,18 @@ struct PoseBatch {
   PoseBatchInfo info;
   std::span<const AvatarNumber> avatars;  ///< 0 to kMaxItems, none 0
   std::span<const std::uint8_t> flags;    ///< One an avatar.
-  std::span<const std::byte> poses;       ///< One after the other, PoseBytes(mode, joints) each.
+  std::span<const std::byte> poses;       ///< One after the other (PoseBatchReader).
 
+  /// One of a full or quantised batch.
   [[nodiscard]] std::span<const std::byte> pose(std::size_t i) const {
     const std::size_t bytes = PoseBytes(info.mode, info.joint_count);
     return poses.subspan(i * bytes, bytes);
   }
 };
+
+/// Bytes of each pose of a compact batch that is not wide, 0 if there is none. Empty: the batch's size is not that of
+/// so many poses.
+[[nodiscard]] std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch);
 
 enum class EventType : std::uint8_t {
   kAccepted = 0,    ///< A request was queued.

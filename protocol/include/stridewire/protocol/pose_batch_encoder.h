@@ -11,7 +11,7 @@
 
 namespace stridewire::protocol {
 
-/// Gathers the poses of a tick into a frame:
+/// Gathers the poses of a tick, full or quantised, into a frame:
 ///
 ///   encoder.Begin(info);
 ///   for (…) encoder.Add(avatar, flags, root_position_m, rotations);

@@ -14,6 +14,8 @@ enum class PoseMode : std::uint8_t {
   kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
   kQuantised = 1,  ///< Root in fixed point, 3 x int32; 48 bits a joint ("smallest three").
   kMovement = 2,   ///< What a movement was decided to be, once a step (Movements). No pose is sent.
+  /// What who agreed on kFeatureCompact gets in place of kQuantised (compact_codec.h); nobody asks for it.
+  kCompact = 3,
 };
 
 /// Quantised root: multiples of 2^-14 m (0.061 mm), so the error is at most 2^-15 m = 0.031 mm as
@@ -31,12 +33,13 @@ inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 /// How far a quaternion's length may be from 1.
 inline constexpr float kUnitTolerance = 1e-3f;
 
-/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement.
+/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement and kCompact, whose poses differ by world.
 [[nodiscard]] constexpr std::size_t PoseBytes(PoseMode mode, std::size_t joint_count) {
   switch (mode) {
     case PoseMode::kFull: return 12 + 16 * joint_count;
     case PoseMode::kQuantised: return 12 + 6 * joint_count;
-    case PoseMode::kMovement: return 0;
+    case PoseMode::kMovement:
+    case PoseMode::kCompact: return 0;
   }
   return 0;
 }
@@ -44,7 +47,7 @@ inline constexpr float kUnitTolerance = 1e-3f;
 /// Writes one pose. `out` is PoseBytes(mode, rotations.size()) long, of any alignment.
 /// kShapeMismatch: `out` has another size; kOutOfRange: a number is not finite, a quaternion not
 /// unit within kUnitTolerance, or the root beyond kMaxRootM (quantised); `index` is the joint;
-/// kUnsupported: kMovement. On error the content of `out` is unspecified. Never allocates.
+/// kUnsupported: another mode. On error the content of `out` is unspecified. Never allocates.
 [[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
                                 std::span<const Quat> rotations, std::span<std::byte> out);
 

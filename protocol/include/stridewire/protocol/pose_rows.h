@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -8,6 +9,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/base/math.h"
+#include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::protocol {
@@ -26,15 +28,20 @@ class PoseRows {
   using Avatars = std::shared_ptr<const std::vector<AvatarNumber>>;
 
   /// Starts anew; drops what was there. `info` with part 0 of 1; `avatars` not null, growing, none of them
-  /// 0. Errors as Check(PoseBatch).
-  [[nodiscard]] Status Begin(const PoseBatchInfo& info, Avatars avatars);
+  /// 0. Compact rows need the world's codec, which has to live until Finish. Errors as Check(PoseBatch), or
+  /// kInvalidArgument: no codec, or one of another number of joints.
+  [[nodiscard]] Status Begin(const PoseBatchInfo& info, Avatars avatars,
+                             const CompactCodec* codec = nullptr);
 
   /// Makes the next row: the pose of the next avatar, encoded by EncodePose with its errors, after which
   /// the row is there but empty. kShapeMismatch: another number of joints. There must be an avatar left.
+  /// Compact poses are copied, to be encoded together: which of them are none shows after Finish.
   [[nodiscard]] Status Add(std::uint8_t flags, const Vec3& root_position_m,
                            std::span<const Quat> rotations);
   /// Makes the rows before the `row`th without a pose.
   void SkipTo(std::size_t row);
+  /// After the last row: now they may be read.
+  void Finish();
 
   [[nodiscard]] const PoseBatchInfo& info() const { return info_; }
   [[nodiscard]] const Avatars& avatars() const { return avatars_; }
@@ -53,6 +60,14 @@ class PoseRows {
   std::vector<std::size_t> begins_;
   std::vector<std::byte> bytes_;  // longer than what is used of it, so that it is not zeroed again
   std::size_t pose_count_ = 0;
+
+  // Compact: the poses on their way, and their rows.
+  void EncodeBlock();
+  std::span<std::byte> Room(std::size_t begin, std::size_t length);
+  const CompactCodec* codec_ = nullptr;
+  CompactCodec::Block block_;
+  std::array<std::size_t, CompactCodec::kBlock> block_rows_{};
+  std::vector<Quat> scratch_;
 };
 
 /// Puts rows into frames: copies, nothing is encoded again. Keeps its memory between frames: once warm

@@ -1,0 +1,132 @@
+import {Malformed} from './malformed';
+import type {RotationCode} from './messages';
+
+const maxThreeSquared = 0.77;
+const leastToldW = 0.9;
+const rootStepM = 1 / 16384;
+const maxRootSteps = 131_071 * 16384;
+
+/** @throws Malformed: codes that no encoder has (protocol/STANDARD.md, "Poses"). */
+export function checkRotationCodes(codes: readonly RotationCode[], jointCount: number): void {
+  if (codes.length !== 0 && codes.length !== jointCount) {
+    throw new Malformed('is not one a joint', 'WorldInfo.rotationCodes');
+  }
+  codes.forEach((code, j) => {
+    const wrong = (what: string): never => {
+      throw new Malformed(what, 'WorldInfo.rotationCodes', j);
+    };
+    const {freeBits, reference, low, step, bits, leastW} = code;
+    if (freeBits !== 0 ? freeBits < 8 || freeBits > 15 : j === 0) wrong('free bits are not 8 to 15');
+    const squared = reference.reduce((sum, x) => sum + x * x, 0);
+    if (!(Math.abs(squared - 1) <= 1e-5)) wrong('reference is not a unit quaternion');
+    if (!(leastW >= 0.3 - 1e-7 && leastW <= 1)) wrong('least w is not 0.3 to 1');
+    for (let c = 0; c < 3; ++c) {
+      if (!(Math.abs(low[c]!) <= 1)) wrong('component begins outside -1 to 1');
+      if (!(step[c]! >= 2 ** -20 && step[c]! <= 2)) wrong('step is not 2^-20 to 2');
+      if (bits[c]! > 16) wrong('more than 16 bits');
+    }
+  });
+}
+
+/** Reads compact poses of one world. */
+export class CompactCodec {
+  readonly jointCount: number;
+  readonly poseBytes: number;
+  /** Per joint: free bits, bits of x, y, z. */
+  private readonly bits: Uint8Array;
+  /** Per joint: reference x, y, z, w, low x, y, z, step x, y, z, square of the least w. */
+  private readonly numbers: Float64Array;
+
+  /** `codes` as checkRotationCodes takes them, at least one. */
+  constructor(codes: readonly RotationCode[]) {
+    this.jointCount = codes.length;
+    this.bits = new Uint8Array(4 * codes.length);
+    this.numbers = new Float64Array(11 * codes.length);
+    let count = 0;
+    codes.forEach((code, j) => {
+      const {freeBits} = code;
+      this.bits.set([freeBits, ...code.bits], 4 * j);
+      const step = freeBits > 0 ? [1 / (Math.SQRT2 * (2 ** (freeBits - 1) - 1)), 0, 0] : code.step;
+      this.numbers.set([...code.reference, ...code.low, ...step, (leastToldW * code.leastW) ** 2],
+                       11 * j);
+      count += freeBits > 0 ? 2 + 3 * freeBits : code.bits[0] + code.bits[1] + code.bits[2];
+    });
+    this.poseBytes = 12 + 2 * Math.ceil(count / 16);
+  }
+
+  /**
+   * The pose that begins at `words[at]`, all of it there: the root to `rootM[rootAt ...]`, x, y, z, w of each
+   * joint to `rotations[rotationsAt ...]`. False: it is none; what was written then has no meaning.
+   */
+  read(words: Uint16Array, at: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
+       rotationsAt: number): boolean {
+    const {bits, numbers} = this;
+    const end = at + (this.poseBytes >> 1);
+    for (let i = 0; i < 3; ++i, at += 2) {
+      const steps = words[at]! | (words[at + 1]! << 16);
+      if (steps > maxRootSteps || steps < -maxRootSteps) return false;
+      rootM[rootAt + i] = steps * rootStepM;
+    }
+    let held = 0;  // of `window`, the lowest bits that were not taken yet
+    let window = 0;
+    for (let j = 0, n = 0, to = rotationsAt; j < bits.length; j += 4, n += 11, to += 4) {
+      const free = bits[j]!;
+      let largest = 0;
+      if (free > 0) {
+        if (held < 2) {
+          window |= words[at++]! << held;
+          held += 16;
+        }
+        largest = window & 3;
+        window >>>= 2;
+        held -= 2;
+      }
+      let a = 0;
+      let b = 0;
+      let c = 0;
+      for (let k = 0; k < 3; ++k) {
+        const count = free > 0 ? free : bits[j + 1 + k]!;
+        if (held < count) {
+          window |= words[at++]! << held;
+          held += 16;
+        }
+        const number = window & ((1 << count) - 1);
+        window >>>= count;
+        held -= count;
+        let value;
+        if (free > 0) {
+          if (number === 0) return false;
+          value = (number - (1 << (free - 1))) * numbers[n + 7]!;
+        } else {
+          value = numbers[n + 4 + k]! + number * numbers[n + 7 + k]!;
+        }
+        if (k === 0) a = value;
+        else if (k === 1) b = value;
+        else c = value;
+      }
+      const squared = a * a + b * b + c * c;
+      if (free > 0) {
+        if (squared > maxThreeSquared) return false;
+        const left = Math.sqrt(1 - squared);
+        rotations[to] = largest === 0 ? left : a;
+        rotations[to + 1] = largest === 0 ? a : largest === 1 ? left : b;
+        rotations[to + 2] = largest < 2 ? b : largest === 2 ? left : c;
+        rotations[to + 3] = largest === 3 ? left : c;
+        continue;
+      }
+      const wSquared = 1 - squared;
+      if (!(wSquared >= numbers[n + 10]!)) return false;
+      const w = Math.sqrt(wSquared);
+      const rx = numbers[n]!;
+      const ry = numbers[n + 1]!;
+      const rz = numbers[n + 2]!;
+      const rw = numbers[n + 3]!;
+      rotations[to] = rw * a + rx * w + ry * c - rz * b;
+      rotations[to + 1] = rw * b - rx * c + ry * w + rz * a;
+      rotations[to + 2] = rw * c + rx * b - ry * a + rz * w;
+      rotations[to + 3] = rw * w - rx * a - ry * b - rz * c;
+    }
+    while (at < end) window |= words[at++]!;
+    return window === 0;
+  }
+}
