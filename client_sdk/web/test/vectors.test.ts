@@ -1,11 +1,13 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
+import type {CompactCodec} from '../src/wire/compact_codec';
 import {decodeFrame} from '../src/wire/decode';
 import {Encoder} from '../src/wire/encode';
 import {MessageType} from '../src/wire/frame';
 import type {ClientMessage} from '../src/wire/messages';
+import {PoseReader} from '../src/wire/pose_codec';
 import {toJson} from './support/to_json';
-import {readVectors} from './support/vectors';
+import {readVectors, vectorCodec} from './support/vectors';
 
 const tolerance = 1e-6;  // Of quantised rotations; all else is exact.
 
@@ -67,4 +69,25 @@ test('a side of 0 is not an absent one', () => {
     assert.ok(back.type === 'Request');
     assert.equal(back.items[0]!.sideM, sideM);
   }
+});
+
+test('compact poses are read in any order, and not without their codes', () => {
+  const batch = decodeFrame(vectors.find(({name}) => name === 'pose_batch_compact')!.frame, 'server');
+  assert.ok(batch.type === 'PoseBatch');
+  assert.equal(batch.flags[1]! & 4, 4, 'the second is wide');
+  const read = (codec: CompactCodec | null, order: number[]): (number[] | null)[] => {
+    const reader = new PoseReader({...batch, codec});
+    const poses: (number[] | null)[] = [];
+    for (const i of order) {
+      const rootM = new Float32Array(3);
+      const rotations = new Float32Array(4 * batch.jointCount);
+      poses[i] = reader.read(i, rootM, 0, rotations, 0) ? [...rootM, ...rotations] : null;
+    }
+    return poses;
+  };
+  const inOrder = read(vectorCodec(), [0, 1, 2]);
+  assert.ok(inOrder.every((pose) => pose !== null));
+  assert.deepEqual(read(vectorCodec(), [2, 0, 1]), inOrder);
+  // A wide one means the same whatever the codes are.
+  assert.deepEqual(read(null, [0, 1, 2]), [null, inOrder[1], null]);
 });
