@@ -88,7 +88,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
     hold_until_s_ = time_s_ + hold_s;
     if (held_until_s > time_s_) hold_until_s_ = std::min(hold_until_s_, held_until_s);
   }
-  if (queue_head_ > 64 && queue_head_ * 2 > queue_.size()) {
+  if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
