@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "end_measures.h"
 #include "pose_kernels.h"
 #include "stridewire/base/trig.h"
 
@@ -122,27 +123,12 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
 }
 
 ParameterValues EndPoses::Measure() const {
-  const DVec3 start = sign_ * (ends_[0].Ball(0) - ends_[0].Ball(1));
-  const DVec3 end = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1));
-  const DVec3 travel =
-      0.5 * (ends_[1].Ball(0) + ends_[1].Ball(1) - ends_[0].Ball(0) - ends_[0].Ball(1));
-  ParameterValues measured;
-  measured.count = group_.parameter_count();
-  for (std::size_t l = 0; l < group_.parameters.size(); ++l) {
-    double& value = measured.values[l];
-    switch (group_.parameters[l].name) {
-      case ParameterName::kStartX: value = start.x; break;
-      case ParameterName::kStartY: value = start.y; break;
-      case ParameterName::kStartZ: value = start.z; break;
-      case ParameterName::kEndX: value = end.x; break;
-      case ParameterName::kEndY: value = end.y; break;
-      case ParameterName::kEndZ: value = end.z; break;
-      case ParameterName::kTurn: value = heading_change_rad_; break;
-      case ParameterName::kLength: value = travel.z; break;
-      case ParameterName::kHeight: value = travel.y; break;
-    }
-  }
-  return measured;
+  return ParametersOf(group_,
+                      {.start_m = sign_ * (ends_[0].Ball(0) - ends_[0].Ball(1)),
+                       .end_m = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1)),
+                       .travel_m = 0.5 * (ends_[1].Ball(0) + ends_[1].Ball(1) - ends_[0].Ball(0) -
+                                          ends_[0].Ball(1)),
+                       .heading_change_rad = heading_change_rad_});
 }
 
 // How far a foot's ball goes `along` a direction of the world. From the root down: the direction in the axes of each

@@ -1,9 +1,9 @@
 #include "stridewire/runtime/measure.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
+#include "end_measures.h"
 #include "stridewire/runtime/foot_vector.h"
 
 namespace stridewire {
@@ -39,27 +39,11 @@ ParameterValues MeasureMovement(const Skeleton& skeleton, const GridLayout& layo
   const double sign = group.kind == MovementKind::kStepRight ? -1.0 : 1.0;
   const double start_heading = movement.base.heading_rad;
   const double end_heading = start_heading + movement.heading_change_rad;
-  const DVec3 start = sign * RotateYaw(-start_heading, before.left - before.right);
-  const DVec3 end = sign * RotateYaw(-end_heading, after.left - after.right);
-  const DVec3 travel = RotateYaw(-start_heading, after.Centre() - before.Centre());
-
-  ParameterValues measured;
-  measured.count = group.parameter_count();
-  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-    double& value = measured.values[l];
-    switch (group.parameters[l].name) {
-      case ParameterName::kStartX: value = start.x; break;
-      case ParameterName::kStartY: value = start.y; break;
-      case ParameterName::kStartZ: value = start.z; break;
-      case ParameterName::kEndX: value = end.x; break;
-      case ParameterName::kEndY: value = end.y; break;
-      case ParameterName::kEndZ: value = end.z; break;
-      case ParameterName::kTurn: value = movement.heading_change_rad; break;
-      case ParameterName::kLength: value = travel.z; break;
-      case ParameterName::kHeight: value = travel.y; break;
-    }
-  }
-  return measured;
+  return ParametersOf(group,
+                      {.start_m = sign * RotateYaw(-start_heading, before.left - before.right),
+                       .end_m = sign * RotateYaw(-end_heading, after.left - after.right),
+                       .travel_m = RotateYaw(-start_heading, after.Centre() - before.Centre()),
+                       .heading_change_rad = movement.heading_change_rad});
 }
 
 double LargestDifference(const MotionGroup& group, const ParameterValues& a,
