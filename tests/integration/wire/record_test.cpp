@@ -125,6 +125,21 @@ std::optional<Seen> RecordOnce(RawClient& game, std::uint16_t port, protocol::Wo
   return seen;
 }
 
+test::ChildProcess StartServer(int shards) {
+  return test::ChildProcess(STRIDEWIRE_STRIDEWIRED,
+                            {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards",
+                             std::to_string(shards), "--max-catch-up-ticks", "1000"});
+}
+
+// Where it says that it listens.
+std::optional<std::uint16_t> PortOf(test::ChildProcess& server) {
+  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
+  const std::string before_port = "listen=127.0.0.1:";
+  const std::size_t at = ready.find(before_port);
+  if (at == std::string::npos) return std::nullopt;
+  return static_cast<std::uint16_t>(std::stoi(ready.substr(at + before_port.size())));
+}
+
 class RecordTest : public testing::TestWithParam<int> {};
 
 TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
@@ -132,14 +147,10 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
   const auto truth = Synthesize(library, {}, Choreography(), kFps);
   ASSERT_TRUE(truth.has_value()) << Describe(truth.error());
 
-  test::ChildProcess server(STRIDEWIRE_STRIDEWIRED,
-                            {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards",
-                             std::to_string(GetParam()), "--max-catch-up-ticks", "1000"});
-  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
-  const std::string before_port = "listen=127.0.0.1:";
-  const std::size_t at = ready.find(before_port);
-  ASSERT_NE(at, std::string::npos) << ready;
-  const auto port = static_cast<std::uint16_t>(std::stoi(ready.substr(at + before_port.size())));
+  test::ChildProcess server = StartServer(GetParam());
+  const std::optional<std::uint16_t> listening = PortOf(server);
+  ASSERT_TRUE(listening);
+  const std::uint16_t port = *listening;
   RawClient game("127.0.0.1", port);
   ASSERT_TRUE(game.SayHello());
   const auto world = game.Join("w");
@@ -180,14 +191,10 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
 // Poses evaluated by the recorder are those the server sends another; the library comes over the connection first, and
 // out of its folder the second time.
 TEST(RecordMovements, AreTheFullPosesBitByBit) {
-  test::ChildProcess server(STRIDEWIRE_STRIDEWIRED,
-                            {"--listen", "127.0.0.1:0", "--http", "127.0.0.1:0", "--shards", "2",
-                             "--max-catch-up-ticks", "1000"});
-  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
-  const std::string before_port = "listen=127.0.0.1:";
-  const std::size_t at = ready.find(before_port);
-  ASSERT_NE(at, std::string::npos) << ready;
-  const auto port = static_cast<std::uint16_t>(std::stoi(ready.substr(at + before_port.size())));
+  test::ChildProcess server = StartServer(2);
+  const std::optional<std::uint16_t> listening = PortOf(server);
+  ASSERT_TRUE(listening);
+  const std::uint16_t port = *listening;
   RawClient game("127.0.0.1", port);
   ASSERT_TRUE(game.SayHello());
   const auto world = game.Join("w");
