@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <string>
 #include <vector>
@@ -17,7 +18,6 @@
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
@@ -334,22 +334,24 @@ void DecodeCompactPose(benchmark::State& state, const Library& library) {
 /// What a tick encodes for a crowd: one frame, to be shared by all observers.
 void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   const Crowd crowd(library, kCrowd);
-  protocol::PoseBatchEncoder encoder;
-  protocol::PoseBatchInfo info;
-  info.world = 1;
-  info.tick = 1;
-  info.mode = mode;
-  info.joint_count = static_cast<std::uint16_t>(library->skeleton().joint_count());
+  std::vector<protocol::AvatarNumber> numbers(kCrowd);
+  std::iota(numbers.begin(), numbers.end(), 1u);
+  const auto avatars = std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers);
+  std::vector<std::uint32_t> all(kCrowd);
+  std::iota(all.begin(), all.end(), 0u);
+  const auto joints = static_cast<std::uint16_t>(library->skeleton().joint_count());
+  protocol::PoseRows rows;
+  protocol::PoseBatchComposer composer;
   std::vector<std::byte> frame;
   for (auto _ : state) {
     frame.clear();
-    Status status = encoder.Begin(info);
-    protocol::AvatarNumber number = 0;
+    Status status = rows.Begin({1, 0, 0, 1, 1, 0.0, mode, joints}, avatars);
     for (const Avatar& avatar : crowd.avatars()) {
       if (!status) break;
-      status = encoder.Add(++number, 0, avatar.pose().root_position_m, avatar.pose().rotations);
+      status = rows.Add(0, avatar.pose().root_position_m, avatar.pose().rotations);
     }
-    if (status) status = encoder.Finish(frame);
+    rows.Finish();
+    if (status) status = composer.Compose(rows, all, {}, frame);
     if (!status) return state.SkipWithError(status.error().text);
     benchmark::DoNotOptimize(frame.data());
   }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -85,6 +86,7 @@ inline std::vector<Quat> RotationsAt(double time_s) {
 struct AvatarAt {
   std::uint32_t avatar = 1;
   std::uint8_t flags = 0;
+  std::optional<Vec3> root_position_m = {};  ///< Elsewhere than RootAt.
 };
 
 /// The frame of one batch: those avatars at that tick.
@@ -113,7 +115,8 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   (void)rows.Begin(info, std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
                    &codec);
   for (const AvatarAt& a : avatars) {
-    (void)rows.Add(a.flags, RootAt(info.server_time_s, a.avatar), rotations);
+    (void)rows.Add(a.flags, a.root_position_m.value_or(RootAt(info.server_time_s, a.avatar)),
+                   rotations);
   }
   rows.Finish();
   std::vector<std::byte> frame;

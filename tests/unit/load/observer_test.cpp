@@ -13,7 +13,6 @@
 #include <thread>
 
 #include "fake_server.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
 #include "toy_world.h"
 
 namespace stridewire::load {
@@ -230,16 +229,7 @@ TEST_F(ObserverTest, ComplainsAboutAnAvatarThatLeapsUnlessItIsFlagged) {
   Greet();
   // The toy avatars walk at 1.5 m/s: 200 m in 133 s, which is all right; 1 m is not in one tick.
   const auto frame_at = [](std::uint64_t tick, float x_m, std::uint8_t flags) {
-    protocol::PoseBatchEncoder encoder;
-    protocol::PoseBatchInfo info;
-    info.world = kWorld;
-    info.tick = tick;
-    info.joint_count = toy::kJoints;
-    std::vector<std::byte> frame;
-    EXPECT_TRUE(encoder.Begin(info).has_value());
-    EXPECT_TRUE(encoder.Add(1, flags, Vec3(x_m, 1.0f, 0.0f), toy::RotationsAt(0.0)).has_value());
-    EXPECT_TRUE(encoder.Finish(frame).has_value());
-    return frame;
+    return toy::PoseFrame(kWorld, tick, {{1, flags, Vec3(x_m, 1.0f, 0.0f)}});
   };
   connection_.SendBytes(frame_at(100, 0.0f, 0));
   connection_.SendBytes(frame_at(101, 0.2f, 0));

@@ -8,7 +8,6 @@
 #include <numeric>
 
 #include "protocol_testing.h"
-#include "stridewire/protocol/pose_batch_encoder.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
@@ -46,43 +45,40 @@ struct Decoded {
   PoseBatch batch;
 };
 
-TEST(PoseBatchComposer, MakesOfAllRowsTheBytesOfTheEncoder) {
+TEST(PoseBatchComposer, MakesOfAllRowsTheBytesOfTheGeneralEncoder) {
   for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
     PoseRows rows;
     PoseBatchComposer composer;
     for (const std::size_t count : {20u, 7u}) {  // the second with the first one's memory
       Fill(rows, mode, count);
-      PoseBatchEncoder encoder;
-      ASSERT_TRUE(encoder.Begin(Info(mode)));
-      for (std::size_t i = 0; i < count; ++i) {
-        const auto avatar = static_cast<AvatarNumber>(10 * (i + 1));
-        ASSERT_TRUE(encoder.Add(avatar, static_cast<std::uint8_t>(i), RootOf(avatar),
-                                std::vector<Quat>(kJoints, YawRotation(0.25))));
-      }
-      std::vector<std::byte> expected;
-      ASSERT_TRUE(encoder.Finish(expected));
       std::vector<std::uint32_t> all(count);
       std::iota(all.begin(), all.end(), 0u);
-      EXPECT_EQ(Decoded(composer, rows, all).frame, expected);
+      const Decoded decoded(composer, rows, all);
+      EXPECT_EQ(decoded.batch.info, Info(mode));
+      ASSERT_EQ(decoded.batch.avatars.size(), count);
+      EXPECT_EQ(EncodeOrFail(decoded.batch), decoded.frame);
     }
   }
 }
 
 TEST(PoseBatchComposer, HoldsExactlyTheRowsPicked) {
-  PoseRows rows;
-  Fill(rows, PoseMode::kQuantised, 40);
-  PoseBatchComposer composer;
-  const Decoded decoded(composer, rows, {0, 3, 4, 5, 20, 39});
-  EXPECT_EQ(decoded.batch.info, Info(PoseMode::kQuantised));
-  EXPECT_THAT(decoded.batch.avatars, ElementsAre(10, 40, 50, 60, 210, 400));
-  EXPECT_THAT(decoded.batch.flags, ElementsAre(0, 3, 4, 5, 20, 39));
-  for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
-    Vec3 root;
-    std::vector<Quat> rotations(kJoints);
-    ASSERT_TRUE(DecodePose(PoseMode::kQuantised, decoded.batch.pose(i), root, rotations));
-    EXPECT_EQ(root.x, RootOf(decoded.batch.avatars[i]).x);
+  for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+    PoseRows rows;
+    Fill(rows, mode, 40);
+    PoseBatchComposer composer;
+    const Decoded decoded(composer, rows, {0, 3, 4, 5, 20, 39});
+    EXPECT_EQ(decoded.batch.info, Info(mode));
+    EXPECT_THAT(decoded.batch.avatars, ElementsAre(10, 40, 50, 60, 210, 400));
+    EXPECT_THAT(decoded.batch.flags, ElementsAre(0, 3, 4, 5, 20, 39));
+    for (std::size_t i = 0; i < decoded.batch.avatars.size(); ++i) {
+      Vec3 root;
+      std::vector<Quat> rotations(kJoints);
+      ASSERT_TRUE(DecodePose(mode, decoded.batch.pose(i), root, rotations));
+      EXPECT_EQ(root.x, RootOf(decoded.batch.avatars[i]).x);
+      EXPECT_NEAR(rotations.back().y, YawRotation(0.25).y, 3e-5);
+    }
+    EXPECT_TRUE(Decoded(composer, rows, {}).batch.avatars.empty());
   }
-  EXPECT_TRUE(Decoded(composer, rows, {}).batch.avatars.empty());
 }
 
 TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
@@ -185,17 +181,54 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
   std::vector<std::uint32_t> picked(100);
   std::iota(picked.begin(), picked.end(), 0u);
   const std::size_t fitting = composer.Fitting(rows, picked);
-  EXPECT_EQ(fitting, PoseBatchEncoder(limits).MaxAvatars(PoseMode::kFull, kJoints));
+  // All but what the batch says of itself and less than one more avatar takes.
+  const std::size_t avatar_bytes = PoseBytes(PoseMode::kFull, kJoints) + sizeof(AvatarNumber) + 1;
+  EXPECT_GT((fitting + 1) * avatar_bytes + 128, 4096u);
   std::vector<std::byte> frame;
   ASSERT_TRUE(composer.Compose(rows, std::span(picked).first(fitting),
                                {.part = 3, .parts = 4, .is_partial = true}, frame));
+  EXPECT_LE(frame.size(), 4096 + kFrameHeaderBytes);
   const auto message = Decode(frame, MessageType::kPoseBatch);
   ASSERT_TRUE(message);
+  EXPECT_EQ(std::get<PoseBatch>(*message).avatars.size(), fitting);
   EXPECT_EQ(std::get<PoseBatch>(*message).info.part, 3);
   EXPECT_EQ(std::get<PoseBatch>(*message).info.parts, 4);
   EXPECT_TRUE(std::get<PoseBatch>(*message).info.is_partial);
   EXPECT_EQ(composer.Compose(rows, picked, {}, frame).error().code, ErrorCode::kLimitExceeded);
   EXPECT_FALSE(composer.Compose(rows, std::span(picked).first(1), {.part = 4, .parts = 4}, frame));
+}
+
+TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
+  // 4 KiB frames, filled to the last avatar.
+  PoseBatchComposer composer({4096, 4096});
+  std::vector<AvatarNumber> avatars(500);
+  std::iota(avatars.begin(), avatars.end(), 1u);
+  const auto numbers = std::make_shared<const std::vector<AvatarNumber>>(avatars);
+  std::vector<std::uint32_t> all(avatars.size());
+  std::iota(all.begin(), all.end(), 0u);
+  for (std::uint16_t joints = 1; joints <= 64; ++joints) {
+    for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
+      PoseRows rows;
+      ASSERT_TRUE(rows.Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, numbers));
+      const std::vector<Quat> rotations(joints, kIdentityQuat);
+      while (rows.size() < avatars.size()) ASSERT_TRUE(rows.Add(0, Vec3(0.0f), rotations));
+      const std::size_t fitting = composer.Fitting(rows, all);
+      ASSERT_GT(fitting, 0u);
+      ASSERT_LT(fitting, all.size());
+      std::vector<std::byte> frame;
+      ASSERT_TRUE(composer.Compose(rows, std::span(all).first(fitting), {}, frame)) << joints;
+    }
+  }
+}
+
+TEST(PoseRows, AreOfABatchThatCanBe) {
+  const auto none = std::make_shared<const std::vector<AvatarNumber>>();
+  const auto begin = [&](PoseMode mode, std::uint16_t joints) {
+    return PoseRows().Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, none).error().code;
+  };
+  EXPECT_EQ(begin(PoseMode::kMovement, 31), ErrorCode::kUnsupported);
+  EXPECT_EQ(begin(PoseMode::kFull, 0), ErrorCode::kOutOfRange);
+  EXPECT_EQ(begin(PoseMode::kFull, 257), ErrorCode::kOutOfRange);
 }
 
 }  // namespace
