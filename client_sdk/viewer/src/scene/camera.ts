@@ -106,11 +106,13 @@ export interface PointerActions {
   release?(): void;
 }
 
+/** Who moves further than that drags; in CSS pixels. */
+const clickPx = 6;
+
 /** Mouse and touch on `element`; positions in CSS pixels within it. */
 export function listenToPointers(element: HTMLElement, actions: PointerActions): void {
   const pointers = new Map<number, {x: number; y: number}>();
   let moved = 0;
-  let downAt = 0;
   let downStamp = 0;
   let lastClick = -1e9;
   let grabbed = false;
@@ -122,7 +124,6 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
     element.setPointerCapture(e.pointerId);
     if (pointers.size === 0) {
       moved = 0;
-      downAt = performance.now();
       downStamp = e.timeStamp;
       grabbed = e.button === 0 && !e.shiftKey &&
         (actions.grab?.(...where(e), e.pointerType === 'touch') ?? false);
@@ -139,10 +140,13 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
     const dx = e.clientX - p.x;
     const dy = e.clientY - p.y;
     const [x, y] = where(e);
+    const way = moved + Math.abs(dx) + Math.abs(dy);
     if (pointers.size === 1) {
       if (grabbed) actions.drag?.(x, y);
       else if (e.buttons & 6 || e.shiftKey) actions.pan(dx, dy, x, y);
-      else if (moved > 4) actions.orbit(dx, dy);
+      // From where it went down: between two slow frames a whole drag is one event.
+      else if (way <= clickPx) return;
+      else actions.orbit(dx, dy);
     } else if (pointers.size === 2) {
       const other = [...pointers.entries()].find(([id]) => id !== e.pointerId)![1];
       const before = Math.hypot(p.x - other.x, p.y - other.y);
@@ -150,7 +154,7 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
       if (before > 10 && after > 10) actions.zoom(before / after);
       actions.pan(dx / 2, dy / 2, x, y);
     }
-    moved += Math.abs(dx) + Math.abs(dy);
+    moved = way;
     p.x = e.clientX;
     p.y = e.clientY;
   });
@@ -163,11 +167,11 @@ export function listenToPointers(element: HTMLElement, actions: PointerActions):
       return;
     }
     if (!known || e.type === 'pointercancel' || pointers.size > 0) return;
-    const now = performance.now();
-    if (moved <= 6 && now - downAt < 600 && e.button === 0) {
+    // When it happened, not when a busy page came to hear of it.
+    if (moved <= clickPx && e.timeStamp - downStamp < 600 && e.button === 0) {
       const [x, y] = where(e);
-      actions.click(x, y, now - lastClick < 350, e.shiftKey);
-      lastClick = now;
+      actions.click(x, y, e.timeStamp - lastClick < 350, e.shiftKey);
+      lastClick = e.timeStamp;
     }
   };
   element.addEventListener('pointerup', up);

@@ -740,6 +740,14 @@ test('every control does what its label says', async () => {
     'Drag, arrow keys': async () => {
       await turned(() => drag(80, 0), (a, b) => b.wantAzimuth < a.wantAzimuth);
       await turned(() => drag(0, 40), (a, b) => b.wantElevation > a.wantElevation);
+      // As a page that draws slowly hears of it: all of the way in one event.
+      await turned(async () => {
+        const {x, y} = await middle();
+        await page.mouse.move(x, y);
+        await page.mouse.down();
+        await page.mouse.move(x - 80, y);
+        await page.mouse.up();
+      }, (a, b) => Math.abs(b.wantAzimuth - a.wantAzimuth - 80 * 0.006) < 1e-6);
       await turned(() => key('ArrowLeft'), (a, b) => b.wantAzimuth > a.wantAzimuth);
       await turned(() => key('ArrowRight'), (a, b) => b.wantAzimuth < a.wantAzimuth);
       await turned(() => key('ArrowDown'), (a, b) => b.wantElevation < a.wantElevation);
