@@ -131,7 +131,7 @@ void Prefetch(const PoseJob& job) {
 
 void EvaluatePoses(const MotionLibrary& library, std::span<const PoseJob> jobs) {
   // Far enough ahead that memory has come by then, near enough that it has not gone again.
-  constexpr std::size_t kAhead = 3;
+  constexpr std::size_t kAhead = 2;
   const GridLayout& layout = library.layout();
   std::array<kernels::PlantJob, kernels::kBlock> plants;
   for (std::size_t i = 0; i < std::min(2 * kAhead, jobs.size()); ++i) PrefetchPlaces(jobs[i]);

@@ -28,23 +28,7 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// Four floats of each of the jobs' plans, or of one of their rotations, turned into four vectors.
-template <typename Address>
-HWY_INLINE Quat4 Gather(std::size_t lanes, Address address) {
-  HWY_ALIGN float buffer[4 * kBlock];
-  for (std::size_t i = 0; i < lanes; ++i) {
-    std::memcpy(buffer + 4 * i, address(i), 4 * sizeof(float));
-  }
-  const FloatTag d;
-  // Lanes nobody asked for do as the first does.
-  for (std::size_t i = lanes; i < hn::Lanes(d); ++i) {
-    std::memcpy(buffer + 4 * i, buffer, 4 * sizeof(float));
-  }
-  Quat4 q;
-  hn::LoadInterleaved4(d, buffer, q.x.v, q.y.v, q.z.v, q.w.v);
-  return q;
-}
-
+// Where four floats of each job's plan are, or of one of its rotations.
 struct PlanAddress {
   const PlantJob* jobs;
   std::size_t at;
@@ -53,7 +37,7 @@ struct PlanAddress {
 struct JointAddress {
   const PlantJob* jobs;
   std::size_t joint;
-  HWY_INLINE const float* operator()(std::size_t i) const { return jobs[i].rotations + 4 * joint; }
+  HWY_INLINE float* operator()(std::size_t i) const { return jobs[i].rotations + 4 * joint; }
 };
 
 HWY_INLINE Vec3x XyzOf(Quat4 q) { return {q.x, q.y, q.z}; }
@@ -67,10 +51,10 @@ struct Track {
   Float rest_over_s, release_s, land_s;
 };
 
-HWY_INLINE Track LoadTrack(const PlantJob* jobs, std::size_t lanes, std::size_t at) {
+HWY_INLINE Track LoadTrack(const PlantJob* jobs, std::size_t at) {
   Track t;
   const auto next = [&]() HWY_ATTR {
-    const Quat4 four = Gather(lanes, PlanAddress{jobs, at});
+    const Quat4 four = GatherQuats(PlanAddress{jobs, at});
     at += 4;
     return four;
   };
@@ -117,15 +101,15 @@ struct LegLanes {
 
 HWY_INLINE Vec3x Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const PlantJob* jobs, std::size_t lanes,
-                            Quat4 root, LegLanes& out) {
+HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const PlantJob* jobs, Quat4 root,
+                            LegLanes& out) {
   out.positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
   out.rotations[0] = root;
   for (std::size_t i = 1; i < bones.count; ++i) {
     out.positions[i] =
         out.positions[i - 1] + Rotate(out.rotations[i - 1], Same(bones.offsets_m[i]));
     out.rotations[i] =
-        Multiply(out.rotations[i - 1], Gather(lanes, JointAddress{jobs, bones.joints[i]}));
+        Multiply(out.rotations[i - 1], GatherQuats(JointAddress{jobs, bones.joints[i]}));
   }
   const std::size_t last = bones.count - 1;
   out.ball = out.positions[last] + Rotate(out.rotations[last], Same(bones.ball_m));
@@ -280,32 +264,23 @@ HWY_INLINE LegRotations SolveLeg(const LegRig::Bones& bones, const LegLanes& leg
           Normalise(Multiply(Conjugate(before_ankle), ankle_rotation))};
 }
 
-HWY_INLINE void Scatter(Quat4 q, const PlantJob* jobs, std::size_t lanes, std::size_t joint) {
-  const FloatTag d;
-  HWY_ALIGN float buffer[4 * kBlock];
-  hn::StoreInterleaved4(q.x.v, q.y.v, q.z.v, q.w.v, d, buffer);
-  for (std::size_t i = 0; i < lanes; ++i) {
-    std::memcpy(jobs[i].rotations + 4 * joint, buffer + 4 * i, 4 * sizeof(float));
-  }
-}
-
-// As many as a vector has lanes at most.
+// As many as a vector has lanes; what comes of the first `lanes` is kept.
 void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   const FloatTag d;
   HWY_ALIGN float buffer[4 * kBlock] = {};
   Common common;
   {
     constexpr std::size_t kAt = 2 * kPackedTrackFloats;
-    Quat4 q = Gather(lanes, PlanAddress{jobs, kAt});
+    Quat4 q = GatherQuats(PlanAddress{jobs, kAt});
     common.root_rest = XyzOf(q), common.steer = q.w;
-    q = Gather(lanes, PlanAddress{jobs, kAt + 4});
+    q = GatherQuats(PlanAddress{jobs, kAt + 4});
     common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
-    q = Gather(lanes, PlanAddress{jobs, kAt + 8});
+    q = GatherQuats(PlanAddress{jobs, kAt + 8});
     common.entered_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.settle_s = q.w;
   }
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const PlantJob& job = jobs[i < lanes ? i : 0];
+    const PlantJob& job = jobs[i];
     for (std::size_t c = 0; c < 3; ++c) {
       buffer[4 * i + c] = static_cast<float>(static_cast<double>(job.root_m[c]) - job.base_m[c]);
     }
@@ -316,7 +291,7 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   const Vec3x root = XyzOf(start);
   common.time_s = start.w;
 
-  const Quat4 root_rotation = Gather(lanes, JointAddress{jobs, 0});
+  const Quat4 root_rotation = GatherQuats(JointAddress{jobs, 0});
   LegLanes legs[2];
   Correction corrections[2];
   Vec3x ankles[2];
@@ -324,14 +299,14 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   for (std::size_t f = 0; f < 2; ++f) {
     const LegRig::Bones& bones = rig.bones[f];
     LegLanes& leg = legs[f];
-    EvaluateLeg(bones, jobs, lanes, root_rotation, leg);
+    EvaluateLeg(bones, jobs, root_rotation, leg);
     const Vec3x ankle = leg.positions[bones.ankle];
     const Vec3x sole = leg.ball - ankle;
     const Float heading = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
     const Float flatness = bones.foot_m < kSmallestBoneM
                                ? Float(0.0f)
                                : Sqrt(sole.x * sole.x + sole.z * sole.z) / Float(bones.foot_m);
-    const Track track = LoadTrack(jobs, lanes, f * kPackedTrackFloats);
+    const Track track = LoadTrack(jobs, f * kPackedTrackFloats);
     const Vec3x ball = root + leg.ball;
     Correction& c = corrections[f];
     c = CorrectFoot(common, track, ball, heading, flatness);
@@ -388,7 +363,7 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   // The root is shown in floats of the world: the legs reach from where that is.
   hn::StoreInterleaved4(shift.x.v, shift.y.v, shift.z.v, shift.z.v, d, buffer);
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const PlantJob& job = jobs[i < lanes ? i : 0];
+    const PlantJob& job = jobs[i];
     for (std::size_t c = 0; c < 3; ++c) {
       const double world =
           static_cast<double>(job.root_m[c]) + static_cast<double>(buffer[4 * i + c]);
@@ -404,17 +379,21 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
     const LegLanes& leg = legs[f];
     const Quat4 ankle_rotation = Multiply(corrections[f].turn, leg.rotations[bones.ankle]);
     const LegRotations solved = SolveLeg(bones, leg, ankles[f] - XyzOf(moved), ankle_rotation);
-    Scatter(solved.hip, jobs, lanes, bones.joints[bones.hip]);
-    Scatter(solved.knee, jobs, lanes, bones.joints[bones.knee]);
-    Scatter(solved.ankle, jobs, lanes, bones.joints[bones.ankle]);
+    ScatterQuats(solved.hip, lanes, JointAddress{jobs, bones.joints[bones.hip]});
+    ScatterQuats(solved.knee, lanes, JointAddress{jobs, bones.joints[bones.knee]});
+    ScatterQuats(solved.ankle, lanes, JointAddress{jobs, bones.joints[bones.ankle]});
   }
 }
 
 void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count) {
   const std::size_t width = hn::Lanes(FloatTag());
-  for (std::size_t i = 0; i < count; i += width) {
-    PlantSome(rig, jobs + i, count - i < width ? count - i : width);
-  }
+  std::size_t i = 0;
+  for (; i + width <= count; i += width) PlantSome(rig, jobs + i, width);
+  if (i == count) return;
+  // Lanes nobody asked for do as the first does.
+  PlantJob last[kBlock];
+  for (std::size_t lane = 0; lane < width; ++lane) last[lane] = jobs[i + lane < count ? i + lane : i];
+  PlantSome(rig, last, count - i);
 }
 
 }  // namespace

@@ -202,6 +202,82 @@ HWY_INLINE void StoreQuats(Quat4 q, float* at, std::size_t left) {
   hn::StoreInterleaved4(q.x.v, q.y.v, q.z.v, q.w.v, d, buffer);
   std::memcpy(at, buffer, left * 4 * sizeof(float));
 }
+
+// Four floats from each of several places, address(lane), turned into four vectors. Blocks are put together in
+// registers: a vector read from where its parts were just stored would wait for them.
+#if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
+// Four by four numbers of each block of four lanes, rows for columns.
+HWY_INLINE void TransposeBlocks(hn::Vec<FloatTag>& a, hn::Vec<FloatTag>& b, hn::Vec<FloatTag>& c,
+                                hn::Vec<FloatTag>& e) {
+  const FloatTag d;
+  const hn::RepartitionToWide<FloatTag> pairs;
+  const auto ab_low = hn::BitCast(pairs, hn::InterleaveLower(d, a, b));
+  const auto ab_high = hn::BitCast(pairs, hn::InterleaveUpper(d, a, b));
+  const auto ce_low = hn::BitCast(pairs, hn::InterleaveLower(d, c, e));
+  const auto ce_high = hn::BitCast(pairs, hn::InterleaveUpper(d, c, e));
+  a = hn::BitCast(d, hn::InterleaveLower(pairs, ab_low, ce_low));
+  b = hn::BitCast(d, hn::InterleaveUpper(pairs, ab_low, ce_low));
+  c = hn::BitCast(d, hn::InterleaveLower(pairs, ab_high, ce_high));
+  e = hn::BitCast(d, hn::InterleaveUpper(pairs, ab_high, ce_high));
+}
+template <typename Tag, typename Address>
+HWY_INLINE hn::Vec<Tag> LoadBlocks(Tag d, std::size_t first, Address address) {
+  if constexpr (hn::MaxLanes(d) == 4) {
+    return hn::LoadU(d, address(first));
+  } else {
+    const hn::Half<Tag> half;
+    return hn::Combine(d, LoadBlocks(half, first + hn::MaxLanes(half), address),
+                       LoadBlocks(half, first, address));
+  }
+}
+template <typename Tag, typename Address>
+HWY_INLINE void StoreBlocks(Tag d, hn::Vec<Tag> v, std::size_t first, std::size_t lanes,
+                            Address address) {
+  if constexpr (hn::MaxLanes(d) == 4) {
+    if (first < lanes) hn::StoreU(v, d, address(first));
+  } else {
+    const hn::Half<Tag> half;
+    StoreBlocks(half, hn::LowerHalf(half, v), first, lanes, address);
+    StoreBlocks(half, hn::UpperHalf(half, v), first + hn::MaxLanes(half), lanes, address);
+  }
+}
+template <typename Address>
+HWY_INLINE Quat4 GatherQuats(Address address) {
+  const FloatTag d;
+  Quat4 q = {Float(LoadBlocks(d, 0, address)), Float(LoadBlocks(d, 1, address)),
+             Float(LoadBlocks(d, 2, address)), Float(LoadBlocks(d, 3, address))};
+  TransposeBlocks(q.x.v, q.y.v, q.z.v, q.w.v);
+  return q;
+}
+// The way back, of the first `lanes`.
+template <typename Address>
+HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
+  const FloatTag d;
+  TransposeBlocks(q.x.v, q.y.v, q.z.v, q.w.v);
+  StoreBlocks(d, q.x.v, 0, lanes, address);
+  StoreBlocks(d, q.y.v, 1, lanes, address);
+  StoreBlocks(d, q.z.v, 2, lanes, address);
+  StoreBlocks(d, q.w.v, 3, lanes, address);
+}
+#else
+template <typename Address>
+HWY_INLINE Quat4 GatherQuats(Address address) {
+  const FloatTag d;
+  HWY_ALIGN float buffer[4 * kBlock];
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
+    std::memcpy(buffer + 4 * i, address(i), 4 * sizeof(float));
+  }
+  return LoadQuats(buffer, kBlock);
+}
+template <typename Address>
+HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
+  HWY_ALIGN float buffer[4 * kBlock];
+  StoreQuats(q, buffer, kBlock);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    std::memcpy(address(i), buffer + 4 * i, 4 * sizeof(float));
+  }
+}
+#endif
 HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
   const FloatTag d;
   HWY_ALIGN float buffer[3 * kBlock];

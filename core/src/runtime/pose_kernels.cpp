@@ -56,17 +56,26 @@ std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_REST
                        std::size_t joint_count, float* HWY_RESTRICT row) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
-  SumRows(examples, weights, count, row_floats, row);
   std::uint32_t degenerate = 0;
-  for (std::size_t j = 0; j < joint_count; j += width) {
-    const hn::Mask<FloatTag> is_joint =
-        hn::FirstN(d, joint_count - j < width ? joint_count - j : width);
-    const Quat4 q = LoadParts(row + j, padded);
+  std::size_t next = 0;
+  while (next < padded) {
+    // The last ones go with some before them, as in BlendRotations.
+    const std::size_t j = next + width > padded && padded >= width ? padded - width : next;
+    Quat4 q = {Float(0.0f), Float(0.0f), Float(0.0f), Float(0.0f)};
+    const float* source = examples + j;
+    for (std::size_t e = 0; e < count; ++e, source += row_floats) {
+      q = q + LoadParts(source, padded) * Float(weights[e]);
+    }
+    // Behind the joints comes the root, which is no rotation.
+    const auto is_joint = hn::FirstN(d, joint_count > j ? joint_count - j : 0);
     const Float norm = Sqrt(Dot(q, q));
-    const Mask is_sound = norm >= Float(kSmallestNorm);
-    const Float scale = Select(is_sound, Float(1.0f) / norm, Float(1.0f));
-    StoreParts(q * scale, row + j, padded, is_joint);
-    degenerate += static_cast<std::uint32_t>(hn::CountTrue(d, hn::AndNot(is_sound.m, is_joint)));
+    const hn::Mask<FloatTag> is_sound = hn::Ge(norm.v, hn::Set(d, kSmallestNorm));
+    const Float scale = Select({hn::And(is_joint, is_sound)}, Float(1.0f) / norm, Float(1.0f));
+    StoreParts(q * scale, row + j, padded, hn::FirstN(d, padded - j));
+    const auto is_new = hn::Not(hn::FirstN(d, next - j));
+    degenerate += static_cast<std::uint32_t>(
+        hn::CountTrue(d, hn::And(hn::AndNot(is_sound, is_joint), is_new)));
+    next = j + width;
   }
   return degenerate;
 }
