@@ -52,7 +52,7 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
       position += weight * root.position_m;
       yaw_rad += weight * root.yaw_rad;
     }
-    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.duration_s()));
+    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.warp.duration_s()));
     positions[i] = position;
     angles_rad[2 * i] = movement.base.heading_rad;
     angles_rad[2 * i + 1] = 0.5 * (movement.base.heading_rad + yaw_rad);
@@ -107,8 +107,7 @@ namespace {
 // Where what is read of a job lies, which Prefetch reads.
 void PrefetchPlaces(const PoseJob& job) {
   const Movement& movement = *job.movement;
-  PrefetchBytes(&movement, offsetof(Movement, feet));
-  PrefetchBytes(&movement.feet.is_active, 1);
+  PrefetchBytes(&movement, offsetof(Movement, feet) + offsetof(FootPlan, packed));
   PrefetchBytes(job.cache, sizeof(*job.cache));
   PrefetchBytes(job.shown, sizeof(*job.shown));
 }
@@ -117,7 +116,6 @@ void PrefetchPlaces(const PoseJob& job) {
 void Prefetch(const PoseJob& job) {
   const Movement& movement = *job.movement;
   job.cache->Prefetch();
-  PrefetchBytes(&movement.warp, sizeof(movement.warp));
   PrefetchBytes(&movement.feet.packed, sizeof(movement.feet.packed));
   PrefetchBytes(job.shown->rotations.data(), job.shown->rotations.size() * sizeof(Quat));
   if (job.time_s < movement.entered_s + movement.ease_out_s) {

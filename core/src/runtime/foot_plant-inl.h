@@ -392,7 +392,8 @@ void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count) {
   if (i == count) return;
   // Lanes nobody asked for do as the first does.
   PlantJob last[kBlock];
-  for (std::size_t lane = 0; lane < width; ++lane) last[lane] = jobs[i + lane < count ? i + lane : i];
+  for (std::size_t lane = 0; lane < width; ++lane)
+    last[lane] = jobs[i + lane < count ? i + lane : i];
   PlantSome(rig, last, count - i);
 }
 

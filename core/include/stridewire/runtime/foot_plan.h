@@ -65,6 +65,12 @@ using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 /// Both feet through a movement: a value of the movement, from which with the blended pose and the
 /// time everything about planting follows.
 struct FootPlan {
+  bool is_active = false;
+  /// What was displayed before had no feet planted: soles come out of the ground, and what else planting changes at
+  /// once (a root lower so that legs bend) sets in, over this long.
+  double settle_s = 0.0;
+  PackedFootPlan packed{};  ///< All of it but what was missed, once the plan is made
+
   std::array<FootTrack, 2> feet;   ///< Indexed by Foot.
   std::array<FootRest, 2> rests;   ///< Indexed by Foot.
   DVec3 root_rest_m = DVec3(0.0);  ///< The same of the root, which may change the foot it follows
@@ -72,16 +78,11 @@ struct FootPlan {
   /// On terrain: soles are lifted out of the ground they leave and land on. Level ground the blend
   /// itself keeps to within what the examples do, and knees move less.
   bool keeps_above_ground = false;
-  /// What was displayed before had no feet planted: soles come out of the ground, and what else planting changes at
-  /// once (a root lower so that legs bend) sets in, over this long.
-  double settle_s = 0.0;
   Vec3 settle_root_m = Vec3(0.0f);  ///< What was displayed less what planting makes of it
   std::array<std::array<Quat, 3>, 2>
-      settle_rotations{};  ///< The same of hip, knee and ankle, by Foot
-  bool is_active = false;
+      settle_rotations{};       ///< The same of hip, knee and ankle, by Foot
   DVec3 missed_m = DVec3(0.0);  ///< From where a step lands to where it was asked to, horizontally
   double missed_rad = 0.0;      ///< The same for the foot's heading
-  PackedFootPlan packed{};      ///< All of it but what was missed, once the plan is made
 
   [[nodiscard]] const FootTrack& foot(Foot f) const { return feet[static_cast<std::size_t>(f)]; }
   [[nodiscard]] FootTrack& foot(Foot f) { return feet[static_cast<std::size_t>(f)]; }

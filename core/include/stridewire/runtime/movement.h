@@ -42,21 +42,23 @@ struct PoseVelocity {
 /// One synthesized variation: everything that can be seen of an avatar while it lasts follows from
 /// this value, its group and the time.
 struct Movement {
+  // First what each of its poses is made of, in few lines of a cache.
   int group = -1;
-  ParameterValues parameters;                          ///< What was asked of it
-  std::vector<float> weights;                          ///< [example], sum 1
-  std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
   int interval_count = 0;
-  TimeWarp warp;
-  double heading_change_rad = 0.0;  ///< blended
-  double steer_rad = 0.0;           ///< Turned further than that, evenly over the movement
+  bool is_inertial = false;  ///< There is a difference_velocity
   BaseFrame base;
-  double entered_s = 0.0;            ///< Where it began: later than 0 if it took over in mid-swing
+  double steer_rad = 0.0;  ///< Turned further than its examples turn, evenly over the movement
+  double entered_s = 0.0;  ///< Where it began: later than 0 if it took over in mid-swing
+  double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration)
   Pose difference;                   ///< D = P - M(entered_s), world frame
   PoseVelocity difference_velocity;  ///< Of D when the movement was entered
-  bool is_inertial = false;          ///< There is a difference_velocity
-  double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration)
-  FootPlan feet;                     ///< Not active: feet are where the blend has them
+  TimeWarp warp;
+  FootPlan feet;  ///< Not active: feet are where the blend has them
+
+  std::vector<float> weights;                          ///< [example], sum 1
+  ParameterValues parameters;                          ///< What was asked of it
+  std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
+  double heading_change_rad = 0.0;                     ///< blended
 
   [[nodiscard]] double duration_s() const {
     return keytimes_s[static_cast<std::size_t>(interval_count)];
