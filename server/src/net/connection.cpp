@@ -186,17 +186,25 @@ void Connection::ScheduleFlush() {
 }
 
 void Connection::Flush() {
-  if (is_writing_ || is_closed_ || is_lingering_) return;
-  queue_.Gather(kWriteBytes, in_flight_);
-  if (in_flight_.frames.empty()) {
-    if (is_closing_) BeginLinger();
-    return;
+  while (!is_writing_ && !is_closed_ && !is_lingering_) {
+    queue_.Gather(kWriteBytes, in_flight_);
+    if (in_flight_.frames.empty()) {
+      if (is_closing_) BeginLinger();
+      return;
+    }
+    metrics_.poses_sent.Add(in_flight_.poses);
+    metrics_.batches_sent.Add(in_flight_.batches);
+    traffic_.BeginToSend();
+    is_writing_ = true;
+    if (!transport_->Send(shared_from_this(), in_flight_.frames)) return;
+    is_writing_ = false;
+    Sent();
   }
-  metrics_.poses_sent.Add(in_flight_.poses);
-  metrics_.batches_sent.Add(in_flight_.batches);
-  traffic_.BeginToSend();
-  is_writing_ = true;
-  transport_->Send(shared_from_this(), in_flight_.frames);
+}
+
+void Connection::Sent() {
+  in_flight_.clear();
+  if (handler_ != nullptr) handler_->OnSent();
 }
 
 void Connection::OnSent(const error_code& error) {
@@ -206,8 +214,7 @@ void Connection::OnSent(const error_code& error) {
     Close();
     return;
   }
-  in_flight_.clear();
-  if (handler_ != nullptr) handler_->OnSent();
+  Sent();
   Flush();
 }
 

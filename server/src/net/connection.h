@@ -91,6 +91,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   void Read();
   void ScheduleFlush();
   void Flush();
+  void Sent();
   void Watch();
   void BeginLinger();
 

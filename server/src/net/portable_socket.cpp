@@ -15,6 +15,7 @@ void PortableSocket::Prepare(Traffic& traffic, std::size_t send_buffer_bytes) {
   traffic_ = &traffic;
   error_code ignored;  // a socket that fails here fails when it is read, too
   socket_->set_option(asio::ip::tcp::no_delay(true), ignored);
+  socket_->non_blocking(true, ignored);  // what is not asynchronous, too
   if (send_buffer_bytes > 0) {
     socket_->set_option(asio::socket_base::send_buffer_size(static_cast<int>(send_buffer_bytes)),
                         ignored);

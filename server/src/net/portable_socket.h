@@ -28,6 +28,14 @@ class PortableSocket {
   ~PortableSocket();
 
   void Prepare(Traffic& traffic, std::size_t send_buffer_bytes);
+  /// Writes what the system takes at once; 0: nothing now, or an error that writing again will tell.
+  template <typename Buffers>
+  [[nodiscard]] std::size_t WriteWhatFits(const Buffers& buffers) {
+    boost::system::error_code ignored;
+    const std::size_t bytes = socket_->write_some(buffers, ignored);
+    if (bytes > 0) traffic_->Sent(bytes);
+    return bytes;
+  }
   [[nodiscard]] bool ShutDownSending();
   void Close();
   /// Lets go of its io_context, when nothing is under way. Nothing else may be called then but

@@ -42,11 +42,20 @@ class TcpTransport final : public Transport {
         });
   }
 
-  void Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
     buffers_.clear();
     for (const SharedFrame& frame : frames) buffers_.emplace_back(frame->data(), frame->size());
     first_buffer_ = 0;
-    Write(std::move(user));
+    // The system mostly has room for all of a tick. To hear of that later would cost a small frame a tenth more.
+    while (first_buffer_ < buffers_.size()) {
+      const std::size_t bytes = socket_.WriteWhatFits(unsent());
+      if (bytes == 0) {
+        Write(std::move(user));
+        return false;
+      }
+      Took(bytes);
+    }
+    return true;
   }
 
   bool End(std::shared_ptr<User> /*user*/, CloseCode /*code*/) override {
@@ -57,21 +66,28 @@ class TcpTransport final : public Transport {
   bool Attach(asio::io_context& context) override { return socket_.Attach(context); }
 
  private:
+  [[nodiscard]] BufferList unsent() const {
+    return {buffers_.data() + first_buffer_, buffers_.data() + buffers_.size()};
+  }
+
+  void Took(std::size_t bytes) {
+    while (bytes > 0) {
+      asio::const_buffer& buffer = buffers_[first_buffer_];
+      const std::size_t taken = std::min(bytes, buffer.size());
+      buffer += taken;
+      bytes -= taken;
+      if (buffer.size() == 0) ++first_buffer_;
+    }
+  }
+
   void Write(std::shared_ptr<User> user) {
-    const BufferList buffers{buffers_.data() + first_buffer_, buffers_.data() + buffers_.size()};
-    socket_.async_write_some(buffers, [this, user = std::move(user)](const error_code& error,
-                                                                     std::size_t bytes) mutable {
+    socket_.async_write_some(unsent(), [this, user = std::move(user)](const error_code& error,
+                                                                      std::size_t bytes) mutable {
       if (error) {
         user->OnSent(error);
         return;
       }
-      while (bytes > 0) {
-        asio::const_buffer& buffer = buffers_[first_buffer_];
-        const std::size_t taken = std::min(bytes, buffer.size());
-        buffer += taken;
-        bytes -= taken;
-        if (buffer.size() == 0) ++first_buffer_;
-      }
+      Took(bytes);
       if (first_buffer_ < buffers_.size()) {
         Write(std::move(user));
       } else {

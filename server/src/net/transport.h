@@ -93,8 +93,9 @@ class Transport {
 
   /// Receives some bytes into `buffer`, which is the user's.
   virtual void Receive(std::shared_ptr<User> user, std::span<std::byte> buffer) = 0;
-  /// Sends all of `frames`, which the user keeps.
-  virtual void Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) = 0;
+  /// Sends all of `frames`, which the user keeps. True: that is done, and nobody is told.
+  [[nodiscard]] virtual bool Send(std::shared_ptr<User> user,
+                                  std::span<const SharedFrame> frames) = 0;
 
   /// Tells the peer that nothing more comes. After the last Send; the user goes on receiving until
   /// the peer has closed, too. An error: there is nobody to tell.

@@ -69,9 +69,10 @@ class WebSocketTransport final : public Transport {
         });
   }
 
-  void Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
+  bool Send(std::shared_ptr<User> user, std::span<const SharedFrame> frames) override {
     unsent_ = frames;
     Write(std::move(user));
+    return false;
   }
 
   bool End(std::shared_ptr<User> user, CloseCode code) override {
