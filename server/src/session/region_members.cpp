@@ -1,7 +1,6 @@
 #include "session/region_members.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -16,43 +15,62 @@ void RegionMembers::Move(const protocol::Region& region, double leave_m,
   for (const protocol::RateRing& ring : region.rings) every_ = std::gcd(every_, ring.every_n_ticks);
 }
 
-std::uint16_t RegionMembers::EveryAt(double distance_m) const {
+std::uint16_t RegionMembers::EveryAt(double distance_m2) const {
   for (const protocol::RateRing& ring : region_.rings) {
-    if (distance_m <= ring.to_m) return ring.every_n_ticks;
+    if (distance_m2 <= ring.to_m * ring.to_m) return ring.every_n_ticks;
   }
   return every_n_ticks_;
 }
 
 RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
-  std::vector<AvatarNumber>& inside = inside_[delivery.from_shard];
+  Lane& lane = lanes_[delivery.from_shard];
   const protocol::PoseRows& rows = *delivery.rows;
+  if (lane.avatars != rows.avatars()) {
+    lane.avatars = rows.avatars();
+    lane.is_inside.assign(lane.avatars->size(), false);
+    for (const AvatarNumber number : lane.inside) {
+      const auto at = std::ranges::lower_bound(*lane.avatars, number);
+      if (at == lane.avatars->end() || *at != number) continue;
+      lane.is_inside[static_cast<std::size_t>(at - lane.avatars->begin())] = true;
+    }
+  }
   near_.clear();
   const double centre_x = region_.centre_m.x;
   const double centre_z = region_.centre_m.z;
-  delivery.places->ForEachNear(centre_x, centre_z, leave_at_m_,
-                               [&](std::uint32_t row, double x, double z) {
-                                 const double distance_m = std::hypot(x - centre_x, z - centre_z);
-                                 if (distance_m <= leave_at_m_) near_.emplace_back(row, distance_m);
-                               });
+  const double enter_m2 = region_.radius_m * region_.radius_m;
+  const double leave_m2 = leave_at_m_ * leave_at_m_;
+  delivery.places->ForEachNear(
+      centre_x, centre_z, leave_at_m_, [&](std::uint32_t row, double x, double z) {
+        const double distance_m2 =
+            (x - centre_x) * (x - centre_x) + (z - centre_z) * (z - centre_z);
+        if (distance_m2 > (lane.is_inside[row] ? leave_m2 : enter_m2)) return;
+        near_.emplace_back(row, distance_m2);
+      });
   std::ranges::sort(near_);
   now_.clear();
   entered_.clear();
   left_.clear();
   due_.clear();
-  for (const auto& [row, distance_m] : near_) {
-    const AvatarNumber number = (*rows.avatars())[row];
-    if (!std::ranges::binary_search(inside, number)) {
+  std::size_t kept = 0;
+  for (const auto& [row, distance_m2] : near_) {
+    const AvatarNumber number = (*lane.avatars)[row];
+    if (!lane.is_inside[row]) {
       // Just after a region has moved the shard may not know yet that its pose is wanted.
-      if (distance_m > region_.radius_m || !rows.has_pose(row)) continue;
+      if (!rows.has_pose(row)) continue;
       entered_.push_back(number);
       due_.push_back(row);
-    } else if (rows.has_pose(row) && delivery.tick % EveryAt(distance_m) == 0) {
+    } else if (rows.has_pose(row) && delivery.tick % EveryAt(distance_m2) == 0) {
       due_.push_back(row);
     }
     now_.push_back(number);
+    near_[kept++].first = row;
   }
-  std::ranges::set_difference(inside, now_, std::back_inserter(left_));
-  std::swap(inside, now_);
+  if (!entered_.empty() || now_.size() < lane.inside.size()) {
+    std::ranges::set_difference(lane.inside, now_, std::back_inserter(left_));
+    std::swap(lane.inside, now_);
+    lane.is_inside.assign(lane.avatars->size(), false);
+    for (std::size_t i = 0; i < kept; ++i) lane.is_inside[near_[i].first] = true;
+  }
   return {entered_, left_, due_};
 }
 

@@ -32,15 +32,20 @@ class RegionMembers {
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
 
  private:
-  [[nodiscard]] std::uint16_t EveryAt(double distance_m) const;
+  [[nodiscard]] std::uint16_t EveryAt(double distance_m2) const;
 
   protocol::Region region_;
   double leave_at_m_ = 0.0;
   std::uint16_t every_n_ticks_ = 1;
   std::uint16_t every_ = 1;
-  std::map<int, std::vector<AvatarNumber>> inside_;  // by shard, growing
+  struct Lane {
+    std::vector<AvatarNumber> inside;  // growing
+    protocol::PoseRows::Avatars avatars;
+    std::vector<bool> is_inside;  // by row of those
+  };
+  std::map<int, Lane> lanes_;  // by shard
   // What the last Change is about.
-  std::vector<std::pair<std::uint32_t, double>> near_;  // row, distance
+  std::vector<std::pair<std::uint32_t, double>> near_;  // row, distance squared
   std::vector<AvatarNumber> now_;
   std::vector<AvatarNumber> entered_;
   std::vector<AvatarNumber> left_;

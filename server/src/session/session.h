@@ -7,6 +7,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <unordered_map>
 #include <vector>
 
 #include "net/connection.h"
@@ -64,7 +66,13 @@ class SharedPoses {
   const PoseDelivery& delivery_;
   protocol::PoseBatchComposer& composer_;
   ThreadMetrics& metrics_;
-  std::map<std::vector<std::uint32_t>, PoseDelivery> shared_;
+  struct RowsHash {
+    std::size_t operator()(const std::vector<std::uint32_t>& rows) const {
+      return std::hash<std::string_view>()(
+          {reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(rows[0])});
+    }
+  };
+  std::unordered_map<std::vector<std::uint32_t>, PoseDelivery, RowsHash> shared_;
 };
 
 /// One client: worlds joined, subscriptions, commands under way and answered. Lives on one shard
