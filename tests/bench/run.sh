@@ -7,9 +7,10 @@
 #   tests/bench/run.sh --min-time 2 --filter synthesize
 #
 # Crowds of 100 to 100,000 are told as multiples of a floor as well, which is measured in the same run: what reading their
-# bytes once and giving each float one multiply-add takes.
+# bytes once and giving each float one multiply-add takes. For observers it is what giving the system their bytes takes.
+# Where there is AVX-512, crowds are measured with AVX2, too.
 #
-#   --out DIR        where the CSV goes (default: build/release/bench)
+#   --out PATH       where the CSV goes: a file that ends in .csv, or a folder (default: build/release/bench)
 #   --min-time S     seconds for each benchmark (default: 0.5)
 #   --filter REGEX   only benchmarks whose name matches
 #   --no-build       the programs are built already
@@ -44,6 +45,12 @@ if $build; then
   cmake -S "$root" --preset release >/dev/null
   cmake --build "$root/build/release" --target stridewire-bench stridewire-library >&2
 fi
+csv=
+if [[ $out == *.csv ]]; then
+  csv=$(realpath -m "$out")
+  out=$root/build/release/bench
+  mkdir -p "$(dirname "$csv")"
+fi
 mkdir -p "$out"
 
 captures=$root/../shared/mocap/cmu/16
@@ -58,7 +65,7 @@ compiler=$(sed -n 's/^CMAKE_CXX_COMPILER:[A-Z]*=//p' "$root/build/release/CMakeC
 compiler=$("$compiler" --version | head -n 1)
 cpu=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo | head -n 1)
 load=$(cut -d ' ' -f 1 /proc/loadavg)
-csv=$out/$(date -u +%Y%m%dT%H%M%SZ)-$commit.csv
+[[ -n $csv ]] || csv=$out/$(date -u +%Y%m%dT%H%M%SZ)-$commit.csv
 
 raw=$(mktemp)
 trap 'rm -f "$raw"' EXIT
@@ -70,6 +77,10 @@ one_core=$({ grep -v '/shards/' <<<"$all_names" || true; } | one_of)
 several=$({ grep '/shards/' <<<"$all_names" || true; } | one_of)
 [[ -n $one_core$several ]] || bad_usage "no benchmark's name matches '$filter'"
 [[ -z $one_core ]] || bench taskset -c 0 "$bin/stridewire-bench" --benchmark_filter="^($one_core)\$"
+crowds=$({ grep -E '/crowd/' <<<"$all_names" || true; } | one_of)
+if [[ -n $crowds ]] && grep -q '"instruction_set": "AVX-512"' "$raw"; then
+  bench taskset -c 0 "$bin/stridewire-bench" --instruction-set=AVX2 --benchmark_filter="^($crowds)\$"
+fi
 [[ -z $several ]] || bench "$bin/stridewire-bench" --benchmark_filter="^($several)\$"
 
 # One benchmark is one object; its keys stand one a line.
@@ -78,8 +89,14 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
   function number(text) { return text == "" ? "" : sprintf("%.6g", text) }
   function quoted(text) { gsub(/"/, "\"\"", text); return "\"" text "\"" }
   BEGIN {
-    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,times_floor,commit,compiler,cpu,load_average" > csv
+    print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,times_floor,instruction_set,commit,compiler,cpu,load_average" > csv
     printf "%-40s %14s %12s %10s %12s\n", "one core of " cpu, "items/s", "us an item", "MB/s", "times floor"
+  }
+  /^ *"instruction_set":/ {
+    set = value($0)
+    if (set != last_set) print set
+    last_set = set
+    next
   }
   /"benchmarks": \[/ { inside = 1; next }
   !inside { next }
@@ -87,24 +104,26 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
   /^ *"[a-z_]+":/ { key = $1; gsub(/[":]/, "", key); f[key] = value($0) }
   /^ *\}/ && ("name" in f) {
     if ("error_message" in f) { print f["name"] ": " f["error_message"] > "/dev/stderr"; failed = 1 }
-    us = f["cpu_time"]
+    name = f["name"]
+    # Who keeps the time itself counts processor time, without what readers do meanwhile.
+    us = sub(/\/manual_time$/, "", name) ? f["real_time"] : f["cpu_time"]
     items = f["items_per_second"] != "" ? f["items_per_second"] : 1e6 / us
-    # Crowds are told beside the floor of as many, measured before them.
+    # PREFIX/KIND/SIZE is told beside PREFIX/floor/SIZE, measured before it with the same instruction set.
     times = ""
-    if (f["name"] ~ /\/crowd\//) {
-      size = f["name"]; sub(/.*\//, "", size)
-      of = f["name"]; sub(/\/crowd\/.*/, "", of)
-      if (f["name"] ~ /\/crowd\/floor\//) floor[of "/" size] = items
-      if ((of "/" size) in floor) times = sprintf("%.2f", floor[of "/" size] / items)
+    if (match(name, /\/[^\/]+\/[^\/]+$/)) {
+      split(substr(name, RSTART + 1), end, "/")
+      of = substr(name, 1, RSTART - 1) "/" end[2]
+      if (end[1] == "floor") floor[of] = items
+      if (of in floor) times = sprintf("%.2f", floor[of] / items)
     }
-    print quoted(f["name"]) "," number(items) "," number(us) "," f["iterations"] "," \
+    print quoted(name) "," number(items) "," number(us) "," f["iterations"] "," \
           number(f["bytes_per_second"]) "," number(f["examples"]) "," number(f["parameters"]) "," \
           number(f["library_bytes"]) "," number(f["bytes_per_example"]) "," times "," \
-          quoted(commit) "," quoted(compiler) "," quoted(cpu) "," load > csv
+          quoted(set) "," quoted(commit) "," quoted(compiler) "," quoted(cpu) "," load > csv
     if (f["library_bytes"] != "") {
-      printf "%-40s %d bytes, %d examples, %.0f bytes an example\n", f["name"], f["library_bytes"], f["examples"], f["bytes_per_example"]
+      printf "%-40s %d bytes, %d examples, %.0f bytes an example\n", name, f["library_bytes"], f["examples"], f["bytes_per_example"]
     } else {
-      printf "%-40s %14.0f %12.4f %10s %12s\n", f["name"], items, 1e6 / items, \
+      printf "%-40s %14.0f %12.4f %10s %12s\n", name, items, 1e6 / items, \
              f["bytes_per_second"] != "" ? sprintf("%.0f", f["bytes_per_second"] / 1e6) : "", times
     }
     split("", f)

@@ -1,5 +1,8 @@
 // What movements, poses and messages cost on one core, on `builtin` and on every library named after
-// the options: stridewire-bench [--benchmark_…] [LIBRARY.swl …]
+// the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
+//
+// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those named. Floors are always
+// as fast as the machine can be.
 //
 // A step counts as the paper counts it: weights, blended keytimes and the poses of its whole length,
 // here 30 of them.
@@ -12,9 +15,11 @@
 #include <numeric>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "bench_libraries.h"
+#include "instruction_sets.h"
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
@@ -461,10 +466,35 @@ void RegisterAll(const std::string& path, const Library& library) {
   Register(name + "/decode_pose/compact", DecodeCompactPose, library);
 }
 
+/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this machine has none.
+std::string_view ChooseInstructionSet(std::string_view name) {
+  for (const InstructionSet& set : kInstructionSets) {
+    if ((hwy::SupportedTargets() & set.target) == 0 || (!name.empty() && name != set.name))
+      continue;
+    if (!name.empty()) static const OnlyInstructionSet only(set.target);
+    return set.name;
+  }
+  return name.empty() ? "none" : "";
+}
+
 int Run(int argc, char** argv) {
-  benchmark::AddCustomContext("stridewire", kVersion);
   benchmark::Initialize(&argc, argv);
   std::vector<std::string> names = {"builtin"};
+  std::string_view wanted_set;
+  constexpr std::string_view kSetOption = "--instruction-set=";
+  if (argc > 1 && std::string_view(argv[1]).starts_with(kSetOption)) {
+    wanted_set = std::string_view(argv[1]).substr(kSetOption.size());
+    --argc;
+    ++argv;
+  }
+  const std::string_view set = ChooseInstructionSet(wanted_set);
+  if (set.empty()) {
+    std::fprintf(stderr, "stridewire-bench: this machine has no instruction set '%.*s'\n",
+                 static_cast<int>(wanted_set.size()), wanted_set.data());
+    return 2;
+  }
+  benchmark::AddCustomContext("stridewire", kVersion);
+  benchmark::AddCustomContext("instruction_set", std::string(set));
   for (int i = 1; i < argc; ++i) names.emplace_back(argv[i]);
   for (const std::string& name : names) {
     Expected<Library> library = OpenLibrary(name);
@@ -473,6 +503,7 @@ int Run(int argc, char** argv) {
       return 2;
     }
     RegisterAll(name, *library);
+    if (name == "builtin") RegisterObservers(name, *library);
   }
   RegisterScaledCrowds();
   benchmark::RunSpecifiedBenchmarks();

@@ -3,6 +3,7 @@
 #include <hwy/highway.h>
 
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 namespace stridewire {
@@ -22,11 +23,19 @@ class OnlyInstructionSet {
   }
 };
 
+/// Widest first.
+struct InstructionSet {
+  std::int64_t target;
+  std::string_view name;
+};
+inline constexpr InstructionSet kInstructionSets[] = {
+    {HWY_AVX3, "AVX-512"}, {HWY_AVX2, "AVX2"}, {HWY_SSE4, "SSE4"}, {HWY_NEON, "NEON"}};
+
 /// Those compiled in that this machine has; the last is plain C++.
 inline std::vector<std::int64_t> InstructionSets() {
   std::vector<std::int64_t> sets;
-  for (const std::int64_t target : {HWY_AVX3, HWY_AVX2, HWY_SSE4, HWY_NEON}) {
-    if ((hwy::SupportedTargets() & target) != 0) sets.push_back(target);
+  for (const InstructionSet& set : kInstructionSets) {
+    if ((hwy::SupportedTargets() & set.target) != 0) sets.push_back(set.target);
   }
   sets.push_back(HWY_SCALAR);
   return sets;
