@@ -21,6 +21,8 @@ constexpr double kClosingGainM = 0.03;
 constexpr std::size_t kEventReserve = 7;
 // Of a tick: finished, started, foot-strike. Room for more is made when there are more.
 constexpr std::size_t kUsualEvents = 3;
+// Requests a queue keeps room for.
+constexpr std::size_t kUsualQueue = 8;
 
 }  // namespace
 
@@ -91,6 +93,11 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
   if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
+  }
+  // In small steps, and given back: a crowd's queues are long at once, but not for long.
+  if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
+  if (queue_.size() == queue_.capacity()) {
+    queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
   }
   queue_.push_back(request);
   return {};

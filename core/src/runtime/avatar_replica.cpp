@@ -145,6 +145,7 @@ void SetTimes(MovementKind kind, Movement& movement) {
 AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
     : body_(std::move(library)) {
   body_.layered_pose = body_.pose;
+  body_.layers.MakeRoom();
 }
 
 bool AvatarReplica::IsState(std::span<const std::byte> record) {
@@ -281,7 +282,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   if ((flags & record::kLayers) != 0) {
     ReadLayers(*body_.library, body_.layers, reader);
   } else {
-    body_.layers = {};
+    body_.layers.Clear();
   }
   is_told_ = are_layers_told_ = true;
   reader.Finish();

@@ -53,10 +53,9 @@ void HeadFor(double weight, double speed, double blend_s, LayerStack::Playing& p
 }  // namespace
 
 LayerStack::Playing* LayerStack::Find(int layer, bool is_ending) {
-  for (std::size_t i = 0; i < count_; ++i) {
-    if (playing_[i].layer == layer && playing_[i].is_ending == is_ending) return &playing_[i];
-  }
-  return nullptr;
+  const auto found = std::ranges::find_if(
+      playing_, [&](const Playing& p) { return p.layer == layer && p.is_ending == is_ending; });
+  return found == playing_.end() ? nullptr : &*found;
 }
 
 Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request) {
@@ -84,11 +83,11 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
     on = Find(request.layer, true);
   }
   if (on == nullptr) {
-    if (count_ == kMaxLayers) {
+    if (playing_.size() == kMaxLayers) {
       return Fail(ErrorCode::kLimitExceeded, "the avatar plays four layers already", kMaxLayers);
     }
-    on = &playing_[count_++];
-    *on = {.layer = request.layer, .speed = request.speed};
+    MakeRoom();
+    on = &playing_.emplace_back(Playing{.layer = request.layer, .speed = request.speed});
   }
   HeadFor(request.weight, request.speed, request.blend_s, *on);
   on->is_ending = false;
@@ -98,9 +97,7 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
 }
 
 void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < count_; ++i) {
-    Playing p = playing_[i];
+  for (Playing& p : playing_) {
     p.elapsed_s += dt_s;
     p.speed = p.from_speed + (p.to_speed - p.from_speed) * Ease(Progress(p));
     p.time_s += dt_s * p.speed;
@@ -113,10 +110,8 @@ void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
       HeadFor(0.0, p.speed, p.blend_s, p);
       p.is_ending = true;
     }
-    if (p.is_ending && p.elapsed_s >= p.ease_s) continue;
-    playing_[kept++] = p;
   }
-  count_ = kept;
+  std::erase_if(playing_, [](const Playing& p) { return p.is_ending && p.elapsed_s >= p.ease_s; });
 }
 
 void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
@@ -141,8 +136,8 @@ Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing
   if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, could_be)) {
     return Fail(ErrorCode::kOutOfRange, "no stack has these layers in play");
   }
-  std::ranges::copy(playing, playing_.begin());
-  count_ = playing.size();
+  if (!playing.empty()) MakeRoom();
+  playing_.assign(playing.begin(), playing.end());
   return {};
 }
 

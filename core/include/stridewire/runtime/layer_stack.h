@@ -1,8 +1,8 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/layer_clip.h"
@@ -25,7 +25,8 @@ inline constexpr double kMinLayerSpeed = 0.1;
 inline constexpr double kMaxLayerSpeed = 4.0;
 
 /// The layers one avatar plays. Weights ease in and out with a continuous derivative, also when a
-/// request comes while one is on its way. Later layers lie over earlier ones. Never allocates.
+/// request comes while one is on its way. Later layers lie over earlier ones. The first that is set or restored
+/// allocates, unless there is room.
 class LayerStack {
  public:
   static constexpr std::size_t kMaxLayers = 4;  ///< At a time, those that ease out included.
@@ -62,10 +63,10 @@ class LayerStack {
   /// Applies all to a pose of the library's skeleton.
   void Apply(const MotionLibrary& library, PoseSpan pose) const;
 
-  [[nodiscard]] std::span<const Playing> playing() const {
-    return std::span(playing_).first(count_);
-  }
-  [[nodiscard]] bool empty() const { return count_ == 0; }
+  [[nodiscard]] std::span<const Playing> playing() const { return playing_; }
+  void MakeRoom() { playing_.reserve(kMaxLayers); }
+  void Clear() { playing_.clear(); }
+  [[nodiscard]] bool empty() const { return playing_.empty(); }
 
   /// Goes on from what another stack of the library had in play. kOutOfRange: what no stack has; nothing changes then.
   [[nodiscard]] Status Restore(const MotionLibrary& library, std::span<const Playing> playing);
@@ -73,8 +74,7 @@ class LayerStack {
  private:
   [[nodiscard]] Playing* Find(int layer, bool is_ending);
 
-  std::array<Playing, kMaxLayers> playing_{};
-  std::size_t count_ = 0;
+  std::vector<Playing> playing_;  // with room for all from the first on: most avatars have none
 };
 
 }  // namespace stridewire
