@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "session/encode_frame.h"
 #include "stridewire/base/check.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
@@ -51,19 +52,6 @@ constexpr std::size_t kNumbersPerItem = 32;
 
 std::size_t MaxItems(const Limits& limits) {
   return std::min(protocol::kMaxItems, limits.max_bulk_bytes / kReplyItemBytes);
-}
-
-// Encodes a message of the server's own making, which cannot be wrong; null if it was all the
-// same, and then says so.
-template <typename Message>
-SharedFrame EncodeFrame(protocol::Encoder& encoder, const Message& message) {
-  auto frame = std::make_shared<std::vector<std::byte>>();
-  const Status status = encoder.Encode(message, *frame);
-  if (status) return frame;
-  spdlog::error("a {} could not be encoded: {}",
-                protocol::MessageTypeName(std::remove_cvref_t<Message>::kType),
-                Describe(status.error()));
-  return nullptr;
 }
 
 template <typename Function>
@@ -155,7 +143,7 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   movement_feeds_.clear();
   for (auto& [id, membership] : worlds_) {
     host_.InterestChanged(membership.world);
-    if (subscriptions_.Watches(id, PoseMode::kMovement)) BeginMovements(membership.world);
+    if (subscriptions_.Watches(id, PoseMode::kMovement)) WatchMovements(membership.world);
   }
   spdlog::info("session {:016x} of '{}' ({}{}) {}", identity_.id, client_name_, identity_.address,
                connection_->kind() == TransportKind::kWebSocket ? ", WebSocket" : "",
@@ -718,7 +706,7 @@ void Session::Execute(protocol::Observe&& command) {
     return;
   }
   if (command.region && command.mode == PoseMode::kMovement) {
-    Answer(command.seq, StatusCode::kUnsupported, "movements are told of whole worlds");
+    Answer(command.seq, StatusCode::kUnsupported, "movements are not told of regions");
     return;
   }
   if (command.replace) {
@@ -772,7 +760,7 @@ void Session::Execute(protocol::Observe&& command) {
                                             .region = std::move(region)});
   host_.InterestChanged(it->second.world);
   Answer(command.seq, StatusCode::kOk);
-  if (command.mode == PoseMode::kMovement) BeginMovements(it->second.world);
+  if (command.mode == PoseMode::kMovement) WatchMovements(it->second.world);
 }
 
 void Session::MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world) {
@@ -799,8 +787,12 @@ void Session::Execute(protocol::StopObserving&& command) {
   }
   const auto [world, mode] = *stopped;
   const bool is_last = !subscriptions_.Watches(world, mode);
-  if (is_last && mode == PoseMode::kMovement) {
-    EndMovements(world);
+  if (mode == PoseMode::kMovement) {
+    if (is_last) {
+      EndMovements(world);
+    } else {
+      WatchMovements(worlds_.at(world).world);
+    }
   } else if (is_last && connection_ != nullptr) {
     connection_->DropPoses(world, mode);
   }

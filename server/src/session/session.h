@@ -13,6 +13,7 @@
 
 #include "net/connection.h"
 #include "session/event_replay.h"
+#include "session/movement_feed.h"
 #include "session/refusal.h"
 #include "session/reply_memory.h"
 #include "session/session_host.h"
@@ -48,6 +49,24 @@ class SharedEvents {
   const EventDelivery& delivery_;
   protocol::Encoder& encoder_;
   std::vector<SharedFrame> frames_;
+};
+
+/// Movements of one delivery as frames, encoded when the first session asks.
+class SharedMovements {
+ public:
+  SharedMovements(const MovementDelivery& delivery, protocol::Encoder& encoder)
+      : delivery_(delivery), encoder_(encoder) {}
+  [[nodiscard]] const MovementDelivery& delivery() const { return delivery_; }
+  /// The steps of all avatars.
+  [[nodiscard]] const std::vector<SharedFrame>& frames();
+  /// The `i`th with no avatar in it; `empty` says so.
+  [[nodiscard]] const SharedFrame& Empty(std::size_t i, const protocol::Movements& empty);
+
+ private:
+  const MovementDelivery& delivery_;
+  protocol::Encoder& encoder_;
+  std::vector<SharedFrame> frames_;
+  std::vector<SharedFrame> empty_;  // null: nobody has asked
 };
 
 /// Poses of one delivery and the batches made of them for several sessions.
@@ -101,7 +120,7 @@ class Session : private ConnectionHandler {
   /// The ground of a world has changed.
   void OnGround(WorldId world, const SharedFrame& frame);
   void OnPoses(SharedPoses& poses);
-  void OnMovements(const MovementDelivery& delivery);
+  void OnMovements(SharedMovements& movements);
   void OnStates(const StatesAnswer& answer);
   void OnEvents(SharedEvents& events);
 
@@ -140,13 +159,6 @@ class Session : private ConnectionHandler {
     std::uint64_t dropped_events = 0;
     std::uint64_t told_dropped = 0;  // sum of the two when Lagging was last sent
   };
-  // How far the client has the states that movements go on from, of the avatars of one world and shard.
-  struct MovementFeed {
-    std::shared_ptr<World> world;
-    AvatarNumber next = 1;    // avatars from here on are still to be told; 0: none
-    std::uint32_t asked = 0;  // nonce of the question under way, 0: none
-    bool is_lost = false;  // movements were dropped: from the beginning, once the queue has drained
-  };
   struct Pending {
     int outstanding = 0;  // shards that have not answered
     std::size_t item_count = 0;
@@ -178,10 +190,10 @@ class Session : private ConnectionHandler {
   void Inspect(const protocol::InspectAvatar& question);
   void Fetch(const protocol::FetchLibrary& question);
 
-  void BeginMovements(const std::shared_ptr<World>& world);
+  void WatchMovements(const std::shared_ptr<World>& world);
   void EndMovements(WorldId world);
   void AskForStates();
-  void SendMovements(WorldId world, int shard, const SharedFrame& frame);
+  void SendMovements(WorldId world, int shard, MovementFeed& feed, const SharedFrame& frame);
 
   /// The membership a controller's command needs; answers and returns null if there is none.
   Membership* Commanding(protocol::Seq seq, WorldId world);

@@ -1,7 +1,9 @@
 // The part of a session that tells what avatars begin, and gives out their library, to a client that evaluates the poses itself.
 
 #include <algorithm>
+#include <iterator>
 
+#include "session/encode_frame.h"
 #include "session/session.h"
 
 namespace stridewire::server {
@@ -15,11 +17,36 @@ constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace
 
-// The client knows nothing of the avatars of a world, or not of all it is now to show.
-void Session::BeginMovements(const std::shared_ptr<World>& world) {
+const std::vector<SharedFrame>& SharedMovements::frames() {
+  if (frames_.empty()) {
+    for (const protocol::Movements& step : *delivery_.steps) {
+      frames_.push_back(EncodeFrame(encoder_, step));
+    }
+  }
+  return frames_;
+}
+
+const SharedFrame& SharedMovements::Empty(std::size_t i, const protocol::Movements& empty) {
+  empty_.resize(delivery_.steps->size());
+  if (empty_[i] == nullptr) empty_[i] = EncodeFrame(encoder_, empty);
+  return empty_[i];
+}
+
+// Others are to be told of, or the client knows of nobody yet.
+void Session::WatchMovements(const std::shared_ptr<World>& world) {
+  const std::span<const AvatarNumber> named =
+      subscriptions_.Named(world->id, protocol::PoseMode::kMovement);
   for (int shard = 0; shard < host_.shard_count(); ++shard) {
-    MovementFeed& feed = movement_feeds_[{world->id, shard}];
-    feed = {.world = world, .is_lost = feed.is_lost};
+    MovementFeed& feed = movement_feeds_.try_emplace({world->id, shard}, world).first->second;
+    if (named.empty()) {
+      feed.Watch(std::nullopt);
+      continue;
+    }
+    std::vector<AvatarNumber> there;
+    std::ranges::copy_if(named, std::back_inserter(there), [&](AvatarNumber number) {
+      return ShardOf(number, host_.shard_count()) == shard;
+    });
+    feed.Watch(std::move(there));
   }
   AskForStates();
 }
@@ -35,20 +62,14 @@ void Session::AskForStates() {
   // States alone never are more than the budget.
   const std::size_t little = host_.config().limits.control_buffer_bytes / 16;
   for (auto& [key, feed] : movement_feeds_) {
-    if (feed.is_lost && waiting == 0) {
-      feed.is_lost = false;
-      feed.next = 1;
-      feed.asked = 0;
-    }
-    if (feed.is_lost || feed.next == 0 || feed.asked != 0 || waiting > little) continue;
+    if (feed.is_lost() && waiting == 0) feed.Recover();
+    if (!feed.asks() || waiting > little) continue;
     if (++states_nonce_ == 0) ++states_nonce_;
-    feed.asked = states_nonce_;
-    host_.Ask(key.second, StatesQuestion{.world = feed.world,
-                                         .from_shard = host_.shard_index(),
-                                         .session = identity_.id,
-                                         .nonce = feed.asked,
-                                         .first = feed.next,
-                                         .enough_bytes = std::min(kStatesBytes, little)});
+    StatesQuestion question{.from_shard = host_.shard_index(),
+                            .session = identity_.id,
+                            .enough_bytes = std::min(kStatesBytes, little)};
+    feed.Ask(states_nonce_, question);
+    host_.Ask(key.second, std::move(question));
   }
 }
 
@@ -57,20 +78,32 @@ void Session::OnSent() {
   AskForStates();
 }
 
-void Session::SendMovements(WorldId world, int shard, const SharedFrame& frame) {
-  const auto feed = movement_feeds_.find({world, shard});
-  if (connection_ == nullptr || feed == movement_feeds_.end() || feed->second.is_lost) return;
+void Session::SendMovements(WorldId world, int shard, MovementFeed& feed,
+                            const SharedFrame& frame) {
+  if (connection_ == nullptr || feed.is_lost() || frame == nullptr) return;
   const std::size_t dropped = connection_->SendMovements(world, shard, frame);
   if (dropped == 0) return;
-  feed->second.is_lost = true;
+  feed.Lose();
   worlds_.at(world).dropped_batches += dropped;
   host_.metrics().batches_dropped.Add(dropped);
   host_.metrics().Reached(Limit::kObserverBacklog);
 }
 
-void Session::OnMovements(const MovementDelivery& delivery) {
-  for (const SharedFrame& frame : delivery.frames) {
-    SendMovements(delivery.world, delivery.from_shard, frame);
+void Session::OnMovements(SharedMovements& movements) {
+  const MovementDelivery& delivery = movements.delivery();
+  const auto it = movement_feeds_.find({delivery.world, delivery.from_shard});
+  if (it == movement_feeds_.end()) return;
+  MovementFeed& feed = it->second;
+  for (std::size_t i = 0; i < delivery.steps->size() && !feed.is_lost(); ++i) {
+    if (feed.is_whole()) {
+      SendMovements(delivery.world, delivery.from_shard, feed, movements.frames()[i]);
+      continue;
+    }
+    const protocol::Movements some =
+        feed.Pick((*delivery.steps)[i], host_.config().limits.max_bulk_bytes);
+    SendMovements(
+        delivery.world, delivery.from_shard, feed,
+        some.avatars.empty() ? movements.Empty(i, some) : EncodeFrame(host_.encoder(), some));
   }
   // Nothing waits to be sent any more, so OnSent did not come: a feed that was lost goes on from here.
   AskForStates();
@@ -78,11 +111,10 @@ void Session::OnMovements(const MovementDelivery& delivery) {
 
 void Session::OnStates(const StatesAnswer& answer) {
   const auto it = movement_feeds_.find({answer.world, answer.from_shard});
-  if (it == movement_feeds_.end() || it->second.asked != answer.nonce) return;
-  MovementFeed& feed = it->second;
-  feed.asked = 0;
-  feed.next = answer.next;
-  if (answer.frame != nullptr) SendMovements(answer.world, answer.from_shard, answer.frame);
+  if (it == movement_feeds_.end() || !it->second.OnStates(answer)) return;
+  if (answer.frame != nullptr) {
+    SendMovements(answer.world, answer.from_shard, it->second, answer.frame);
+  }
   AskForStates();
 }
 

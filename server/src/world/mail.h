@@ -111,7 +111,8 @@ struct StatesQuestion {
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarNumber first = 0;
-  std::size_t enough_bytes = 0;  ///< Of states; the last may go beyond.
+  std::size_t enough_bytes = 0;                            ///< Of states; the last may go beyond.
+  std::shared_ptr<const std::vector<AvatarNumber>> named;  ///< Whose, growing; null: all.
 };
 struct StatesAnswer {
   WorldId world = 0;
@@ -176,11 +177,11 @@ struct PoseDelivery {
   std::shared_ptr<const Places> places;
 };
 
-/// What the avatars of one world and shard began in a tick: Movements of its steps, in order.
+/// What the avatars of one world and shard began in a tick, step by step.
 struct MovementDelivery {
   WorldId world = 0;
   int from_shard = 0;
-  std::vector<SharedFrame> frames;
+  std::shared_ptr<const std::vector<protocol::Movements>> steps;
 };
 
 /// Events of one world, shard and tick.

@@ -126,8 +126,7 @@ void Shard::AnswerQuestions() {
   }
   questions_.clear();
   for (const StatesQuestion& question : states_questions_) {
-    StatesAnswer answer =
-        WorldOf(question.world).States(question.first, question.enough_bytes, encoder_);
+    StatesAnswer answer = WorldOf(question.world).States(question, encoder_);
     answer.session = question.session;
     answer.nonce = question.nonce;
     outgoing_[static_cast<std::size_t>(question.from_shard)].states.push_back(std::move(answer));
@@ -143,10 +142,10 @@ void Shard::Publish() {
         outgoing_[shard].events.push_back({id, tick_, events});
       }
     }
-    if (const std::vector<SharedFrame> frames = world->TakeMovements(encoder_); !frames.empty()) {
+    if (const auto steps = world->TakeMovements()) {
       for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
         if (!world->WantsMovements(static_cast<int>(shard))) continue;
-        outgoing_[shard].movements.push_back({id, index_, frames});
+        outgoing_[shard].movements.push_back({id, index_, steps});
       }
     }
     for (const PoseMode mode : kSentModes) {
@@ -190,7 +189,8 @@ void Shard::Receive(TickMail&& mail) {
     for (Session* session : WatchersOf(delivery.world)) session->OnEvents(events);
   }
   for (const MovementDelivery& delivery : mail.movements) {
-    for (Session* session : WatchersOf(delivery.world)) session->OnMovements(delivery);
+    SharedMovements movements(delivery, encoder_);
+    for (Session* session : WatchersOf(delivery.world)) session->OnMovements(movements);
   }
   for (const StatesAnswer& answer : mail.states) {
     const auto it = sessions_.find(answer.session);

@@ -418,34 +418,41 @@ void WorldShard::TellMovements() {
   }
 }
 
-std::vector<SharedFrame> WorldShard::TakeMovements(protocol::Encoder& encoder) {
-  std::vector<SharedFrame> frames;
+std::shared_ptr<const std::vector<protocol::Movements>> WorldShard::TakeMovements() {
+  if (movements_.empty()) return nullptr;
   for (const protocol::Movements& message : movements_) {
-    auto frame = std::make_shared<std::vector<std::byte>>();
-    const Status status = encoder.Encode(message, *frame);
-    STRIDEWIRE_CHECK(status.has_value());
     metrics_.movements_encoded.Add(message.avatars.size());
-    frames.push_back(std::move(frame));
   }
-  movements_.clear();
-  return frames;
+  return std::make_shared<const std::vector<protocol::Movements>>(std::exchange(movements_, {}));
 }
 
-StatesAnswer WorldShard::States(AvatarNumber first, std::size_t enough_bytes,
-                                protocol::Encoder& encoder) const {
+StatesAnswer WorldShard::States(const StatesQuestion& question, protocol::Encoder& encoder) const {
   StatesAnswer answer{.world = world_->id, .from_shard = shard_};
   protocol::Movements message = EmptyMovements();
   message.states = true;
-  auto it = avatars_.lower_bound(first);
-  for (; it != avatars_.end(); ++it) {
-    if (message.records.size() > enough_bytes || IsFull(message)) break;
+  const auto tell = [&](AvatarNumber number, const Entry& entry) {
+    if (message.records.size() > question.enough_bytes || IsFull(message)) {
+      answer.next = number;
+      return;
+    }
     // One that came with this tick is told with it; its state is the same.
-    AppendState(it->second.avatar, message.records);
-    message.avatars.push_back(it->first);
+    AppendState(entry.avatar, message.records);
+    message.avatars.push_back(number);
     message.flags.push_back(0);
     message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
+  };
+  if (question.named == nullptr) {
+    for (auto it = avatars_.lower_bound(question.first); it != avatars_.end() && answer.next == 0;
+         ++it) {
+      tell(it->first, it->second);
+    }
+  } else {
+    const std::vector<AvatarNumber>& named = *question.named;
+    for (auto number = std::ranges::lower_bound(named, question.first);
+         number != named.end() && answer.next == 0; ++number) {
+      if (const auto it = avatars_.find(*number); it != avatars_.end()) tell(*number, it->second);
+    }
   }
-  if (it != avatars_.end()) answer.next = it->first;
   if (message.avatars.empty()) return answer;
   auto frame = std::make_shared<std::vector<std::byte>>();
   const Status status = encoder.Encode(message, *frame);

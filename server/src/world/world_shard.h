@@ -61,11 +61,11 @@ class WorldShard {
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
-  /// What avatars began since this was last called, as frames; empty if nobody would miss it.
-  [[nodiscard]] std::vector<SharedFrame> TakeMovements(protocol::Encoder& encoder);
+  /// What avatars began since this was last called, in order; null if nobody would miss it.
+  [[nodiscard]] std::shared_ptr<const std::vector<protocol::Movements>> TakeMovements();
 
-  /// The states of avatars from a number on after the last tick, of one at least and until there are `enough_bytes`.
-  [[nodiscard]] StatesAnswer States(AvatarNumber first, std::size_t enough_bytes,
+  /// The states of avatars after the last tick, of one at least and until there are `enough_bytes`.
+  [[nodiscard]] StatesAnswer States(const StatesQuestion& question,
                                     protocol::Encoder& encoder) const;
 
   /// What an avatar is doing after `tick`, the answer to InspectAvatar.

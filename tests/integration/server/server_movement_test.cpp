@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstring>
 #include <map>
+#include <numeric>
 #include <string>
 
 #include "movement_view.h"
@@ -67,9 +68,16 @@ class BothWays {
     world_ = client_.Join(world, protocol::Role::kObserver)->world;
   }
 
-  void Observe(PoseMode mode, protocol::SubscriptionId id) {
-    client_.Send(protocol::Observe{
-        .seq = client_.NextSeq(), .world = world_, .subscription = id, .mode = mode});
+  void Observe(PoseMode mode, protocol::SubscriptionId id,
+               const std::vector<AvatarNumber>& avatars = {}) {
+    client_.Send(protocol::Observe{.seq = client_.NextSeq(),
+                                   .world = world_,
+                                   .subscription = id,
+                                   .mode = mode,
+                                   .avatars = avatars});
+  }
+  void StopObserving(protocol::SubscriptionId id) {
+    client_.Send(protocol::StopObserving{.seq = client_.NextSeq(), .subscription = id});
   }
 
   // Takes what comes until `is_enough`.
@@ -82,6 +90,7 @@ class BothWays {
         const Status taken = view_.Take(*movements, told_);
         ASSERT_TRUE(taken) << Describe(taken.error());
         states_ += movements->states;
+        for (const AvatarNumber avatar : movements->avatars) ++told_of_[avatar];
       } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
         for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
           const auto pose = batch->pose(i);
@@ -109,6 +118,7 @@ class BothWays {
   const client::MovementView& view() const { return view_; }
   const Shown& full() const { return full_; }
   int states() const { return states_; }
+  const std::map<AvatarNumber, int>& told_of() const { return told_of_; }
   std::uint64_t last_tick() const { return last_tick_; }
 
  private:
@@ -118,6 +128,7 @@ class BothWays {
   Keeper told_;
   Shown full_;
   int states_ = 0;
+  std::map<AvatarNumber, int> told_of_;
   std::uint64_t last_tick_ = 0;
 };
 
@@ -152,6 +163,10 @@ class Crowd {
         .seq = client_.NextSeq(), .world = world_, .avatars = {avatar}, .is_off = true});
     ASSERT_TRUE(client_.Await<protocol::Reply>());
     ASSERT_TRUE(client_.Await<protocol::Reply>());
+  }
+  void Spawn(AvatarNumber avatar) {
+    EXPECT_EQ(client_.Spawn(world_, {{avatar, {DVec3(0.0), 0.0}}})->accepted, 1u);
+    EXPECT_TRUE(client_.Request(world_, Steps(avatar, 20, 0.5)));
   }
   void Remove(AvatarNumber avatar) {
     client_.Send(protocol::Remove{.seq = client_.NextSeq(), .world = world_, .avatars = {avatar}});
@@ -188,6 +203,45 @@ TEST(ServerMovement, ShowsTheBytesOfFullPoses) {
   EXPECT_EQ(other.view().avatar_count(), 1u);
 }
 
+TEST(ServerMovement, TellsOfThoseNamedAlone) {
+  TestServer server(BuiltinConfig(2));
+  Crowd crowd(server, "w", 40);
+  BothWays both(server, "w");
+  both.Observe(PoseMode::kFull, 1);
+  both.Observe(PoseMode::kMovement, 2, {3, 4, 9, 100});
+  const auto shown_of = [&](AvatarNumber avatar) {
+    return std::ranges::count_if(both.told().shown,
+                                 [&](const auto& item) { return item.first.second == avatar; });
+  };
+  both.TakeUntil([&] { return shown_of(3) > 60 && shown_of(4) > 60; });
+  EXPECT_EQ(both.view().avatar_count(), 3u);
+  // More of them, one of whom is known, and one who is not there yet.
+  both.Observe(PoseMode::kMovement, 5, {9, 12, 41});
+  both.TakeUntil([&] { return shown_of(12) > 30; });
+  EXPECT_EQ(both.view().avatar_count(), 4u);
+  crowd.Spawn(41);
+  both.TakeUntil([&] { return shown_of(41) > 30; });
+  for (const AvatarNumber avatar : {3u, 9u, 13u}) crowd.Stir(avatar);
+  EXPECT_TRUE(both.told().gone.empty());
+  both.StopObserving(2);
+  both.TakeUntil([&] { return both.told().gone.size() == 2; });
+  EXPECT_TRUE(both.told().gone.contains(3) && both.told().gone.contains(4));
+  EXPECT_EQ(both.view().avatar_count(), 3u);
+  const auto before = shown_of(9);
+  const auto of_3 = shown_of(3);
+  both.TakeUntil([&] { return shown_of(9) > before + 60; });
+  EXPECT_EQ(shown_of(3), of_3);
+  // Once more from the middle of what it does.
+  both.Observe(PoseMode::kMovement, 6, {3});
+  both.TakeUntil([&] { return shown_of(3) > of_3 + 30; });
+  EXPECT_GT(both.Compare(), 60 + 60 + 60 + 60 + 30 + 30);
+  for (const auto& [avatar, count] : both.told_of()) {
+    EXPECT_TRUE(avatar == 3 || avatar == 4 || avatar == 9 || avatar == 12 || avatar == 41 ||
+                avatar == 100)
+        << avatar << " was told of " << count << " times";
+  }
+}
+
 TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) {
   TestServer server(BuiltinConfig(2));
   Crowd crowd(server, "w", kLargeCrowd);
@@ -200,7 +254,7 @@ TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) 
       return both.told().shown.size() > before + kLargeCrowd * 40 &&
              both.view().avatar_count() == kLargeCrowd;
     });
-    both.client().Send(protocol::StopObserving{.seq = both.client().NextSeq(), .subscription = id});
+    both.StopObserving(id);
     std::uint64_t from = both.last_tick();
     both.TakeUntil([&] { return both.last_tick() > from + 20; });
   }
@@ -208,7 +262,10 @@ TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) 
   EXPECT_GT(both.Compare(), static_cast<int>(kLargeCrowd) * 70);
 }
 
-TEST(ServerMovement, WhoReadsTooSlowlyIsToldAnew) {
+class ServerMovementOf : public testing::TestWithParam<bool> {};  // of named ones
+INSTANTIATE_TEST_SUITE_P(AllOrNamed, ServerMovementOf, testing::Bool());
+
+TEST_P(ServerMovementOf, WhoReadsTooSlowlyIsToldAnew) {
   server::Config config = BuiltinConfig(1);
   config.limits.socket_send_buffer_bytes = 16 << 10;
   config.limits.control_buffer_bytes = 64 << 10;
@@ -216,8 +273,12 @@ TEST(ServerMovement, WhoReadsTooSlowlyIsToldAnew) {
   Crowd crowd(server, "w", kLargeCrowd);
   BothWays both(server, "w", 16 << 10);
   both.Observe(PoseMode::kFull, 1);
-  both.Observe(PoseMode::kMovement, 2);
-  both.TakeUntil([&] { return both.view().avatar_count() == kLargeCrowd; });
+  std::vector<AvatarNumber> all_but_one(kLargeCrowd);
+  std::iota(all_but_one.begin(), all_but_one.end(), 1u);
+  all_but_one.pop_back();
+  both.Observe(PoseMode::kMovement, 2, GetParam() ? all_but_one : std::vector<AvatarNumber>());
+  const std::size_t watched = GetParam() ? all_but_one.size() : kLargeCrowd;
+  both.TakeUntil([&] { return both.view().avatar_count() == watched; });
   const int states = both.states();
   // Reads nothing until movements were dropped.
   for (AvatarNumber avatar = 1; server.metrics().Sum(Limit::kObserverBacklog) == 0; ++avatar) {
@@ -227,7 +288,7 @@ TEST(ServerMovement, WhoReadsTooSlowlyIsToldAnew) {
   both.TakeUntil([&] { return both.states() > states; });
   both.TakeUntil([&] { return both.told().shown.size() > before + kLargeCrowd * 60; });
   EXPECT_GT(server.metrics().Sum(&ThreadMetrics::batches_dropped), 0u);
-  EXPECT_EQ(both.view().avatar_count(), kLargeCrowd);
+  EXPECT_EQ(both.view().avatar_count(), watched);
   EXPECT_GT(both.Compare(), static_cast<int>(kLargeCrowd) * 30);
 }
 
