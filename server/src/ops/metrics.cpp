@@ -137,6 +137,18 @@ std::string Metrics::Text() {
   histogram("stridewire_tick_late_seconds", "How long after it was due a tick began.",
             &ThreadMetrics::tick_late);
 
+  MetricFamily shards{"stridewire_shard_cpu_seconds_total",
+                      "Processor time a shard's thread took, for ticks and sockets.",
+                      MetricType::Counter,
+                      {}};
+  for (std::size_t i = 0; i + 1 < threads_.size(); ++i) {
+    ClientMetric metric;
+    metric.label.push_back({"shard", std::to_string(i)});
+    metric.counter.value = 1e-9 * static_cast<double>(threads_[i]->cpu_ns.value());
+    shards.metric.push_back(std::move(metric));
+  }
+  families.push_back(std::move(shards));
+
   counter("stridewire_poses_encoded_total", "Poses encoded.", &ThreadMetrics::poses_encoded);
   counter("stridewire_movements_encoded_total", "Records of movements encoded.",
           &ThreadMetrics::movements_encoded);

@@ -45,8 +45,9 @@ class TimeHistogram {
   std::atomic<std::uint64_t> recent_max_ns_{0};
 };
 
-/// What one thread (a shard, or the one that accepts connections) counts. It alone writes.
-struct ThreadMetrics {
+/// What one thread (a shard, or the one that accepts connections) counts. It alone writes, and nothing another
+/// thread writes shares a cache line with it, nor the one fetched along with that.
+struct alignas(128) ThreadMetrics {
   Count avatars;
   Count regions;  ///< That sessions observe.
   Count sessions_attached;
@@ -55,6 +56,7 @@ struct ThreadMetrics {
   Count ticks;
   Count ticks_missed;
   Count ticks_slipped;      ///< Missed so many at once that animation time was lost, too.
+  Count cpu_ns;             ///< Processor time of the thread, ticks and sockets; of shards only.
   TimeHistogram tick;       ///< From draining requests to publishing batches.
   TimeHistogram tick_late;  ///< From when a tick was due to its start.
   Count poses_encoded;

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <boost/asio/post.hpp>
+#include <ctime>
 #include <numeric>
 #include <utility>
 
@@ -19,6 +20,13 @@ using protocol::PoseMode;
 using Clock = TickClock::Clock;
 
 constexpr std::chrono::milliseconds kHousekeepingInterval{100};
+
+std::uint64_t ProcessorTimeOfThreadNs() {
+  timespec time{};
+  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time) != 0) return 0;
+  return static_cast<std::uint64_t>(time.tv_sec) * 1'000'000'000u +
+         static_cast<std::uint64_t>(time.tv_nsec);
+}
 
 }  // namespace
 
@@ -112,6 +120,7 @@ void Shard::Tick() {
 
   metrics_.ticks.Add();
   metrics_.tick.Observe(std::chrono::duration<double>(Clock::now() - begin).count());
+  metrics_.cpu_ns.Set(ProcessorTimeOfThreadNs());
   UpdateGauges();
 }
 

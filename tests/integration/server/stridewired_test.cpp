@@ -14,6 +14,7 @@
 #include <chrono>
 #include <csignal>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -187,6 +188,20 @@ TEST(Stridewired, ServesHealthAndMetrics) {
   const std::string huge = "GET / HTTP/1.1\r\nX: " + std::string(64 << 10, 'x');
   EXPECT_THAT(Http(port, huge), testing::Not(StartsWith("HTTP/1.1 200")));
   EXPECT_THAT(Get(port, "/healthz"), StartsWith("HTTP/1.1 200"));
+  // Ticks take processor time, also with nobody there.
+  const auto cpu_of_first = [&] {
+    const std::string text = Get(port, "/metrics");
+    const std::string name = "stridewire_shard_cpu_seconds_total{shard=\"0\"} ";
+    const std::size_t at = text.find(name);
+    return at == std::string::npos ? -1.0 : std::stod(text.substr(at + name.size()));
+  };
+  const double before_s = cpu_of_first();
+  EXPECT_GE(before_s, 0.0);
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (cpu_of_first() <= before_s) {
+    ASSERT_LT(std::chrono::steady_clock::now(), deadline);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 TEST(Stridewired, SaysWhatIsWrongAndExitsWith2) {

@@ -48,6 +48,13 @@ TEST(Metrics, HistogramsAreCumulativeAndHaveMaxima) {
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_max_since_scrape 0.25\n"));
 }
 
+TEST(Metrics, ProcessorTimeIsToldOfEachShard) {
+  Metrics metrics(2);
+  metrics.shard(1).cpu_ns.Set(1'500'000'000);
+  EXPECT_THAT(metrics.Text(), HasSubstr("stridewire_shard_cpu_seconds_total{shard=\"0\"} 0\n"
+                                        "stridewire_shard_cpu_seconds_total{shard=\"1\"} 1.5\n"));
+}
+
 TEST(Metrics, EveryLimitHasANameOfItsOwn) {
   const std::set<std::string_view> names(kLimitNames.begin(), kLimitNames.end());
   EXPECT_EQ(names.size(), kLimitNames.size());
