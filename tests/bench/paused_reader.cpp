@@ -10,18 +10,14 @@
 #include <thread>
 
 #include "child_process.h"
+#include "ready_line.h"
 #include "web_client.h"
 
 namespace stridewire {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::uint16_t PortIn(const std::string& ready, const std::string& key) {
-  const auto at = ready.find(key + "=127.0.0.1:");
-  if (at == std::string::npos) return 0;
-  return static_cast<std::uint16_t>(std::stoi(ready.substr(at + key.size() + 11)));
-}
+using test::PortIn;
 
 // Resident memory of a process in KiB, as the system tells it; of a child by its parent's list.
 std::size_t ResidentKiB(const std::string& pid) {

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "drawn_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
 #include "rough_ground.h"
@@ -155,62 +156,6 @@ class Passage {
   double largest_m_ = 0.0;
 };
 
-// Avatars that step, turn, walk, jump, stand and take over, every second one on rough ground, with layers.
-class Crowd {
- public:
-  Crowd(Library library, int size, unsigned seed) : library_(std::move(library)), random_(seed) {
-    const auto ground = RoughGround(random_);
-    for (int i = 0; i < size; ++i) {
-      const BaseFrame start{DVec3(3.0 * i, 0.0, random_.Draw(-50.0, 50.0)),
-                            random_.Draw(-20.0, 20.0)};
-      avatars_.emplace_back(library_, start,
-                            AvatarOptions{.terrain = i % 2 == 0 ? nullptr : ground});
-    }
-    for (Avatar& avatar : avatars_) all_.push_back(&avatar);
-  }
-
-  void Advance() {
-    const auto layers = static_cast<double>(library_->layers().size());
-    for (Avatar& avatar : avatars_) {
-      if (layers > 0.0 && Chance(0.01)) {
-        (void)avatar.SetLayer(
-            {.layer = static_cast<int>(random_.Draw(0.0, layers)), .is_on = Chance(0.6)});
-      }
-      if (avatar.queue_size() == 0 && Chance(0.2)) Ask(avatar);
-    }
-    Avatar::AdvanceAll(all_, 1.0 / 60.0);
-  }
-
-  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
-
- private:
-  bool Chance(double of_one) { return random_.Draw(0.0, 1.0) < of_one; }
-
-  void Ask(Avatar& avatar) {
-    MovementRequest request{.id = ++id_};
-    const double kind = random_.Draw(0.0, 1.0);
-    if (kind < 0.5) {
-      request.movement =
-          StepRequest{.length_m = random_.Draw(0.1, 0.8), .turn_rad = random_.Draw(-0.4, 0.4)};
-    } else if (kind < 0.8) {
-      request.movement =
-          WalkRequest{.position_m = avatar.base().position_m +
-                                    DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0)),
-                      .heading_rad = random_.Draw(-3.0, 3.0)};
-    } else {
-      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
-    }
-    if (Chance(0.2)) request.takeover = Takeover::kNow;
-    (void)avatar.Enqueue(request);
-  }
-
-  Library library_;
-  Random random_;
-  std::uint64_t id_ = 0;
-  std::vector<Avatar> avatars_;
-  std::vector<Avatar*> all_;
-};
-
 struct Source {
   const char* name;
   std::vector<std::string> subjects;  // captured; none: the generated library
@@ -260,7 +205,7 @@ TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
 TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);
-  Crowd crowd(library_, 20, 5);
+  DrawnCrowd crowd(library_, 20, 5);
   for (int tick = 0; tick < 1200; ++tick) {
     crowd.Advance();
     for (const Avatar& avatar : crowd.avatars()) passage.Send(avatar.pose());
@@ -273,7 +218,7 @@ TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
 
 TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
-  Crowd crowd(library_, 7, 6);  // the last block is not full
+  DrawnCrowd crowd(library_, 7, 6);  // the last block is not full
   std::vector<CompactCodec::Block> blocks;
   for (int tick = 0; tick < 120; ++tick) {
     crowd.Advance();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "drawn_requests.h"
 #include "instruction_sets.h"
 #include "pose_kernels.h"
 #include "random.h"
@@ -22,67 +23,11 @@ namespace {
 
 using Library = std::shared_ptr<const MotionLibrary>;
 
-constexpr double kTickS = 1.0 / 60.0;
-
 struct Source {
   const char* name;
   std::vector<std::string> subjects;  // captured; none: the generated library
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
-
-// A crowd that is sent here and there, steps and jumps; what it does depends on `seed` alone.
-class Crowd {
- public:
-  Crowd(Library library, int size, unsigned seed) : library_(std::move(library)), random_(seed) {
-    for (int i = 0; i < size; ++i) {
-      const BaseFrame start{DVec3(3.0 * i, 0.0, random_.Draw(-50.0, 50.0)),
-                            random_.Draw(-20.0, 20.0)};
-      // Every second one on rough ground, where soles are kept above it as well.
-      avatars_.emplace_back(library_, start,
-                            AvatarOptions{.terrain = i % 2 == 0 ? nullptr : RoughGround(random_)});
-    }
-  }
-
-  // `at_once` avatars together, the last ones fewer.
-  void Advance(std::size_t at_once = 1000) {
-    for (Avatar& avatar : avatars_) {
-      if (avatar.queue_size() == 0 && random_.Draw(0.0, 1.0) < 0.2) Ask(avatar);
-    }
-    std::vector<Avatar*> some;
-    for (Avatar& avatar : avatars_) {
-      some.push_back(&avatar);
-      if (some.size() < at_once && &avatar != &avatars_.back()) continue;
-      Avatar::AdvanceAll(some, kTickS);
-      some.clear();
-    }
-  }
-
-  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
-
- private:
-  void Ask(Avatar& avatar) {
-    MovementRequest request{.id = ++id_};
-    const double kind = random_.Draw(0.0, 1.0);
-    if (kind < 0.5) {
-      request.movement = StepRequest{.length_m = random_.Draw(0.1, 0.8)};
-    } else if (kind < 0.8) {
-      request.movement =
-          WalkRequest{.position_m = avatar.base().position_m +
-                                    DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0)),
-                      .heading_rad = random_.Draw(-3.0, 3.0)};
-    } else {
-      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
-    }
-    if (random_.Draw(0.0, 1.0) < 0.2) request.takeover = Takeover::kNow;
-    if (random_.Draw(0.0, 1.0) < 0.1) (void)avatar.SetFootPlanting(!avatar.foot_planting());
-    (void)avatar.Enqueue(request);
-  }
-
-  Library library_;
-  Random random_;
-  std::uint64_t id_ = 0;
-  std::vector<Avatar> avatars_;
-};
 
 void AppendBytes(const Avatar& avatar, std::string& bytes) {
   const ConstPoseSpan pose = avatar.pose();
@@ -124,7 +69,7 @@ class EvaluationOf : public testing::TestWithParam<Source> {
 
 TEST_P(EvaluationOf, IsTheReference) {
   constexpr unsigned kSeed = 1;
-  Crowd crowd(library_, 20, kSeed);
+  DrawnCrowd crowd(library_, 20, kSeed);
   Pose fast(library_->skeleton().joint_count());
   Pose reference(library_->skeleton().joint_count());
   Pose sampled(library_->skeleton().joint_count());
@@ -163,7 +108,7 @@ TEST_P(EvaluationOf, IsTheReference) {
 
 TEST_P(EvaluationOf, PlantsAsTheReference) {
   constexpr unsigned kSeed = 2;
-  Crowd crowd(library_, 20, kSeed);
+  DrawnCrowd crowd(library_, 20, kSeed);
   const Skeleton& skeleton = library_->skeleton();
   const LegRig& rig = library_->leg_rig();
   Pose fast(skeleton.joint_count());
@@ -213,7 +158,7 @@ TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
   std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick]
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
-    Crowd crowd(library_, 24, kSeed);
+    DrawnCrowd crowd(library_, 24, kSeed);
     std::vector<std::string>& ticks = bytes[hwy::TargetName(set)];
     for (int tick = 0; tick < 300; ++tick) {
       crowd.Advance();
@@ -237,7 +182,7 @@ TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
   constexpr unsigned kSeed = 8;
   std::vector<std::string> alone;
   for (const std::size_t at_once : {1, 3, 16, 29}) {
-    Crowd crowd(library_, 29, kSeed);
+    DrawnCrowd crowd(library_, 29, kSeed);
     for (std::size_t tick = 0; tick < 300; ++tick) {
       crowd.Advance(at_once);
       std::string bytes;

@@ -12,6 +12,7 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
+#include "drawn_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
 #include "rough_ground.h"
@@ -52,7 +53,7 @@ class Restless {
  public:
   Restless(Library library, Random& random)
       : random_(random),
-        avatar_(std::move(library), Anywhere(),
+        avatar_(std::move(library), DrawBase(random),
                 {.run_time_correction = Draws(0.7),
                  .foot_planting = Draws(0.8),
                  .join = Draws(0.8) ? JoinKind::kInertial : JoinKind::kCubic,
@@ -60,59 +61,21 @@ class Restless {
 
   // What is done to it between two ticks.
   void Stir() {
-    if (Draws(avatar_.queue_size() == 0 ? 0.2 : 0.02)) Ask();
+    if (Draws(avatar_.queue_size() == 0 ? 0.2 : 0.02)) {
+      const MovementRequest request = DrawRequest(random_, avatar_);
+      (void)avatar_.Enqueue(request, Draws(0.1) ? random_.Draw(0.0, 0.5) : 0.0);
+    }
     if (Draws(0.002)) (void)avatar_.SetFootPlanting(!avatar_.foot_planting());
     if (Draws(0.002)) avatar_.SetTerrain(Draws(0.5) ? RoughGround(random_) : nullptr);
-    if (Draws(0.0005)) avatar_.Teleport(Anywhere());
+    if (Draws(0.0005)) avatar_.Teleport(DrawBase(random_));
     if (Draws(0.002)) avatar_.CancelQueue();
-    if (Draws(0.01) && !avatar_.library().layers().empty()) {
-      const auto layers = static_cast<double>(avatar_.library().layers().size());
-      (void)avatar_.SetLayer({.layer = static_cast<int>(random_.Draw(0.0, layers)),
-                              .is_on = Draws(0.6),
-                              .weight = random_.Draw(0.1, 1.0),
-                              .blend_s = random_.Draw(0.0, 1.0),
-                              .speed = random_.Draw(0.2, 3.0)});
-    }
+    if (Draws(0.01)) DrawLayer(random_, avatar_);
   }
 
   [[nodiscard]] Avatar& avatar() { return avatar_; }
 
  private:
-  bool Draws(double likely) { return random_.Draw(0.0, 1.0) < likely; }
-  BaseFrame Anywhere() {
-    return {DVec3(random_.Draw(-50.0, 50.0), random_.Draw(0.0, 3.0), random_.Draw(-50.0, 50.0)),
-            random_.Draw(-20.0, 20.0)};
-  }
-  DVec3 Near() {
-    return avatar_.base().position_m + DVec3(random_.Draw(-3.0, 3.0), 0.0, random_.Draw(-3.0, 3.0));
-  }
-
-  void Ask() {
-    MovementRequest request{.id = 1};
-    const double kind = random_.Draw(0.0, 1.0);
-    if (kind < 0.4) {
-      request.movement = StepRequest{.length_m = random_.Draw(0.0, 0.9),
-                                     .turn_rad = Draws(0.5) ? random_.Draw(-0.5, 0.5) : 0.0};
-    } else if (kind < 0.6) {
-      request.movement = StepRequest{
-          .at =
-              FootprintRequest{
-                  avatar_.base().position_m +
-                      RotateYaw(avatar_.base().heading_rad,
-                                DVec3(random_.Draw(-0.4, 0.4), 0.0, random_.Draw(-0.1, 0.9))),
-                  Draws(0.5) ? std::optional(avatar_.base().heading_rad + random_.Draw(-0.5, 0.5))
-                             : std::nullopt},
-          .must_be_met = Draws(0.5)};
-    } else if (kind < 0.8) {
-      request.movement = WalkRequest{.position_m = Near(), .heading_rad = random_.Draw(-3.0, 3.0)};
-    } else if (kind < 0.9) {
-      request.movement = JumpRequest{.length_m = random_.Draw(0.5, 1.0)};
-    } else {
-      request.movement = StandRequest{Draws(0.3) ? 0.0 : random_.Draw(0.0, 0.5)};
-    }
-    if (Draws(0.4)) request.takeover = Draws(0.7) ? Takeover::kNow : Takeover::kAfterMovement;
-    (void)avatar_.Enqueue(request, Draws(0.1) ? random_.Draw(0.0, 0.5) : 0.0);
-  }
+  bool Draws(double likely) { return stridewire::Draws(random_, likely); }
 
   Random& random_;
   Avatar avatar_;

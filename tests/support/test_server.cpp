@@ -1,5 +1,7 @@
 #include "test_server.h"
 
+#include <gtest/gtest.h>
+
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -40,6 +42,16 @@ TestServer::~TestServer() {
 
 RawClient TestServer::Connect(int receive_buffer_bytes) const {
   return {"127.0.0.1", port(), receive_buffer_bytes};
+}
+
+std::pair<RawClient, std::optional<protocol::WorldInfo>> TestServer::Enter(
+    const std::string& world, protocol::Role role) const {
+  RawClient client = Connect();
+  EXPECT_TRUE(client.SayHello());
+  auto info = client.Join(world, role);
+  EXPECT_TRUE(info);
+  if (!info) info.emplace();
+  return {std::move(client), std::move(info)};
 }
 
 bool TestServer::DrainAndJoin() {

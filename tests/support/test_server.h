@@ -1,8 +1,10 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "ops/server.h"
 #include "raw_client.h"
@@ -21,6 +23,9 @@ class TestServer {
   TestServer& operator=(const TestServer&) = delete;
 
   [[nodiscard]] RawClient Connect(int receive_buffer_bytes = 0) const;
+  /// A session that is in a world. The test fails if it does not come to that, and has a world of number 0.
+  [[nodiscard]] std::pair<RawClient, std::optional<protocol::WorldInfo>> Enter(
+      const std::string& world, protocol::Role role = protocol::Role::kController) const;
   [[nodiscard]] std::uint16_t port() const { return server_->listen_endpoint().port; }
   [[nodiscard]] std::uint16_t http_port() const { return server_->http_endpoint().port; }
   [[nodiscard]] server::Server& server() { return *server_; }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "child_process.h"
+#include "ready_line.h"
 #include "run_program.h"
 #include "scratch_folder.h"
 #include "stridewire/base/version.h"
@@ -46,13 +47,8 @@ class Daemon {
  public:
   explicit Daemon(std::uint16_t port = 0)
       : process_(STRIDEWIRE_SERVER, {"--listen", "127.0.0.1:" + std::to_string(port), "--http",
-                                     "127.0.0.1:0", "--shards", "2", "--log-level", "warning"}) {
-    const auto line = process_.ReadLineThatBegins("ready ");
-    if (!line) return;
-    const std::size_t at = line->find("listen=127.0.0.1:");
-    if (at == std::string::npos) return;
-    port_ = static_cast<std::uint16_t>(std::stoi(line->substr(at + 17)));
-  }
+                                     "127.0.0.1:0", "--shards", "2", "--log-level", "warning"}),
+        port_(test::PortIn(process_.ReadLineThatBegins("ready ").value_or(""), "listen")) {}
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
   /// Its ticks of that time are missed.
@@ -72,7 +68,7 @@ class Daemon {
 
  private:
   ChildProcess process_;
-  std::uint16_t port_ = 0;
+  std::uint16_t port_;
 };
 
 /// A client in world "plaza".

@@ -161,10 +161,7 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
   server::Config config = TestConfig(2);
   config.limits.starts_per_tick = 16;
   TestServer server(config);
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto world = client.Join("crowd");
-  ASSERT_TRUE(world);
+  auto [client, world] = server.Enter("crowd");
   std::vector<protocol::SpawnItem> spawns;
   for (AvatarNumber avatar = 1; avatar <= 48; ++avatar) spawns.push_back({avatar, Start(avatar)});
   ASSERT_TRUE(client.Spawn(world->world, spawns));
@@ -272,15 +269,10 @@ TEST(ServerWorld, QuantisedPosesAreCompactForWhoAgreedOnThem) {
 
 TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
   TestServer server;
-  RawClient controller = server.Connect();
-  ASSERT_TRUE(controller.SayHello());
-  const auto world = controller.Join("w");
-  ASSERT_TRUE(world);
+  auto [controller, world] = server.Enter("w");
   ASSERT_TRUE(controller.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
 
-  RawClient watcher = server.Connect();
-  ASSERT_TRUE(watcher.SayHello());
-  ASSERT_TRUE(watcher.Join("w", protocol::Role::kObserver));
+  RawClient watcher = server.Enter("w", protocol::Role::kObserver).first;
   ASSERT_EQ(watcher.Observe(world->world, 1, PoseMode::kQuantised, false, 4)->code,
             StatusCode::kOk);
   // A second one of the same mode gets no copy: 6 and 4 are both served by one stream.
@@ -316,10 +308,7 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
 
 TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
   TestServer server(TestConfig(1));
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto world = client.Join("w");
-  ASSERT_TRUE(world);
+  auto [client, world] = server.Enter("w");
   ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kFull));
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   auto batch = client.Await<protocol::PoseBatch>();
@@ -343,17 +332,12 @@ TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
 // subscriptions is about all.
 TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   TestServer server(TestConfig(2));
-  RawClient controller = server.Connect();
-  ASSERT_TRUE(controller.SayHello());
-  const auto world = controller.Join("w");
-  ASSERT_TRUE(world);
+  auto [controller, world] = server.Enter("w");
   std::vector<protocol::SpawnItem> items;
   for (AvatarNumber avatar = 1; avatar <= 20; ++avatar)
     items.push_back({.avatar = avatar, .start = {}});
   ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 20u);
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  ASSERT_TRUE(client.Join("w", protocol::Role::kObserver));
+  RawClient client = server.Enter("w", protocol::Role::kObserver).first;
   std::map<std::uint16_t, std::vector<AvatarNumber>> last;  // by shard
   const auto observe = [&](protocol::SubscriptionId id, std::vector<AvatarNumber> avatars) {
     client.Send(protocol::Observe{.seq = client.NextSeq(),
@@ -399,19 +383,14 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
 // A player walks along a crowd that stands on a line, one avatar a metre.
 TEST(ServerWorld, ShowsARegionThatMoves) {
   TestServer server(TestConfig(2));
-  RawClient controller = server.Connect();
-  ASSERT_TRUE(controller.SayHello());
-  const auto world = controller.Join("w");
-  ASSERT_TRUE(world);
+  auto [controller, world] = server.Enter("w");
   std::vector<protocol::SpawnItem> items;
   for (AvatarNumber avatar = 1; avatar <= 60; ++avatar) {
     items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
   }
   ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 60u);
 
-  RawClient player = server.Connect();
-  ASSERT_TRUE(player.SayHello());
-  ASSERT_TRUE(player.Join("w", protocol::Role::kObserver));
+  RawClient player = server.Enter("w", protocol::Role::kObserver).first;
   std::set<AvatarNumber> inside;
   std::map<AvatarNumber, std::uint64_t> seen;  // tick of the last pose
   std::uint64_t last_number = 0;
@@ -553,9 +532,7 @@ TEST(ServerLimits, EachIsKeptAndCounted) {
   config.limits.max_sessions_per_address = 2;
   TestServer server(config);
   const auto reached = [&](Limit limit) { return server.metrics().Sum(limit); };
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto a = client.Join("a");
+  auto [client, a] = server.Enter("a");
   const auto b = client.Join("b");
   ASSERT_TRUE(a && b);
   client.Send(protocol::JoinWorld{.seq = client.NextSeq(), .name = "c"});
@@ -645,10 +622,7 @@ TEST(ServerLimits, ItemsASecond) {
   config.limits.requests_per_s = 1;
   config.limits.request_burst = 10;
   TestServer server(config);
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto world = client.Join("w");
-  ASSERT_TRUE(world);
+  auto [client, world] = server.Enter("w");
   ASSERT_EQ(client.Spawn(world->world, {{.avatar = 1}})->code, StatusCode::kOk);
   EXPECT_EQ(client.Request(world->world, Steps(1, 8, 0.5))->code, StatusCode::kOk);
   const auto refused = client.Request(world->world, Steps(1, 9, 0.5));
@@ -678,10 +652,7 @@ TEST(ServerLimits, PendingCommandsWaitForTheirTurn) {
   server::Config config = TestConfig();
   config.limits.max_pending_commands = 4;
   TestServer server(config);
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto world = client.Join("w");
-  ASSERT_TRUE(world);
+  auto [client, world] = server.Enter("w");
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   constexpr int kCommands = 40;
   for (int i = 0; i < kCommands; ++i) {
@@ -734,10 +705,7 @@ TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
   config.tick_hz = 240.0;  // the same load in a quarter of the time
   config.limits.socket_send_buffer_bytes = 64 << 10;
   TestServer server(config);
-  RawClient controller = server.Connect();
-  ASSERT_TRUE(controller.SayHello());
-  const auto world = controller.Join("w");
-  ASSERT_TRUE(world);
+  auto [controller, world] = server.Enter("w");
   std::vector<protocol::SpawnItem> crowd(200);
   ASSERT_EQ(controller.Spawn(world->world, crowd)->accepted, 200u);
   std::vector<protocol::RequestItem> walk;
@@ -860,10 +828,7 @@ TEST(ServerDrain, EndsThoughAClientDoesNotRead) {
 
 TEST(ServerDrain, AnswersWhatItHasTakenOn) {
   TestServer server;
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello());
-  const auto world = client.Join("w");
-  ASSERT_TRUE(world);
+  auto [client, world] = server.Enter("w");
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   client.Send(
       protocol::Request{.seq = client.NextSeq(), .world = world->world, .items = Steps(1, 4, 0.5)});

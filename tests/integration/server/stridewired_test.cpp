@@ -19,12 +19,14 @@
 #include <vector>
 
 #include "raw_client.h"
+#include "ready_line.h"
 
 extern char** environ;
 
 namespace stridewire {
 namespace {
 
+using test::PortIn;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -94,15 +96,6 @@ class Program {
   std::array<int, 2> errors_{};
   pid_t pid_ = -1;
 };
-
-std::uint16_t PortIn(const std::string& ready, const std::string& key) {
-  const std::string before = key + "=127.0.0.1:";
-  const auto at = ready.find(before);
-  EXPECT_NE(at, std::string::npos) << ready;
-  return at == std::string::npos
-             ? std::uint16_t{0}
-             : static_cast<std::uint16_t>(std::stoi(ready.substr(at + before.size())));
-}
 
 // One request, the whole answer.
 std::string Http(std::uint16_t port, const std::string& request) {

@@ -17,6 +17,7 @@
 
 #include "child_process.h"
 #include "raw_client.h"
+#include "ready_line.h"
 #include "scratch_folder.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/choreography.h"
@@ -131,15 +132,6 @@ test::ChildProcess StartServer(int shards) {
                              std::to_string(shards), "--max-catch-up-ticks", "1000"});
 }
 
-// Where it says that it listens.
-std::optional<std::uint16_t> PortOf(test::ChildProcess& server) {
-  const std::string ready = server.ReadLineThatBegins("ready ").value_or("");
-  const std::string before_port = "listen=127.0.0.1:";
-  const std::size_t at = ready.find(before_port);
-  if (at == std::string::npos) return std::nullopt;
-  return static_cast<std::uint16_t>(std::stoi(ready.substr(at + before_port.size())));
-}
-
 class RecordTest : public testing::TestWithParam<int> {};
 
 TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
@@ -148,9 +140,9 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
   ASSERT_TRUE(truth.has_value()) << Describe(truth.error());
 
   test::ChildProcess server = StartServer(GetParam());
-  const std::optional<std::uint16_t> listening = PortOf(server);
-  ASSERT_TRUE(listening);
-  const std::uint16_t port = *listening;
+  const std::uint16_t port =
+      test::PortIn(server.ReadLineThatBegins("ready ").value_or(""), "listen");
+  ASSERT_NE(port, 0);
   RawClient game("127.0.0.1", port);
   ASSERT_TRUE(game.SayHello());
   const auto world = game.Join("w");
@@ -192,9 +184,9 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
 // out of its folder the second time.
 TEST(RecordMovements, AreTheFullPosesBitByBit) {
   test::ChildProcess server = StartServer(2);
-  const std::optional<std::uint16_t> listening = PortOf(server);
-  ASSERT_TRUE(listening);
-  const std::uint16_t port = *listening;
+  const std::uint16_t port =
+      test::PortIn(server.ReadLineThatBegins("ready ").value_or(""), "listen");
+  ASSERT_NE(port, 0);
   RawClient game("127.0.0.1", port);
   ASSERT_TRUE(game.SayHello());
   const auto world = game.Join("w");

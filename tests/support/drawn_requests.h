@@ -1,0 +1,105 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "random.h"
+#include "rough_ground.h"
+#include "stridewire/runtime/avatar.h"
+
+namespace stridewire {
+
+inline bool Draws(Random& random, double likely) { return random.Draw(0.0, 1.0) < likely; }
+
+/// A place where avatars may be put.
+inline BaseFrame DrawBase(Random& random) {
+  return {DVec3(random.Draw(-50.0, 50.0), random.Draw(0.0, 3.0), random.Draw(-50.0, 50.0)),
+          random.Draw(-20.0, 20.0)};
+}
+
+/// Whatever an avatar can be asked for: steps, also to footprints, walks, jumps, stands, some of which take over and some of
+/// which it cannot do.
+inline MovementRequest DrawRequest(Random& random, const Avatar& avatar) {
+  MovementRequest request{.id = 1};
+  const double kind = random.Draw(0.0, 1.0);
+  if (kind < 0.4) {
+    request.movement = StepRequest{.length_m = random.Draw(0.0, 0.9),
+                                   .turn_rad = Draws(random, 0.5) ? random.Draw(-0.5, 0.5) : 0.0};
+  } else if (kind < 0.6) {
+    request.movement = StepRequest{
+        .at =
+            FootprintRequest{avatar.base().position_m + RotateYaw(avatar.base().heading_rad,
+                                                                  DVec3(random.Draw(-0.4, 0.4), 0.0,
+                                                                        random.Draw(-0.1, 0.9))),
+                             Draws(random, 0.5)
+                                 ? std::optional(avatar.base().heading_rad + random.Draw(-0.5, 0.5))
+                                 : std::nullopt},
+        .must_be_met = Draws(random, 0.5)};
+  } else if (kind < 0.8) {
+    request.movement =
+        WalkRequest{.position_m = avatar.base().position_m +
+                                  DVec3(random.Draw(-3.0, 3.0), 0.0, random.Draw(-3.0, 3.0)),
+                    .heading_rad = random.Draw(-3.0, 3.0)};
+  } else if (kind < 0.9) {
+    request.movement = JumpRequest{.length_m = random.Draw(0.5, 1.0)};
+  } else {
+    request.movement = StandRequest{Draws(random, 0.3) ? 0.0 : random.Draw(0.0, 0.5)};
+  }
+  if (Draws(random, 0.4)) {
+    request.takeover = Draws(random, 0.7) ? Takeover::kNow : Takeover::kAfterMovement;
+  }
+  return request;
+}
+
+/// One of its library's layers comes or goes, if there are any.
+inline void DrawLayer(Random& random, Avatar& avatar) {
+  const auto layers = static_cast<double>(avatar.library().layers().size());
+  if (layers == 0.0) return;
+  (void)avatar.SetLayer({.layer = static_cast<int>(random.Draw(0.0, layers)),
+                         .is_on = Draws(random, 0.6),
+                         .weight = random.Draw(0.1, 1.0),
+                         .blend_s = random.Draw(0.0, 1.0),
+                         .speed = random.Draw(0.2, 3.0)});
+}
+
+/// Avatars that are asked for something else all the time, every second one on rough ground, with layers. What they do
+/// depends on `seed` alone.
+class DrawnCrowd {
+ public:
+  DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed)
+      : random_(seed) {
+    for (int i = 0; i < size; ++i) {
+      avatars_.emplace_back(library, DrawBase(random_),
+                            AvatarOptions{.terrain = i % 2 == 0 ? nullptr : RoughGround(random_)});
+    }
+  }
+
+  /// A sixtieth of a second, `at_once` avatars together, the last ones fewer.
+  void Advance(std::size_t at_once = 1000) {
+    for (Avatar& avatar : avatars_) {
+      if (Draws(random_, 0.01)) DrawLayer(random_, avatar);
+      if (Draws(random_, 0.003)) (void)avatar.SetFootPlanting(!avatar.foot_planting());
+      if (avatar.queue_size() == 0 && Draws(random_, 0.2)) {
+        (void)avatar.Enqueue(DrawRequest(random_, avatar));
+      }
+    }
+    std::vector<Avatar*> some;
+    for (Avatar& avatar : avatars_) {
+      some.push_back(&avatar);
+      if (some.size() < at_once && &avatar != &avatars_.back()) continue;
+      Avatar::AdvanceAll(some, 1.0 / 60.0);
+      some.clear();
+    }
+  }
+
+  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+
+ private:
+  Random random_;
+  std::vector<Avatar> avatars_;
+};
+
+}  // namespace stridewire
