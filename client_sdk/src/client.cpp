@@ -157,6 +157,7 @@ void WriteRaw(const PoseHistory& history, std::size_t index, stridewire_pose* po
   pose->time_s = stamp.time_s;
   pose->discontinuity = stamp.discontinuity ? 1 : 0;
   pose->standing = stamp.standing ? 1 : 0;
+  pose->detail = static_cast<std::uint8_t>(stamp.detail);
   CopyVector(history.root_position_m(index), pose->root_position_m);
   WriteRotations(history.rotations(index), rotations_xyzw);
 }
@@ -528,13 +529,17 @@ stridewire_status Observe(stridewire_client* client, stridewire_world world,
                           const stridewire_region* region, std::uint32_t* subscription,
                           std::uint64_t* command) {
   if (observation == nullptr || observation->mode < STRIDEWIRE_FULL ||
-      observation->mode > STRIDEWIRE_MOVEMENT || observation->avatar_count > STRIDEWIRE_MAX_ITEMS ||
+      observation->mode > STRIDEWIRE_MOVEMENT || observation->detail < STRIDEWIRE_DETAIL_ALL ||
+      observation->detail > STRIDEWIRE_DETAIL_ROOT ||
+      (observation->detail != STRIDEWIRE_DETAIL_ALL && observation->mode != STRIDEWIRE_QUANTISED) ||
+      observation->avatar_count > STRIDEWIRE_MAX_ITEMS ||
       (observation->avatars == nullptr) != (observation->avatar_count == 0)) {
     return STRIDEWIRE_INVALID_ARGUMENT;
   }
   return Command(client, [&](Session& session) {
     protocol::Observe message;
     message.mode = static_cast<protocol::PoseMode>(observation->mode);
+    message.detail = static_cast<protocol::PoseDetail>(observation->detail);
     message.every_n_ticks = observation->every_n_ticks;
     message.with_events = observation->with_events != 0;
     message.avatars.assign(observation->avatars, observation->avatars + observation->avatar_count);
@@ -754,6 +759,7 @@ stridewire_status stridewire_client_sample_pose(stridewire_client* client, strid
                     pose->time_s = time_s;
                     pose->held_s = sampled->interpolated ? 0.0 : time_s - stamp.time_s;
                     pose->standing = stamp.standing ? 1 : 0;
+                    pose->detail = static_cast<std::uint8_t>(stamp.detail);
                     CopyVector(root_position_m, pose->root_position_m);
                     WriteRotations(joints, rotations_xyzw);
                   });

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stridewire/base/math.h"
+#include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::client {
 
@@ -16,6 +17,7 @@ struct PoseStamp {
   double time_s = 0.0;         ///< On the server's clock.
   bool discontinuity = false;  ///< Not to be interpolated from the one before.
   bool standing = false;
+  protocol::PoseDetail detail = protocol::PoseDetail::kAll;
 };
 
 /// The last poses of one avatar, oldest first: the jitter buffer. A ring that takes its memory when

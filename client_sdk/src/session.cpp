@@ -346,11 +346,12 @@ void Session::UpdateFilter(World& world) {
 }
 
 std::uint64_t Session::EveryNTicks(const World& world, protocol::PoseMode mode) {
+  const protocol::PoseDetail detail = protocol::DetailOf(mode);
   // What was asked for as quantised.
-  if (mode == protocol::PoseMode::kCompact) mode = protocol::PoseMode::kQuantised;
+  if (protocol::IsCompact(mode)) mode = protocol::PoseMode::kQuantised;
   std::uint64_t every = 0;
   for (const auto& [id, subscription] : world.subscriptions) {
-    if (subscription.message.mode != mode) continue;
+    if (subscription.message.mode != mode || subscription.message.detail != detail) continue;
     const std::uint64_t n = subscription.message.every_n_ticks;
     every = every == 0 ? n : std::min(every, n);
   }
@@ -421,7 +422,7 @@ void Session::OnConnected(double now_s) {
       protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
       protocol::kFeatureRegions | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
       protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
-      protocol::kFeatureCompact;
+      protocol::kFeatureCompact | protocol::kFeatureDetail;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
@@ -622,6 +623,10 @@ bool Session::Understands(const CommandMessage& message) const {
   }
   if (const auto* observe = std::get_if<protocol::Observe>(&message)) {
     if (observe->region && (features_ & protocol::kFeatureRegions) == 0) return false;
+    constexpr std::uint64_t kDetail = protocol::kFeatureDetail | protocol::kFeatureCompact;
+    if (observe->detail != protocol::PoseDetail::kAll && (features_ & kDetail) != kDetail) {
+      return false;
+    }
     return observe->mode != protocol::PoseMode::kMovement ||
            (features_ & protocol::kFeatureMovementMode) != 0;
   }

@@ -13,13 +13,14 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
   skeleton_ = info.skeleton;
   library_hash_ = info.library_hash;
   layers_ = info.layers;
-  codec_.reset();
+  codecs_ = {};
   if (!info.rotation_codes.empty()) {
     std::vector<std::int16_t> parents;
     for (const protocol::JointInfo& joint : skeleton_.joints) parents.push_back(joint.parent);
     // A message that was decoded has codes and parents that make sense.
-    if (auto codec = protocol::CompactCodec::Make(info.rotation_codes, parents)) {
-      codec_ = *std::move(codec);
+    if (auto codecs =
+            protocol::CompactCodecs::Make(info.rotation_codes, parents, info.fewer_joints)) {
+      codecs_ = *std::move(codecs);
     }
   }
   scratch_.assign(skeleton_.joints.size(), kIdentityQuat);
@@ -37,7 +38,7 @@ void WorldView::Clear() {
   skeleton_ = {};
   library_hash_.clear();
   layers_.clear();
-  codec_.reset();
+  codecs_ = {};
 }
 
 void WorldView::SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter) {
@@ -82,7 +83,7 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   }
   ++shard.parts_seen;
 
-  protocol::PoseBatchReader reader(batch, codec_ ? &*codec_ : nullptr);
+  protocol::PoseBatchReader reader(batch, codecs_.Find(info.mode));
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber avatar = batch.avatars[i];
     reader.Next();
@@ -100,7 +101,8 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
     const PoseStamp stamp{.tick = info.tick,
                           .time_s = info.server_time_s,
                           .discontinuity = (batch.flags[i] & protocol::kPoseDiscontinuity) != 0,
-                          .standing = (batch.flags[i] & protocol::kPoseStanding) != 0};
+                          .standing = (batch.flags[i] & protocol::kPoseStanding) != 0,
+                          .detail = protocol::DetailOf(info.mode)};
     Push(*track, {info.shard, info.mode}, stamp, root_position_m, scratch_, counts);
   }
   if (shard.parts_seen >= info.parts) Sweep(info);

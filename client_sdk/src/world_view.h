@@ -11,7 +11,7 @@
 
 #include "movement_view.h"
 #include "pose_history.h"
-#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::client {
@@ -125,7 +125,7 @@ class WorldView : public PoseScreen {
   protocol::SkeletonInfo skeleton_;
   std::string library_hash_;
   std::vector<std::string> layers_;
-  std::optional<protocol::CompactCodec> codec_;  ///< Of compact poses, if the server tells them
+  protocol::CompactCodecs codecs_;  ///< Of compact poses, if the server tells them
   std::optional<std::set<protocol::AvatarNumber>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;

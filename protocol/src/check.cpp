@@ -370,6 +370,10 @@ Status Check(const Observe& m) {
              "not 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
   found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed,
              "only a region takes another one's place", "Observe.replace");
+  found.Known(m.detail, PoseDetail::kRoot, "Observe.detail");
+  found.That(m.detail == PoseDetail::kAll || m.mode == PoseMode::kQuantised,
+             ErrorCode::kUnsupported, "only quantised poses have levels of detail",
+             "Observe.detail");
   if (m.region) CheckRegion(found, m);
   return found.Result();
 }
@@ -434,6 +438,15 @@ Status Check(const WorldInfo& m) {
     const Error& error = status.error();
     found.Wrong(error.code, error.text, "WorldInfo.rotation_codes", error.index);
   }
+  if (!m.fewer_joints.empty()) {
+    std::vector<std::int16_t> parents;
+    for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
+    if (m.rotation_codes.empty()) parents.clear();  // Without codes there is nothing to leave out.
+    if (const Status status = CheckFewerJoints(m.fewer_joints, parents); !status) {
+      const Error& error = status.error();
+      found.Wrong(error.code, error.text, "WorldInfo.fewer_joints", error.index);
+    }
+  }
   return found.Result();
 }
 
@@ -474,7 +487,7 @@ Status Check(const PoseBatch& m) {
              ErrorCode::kOutOfRange, "not part 0 to parts - 1 of 1 to 1024", "PoseBatch.part",
              info.part);
   found.Finite(info.server_time_s, "PoseBatch.server_time_s");
-  found.Known(info.mode, PoseMode::kCompact, "PoseBatch.mode");
+  found.Known(info.mode, PoseMode::kCompactRoot, "PoseBatch.mode");
   found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
              "no pose is sent in this mode", "PoseBatch.mode");
   found.That(info.joint_count >= 1 && info.joint_count <= kMaxJoints, ErrorCode::kOutOfRange,
@@ -484,7 +497,7 @@ Status Check(const PoseBatch& m) {
              "not one flag an avatar", "PoseBatch.flags",
              static_cast<std::int64_t>(m.flags.size()));
   const bool has_all =
-      info.mode == PoseMode::kCompact
+      IsCompact(info.mode)
           ? CompactPoseBytes(m).has_value()
           : m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count);
   found.That(has_all, ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",

@@ -123,14 +123,43 @@ Status CheckRotationCodes(std::span<const RotationCode> codes) {
   return {};
 }
 
+Status CheckFewerJoints(std::span<const std::uint16_t> joints,
+                        std::span<const std::int16_t> parents) {
+  const auto wrong = [](const char* text, std::size_t index) {
+    return Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(index));
+  };
+  if (joints.size() > parents.size()) {
+    return Fail(ErrorCode::kShapeMismatch, "more joints than there are",
+                static_cast<std::int64_t>(joints.size()));
+  }
+  if (joints.empty() || joints[0] != 0) return wrong("the root is left out", 0);
+  for (std::size_t i = 1; i < joints.size(); ++i) {
+    if (joints[i] >= parents.size()) return wrong("no such joint", i);
+    if (joints[i] <= joints[i - 1]) return wrong("joints do not grow", i);
+    // Where there are poses at all parents come first (WorldInfo, CompactCodec::Make).
+    const std::int16_t parent = parents[joints[i]];
+    if (parent < 0 ||
+        !std::ranges::binary_search(joints.first(i), static_cast<std::uint16_t>(parent))) {
+      return wrong("a joint without the one it hangs from", i);
+    }
+  }
+  return {};
+}
+
 Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
-                                          std::span<const std::int16_t> parents) {
+                                          std::span<const std::int16_t> parents,
+                                          std::span<const std::uint16_t> told) {
   if (const Status status = CheckRotationCodes(codes); !status) {
     return std::unexpected(status.error());
   }
   if (codes.empty() || codes.size() != parents.size()) {
     return std::unexpected(Error{ErrorCode::kShapeMismatch, "not one rotation code a joint",
                                  static_cast<std::int64_t>(codes.size())});
+  }
+  if (!told.empty()) {
+    if (const Status status = CheckFewerJoints(told, parents); !status) {
+      return std::unexpected(status.error());
+    }
   }
   CompactCodec codec;
   codec.joints_.resize(codes.size());
@@ -150,6 +179,9 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
     joint.reference[1] = code.reference.y;
     joint.reference[2] = code.reference.z;
     joint.reference[3] = code.reference.w;
+    joint.is_left_out =
+        !told.empty() && !std::ranges::binary_search(told, static_cast<std::uint16_t>(j));
+    if (joint.is_left_out) continue;
     joint.least_w = code.least_w;
     joint.free_bits = code.free_bits;
     if (code.free_bits > 0) {
@@ -229,6 +261,11 @@ Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m
   BitReader reader(in.subspan(kRootBytes));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const CompactJoint& joint = joints_[j];
+    if (joint.is_left_out) {
+      rotations[j] =
+          Quat(joint.reference[3], joint.reference[0], joint.reference[1], joint.reference[2]);
+      continue;
+    }
     const bool is_good = joint.free_bits > 0 ? TakeFree(reader, joint, rotations[j])
                                              : TakeRanged(reader, joint, rotations[j]);
     if (!is_good) {

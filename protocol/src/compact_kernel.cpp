@@ -131,6 +131,7 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
       const V squared =
           hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)), hn::Mul(q.w, q.w));
       fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
+      if (joint.is_left_out) continue;
       if (joint.parent >= 0) {
         // e q, where e = (ex, ey, ez, 1): an angle of a thousandth or two.
         if (static_cast<std::size_t>(joint.parent) + 1 != j) {

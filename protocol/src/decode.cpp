@@ -208,6 +208,7 @@ void Unpack(Unpacker& u, const wire::Observe& w, Observe& m) {
   m.every_n_ticks = w.every_n_ticks();
   m.with_events = w.with_events();
   m.replace = w.replace();
+  m.detail = static_cast<PoseDetail>(w.detail());
   if (const wire::Region* from = w.region()) {
     Region& region = m.region.emplace();
     if (const auto* centre = from->centre_m()) region.centre_m = {centre->x(), centre->z()};
@@ -312,6 +313,10 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
         .bits = {from.bits_x(), from.bits_y(), from.bits_z()},
         .free_bits = from.free_bits(),
         .least_w = from.least_w()};
+  }
+  m.fewer_joints.resize(u.Count(w.fewer_joints(), kMaxJoints, "WorldInfo.fewer_joints"));
+  for (std::size_t i = 0; i < m.fewer_joints.size(); ++i) {
+    m.fewer_joints[i] = w.fewer_joints()->Get(static_cast<flatbuffers::uoffset_t>(i));
   }
 }
 

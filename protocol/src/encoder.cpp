@@ -131,7 +131,8 @@ Offset<wire::Observe> Build(FlatBufferBuilder& b, const Observe& m) {
     region = builder.Finish();
   }
   return wire::CreateObserve(b, m.seq, m.world, m.subscription, static_cast<wire::PoseMode>(m.mode),
-                             avatars, m.every_n_ticks, m.with_events, region, m.replace);
+                             avatars, m.every_n_ticks, m.with_events, region, m.replace,
+                             static_cast<wire::PoseDetail>(m.detail));
 }
 
 Offset<wire::StopObserving> Build(FlatBufferBuilder& b, const StopObserving& m) {
@@ -205,8 +206,10 @@ Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
   }
   const auto codes = code_list.empty() ? Offset<flatbuffers::Vector<const wire::RotationCode*>>()
                                        : b.CreateVectorOfStructs(code_list);
+  const auto fewer = m.fewer_joints.empty() ? Offset<flatbuffers::Vector<std::uint16_t>>()
+                                            : b.CreateVector(m.fewer_joints);
   return wire::CreateWorldInfo(b, m.seq, m.world, name, static_cast<wire::Role>(m.role), m.tick,
-                               hash, skeleton, layers, codes);
+                               hash, skeleton, layers, codes, fewer);
 }
 
 Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {

@@ -5,19 +5,18 @@ namespace stridewire::protocol {
 std::span<const std::byte> PoseBatchReader::Next() {
   const PoseBatchInfo& info = batch_.info;
   mode_ = info.mode;
-  if (mode_ == PoseMode::kCompact && (batch_.flags[index_] & kPoseWide) != 0) {
+  if (IsCompact(mode_) && (batch_.flags[index_] & kPoseWide) != 0) {
     mode_ = PoseMode::kQuantised;
   }
   ++index_;
-  const std::size_t bytes =
-      mode_ == PoseMode::kCompact ? compact_bytes_ : PoseBytes(mode_, info.joint_count);
+  const std::size_t bytes = IsCompact(mode_) ? compact_bytes_ : PoseBytes(mode_, info.joint_count);
   pose_ = batch_.poses.subspan(at_, bytes);
   at_ += bytes;
   return pose_;
 }
 
 Status PoseBatchReader::Decode(Vec3& root_position_m, std::span<Quat> rotations) const {
-  if (mode_ != PoseMode::kCompact) return DecodePose(mode_, pose_, root_position_m, rotations);
+  if (!IsCompact(mode_)) return DecodePose(mode_, pose_, root_position_m, rotations);
   if (codec_ == nullptr) {
     return Fail(ErrorCode::kUnsupported, "compact poses of a world without codes");
   }

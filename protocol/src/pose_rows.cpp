@@ -21,8 +21,7 @@ Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars, const Compact
   begins_.reserve(avatars_->size() + 1);
   begins_.assign(1, 0);
   pose_count_ = 0;
-  if (info.mode == PoseMode::kCompact &&
-      (codec == nullptr || codec->joint_count() != info.joint_count)) {
+  if (IsCompact(info.mode) && (codec == nullptr || codec->joint_count() != info.joint_count)) {
     return Fail(ErrorCode::kInvalidArgument, "compact poses without the codec of their joints",
                 "PoseBatch.mode");
   }
@@ -39,7 +38,7 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
     return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints", "PoseBatch.poses",
                 static_cast<std::int64_t>(rotations.size()));
   }
-  if (info_.mode == PoseMode::kCompact) {
+  if (IsCompact(info_.mode)) {
     block_rows_[block_.size()] = size() - 1;
     block_.Add(root_position_m, rotations);
     if (block_.size() == CompactCodec::kBlock) EncodeBlock();

@@ -116,6 +116,7 @@ Json Fields(const Observe& m) {
       {"seq", Wide(m.seq)},          {"world", m.world},     {"subscription", m.subscription},
       {"mode", Number(m.mode)},      {"avatars", m.avatars}, {"every_n_ticks", m.every_n_ticks},
       {"with_events", m.with_events}};
+  if (m.detail != PoseDetail::kAll) json["detail"] = Number(m.detail);
   if (!m.region) return json;
   const Region& region = *m.region;
   Json rings = Json::array();
@@ -194,19 +195,21 @@ Json Fields(const WorldInfo& m) {
   }
   Json codes = Json::array();
   for (const RotationCode& code : m.rotation_codes) codes.push_back(Fields(code));
-  return {{"seq", Wide(m.seq)},
-          {"world", m.world},
-          {"name", m.name},
-          {"role", Number(m.role)},
-          {"tick", Wide(m.tick)},
-          {"library_hash", m.library_hash},
-          {"skeleton",
-           {{"joints", joints},
-            {"end_sites", end_sites},
-            {"left_leg", Leg(m.skeleton.legs[0])},
-            {"right_leg", Leg(m.skeleton.legs[1])}}},
-          {"layers", m.layers},
-          {"rotation_codes", codes}};
+  Json json = {{"seq", Wide(m.seq)},
+               {"world", m.world},
+               {"name", m.name},
+               {"role", Number(m.role)},
+               {"tick", Wide(m.tick)},
+               {"library_hash", m.library_hash},
+               {"skeleton",
+                {{"joints", joints},
+                 {"end_sites", end_sites},
+                 {"left_leg", Leg(m.skeleton.legs[0])},
+                 {"right_leg", Leg(m.skeleton.legs[1])}}},
+               {"layers", m.layers},
+               {"rotation_codes", codes}};
+  if (!m.fewer_joints.empty()) json["fewer_joints"] = m.fewer_joints;
+  return json;
 }
 
 Json Fields(const Reply& m) {
@@ -228,7 +231,7 @@ Json Fields(const Reply& m) {
 Json Fields(const PoseBatch& m) {
   Json poses = Json::array();
   std::vector<Quat> rotations(m.info.joint_count);
-  PoseBatchReader reader(m, &SampleCodec());
+  PoseBatchReader reader(m, SampleCodecs().Find(m.info.mode));
   for (std::size_t i = 0; i < m.avatars.size(); ++i) {
     Vec3 root(0.0f);
     reader.Next();

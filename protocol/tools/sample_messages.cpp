@@ -59,6 +59,9 @@ std::vector<RotationCode> RotationCodes() {
   return codes;
 }
 
+// Neither feet nor head.
+const std::vector<std::uint16_t> kFewerJoints = {0, 1, 2, 4, 5};
+
 // What those can tell, but for the second avatar, whose left knee turns about another axis.
 struct CompactArrays {
   PoseBatchInfo info{3, 1, 2, 4, 123'456, 2057.6, PoseMode::kCompact, 8};
@@ -66,7 +69,10 @@ struct CompactArrays {
   std::vector<std::uint8_t> flags = {kPoseStanding, kPoseWide, kPoseDiscontinuity};
   std::vector<std::byte> poses;
 
-  CompactArrays() {
+  explicit CompactArrays(PoseMode mode) {
+    info.mode = mode;
+    if (mode == PoseMode::kCompactRoot) flags[1] = 0;  // The root turns every way.
+    const CompactCodec& codec = *SampleCodecs().Find(mode);
     const std::vector<RotationCode> codes = RotationCodes();
     CompactCodec::Block block;
     for (int a = 0; a < 3; ++a) {
@@ -87,12 +93,12 @@ struct CompactArrays {
       }
       block.Add(Vec3(-1.5f * static_cast<float>(a), 0.9375f, 70'000.25f), rotations);
     }
-    SampleCodec().Encode(block);
+    codec.Encode(block);
     for (std::size_t a = 0; a < 3; ++a) {
-      STRIDEWIRE_CHECK(block.fits(a) == (a != 1));
+      STRIDEWIRE_CHECK(block.fits(a) == ((flags[a] & kPoseWide) == 0));
       const std::size_t begin = poses.size();
       if (block.fits(a)) {
-        poses.resize(begin + SampleCodec().pose_bytes());
+        poses.resize(begin + codec.pose_bytes());
         block.CopyBytes(a, std::span(poses).subspan(begin));
         continue;
       }
@@ -195,20 +201,22 @@ std::vector<Event> EveryEvent() {
 
 }  // namespace
 
-const CompactCodec& SampleCodec() {
-  static const CompactCodec codec = [] {
+const CompactCodecs& SampleCodecs() {
+  static const CompactCodecs codecs = [] {
     std::vector<std::int16_t> parents;
     for (const JointInfo& joint : Skeleton().joints) parents.push_back(joint.parent);
-    return CompactCodec::Make(RotationCodes(), parents).value();
+    return CompactCodecs::Make(RotationCodes(), parents, kFewerJoints).value();
   }();
-  return codec;
+  return codecs;
 }
 
 std::vector<SampleMessage> SampleMessages() {
   static const BatchArrays full(PoseMode::kFull, 8, 3);
   static const BatchArrays quantised(PoseMode::kQuantised, 8, 3);
   static const BatchArrays nobody(PoseMode::kQuantised, 31, 0);
-  static const CompactArrays compact;
+  static const CompactArrays compact(PoseMode::kCompact);
+  static const CompactArrays fewer(PoseMode::kCompactFewer);
+  static const CompactArrays root(PoseMode::kCompactRoot);
 
   std::vector<SampleMessage> samples;
   const auto add = [&](const char* name, Message message) {
@@ -248,6 +256,11 @@ std::vector<SampleMessage> SampleMessages() {
     region.region = Region{{-11.75, 40.0}, 30.0, std::nullopt, {}};
     region.replace = true;
     add("observe_region_moved", region);
+  }
+  {
+    Observe afar{22, 3, 6, PoseMode::kQuantised, {}, 4, false};
+    afar.detail = PoseDetail::kFewer;
+    add("observe_fewer", afar);
   }
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});
@@ -402,6 +415,10 @@ std::vector<SampleMessage> SampleMessages() {
     with_codes.rotation_codes = RotationCodes();
     add("world_info_compact", with_codes);
     add("pose_batch_compact", compact.view());
+    with_codes.fewer_joints = kFewerJoints;
+    add("world_info_detail", with_codes);
+    add("pose_batch_fewer", fewer.view());
+    add("pose_batch_root", root.view());
     add("world_terrain_boxes", WorldTerrain{3, boxes});
     add("world_terrain_flat", WorldTerrain{3, std::nullopt});
   }

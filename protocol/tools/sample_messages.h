@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::protocol {
@@ -16,7 +16,7 @@ struct SampleMessage {
 };
 
 /// How the rotations of the vectors' world are told: the codes of `world_info_compact`, for `pose_batch_compact`.
-[[nodiscard]] const CompactCodec& SampleCodec();
+[[nodiscard]] const CompactCodecs& SampleCodecs();
 
 /// The messages the test vectors are made of; the same every time.
 [[nodiscard]] std::vector<SampleMessage> SampleMessages();

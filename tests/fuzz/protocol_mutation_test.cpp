@@ -145,7 +145,7 @@ void ExpectMeaning(const Message& message, Sender sender) {
   ASSERT_TRUE(Same(message, *again));
   if (const auto* batch = std::get_if<PoseBatch>(&message)) {
     std::vector<Quat> rotations(batch->info.joint_count);
-    PoseBatchReader reader(*batch, &SampleCodec());
+    PoseBatchReader reader(*batch, SampleCodecs().Find(batch->info.mode));
     for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
       Vec3 root;
       reader.Next();
@@ -241,39 +241,44 @@ TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
   EXPECT_GT(decoded, 0u);
 
   // Compact ones: a good pose with some bits changed.
-  const CompactCodec& codec = SampleCodec();
-  std::vector<Quat> rotations(codec.joint_count(), kIdentityQuat);
-  CompactCodec::Block block;
-  Bytes good(codec.pose_bytes());
-  for (const SampleMessage& sample : SampleMessages()) {
-    if (sample.name != "pose_batch_compact") continue;
-    PoseBatchReader reader(std::get<PoseBatch>(sample.message), &codec);
-    std::ranges::copy(reader.Next(), good.begin());
-  }
-  Vec3 root;
-  ASSERT_TRUE(codec.Decode(good, root, rotations));
-  std::uint64_t known = 0;
-  for (std::uint64_t i = 0; i < count; ++i) {
-    Bytes pose = good;
-    for (std::uint64_t change = 1 + random() % 4; change > 0; --change) {
-      pose[random() % pose.size()] ^= static_cast<std::byte>(1u << random() % 8);
+  for (const auto& [name, mode] : {std::pair("pose_batch_compact", PoseMode::kCompact),
+                                   std::pair("pose_batch_fewer", PoseMode::kCompactFewer),
+                                   std::pair("pose_batch_root", PoseMode::kCompactRoot)}) {
+    SCOPED_TRACE(name);
+    const CompactCodec& codec = *SampleCodecs().Find(mode);
+    std::vector<Quat> rotations(codec.joint_count(), kIdentityQuat);
+    CompactCodec::Block block;
+    Bytes good(codec.pose_bytes());
+    for (const SampleMessage& sample : SampleMessages()) {
+      if (sample.name != name) continue;
+      PoseBatchReader reader(std::get<PoseBatch>(sample.message), &codec);
+      std::ranges::copy(reader.Next(), good.begin());
     }
-    if (random() % 8 == 0) pose.resize(random() % (2 * pose.size()));
-    if (!codec.Decode(pose, root, rotations)) continue;
-    ++known;
-    for (const Quat& q : rotations) ASSERT_NEAR(Dot(q, q), 1.0f, 1e-5f) << "seed " << seed;
-    block.Clear();
-    block.Add(root, rotations);
-    codec.Encode(block);
-    if (!block.fits(0)) continue;  // at the very end of a range
-    Bytes again(codec.pose_bytes());
-    block.CopyBytes(0, again);
-    std::vector<Quat> back(rotations.size());
-    Vec3 root_back;
-    ASSERT_TRUE(codec.Decode(again, root_back, back)) << "seed " << seed << ", pose " << i;
+    Vec3 root;
+    ASSERT_TRUE(codec.Decode(good, root, rotations));
+    std::uint64_t known = 0;
+    for (std::uint64_t i = 0; i < count; ++i) {
+      Bytes pose = good;
+      for (std::uint64_t change = 1 + random() % 4; change > 0; --change) {
+        pose[random() % pose.size()] ^= static_cast<std::byte>(1u << random() % 8);
+      }
+      if (random() % 8 == 0) pose.resize(random() % (2 * pose.size()));
+      if (!codec.Decode(pose, root, rotations)) continue;
+      ++known;
+      for (const Quat& q : rotations) ASSERT_NEAR(Dot(q, q), 1.0f, 1e-5f) << "seed " << seed;
+      block.Clear();
+      block.Add(root, rotations);
+      codec.Encode(block);
+      if (!block.fits(0)) continue;  // at the very end of a range
+      Bytes again(codec.pose_bytes());
+      block.CopyBytes(0, again);
+      std::vector<Quat> back(rotations.size());
+      Vec3 root_back;
+      ASSERT_TRUE(codec.Decode(again, root_back, back)) << "seed " << seed << ", pose " << i;
+    }
+    EXPECT_GT(known, 0u);
+    EXPECT_LT(known, count);
   }
-  EXPECT_GT(known, 0u);
-  EXPECT_LT(known, count);
 }
 
 }  // namespace

@@ -202,6 +202,54 @@ TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
   EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
 }
 
+// Of those that are left out the shift is stated, and within it what is shown.
+TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
+  const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
+  const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
+  Passage passage(skeleton(), codec);
+  for (const auto& take : TakesOf(GetParam().subjects)) {
+    const Capture capture = ReadBvh(take).value();
+    for (int f = 0; f < capture.clip.frame_count(); ++f) passage.Send(capture.clip.frame(f));
+  }
+  passage.Flush();
+  passage.Print(std::string(GetParam().name) + " of " + std::to_string(told.size()) + " joints");
+  EXPECT_LE(passage.largest_error_m(), kFewerJointsShift_m + kLargestErrorM);
+  EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
+}
+
+TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
+  const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
+  const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
+  Passage passage(skeleton(), codec);
+  constexpr std::array<std::uint16_t, 1> kRootAlone{0};
+  const CompactCodec root =
+      CompactCodec::Make(code_.joints, ParentsOf(skeleton()), kRootAlone).value();
+  Passage root_passage(skeleton(), root);
+  Crowd crowd(library_, 20, 5);
+  for (int tick = 0; tick < 1200; ++tick) {
+    crowd.Advance();
+    for (const Avatar& avatar : crowd.avatars()) {
+      passage.Send(avatar.pose());
+      root_passage.Send(avatar.pose());
+    }
+  }
+  passage.Flush();
+  root_passage.Flush();
+  const std::string who = std::string("avatars of ") + GetParam().name;
+  std::string left_out;
+  for (std::size_t j = 0; j < skeleton().joints.size(); ++j) {
+    if (!std::ranges::binary_search(told, static_cast<std::uint16_t>(j))) {
+      left_out += ' ' + skeleton().joints[j].name;
+    }
+  }
+  passage.Print(who + ", fewer joints, without" + left_out);
+  root_passage.Print(who + ", the root");
+  EXPECT_LE(passage.largest_error_m(), kFewerJointsShift_m + kLargestErrorM);
+  EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
+  EXPECT_EQ(root_passage.wide(), 0u);
+  EXPECT_LE(root.pose_bytes(), 20u);
+}
+
 TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);

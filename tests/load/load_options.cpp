@@ -131,6 +131,7 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   std::string connect;
   std::string http;
   std::string mode = "quantised";
+  std::string detail = "all";
   std::string observe = "all";
   bool wander = false;
   std::vector<std::string> fail_ifs;
@@ -151,6 +152,8 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
       ->required();
   app.add_option("--mode", mode,
                  "How poses are sent: full or quantised; movement: evaluated here [quantised]");
+  app.add_option("--detail", detail,
+                 "Joints that are sent: all, fewer or root; others than all quantised [all]");
   app.add_option("--library", options.library,
                  "What the server's worlds have, for --mode movement [builtin]")
       ->type_name("FILE");
@@ -206,6 +209,17 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   } else if (mode != "quantised") {
     return Fail(ErrorCode::kInvalidArgument, "is not full, quantised or movement",
                 "--mode " + mode);
+  }
+  if (detail == "fewer") {
+    options.detail = protocol::PoseDetail::kFewer;
+  } else if (detail == "root") {
+    options.detail = protocol::PoseDetail::kRoot;
+  } else if (detail != "all") {
+    return Fail(ErrorCode::kInvalidArgument, "is not all, fewer or root", "--detail " + detail);
+  }
+  if (options.detail != protocol::PoseDetail::kAll &&
+      options.mode != protocol::PoseMode::kQuantised) {
+    return Fail(ErrorCode::kInvalidArgument, "goes with --mode quantised", "--detail " + detail);
   }
   if (observe != "all" && observe != "one") {
     return Fail(ErrorCode::kInvalidArgument, "is neither all nor one", "--observe " + observe);

@@ -39,6 +39,7 @@ struct LoadOptions {
   int partial_avatars = 100;  ///< How many each of those names.
   double seconds = 10.0;
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
+  protocol::PoseDetail detail = protocol::PoseDetail::kAll;
   std::string library = "builtin";  ///< The server's, in mode movement.
   std::string choreography;         ///< A file; empty: the avatars wander.
   bool observe_all = true;          ///< Every observer watches every world; else one each, in turn.

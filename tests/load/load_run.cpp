@@ -388,7 +388,9 @@ LoadReport LoadRun::Report() {
   report.observers = options_.observers;
   report.partial_observers = options_.partial_observers;
   report.partial_avatars = options_.partial_observers > 0 ? options_.partial_avatars : 0;
-  report.mode = options_.mode;
+  report.mode = options_.detail == protocol::PoseDetail::kAll
+                    ? options_.mode
+                    : protocol::CompactMode(options_.detail);
   report.seed = options_.seed;
   report.seconds = seconds_;
   report.threads = options_.threads;

@@ -102,14 +102,15 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
     world.evaluated =
         std::make_unique<client::MovementView>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
   }
-  world.codec.reset();
-  if (SentMode() == protocol::PoseMode::kCompact) {
+  world.codecs = {};
+  if (protocol::IsCompact(SentMode())) {
     std::vector<std::int16_t> parents;
     for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
-    auto codec = protocol::CompactCodec::Make(info.rotation_codes, parents);
-    if (!codec) return Lose("a world without codes for its compact poses");
-    world.codec = *std::move(codec);
-    world.most_pose_bytes = std::max(world.most_pose_bytes, world.codec->pose_bytes());
+    auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.fewer_joints);
+    const protocol::CompactCodec* codec = codecs ? codecs->Find(SentMode()) : nullptr;
+    if (codec == nullptr) return Lose("a world without codes for its compact poses");
+    world.most_pose_bytes = std::max(world.most_pose_bytes, codec->pose_bytes());
+    world.codecs = *std::move(codecs);
   }
   if (probes_ != nullptr) {
     world.last_poses.assign(world.seen.size() * world.most_pose_bytes, {});
@@ -125,13 +126,14 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
                          .mode = run_.options.mode,
                          .avatars = world.watched,
                          .every_n_ticks = 1,
-                         .with_events = false});
+                         .with_events = false,
+                         .detail = run_.options.detail});
 }
 
 protocol::PoseMode Observer::SentMode() const {
   const bool is_compact = run_.options.mode == protocol::PoseMode::kQuantised &&
                           (welcome().features & protocol::kFeatureCompact) != 0;
-  return is_compact ? protocol::PoseMode::kCompact : run_.options.mode;
+  return is_compact ? protocol::CompactMode(run_.options.detail) : run_.options.mode;
 }
 
 void Observer::OnReply(const protocol::Reply& reply) {
@@ -248,7 +250,7 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
   const bool counts = run_.window.Contains(tick);
   const bool verifies =
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
-  protocol::PoseBatchReader reader(batch, world.codec ? &*world.codec : nullptr);
+  protocol::PoseBatchReader reader(batch, world.codecs.Find(batch.info.mode));
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
     const protocol::AvatarNumber number = batch.avatars[i];
     const std::span<const std::byte> pose = reader.Next();

@@ -13,7 +13,7 @@
 #include "movement_view.h"
 #include "run_state.h"
 #include "session.h"
-#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::load {
@@ -74,7 +74,7 @@ class Observer final : public Session {
     std::size_t joint_count = 0;
     std::vector<protocol::AvatarNumber> watched;  ///< Growing; empty: all
     std::vector<Seen> seen;                       ///< Of each of them
-    std::optional<protocol::CompactCodec> codec;  ///< Of compact poses, if the server tells them
+    protocol::CompactCodecs codecs;               ///< Of compact poses, if the server tells them
     /// Only to measure latency: all poses, as they came, each with room for the longest.
     std::vector<std::byte> last_poses;
     std::vector<std::size_t> last_sizes;

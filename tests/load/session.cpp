@@ -46,8 +46,8 @@ void Session::Open() {
     state_ = State::kGreeting;
     protocol::Hello hello;
     hello.client_name = name_;
-    hello.features =
-        protocol::kFeatureQuantised | protocol::kFeatureCompact | protocol::kFeatureMovementMode;
+    hello.features = protocol::kFeatureQuantised | protocol::kFeatureCompact |
+                     protocol::kFeatureDetail | protocol::kFeatureMovementMode;
     WaitToRead();
     Send(hello);
   });

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/protocol/pose_rows.h"
@@ -24,7 +24,8 @@ inline protocol::Welcome Welcome(bool resumed = false) {
       protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureWalks |
       protocol::kFeatureTakeovers | protocol::kFeatureQuantised | protocol::kFeatureTerrain |
       protocol::kFeatureFootprints | protocol::kFeatureLayers | protocol::kFeatureRefusals |
-      protocol::kFeaturePlanting | protocol::kFeatureMovementMode | protocol::kFeatureCompact;
+      protocol::kFeaturePlanting | protocol::kFeatureMovementMode | protocol::kFeatureCompact |
+      protocol::kFeatureDetail;
   welcome.session = 7;
   welcome.resume_token = std::vector<std::byte>(16, std::byte{0x5a});
   welcome.resumed = resumed;
@@ -46,8 +47,11 @@ inline std::vector<RotationCode> RotationCodes() {
   codes[2].free_bits = 14;
   return codes;
 }
-inline protocol::CompactCodec Codec() {
-  return protocol::CompactCodec::Make(RotationCodes(), std::array<std::int16_t, kJoints>{-1, 0, 1})
+/// From afar the head's turn is not told.
+inline std::vector<std::uint16_t> FewerJoints() { return {0, 1}; }
+inline protocol::CompactCodecs Codecs() {
+  return protocol::CompactCodecs::Make(RotationCodes(), std::array<std::int16_t, kJoints>{-1, 0, 1},
+                                       FewerJoints())
       .value();
 }
 
@@ -63,6 +67,7 @@ inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                           {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
   info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
   info.rotation_codes = RotationCodes();
+  info.fewer_joints = FewerJoints();
   return info;
 }
 
@@ -110,10 +115,10 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
     all.push_back(static_cast<std::uint32_t>(numbers.size()));
     numbers.push_back(a.avatar);
   }
-  const protocol::CompactCodec codec = Codec();
+  const protocol::CompactCodecs codecs = Codecs();
   protocol::PoseRows rows;
   (void)rows.Begin(info, std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
-                   &codec);
+                   codecs.Find(mode));
   for (const AvatarAt& a : avatars) {
     (void)rows.Add(a.flags, a.root_position_m.value_or(RootAt(info.server_time_s, a.avatar)),
                    rotations);

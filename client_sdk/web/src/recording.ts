@@ -1,4 +1,5 @@
 import {createKeys, copyPose, interpolate} from './interpolate';
+import {flagsOf, lastingFlags} from './pose_flags';
 import {reserve} from './room';
 import {PoseFlag, type CrowdPose, type Recording, type WorldEvent} from './types';
 import type {BatchMode, PoseBatch} from './wire/messages';
@@ -212,12 +213,12 @@ export class WorldRecording implements Recording {
       const avatar = at.avatars[i]!;
       const place = this.placed.get(avatar);
       if (place === undefined) continue;
-      const standing = at.flags[i]! & PoseFlag.standing;
+      const lasting = at.flags[i]! & lastingFlags;
       const j = atEnd?.places.get(avatar);
       if (j === undefined || (atEnd!.flags[j]! & PoseFlag.discontinuity) !== 0) {
         copyPose(at.roots, at.rotations, i, jointCount, out.rootsM, 3 * place, out.rotations,
                  4 * jointCount * place);
-        out.flags[place] = exact ? at.flags[i]! : standing | PoseFlag.held;
+        out.flags[place] = exact ? at.flags[i]! : lasting | PoseFlag.held;
         continue;
       }
       const b = (at.flags[i]! & PoseFlag.discontinuity) === 0 ? atBefore?.places.get(avatar)
@@ -230,7 +231,7 @@ export class WorldRecording implements Recording {
       this.setKey(3, n === undefined ? atEnd! : atBeyond!, n ?? j);
       interpolate(this.keys, timeS, jointCount, out.rootsM, 3 * place, out.rotations,
                   4 * jointCount * place);
-      out.flags[place] = standing;
+      out.flags[place] = lasting;
     }
   }
 
@@ -284,7 +285,7 @@ export class WorldRecording implements Recording {
           continue;
         }
         into.avatars[place] = part.avatars[i]!;
-        into.flags[place] = part.flags[i]! & (PoseFlag.discontinuity | PoseFlag.standing);
+        into.flags[place] = flagsOf(part.flags[i]!, part.mode);
         into.places.set(part.avatars[i]!, place++);
       }
     }

@@ -8,6 +8,7 @@ export function createPose(jointCount = 0): Pose {
     jointCount,
     tick: 0,
     standing: false,
+    detail: 'all',
     heldS: 0,
   };
 }

@@ -12,7 +12,7 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureCompact, featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
+  featureCompact, featureDetail, featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
   featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
   maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
 } from './wire/limits';
@@ -28,7 +28,7 @@ import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
 const featureBits: Record<Feature, bigint> = {
   inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
   takeovers: featureTakeovers, layers: featureLayers, refusals: featureRefusals,
-  planting: featurePlanting, regions: featureRegions,
+  planting: featurePlanting, regions: featureRegions, detail: featureDetail | featureCompact,
 };
 
 /** What the caller may set, filled in. */
@@ -447,7 +447,7 @@ export class Session {
       clientName: this.options.clientName,
       features: featureResume | featureEventReplay | featureQuantised | featureInspect |
           featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
-          featureRefusals | featureRegions | featurePlanting | featureCompact,
+          featureRefusals | featureRegions | featurePlanting | featureCompact | featureDetail,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -646,7 +646,11 @@ export class Session {
 
   /** Of the connection that is ready; false while none is. */
   has(feature: Feature): boolean {
-    return this.state === 'ready' && (this.features & featureBits[feature]) !== 0n;
+    return this.state === 'ready' && this.hasAll(featureBits[feature]);
+  }
+
+  private hasAll(bits: bigint): boolean {
+    return (this.features & bits) === bits;
   }
 
   /** Whether this server knows what it is asked. */
@@ -655,7 +659,9 @@ export class Session {
       case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
       case 'SetLayers': return (this.features & featureLayers) !== 0n;
       case 'SetPlanting': return (this.features & featurePlanting) !== 0n;
-      case 'Observe': return message.region === null || (this.features & featureRegions) !== 0n;
+      case 'Observe':
+        return (message.region === null || this.hasAll(featureRegions)) &&
+            (message.detail === 'all' || this.hasAll(featureBits.detail));
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
@@ -988,7 +994,7 @@ export class Session {
     if (world === undefined || world.skeleton === null || world.subscriptions.size === 0) return;
     this.clock.addSample(nowS, message.serverTimeS);
     this.followJitter(nowS);
-    message.codec = world.codec;  // Recorded with it: a later server may tell others.
+    message.codec = world.codecs[message.mode] ?? null;  // Recorded with it: a later server may tell others.
     world.view.take(message, world.everyNTicks(message.mode));
     world.record.addBatch(message, world.view.epoch);
   }

@@ -8,13 +8,17 @@ export type Role = 'controller' | 'observer';
 /** `full`: float32, as the server has them. `quantised`: a quarter of it, nothing off by more than 1 mm; from servers
  * of before compact poses 2.5 times smaller. */
 export type PoseMode = 'full' | 'quantised';
+/** How much of a pose is told. The joints that are not come as the references of the server's codes: about as the
+ * library's figures mostly hold them. `fewer`: without those that move nothing by more than 0.12 m (hands, toes, the head).
+ * `root`: where the figure is and how it is turned. */
+export type PoseDetail = 'all' | 'fewer' | 'root';
 export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
 /** When a movement begins: after all that is queued; after the one under way, or as soon as feet allow, and
  * then what was queued is dropped. */
 export type Takeover = 'none' | 'afterMovement' | 'now';
 /** What servers may or may not know of. */
 export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals' |
-  'planting' | 'regions';
+  'planting' | 'regions' | 'detail';
 export type FootChoice = 'auto' | 'left' | 'right';
 export type Foot = 'left' | 'right';
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
@@ -259,6 +263,8 @@ export interface Observation {
   everyNTicks?: number;
   /** Events of the world, too. Controllers get them anyway. */
   withEvents?: boolean;
+  /** 'all' (default); others of quantised poses only, from servers that have them: `Client.serverHas('detail')`. */
+  detail?: PoseDetail;
 }
 
 export interface Subscription {
@@ -344,6 +350,8 @@ export interface Pose {
   tick: number;
   /** Standing, nothing queued. */
   standing: boolean;
+  /** With which it was sent. */
+  detail: PoseDetail;
   /** Held: how long after its last received pose. */
   heldS: number;
 }
@@ -355,6 +363,10 @@ export const PoseFlag = {
   standing: 2,
   /** Not interpolated: nothing continuous came after it. */
   held: 4,
+  /** It was sent with the detail 'fewer'. */
+  fewerJoints: 8,
+  /** It was sent with the detail 'root'. */
+  rootOnly: 16,
 } as const;
 
 /** Room for the poses of a crowd, for `sampleAll`; make it with `createCrowdPose`. Arrays are only

@@ -24,7 +24,7 @@ export class WorldHandle implements World {
   libraryHash = '';
   layers: readonly string[] = [];
   /** Of compact poses, if the server tells them. */
-  codec: CompactCodec | null = null;
+  codecs: Partial<Record<BatchMode, CompactCodec>> = {};
   terrain: Terrain | null = null;
   readonly joined: Promise<Reply>;
 
@@ -120,7 +120,12 @@ export class WorldHandle implements World {
     }
     this.libraryHash = info.libraryHash;
     this.layers = info.layers;
-    this.codec = info.rotationCodes.length > 0 ? new CompactCodec(info.rotationCodes) : null;
+    const {rotationCodes: codes, fewerJoints} = info;
+    this.codecs = codes.length === 0 ? {} : {
+      compact: new CompactCodec(codes),
+      compactRoot: new CompactCodec(codes, [0]),
+      ...(fewerJoints.length > 0 ? {compactFewer: new CompactCodec(codes, fewerJoints)} : {}),
+    };
   }
 
   /** Nothing of it is known any more. */
@@ -134,7 +139,7 @@ export class WorldHandle implements World {
     this.skeleton = null;
     this.libraryHash = '';
     this.layers = [];
-    this.codec = null;
+    this.codecs = {};
     this.terrain = null;
   }
 
@@ -150,10 +155,11 @@ export class WorldHandle implements World {
 
   /** The rate asked for; 0: none of this mode. */
   everyNTicks(batchMode: BatchMode): number {
-    const mode: PoseMode = batchMode === 'compact' ? 'quantised' : batchMode;
+    const mode: PoseMode = batchMode === 'full' ? 'full' : 'quantised';
+    const detail = batchMode === 'compactFewer' ? 'fewer' : batchMode === 'compactRoot' ? 'root' : 'all';
     let every = 0;
     for (const {message} of this.subscriptions.values()) {
-      if (message.mode !== mode) continue;
+      if (message.mode !== mode || message.detail !== detail) continue;
       every = every === 0 ? message.everyNTicks : Math.min(every, message.everyNTicks);
     }
     return every;

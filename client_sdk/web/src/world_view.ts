@@ -1,9 +1,10 @@
+import {flagsOf, lastingFlags} from './pose_flags';
 import {PoseHistory} from './pose_history';
 import {reserve} from './room';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
 import {maxItems} from './wire/limits';
 import {Malformed} from './wire/malformed';
-import type {PoseBatch} from './wire/messages';
+import type {BatchMode, PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** Poses of an avatar that is gone can still be sampled for this long. */
@@ -46,8 +47,9 @@ interface Shard {
 
 /** A shard's batches of one mode, which are about the same avatars. */
 function streamOf(batch: PoseBatch): number {
-  return 3 * batch.shard + ['full', 'quantised', 'compact'].indexOf(batch.mode);
+  return streamModes.length * batch.shard + streamModes.indexOf(batch.mode);
 }
+const streamModes: readonly BatchMode[] = ['full', 'quantised', 'compact', 'compactFewer', 'compactRoot'];
 
 /** What is seen of a world: the poses of its avatars. */
 export class WorldView {
@@ -145,7 +147,7 @@ export class WorldView {
                          4 * slot * this.jointCount)) {
           throw new Malformed('is no pose', 'PoseBatch.poses', i);
         }
-        let flags = batch.flags[i]! & (PoseFlag.discontinuity | PoseFlag.standing);
+        let flags = flagsOf(batch.flags[i]!, batch.mode);
         if (track.epoch !== this.epochNumber) flags |= PoseFlag.discontinuity;
         history.commit(batch.tick, batch.serverTimeS, flags);
         ++this.counts.poses;
@@ -204,7 +206,9 @@ export class WorldView {
     const slot = history.sampledSlot;
     out.jointCount = history.jointCount;
     out.tick = history.tickOf(slot);
-    out.standing = (history.flagsOf(slot) & PoseFlag.standing) !== 0;
+    const flags = history.flagsOf(slot);
+    out.standing = (flags & PoseFlag.standing) !== 0;
+    out.detail = (flags & PoseFlag.fewerJoints) !== 0 ? 'fewer' : (flags & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
     out.heldS = found === 2 ? timeS - history.timeOf(slot) : 0;
     if (found === 2 && timeS > history.newestTimeS) ++this.counts.starved;
     return found === 1 ? 'interpolated' : 'held';
@@ -222,11 +226,11 @@ export class WorldView {
                                    4 * jointCount * count);
       if (found === 0) continue;
       const slot = history.sampledSlot;
-      const standing = history.flagsOf(slot) & PoseFlag.standing;
+      const lasting = history.flagsOf(slot) & lastingFlags;
       out.avatars[count] = track.avatar;
       out.flags[count] = found === 2
-          ? standing | PoseFlag.held
-          : standing | (history.timeOf(slot) === timeS ? history.flagsOf(slot) : 0);
+          ? lasting | PoseFlag.held
+          : lasting | (history.timeOf(slot) === timeS ? history.flagsOf(slot) : 0);
       if (found === 2 && timeS > history.newestTimeS) ++this.counts.starved;
       ++count;
     }

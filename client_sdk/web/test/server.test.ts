@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import WebSocket from 'ws';
 import {Client} from '../src/client';
-import {createCrowdPose} from '../src/room';
+import {createCrowdPose, createPose} from '../src/room';
 import type {ClientOptions, PoseMode, WorldEvent} from '../src/types';
 import {ServerProcess, programs, run, until} from './support/server_process';
 
@@ -66,6 +66,50 @@ for (const mode of ['full', 'quantised'] as PoseMode[]) {
     }
   });
 }
+
+test('poses come in the detail and at the rate asked for', {skip}, async () => {
+  const server = await ServerProcess.start();
+  const client = makeClient(server);
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    // They stand: nothing is to be told but poses.
+    assert.ok((await world.spawn(Array.from({length: 50}, (_, i) => (
+        {avatar: i + 1, positionM: [i, 0, 0] as const, headingRad: 0})))).ok);
+    assert.ok(client.serverHas('detail'));
+    const pose = createPose();
+    let bytes = Infinity;
+    for (const [detail, everyNTicks] of [['all', 1], ['fewer', 2], ['root', 4]] as const) {
+      const observed = world.observe({mode: 'quantised', detail, everyNTicks});
+      assert.ok((await observed.reply).ok);
+      await until(`${detail} is there`, () => {
+        world.sample(1, Infinity, pose);
+        return pose.detail === detail;
+      });
+      const ticks: number[] = [];
+      await until('ten of them', () => {
+        if (world.sample(1, Infinity, pose) !== 'missing' && pose.tick !== ticks.at(-1)) ticks.push(pose.tick);
+        return ticks.length === 10;
+      });
+      // Polled: some may pass unseen.
+      for (const tick of ticks) assert.equal(tick % everyNTicks, 0, `${detail} at tick ${tick}`);
+      assert.equal(pose.jointCount, world.skeleton!.jointCount);
+      for (let j = 0; j < 4 * pose.jointCount; j += 4) {
+        assert.ok(Math.abs(Math.hypot(...pose.rotations.subarray(j, j + 4)) - 1) < 1e-5);
+      }
+      const before = client.statistics;
+      await until('some more', () => client.statistics.posesReceived >= before.posesReceived + 500);
+      const after = client.statistics;
+      const aPose = (after.bytesReceived - before.bytesReceived) / (after.posesReceived - before.posesReceived);
+      assert.ok(aPose < bytes, `${detail}: ${aPose} bytes after ${bytes}`);
+      bytes = aPose;
+      assert.ok((await observed.stop()).ok);
+    }
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
 
 test('a region shows who is in it, and moves', {skip}, async () => {
   const server = await ServerProcess.start();

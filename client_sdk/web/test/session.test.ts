@@ -456,6 +456,8 @@ test('bad arguments are told at once and named', async () => {
     [world.request(null as never), /items/],
     [world.observe({mode: 'movement' as 'full'}).reply, /mode/],
     [world.observe({mode: 'full', everyNTicks: 0}).reply, /everyNTicks/],
+    [world.observe({mode: 'full', detail: 'root'}).reply, /detail/],
+    [world.observe({mode: 'quantised', detail: 'some' as 'root'}).reply, /detail/],
   ];
   for (const [promise, why] of bad) {
     const reply = await promise;
@@ -738,6 +740,19 @@ test('planting is switched for a list of avatars, on a server that knows it', as
   const old = new Harness();
   const before = old.joined({features: 2047n});
   assert.equal((await before.setPlanting([1], true)).status, 'unsupported');
+});
+
+test('levels of detail are asked of a server that knows them', async () => {
+  const h = new Harness();
+  const world = h.joined({features: 16_383n});
+  void world.observe({mode: 'quantised', detail: 'fewer'});
+  assert.deepEqual(h.sent().map((m) => m.type === 'Observe' && m.detail), ['fewer']);
+  for (const features of [8191n, 16_383n - 4096n]) {
+    const old = new Harness();
+    const before = old.joined({features});
+    assert.equal((await before.observe({mode: 'quantised', detail: 'root'}).reply).status, 'unsupported');
+    assert.equal(old.sent().length, 0);
+  }
 });
 
 test('a server of before is not asked for ground or footprints', async () => {

@@ -85,9 +85,31 @@ test('compact poses are read in any order, and not without their codes', () => {
     }
     return poses;
   };
-  const inOrder = read(vectorCodec(), [0, 1, 2]);
+  const inOrder = read(vectorCodec('compact'), [0, 1, 2]);
   assert.ok(inOrder.every((pose) => pose !== null));
-  assert.deepEqual(read(vectorCodec(), [2, 0, 1]), inOrder);
+  assert.deepEqual(read(vectorCodec('compact'), [2, 0, 1]), inOrder);
   // A wide one means the same whatever the codes are.
   assert.deepEqual(read(null, [0, 1, 2]), [null, inOrder[1], null]);
+});
+
+test('what a detail leaves out is the reference, the rest as it was', () => {
+  const info = decodeFrame(vectors.find(({name}) => name === 'world_info_detail')!.frame, 'server');
+  assert.ok(info.type === 'WorldInfo');
+  const read = (name: string): Float32Array => {
+    const batch = decodeFrame(vectors.find((vector) => vector.name === name)!.frame, 'server');
+    assert.ok(batch.type === 'PoseBatch');
+    const rotations = new Float32Array(4 * batch.jointCount);
+    assert.ok(new PoseReader({...batch, codec: vectorCodec(batch.mode)})
+      .read(0, new Float32Array(3), 0, rotations, 0));
+    return rotations;
+  };
+  const all = read('pose_batch_compact');
+  for (const [name, told] of [['pose_batch_fewer', info.fewerJoints], ['pose_batch_root', [0]]] as const) {
+    const rotations = read(name);
+    info.rotationCodes.forEach(({reference}, j) => {
+      const isTold = (told as readonly number[]).includes(j);
+      const expected = isTold ? all.subarray(4 * j, 4 * j + 4) : Float32Array.from(reference);
+      assert.deepEqual(rotations.subarray(4 * j, 4 * j + 4), expected, `${name}, joint ${j}`);
+    });
+  }
 });

@@ -54,6 +54,11 @@ double DotOf(const DQuat& a, const DQuat& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w;
 }
 
+double LengthOf(const Vec3& v) {
+  const DVec3 d(v);
+  return std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
+}
+
 // Joints that planting turns, about whatever axis.
 std::vector<bool> PlantedJoints(const Skeleton& skeleton) {
   std::vector<bool> planted(skeleton.joints.size(), false);
@@ -121,7 +126,7 @@ class BitChoice {
     }
     std::vector<bool> has_end(joints_.size(), false);
     for (const EndSite& site : skeleton.end_sites) {
-      AddChain(skeleton, site.joint, Length(site.offset_m));
+      AddChain(skeleton, site.joint, LengthOf(site.offset_m));
       has_end[static_cast<std::size_t>(site.joint)] = true;
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
@@ -183,17 +188,12 @@ class BitChoice {
   };
   using Chain = std::vector<Bone>;
 
-  static double Length(const Vec3& v) {
-    const DVec3 d(v);
-    return std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
-  }
-
   void AddChain(const Skeleton& skeleton, int joint, double length_m) {
     Chain& chain = chains_.emplace_back();
     while (joint >= 0) {
       joints_[static_cast<std::size_t>(joint)].chains.push_back(chains_.size() - 1);
       chain.push_back({static_cast<std::size_t>(joint), length_m});
-      length_m = Length(skeleton.joints[static_cast<std::size_t>(joint)].offset_m);
+      length_m = LengthOf(skeleton.joints[static_cast<std::size_t>(joint)].offset_m);
       joint = skeleton.joints[static_cast<std::size_t>(joint)].parent;
     }
   }
@@ -322,6 +322,44 @@ PoseCode ChoosePoseCode(const Skeleton& skeleton, std::span<const RotationRange>
   BitChoice choice(skeleton, ranges, largest_error_m);
   choice.GiveBits();
   return choice.Result();
+}
+
+std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
+                                             std::span<const RotationRange> ranges,
+                                             double largest_shift_m) {
+  STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
+  const std::size_t count = ranges.size();
+  std::vector<double> reach_m(count, 0.0);  // of the longest chain that hangs from it
+  for (const EndSite& site : skeleton.end_sites) {
+    double& reach = reach_m[static_cast<std::size_t>(site.joint)];
+    reach = std::max(reach, LengthOf(site.offset_m));
+  }
+  std::vector<double> shift_m(count, 0.0);
+  std::vector<double> below_m(count, 0.0);  // of the worst of those that hang from it
+  for (std::size_t j = count; j-- > 0;) {
+    const RotationRange& range = ranges[j];
+    double squared = 0.0;
+    for (int c = 0; c < 3; ++c) {
+      const double most = std::max(std::abs(static_cast<double>(range.low[c])),
+                                   std::abs(static_cast<double>(range.high[c])));
+      squared += most * most;
+    }
+    const double sine = std::sqrt(std::min(squared, 1.0 - range.least_w * range.least_w));
+    shift_m[j] = 2.0 * sine * reach_m[j] + below_m[j];
+    if (j == 0) break;
+    const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
+    reach_m[parent] = std::max(reach_m[parent], LengthOf(skeleton.joints[j].offset_m) + reach_m[j]);
+    below_m[parent] = std::max(below_m[parent], shift_m[j]);
+  }
+  std::vector<std::uint16_t> told;
+  for (std::size_t j = 0; j < count; ++j) {
+    if (j == 0 || shift_m[j] > largest_shift_m) told.push_back(static_cast<std::uint16_t>(j));
+  }
+  return told;
+}
+
+std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library) {
+  return ChooseFewerJoints(library.skeleton(), FindRotationRanges(library), kFewerJointsShift_m);
 }
 
 PoseCode ChoosePoseCode(const MotionLibrary& library) {

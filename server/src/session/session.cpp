@@ -105,7 +105,8 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   if (limits.resume_window_s <= 0.0) offered &= ~protocol::kFeatureResume;
   features_ = hello.features & offered;
   constexpr std::uint64_t kCompact = protocol::kFeatureQuantised | protocol::kFeatureCompact;
-  subscriptions_.SetCompact((features_ & kCompact) == kCompact);
+  subscriptions_.SetCompact((features_ & kCompact) == kCompact,
+                            (features_ & protocol::kFeatureDetail) != 0);
 
   protocol::Welcome welcome;
   welcome.protocol = std::min(hello.protocol_max, protocol::kProtocolMax);
@@ -694,7 +695,15 @@ void Session::OnResult(CommandResult&& result) {
 }
 
 void Session::Execute(protocol::Observe&& command) {
-  command.mode = subscriptions_.SentMode(command.mode);
+  if (command.detail != protocol::PoseDetail::kAll &&
+      subscriptions_.SentMode(command.mode, command.detail) !=
+          protocol::CompactMode(command.detail)) {
+    Answer(
+        command.seq, StatusCode::kUnsupported,
+        "the features 'compact poses' and 'levels of detail' were not agreed on in the handshake");
+    return;
+  }
+  command.mode = subscriptions_.SentMode(command.mode, command.detail);
   const auto it = worlds_.find(command.world);
   if (it == worlds_.end()) {
     Answer(command.seq, StatusCode::kNotJoined, "this session is not in that world");
@@ -832,7 +841,11 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
     for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
   }
   std::vector<RotationCode> codes;
-  if ((features_ & protocol::kFeatureCompact) != 0) codes = world.codes->joints;
+  std::vector<std::uint16_t> fewer_joints;
+  if ((features_ & protocol::kFeatureCompact) != 0) {
+    codes = world.codes->joints;
+    if ((features_ & protocol::kFeatureDetail) != 0) fewer_joints = world.codes->fewer_joints;
+  }
   Send(protocol::WorldInfo{.seq = seq,
                            .world = world.id,
                            .name = world.name,
@@ -841,7 +854,8 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
                            .library_hash = world.library->hash(),
                            .skeleton = ToWire(world.library->skeleton()),
                            .layers = std::move(layers),
-                           .rotation_codes = std::move(codes)});
+                           .rotation_codes = std::move(codes),
+                           .fewer_joints = std::move(fewer_joints)});
 }
 
 void Session::SendGround(const World& world, bool also_flat) {

@@ -28,7 +28,7 @@ inline constexpr std::uint64_t kServerFeatures =
     protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
     protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
     protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
-    protocol::kFeatureCompact | protocol::kFeatureRegions;
+    protocol::kFeatureCompact | protocol::kFeatureDetail | protocol::kFeatureRegions;
 
 /// Who a session is; made when it begins, the same for its whole life.
 struct SessionIdentity {

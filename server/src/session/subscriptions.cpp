@@ -5,20 +5,23 @@
 
 namespace stridewire::server {
 
+using protocol::PoseDetail;
 using protocol::PoseMode;
 using protocol::SubscriptionId;
 
-PoseMode Subscriptions::SentMode(PoseMode asked) const {
-  if (asked != PoseMode::kQuantised && asked != PoseMode::kCompact) return asked;
-  return is_compact_ ? PoseMode::kCompact : PoseMode::kQuantised;
+PoseMode Subscriptions::SentMode(PoseMode asked, PoseDetail detail) const {
+  if (asked != PoseMode::kQuantised && !IsCompact(asked)) return asked;
+  if (!is_compact_) return PoseMode::kQuantised;
+  return CompactMode(has_detail_ ? detail : PoseDetail::kAll);
 }
 
-void Subscriptions::SetCompact(bool is_compact) {
-  if (is_compact == is_compact_) return;
+void Subscriptions::SetCompact(bool is_compact, bool has_detail) {
+  if (is_compact == is_compact_ && has_detail == has_detail_) return;
   is_compact_ = is_compact;
+  has_detail_ = has_detail;
   watches_.clear();
   for (auto& [id, subscription] : all_) {
-    subscription.mode = SentMode(subscription.mode);
+    subscription.mode = SentMode(subscription.mode, DetailOf(subscription.mode));
     SumUp({subscription.world, subscription.mode});
   }
 }

@@ -29,10 +29,12 @@ class Subscriptions {
   };
   enum class Share : std::uint8_t { kNone, kWhole, kSome, kRegion };
 
-  /// Whether quantised poses, those subscribed to already as well, are sent as compact ones.
-  void SetCompact(bool is_compact);
-  /// The mode in which what is asked for is sent: that of everything here.
-  [[nodiscard]] protocol::PoseMode SentMode(protocol::PoseMode asked) const;
+  /// Whether quantised poses, those subscribed to already as well, are sent as compact ones, and of those some with
+  /// less detail.
+  void SetCompact(bool is_compact, bool has_detail);
+  /// The mode in which what is asked for is sent: that of everything here. Detail that was not agreed on is all.
+  [[nodiscard]] protocol::PoseMode SentMode(protocol::PoseMode asked,
+                                            protocol::PoseDetail detail) const;
 
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
@@ -95,6 +97,7 @@ class Subscriptions {
   void CountNamed();
 
   bool is_compact_ = false;
+  bool has_detail_ = false;
   std::map<protocol::SubscriptionId, Subscription> all_;
   std::map<Key, Watch> watches_;
   std::size_t named_count_ = 0;

@@ -1,10 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "stridewire/base/rotation_code.h"
-#include "stridewire/protocol/compact_codec.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire::server {
@@ -12,7 +13,8 @@ namespace stridewire::server {
 /// How the compact poses of a library's worlds are told.
 struct PoseCodes {
   std::vector<RotationCode> joints;
-  protocol::CompactCodec codec;
+  std::vector<std::uint16_t> fewer_joints;  ///< Told at protocol::PoseDetail::kFewer.
+  protocol::CompactCodecs codecs;
 };
 
 /// Milliseconds: once a library.

@@ -571,7 +571,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
        .server_time_s = clock_.TickTime(tick),
        .mode = mode,
        .joint_count = static_cast<std::uint16_t>(world_->library->skeleton().joint_count())},
-      numbers_, world_->codes == nullptr ? nullptr : &world_->codes->codec);
+      numbers_, world_->codes == nullptr ? nullptr : world_->codes->codecs.Find(mode));
   STRIDEWIRE_CHECK(begun.has_value());
   constexpr std::size_t kAhead = 4;
   for (std::size_t i = 0; i < wanted.size(); ++i) {

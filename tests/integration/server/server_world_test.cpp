@@ -11,6 +11,7 @@
 #include <set>
 
 #include "counted_memory.h"
+#include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 #include "stridewire/runtime/avatar.h"
 #include "test_server.h"
@@ -202,6 +203,79 @@ TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
   // Compact ones are encoded beside others, who they are by chance of the shards.
   const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised, ~0ull);
   ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised, ~0ull));
+}
+
+// Nobody is sent what another asked for, and what nobody asks for is not made.
+TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
+  using protocol::PoseDetail;
+  TestServer server(TestConfig(2));
+  RawClient client = server.Connect();
+  RawClient old = server.Connect();
+  ASSERT_TRUE(client.SayHello() && old.SayHello(~protocol::kFeatureDetail));
+  const auto world = client.Join("w");
+  const auto old_world = old.Join("w", protocol::Role::kObserver);
+  ASSERT_TRUE(world && old_world);
+  EXPECT_TRUE(old_world->fewer_joints.empty());
+  const auto observe = [&](RawClient& who, PoseDetail detail, std::uint16_t every_n_ticks = 1) {
+    who.Send(protocol::Observe{.seq = who.NextSeq(),
+                               .world = world->world,
+                               .subscription = 1 + static_cast<std::uint32_t>(detail),
+                               .mode = PoseMode::kQuantised,
+                               .avatars = {},
+                               .every_n_ticks = every_n_ticks,
+                               .with_events = false,
+                               .detail = detail});
+    return who.Await<protocol::Reply>()->code;
+  };
+  EXPECT_EQ(observe(old, PoseDetail::kFewer), StatusCode::kUnsupported);
+  EXPECT_EQ(observe(old, PoseDetail::kAll), StatusCode::kOk);
+
+  std::vector<std::int16_t> parents;
+  for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
+  const auto codecs =
+      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->fewer_joints).value();
+  ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(client.Request(world->world, Steps(1, 40, 0.6)));
+  constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot};
+  // Those of the root come half as often.
+  for (const PoseDetail detail : kDetails) {
+    ASSERT_EQ(observe(client, detail, detail == PoseDetail::kRoot ? 2 : 1), StatusCode::kOk);
+  }
+  std::map<std::uint64_t, std::map<PoseMode, std::vector<Quat>>> seen;
+  std::map<PoseMode, std::size_t> bytes;
+  std::map<PoseMode, int> counts;
+  while (counts[PoseMode::kCompactRoot] < 20) {
+    const auto batch = client.Await<protocol::PoseBatch>();
+    ASSERT_TRUE(batch);
+    const PoseMode mode = batch->info.mode;
+    if (batch->avatars.empty()) continue;  // of the shard that has nobody
+    ASSERT_NE(codecs.Find(mode), nullptr);
+    EXPECT_EQ(mode == PoseMode::kCompactRoot ? batch->info.tick % 2 : 0, 0u);
+    protocol::PoseBatchReader reader(*batch, codecs.Find(mode));
+    bytes[mode] = std::max(bytes[mode], reader.Next().size());
+    Vec3 root;
+    std::vector<Quat>& rotations = seen[batch->info.tick][mode];
+    rotations.resize(parents.size());
+    ASSERT_TRUE(reader.Decode(root, rotations));
+    ++counts[mode];
+  }
+  EXPECT_EQ(bytes[PoseMode::kCompactRoot], 18u);
+  // Toys hardly have what could be left out.
+  EXPECT_LE(bytes[PoseMode::kCompactFewer], bytes[PoseMode::kCompact]);
+  int compared = 0;
+  for (const auto& [tick, modes] : seen) {
+    if (modes.size() < 3) continue;
+    ++compared;
+    for (std::size_t j = 0; j < parents.size(); ++j) {
+      const bool is_told =
+          std::ranges::binary_search(world->fewer_joints, static_cast<std::uint16_t>(j));
+      const Quat& reference = world->rotation_codes[j].reference;
+      const Quat& all = modes.at(PoseMode::kCompact)[j];
+      EXPECT_EQ(modes.at(PoseMode::kCompactFewer)[j], is_told ? all : reference) << j;
+      EXPECT_EQ(modes.at(PoseMode::kCompactRoot)[j], j == 0 ? all : reference) << j;
+    }
+  }
+  EXPECT_GT(compared, 10);
 }
 
 // What each of two observers of one avatar shows at the same ticks.

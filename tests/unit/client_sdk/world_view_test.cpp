@@ -147,13 +147,13 @@ protocol::Message Decoded(const std::vector<std::byte>& frame) {
 }
 
 TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
-  const protocol::CompactCodec codec = toy::Codec();
+  const protocol::CompactCodecs codecs = toy::Codecs();
   protocol::PoseRows rows;
   protocol::PoseBatchInfo info{.world = 1, .tick = 1, .mode = protocol::PoseMode::kCompact};
   info.joint_count = toy::kJoints;
   const std::vector<std::uint32_t> avatars = {1, 2, 3};
-  ASSERT_TRUE(
-      rows.Begin(info, std::make_shared<const std::vector<std::uint32_t>>(avatars), &codec));
+  ASSERT_TRUE(rows.Begin(info, std::make_shared<const std::vector<std::uint32_t>>(avatars),
+                         codecs.Find(info.mode)));
   std::vector<Quat> pose = toy::RotationsAt(0.75);
   ASSERT_TRUE(rows.Add(0, Vec3(1.0f), pose));
   pose[1] = YawRotation(1.0);  // a spine that turns after all: told the wide way
@@ -179,10 +179,32 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
   // Of a world whose codes were not told they mean nothing.
   protocol::WorldInfo uncoded = toy::WorldInfo(1, 1, "plaza");
   uncoded.rotation_codes.clear();
+  uncoded.fewer_joints.clear();
   view_.SetInfo(uncoded);
   const Status status = view_.Take(batch, 1, counts_);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
+}
+
+TEST_F(WorldViewTest, WhatADetailLeavesOutIsTheReference) {
+  using protocol::PoseDetail;
+  std::uint64_t tick = 60;
+  for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot}) {
+    ++tick;
+    const protocol::Message message =
+        Decoded(toy::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail)));
+    ASSERT_TRUE(view_.Take(std::get<protocol::PoseBatch>(message), 1, counts_));
+    const PoseHistory& history = *view_.Find(1);
+    const std::size_t newest = history.size() - 1;
+    EXPECT_EQ(history.stamp(newest).detail, detail);
+    EXPECT_NEAR(history.root_position_m(newest).z, toy::RootAt(toy::TickTime(tick)).z, 1e-3);
+    const double turned = AngleBetween(history.rotations(newest)[2], kIdentityQuat);
+    if (detail == PoseDetail::kAll) {
+      EXPECT_GT(turned, 0.5);
+    } else {
+      EXPECT_EQ(history.rotations(newest)[2], kIdentityQuat);
+    }
+  }
 }
 
 TEST_F(WorldViewTest, RefusesAnotherFigureAndTicksThatRunBackwards) {

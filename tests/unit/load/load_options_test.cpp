@@ -137,6 +137,9 @@ TEST(LoadOptions, NameTheOptionThatIsWrong) {
   EXPECT_EQ(ErrorOf(With({"--threads", "65"})), "--threads 65" + range);
   EXPECT_EQ(ErrorOf(With({"--verify-one-in", "0"})), "--verify-one-in 0" + range);
   EXPECT_EQ(ErrorOf(With({"--mode", "raw"})), "--mode raw: is not full, quantised or movement");
+  EXPECT_EQ(ErrorOf(With({"--detail", "1"})), "--detail 1: is not all, fewer or root");
+  EXPECT_EQ(ErrorOf(With({"--detail", "root", "--mode", "full"})),
+            "--detail root: goes with --mode quantised");
   EXPECT_EQ(ErrorOf(With({"--observe", "none"})), "--observe none: is neither all nor one");
   EXPECT_EQ(ErrorOf(With({"--wander", "--choreography", "c.json"})),
             "--wander: excludes --choreography");

@@ -236,6 +236,12 @@ TEST(Check, Observe) {
       good, [](Observe& m) { m.mode = static_cast<PoseMode>(3); }, ErrorCode::kMalformed,
       "Observe.mode");
   Refused<Observe>(
+      good, [](Observe& m) { m.detail = static_cast<PoseDetail>(3); }, ErrorCode::kMalformed,
+      "Observe.detail");
+  Refused<Observe>(
+      good, [](Observe& m) { m.detail = PoseDetail::kRoot; }, ErrorCode::kUnsupported,
+      "Observe.detail");
+  Refused<Observe>(
       good, [](Observe& m) { m.avatars[0] = 0; }, ErrorCode::kOutOfRange, "Observe.avatars", 0);
   Refused<Observe>(
       good, [](Observe& m) { m.avatars.assign(kMaxItems + 1, 1); }, ErrorCode::kLimitExceeded,
@@ -370,6 +376,22 @@ TEST(Check, WorldInfo) {
   Refused<W>(
       with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,
       "WorldInfo.rotation_codes");
+  W with_fewer = with_codes;
+  with_fewer.fewer_joints = {0, 1};
+  EXPECT_TRUE(Check(with_fewer));
+  Refused<W>(
+      with_fewer, [](W& m) { m.rotation_codes.clear(); }, ErrorCode::kShapeMismatch,
+      "WorldInfo.fewer_joints");
+  Refused<W>(
+      with_fewer, [](W& m) { m.fewer_joints.resize(m.skeleton.joints.size() + 1); },
+      ErrorCode::kShapeMismatch, "WorldInfo.fewer_joints");
+  const auto last = static_cast<std::uint16_t>(good.skeleton.joints.size());
+  for (const std::vector<std::uint16_t>& wrong :
+       {std::vector<std::uint16_t>{1}, {0, 0}, {0, last}, {0, 1, 1}}) {
+    Refused<W>(
+        with_fewer, [&](W& m) { m.fewer_joints = wrong; }, ErrorCode::kMalformed,
+        "WorldInfo.fewer_joints");
+  }
 }
 
 TEST(Check, Reply) {
@@ -405,7 +427,7 @@ TEST(Check, PoseBatch) {
   RefusedWhenNotFinite<B>(
       good, [](B& m) -> double& { return m.info.server_time_s; }, "PoseBatch.server_time_s");
   Refused<B>(
-      good, [](B& m) { m.info.mode = static_cast<PoseMode>(4); }, ErrorCode::kMalformed,
+      good, [](B& m) { m.info.mode = static_cast<PoseMode>(6); }, ErrorCode::kMalformed,
       "PoseBatch.mode");
   Refused<B>(
       good, [](B& m) { m.info.mode = PoseMode::kMovement; }, ErrorCode::kUnsupported,

@@ -230,6 +230,49 @@ TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
             ErrorCode::kShapeMismatch);
   EXPECT_EQ(CompactCodec::Make(Codes(), std::array<std::int16_t, 3>{-1, 0, 2}).error().code,
             ErrorCode::kOutOfRange);
+  const auto told = [](std::vector<std::uint16_t> joints) {
+    const auto codec = CompactCodec::Make(Codes(), kParents, joints);
+    return codec ? ErrorCode::kIo : codec.error().code;
+  };
+  EXPECT_EQ(told({0, 1}), ErrorCode::kIo);
+  EXPECT_EQ(told({1}), ErrorCode::kMalformed);
+  EXPECT_EQ(told({0, 2}), ErrorCode::kMalformed);  // without the one it hangs from
+  EXPECT_EQ(told({0, 1, 3}), ErrorCode::kMalformed);
+  EXPECT_EQ(told({0, 0}), ErrorCode::kMalformed);
+  EXPECT_EQ(told({0, 1, 2, 3}), ErrorCode::kShapeMismatch);
+}
+
+TEST(CompactCodec, WhatIsLeftOutIsTheReferenceHoweverItIsTurned) {
+  const CompactCodec all = Codec();
+  const CompactCodec fewer =
+      CompactCodec::Make(Codes(), kParents, std::array<std::uint16_t, 2>{0, 1}).value();
+  const CompactCodec root =
+      CompactCodec::Make(Codes(), kParents, std::array<std::uint16_t, 1>{0}).value();
+  EXPECT_EQ(all.pose_bytes(), 12u + 2 * 6);  // 38, 30 and 13 bits
+  EXPECT_EQ(fewer.pose_bytes(), 12u + 2 * 5);
+  EXPECT_EQ(root.pose_bytes(), 12u + 2 * 3);
+
+  std::vector<Quat> pose = SomePose();
+  const std::vector<std::byte> whole = BytesOf(all, Vec3(1.0f), pose);
+  std::vector<Quat> back(3);
+  std::vector<Quat> back_whole(3);
+  Vec3 root_m;
+  ASSERT_TRUE(all.Decode(whole, root_m, back_whole));
+  pose[2] = YawRotation(3.0);  // in no range
+  EXPECT_TRUE(BytesOf(all, Vec3(1.0f), pose).empty());
+  ASSERT_TRUE(fewer.Decode(BytesOf(fewer, Vec3(1.0f), pose), root_m, back));
+  EXPECT_EQ(back[0], back_whole[0]);
+  EXPECT_EQ(back[1], back_whole[1]);
+  EXPECT_EQ(back[2], Codes()[2].reference);
+  pose[1] = YawRotation(-2.0);
+  EXPECT_TRUE(BytesOf(fewer, Vec3(1.0f), pose).empty());
+  ASSERT_TRUE(root.Decode(BytesOf(root, Vec3(1.0f), pose), root_m, back));
+  EXPECT_EQ(back[0], back_whole[0]);
+  EXPECT_EQ(back[1], Codes()[1].reference);
+  EXPECT_EQ(back[2], Codes()[2].reference);
+  // What is no rotation is not told, even where it would be left out.
+  pose[2] = Quat(0.0f, 0.0f, 0.0f, 0.0f);
+  EXPECT_TRUE(BytesOf(root, Vec3(1.0f), pose).empty());
 }
 
 }  // namespace

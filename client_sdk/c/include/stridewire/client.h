@@ -340,12 +340,24 @@ typedef enum stridewire_pose_mode {
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
 
+/// How much of a pose is told, of QUANTISED ones. The joints that are not told come back as the references of the
+/// server's codes: about as the library's figures mostly hold them.
+typedef enum stridewire_pose_detail {
+  STRIDEWIRE_DETAIL_ALL = 0,
+  /// Without those that move nothing by more than 0.12 m: hands, toes, the head; for who is seen from afar.
+  STRIDEWIRE_DETAIL_FEWER = 1,
+  STRIDEWIRE_DETAIL_ROOT = 2,  ///< Where the figure is and how it is turned, 18 bytes.
+  STRIDEWIRE_POSE_DETAIL_MAX = 0x7fffffff
+} stridewire_pose_detail;
+
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
   uint16_t every_n_ticks;   ///< 1 to 3600
   uint8_t with_events;      ///< 1: events of the world, too (controllers get them anyway).
   const uint32_t* avatars;  ///< NULL: all. Poses of others are not kept.
   size_t avatar_count;
+  /// INVALID_ARGUMENT beside another mode than QUANTISED; UNSUPPORTED, in the command's REPLY: a server without them.
+  stridewire_pose_detail detail;
 } stridewire_observation;
 
 /// `subscription` gets the number for stridewire_client_stop_observing. Observing one world twice is
@@ -579,6 +591,7 @@ typedef struct stridewire_pose {
   float root_position_m[3];
   uint8_t discontinuity;  ///< RAW: not to be interpolated from the pose before.
   uint8_t standing;       ///< Standing, nothing queued.
+  uint8_t detail;         ///< stridewire_pose_detail it was sent with.
 } stridewire_pose;
 
 /// Pose of an avatar at a time of the server's clock. `rotations_xyzw` gets 4 numbers a joint, the

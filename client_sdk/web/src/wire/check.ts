@@ -1,7 +1,7 @@
 import type {
   LayerRequest, MovementRequest, Observation, PoseMode, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox, Vec3
 } from '../types';
-import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
+import {footChoices, movementTypes, poseDetails, poseModes, roles, takeovers} from './decode';
 import {
   maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes, maxTerrainColumns,
   maxWaypoints
@@ -225,17 +225,21 @@ export function observe(observation: Observation): Observe {
   if (inRegion !== null && (observation.avatars?.length ?? 0) > 0) {
     throw new Malformed('are not needed beside a region', 'avatars');
   }
+  const mode = oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode');
+  const detail = oneOf(poseDetails, observation.detail ?? 'all', 'detail');
+  if (detail !== 'all' && mode !== 'quantised') throw new Malformed('is of quantised poses only', 'detail');
   return {
     type: 'Observe',
     seq: 0n,
     world: 0,
     subscription: 0,
-    mode: oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode'),
+    mode,
     avatars: avatarList(observation.avatars ?? [], 0, 'avatars'),
     everyNTicks,
     withEvents: observation.withEvents === true,
     region: inRegion,
     replace: false,
+    detail,
   };
 }
 

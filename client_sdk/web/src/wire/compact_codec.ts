@@ -28,22 +28,40 @@ export function checkRotationCodes(codes: readonly RotationCode[], jointCount: n
   });
 }
 
+/** @throws Malformed: joints that cannot be told without the others: not growing, or without the one they hang from. */
+export function checkFewerJoints(joints: readonly number[], parents: readonly number[]): void {
+  const wrong = (what: string, i: number): never => {
+    throw new Malformed(what, 'WorldInfo.fewerJoints', i);
+  };
+  if (joints.length > parents.length) wrong('are more than there are', -1);
+  joints.forEach((joint, i) => {
+    if (joint >= parents.length) wrong('is no joint', i);
+    if (i === 0 ? joint !== 0 : joint <= joints[i - 1]!) wrong('does not grow from the root', i);
+    if (i > 0 && !joints.includes(parents[joint]!)) wrong('is without the one it hangs from', i);
+  });
+}
+
 /** Reads compact poses of one world. */
 export class CompactCodec {
   readonly jointCount: number;
   readonly poseBytes: number;
-  /** Per joint: free bits, bits of x, y, z. */
+  /** Per joint: free bits, bits of x, y, z. Of one that is left out none. */
   private readonly bits: Uint8Array;
   /** Per joint: reference x, y, z, w, low x, y, z, step x, y, z, square of the least w. */
   private readonly numbers: Float64Array;
 
-  /** `codes` as checkRotationCodes takes them, at least one. */
-  constructor(codes: readonly RotationCode[]) {
+  /** `codes` as checkRotationCodes takes them, at least one; `told` as checkFewerJoints does, the joints that are
+   * told, or none: all. Others are read as their references. */
+  constructor(codes: readonly RotationCode[], told: readonly number[] = []) {
     this.jointCount = codes.length;
     this.bits = new Uint8Array(4 * codes.length);
     this.numbers = new Float64Array(11 * codes.length);
     let count = 0;
     codes.forEach((code, j) => {
+      if (told.length > 0 && !told.includes(j)) {
+        this.numbers.set(code.reference, 11 * j);  // All others 0: w is 1.
+        return;
+      }
       const {freeBits} = code;
       this.bits.set([freeBits, ...code.bits], 4 * j);
       const step = freeBits > 0 ? [1 / (Math.SQRT2 * (2 ** (freeBits - 1) - 1)), 0, 0] : code.step;

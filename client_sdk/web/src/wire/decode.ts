@@ -3,7 +3,7 @@ import {tableNumbers} from '../../generated/layout';
 import * as wire from '../../generated/wire';
 import type {
   CurrentMovement, EndSite, Foot, FootChoice, Landing, Leg, MovementKind, MovementType, ParameterName, Parameters,
-  PlayingLayer, PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
+  PlayingLayer, PoseDetail, PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
 } from '../types';
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
@@ -17,7 +17,7 @@ import {Malformed} from './malformed';
 import type {
   Joint, LayerEntry, Message, RegionEntry, ReplyEntry, RotationCode, SpawnEntry
 } from './messages';
-import {checkRotationCodes} from './compact_codec';
+import {checkFewerJoints, checkRotationCodes} from './compact_codec';
 import {compactPoseBytes, poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
@@ -26,7 +26,9 @@ import {verify} from './verify';
 const asBytes = Encoding.UTF8_BYTES;
 
 export const roles: readonly Role[] = ['controller', 'observer'];
-export const poseModes = ['full', 'quantised', 'movement', 'compact'] as const;
+export const poseModes =
+    ['full', 'quantised', 'movement', 'compact', 'compactFewer', 'compactRoot'] as const;
+export const poseDetails: readonly PoseDetail[] = ['all', 'fewer', 'root'];
 /** Those that can be asked for. */
 const observedModes = poseModes.slice(0, 3) as (PoseMode | 'movement')[];
 export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand', 'walk'];
@@ -145,6 +147,16 @@ function rotationCodes(m: wire.WorldInfo, jointCount: number): RotationCode[] {
   return codes;
 }
 
+function fewerJoints(m: wire.WorldInfo, joints: readonly Joint[]): number[] {
+  const length = count(m.fewerJointsLength(), 0, joints.length, 'WorldInfo.fewerJoints');
+  if (length > 0 && m.rotationCodesLength() === 0) {
+    throw new Malformed('is without codes', 'WorldInfo.fewerJoints');
+  }
+  const told = Array.from({length}, (_, i) => m.fewerJoints(i)!);
+  checkFewerJoints(told, joints.map(({parent}) => parent));
+  return told;
+}
+
 const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message} = {
   Hello(bytes) {
     const m = wire.Hello.getRootAsHello(bytes);
@@ -249,17 +261,23 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     if (inRegion === null && m.replace()) {
       throw new Malformed("only a region takes another one's place", 'Observe.replace');
     }
+    const mode = known(observedModes, m.mode(), 'Observe.mode');
+    const detail = known(poseDetails, m.detail(), 'Observe.detail');
+    if (detail !== 'all' && mode !== 'quantised') {
+      throw new Malformed('only quantised poses have levels of detail', 'Observe.detail');
+    }
     return {
       type: 'Observe',
       seq: id(m.seq(), 'Observe.seq'),
       world: id(m.world(), 'Observe.world'),
       subscription: id(m.subscription(), 'Observe.subscription'),
-      mode: known(observedModes, m.mode(), 'Observe.mode'),
+      mode,
       avatars,
       everyNTicks: everyNTicks(m.everyNTicks(), 'Observe.everyNTicks'),
       withEvents: m.withEvents(),
       region: inRegion,
       replace: m.replace(),
+      detail,
     };
   },
 
@@ -377,6 +395,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
           {length: count(m.layersLength(), 0, maxLayerNames, 'WorldInfo.layers')},
           (_, l) => name(m.layers(l)!.name(asBytes), 'WorldInfo.layers', l)),
       rotationCodes: rotationCodes(m, jointCount),
+      fewerJoints: fewerJoints(m, joints),
     };
   },
 
@@ -427,9 +446,10 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       throw new Malformed('is not one an avatar', 'PoseBatch.flags');
     }
     const poses = m.posesArray() ?? new Uint8Array(0);
-    const compactBytes = mode === 'compact' ? compactPoseBytes(flags, poses.length, jointCount) : 0;
-    if (mode === 'compact' ? compactBytes < 0
-                           : poses.length !== avatars.length * poseBytes(mode, jointCount)) {
+    const isCompact = mode !== 'full' && mode !== 'quantised';
+    const compactBytes = isCompact ? compactPoseBytes(flags, poses.length, jointCount) : 0;
+    if (isCompact ? compactBytes < 0
+                  : poses.length !== avatars.length * poseBytes(mode, jointCount)) {
       throw new Malformed('is not one an avatar', 'PoseBatch.poses');
     }
     return {

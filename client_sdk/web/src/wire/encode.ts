@@ -1,6 +1,6 @@
 import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
-import {footChoices, movementTypes, poseModes, roles, takeovers} from './decode';
+import {footChoices, movementTypes, poseDetails, poseModes, roles, takeovers} from './decode';
 import {makeFrame, maxPayloadBytes} from './frame';
 import {maxBulkBytes, maxControlBytes} from './limits';
 import {Malformed} from './malformed';
@@ -153,6 +153,7 @@ function build(b: Builder, m: ClientMessage): number {
       wire.Observe.addWithEvents(b, m.withEvents);
       if (region !== 0) wire.Observe.addRegion(b, region);
       wire.Observe.addReplace(b, m.replace);
+      wire.Observe.addDetail(b, poseDetails.indexOf(m.detail));
       return wire.Observe.endObserve(b);
     }
     case 'SetTerrain': {

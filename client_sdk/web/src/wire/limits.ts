@@ -14,6 +14,7 @@ export const featureLayers = 512n;
 export const featureRefusals = 1024n;
 export const featurePlanting = 2048n;
 export const featureCompact = 4096n;
+export const featureDetail = 8192n;
 export const featureRegions = 16_384n;
 
 export const maxHelloBytes = 16 << 10;

@@ -1,6 +1,6 @@
 /** Messages as plain objects, checked. 64-bit numbers are bigint where all their bits matter. */
 import type {
-  AvatarState, EndSite, Leg, PoseMode, QueuedRequest, Role, Terrain, Vec3, WorldEvent
+  AvatarState, EndSite, Leg, PoseDetail, PoseMode, QueuedRequest, Role, Terrain, Vec3, WorldEvent
 } from '../types';
 import type {CompactCodec} from './compact_codec';
 
@@ -65,6 +65,7 @@ export interface Observe {
   withEvents: boolean;
   region: RegionEntry | null;
   replace: boolean;
+  detail: PoseDetail;
 }
 export interface RegionEntry {
   x: number;
@@ -137,6 +138,8 @@ export interface WorldInfo {
   layers: string[];
   /** How compact poses are told: one a joint, or none. */
   rotationCodes: RotationCode[];
+  /** Joints that the detail 'fewer' tells, growing; none: there is no such detail. */
+  fewerJoints: number[];
 }
 /** STANDARD.md, "Poses". */
 export interface RotationCode {
@@ -149,7 +152,9 @@ export interface RotationCode {
   leastW: number;
 }
 /** In which mode poses come: who asked for quantised ones gets compact ones from servers that have them. */
-export type BatchMode = PoseMode | 'compact';
+export type BatchMode = PoseMode | CompactMode;
+/** Of all joints, and those of the details 'fewer' and 'root'. */
+export type CompactMode = 'compact' | 'compactFewer' | 'compactRoot';
 export interface ReplyEntry {
   index: number;
   avatar: number;

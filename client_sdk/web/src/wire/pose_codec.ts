@@ -56,7 +56,8 @@ export class PoseReader {
     } else {
       this.words = new Uint16Array(poses.buffer, poses.byteOffset, poses.byteLength >> 1);
     }
-    this.compactBytes = mode === 'compact' ? compactPoseBytes(flags, poses.length, jointCount) : 0;
+    this.compactBytes = mode === 'full' || mode === 'quantised' ? 0 :
+      compactPoseBytes(flags, poses.length, jointCount);
   }
 
   /**

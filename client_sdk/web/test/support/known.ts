@@ -6,7 +6,7 @@ import {vectorCodec} from './vectors';
 const texts = new Set([
   'Hello', 'JoinWorld', 'LeaveWorld', 'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe',
   'StopObserving', 'Ping', 'InspectAvatar', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch',
-  'compact', 'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
+  'compact', 'compactFewer', 'compactRoot', 'all', 'fewer', 'root', 'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
   'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
   'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
   'removed', 'entered', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
@@ -50,7 +50,7 @@ export function onlyKnown(value: unknown, field = ''): void {
 export function checkMessage(message: Message): 'known' | 'refused pose' {
   onlyKnown(message);
   if (message.type !== 'PoseBatch') return 'known';
-  if (message.mode === 'compact') message.codec = vectorCodec();
+  message.codec = vectorCodec(message.mode);
   const reader = new PoseReader(message);
   const rootM = new Float32Array(3);
   const rotations = new Float32Array(4 * message.jointCount);

@@ -1,5 +1,5 @@
 import {
-  eventTypes, footChoices, movementKinds, movementTypes, takeovers, parameterNames, poseModes, roles
+  eventTypes, footChoices, movementKinds, movementTypes, takeovers, parameterNames, poseDetails, poseModes, roles
 } from '../../src/wire/decode';
 import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
@@ -109,6 +109,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         seq: u64(m.seq), world: m.world, subscription: m.subscription,
         mode: poseModes.indexOf(m.mode), avatars: [...m.avatars], every_n_ticks: m.everyNTicks,
         with_events: m.withEvents,
+        ...(m.detail === 'all' ? {} : {detail: poseDetails.indexOf(m.detail)}),
         ...(m.region === null ? {} : {
           region: {
             centre_m: {x: m.region.x, z: m.region.z}, radius_m: m.region.radiusM,
@@ -166,6 +167,7 @@ export function toJson(m: Message): {[name: string]: Json} {
           reference: [...code.reference], low: vec3(code.low), step: vec3(code.step),
           bits: vec3(code.bits), free_bits: code.freeBits, least_w: code.leastW,
         })),
+        ...(m.fewerJoints.length === 0 ? {} : {fewer_joints: [...m.fewerJoints]}),
       };
     case 'Reply':
       return {
@@ -177,7 +179,7 @@ export function toJson(m: Message): {[name: string]: Json} {
       };
     case 'PoseBatch': {
       const reader = new PoseReader(
-          m.mode === 'compact' ? {...m, codec: vectorCodec()} : m);
+          {...m, codec: vectorCodec(m.mode)});
       return {
         world: m.world, shard: m.shard, part: m.part, parts: m.parts, tick: u64(m.tick),
         server_time_s: m.serverTimeS, mode: poseModes.indexOf(m.mode),

@@ -1,5 +1,6 @@
 import {readFileSync, readdirSync} from 'node:fs';
 import {CompactCodec} from '../../src/wire/compact_codec';
+import type {BatchMode} from '../../src/wire/messages';
 import {decodeFrame} from '../../src/wire/decode';
 import {root} from './environment';
 
@@ -27,15 +28,18 @@ export function readVectors(): Vector[] {
   });
 }
 
-let codec: CompactCodec | null = null;
+const codecs = new Map<BatchMode, CompactCodec>();
 
-/** Of the vectors' compact poses: told by `world_info_compact`. */
-export function vectorCodec(): CompactCodec {
-  if (codec === null) {
-    const vector = readVectors().find(({name}) => name === 'world_info_compact')!;
-    const info = decodeFrame(vector.frame, 'server');
-    if (info.type !== 'WorldInfo') throw new Error('world_info_compact is no WorldInfo');
-    codec = new CompactCodec(info.rotationCodes);
-  }
+/** Of the vectors' compact poses: told by `world_info_detail`. Null for modes that need none. */
+export function vectorCodec(mode: BatchMode): CompactCodec | null {
+  if (mode === 'full' || mode === 'quantised') return null;
+  const known = codecs.get(mode);
+  if (known !== undefined) return known;
+  const vector = readVectors().find(({name}) => name === 'world_info_detail')!;
+  const info = decodeFrame(vector.frame, 'server');
+  if (info.type !== 'WorldInfo') throw new Error('world_info_detail is no WorldInfo');
+  const codec = new CompactCodec(info.rotationCodes,
+    mode === 'compactFewer' ? info.fewerJoints : mode === 'compactRoot' ? [0] : []);
+  codecs.set(mode, codec);
   return codec;
 }

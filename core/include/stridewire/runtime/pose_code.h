@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -37,6 +38,17 @@ struct PoseCode {
 [[nodiscard]] PoseCode ChoosePoseCode(const Skeleton& skeleton,
                                       std::span<const RotationRange> ranges,
                                       double largest_error_m);
+
+/// The joints that are worth telling of who is seen from afar, growing. Left out are those that, shown with everything
+/// below them as their ranges' references, move no joint or end site by more than `largest_shift_m` within the ranges: a
+/// joint's turn from its reference, as a chord, times the reach of what hangs from it, and the sum of that along a chain.
+/// The root is never left out, nor is the parent of one that is told. Same on every machine.
+[[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
+                                                           std::span<const RotationRange> ranges,
+                                                           double largest_shift_m);
+/// The largest shift of those left out of a library's poses.
+inline constexpr double kFewerJointsShift_m = 0.12;
+[[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library);
 
 /// Both, so that with the root in steps of 2^-14 m everything is within 1 mm of where it is in the world.
 [[nodiscard]] PoseCode ChoosePoseCode(const MotionLibrary& library);

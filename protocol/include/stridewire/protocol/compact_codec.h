@@ -15,6 +15,11 @@ namespace stridewire::protocol {
 /// that turns every way. kOutOfRange, kMalformed; `index` is the joint. None at all is allowed: a world without.
 [[nodiscard]] Status CheckRotationCodes(std::span<const RotationCode> codes);
 
+/// Whether some joints can be told without the others: numbers growing, the root among them and of each its parent.
+/// kShapeMismatch: more than there are joints; kMalformed with `index` in `joints`.
+[[nodiscard]] Status CheckFewerJoints(std::span<const std::uint16_t> joints,
+                                      std::span<const std::int16_t> parents);
+
 /// A RotationCode as the codec takes it.
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
@@ -26,6 +31,7 @@ struct CompactJoint {
   float least_w = 0.0f;
   std::int32_t parent = -1;  ///< -1: none
   bool bears_others = false;
+  bool is_left_out = false;  ///< Decoded to `reference`, however it is turned.
 };
 
 /// PoseMode::kCompact (STANDARD.md, "Poses"): the root as in kQuantised, then every joint's bits behind one another, the
@@ -38,10 +44,12 @@ class CompactCodec {
   /// Poses that are encoded together.
   static constexpr std::size_t kBlock = 16;
 
-  /// `parents` has one entry a joint, -1 for the first, then below its own index. Errors as CheckRotationCodes,
-  /// kShapeMismatch: not as many parents; kOutOfRange: a parent.
+  /// `parents` has one entry a joint, -1 for the first, then below its own index. `told`: the joints that are told;
+  /// none: all. Errors as CheckRotationCodes and CheckFewerJoints, kShapeMismatch: not as many parents; kOutOfRange:
+  /// a parent.
   [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationCode> codes,
-                                                   std::span<const std::int16_t> parents);
+                                                   std::span<const std::int16_t> parents,
+                                                   std::span<const std::uint16_t> told = {});
 
   [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
   /// Bytes of a pose.

@@ -23,7 +23,7 @@ inline constexpr std::uint64_t kFeatureLayers = 512;      ///< SetLayers, WorldI
 inline constexpr std::uint64_t kFeatureRefusals = 1024;   ///< StepMovement::must_be_met.
 inline constexpr std::uint64_t kFeaturePlanting = 2048;   ///< SetPlanting.
 inline constexpr std::uint64_t kFeatureCompact = 4096;    ///< PoseMode::kCompact.
-
+inline constexpr std::uint64_t kFeatureDetail = 8192;     ///< Observe::detail.
 inline constexpr std::uint64_t kFeatureRegions = 16'384;  ///< Observe::region, kEntered, kLeft.
 
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.

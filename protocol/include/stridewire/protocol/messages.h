@@ -270,6 +270,8 @@ struct Observe {
   /// Who is in it, instead of `avatars`, which is empty then. Only with kFeatureRegions.
   std::optional<Region> region;
   bool replace = false;  ///< Puts this region in place of that of the subscription of that number.
+  /// Of quantised poses only. With kFeatureDetail and kFeatureCompact, else kAll.
+  PoseDetail detail = PoseDetail::kAll;
   bool operator==(const Observe&) const = default;
 };
 
@@ -392,6 +394,9 @@ struct WorldInfo {
   std::vector<std::string> layers;  ///< Names for SetLayers; only with kFeatureLayers.
   /// One a joint, for compact poses; only with kFeatureCompact, else none.
   std::vector<RotationCode> rotation_codes;
+  /// Those that PoseDetail::kFewer tells, growing, the root among them and of each its parent (CheckFewerJoints);
+  /// only with kFeatureDetail and codes, else none.
+  std::vector<std::uint16_t> fewer_joints;
   bool operator==(const WorldInfo&) const = default;
 };
 
@@ -430,7 +435,7 @@ struct PoseBatchInfo {
   std::uint16_t parts = 1;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;       ///< The server's clock at that tick.
-  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or kCompact
+  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or IsCompact
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
   bool is_partial = false;          ///< Who is not in it may be there all the same: of a region.
   bool operator==(const PoseBatchInfo&) const = default;

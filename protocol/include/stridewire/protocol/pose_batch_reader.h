@@ -21,7 +21,7 @@ namespace stridewire::protocol {
 /// Borrows both; never allocates.
 class PoseBatchReader {
  public:
-  /// `codec`: the world's, null if none was told.
+  /// `codec`: the world's for the batch's mode (CompactCodecs::Find), null if there is none.
   PoseBatchReader(const PoseBatch& batch, const CompactCodec* codec)
       : batch_(batch), codec_(codec), compact_bytes_(CompactPoseBytes(batch).value_or(0)) {}
 

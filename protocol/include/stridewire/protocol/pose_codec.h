@@ -16,7 +16,33 @@ enum class PoseMode : std::uint8_t {
   kMovement = 2,   ///< What a movement was decided to be, once a step (Movements). No pose is sent.
   /// What who agreed on kFeatureCompact gets in place of kQuantised (compact_codec.h); nobody asks for it.
   kCompact = 3,
+  /// What who asked for PoseDetail::kFewer or kRoot gets: compact poses that tell some of the joints.
+  kCompactFewer = 4,
+  kCompactRoot = 5,
 };
+
+/// How much of a pose is told. The joints that are not are decoded to the references of the world's codes.
+enum class PoseDetail : std::uint8_t {
+  kAll = 0,
+  kFewer = 1,  ///< WorldInfo::fewer_joints: what is left out moves little.
+  kRoot = 2,   ///< Where the figure is and how it is turned.
+};
+
+/// Whether poses are told by a CompactCodec.
+[[nodiscard]] constexpr bool IsCompact(PoseMode mode) {
+  return mode == PoseMode::kCompact || mode == PoseMode::kCompactFewer ||
+         mode == PoseMode::kCompactRoot;
+}
+[[nodiscard]] constexpr PoseMode CompactMode(PoseDetail detail) {
+  return detail == PoseDetail::kAll     ? PoseMode::kCompact
+         : detail == PoseDetail::kFewer ? PoseMode::kCompactFewer
+                                        : PoseMode::kCompactRoot;
+}
+[[nodiscard]] constexpr PoseDetail DetailOf(PoseMode mode) {
+  return mode == PoseMode::kCompactFewer  ? PoseDetail::kFewer
+         : mode == PoseMode::kCompactRoot ? PoseDetail::kRoot
+                                          : PoseDetail::kAll;
+}
 
 /// Quantised root: multiples of 2^-14 m (0.061 mm), so the error is at most 2^-15 m = 0.031 mm as
 /// long as float32 itself is that fine (|x| < 256 m), over +-131,071 m from the world's origin.
@@ -33,13 +59,15 @@ inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 /// How far a quaternion's length may be from 1.
 inline constexpr float kUnitTolerance = 1e-3f;
 
-/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement and kCompact, whose poses differ by world.
+/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement and compact modes, whose poses differ by world.
 [[nodiscard]] constexpr std::size_t PoseBytes(PoseMode mode, std::size_t joint_count) {
   switch (mode) {
     case PoseMode::kFull: return 12 + 16 * joint_count;
     case PoseMode::kQuantised: return 12 + 6 * joint_count;
     case PoseMode::kMovement:
-    case PoseMode::kCompact: return 0;
+    case PoseMode::kCompact:
+    case PoseMode::kCompactFewer:
+    case PoseMode::kCompactRoot: return 0;
   }
   return 0;
 }
