@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "net/connection.h"
+#include "session/encode_frame.h"
 #include "session/event_replay.h"
 #include "session/movement_feed.h"
 #include "session/refusal.h"
@@ -198,6 +199,8 @@ class Session : private ConnectionHandler {
   /// The membership a controller's command needs; answers and returns null if there is none.
   Membership* Commanding(protocol::Seq seq, WorldId world);
   bool Affords(protocol::Seq seq, std::size_t item_count);
+  /// Of one command.
+  [[nodiscard]] static std::size_t MaxItems(const Limits& limits);
   template <typename Part>
   void SubmitParts(protocol::Seq seq, const std::shared_ptr<World>& world,
                    std::vector<Part>&& parts, Pending&& pending);
@@ -220,7 +223,12 @@ class Session : private ConnectionHandler {
   std::uint64_t SendNumbered(protocol::Events&& message);
   void CountDropped(WorldId world, std::uint64_t events);
   template <typename Message>
-  void Send(const Message& message);
+  void Send(const Message& message) {
+    if (connection_ == nullptr) return;
+    if (auto frame = EncodeFrame(host_.encoder(), message)) {
+      connection_->SendControl(std::move(frame));
+    }
+  }
   /// Says why and lets the connection go; the session waits for its client.
   void Fail(protocol::StatusCode code, std::string text, protocol::Seq seq = 0);
   void Detach();
