@@ -61,12 +61,13 @@ struct Crowd {
     auto rows = std::make_shared<protocol::PoseRows>();
     auto places = std::make_shared<server::Places>();
     const Pose& pose = library->stand_pose();
-    Status status = rows->Begin(
-        {.world = world->id,
-         .tick = 1,
-         .mode = protocol::PoseMode::kCompact,
-         .joint_count = static_cast<std::uint16_t>(pose.rotations.size())},
-        std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers), &world->codes->codec);
+    Status status =
+        rows->Begin({.world = world->id,
+                     .tick = 1,
+                     .mode = protocol::PoseMode::kCompact,
+                     .joint_count = static_cast<std::uint16_t>(pose.rotations.size())},
+                    std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
+                    world->codes->codecs.Find(protocol::PoseMode::kCompact));
     places->Begin(world->interest_cell_m, kAvatars);
     std::mt19937 random(1);
     for (std::uint32_t row = 0; row < kAvatars; ++row) {
