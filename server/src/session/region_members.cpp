@@ -23,10 +23,17 @@ std::uint16_t RegionMembers::EveryAt(double distance_m2) const {
 }
 
 RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
-  Lane& lane = lanes_[delivery.from_shard];
-  const protocol::PoseRows& rows = *delivery.rows;
-  if (lane.avatars != rows.avatars()) {
-    lane.avatars = rows.avatars();
+  return Update(delivery.from_shard, delivery.tick, delivery.rows->avatars(), *delivery.places,
+                delivery.rows.get());
+}
+
+RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
+                                            const protocol::PoseRows::Avatars& avatars,
+                                            const Places& places, const protocol::PoseRows* rows) {
+  const auto has_pose = [&](std::uint32_t row) { return rows == nullptr || rows->has_pose(row); };
+  Lane& lane = lanes_[from_shard];
+  if (lane.avatars != avatars) {
+    lane.avatars = avatars;
     lane.is_inside.assign(lane.avatars->size(), false);
     for (const AvatarNumber number : lane.inside) {
       const auto at = std::ranges::lower_bound(*lane.avatars, number);
@@ -39,13 +46,11 @@ RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
   const double centre_z = region_.centre_m.z;
   const double enter_m2 = region_.radius_m * region_.radius_m;
   const double leave_m2 = leave_at_m_ * leave_at_m_;
-  delivery.places->ForEachNear(
-      centre_x, centre_z, leave_at_m_, [&](std::uint32_t row, double x, double z) {
-        const double distance_m2 =
-            (x - centre_x) * (x - centre_x) + (z - centre_z) * (z - centre_z);
-        if (distance_m2 > (lane.is_inside[row] ? leave_m2 : enter_m2)) return;
-        near_.emplace_back(row, distance_m2);
-      });
+  places.ForEachNear(centre_x, centre_z, leave_at_m_, [&](std::uint32_t row, double x, double z) {
+    const double distance_m2 = (x - centre_x) * (x - centre_x) + (z - centre_z) * (z - centre_z);
+    if (distance_m2 > (lane.is_inside[row] ? leave_m2 : enter_m2)) return;
+    near_.emplace_back(row, distance_m2);
+  });
   std::ranges::sort(near_);
   now_.clear();
   entered_.clear();
@@ -56,10 +61,10 @@ RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
     const AvatarNumber number = (*lane.avatars)[row];
     if (!lane.is_inside[row]) {
       // Just after a region has moved the shard may not know yet that its pose is wanted.
-      if (!rows.has_pose(row)) continue;
+      if (!has_pose(row)) continue;
       entered_.push_back(number);
       due_.push_back(row);
-    } else if (rows.has_pose(row) && delivery.tick % EveryAt(distance_m2) == 0) {
+    } else if (has_pose(row) && tick % EveryAt(distance_m2) == 0) {
       due_.push_back(row);
     }
     now_.push_back(number);

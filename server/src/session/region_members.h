@@ -30,8 +30,19 @@ class RegionMembers {
     std::span<const std::uint32_t> due;     ///< Rows whose poses are to be sent.
   };
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
+  /// The same of all avatars of a shard, whose poses nobody asks for.
+  [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
+                              const protocol::PoseRows::Avatars& avatars, const Places& places) {
+    return Update(from_shard, tick, avatars, places, nullptr);
+  }
+  /// Who of a shard is in it, growing.
+  [[nodiscard]] const std::vector<AvatarNumber>& inside(int shard) { return lanes_[shard].inside; }
 
  private:
+  // `rows` null: all have poses.
+  [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
+                              const protocol::PoseRows::Avatars& avatars, const Places& places,
+                              const protocol::PoseRows* rows);
   [[nodiscard]] std::uint16_t EveryAt(double distance_m2) const;
 
   protocol::Region region_;

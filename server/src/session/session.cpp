@@ -373,10 +373,6 @@ void Session::Execute(protocol::Observe&& command) {
            "the feature 'regions' was not agreed on in the handshake");
     return;
   }
-  if (command.region && command.mode == PoseMode::kMovement) {
-    Answer(command.seq, StatusCode::kUnsupported, "movements are not told of regions");
-    return;
-  }
   if (command.replace) {
     MoveRegion(command, it->second.world);
     return;

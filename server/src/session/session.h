@@ -147,6 +147,10 @@ class Session : private ConnectionHandler {
   [[nodiscard]] bool WantsMovements(WorldId world) const {
     return connection_ != nullptr && subscriptions_.Watches(world, protocol::PoseMode::kMovement);
   }
+  /// Where avatars are, too, for a region whose movements it wants.
+  [[nodiscard]] bool WantsMovementPlaces(WorldId world) const {
+    return WantsMovements(world) && subscriptions_.HasRegion(world);
+  }
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
@@ -218,7 +222,7 @@ class Session : private ConnectionHandler {
   void SendLagging(Membership& membership);
   void SendPoses(const PoseDelivery& delivery);
   void MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world);
-  void TellRegion(const PoseDelivery& delivery, const RegionMembers::Change& change);
+  void TellRegion(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers and sends it, or keeps it for a client that is away. Returns how many events were lost.
   std::uint64_t SendNumbered(protocol::Events&& message);
   void CountDropped(WorldId world, std::uint64_t events);

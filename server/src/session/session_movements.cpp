@@ -36,8 +36,13 @@ const SharedFrame& SharedMovements::Empty(std::size_t i, const protocol::Movemen
 void Session::WatchMovements(const std::shared_ptr<World>& world) {
   const std::span<const AvatarNumber> named =
       subscriptions_.Named(world->id, protocol::PoseMode::kMovement);
+  RegionMembers* region = subscriptions_.RegionOf(world->id, protocol::PoseMode::kMovement);
   for (int shard = 0; shard < host_.shard_count(); ++shard) {
     MovementFeed& feed = movement_feeds_.try_emplace({world->id, shard}, world).first->second;
+    if (region != nullptr) {
+      feed.Watch(region->inside(shard));
+      continue;
+    }
     if (named.empty()) {
       feed.Watch(std::nullopt);
       continue;
@@ -104,6 +109,16 @@ void Session::OnMovements(SharedMovements& movements) {
     SendMovements(
         delivery.world, delivery.from_shard, feed,
         some.avatars.empty() ? movements.Empty(i, some) : EncodeFrame(host_.encoder(), some));
+  }
+  RegionMembers* region = subscriptions_.RegionOf(delivery.world, protocol::PoseMode::kMovement);
+  // No places: the shard has not heard yet that there is a region.
+  if (region != nullptr && delivery.places != nullptr) {
+    const RegionMembers::Change change =
+        region->Update(delivery.from_shard, delivery.tick, delivery.avatars, *delivery.places);
+    if (!change.entered.empty() || !change.left.empty()) {
+      feed.Watch(region->inside(delivery.from_shard));
+      TellRegion(delivery.world, delivery.tick, change);
+    }
   }
   // Nothing waits to be sent any more, so OnSent did not come: a feed that was lost goes on from here.
   AskForStates();

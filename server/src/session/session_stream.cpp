@@ -100,33 +100,31 @@ void Session::OnPoses(SharedPoses& poses) {
     case Subscriptions::Share::kRegion:
       if (delivery.places == nullptr) return;  // the same
       const RegionMembers::Change change = subscriptions_.UpdateRegion(delivery);
-      TellRegion(delivery, change);
+      TellRegion(delivery.world, delivery.tick, change);
       if (!change.due.empty()) SendPoses(poses.ComposeShared(change.due));
       return;
   }
 }
 
-void Session::TellRegion(const PoseDelivery& delivery, const RegionMembers::Change& change) {
+void Session::TellRegion(WorldId world, std::uint64_t tick, const RegionMembers::Change& change) {
   const std::size_t count = change.left.size() + change.entered.size();
   if (count == 0) return;
   std::vector<protocol::Event> events;
   events.reserve(count);
   const auto add = [&](protocol::EventType type, std::span<const AvatarNumber> avatars) {
     for (const AvatarNumber avatar : avatars) {
-      events.push_back({.type = type,
-                        .avatar = avatar,
-                        .tick = delivery.tick,
-                        .time_s = host_.clock().TickTime(delivery.tick)});
+      events.push_back(
+          {.type = type, .avatar = avatar, .tick = tick, .time_s = host_.clock().TickTime(tick)});
     }
   };
   add(protocol::EventType::kLeft, change.left);
   add(protocol::EventType::kEntered, change.entered);
-  const EventDelivery own{delivery.world, delivery.tick,
+  const EventDelivery own{world, tick,
                           std::make_shared<const std::vector<protocol::Event>>(std::move(events))};
   std::uint64_t dropped = 0;
   ForEachEventFrame(
       own, [&](protocol::Events&& message) { dropped += SendNumbered(std::move(message)); });
-  CountDropped(delivery.world, dropped);
+  CountDropped(world, dropped);
 }
 
 void Session::SendPoses(const PoseDelivery& delivery) {

@@ -9,6 +9,20 @@ using protocol::PoseDetail;
 using protocol::PoseMode;
 using protocol::SubscriptionId;
 
+namespace {
+
+// The region of a world and mode; null: there is none.
+template <typename All>
+auto RegionIn(All& all, const std::pair<WorldId, PoseMode>& key)
+    -> decltype(&*all.begin()->second.region) {
+  const auto it = std::ranges::find_if(all, [&](const auto& item) {
+    return item.second.region && std::pair(item.second.world, item.second.mode) == key;
+  });
+  return it == all.end() ? nullptr : &*it->second.region;
+}
+
+}  // namespace
+
 PoseMode Subscriptions::SentMode(PoseMode asked, PoseDetail detail) const {
   if (asked != PoseMode::kQuantised && !IsCompact(asked)) return asked;
   if (!is_compact_) return PoseMode::kQuantised;
@@ -131,24 +145,19 @@ bool Subscriptions::MoveRegion(SubscriptionId id, const protocol::Observe& moved
   return true;
 }
 
-const RegionMembers* Subscriptions::FindRegion(const Key& key) const {
-  const auto it = std::ranges::find_if(all_, [&](const auto& item) {
-    return item.second.region && Key(item.second.world, item.second.mode) == key;
-  });
-  return it == all_.end() ? nullptr : &*it->second.region;
-}
+const RegionMembers* Subscriptions::FindRegion(const Key& key) const { return RegionIn(all_, key); }
 
 std::optional<RegionReach> Subscriptions::ReachOf(WorldId world, PoseMode mode) const {
   const RegionMembers* region = FindRegion({world, mode});
   return region == nullptr ? std::nullopt : std::optional(region->reach());
 }
 
+RegionMembers* Subscriptions::RegionOf(WorldId world, PoseMode mode) {
+  return RegionIn(all_, {world, mode});
+}
+
 RegionMembers::Change Subscriptions::UpdateRegion(const PoseDelivery& delivery) {
-  const auto it = std::ranges::find_if(all_, [&](const auto& item) {
-    return item.second.region && item.second.world == delivery.world &&
-           item.second.mode == delivery.mode;
-  });
-  return it->second.region->Update(delivery);
+  return RegionOf(delivery.world, delivery.mode)->Update(delivery);
 }
 
 Subscriptions::Share Subscriptions::ShareOf(const PoseDelivery& delivery) const {

@@ -74,6 +74,8 @@ class Subscriptions {
   /// The rows of a delivery that Share::kSome is about; without value: none has a pose and the client knows
   /// already. They hold until the next call of anything here.
   [[nodiscard]] std::optional<std::span<const std::uint32_t>> Pick(const PoseDelivery& delivery);
+  /// The region of that world and mode; null: there is none.
+  [[nodiscard]] RegionMembers* RegionOf(WorldId world, protocol::PoseMode mode);
   /// The same of Share::kRegion. The delivery has places.
   [[nodiscard]] RegionMembers::Change UpdateRegion(const PoseDelivery& delivery);
 

@@ -162,6 +162,7 @@ struct Interest {
   std::array<PoseInterest, kSentModes.size()> poses;
   bool events = false;
   bool movements = false;
+  bool movement_places = false;  ///< Some of them are about regions.
 };
 
 /// Poses of one world, shard, mode and tick.
@@ -182,7 +183,11 @@ struct PoseDelivery {
 struct MovementDelivery {
   WorldId world = 0;
   int from_shard = 0;
+  std::uint64_t tick = 0;
   std::shared_ptr<const std::vector<protocol::Movements>> steps;
+  /// Whose, and where they are after it; null: nobody has a region.
+  protocol::PoseRows::Avatars avatars;
+  std::shared_ptr<const Places> places;
 };
 
 /// Events of one world, shard and tick.

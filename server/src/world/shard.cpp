@@ -151,10 +151,10 @@ void Shard::Publish() {
         outgoing_[shard].events.push_back({id, tick_, events});
       }
     }
-    if (const auto steps = world->TakeMovements()) {
+    if (MovementDelivery movements; world->TakeMovements(tick_, movements)) {
       for (std::size_t shard = 0; shard < outgoing_.size(); ++shard) {
         if (!world->WantsMovements(static_cast<int>(shard))) continue;
-        outgoing_[shard].movements.push_back({id, index_, steps});
+        outgoing_[shard].movements.push_back(movements);
       }
     }
     for (const PoseMode mode : kSentModes) {
@@ -272,6 +272,7 @@ void Shard::InterestChanged(const std::shared_ptr<World>& world) {
     }
     const bool movements = session->WantsMovements(world->id);
     interest.movements |= movements;
+    interest.movement_places |= session->WantsMovementPlaces(world->id);
     watches |= movements;
     if (watches) watchers.push_back(session.get());
   }
@@ -283,7 +284,8 @@ void Shard::InterestChanged(const std::shared_ptr<World>& world) {
   // holds, which has all that anyone has seen so far.
   if (is_told || !is_none) named_anew_.insert(world->id);
   bool is_same = is_told ? told->second.events == interest.events &&
-                               told->second.movements == interest.movements
+                               told->second.movements == interest.movements &&
+                               told->second.movement_places == interest.movement_places
                          : is_none;
   for (std::size_t mode = 0; is_told && mode < kSentModes.size(); ++mode) {
     interest.poses[mode].named = told->second.poses[mode].named;

@@ -313,12 +313,14 @@ void WorldShard::SetInterest(const Interest& interest) {
   interests_[static_cast<std::size_t>(interest.shard)] = interest;
   events_wanted_ = false;
   movements_wanted_ = false;
+  movement_places_wanted_ = false;
   max_every_ = 1;
   are_named_rows_known_ = false;
   std::array<bool, kSentModes.size()> observed{};
   for (const Interest& shard : interests_) {
     events_wanted_ |= shard.events;
     movements_wanted_ |= shard.movements;
+    movement_places_wanted_ |= shard.movement_places;
     for (std::size_t mode = 0; mode < observed.size(); ++mode) {
       const PoseInterest::Every& every = shard.poses[mode].every;
       observed[mode] |= every.whole > 0 || every.some > 0;
@@ -418,12 +420,23 @@ void WorldShard::TellMovements() {
   }
 }
 
-std::shared_ptr<const std::vector<protocol::Movements>> WorldShard::TakeMovements() {
-  if (movements_.empty()) return nullptr;
+bool WorldShard::TakeMovements(std::uint64_t tick, MovementDelivery& delivery) {
+  if (movements_.empty()) return false;
   for (const protocol::Movements& message : movements_) {
     metrics_.movements_encoded.Add(message.avatars.size());
   }
-  return std::make_shared<const std::vector<protocol::Movements>>(std::exchange(movements_, {}));
+  delivery = {.world = world_->id,
+              .from_shard = shard_,
+              .tick = tick,
+              .steps = std::make_shared<const std::vector<protocol::Movements>>(
+                  std::exchange(movements_, {})),
+              .avatars = nullptr,
+              .places = nullptr};
+  if (movement_places_wanted_) {
+    delivery.places = PlacesAt(tick);
+    delivery.avatars = numbers_;
+  }
+  return true;
 }
 
 StatesAnswer WorldShard::States(const StatesQuestion& question, protocol::Encoder& encoder) const {

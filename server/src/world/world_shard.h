@@ -61,8 +61,8 @@ class WorldShard {
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
-  /// What avatars began since this was last called, in order; null if nobody would miss it.
-  [[nodiscard]] std::shared_ptr<const std::vector<protocol::Movements>> TakeMovements();
+  /// What avatars began since this was last called, up to `tick`. False: nobody would miss it.
+  [[nodiscard]] bool TakeMovements(std::uint64_t tick, MovementDelivery& delivery);
 
   /// The states of avatars after the last tick, of one at least and until there are `enough_bytes`.
   [[nodiscard]] StatesAnswer States(const StatesQuestion& question,
@@ -137,6 +137,7 @@ class WorldShard {
   bool events_wanted_ = false;
   std::vector<protocol::Event> events_;
   bool movements_wanted_ = false;
+  bool movement_places_wanted_ = false;
   bool last_step_had_avatars_ = false;
   std::uint64_t step_ = 0;  // of its avatars
   std::uint64_t tick_ = 0;  // to which they go on

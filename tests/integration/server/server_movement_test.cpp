@@ -7,6 +7,7 @@
 #include <cstring>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string>
 
 #include "movement_view.h"
@@ -76,6 +77,15 @@ class BothWays {
                                    .mode = mode,
                                    .avatars = avatars});
   }
+  void ObserveRegion(double x, double radius_m, bool replace = false) {
+    client_.Send(protocol::Observe{
+        .seq = client_.NextSeq(),
+        .world = world_,
+        .subscription = 9,
+        .mode = PoseMode::kMovement,
+        .region = protocol::Region{.centre_m = {x, 0.0}, .radius_m = radius_m, .leave_m = 3.0},
+        .replace = replace});
+  }
   void StopObserving(protocol::SubscriptionId id) {
     client_.Send(protocol::StopObserving{.seq = client_.NextSeq(), .subscription = id});
   }
@@ -97,16 +107,22 @@ class BothWays {
           full_[{batch->info.tick, batch->avatars[i]}].assign(pose.begin(), pose.end());
         }
         last_tick_ = batch->info.tick;
+      } else if (const auto* events = std::get_if<protocol::Events>(&*message)) {
+        for (const protocol::Event& event : events->events) {
+          if (event.type == protocol::EventType::kEntered) inside_.insert(event.avatar);
+          if (event.type == protocol::EventType::kLeft) inside_.erase(event.avatar);
+        }
       }
     }
   }
 
   // Compares where both are; how many that were.
-  int Compare() const {
+  int Compare() const { return CompareWith(full_); }
+  int CompareWith(const Shown& others) const {
     int compared = 0;
     for (const auto& [key, bytes] : told_.shown) {
-      const auto full = full_.find(key);
-      if (full == full_.end()) continue;
+      const auto full = others.find(key);
+      if (full == others.end()) continue;
       EXPECT_TRUE(full->second == bytes) << "tick " << key.first << ", avatar " << key.second;
       ++compared;
     }
@@ -120,6 +136,8 @@ class BothWays {
   int states() const { return states_; }
   const std::map<AvatarNumber, int>& told_of() const { return told_of_; }
   std::uint64_t last_tick() const { return last_tick_; }
+  /// The region it observes has them, as it was told.
+  const std::set<AvatarNumber>& inside() const { return inside_; }
 
  private:
   RawClient client_;
@@ -129,6 +147,7 @@ class BothWays {
   Shown full_;
   int states_ = 0;
   std::map<AvatarNumber, int> told_of_;
+  std::set<AvatarNumber> inside_;
   std::uint64_t last_tick_ = 0;
 };
 
@@ -240,6 +259,44 @@ TEST(ServerMovement, TellsOfThoseNamedAlone) {
                 avatar == 100)
         << avatar << " was told of " << count << " times";
   }
+}
+
+// 40 who walk away from a row at z = 0, 2 m from each other: they leave by themselves, or as the region moves along the row.
+TEST(ServerMovement, TellsOfThoseInARegionThatMoves) {
+  TestServer server(BuiltinConfig(2));
+  Crowd crowd(server, "w", 40);
+  BothWays watcher(server, "w");
+  watcher.Observe(PoseMode::kFull, 1);
+  BothWays player(server, "w");
+  player.ObserveRegion(20.0, 6.0);
+  const auto shown_of = [&](AvatarNumber avatar) {
+    return std::ranges::count_if(player.told().shown,
+                                 [&](const auto& item) { return item.first.second == avatar; });
+  };
+  const auto is_told_of_those_inside = [&] {
+    return player.view().avatar_count() == player.inside().size() &&
+           std::ranges::none_of(player.inside(), [&](AvatarNumber avatar) {
+             return !shown_of(avatar) || player.told().gone.contains(avatar);
+           });
+  };
+  player.TakeUntil([&] { return shown_of(10) > 20 && is_told_of_those_inside(); });
+  EXPECT_GE(player.inside().size(), 4u);
+  EXPECT_LE(player.inside().size(), 9u);
+  for (int step = 1; step <= 10; ++step) {
+    player.ObserveRegion(20.0 + 4.0 * step, 6.0, /*replace=*/true);
+    const std::uint64_t from = player.told().shown.rbegin()->first.first;
+    player.TakeUntil([&] { return player.told().shown.rbegin()->first.first > from + 10; });
+  }
+  // 60 m along: all of before are out, with those who have walked further than 9 m.
+  player.TakeUntil([&] { return player.told().gone.contains(10) && is_told_of_those_inside(); });
+  EXPECT_FALSE(player.inside().contains(10));
+  EXPECT_GT(player.told_of().size(), 15u);
+  for (const auto& [avatar, count] : player.told_of()) {
+    EXPECT_TRUE(avatar >= 5 && avatar <= 37) << avatar << " was told of " << count << " times";
+  }
+  const std::uint64_t until = player.told().shown.rbegin()->first.first;
+  watcher.TakeUntil([&] { return watcher.last_tick() >= until; });
+  EXPECT_GT(player.CompareWith(watcher.full()), 300);
 }
 
 TEST(ServerMovement, ALargeCrowdIsToldBitByBitAndAnotherSubscriptionBeginsAnew) {
