@@ -1,11 +1,11 @@
 // What the page's address asks for, see README.md; what it does not understand it leaves as it is.
 
 import type {FigureStyle, QualityChoice} from './quality.js';
-import type {PoseMode} from './sdk.js';
+import {rates, type Stream} from './stream.js';
 
 export interface Asked {
   readonly figures: 'auto' | FigureStyle;
-  readonly mode: PoseMode;
+  readonly stream: Stream;
   readonly quality: QualityChoice;
   /** So many frames a second at most; infinite: as many as the display shows. */
   readonly framesPerS: number;
@@ -22,7 +22,11 @@ export function readAddress(search: string): Asked {
   const framesPerS = /^\d{1,3}$/.test(frames) ? Number(frames) : 0;
   return {
     figures: oneOf('figures', ['auto', 'bodies', 'lines'], 'auto'),
-    mode: oneOf('mode', ['quantised', 'full'], 'quantised'),
+    stream: {
+      mode: oneOf('mode', ['quantised', 'full'], 'quantised'),
+      detail: oneOf('detail', ['all', 'fewer', 'root'], 'all'),
+      everyNTicks: rates.find((rate) => query.get('every') === String(rate)) ?? 1,
+    },
     quality: oneOf('quality', ['auto', 'high', 'low'], 'auto'),
     framesPerS: framesPerS >= 1 && framesPerS <= mostFramesPerS ? framesPerS : Infinity,
     worlds: query.getAll('world').filter((name) => name !== ''),

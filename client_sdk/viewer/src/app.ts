@@ -28,7 +28,8 @@ import {Overlay} from './scene/overlay.js';
 import {shareOut} from './scene/share_out.js';
 import {WorldView, projected} from './scene/world_view.js';
 import {Client} from './sdk.js';
-import type {PoseMode, Vec3, World} from './sdk.js';
+import type {Subscription, Vec3, World} from './sdk.js';
+import {StreamCosts, nameOf, observationOf, type Stream} from './stream.js';
 import type {Chosen, Shown} from './shown.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from './theme.js';
 import type {ThemeName} from './theme.js';
@@ -72,7 +73,8 @@ export class App {
   private height = 1;
   private layOutMs = -1e9;
   private drivenMs = -1e9;
-  private mode = this.asked.mode;
+  private stream = this.asked.stream;
+  private readonly streamCosts = new StreamCosts();
   private worldNames: string[] = [];
   private chosen: Chosen | null = null;
   /** How long the one chosen has not been seen, in frames that were drawn. */
@@ -177,9 +179,9 @@ export class App {
     this.viewPanel = new ViewPanel({
       figures: (choice) => this.appearance.chooseFigures(choice),
       quality: (choice) => this.appearance.chooseQuality(choice),
-      mode: (mode) => this.setMode(mode),
+      stream: (change) => this.setStream({...this.stream, ...change}),
       toggle: (name, on) => this.appearance.toggle(name, on),
-    }, {figures: this.asked.figures, quality: this.asked.quality, mode: this.mode});
+    }, {figures: this.asked.figures, quality: this.asked.quality, stream: this.stream});
 
     this.frameButton = button('Frame all', {icon: 'frame', key: 'F', text: false, class: 'round'},
       () => this.camera.frameAll());
@@ -270,7 +272,7 @@ export class App {
     const world = this.client.joinWorld(name, 'controller');
     const view = new WorldView(world, this.colours, this.appearance.options);
     const shown: Shown = {
-      world, view, subscription: world.observe({mode: this.mode, withEvents: true}), wander: null,
+      world, view, subscription: this.observe(world), wander: null,
       ours: new Set()};
     world.on('event', (event) => {
       if (event.type === 'removed') shown.ours.delete(event.avatar);
@@ -322,12 +324,30 @@ export class App {
     if (this.shown.length > 0) history.replaceState(null, '', `?${query.toString()}`);
   }
 
-  private setMode(mode: PoseMode): void {
-    if (mode === this.mode) return;
-    this.mode = mode;
+  private setStream(stream: Stream): void {
+    const was = nameOf(this.stream);
+    this.stream = stream;
+    if (nameOf(stream) === was) return;
     for (const shown of this.shown) {
-      void shown.subscription?.stop();
-      shown.subscription = shown.world.observe({mode, withEvents: true});
+      const before = shown.subscription;
+      shown.subscription = this.observe(shown.world);
+      void before?.stop();  // Only now: poses go on.
+    }
+  }
+
+  private observe(world: World): Subscription {
+    const observed = world.observe(observationOf(this.stream));
+    void observed.reply.then(({status}) => {
+      // Asked for in the address, of a server of before.
+      if (status === 'unsupported') this.setStream({...this.stream, detail: 'all'});
+    });
+    return observed;
+  }
+
+  private tellStream(ms: number, avatars: number): void {
+    this.viewPanel.setDetail(this.stream.mode === 'quantised' && this.client.serverHas('detail'));
+    if (this.streamCosts.measure(ms, this.stream, avatars, this.client.statistics)) {
+      this.viewPanel.setCosts(this.streamCosts.costs);
     }
   }
 
@@ -447,7 +467,7 @@ export class App {
     const avatars = this.shown.reduce((sum, shown) => sum + (shown.view.crowd?.count ?? 0), 0);
     const recorded = this.shown.reduce((sum, shown) => sum + shown.world.recording.bytes, 0);
     const perPose = s.posesReceived > 0 ? s.bytesReceived / s.posesReceived : 0;
-    return `${avatars} avatars, ${perPose.toFixed(0)} bytes a pose (${this.mode}), ` +
+    return `${avatars} avatars, ${perPose.toFixed(0)} bytes a pose (${nameOf(this.stream)}), ` +
       `${(recorded / 1e6).toFixed(1)} MB recorded, ${s.batchesDropped} batches dropped, ` +
       `${s.reconnects} reconnects. Drawn by ${this.rendererInfo.software ? 'software' : 'the graphics card'}.`;
   }
@@ -522,6 +542,7 @@ export class App {
     if (ms - this.drivenMs >= panelsEveryMs) {
       this.drivenMs = ms;
       this.showDriven();
+      this.tellStream(ms, avatars);
     }
   }
 

@@ -2,7 +2,7 @@
 
 export {Client, createCrowdPose} from '@stridewire/client';
 export type {
-  CrowdPose, HeightField, MovementRequest, Parameters, PoseMode, QueuedRequest, Reply, Skeleton, Statistics,
+  CrowdPose, HeightField, MovementRequest, Parameters, PoseDetail, PoseMode, QueuedRequest, Reply, Skeleton, Statistics,
   Subscription, Terrain, TerrainBox, Vec3, World, WorldEvent,
 } from '@stridewire/client';
 

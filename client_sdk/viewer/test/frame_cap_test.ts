@@ -34,13 +34,14 @@ test('after a pause frames come no faster', () => {
 });
 
 test('the address is taken where it makes sense', () => {
-  const nothing = {figures: 'auto', mode: 'quantised', quality: 'auto', framesPerS: Infinity, worlds: []};
+  const stream = {mode: 'quantised', detail: 'all', everyNTicks: 1};
+  const nothing = {figures: 'auto', stream, quality: 'auto', framesPerS: Infinity, worlds: []};
   assert.deepEqual(readAddress(''), nothing);
-  assert.deepEqual(readAddress('?figures=cubes&mode=half&quality=best&frames=many&world='), nothing);
+  assert.deepEqual(readAddress('?figures=cubes&mode=half&detail=none&every=3&quality=best&frames=many&world='), nothing);
   for (const frames of ['0', '241', '-5', '1.5', '1e2', ' 9', '0015']) {
     assert.equal(readAddress(`?frames=${frames}`).framesPerS, Infinity, frames);
   }
   assert.deepEqual(
-    readAddress('?world=a&world=b%20c&figures=lines&mode=full&quality=low&frames=15'),
-    {figures: 'lines', mode: 'full', quality: 'low', framesPerS: 15, worlds: ['a', 'b c']});
+    readAddress('?world=a&world=b%20c&figures=lines&mode=full&detail=root&every=4&quality=low&frames=15'),
+    {figures: 'lines', stream: {mode: 'full', detail: 'root', everyNTicks: 4}, quality: 'low', framesPerS: 15, worlds: ['a', 'b c']});
 });

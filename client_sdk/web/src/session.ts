@@ -151,8 +151,8 @@ export class Session {
   private telling = false;
   private readonly rttsS: number[] = [];
   private readonly total = {
-    bytesReceived: 0, bytesSent: 0, framesReceived: 0, batchesDropped: 0, eventsDropped: 0,
-    eventsReceived: 0, invalidFrames: 0, commandsSent: 0, commandsResent: 0, connects: 0,
+    bytesReceived: 0, poseBytesReceived: 0, bytesSent: 0, framesReceived: 0, batchesDropped: 0,
+    eventsDropped: 0, eventsReceived: 0, invalidFrames: 0, commandsSent: 0, commandsResent: 0, connects: 0,
     resumes: 0, connectFailures: 0,
   };
   private jitterS = 0;
@@ -754,7 +754,9 @@ export class Session {
     switch (message.type) {
       case 'WorldInfo': return this.onWorldInfo(message);
       case 'Reply': return this.onReply(message);
-      case 'PoseBatch': return this.onPoseBatch(message, nowS);
+      case 'PoseBatch':
+        this.total.poseBytesReceived += frame.byteLength;
+        return this.onPoseBatch(message, nowS);
       case 'Events': return this.onEvents(message);
       case 'Lagging': return this.onLagging(message);
       case 'Pong': return this.onPong(message, nowS);

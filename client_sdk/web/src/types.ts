@@ -502,6 +502,8 @@ export interface ClientOptions {
 /** Counted since the client was made. */
 export interface Statistics {
   bytesReceived: number;
+  /** Of them those of poses, with their numbers and headers. */
+  poseBytesReceived: number;
   bytesSent: number;
   framesReceived: number;
   batchesReceived: number;

@@ -100,7 +100,8 @@ test('poses come in the detail and at the rate asked for', {skip}, async () => {
       const before = client.statistics;
       await until('some more', () => client.statistics.posesReceived >= before.posesReceived + 500);
       const after = client.statistics;
-      const aPose = (after.bytesReceived - before.bytesReceived) / (after.posesReceived - before.posesReceived);
+      const aPose = (after.poseBytesReceived - before.poseBytesReceived) /
+          (after.posesReceived - before.posesReceived);
       assert.ok(aPose < bytes, `${detail}: ${aPose} bytes after ${bytes}`);
       bytes = aPose;
       assert.ok((await observed.stop()).ok);

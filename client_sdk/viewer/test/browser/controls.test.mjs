@@ -293,6 +293,12 @@ test('every control does what its label says', async () => {
     });
     return (to.bytes - from.bytes) / (to.poses - from.poses);
   };
+  /** What the table says of a stream, the one that is on where `now`. */
+  const costOf = (name, now = false) => until(`it is told what ${name} costs`, () => look(([wanted, isNow]) => {
+    const row = [...document.querySelectorAll('.costs tbody tr')].find((each) =>
+      each.querySelector('th').textContent === wanted && (!isNow || each.getAttribute('aria-current') === 'true'));
+    return row ? window.stridewire.app.streamCosts.costs.find((cost) => cost.name === wanted) : null;
+  }, [name, now]));
   const figureAt = () => until('it can be clicked', () => look((number) => {
     const {view} = window.stridewire.worlds[0];
     const {x, y, width, height} = view.free;
@@ -651,6 +657,25 @@ test('every control does what its label says', async () => {
       await page.locator('label[for=mode-quantised]').click();
       await until('poses are smaller', async () => await bytesAPose() < full - 150);
     }],
+    ...[['root', 16], ['fewer', 8], ['all', 0]].map(([detail, flag]) => [`view: detail-${detail}`, async () => {
+      const all = await costOf('Quantised');
+      await page.locator(`label[for=detail-${detail}]`).click();
+      await eventually('poses are of that detail', (wanted) => {
+        const {pose} = window.stridewire.worlds[0].view;
+        return pose.count > 0 && (pose.flags[0] & 24) === wanted;
+      }, flag);
+      const {bytesAPose: now} = await costOf(
+        {root: 'Quantised, root only', fewer: 'Quantised, fewer joints', all: 'Quantised'}[detail], true);
+      const less = {root: 70, fewer: 5}[detail];
+      if (less) assert.ok(now < all.bytesAPose - less, `${now}, of all ${all.bytesAPose}`);
+    }]),
+    ...[2, 4, 1].map((every) => [`view: rate-${every}`, async () => {
+      const all = await costOf('Quantised');
+      await page.locator(`label[for=rate-${every}]`).click();
+      const {bytesPerS: now} = await costOf(
+        {1: 'Quantised', 2: 'Quantised, half rate', 4: 'Quantised, quarter rate'}[every], true);
+      if (every > 1) assert.ok(now < 1.4 * all.bytesPerS / every, `${now} bytes a second, of every tick ${all.bytesPerS}`);
+    }]),
     ['inspect: Deselect', async () => {
       await opened('Inspect');
       await press('Deselect', '#panel-inspect');
