@@ -4,7 +4,6 @@
 #include <array>
 #include <optional>
 
-#include "cell_weights.h"
 #include "pose_kernels.h"
 #include "prefetch.h"
 
@@ -21,48 +20,65 @@ struct BlendJob {
   PoseSpan out;
 };
 
-// `count` poses, kernels::kBlock at most; `job_at(i)` tells what they are. Whatever they are batched with, they are
-// the same bytes.
-template <typename JobAt>
-void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
+// `count` poses, kernels::kBlock at most; `job_at(i)` tells what they are, `before(i)` is called before the rows of one
+// are read. Whatever they are batched with, they are the same bytes.
+template <typename JobAt, typename Before>
+void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at, Before&& before) {
   std::array<std::optional<BlendJob>, kernels::kBlock> blends;
+  kernels::GridTimes times = {};  // lanes of nobody are worked out, too
+  for (std::size_t i = 0; i < count; ++i) {
+    const BlendJob& job = blends[i].emplace(job_at(i));
+    const Movement& movement = job.movement;
+    const TimeWarp::Piece piece = movement.warp.PieceAt(job.time_s);
+    times.time_s[i] = job.time_s;
+    times.begin_s[i] = piece.begin_s;
+    times.end_s[i] = piece.end_s;
+    times.begin[i] = piece.begin;
+    times.end[i] = piece.end;
+    times.begin_slope[i] = piece.begin_slope;
+    times.end_slope[i] = piece.end_slope;
+    times.last_cell[i] = job.group.grid_point_count - 2;
+    times.duration_s[i] = movement.warp.duration_s();
+    times.entered_s[i] = movement.entered_s;
+    times.ease_out_s[i] = movement.ease_out_s;
+  }
+  kernels::FindInGrids(count, times);
+
   std::array<DVec3, kernels::kBlock> positions;
   std::array<double, 2 * kernels::kBlock> angles_rad;  // of the base, and half of the root's
   std::array<double, 2 * kernels::kBlock> sines;
   std::array<double, 2 * kernels::kBlock> cosines;
-  std::array<double, kernels::kBlock> eased;
   for (std::size_t i = 0; i < count; ++i) {
-    const BlendJob& job = blends[i].emplace(job_at(i));
+    before(i);
+    const BlendJob& job = *blends[i];
     const Movement& movement = job.movement;
-    const double u = movement.warp.GridPosition(job.time_s);
-    const CellWeights cell = CellWeightsAt(u, job.group.grid_point_count);
     kernels::RotationBlend blend;
     blend.padded = static_cast<std::size_t>(layout.padded_joints);
     blend.joint_count = job.out.rotations.size();
+    const int first = static_cast<int>(times.first_point[i]);
     DVec3 position(0.0);
     double yaw_rad = 0.0;
     for (std::size_t k = 0; k < 4; ++k) {
-      const bool is_there = static_cast<int>(k) < cell.count;
-      const int point = cell.first + (is_there ? static_cast<int>(k) : 0);
+      // One that is not there weighs nothing, but is read.
+      const int point = std::min(first + static_cast<int>(k), job.group.grid_point_count - 1);
       const float* row = job.cache.Row(job.group, movement.weights, point).data();
       blend.rows[k] = row;
-      blend.weights[k] = cell.weights[k];
-      const double weight = cell.weights[k];
+      blend.weights[k] = times.weights[k][i];
+      const double weight = times.weights[k][i];
       const GridLayout::Root root = layout.RootOf(row);
       position += weight * root.position_m;
       yaw_rad += weight * root.yaw_rad;
     }
-    yaw_rad += movement.steer_rad * (1.0 - EaseOut(job.time_s / movement.warp.duration_s()));
+    yaw_rad += movement.steer_rad * (1.0 - times.steered[i]);
     positions[i] = position;
     angles_rad[2 * i] = movement.base.heading_rad;
     angles_rad[2 * i + 1] = 0.5 * (movement.base.heading_rad + yaw_rad);
-    eased[i] = (job.time_s - movement.entered_s) / movement.ease_out_s;
-    if (job.is_eased && eased[i] < 1.0) {
+    if (job.is_eased && times.eased[i] < 1.0) {
       blend.difference = &movement.difference.rotations[0].x;
-      blend.fraction = static_cast<float>(EaseOut(eased[i]));
+      blend.fraction = times.fraction[i];
       if (movement.is_inertial) {
         blend.velocity = &movement.difference_velocity.joints_rad_s[0].x;
-        blend.seconds = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i]));
+        blend.seconds = times.slope_s[i];
       }
     }
     kernels::BlendRotations(blend, &job.out.rotations[0].x);
@@ -79,12 +95,10 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
     job.out.rotations[0] = Quat(static_cast<float>(cosines[2 * i + 1]), 0.0f,
                                 static_cast<float>(sines[2 * i + 1]), 0.0f) *
                            job.out.rotations[0];
-    if (!job.is_eased || !(eased[i] < 1.0)) continue;
+    if (!job.is_eased || !(times.eased[i] < 1.0)) continue;
     const Movement& movement = job.movement;
-    out += static_cast<float>(EaseOut(eased[i])) * movement.difference.root_position_m;
-    if (!movement.is_inertial) continue;
-    out += static_cast<float>(movement.ease_out_s * EaseOutSlope(eased[i])) *
-           movement.difference_velocity.root_m_s;
+    out += times.fraction[i] * movement.difference.root_position_m;
+    if (movement.is_inertial) out += times.slope_s[i] * movement.difference_velocity.root_m_s;
   }
 }
 
@@ -92,14 +106,16 @@ void BlendPoses(const GridLayout& layout, std::size_t count, JobAt&& job_at) {
 
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out) {
-  BlendPoses(layout, 1,
-             [&](std::size_t) { return BlendJob{group, movement, time_s, cache, false, out}; });
+  BlendPoses(
+      layout, 1, [&](std::size_t) { return BlendJob{group, movement, time_s, cache, false, out}; },
+      [](std::size_t) {});
 }
 
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out) {
-  BlendPoses(layout, 1,
-             [&](std::size_t) { return BlendJob{group, movement, time_s, cache, true, out}; });
+  BlendPoses(
+      layout, 1, [&](std::size_t) { return BlendJob{group, movement, time_s, cache, true, out}; },
+      [](std::size_t) {});
 }
 
 namespace {
@@ -132,22 +148,26 @@ void EvaluatePoses(const MotionLibrary& library, std::span<const PoseJob> jobs) 
   constexpr std::size_t kAhead = 2;
   const GridLayout& layout = library.layout();
   std::array<kernels::PlantJob, kernels::kBlock> plants;
-  for (std::size_t i = 0; i < std::min(2 * kAhead, jobs.size()); ++i) PrefetchPlaces(jobs[i]);
+  for (std::size_t i = 0; i < std::min(kernels::kBlock, jobs.size()); ++i) PrefetchPlaces(jobs[i]);
   for (std::size_t i = 0; i < std::min(kAhead, jobs.size()); ++i) Prefetch(jobs[i]);
   while (!jobs.empty()) {
     const std::size_t count = std::min(jobs.size(), kernels::kBlock);
     std::size_t planted = 0;
-    BlendPoses(layout, count, [&](std::size_t i) {
-      if (i + 2 * kAhead < jobs.size()) PrefetchPlaces(jobs[i + 2 * kAhead]);
-      if (i + kAhead < jobs.size()) Prefetch(jobs[i + kAhead]);
-      const PoseJob& job = jobs[i];
-      return BlendJob{library.group(job.movement->group),
-                      *job.movement,
-                      job.time_s,
-                      *job.cache,
-                      true,
-                      *job.shown};
-    });
+    BlendPoses(
+        layout, count,
+        [&](std::size_t i) {
+          const PoseJob& job = jobs[i];
+          return BlendJob{library.group(job.movement->group),
+                          *job.movement,
+                          job.time_s,
+                          *job.cache,
+                          true,
+                          *job.shown};
+        },
+        [&](std::size_t i) {
+          if (i + kernels::kBlock < jobs.size()) PrefetchPlaces(jobs[i + kernels::kBlock]);
+          if (i + kAhead < jobs.size()) Prefetch(jobs[i + kAhead]);
+        });
     for (const PoseJob& job : jobs.first(count)) {
       if (job.blended != nullptr) *job.blended = *job.shown;  // of the same size: no allocation
       if (!job.movement->feet.is_active) continue;

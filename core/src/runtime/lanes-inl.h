@@ -171,6 +171,13 @@ HWY_INLINE Quat4 LoadParts(const float* at, std::size_t stride) {
   return {Float(hn::LoadU(d, at)), Float(hn::LoadU(d, at + stride)),
           Float(hn::LoadU(d, at + 2 * stride)), Float(hn::LoadU(d, at + 3 * stride))};
 }
+HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride) {
+  const FloatTag d;
+  hn::StoreU(q.x.v, d, at);
+  hn::StoreU(q.y.v, d, at + stride);
+  hn::StoreU(q.z.v, d, at + 2 * stride);
+  hn::StoreU(q.w.v, d, at + 3 * stride);
+}
 HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride, hn::Mask<FloatTag> lanes) {
   const FloatTag d;
   hn::BlendedStore(q.x.v, lanes, d, at);

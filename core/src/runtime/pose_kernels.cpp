@@ -71,7 +71,11 @@ std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_REST
     const Float norm = Sqrt(Dot(q, q));
     const hn::Mask<FloatTag> is_sound = hn::Ge(norm.v, hn::Set(d, kSmallestNorm));
     const Float scale = Select({hn::And(is_joint, is_sound)}, Float(1.0f) / norm, Float(1.0f));
-    StoreParts(q * scale, row + j, padded, hn::FirstN(d, padded - j));
+    if (padded >= width) {
+      StoreParts(q * scale, row + j, padded);
+    } else {
+      StoreParts(q * scale, row + j, padded, hn::FirstN(d, padded));
+    }
     const auto is_new = hn::Not(hn::FirstN(d, next - j));
     degenerate += static_cast<std::uint32_t>(
         hn::CountTrue(d, hn::And(hn::AndNot(is_sound, is_joint), is_new)));
@@ -114,6 +118,80 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   }
 }
 
+void FindInGrids(std::size_t count, GridTimes& times) {
+  const DoubleTag d;
+  const hn::Rebind<float, DoubleTag> floats;
+  const std::size_t width = hn::Lanes(d);
+  const auto number = [d](double value) HWY_ATTR { return hn::Set(d, value); };
+  const auto zero = number(0.0);
+  const auto one = number(1.0);
+  const auto ease_out = [&](auto s) HWY_ATTR {
+    const auto r = hn::Sub(one, hn::Min(hn::Max(s, zero), one));
+    return hn::Mul(hn::Mul(r, r), hn::Sub(number(3.0), hn::Mul(number(2.0), r)));
+  };
+  for (std::size_t i = 0; i < count; i += width) {
+    const auto time = hn::Load(d, times.time_s + i);
+    const auto begin_s = hn::Load(d, times.begin_s + i);
+    const auto end_s = hn::Load(d, times.end_s + i);
+    const auto begin = hn::Load(d, times.begin + i);
+    const auto end = hn::Load(d, times.end + i);
+    // Hermite's cubic, as TimeWarp::GridPosition has it.
+    const auto h = hn::Sub(end_s, begin_s);
+    const auto s = hn::Div(hn::Sub(time, begin_s), h);
+    const auto rise = hn::Sub(end, begin);
+    const auto m0 = hn::Mul(hn::Load(d, times.begin_slope + i), h);
+    const auto m1 = hn::Mul(hn::Load(d, times.end_slope + i), h);
+    const auto two_rise = hn::Mul(number(2.0), rise);
+    const auto cubic = hn::Sub(hn::Add(m0, m1), two_rise);
+    const auto square = hn::Sub(hn::Sub(hn::Mul(number(3.0), rise), hn::Mul(number(2.0), m0)), m1);
+    auto u =
+        hn::Add(begin, hn::Mul(s, hn::Add(m0, hn::Mul(s, hn::Add(square, hn::Mul(s, cubic))))));
+    u = hn::Min(hn::Max(u, begin), end);
+    u = hn::IfThenElse(hn::Ge(time, end_s), end, u);
+    u = hn::IfThenElse(hn::Gt(time, begin_s), u, begin);
+
+    // As CellWeightsAt.
+    const auto last = hn::Load(d, times.last_cell + i);
+    const auto cell = hn::Min(hn::Max(hn::Trunc(u), zero), last);
+    const auto f = hn::Min(hn::Max(hn::Sub(u, cell), zero), one);
+    const auto half = number(0.5);
+    const auto ff = hn::Mul(f, f);
+    const auto before =
+        hn::Mul(f, hn::Add(number(-0.5), hn::Mul(f, hn::Sub(one, hn::Mul(half, f)))));
+    const auto left = hn::Add(one, hn::Mul(ff, hn::Add(number(-2.5), hn::Mul(number(1.5), f))));
+    const auto right =
+        hn::Mul(f, hn::Add(half, hn::Mul(f, hn::Sub(number(2.0), hn::Mul(number(1.5), f)))));
+    const auto after = hn::Mul(ff, hn::Add(number(-0.5), hn::Mul(half, f)));
+    const auto is_pair = hn::Eq(last, zero);
+    const auto is_first = hn::Eq(cell, zero);
+    const auto is_last = hn::Eq(cell, last);
+    const auto three_before = hn::Mul(number(3.0), before);
+    const auto three_after = hn::Mul(number(3.0), after);
+    const auto weight = [&](std::size_t k, auto pair, auto at_first, auto at_last, auto within)
+                            HWY_ATTR {
+                              auto w = hn::IfThenElse(is_last, at_last, within);
+                              w = hn::IfThenElse(is_first, at_first, w);
+                              w = hn::IfThenElse(is_pair, pair, w);
+                              hn::Store(hn::DemoteTo(floats, w), floats, times.weights[k] + i);
+                            };
+    weight(0, hn::Sub(one, f), hn::Add(left, three_before), hn::Add(before, after), before);
+    weight(1, f, hn::Sub(right, three_before), hn::Sub(left, three_after), left);
+    weight(2, zero, hn::Add(after, before), hn::Add(right, three_after), right);
+    weight(3, zero, zero, zero, after);
+    hn::Store(hn::IfThenElse(is_first, zero, hn::Sub(cell, one)), d, times.first_point + i);
+
+    hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, times.steered + i);
+    const auto over = hn::Load(d, times.ease_out_s + i);
+    const auto eased = hn::Div(hn::Sub(time, hn::Load(d, times.entered_s + i)), over);
+    const auto part = hn::Min(hn::Max(eased, zero), one);
+    const auto rest = hn::Sub(one, part);
+    hn::Store(eased, d, times.eased + i);
+    hn::Store(hn::DemoteTo(floats, ease_out(eased)), floats, times.fraction + i);
+    hn::Store(hn::DemoteTo(floats, hn::Mul(over, hn::Mul(hn::Mul(part, rest), rest))), floats,
+              times.slope_s + i);
+  }
+}
+
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines) {
   const DoubleTag d;
   const std::size_t width = hn::Lanes(d);
@@ -140,6 +218,7 @@ namespace stridewire::kernels {
 HWY_EXPORT(SumRows);
 HWY_EXPORT(BlendRow);
 HWY_EXPORT(BlendRotations);
+HWY_EXPORT(FindInGrids);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(PlantPoses);
 
@@ -157,6 +236,10 @@ std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t 
 
 void BlendRotations(const RotationBlend& blend, float* out) {
   HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
+}
+
+void FindInGrids(std::size_t count, GridTimes& times) {
+  HWY_DYNAMIC_DISPATCH(FindInGrids)(count, times);
 }
 
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines) {

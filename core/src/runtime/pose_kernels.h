@@ -25,6 +25,27 @@ void SumRows(const float* examples, const float* weights, std::size_t count, std
                                      std::size_t row_floats, std::size_t padded,
                                      std::size_t joint_count, float* row);
 
+/// Where the poses of a block lie in their movements' grids, and how much of the poses before is left: one number a
+/// pose. In doubles and in the order of operations of TimeWarp::GridPosition, CellWeightsAt and EaseOut.
+struct GridTimes {
+  // What is known of each:
+  alignas(64) double time_s[kBlock];
+  alignas(64) double begin_s[kBlock], end_s[kBlock];  ///< TimeWarp::Piece
+  alignas(64) double begin[kBlock], end[kBlock];
+  alignas(64) double begin_slope[kBlock], end_slope[kBlock];
+  alignas(64) double last_cell[kBlock];  ///< Points of the grid less two
+  alignas(64) double duration_s[kBlock], entered_s[kBlock],
+      ease_out_s[kBlock];  ///< Of the movement
+  // What follows:
+  alignas(64) double first_point[kBlock];  ///< Of the rows that are interpolated
+  alignas(64) float weights[4][kBlock];    ///< Of them, in order; 0 for one that is not there
+  alignas(64) double steered[kBlock];      ///< EaseOut of the part of the movement behind
+  alignas(64) double eased[kBlock];    ///< Part of the easing out that is behind, above 1 beyond it
+  alignas(64) float fraction[kBlock];  ///< EaseOut of that
+  alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of it, times ease_out_s
+};
+void FindInGrids(std::size_t count, GridTimes& times);
+
 /// Local rotations between four grid rows and, while the movement before is eased out, the difference to it.
 struct RotationBlend {
   const float* rows[4] =

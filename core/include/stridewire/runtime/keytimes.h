@@ -58,6 +58,22 @@ class TimeWarp {
     return keytimes_s_[static_cast<std::size_t>(interval_count_)];
   }
 
+  /// The piece of the map between two keytimes.
+  struct Piece {
+    double begin_s, end_s;          ///< Keytimes
+    double begin, end;              ///< Grid positions there
+    double begin_slope, end_slope;  ///< Grid positions a second
+  };
+  /// The one `time_s` lies in, the first or the last for times outside.
+  [[nodiscard]] Piece PieceAt(double time_s) const {
+    std::size_t i = 0;
+    for (int k = 1; k < interval_count_; ++k) {
+      i += time_s >= keytimes_s_[static_cast<std::size_t>(k)] ? 1 : 0;
+    }
+    return {keytimes_s_[i],    keytimes_s_[i + 1], positions_[i],
+            positions_[i + 1], slopes_[i],         slopes_[i + 1]};
+  }
+
  private:
   int interval_count_ = 0;
   std::array<double, kMaxIntervals + 1> keytimes_s_{};
