@@ -317,7 +317,7 @@ void Shard::TellNamed() {
       const auto update = [&]<typename List>(std::shared_ptr<const List>& known, List&& list) {
         if (known == nullptr ? list.empty() : *known == list) return;
         is_same = false;
-        known = std::make_shared<const List>(std::move(list));
+        known = std::make_shared<const List>(std::forward<List>(list));
       };
       PoseInterest& poses = told->second.poses[ModeIndex(mode)];
       update(poses.named, numbers.Take());

@@ -160,13 +160,17 @@ TEST(ClientAndServer, AStepAskedForComesBackAsAWalkingAvatar) {
   EXPECT_EQ(server.Terminate(), 0);
 }
 
-TEST(ClientAndServer, ARegionShowsWhoIsInItAndMoves) {
+class ClientRegion : public testing::TestWithParam<stridewire_pose_mode> {};
+INSTANTIATE_TEST_SUITE_P(Modes, ClientRegion,
+                         testing::Values(STRIDEWIRE_QUANTISED, STRIDEWIRE_MOVEMENT));
+
+TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
   user.Spawn(30);  // on a grid
   stridewire_observation observation{};
-  observation.mode = STRIDEWIRE_QUANTISED;
+  observation.mode = GetParam();
   observation.every_n_ticks = 1;
   const stridewire_rate_ring ring{1.0, 2};
   stridewire_region region{-1000.0, 0.0, 5.0, -1.0, &ring, 1};
