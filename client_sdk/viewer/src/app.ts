@@ -466,7 +466,7 @@ export class App {
     const s = this.client.statistics;
     const avatars = this.shown.reduce((sum, shown) => sum + (shown.view.crowd?.count ?? 0), 0);
     const recorded = this.shown.reduce((sum, shown) => sum + shown.world.recording.bytes, 0);
-    const perPose = s.posesReceived > 0 ? s.bytesReceived / s.posesReceived : 0;
+    const perPose = s.posesReceived > 0 ? s.poseBytesReceived / s.posesReceived : 0;
     return `${avatars} avatars, ${perPose.toFixed(0)} bytes a pose (${nameOf(this.stream)}), ` +
       `${(recorded / 1e6).toFixed(1)} MB recorded, ${s.batchesDropped} batches dropped, ` +
       `${s.reconnects} reconnects. Drawn by ${this.rendererInfo.software ? 'software' : 'the graphics card'}.`;

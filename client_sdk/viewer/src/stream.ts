@@ -19,8 +19,8 @@ export function observationOf({mode, detail, everyNTicks}: Stream) {
 export function nameOf(stream: Stream): string {
   const {mode, detail, everyNTicks} = observationOf(stream);
   return (mode === 'full' ? 'Full' : 'Quantised') +
-    {all: '', fewer: ', fewer joints', root: ', root only'}[detail] +
-    {1: '', 2: ', half rate', 4: ', quarter rate'}[everyNTicks];
+    {all: '', fewer: ', fewer', root: ', root'}[detail] +
+    {1: '', 2: ', ½ rate', 4: ', ¼ rate'}[everyNTicks];
 }
 
 export interface Cost {

@@ -44,7 +44,7 @@ const inspect = async (page) => {
   // Till a step is on its way, then hold it.
   await page.waitForFunction(() => {
     const movement = window.stridewire.inspected?.movement;
-    return movement?.kind.startsWith('step') && movement.weights.length > 0;
+    return movement?.kind.startsWith('step') && movement.weights.length > 0 && !movement.extrapolated;
   });
   await page.locator('.scene').focus();  // On a button the space bar would press that.
   await page.keyboard.press('Space');
@@ -54,6 +54,17 @@ await picture('viewer_inspect', 1280, 720, 'dark', 'world=captured&quality=high'
 await picture('viewer_inspect_phone', 390, 844, 'light', 'world=generated&quality=high', async (page) => {
   await page.click('button[aria-controls=panel-inspect]');
   await inspect(page);
+  await page.waitForTimeout(1500);
+});
+// What the ways cost that poses can travel; at last few joints of them.
+await picture('viewer_streams', 1280, 720, 'light', both, async (page) => {
+  await page.click('button[aria-controls=panel-drive]');
+  await page.click('button[aria-controls=panel-view]');
+  for (const id of ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-fewer']) {
+    await page.click(`label[for=${id}]`);
+    await page.waitForTimeout(4000);
+  }
+  await page.evaluate(() => document.querySelector('.costs').scrollIntoView({block: 'end'}));
   await page.waitForTimeout(1500);
 });
 // Footprints along the ladder of slabs, the middle one's still to come outlined.

@@ -9,8 +9,8 @@ const root: Stream = {mode: 'quantised', detail: 'root', everyNTicks: 4};
 
 test('full poses have all joints, whatever detail is chosen', () => {
   assert.equal(observationOf({...root, mode: 'full'}).detail, 'all');
-  assert.equal(nameOf({...root, mode: 'full'}), 'Full, quarter rate');
-  assert.equal(nameOf(root), 'Quantised, root only, quarter rate');
+  assert.equal(nameOf({...root, mode: 'full'}), 'Full, ¼ rate');
+  assert.equal(nameOf(root), 'Quantised, root, ¼ rate');
 });
 
 test('what streams cost is kept beside one another as long as there are as many avatars', () => {
@@ -37,7 +37,7 @@ test('what streams cost is kept beside one another as long as there are as many 
   run(root, 8, 2, 20);
   assert.deepEqual(costs.costs, [
     {name: 'Quantised', now: false, bytesAPose: 100, bytesPerS: 48_000},
-    {name: 'Quantised, root only, quarter rate', now: true, bytesAPose: 20, bytesPerS: 2400}]);
+    {name: 'Quantised, root, ¼ rate', now: true, bytesAPose: 20, bytesPerS: 2400}]);
   run(root, 9, 0.2, 20);
   assert.deepEqual(costs.costs, []);
 });

@@ -33,7 +33,7 @@ export class ViewPanel {
       radios('Poses travel', 'mode', [['quantised', 'Quantised'], ['full', 'Full']], now.stream.mode,
         (value) => actions.stream({mode: value as Stream['mode']})),
       this.detail,
-      radios('Rate', 'rate', [['1', 'Every tick'], ['2', 'Half'], ['4', 'Quarter']],
+      radios('Rate', 'rate', [['1', 'Whole'], ['2', 'Half'], ['4', 'Quarter']],
         String(now.stream.everyNTicks),
         (value) => actions.stream({everyNTicks: Number(value) as Stream['everyNTicks']})),
       h('table', {class: 'costs'},

@@ -665,7 +665,7 @@ test('every control does what its label says', async () => {
         return pose.count > 0 && (pose.flags[0] & 24) === wanted;
       }, flag);
       const {bytesAPose: now} = await costOf(
-        {root: 'Quantised, root only', fewer: 'Quantised, fewer joints', all: 'Quantised'}[detail], true);
+        {root: 'Quantised, root', fewer: 'Quantised, fewer', all: 'Quantised'}[detail], true);
       const less = {root: 70, fewer: 5}[detail];
       if (less) assert.ok(now < all.bytesAPose - less, `${now}, of all ${all.bytesAPose}`);
     }]),
@@ -673,7 +673,7 @@ test('every control does what its label says', async () => {
       const all = await costOf('Quantised');
       await page.locator(`label[for=rate-${every}]`).click();
       const {bytesPerS: now} = await costOf(
-        {1: 'Quantised', 2: 'Quantised, half rate', 4: 'Quantised, quarter rate'}[every], true);
+        {1: 'Quantised', 2: 'Quantised, ½ rate', 4: 'Quantised, ¼ rate'}[every], true);
       if (every > 1) assert.ok(now < 1.4 * all.bytesPerS / every, `${now} bytes a second, of every tick ${all.bytesPerS}`);
     }]),
     ['inspect: Deselect', async () => {
