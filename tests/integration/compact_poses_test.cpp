@@ -213,7 +213,7 @@ TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
   }
   passage.Flush();
   passage.Print(std::string(GetParam().name) + " of " + std::to_string(told.size()) + " joints");
-  EXPECT_LE(passage.largest_error_m(), kFewerJointsShift_m + kLargestErrorM);
+  EXPECT_LE(passage.largest_error_m(), kFewerJointsShiftM + kLargestErrorM);
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
 }
 
@@ -225,7 +225,7 @@ TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
   const CompactCodec root =
       CompactCodec::Make(code_.joints, ParentsOf(skeleton()), kRootAlone).value();
   Passage root_passage(skeleton(), root);
-  Crowd crowd(library_, 20, 5);
+  DrawnCrowd crowd(library_, 20, 5);
   for (int tick = 0; tick < 1200; ++tick) {
     crowd.Advance();
     for (const Avatar& avatar : crowd.avatars()) {
@@ -244,7 +244,7 @@ TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
   }
   passage.Print(who + ", fewer joints, without" + left_out);
   root_passage.Print(who + ", the root");
-  EXPECT_LE(passage.largest_error_m(), kFewerJointsShift_m + kLargestErrorM);
+  EXPECT_LE(passage.largest_error_m(), kFewerJointsShiftM + kLargestErrorM);
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
   EXPECT_EQ(root_passage.wide(), 0u);
   EXPECT_LE(root.pose_bytes(), 20u);

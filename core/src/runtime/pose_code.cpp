@@ -359,7 +359,7 @@ std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
 }
 
 std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library) {
-  return ChooseFewerJoints(library.skeleton(), FindRotationRanges(library), kFewerJointsShift_m);
+  return ChooseFewerJoints(library.skeleton(), FindRotationRanges(library), kFewerJointsShiftM);
 }
 
 PoseCode ChoosePoseCode(const MotionLibrary& library) {

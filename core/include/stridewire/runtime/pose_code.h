@@ -47,7 +47,7 @@ struct PoseCode {
                                                            std::span<const RotationRange> ranges,
                                                            double largest_shift_m);
 /// The largest shift of those left out of a library's poses.
-inline constexpr double kFewerJointsShift_m = 0.12;
+inline constexpr double kFewerJointsShiftM = 0.12;
 [[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library);
 
 /// Both, so that with the root in steps of 2^-14 m everything is within 1 mm of where it is in the world.
