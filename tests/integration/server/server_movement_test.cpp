@@ -345,7 +345,8 @@ TEST_P(ServerMovementOf, WhoReadsTooSlowlyIsToldAnew) {
   both.TakeUntil([&] { return both.states() > states; });
   both.TakeUntil([&] { return both.told().shown.size() > before + kLargeCrowd * 60; });
   EXPECT_GT(server.metrics().Sum(&ThreadMetrics::batches_dropped), 0u);
-  EXPECT_EQ(both.view().avatar_count(), watched);
+  // On a busy machine more is dropped meanwhile, and told anew.
+  both.TakeUntil([&] { return both.view().avatar_count() == watched; });
   EXPECT_GT(both.Compare(), static_cast<int>(kLargeCrowd) * 30);
 }
 
