@@ -56,25 +56,32 @@ std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_REST
                        std::size_t joint_count, float* HWY_RESTRICT row) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
+  // A vector then reaches beyond the row, which `row` has room for and the examples have not.
+  const bool is_narrow = padded < width;
+  if (is_narrow) SumRows(examples, weights, count, row_floats, row);
   std::uint32_t degenerate = 0;
   std::size_t next = 0;
   while (next < padded) {
     // The last ones go with some before them, as in BlendRotations.
-    const std::size_t j = next + width > padded && padded >= width ? padded - width : next;
+    const std::size_t j = next + width > padded && !is_narrow ? padded - width : next;
     Quat4 q = {Float(0.0f), Float(0.0f), Float(0.0f), Float(0.0f)};
-    const float* source = examples + j;
-    for (std::size_t e = 0; e < count; ++e, source += row_floats) {
-      q = q + LoadParts(source, padded) * Float(weights[e]);
+    if (is_narrow) {
+      q = LoadParts(row + j, padded);
+    } else {
+      const float* source = examples + j;
+      for (std::size_t e = 0; e < count; ++e, source += row_floats) {
+        q = q + LoadParts(source, padded) * Float(weights[e]);
+      }
     }
     // Behind the joints comes the root, which is no rotation.
     const auto is_joint = hn::FirstN(d, joint_count > j ? joint_count - j : 0);
     const Float norm = Sqrt(Dot(q, q));
     const hn::Mask<FloatTag> is_sound = hn::Ge(norm.v, hn::Set(d, kSmallestNorm));
     const Float scale = Select({hn::And(is_joint, is_sound)}, Float(1.0f) / norm, Float(1.0f));
-    if (padded >= width) {
-      StoreParts(q * scale, row + j, padded);
-    } else {
+    if (is_narrow) {
       StoreParts(q * scale, row + j, padded, hn::FirstN(d, padded));
+    } else {
+      StoreParts(q * scale, row + j, padded);
     }
     const auto is_new = hn::Not(hn::FirstN(d, next - j));
     degenerate += static_cast<std::uint32_t>(
