@@ -191,8 +191,8 @@ TEST_F(WorldViewTest, WhatADetailLeavesOutIsTheReference) {
   std::uint64_t tick = 60;
   for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot}) {
     ++tick;
-    const protocol::Message message =
-        Decoded(toy::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail)));
+    const auto frame = toy::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail));
+    const protocol::Message message = Decoded(frame);  // borrows the frame
     ASSERT_TRUE(view_.Take(std::get<protocol::PoseBatch>(message), 1, counts_));
     const PoseHistory& history = *view_.Find(1);
     const std::size_t newest = history.size() - 1;
