@@ -103,20 +103,18 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
 }
 
 double TimeWarp::GridPosition(double time_s) const {
-  const auto n = static_cast<std::size_t>(interval_count_);
-  if (!(time_s > keytimes_s_[0])) return 0.0;
-  if (time_s >= keytimes_s_[n]) return positions_[n];
-  std::size_t i = n - 1;
-  while (i > 0 && time_s < keytimes_s_[i]) --i;
-  const double h = keytimes_s_[i + 1] - keytimes_s_[i];
-  const double s = (time_s - keytimes_s_[i]) / h;
-  const double rise = positions_[i + 1] - positions_[i];
-  // Cubic Hermite, relative to the interval's start so that small steps keep their precision.
-  const double m0 = slopes_[i] * h;
-  const double m1 = slopes_[i + 1] * h;
+  const Piece piece = PieceAt(time_s);
+  if (!(time_s > piece.begin_s)) return piece.begin;
+  if (time_s >= piece.end_s) return piece.end;
+  const double h = piece.end_s - piece.begin_s;
+  const double s = (time_s - piece.begin_s) / h;
+  const double rise = piece.end - piece.begin;
+  // Cubic Hermite, relative to the piece's start so that small steps keep their precision.
+  const double m0 = piece.begin_slope * h;
+  const double m1 = piece.end_slope * h;
   const double value =
-      positions_[i] + s * (m0 + s * ((3.0 * rise - 2.0 * m0 - m1) + s * (m0 + m1 - 2.0 * rise)));
-  return std::clamp(value, positions_[i], positions_[i + 1]);
+      piece.begin + s * (m0 + s * ((3.0 * rise - 2.0 * m0 - m1) + s * (m0 + m1 - 2.0 * rise)));
+  return std::clamp(value, piece.begin, piece.end);
 }
 
 double TimeWarp::TimeAt(double grid_position) const {

@@ -64,7 +64,9 @@ class LayerStack {
   void Apply(const MotionLibrary& library, PoseSpan pose) const;
 
   [[nodiscard]] std::span<const Playing> playing() const { return playing_; }
+  /// For as many as there may be: nothing allocates after it.
   void MakeRoom() { playing_.reserve(kMaxLayers); }
+  /// Ends all at once; the room stays.
   void Clear() { playing_.clear(); }
   [[nodiscard]] bool empty() const { return playing_.empty(); }
 
