@@ -17,6 +17,19 @@ using protocol::StatusCode;
 
 namespace {
 
+// The items of a command as parts for each shard, whose avatars they are about, numbered as they came.
+template <typename Item, typename Part>
+void ShareOut(std::vector<Item>&& items, std::vector<Part>& parts) {
+  // Numbers in a row are shared out evenly.
+  for (Part& part : parts) part.items.reserve(items.size() / parts.size() + 1);
+  const int shard_count = static_cast<int>(parts.size());
+  std::uint32_t index = 0;
+  for (Item& item : items) {
+    const auto shard = static_cast<std::size_t>(ShardOf(item.avatar, shard_count));
+    parts[shard].items.push_back({index++, std::move(item)});
+  }
+}
+
 // What one of the requests needs and this client has not agreed on; null: nothing.
 const char* FeatureMissing(const std::vector<protocol::RequestItem>& items,
                            std::uint64_t features) {
@@ -166,13 +179,7 @@ void Session::Execute(protocol::Request&& command) {
   std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()),
                                  RequestPart{.items = {}, .over_ticks = over_ticks});
   const std::size_t item_count = command.items.size();
-  // Numbers in a row are shared out evenly.
-  for (RequestPart& part : parts) part.items.reserve(item_count / parts.size() + 1);
-  std::uint32_t index = 0;
-  for (protocol::RequestItem& item : command.items) {
-    parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(
-        {index++, std::move(item)});
-  }
+  ShareOut(std::move(command.items), parts);
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = item_count, .reply = {}});
 }
@@ -187,11 +194,7 @@ void Session::Execute(protocol::SetLayers&& command) {
   }
   const std::size_t item_count = command.items.size();
   std::vector<LayerPart> parts(static_cast<std::size_t>(host_.shard_count()));
-  std::uint32_t index = 0;
-  for (protocol::LayerItem& item : command.items) {
-    parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))].items.push_back(
-        {index++, std::move(item)});
-  }
+  ShareOut(std::move(command.items), parts);
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = item_count, .reply = {}});
 }
