@@ -1,4 +1,5 @@
 import {Listeners} from './listeners';
+import {detailOf} from './pose_flags';
 import type {WorldRecording} from './recording';
 import type {Command, Session} from './session';
 import type {
@@ -156,7 +157,7 @@ export class WorldHandle implements World {
   /** The rate asked for; 0: none of this mode. */
   everyNTicks(batchMode: BatchMode): number {
     const mode: PoseMode = batchMode === 'full' ? 'full' : 'quantised';
-    const detail = batchMode === 'compactFewer' ? 'fewer' : batchMode === 'compactRoot' ? 'root' : 'all';
+    const detail = detailOf(batchMode);
     let every = 0;
     for (const {message} of this.subscriptions.values()) {
       if (message.mode !== mode || message.detail !== detail) continue;
