@@ -76,10 +76,17 @@ test('every control does what its label says', async () => {
   };
   const letQualityGo = () => look(() => window.stridewire.app.appearance.chooseQuality('auto'));
   /** Of what no panel covers. */
-  const middle = () => look(() => {
-    const {x, y, width, height} = window.stridewire.worlds[0].view.free;
-    return {x: x + width / 2, y: y + height / 2};
-  });
+  const middle = async () => {
+    // What panels leave of the scene is known with the next frame.
+    await frames(2);
+    const {onScene, ...at} = await look(() => {
+      const {x, y, width, height} = window.stridewire.worlds[0].view.free;
+      const at = {x: x + width / 2, y: y + height / 2};
+      return {...at, onScene: document.elementFromPoint(at.x, at.y)?.matches('canvas.scene')};
+    });
+    assert.ok(onScene, `something lies over the scene at ${JSON.stringify(at)}`);
+    return at;
+  };
   const orbit = () => look(() => {
     const {wantAzimuth, wantElevation, wantDistance} = window.stridewire.app.camera.orbit;
     return {wantAzimuth, wantElevation, wantDistance};
