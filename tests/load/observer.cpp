@@ -148,11 +148,13 @@ void Observer::OnReply(const protocol::Reply& reply) {
 void Observer::OnLost(const std::string& why, bool by_us) {
   was_dropped_ = by_us;
   for (World& world : worlds_) {
-    for (Seen& seen : world.seen) seen = Seen{};
-    for (Stream& stream : world.streams) {
-      if (by_us && stream.away_since == 0) stream.away_since = stream.tick + 1;
-      stream.tick = 0;  // A server that was restarted may count anew.
+    for (Seen& seen : world.seen) {
+      const std::uint64_t last = seen.tick != 0 ? seen.tick : latest_tick_.load();
+      seen = Seen{.away_since = seen.away_since == 0 && by_us ? last + 1 : seen.away_since};
     }
+    world.back_tick = 0;
+    for (Stream& stream : world.streams)
+      stream.tick = 0;  // A server that was restarted may count anew.
     if (probes_ != nullptr && by_us) {
       for (std::size_t i = 0; i < world.seen.size(); ++i) {
         probes_->Abandon(run_.layout.Number(world.index, i) - 1);
@@ -248,6 +250,7 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
 void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns) {
   const std::uint64_t tick = batch.info.tick;
   const bool counts = run_.window.Contains(tick);
+  if (world.back_tick == 0) world.back_tick = tick;
   const bool verifies =
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
   protocol::PoseBatchReader reader(batch, world.codecs.Find(batch.info.mode));
@@ -262,6 +265,8 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
+    counts_.poses_excused += ExcusedBefore(world, seen, tick);
+    seen.away_since = 0;
     if (probes_ != nullptr) Measure(world, batch, i, pose, now_ns);
     if (verifies) (void)CheckPose(world, seen, batch, i, reader);
     seen.tick = tick;
@@ -272,6 +277,16 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
   UpdateProgress();
 }
 
+std::uint64_t Observer::ExcusedBefore(const World& world, const Seen& seen,
+                                      std::uint64_t tick) const {
+  if (seen.away_since == 0) return 0;
+  std::uint64_t end = tick;
+  if (world.back_tick != 0) {
+    end = std::min(end, world.back_tick + static_cast<std::uint64_t>(kBackS * run_.tick_hz));
+  }
+  return run_.window.CountBetween(seen.away_since, end - 1);
+}
+
 bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
   const std::uint32_t key = std::uint32_t{batch.info.shard} << 16 | batch.info.part;
   auto stream = std::ranges::find(world.streams, key, &Stream::key);
@@ -280,11 +295,7 @@ bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
     stream = world.streams.end() - 1;
   }
   const std::uint64_t tick = batch.info.tick;
-  if (stream->away_since != 0) {
-    counts_.poses_excused +=
-        stream->avatar_count * run_.window.CountBetween(stream->away_since, tick - 1);
-    stream->away_since = 0;
-  } else if (tick <= stream->tick) {
+  if (tick <= stream->tick) {
     Invalid(world, tick, "a batch that is not newer than the last one of its shard");
     return false;
   }
@@ -361,10 +372,8 @@ void Observer::UpdateProgress() {
 ObserverCounts Observer::Counts() const {
   ObserverCounts counts = counts_;
   for (const World& world : worlds_) {
-    for (const Stream& stream : world.streams) {
-      if (stream.away_since == 0) continue;
-      counts.poses_excused +=
-          stream.avatar_count * run_.window.CountBetween(stream.away_since, run_.window.last());
+    for (const Seen& seen : world.seen) {
+      counts.poses_excused += ExcusedBefore(world, seen, run_.window.last() + 1);
     }
   }
   return counts;

@@ -37,6 +37,9 @@ class Observer final : public Session {
  public:
   static constexpr double kMaxSpeedMPerS = 15.0;
   static constexpr double kSpeedSlackM = 0.05;
+  /// Who came back by our own doing is not expected to see an avatar sooner: in mode movement states are
+  /// told a tick or more after the first message.
+  static constexpr double kBackS = 1.0;
 
   /// The first of them, `observers` of the options, watch all avatars, the others some.
   /// `probes` not null: this one's poses measure the latency; it lives on the probes' thread, and watches all.
@@ -56,8 +59,9 @@ class Observer final : public Session {
 
  private:
   struct Seen {
-    std::uint64_t tick = 0;       ///< Of its last pose; 0: none yet on this connection
-    std::uint64_t root_tick = 0;  ///< Of `root_m`; 0: not known
+    std::uint64_t tick = 0;        ///< Of its last pose; 0: none yet on this connection
+    std::uint64_t root_tick = 0;   ///< Of `root_m`; 0: not known
+    std::uint64_t away_since = 0;  ///< First tick not seen by our own doing; 0: not away
     Vec3 root_m = Vec3(0.0f);
   };
 
@@ -66,7 +70,6 @@ class Observer final : public Session {
     std::uint32_t key = 0;
     std::uint64_t tick = 0;
     std::uint64_t avatar_count = 0;
-    std::uint64_t away_since = 0;  ///< First tick not seen by our own doing; 0: not away
   };
 
   struct World {
@@ -74,6 +77,7 @@ class Observer final : public Session {
     std::size_t joint_count = 0;
     std::vector<protocol::AvatarNumber> watched;  ///< Growing; empty: all
     std::vector<Seen> seen;                       ///< Of each of them
+    std::uint64_t back_tick = 0;                  ///< First seen on this connection; 0: none yet
     protocol::CompactCodecs codecs;               ///< Of compact poses, if the server tells them
     /// Only to measure latency: all poses, as they came, each with room for the longest.
     std::vector<std::byte> last_poses;
@@ -100,6 +104,9 @@ class Observer final : public Session {
                    std::int64_t now_ns);
   void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);
   void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
+  /// How many poses of that avatar were not to be expected before one of `tick`.
+  [[nodiscard]] std::uint64_t ExcusedBefore(const World& world, const Seen& seen,
+                                            std::uint64_t tick) const;
   /// False: the batch is not to be counted.
   bool AdvanceStream(World& world, const protocol::PoseBatch& batch);
   bool CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i,

@@ -85,6 +85,16 @@ class ObserverTest : public ::testing::Test {
     }
   }
 
+  /// Is away by its own doing and greeted again.
+  void ComeBack() {
+    Sync();
+    OnThread([&] { observer_.Drop(0.0); });
+    EXPECT_TRUE(connection_.WaitForClose());
+    OnThread([&] { observer_.Poll(NowNs() + kSecondNs); });
+    Greet();
+    synced_dropped_ = 1;  // A new connection counts anew; the total goes on.
+  }
+
   template <typename F>
   void OnThread(F&& task) {
     std::promise<void> done;
@@ -306,14 +316,9 @@ TEST_F(ObserverTest, ExpectsNothingWhileItIsAwayByOurOwnDoing) {
   Greet();
   SendTick(100);
   SendTick(101);
-  Sync();
-  OnThread([&] { observer_.Drop(0.0); });
-  EXPECT_TRUE(connection_.WaitForClose());
-  OnThread([&] { observer_.Poll(NowNs() + kSecondNs); });
-  Greet();
+  ComeBack();
   SendTick(106);
   SendTick(107);
-  synced_dropped_ = 1;  // A new connection counts anew; the total goes on.
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 4 * 3u);
@@ -321,6 +326,33 @@ TEST_F(ObserverTest, ExpectsNothingWhileItIsAwayByOurOwnDoing) {
   EXPECT_EQ(counts.poses_invalid, 0u);
   EXPECT_EQ(observer_.reconnect_count(), 1u);
   EXPECT_FALSE(run_.failed);
+}
+
+// As in mode movement: states may be told after what changed in their tick.
+TEST_F(ObserverTest, ExpectsNobodyBeforeTheirStatesWhenItComesBack) {
+  Greet();
+  SendTick(100);
+  ComeBack();
+  SendTick(104, {});
+  SendTick(105, {{1}});
+  SendTick(106);
+  Sync();
+  const ObserverCounts counts = Join();
+  EXPECT_EQ(counts.poses_received, 3 + 1 + 3u);
+  EXPECT_EQ(counts.poses_excused, 4 * 1 + 5 * 2u);  // 101 to 104, 101 to 105
+  EXPECT_EQ(counts.poses_invalid, 0u);
+}
+
+TEST_F(ObserverTest, ExpectsAllAMomentAfterItCameBack) {
+  run_.window.Set(kFirstTick, kFirstTick + 1000);
+  Greet();
+  SendTick(100);
+  ComeBack();
+  SendTick(111, {{1}, {2}});
+  Sync();
+  const ObserverCounts counts = Join();
+  const auto moment = static_cast<std::uint64_t>(Observer::kBackS * run_.tick_hz);
+  EXPECT_EQ(counts.poses_excused, 10 * 3 + moment);  // 101 to 110, and as much for the third
 }
 
 TEST_F(ObserverTest, TellsALostConnectionOnce) {
