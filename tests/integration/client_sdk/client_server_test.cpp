@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <functional>
@@ -9,6 +11,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "child_process.h"
@@ -246,6 +249,64 @@ TEST(ClientAndServer, AllObserversSeeTheSameAndQuantisedStaysWithinItsError) {
   // A joint's own error in the world, and its parent's, which it makes up for.
   EXPECT_LT(worst_rad, 0.004 + 0.002);
   EXPECT_LE(worst_m, 0.5 / protocol::kRootStepsPerM + 1e-6);
+}
+
+// Joints of a walk that turn while it is watched.
+std::size_t MovingJoints(const std::vector<client::Pose>& poses) {
+  std::size_t moving = 0;
+  for (std::size_t j = 0; j < poses.front().rotations.size(); ++j) {
+    moving += std::ranges::any_of(poses, [&](const client::Pose& pose) {
+      return pose.rotations[j].x != poses.front().rotations[j].x;
+    });
+  }
+  return moving;
+}
+
+TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  User user(server.port());
+  user.Spawn(1);
+  User all(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  User fewer(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  User root(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
+  const std::array<std::pair<User*, stridewire_pose_detail>, 3> observers = {
+      {{&all, STRIDEWIRE_DETAIL_ALL},
+       {&fewer, STRIDEWIRE_DETAIL_FEWER},
+       {&root, STRIDEWIRE_DETAIL_ROOT}}};
+  for (const auto& [observer, detail] : observers) {
+    ASSERT_TRUE(observer->client.Observe(
+        observer->world, {.mode = STRIDEWIRE_QUANTISED, .every_n_ticks = 1, .detail = detail}));
+    ASSERT_EQ(observer->Collect(1, 1).size(), 1u);
+  }
+  ASSERT_TRUE(
+      user.client.Request(user.world, {client::Step(1, 1, 0.55, 0.1), client::Step(1, 2, 0.55)}));
+  std::array<std::vector<client::Pose>, 3> poses;
+  for (std::size_t i = 0; i < 3; ++i) {
+    poses[i] = observers[i].first->Collect(1, 120);
+    ASSERT_EQ(poses[i].size(), 120u);
+    for (const client::Pose& pose : poses[i]) ASSERT_EQ(pose.detail, observers[i].second);
+  }
+  EXPECT_GT(MovingJoints(poses[0]), MovingJoints(poses[1]));
+  EXPECT_GT(MovingJoints(poses[1]), 8u);  // Two legs, the spine, two arms.
+  EXPECT_EQ(MovingJoints(poses[2]), 1u);
+
+  // However little of it is told, a figure is where it is and turned as it is.
+  std::size_t compared = 0;
+  for (std::size_t i = 1; i < 3; ++i) {
+    for (const client::Pose& pose : poses[i]) {
+      const auto same = std::ranges::find(poses[0], pose.tick, &client::Pose::tick);
+      if (same == poses[0].end()) continue;
+      ++compared;
+      for (int k = 0; k < 3; ++k) {
+        ASSERT_EQ(pose.root_position_m[k], same->root_position_m[k]);
+      }
+      const auto& p = pose.rotations[0];
+      const auto& q = same->rotations[0];
+      ASSERT_LT(AngleBetween(Quat(p.w, p.x, p.y, p.z), Quat(q.w, q.x, q.y, q.z)), 0.012);
+    }
+  }
+  EXPECT_GT(compared, 100u);
 }
 
 TEST(ClientAndServer, RenderedPosesAreInterpolatedAllTheWay) {

@@ -177,6 +177,20 @@ TEST(LoadProgram, EvaluatesThePosesItselfInModeMovement) {
   EXPECT_LT(report["bytes_per_pose"], 50.0);
 }
 
+TEST(LoadProgram, WatchesRootsAlone) {
+  const RealServer server;
+  const ProgramResult result =
+      server.Load({"--avatars", "20", "--observers", "2", "--seconds", "1", "--detail", "root"});
+  const json report = ReportOf(result);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report["mode"], "quantised, the root");
+  ExpectAllPoses(report);
+  ExpectNoErrorsButLateness(report);
+  // A root in 18 bytes, its avatar and flags, and a little for what a batch says of itself.
+  EXPECT_GT(report["bytes_per_pose"], 18.0);
+  EXPECT_LT(report["bytes_per_pose"], 40.0);
+}
+
 TEST(LoadProgram, SpreadsAChoreographyOverWorldsAndThreads) {
   const test::ScratchFolder scratch;
   const std::string file =
