@@ -1,6 +1,7 @@
 import {createKeys, copyPose, interpolate} from './interpolate';
 import {flagsOf, lastingFlags} from './pose_flags';
 import {reserve} from './room';
+import {streamOf} from './stream_of';
 import {PoseFlag, type CrowdPose, type Recording, type WorldEvent} from './types';
 import type {BatchMode, PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
@@ -94,13 +95,14 @@ export class WorldRecording implements Recording {
   }
 
   /** A batch whose poses are known to be good. Of a tick that comes twice, in two modes, the first
-   * is kept. */
+   * is kept; those of a region are of different avatars, and all are kept. */
   addBatch(batch: PoseBatch, epoch: number): void {
     if (this.lengthS <= 0 || this.maxBytes <= 0) return;
-    let stream = this.streams.get(batch.shard);
+    const key = batch.partial ? -1 - streamOf(batch) : batch.shard;
+    let stream = this.streams.get(key);
     if (stream === undefined) {
       stream = {moments: [], first: 0, decoded: []};
-      this.streams.set(batch.shard, stream);
+      this.streams.set(key, stream);
     }
     const bytes = batch.poses.buffer.byteLength;
     const last = stream.moments[stream.moments.length - 1];
@@ -161,6 +163,8 @@ export class WorldRecording implements Recording {
     // In growing order of number, as World.sampleAll has them.
     if (out.count > 1) out.avatars.subarray(0, out.count).sort();
     for (let i = 0; i < out.count; ++i) this.placed.set(out.avatars[i]!, i);
+    // Who crossed a ring of a region is in the moments of two details: the later one holds.
+    this.around.sort((a, b) => a.at.moment!.tick - b.at.moment!.tick);
     for (const around of this.around) this.fill(around, timeS, out);
     return out.count;
   }

@@ -1,10 +1,11 @@
 import {flagsOf, lastingFlags} from './pose_flags';
 import {PoseHistory} from './pose_history';
 import {reserve} from './room';
+import {streamOf} from './stream_of';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
 import {maxItems} from './wire/limits';
 import {Malformed} from './wire/malformed';
-import type {BatchMode, PoseBatch} from './wire/messages';
+import type {PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
 /** Poses of an avatar that is gone can still be sampled for this long. */
@@ -44,12 +45,6 @@ interface Shard {
   partsSeen: number;
   epoch: number;
 }
-
-/** A shard's batches of one mode, which are about the same avatars. */
-function streamOf(batch: PoseBatch): number {
-  return streamModes.length * batch.shard + streamModes.indexOf(batch.mode);
-}
-const streamModes: readonly BatchMode[] = ['full', 'quantised', 'compact', 'compactFewer', 'compactRoot'];
 
 /** What is seen of a world: the poses of its avatars. */
 export class WorldView {

@@ -755,6 +755,32 @@ test('levels of detail are asked of a server that knows them', async () => {
   }
 });
 
+test('who crosses a ring of a region goes on, live and recorded', () => {
+  const h = new Harness({poseHistory: 64});
+  const world = h.joined();
+  const listed: number[] = [];
+  world.on('avatars', (avatars) => listed.push(avatars.length));
+  // Each tick a batch of each detail; 2 comes from the outer ring to the inner one, and then the outer one is empty.
+  for (let tick = 60; tick < 80; ++tick) {
+    const crossed = tick >= 70;
+    h.receive(server.poseBatch({tick, partial: true},
+                               [{avatar: 1, x: 1}, ...(crossed ? [{avatar: 2, x: tick}] : [])]));
+    if (!crossed) {
+      h.receive(server.poseBatch({tick, partial: true, quantised: true}, [{avatar: 2, x: tick}]));
+    }
+  }
+  assert.deepEqual([...new Set(listed)], [1, 2]);
+  const live = createCrowdPose();
+  const recorded = createCrowdPose();
+  for (const tick of [60, 65, 69, 70, 75, 79]) {
+    for (const [source, out] of [[world, live], [world.recording, recorded]] as const) {
+      assert.equal(source.sampleAll(tick / 60, out), 2);
+      assert.deepEqual([...out.avatars.subarray(0, 2)], [1, 2]);
+      assert.deepEqual([out.rootsM[0], out.rootsM[3]], [1, tick]);
+    }
+  }
+});
+
 test('a server of before is not asked for ground or footprints', async () => {
   const h = new Harness();
   const world = h.joined({features: 31n});

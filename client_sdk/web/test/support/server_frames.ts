@@ -105,9 +105,13 @@ export interface BatchFields {
   tick: number;
   timeS?: number;
   joints?: number;
+  /** Of a region. */
+  partial?: boolean;
+  /** Not in mode full. */
+  quantised?: boolean;
 }
 
-/** In mode full. */
+/** In mode full, or of quantised poses, which do not turn. */
 export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer {
   const joints = fields.joints ?? 2;
   const b = builder();
@@ -120,7 +124,8 @@ export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer
       numbers.set([0, Math.sin(half), 0, Math.cos(half)], at + 3 + 4 * j);
     }
   });
-  const bytes = wire.PoseBatch.createPosesVector(b, new Uint8Array(numbers.buffer));
+  const bytes = wire.PoseBatch.createPosesVector(
+      b, fields.quantised === true ? quantisedPoses(poses, joints) : new Uint8Array(numbers.buffer));
   const flags = wire.PoseBatch.createFlagsVector(b, poses.map((pose) => pose.flags ?? 0));
   const avatars = wire.PoseBatch.createAvatarsVector(b, poses.map((pose) => pose.avatar));
   wire.PoseBatch.startPoseBatch(b);
@@ -130,12 +135,30 @@ export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer
   wire.PoseBatch.addParts(b, fields.parts ?? 1);
   wire.PoseBatch.addTick(b, BigInt(fields.tick));
   wire.PoseBatch.addServerTimeS(b, fields.timeS ?? fields.tick / 60);
-  wire.PoseBatch.addMode(b, wire.PoseMode.Full);
+  wire.PoseBatch.addMode(b, fields.quantised === true ? wire.PoseMode.Quantised : wire.PoseMode.Full);
   wire.PoseBatch.addJointCount(b, joints);
   wire.PoseBatch.addAvatars(b, avatars);
   wire.PoseBatch.addFlags(b, flags);
   wire.PoseBatch.addPoses(b, bytes);
+  wire.PoseBatch.addPartial(b, fields.partial === true);
   return finish(b, 'PoseBatch', wire.PoseBatch.endPoseBatch(b));
+}
+
+/** The root at x, 1, 0; no joint turns. */
+function quantisedPoses(poses: PoseFields[], joints: number): Uint8Array {
+  const poseBytes = 12 + 6 * joints;
+  const view = new DataView(new ArrayBuffer(poses.length * poseBytes));
+  poses.forEach((pose, i) => {
+    const at = i * poseBytes;
+    view.setInt32(at, Math.round(pose.x * 2 ** 14), true);
+    view.setInt32(at + 4, 2 ** 14, true);
+    // Of a quaternion 0, 0, 0, 1 the last number is left out: its index is in the top bits.
+    for (let j = 0; j < joints; ++j) {
+      [0xc000, 0xc000, 0x4000].forEach(
+          (bits, k) => view.setUint16(at + 12 + 6 * j + 2 * k, bits, true));
+    }
+  });
+  return new Uint8Array(view.buffer);
 }
 
 export interface EventFields {
