@@ -510,16 +510,24 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 
 namespace {
 
+bool IsDetail(stridewire_pose_detail detail) {
+  return detail >= STRIDEWIRE_DETAIL_ALL && detail <= STRIDEWIRE_DETAIL_ROOT;
+}
+
 bool IsRegion(const stridewire_region* region) {
   return region != nullptr && region->ring_count <= STRIDEWIRE_MAX_RATE_RINGS &&
-         (region->rings == nullptr) == (region->ring_count == 0);
+         (region->rings == nullptr) == (region->ring_count == 0) &&
+         (region->ring_details == nullptr ||
+          std::all_of(region->ring_details, region->ring_details + region->ring_count, IsDetail));
 }
 
 protocol::Region ToRegion(const stridewire_region& region) {
-  protocol::Region out{{region.x, region.z}, region.radius_m, std::nullopt, {}};
+  protocol::Region out{{region.x, region.z}, region.radius_m, std::nullopt, {}, {}};
   if (!(region.leave_m < 0.0)) out.leave_m = region.leave_m;
   for (std::size_t i = 0; i < region.ring_count; ++i) {
     out.rings.push_back({region.rings[i].to_m, region.rings[i].every_n_ticks});
+    if (region.ring_details == nullptr) continue;
+    out.ring_details.push_back(static_cast<protocol::PoseDetail>(region.ring_details[i]));
   }
   return out;
 }
@@ -529,9 +537,10 @@ stridewire_status Observe(stridewire_client* client, stridewire_world world,
                           const stridewire_region* region, std::uint32_t* subscription,
                           std::uint64_t* command) {
   if (observation == nullptr || observation->mode < STRIDEWIRE_FULL ||
-      observation->mode > STRIDEWIRE_MOVEMENT || observation->detail < STRIDEWIRE_DETAIL_ALL ||
-      observation->detail > STRIDEWIRE_DETAIL_ROOT ||
+      observation->mode > STRIDEWIRE_MOVEMENT || !IsDetail(observation->detail) ||
       (observation->detail != STRIDEWIRE_DETAIL_ALL && observation->mode != STRIDEWIRE_QUANTISED) ||
+      (region != nullptr && region->ring_details != nullptr && region->ring_count > 0 &&
+       observation->mode != STRIDEWIRE_QUANTISED) ||
       observation->avatar_count > STRIDEWIRE_MAX_ITEMS ||
       (observation->avatars == nullptr) != (observation->avatar_count == 0)) {
     return STRIDEWIRE_INVALID_ARGUMENT;

@@ -350,10 +350,17 @@ std::uint64_t Session::EveryNTicks(const World& world, protocol::PoseMode mode) 
   // What was asked for as quantised.
   if (protocol::IsCompact(mode)) mode = protocol::PoseMode::kQuantised;
   std::uint64_t every = 0;
+  const auto add = [&](protocol::PoseDetail of, std::uint64_t n) {
+    if (of == detail) every = every == 0 ? n : std::min(every, n);
+  };
   for (const auto& [id, subscription] : world.subscriptions) {
-    if (subscription.message.mode != mode || subscription.message.detail != detail) continue;
-    const std::uint64_t n = subscription.message.every_n_ticks;
-    every = every == 0 ? n : std::min(every, n);
+    const protocol::Observe& asked = subscription.message;
+    if (asked.mode != mode) continue;
+    add(asked.detail, asked.every_n_ticks);
+    if (!asked.region) continue;
+    for (std::size_t i = 0; i < asked.region->ring_details.size(); ++i) {
+      add(asked.region->ring_details[i], asked.region->rings[i].every_n_ticks);
+    }
   }
   return every;
 }
@@ -624,9 +631,9 @@ bool Session::Understands(const CommandMessage& message) const {
   if (const auto* observe = std::get_if<protocol::Observe>(&message)) {
     if (observe->region && (features_ & protocol::kFeatureRegions) == 0) return false;
     constexpr std::uint64_t kDetail = protocol::kFeatureDetail | protocol::kFeatureCompact;
-    if (observe->detail != protocol::PoseDetail::kAll && (features_ & kDetail) != kDetail) {
-      return false;
-    }
+    const bool has_details = observe->detail != protocol::PoseDetail::kAll ||
+                             (observe->region && !observe->region->ring_details.empty());
+    if (has_details && (features_ & kDetail) != kDetail) return false;
     return observe->mode != protocol::PoseMode::kMovement ||
            (features_ & protocol::kFeatureMovementMode) != 0;
   }

@@ -355,6 +355,15 @@ void CheckRegion(Findings& found, const Observe& m) {
                ErrorCode::kOutOfRange, "not 1 to 3600 ticks", "RateRing.every_n_ticks", index);
     before_m = ring.to_m;
   }
+  const std::vector<PoseDetail>& details = region.ring_details;
+  if (details.empty()) return;
+  found.That(details.size() == region.rings.size(), ErrorCode::kMalformed, "not one for each ring",
+             "Region.ring_details", static_cast<std::int64_t>(details.size()));
+  found.That(m.mode == PoseMode::kQuantised, ErrorCode::kUnsupported,
+             "only quantised poses have levels of detail", "Region.ring_details");
+  for (std::size_t i = 0; i < details.size(); ++i) {
+    found.Known(details[i], PoseDetail::kRoot, "Region.ring_details", static_cast<std::int64_t>(i));
+  }
 }
 
 }  // namespace

@@ -219,6 +219,11 @@ void Unpack(Unpacker& u, const wire::Observe& w, Observe& m) {
       const wire::RateRing* ring = from->rings()->Get(static_cast<flatbuffers::uoffset_t>(i));
       region.rings[i] = {ring->to_m(), ring->every_n_ticks()};
     }
+    region.ring_details.resize(u.Count(from->ring_details(), kMaxRateRings, "Region.ring_details"));
+    for (std::size_t i = 0; i < region.ring_details.size(); ++i) {
+      region.ring_details[i] = static_cast<PoseDetail>(
+          from->ring_details()->Get(static_cast<flatbuffers::uoffset_t>(i)));
+    }
   }
 }
 

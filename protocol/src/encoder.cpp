@@ -123,11 +123,18 @@ Offset<wire::Observe> Build(FlatBufferBuilder& b, const Observe& m) {
     const wire::GroundPoint centre(m.region->centre_m.x, m.region->centre_m.z);
     const auto rings_offset = rings.empty() ? Offset<flatbuffers::Vector<const wire::RateRing*>>()
                                             : b.CreateVectorOfStructs(rings);
+    std::vector<std::uint8_t> details;
+    for (const PoseDetail detail : m.region->ring_details) {
+      details.push_back(static_cast<std::uint8_t>(detail));
+    }
+    const auto details_offset =
+        details.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>() : b.CreateVector(details);
     wire::RegionBuilder builder(b);
     builder.add_centre_m(&centre);
     builder.add_radius_m(m.region->radius_m);
     if (m.region->leave_m) builder.add_leave_m(*m.region->leave_m);
     builder.add_rings(rings_offset);
+    builder.add_ring_details(details_offset);
     region = builder.Finish();
   }
   return wire::CreateObserve(b, m.seq, m.world, m.subscription, static_cast<wire::PoseMode>(m.mode),

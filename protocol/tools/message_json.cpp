@@ -127,6 +127,10 @@ Json Fields(const Observe& m) {
                     {"radius_m", region.radius_m},
                     {"leave_m", region.leave_m ? Json(*region.leave_m) : Json(nullptr)},
                     {"rings", rings}};
+  if (!region.ring_details.empty()) {
+    Json& details = json["region"]["ring_details"] = Json::array();
+    for (const PoseDetail detail : region.ring_details) details.push_back(Number(detail));
+  }
   json["replace"] = m.replace;
   return json;
 }

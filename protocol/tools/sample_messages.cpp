@@ -261,6 +261,11 @@ std::vector<SampleMessage> SampleMessages() {
     Observe afar{22, 3, 6, PoseMode::kQuantised, {}, 4, false};
     afar.detail = PoseDetail::kFewer;
     add("observe_fewer", afar);
+    afar.seq = 23;
+    afar.detail = PoseDetail::kRoot;
+    afar.region = Region{{-12.5, 40.0}, 60.0, 4.0, {{8.0, 1}, {20.0, 2}}};
+    afar.region->ring_details = {PoseDetail::kAll, PoseDetail::kFewer};
+    add("observe_ring_details", afar);
   }
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});

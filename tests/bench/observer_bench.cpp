@@ -228,7 +228,7 @@ Wanted Want(const Crowd& crowd, Watch watch, std::mt19937& random,
     region.centre_m = {Crowd::Draw(random), Crowd::Draw(random)};
     region.radius_m = kRegionRadiusM;
     server::RegionMembers members;
-    members.Move(region, crowd.world->interest_cell_m, 1);
+    members.Move(region, crowd.world->interest_cell_m, 1, crowd.delivery.mode);
     const auto due = members.Update(crowd.delivery).due;
     rows.assign(due.begin(), due.end());
   }

@@ -295,7 +295,8 @@ export class Session {
         if (wanted === undefined || wanted.message.region === null) {
           throw new StridewireError(Status.no_such_subscription, 'No region has this number.');
         }
-        const entry = check.region(region);
+        const {mode, detail} = wanted.message;
+        const entry = check.region(region, mode, detail);
         this.enqueue(world, {...wanted.message, seq: 0n, region: entry, replace: true}, resolve);
         wanted.message.region = entry;
         this.pump();
@@ -661,7 +662,8 @@ export class Session {
       case 'SetPlanting': return (this.features & featurePlanting) !== 0n;
       case 'Observe':
         return (message.region === null || this.hasAll(featureRegions)) &&
-            (message.detail === 'all' || this.hasAll(featureBits.detail));
+            ((message.detail === 'all' && (message.region?.ringDetails.length ?? 0) === 0) ||
+             this.hasAll(featureBits.detail));
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&

@@ -238,6 +238,14 @@ export interface CurrentMovement {
   readonly landings: readonly Landing[];
 }
 
+export interface RegionRing {
+  toM: number;
+  /** 1 to 3600. */
+  everyNTicks: number;
+  /** As `Observation.detail`. */
+  detail?: PoseDetail;
+}
+
 /** A circle on the ground; who comes within its radius enters. */
 export interface Region {
   /** Its centre. */
@@ -247,9 +255,9 @@ export interface Region {
   radiusM: number;
   /** Who is inside leaves when further than radius and this; absent: the server chooses. */
   leaveM?: number;
-  /** Within `toM` of the centre poses come every so many ticks, beyond the last as the observation has it. At
-   * most 4, growing. */
-  rings?: readonly {toM: number; everyNTicks: number}[];
+  /** Within `toM` of the centre poses come every so many ticks and in that detail; beyond the last, and in the detail
+   * where a ring names none, as the observation has it. At most 4, growing. */
+  rings?: readonly RegionRing[];
 }
 
 export interface Observation {

@@ -3,8 +3,8 @@ import {detailOf} from './pose_flags';
 import type {WorldRecording} from './recording';
 import type {Command, Session} from './session';
 import type {
-  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseKind, PoseMode, Recording, Reply, Role,
-  Skeleton, SpawnItem, Subscription, Terrain, World, WorldListeners, WorldState
+  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseDetail, PoseKind, PoseMode, Recording, Reply,
+  Role, Skeleton, SpawnItem, Subscription, Terrain, World, WorldListeners, WorldState
 } from './types';
 import * as check from './wire/check';
 import {CompactCodec} from './wire/compact_codec';
@@ -159,9 +159,13 @@ export class WorldHandle implements World {
     const mode: PoseMode = batchMode === 'full' ? 'full' : 'quantised';
     const detail = detailOf(batchMode);
     let every = 0;
+    const add = (of: PoseDetail | undefined, n: number): void => {
+      if (of === detail) every = every === 0 ? n : Math.min(every, n);
+    };
     for (const {message} of this.subscriptions.values()) {
-      if (message.mode !== mode || message.detail !== detail) continue;
-      every = every === 0 ? message.everyNTicks : Math.min(every, message.everyNTicks);
+      if (message.mode !== mode) continue;
+      add(message.detail, message.everyNTicks);
+      message.region?.ringDetails.forEach((of, i) => add(of, message.region!.rings[i]!.everyNTicks));
     }
     return every;
   }

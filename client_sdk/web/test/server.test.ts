@@ -152,6 +152,37 @@ test('a region shows who is in it, and moves', {skip}, async () => {
   }
 });
 
+test('rings of a region have each a detail', {skip}, async () => {
+  const server = await ServerProcess.start();
+  const client = makeClient(server);
+  try {
+    client.connect();
+    const world = client.joinWorld('plaza');
+    assert.ok((await world.spawn(Array.from({length: 30}, (_, i) => (
+        {avatar: i + 1, positionM: [i + 1, 0, 0] as const, headingRad: 0})))).ok);
+    const region = (x: number) => ({x, z: 0, radiusM: 100, rings: [
+      {toM: 10.5, everyNTicks: 1, detail: 'all' as const}, {toM: 20.5, everyNTicks: 2, detail: 'fewer' as const}
+    ]});
+    const watched = world.observe({mode: 'quantised', detail: 'root', everyNTicks: 4, region: region(0)});
+    assert.ok((await watched.reply).ok);
+    const pose = createPose();
+    const shows = (all: number, fewer: number) => until(`${all} are shown whole`, () => {
+      for (let avatar = 1; avatar <= 30; ++avatar) {
+        if (world.sample(avatar, Infinity, pose) === 'missing') return false;
+        if (pose.detail !== (avatar <= all ? 'all' : avatar <= fewer ? 'fewer' : 'root')) return false;
+      }
+      return true;
+    });
+    await shows(10, 20);
+    assert.ok((await watched.moveRegion(region(5))).ok);
+    await shows(15, 25);
+    assert.equal(world.avatars().length, 30);
+  } finally {
+    client.close();
+    await server.kill();
+  }
+});
+
 test('steps asked for are started, land and finish, and can be looked into', {skip}, async () => {
   const server = await ServerProcess.start();
   const client = makeClient(server);

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 import {Session, defaultOptions, type SessionOptions} from '../src/session';
 import {Status} from '../src/status';
-import type {Reply, Terrain, WorldEvent} from '../src/types';
+import type {PoseDetail, Region, Reply, Terrain, WorldEvent} from '../src/types';
 import {decodeFrame} from '../src/wire/decode';
 import type {Message} from '../src/wire/messages';
 import type {WorldHandle} from '../src/world';
@@ -66,6 +66,11 @@ class Harness {
     return world;
   }
 }
+
+const ringed = (detail?: PoseDetail): Region => ({
+  x: 1, z: 2, radiusM: 30, rings: [{toM: 8, everyNTicks: 1, ...(detail === undefined ? {} : {detail})},
+                                   {toM: 20, everyNTicks: 2}],
+});
 
 const summary = (messages: Message[]): string[] => messages.map(
     (message) => 'seq' in message ? `${message.type} ${message.seq}` : message.type);
@@ -458,6 +463,8 @@ test('bad arguments are told at once and named', async () => {
     [world.observe({mode: 'full', everyNTicks: 0}).reply, /everyNTicks/],
     [world.observe({mode: 'full', detail: 'root'}).reply, /detail/],
     [world.observe({mode: 'quantised', detail: 'some' as 'root'}).reply, /detail/],
+    [world.observe({mode: 'full', region: ringed('all')}).reply, /rings.detail/],
+    [world.observe({mode: 'quantised', region: ringed('some' as 'root')}).reply, /rings.detail\[0\]/],
   ];
   for (const [promise, why] of bad) {
     const reply = await promise;
@@ -753,6 +760,33 @@ test('levels of detail are asked of a server that knows them', async () => {
     assert.equal((await before.observe({mode: 'quantised', detail: 'root'}).reply).status, 'unsupported');
     assert.equal(old.sent().length, 0);
   }
+});
+
+test('rings of a region name their details, or have the observation\'s', async () => {
+  const h = new Harness();
+  h.connect({features: 32_767n});
+  const world = h.session.joinWorld('plaza', 'observer');
+  h.sent();
+  h.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
+  const details = (): unknown => h.sent().map((m) => m.type === 'Observe' && [m.detail, m.region?.ringDetails]);
+  const observed = world.observe({mode: 'quantised', detail: 'root', everyNTicks: 4, region: ringed('fewer')});
+  assert.deepEqual(details(), [['root', ['fewer', 'root']]]);
+  h.receive(server.reply(2n));
+  // The rate of each detail, by the batches in which it comes.
+  assert.deepEqual((['compact', 'compactFewer', 'compactRoot'] as const).map((mode) => world.everyNTicks(mode)),
+                   [0, 1, 2]);
+  void observed.moveRegion(ringed());
+  assert.deepEqual(details(), [['root', []]]);
+  void observed.moveRegion(ringed('all'));
+  assert.deepEqual(details(), [['root', ['all', 'root']]]);
+  assert.match((await observed.moveRegion(ringed('none' as 'all'))).text, /rings.detail\[0\]/);
+  const old = new Harness();
+  old.connect({features: 32_767n - 8192n});
+  const before = old.session.joinWorld('plaza', 'observer');
+  old.sent();
+  old.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
+  assert.equal((await before.observe({mode: 'quantised', region: ringed('all')}).reply).status, 'unsupported');
+  assert.equal(old.sent().length, 0);
 });
 
 test('who crosses a ring of a region goes on, live and recorded', () => {

@@ -1,35 +1,69 @@
 #include "session/region_members.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <utility>
 
 namespace stridewire::server {
 
+using protocol::PoseMode;
+
 void RegionMembers::Move(const protocol::Region& region, double leave_m,
-                         std::uint16_t every_n_ticks) {
-  region_ = region;
+                         std::uint16_t every_n_ticks, PoseMode mode) {
+  centre_m_ = region.centre_m;
+  radius_m_ = region.radius_m;
   leave_at_m_ = region.radius_m + region.leave_m.value_or(leave_m);
-  every_n_ticks_ = every_n_ticks;
-  every_ = every_n_ticks;
-  for (const protocol::RateRing& ring : region.rings) every_ = std::gcd(every_, ring.every_n_ticks);
+  rings_.clear();
+  for (std::size_t i = 0; i < region.rings.size(); ++i) {
+    const protocol::RateRing& ring = region.rings[i];
+    rings_.push_back({ring.to_m, ring.every_n_ticks,
+                      region.ring_details.empty() ? mode : CompactMode(region.ring_details[i])});
+  }
+  rings_.push_back({std::numeric_limits<double>::infinity(), every_n_ticks, mode});
 }
 
-std::uint16_t RegionMembers::EveryAt(double distance_m2) const {
-  for (const protocol::RateRing& ring : region_.rings) {
-    if (distance_m2 <= ring.to_m * ring.to_m) return ring.every_n_ticks;
+const RegionMembers::Ring& RegionMembers::RingAt(double distance_m2) const {
+  return *std::find_if(rings_.begin(), rings_.end() - 1,
+                       [&](const Ring& ring) { return distance_m2 <= ring.to_m * ring.to_m; });
+}
+
+std::vector<PoseMode> RegionMembers::modes() const {
+  std::vector<PoseMode> modes;
+  for (const Ring& ring : rings_) {
+    if (std::ranges::find(modes, ring.mode) == modes.end()) modes.push_back(ring.mode);
   }
-  return every_n_ticks_;
+  return modes;
+}
+
+std::uint16_t RegionMembers::every(PoseMode mode) const {
+  std::uint16_t every = 0;
+  for (const Ring& ring : rings_) {
+    if (ring.mode == mode) every = std::gcd(every, ring.every_n_ticks);
+  }
+  return every;
+}
+
+RegionReach RegionMembers::reach(PoseMode mode) const {
+  const auto is_of_mode = [&](const Ring& ring) { return ring.mode == mode; };
+  const auto first = std::ranges::find_if(rings_, is_of_mode);
+  const auto last = std::find_if(rings_.rbegin(), rings_.rend(), is_of_mode);
+  return {.x = centre_m_.x,
+          .z = centre_m_.z,
+          .reach_m = std::min(last->to_m, leave_at_m_),
+          .beyond_m = first == rings_.begin() ? 0.0 : (first - 1)->to_m,
+          .is_one_of_several = !std::ranges::all_of(rings_, is_of_mode)};
 }
 
 RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
   return Update(delivery.from_shard, delivery.tick, delivery.rows->avatars(), *delivery.places,
-                delivery.rows.get());
+                delivery.rows.get(), delivery.mode);
 }
 
 RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
                                             const protocol::PoseRows::Avatars& avatars,
-                                            const Places& places, const protocol::PoseRows* rows) {
+                                            const Places& places, const protocol::PoseRows* rows,
+                                            PoseMode mode) {
   const auto has_pose = [&](std::uint32_t row) { return rows == nullptr || rows->has_pose(row); };
   Lane& lane = lanes_[from_shard];
   if (lane.avatars != avatars) {
@@ -42,9 +76,9 @@ RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
     }
   }
   near_.clear();
-  const double centre_x = region_.centre_m.x;
-  const double centre_z = region_.centre_m.z;
-  const double enter_m2 = region_.radius_m * region_.radius_m;
+  const double centre_x = centre_m_.x;
+  const double centre_z = centre_m_.z;
+  const double enter_m2 = radius_m_ * radius_m_;
   const double leave_m2 = leave_at_m_ * leave_at_m_;
   places.ForEachNear(centre_x, centre_z, leave_at_m_, [&](std::uint32_t row, double x, double z) {
     const double distance_m2 = (x - centre_x) * (x - centre_x) + (z - centre_z) * (z - centre_z);
@@ -59,12 +93,13 @@ RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
   std::size_t kept = 0;
   for (const auto& [row, distance_m2] : near_) {
     const AvatarNumber number = (*lane.avatars)[row];
+    const Ring& ring = RingAt(distance_m2);
     if (!lane.is_inside[row]) {
       // Just after a region has moved the shard may not know yet that its pose is wanted.
-      if (!has_pose(row)) continue;
+      if (ring.mode != mode || !has_pose(row)) continue;
       entered_.push_back(number);
       due_.push_back(row);
-    } else if (has_pose(row) && tick % EveryAt(distance_m2) == 0) {
+    } else if (ring.mode == mode && has_pose(row) && tick % ring.every_n_ticks == 0) {
       due_.push_back(row);
     }
     now_.push_back(number);

@@ -12,18 +12,35 @@ namespace stridewire::server {
 
 /// Who is in a region that a session observes: who came within its radius and has not gone further than radius and
 /// leave_m since. Worked out shard by shard, each time with poses of a tick.
+///
+/// Rings may be of different modes (details): then deliveries of each come one after the other, and each has due those
+/// who are in a ring of its mode.
+///
+///        centre  compact       8 m   fewer          20 m   root    radius  + leave_m
+///   rows   |------- 3 -- 9 -----|---- 1 -------- 4 --|----- 7 -------|--------|
+///   due    [3, 9]                [1, 4]               [7]
+///
+/// Who enters does so with the delivery that has its pose; who leaves, with the first that comes. So nobody is told twice,
+/// and who only crosses a ring neither leaves nor enters.
 class RegionMembers {
  public:
-  /// `leave_m` where the region says nothing; beyond its rings poses come every `every_n_ticks`.
-  void Move(const protocol::Region& region, double leave_m, std::uint16_t every_n_ticks);
-
-  /// Of the ticks wanted those that this divides.
-  [[nodiscard]] std::uint16_t every() const { return every_; }
-  [[nodiscard]] RegionReach reach() const {
-    return {region_.centre_m.x, region_.centre_m.z, leave_at_m_};
+  /// `leave_m` where the region says nothing; beyond its rings poses come every `every_n_ticks` in `mode`.
+  void Move(const protocol::Region& region, double leave_m, std::uint16_t every_n_ticks,
+            protocol::PoseMode mode);
+  /// Puts `function(mode)` in the place of each mode.
+  template <typename Function>
+  void ChangeModes(Function&& function) {
+    for (Ring& ring : rings_) ring.mode = function(ring.mode);
   }
 
-  /// What came of a delivery, which has places. Holds until the next call.
+  /// Those of its rings and beyond, each once.
+  [[nodiscard]] std::vector<protocol::PoseMode> modes() const;
+  /// Of the ticks wanted in a mode those that this divides; 0: no ring is of that mode.
+  [[nodiscard]] std::uint16_t every(protocol::PoseMode mode) const;
+  /// What holds all rings of that mode, of which there is one.
+  [[nodiscard]] RegionReach reach(protocol::PoseMode mode) const;
+
+  /// What came of a delivery, which has places and is of one of the modes. Holds until the next call.
   struct Change {
     std::span<const AvatarNumber> entered;  ///< Growing.
     std::span<const AvatarNumber> left;     ///< The same. Also who is not in the world any more.
@@ -33,7 +50,7 @@ class RegionMembers {
   /// The same of all avatars of a shard, whose poses nobody asks for.
   [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
                               const protocol::PoseRows::Avatars& avatars, const Places& places) {
-    return Update(from_shard, tick, avatars, places, nullptr);
+    return Update(from_shard, tick, avatars, places, nullptr, protocol::PoseMode::kMovement);
   }
   /// Who of a shard is in it, growing.
   [[nodiscard]] const std::vector<AvatarNumber>& inside(int shard) { return lanes_[shard].inside; }
@@ -42,13 +59,18 @@ class RegionMembers {
   // `rows` null: all have poses.
   [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
                               const protocol::PoseRows::Avatars& avatars, const Places& places,
-                              const protocol::PoseRows* rows);
-  [[nodiscard]] std::uint16_t EveryAt(double distance_m2) const;
+                              const protocol::PoseRows* rows, protocol::PoseMode mode);
+  struct Ring {
+    double to_m = 0.0;
+    std::uint16_t every_n_ticks = 1;
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
+  };
+  [[nodiscard]] const Ring& RingAt(double distance_m2) const;
 
-  protocol::Region region_;
+  protocol::GroundPlace centre_m_;
+  double radius_m_ = 0.0;
   double leave_at_m_ = 0.0;
-  std::uint16_t every_n_ticks_ = 1;
-  std::uint16_t every_ = 1;
+  std::vector<Ring> rings_{Ring{}};  // growing; the last is what is beyond the others
   struct Lane {
     std::vector<AvatarNumber> inside;  // growing
     protocol::PoseRows::Avatars avatars;

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 #include <utility>
 
@@ -354,9 +355,9 @@ void Session::Leave(WorldId id) {
 }
 
 void Session::Execute(protocol::Observe&& command) {
-  if (command.detail != protocol::PoseDetail::kAll &&
-      subscriptions_.SentMode(command.mode, command.detail) !=
-          protocol::CompactMode(command.detail)) {
+  const bool has_ring_details = command.region && !command.region->ring_details.empty();
+  if ((command.detail != protocol::PoseDetail::kAll || has_ring_details) &&
+      !subscriptions_.has_detail()) {
     Answer(
         command.seq, StatusCode::kUnsupported,
         "the features 'compact poses' and 'levels of detail' were not agreed on in the handshake");
@@ -413,8 +414,8 @@ void Session::Execute(protocol::Observe&& command) {
   if (!Affords(command.seq, command.avatars.size())) return;
   std::optional<RegionMembers> region;
   if (command.region) {
-    region.emplace().Move(*command.region, it->second.world->interest_cell_m,
-                          command.every_n_ticks);
+    region.emplace().Move(*command.region, it->second.world->interest_cell_m, command.every_n_ticks,
+                          command.mode);
   }
   subscriptions_.Add(command.subscription, {.world = command.world,
                                             .mode = command.mode,
@@ -428,14 +429,19 @@ void Session::Execute(protocol::Observe&& command) {
 }
 
 void Session::MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world) {
-  const PoseInterest::Every before = EveryOf(command.world, command.mode);
+  const auto every = [&] {
+    std::array<PoseInterest::Every, kSentModes.size()> all;
+    for (const PoseMode mode : kSentModes) all[ModeIndex(mode)] = EveryOf(command.world, mode);
+    return all;
+  };
+  const auto before = every();
   const bool had_events = WantsEvents(command.world);
   if (!subscriptions_.MoveRegion(command.subscription, command, world->interest_cell_m)) {
     Answer(command.seq, StatusCode::kNoSuchSubscription,
            "no region of that number, world and mode is observed");
     return;
   }
-  if (EveryOf(command.world, command.mode) == before && WantsEvents(command.world) == had_events) {
+  if (every() == before && WantsEvents(command.world) == had_events) {
     host_.RegionMoved(command.world);
   } else {
     host_.InterestChanged(world);
@@ -449,16 +455,17 @@ void Session::Execute(protocol::StopObserving&& command) {
     Answer(command.seq, StatusCode::kNoSuchSubscription, "no subscription of that number");
     return;
   }
-  const auto [world, mode] = *stopped;
-  const bool is_last = !subscriptions_.Watches(world, mode);
-  if (mode == PoseMode::kMovement) {
-    if (is_last) {
+  const WorldId world = stopped->world;
+  if (stopped->mode == PoseMode::kMovement) {
+    if (!subscriptions_.Watches(world, PoseMode::kMovement)) {
       EndMovements(world);
     } else {
       WatchMovements(worlds_.at(world).world);
     }
-  } else if (is_last && connection_ != nullptr) {
-    connection_->DropPoses(world, mode);
+  } else if (connection_ != nullptr) {
+    for (const PoseMode mode : kSentModes) {
+      if (!subscriptions_.Watches(world, mode)) connection_->DropPoses(world, mode);
+    }
   }
   host_.InterestChanged(worlds_.at(world).world);
   Answer(command.seq, StatusCode::kOk);

@@ -11,12 +11,13 @@ using protocol::SubscriptionId;
 
 namespace {
 
-// The region of a world and mode; null: there is none.
+// The region of a world with a ring of that mode; null: there is none.
 template <typename All>
 auto RegionIn(All& all, const std::pair<WorldId, PoseMode>& key)
     -> decltype(&*all.begin()->second.region) {
   const auto it = std::ranges::find_if(all, [&](const auto& item) {
-    return item.second.region && std::pair(item.second.world, item.second.mode) == key;
+    return item.second.region && item.second.world == key.first &&
+           item.second.region->every(key.second) > 0;
   });
   return it == all.end() ? nullptr : &*it->second.region;
 }
@@ -35,27 +36,41 @@ void Subscriptions::SetCompact(bool is_compact, bool has_detail) {
   has_detail_ = has_detail;
   watches_.clear();
   for (auto& [id, subscription] : all_) {
-    subscription.mode = SentMode(subscription.mode, DetailOf(subscription.mode));
-    SumUp({subscription.world, subscription.mode});
+    const auto sent = [this](PoseMode mode) { return SentMode(mode, DetailOf(mode)); };
+    subscription.mode = sent(subscription.mode);
+    if (subscription.region) subscription.region->ChangeModes(sent);
+    SumUpAll(subscription);
   }
 }
 
+std::vector<PoseMode> Subscriptions::ModesOf(const Subscription& subscription) {
+  return subscription.region ? subscription.region->modes() : std::vector{subscription.mode};
+}
+
+std::uint16_t Subscriptions::EveryOf(const Subscription& subscription, const Key& key) {
+  if (subscription.world != key.first) return 0;
+  if (subscription.region) return subscription.region->every(key.second);
+  return subscription.mode == key.second ? subscription.every_n_ticks : 0;
+}
+
+void Subscriptions::SumUpAll(const Subscription& subscription) {
+  for (const PoseMode mode : ModesOf(subscription)) SumUp({subscription.world, mode});
+}
+
 void Subscriptions::Add(SubscriptionId id, Subscription&& subscription) {
-  const Key key(subscription.world, subscription.mode);
   std::ranges::sort(subscription.avatars);
   const auto twice = std::ranges::unique(subscription.avatars);
   subscription.avatars.erase(twice.begin(), twice.end());
-  all_.emplace(id, std::move(subscription));
-  SumUp(key);
+  SumUpAll(all_.emplace(id, std::move(subscription)).first->second);
 }
 
-std::optional<std::pair<WorldId, PoseMode>> Subscriptions::Remove(SubscriptionId id) {
+std::optional<Subscriptions::Subscription> Subscriptions::Remove(SubscriptionId id) {
   const auto it = all_.find(id);
   if (it == all_.end()) return std::nullopt;
-  const Key key(it->second.world, it->second.mode);
+  Subscription removed = std::move(it->second);
   all_.erase(it);
-  SumUp(key);
-  return key;
+  SumUpAll(removed);
+  return removed;
 }
 
 void Subscriptions::RemoveWorld(WorldId world) {
@@ -81,9 +96,9 @@ void Subscriptions::SumUp(const Key& key) {
   bool is_whole = false;
   std::uint16_t every = 0;
   for (const auto& [id, subscription] : all_) {
-    if (Key(subscription.world, subscription.mode) != key) continue;
-    every = std::gcd(
-        every, subscription.region ? subscription.region->every() : subscription.every_n_ticks);
+    const std::uint16_t wanted = EveryOf(subscription, key);
+    if (wanted == 0) continue;
+    every = std::gcd(every, wanted);
     is_whole |= subscription.avatars.empty() && !subscription.region;
     std::vector<AvatarNumber> named;
     named.reserve(watch.named.size() + subscription.avatars.size());
@@ -138,10 +153,12 @@ bool Subscriptions::MoveRegion(SubscriptionId id, const protocol::Observe& moved
       subscription.mode != moved.mode) {
     return false;
   }
-  subscription.region->Move(*moved.region, leave_m, moved.every_n_ticks);
+  const std::vector<PoseMode> before = subscription.region->modes();
+  subscription.region->Move(*moved.region, leave_m, moved.every_n_ticks, moved.mode);
   subscription.every_n_ticks = moved.every_n_ticks;
   subscription.with_events = moved.with_events;
-  SumUp({moved.world, moved.mode});
+  for (const PoseMode mode : before) SumUp({moved.world, mode});
+  SumUpAll(subscription);
   return true;
 }
 
@@ -149,7 +166,7 @@ const RegionMembers* Subscriptions::FindRegion(const Key& key) const { return Re
 
 std::optional<RegionReach> Subscriptions::ReachOf(WorldId world, PoseMode mode) const {
   const RegionMembers* region = FindRegion({world, mode});
-  return region == nullptr ? std::nullopt : std::optional(region->reach());
+  return region == nullptr ? std::nullopt : std::optional(region->reach(mode));
 }
 
 RegionMembers* Subscriptions::RegionOf(WorldId world, PoseMode mode) {
@@ -164,7 +181,7 @@ Subscriptions::Share Subscriptions::ShareOf(const PoseDelivery& delivery) const 
   const auto watch = watches_.find({delivery.world, delivery.mode});
   if (watch == watches_.end()) return Share::kNone;
   if (const RegionMembers* region = FindRegion({delivery.world, delivery.mode})) {
-    return delivery.tick % region->every() == 0 ? Share::kRegion : Share::kNone;
+    return delivery.tick % region->every(delivery.mode) == 0 ? Share::kRegion : Share::kNone;
   }
   const bool is_due = std::ranges::any_of(all_, [&](const auto& item) {
     const Subscription& subscription = item.second;

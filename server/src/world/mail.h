@@ -132,11 +132,15 @@ inline constexpr std::array kSentModes{
   return static_cast<std::size_t>(mode) - (mode > protocol::PoseMode::kMovement ? 1 : 0);
 }
 
-/// A circle on the ground whose avatars are of interest.
+/// A circle or ring on the ground whose avatars are of interest.
 struct RegionReach {
   double x = 0.0;
   double z = 0.0;
   double reach_m = 0.0;
+  double beyond_m = 0.0;  ///< Nearer than this or just as far they are not, unless it is 0.
+  /// Others of its session's are of other modes. Its deliveries come even with nobody's pose: who was in one of those may
+  /// have left, which only places tell.
+  bool is_one_of_several = false;
   bool operator==(const RegionReach&) const = default;
 };
 

@@ -525,6 +525,13 @@ bool WorldShard::HasRegions(PoseMode mode) const {
   });
 }
 
+bool WorldShard::HasRegionsOfSeveral(PoseMode mode) const {
+  return std::ranges::any_of(interests_, [&](const Interest& shard) {
+    const auto& regions = shard.poses[ModeIndex(mode)].regions;
+    return regions != nullptr && std::ranges::any_of(*regions, &RegionReach::is_one_of_several);
+  });
+}
+
 std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
   if (places_ != nullptr && places_tick_ == tick) return places_;
   const std::span<const InOrder> in_order = AvatarsInOrder();
@@ -548,15 +555,22 @@ std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
 std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const Places& places) {
   is_near_.resize(numbers_->size());
   near_rows_.clear();
-  const auto take = [&](std::uint32_t row, float, float) {
+  const auto take = [&](std::uint32_t row) {
     if (std::exchange(is_near_[row], 1) == 0) near_rows_.push_back(row);
   };
-  for (const std::uint32_t row : NamedRows(mode)) take(row, 0.0f, 0.0f);
+  for (const std::uint32_t row : NamedRows(mode)) take(row);
   for (const Interest& shard : interests_) {
     const auto& regions = shard.poses[ModeIndex(mode)].regions;
     if (regions == nullptr) continue;
     for (const RegionReach& region : *regions) {
-      places.ForEachNear(region.x, region.z, region.reach_m, take);
+      const double beyond_m2 = region.beyond_m * region.beyond_m;
+      const auto take_beyond = [&](std::uint32_t row, double x, double z) {
+        // Told as RegionMembers tells in which ring one is.
+        const double distance_m2 =
+            (x - region.x) * (x - region.x) + (z - region.z) * (z - region.z);
+        if (region.beyond_m == 0.0 || distance_m2 > beyond_m2) take(row);
+      };
+      places.ForEachNear(region.x, region.z, region.reach_m, take_beyond);
     }
   }
   for (const std::uint32_t row : near_rows_) is_near_[row] = 0;
@@ -573,7 +587,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
                                                     ? NamedAndNearRows(mode, *delivery.places)
                                                     : NamedRows(mode);
   bool& had_poses = last_had_poses_[ModeIndex(mode)];
-  if (wanted.empty() && !had_poses) return false;
+  if (wanted.empty() && !had_poses && !HasRegionsOfSeveral(mode)) return false;
   had_poses = !wanted.empty();
 
   protocol::PoseRows& rows = rows_[ModeIndex(mode)].Take();

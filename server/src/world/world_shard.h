@@ -104,6 +104,7 @@ class WorldShard {
   std::span<const InOrder> AvatarsInOrder();
   std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
   bool HasRegions(protocol::PoseMode mode) const;
+  bool HasRegionsOfSeveral(protocol::PoseMode mode) const;
   std::shared_ptr<const Places> PlacesAt(std::uint64_t tick);
   std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const Places& places);
   void TellMovements();

@@ -176,7 +176,7 @@ TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
   observation.mode = GetParam();
   observation.every_n_ticks = 1;
   const stridewire_rate_ring ring{1.0, 2};
-  stridewire_region region{-1000.0, 0.0, 5.0, -1.0, &ring, 1};
+  stridewire_region region{-1000.0, 0.0, 5.0, -1.0, &ring, 1, nullptr};
   std::uint32_t subscription = 0;
   ASSERT_TRUE(user.client.ObserveRegion(user.world, observation, region, &subscription));
   region.ring_count = 5;
@@ -184,7 +184,7 @@ TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
   region.ring_count = 1;
   EXPECT_FALSE(user.client.MoveRegion(subscription + 1, region));
   const auto count = [&] { return user.client.ListAvatars(user.world).size(); };
-  region = {0.0, 0.0, 1000.0, 2.0, nullptr, 0};
+  region = {0.0, 0.0, 1000.0, 2.0, nullptr, 0, nullptr};
   ASSERT_TRUE(user.client.MoveRegion(subscription, region));
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_ENTERED)) << i;
   EXPECT_TRUE(Eventually([&] { return count() == 30; }));
@@ -192,6 +192,52 @@ TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
   ASSERT_TRUE(user.client.MoveRegion(subscription, region));
   for (int i = 0; i < 30; ++i) ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_LEFT)) << i;
   EXPECT_TRUE(Eventually([&] { return count() == 0; }));
+  EXPECT_EQ(server.Terminate(), 0);
+}
+
+TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
+  Daemon server;
+  ASSERT_NE(server.port(), 0);
+  User user(server.port());
+  user.Spawn(30);  // at x = 1 to 30 m
+  const stridewire_rate_ring rings[] = {{10.5, 1}, {20.5, 2}};
+  stridewire_pose_detail details[] = {STRIDEWIRE_DETAIL_ALL, STRIDEWIRE_DETAIL_FEWER};
+  stridewire_region region{0.0, 0.0, 100.0, -1.0, rings, 2, details};
+  stridewire_observation observation{};
+  observation.mode = STRIDEWIRE_FULL;
+  observation.every_n_ticks = 4;
+  EXPECT_EQ(user.client.ObserveRegion(user.world, observation, region).status(),
+            STRIDEWIRE_INVALID_ARGUMENT);
+  observation.mode = STRIDEWIRE_QUANTISED;
+  observation.detail = STRIDEWIRE_DETAIL_ROOT;
+  details[1] = static_cast<stridewire_pose_detail>(3);
+  EXPECT_EQ(user.client.ObserveRegion(user.world, observation, region).status(),
+            STRIDEWIRE_INVALID_ARGUMENT);
+  details[1] = STRIDEWIRE_DETAIL_FEWER;
+  std::uint32_t subscription = 0;
+  ASSERT_TRUE(user.client.ObserveRegion(user.world, observation, region, &subscription));
+  // Avatars up to `all` and up to `fewer` are shown so, the others by their root.
+  const auto shows = [&](std::uint32_t all, std::uint32_t fewer) {
+    return Eventually([&] {
+      for (std::uint32_t avatar = 1; avatar <= 30; ++avatar) {
+        client::Pose pose;
+        if (!user.client.LatestPose(user.world, avatar, pose) || pose.missing()) return false;
+        const int detail = avatar <= all     ? STRIDEWIRE_DETAIL_ALL
+                           : avatar <= fewer ? STRIDEWIRE_DETAIL_FEWER
+                                             : STRIDEWIRE_DETAIL_ROOT;
+        if (pose.detail != detail) return false;
+      }
+      return true;
+    });
+  };
+  EXPECT_TRUE(shows(10, 20));
+  region.x = 5.0;
+  ASSERT_TRUE(user.client.MoveRegion(subscription, region));
+  EXPECT_TRUE(shows(15, 25));
+  region.ring_details = nullptr;
+  ASSERT_TRUE(user.client.MoveRegion(subscription, region));
+  EXPECT_TRUE(shows(0, 0));
+  EXPECT_EQ(user.client.ListAvatars(user.world).size(), 30u);
   EXPECT_EQ(server.Terminate(), 0);
 }
 

@@ -491,7 +491,7 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
                             .world = world->world,
                             .subscription = 1,
                             .mode = PoseMode::kQuantised};
-    asked.region = protocol::Region{{x, 0.0}, radius_m, 3.0, {}};
+    asked.region = protocol::Region{{x, 0.0}, radius_m, 3.0, {}, {}};
     asked.replace = replace;
     player.Send(asked);
     const auto reply = player.Await<Reply>(take);
@@ -538,9 +538,165 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
   ASSERT_TRUE(other.SayHello(protocol::kFeatureQuantised));
   ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
   protocol::Observe without{.seq = other.NextSeq(), .world = world->world, .subscription = 1};
-  without.region = protocol::Region{{0.0, 0.0}, 1.0, {}, {}};
+  without.region = protocol::Region{{0.0, 0.0}, 1.0, {}, {}, {}};
   other.Send(without);
   EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
+}
+
+/// What an observer of a region hears.
+struct Heard {
+  std::map<AvatarNumber, PoseMode> mode;  // of the last pose
+  std::map<AvatarNumber, std::set<std::uint64_t>> ticks;
+  std::map<AvatarNumber, int> entered;
+  std::map<AvatarNumber, int> left;
+
+  void Take(const protocol::Message& message) {
+    if (const auto* events = std::get_if<protocol::Events>(&message)) {
+      for (const protocol::Event& event : events->events) {
+        ++(event.type == EventType::kEntered ? entered : left)[event.avatar];
+      }
+    } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
+      EXPECT_TRUE(batch->info.is_partial);
+      for (const AvatarNumber avatar : batch->avatars) {
+        mode[avatar] = batch->info.mode;
+        // One pose a tick, whatever the number of details.
+        EXPECT_TRUE(ticks[avatar].insert(batch->info.tick).second) << avatar;
+      }
+    }
+  }
+};
+
+// A crowd on a line, one avatar a metre: near ones with all joints every tick, then fewer, then the root alone.
+TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
+  TestServer server(TestConfig(2));
+  auto [controller, world] = server.Enter("w");
+  std::vector<protocol::SpawnItem> items;
+  for (AvatarNumber avatar = 1; avatar <= 60; ++avatar) {
+    items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
+  }
+  ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 60u);
+  RawClient player = server.Enter("w", protocol::Role::kObserver).first;
+  Heard heard;
+  const auto take = [&](const protocol::Message& message) { heard.Take(message); };
+  protocol::Observe asked{.world = world->world,
+                          .subscription = 1,
+                          .mode = PoseMode::kQuantised,
+                          .every_n_ticks = 4,
+                          .detail = protocol::PoseDetail::kRoot};
+  asked.region = protocol::Region{{0.0, 0.0}, 40.5, 3.0, {{10.5, 1}, {20.5, 2}}, {}};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  const auto observe = [&] {
+    asked.seq = player.NextSeq();
+    player.Send(asked);
+    const auto reply = player.Await<Reply>(take);
+    return reply ? reply->code : StatusCode::kInternal;
+  };
+  const auto hear = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      const auto message = player.Receive();
+      ASSERT_TRUE(message);
+      heard.Take(*message);
+    }
+  };
+  const auto shows = [&](AvatarNumber first, AvatarNumber last, PoseMode mode) {
+    for (AvatarNumber avatar = first; avatar <= last; ++avatar) {
+      EXPECT_EQ(heard.mode[avatar], mode) << avatar;
+    }
+  };
+  ASSERT_EQ(observe(), StatusCode::kOk);
+  hear(100);
+  heard.ticks.clear();
+  hear(200);  // two shards: 3.5 batches a tick
+  shows(1, 10, PoseMode::kCompact);
+  shows(11, 20, PoseMode::kCompactFewer);
+  shows(21, 40, PoseMode::kCompactRoot);
+  EXPECT_EQ(heard.mode.size(), 40u);
+  for (const auto& [avatar, ticks] : heard.ticks) {
+    const std::uint64_t every = avatar <= 10 ? 1 : avatar <= 20 ? 2 : 4;
+    for (const std::uint64_t tick : ticks) EXPECT_EQ(tick % every, 0u) << avatar;
+    // A busy machine may miss ticks, of all avatars of a shard alike.
+    const auto due = std::ranges::count_if(heard.ticks[2 - avatar % 2],
+                                           [&](std::uint64_t tick) { return tick % every == 0; });
+    EXPECT_GE(due, 3) << avatar;
+    EXPECT_NEAR(static_cast<double>(ticks.size()), static_cast<double>(due), 2.0) << avatar;
+  }
+  EXPECT_EQ(heard.entered.size(), 40u);
+
+  // Moved 5 m, and nobody beyond the edges: who is in another ring now neither enters nor leaves.
+  asked.region->centre_m.x = 5.0;
+  asked.replace = true;
+  ASSERT_EQ(observe(), StatusCode::kOk);
+  hear(100);
+  shows(1, 15, PoseMode::kCompact);
+  shows(16, 25, PoseMode::kCompactFewer);
+  shows(26, 45, PoseMode::kCompactRoot);
+  // And with the Observe's detail everywhere.
+  asked.region->ring_details.clear();
+  ASSERT_EQ(observe(), StatusCode::kOk);
+  hear(100);
+  shows(1, 45, PoseMode::kCompactRoot);
+  EXPECT_EQ(heard.entered.size(), 45u);
+  for (const auto& [avatar, times] : heard.entered) EXPECT_EQ(times, 1) << avatar;
+  EXPECT_TRUE(heard.left.empty());
+
+  // A region is found by the detail beyond its rings.
+  asked.detail = protocol::PoseDetail::kFewer;
+  EXPECT_EQ(observe(), StatusCode::kNoSuchSubscription);
+  // Without the feature rings have none.
+  RawClient other = server.Connect();
+  ASSERT_TRUE(other.SayHello(~protocol::kFeatureDetail));
+  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
+  asked.seq = other.NextSeq();
+  asked.replace = false;
+  asked.detail = protocol::PoseDetail::kAll;
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kRoot};
+  other.Send(asked);
+  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
+}
+
+// It walks out of a ring into another and on to where its pose is told once a minute; then it is taken away.
+TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
+  TestServer server(TestConfig(2));
+  auto [controller, world] = server.Enter("w");
+  ASSERT_EQ(
+      controller.Spawn(world->world, {{.avatar = 7, .start = {{0.0, 0.0, 1.9}, 0.0}}})->accepted,
+      1u);
+  RawClient player = server.Enter("w", protocol::Role::kObserver).first;
+  Heard heard;
+  const auto take = [&](const protocol::Message& message) { heard.Take(message); };
+  protocol::Observe asked{.seq = player.NextSeq(),
+                          .world = world->world,
+                          .subscription = 1,
+                          .mode = PoseMode::kQuantised,
+                          .every_n_ticks = 3600,
+                          .detail = protocol::PoseDetail::kRoot};
+  asked.region = protocol::Region{{0.0, 0.0}, 40.0, 3.0, {{2.0, 1}, {2.3, 1}}, {}};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  player.Send(asked);
+  ASSERT_EQ(player.Await<Reply>(take)->code, StatusCode::kOk);
+  const auto hear_until = [&](auto&& condition) {
+    while (!condition()) {
+      const auto message = player.Receive();
+      if (!message) return false;
+      heard.Take(*message);
+    }
+    return true;
+  };
+  ASSERT_TRUE(hear_until([&] { return heard.entered[7] == 1 && heard.mode.contains(7); }));
+  EXPECT_EQ(heard.mode[7], PoseMode::kCompact);
+  ASSERT_TRUE(controller.Request(world->world, Steps(7, 3, 0.5)));
+  for (int finished = 0; finished < 3;) {
+    const auto events = controller.Await<protocol::Events>();
+    ASSERT_TRUE(events);
+    for (const protocol::Event& event : events->events) {
+      finished += event.type == EventType::kFinished;
+    }
+  }
+  controller.Send(
+      protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {7}});
+  EXPECT_TRUE(hear_until([&] { return heard.left[7] == 1; }));
+  EXPECT_EQ(heard.entered[7], 1);
+  EXPECT_EQ(heard.mode[7], PoseMode::kCompactFewer);
 }
 
 TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {

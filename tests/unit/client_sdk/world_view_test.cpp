@@ -69,6 +69,29 @@ TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
   EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 2, 3, 4}));
 }
 
+// Rings of a region are of several modes; who crosses one goes on in another.
+TEST_F(WorldViewTest, WhoCrossesARingOfARegionGoesOnInAnotherDetail) {
+  constexpr auto kFewer = protocol::PoseMode::kCompactFewer;
+  constexpr auto kRoot = protocol::PoseMode::kCompactRoot;
+  for (std::uint64_t tick = 60; tick <= 63; ++tick) {
+    const bool has_crossed = tick >= 62;
+    ASSERT_TRUE(Take(
+        tick, has_crossed ? std::vector<toy::AvatarAt>{{1}, {2}} : std::vector<toy::AvatarAt>{{1}},
+        0, kFewer, true));
+    if (!has_crossed) {
+      ASSERT_TRUE(Take(tick, {{2}}, 0, kRoot, true));
+    }
+    EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 2}));
+  }
+  const PoseHistory& history = *view_.Find(2);
+  ASSERT_EQ(history.size(), 4u);
+  EXPECT_EQ(history.stamp(1).detail, protocol::PoseDetail::kRoot);
+  EXPECT_EQ(history.stamp(2).detail, protocol::PoseDetail::kFewer);
+  EXPECT_FALSE(history.stamp(2).discontinuity);
+  EXPECT_EQ(counts_.missing, 0u);
+  EXPECT_EQ(counts_.refused, 0u);
+}
+
 TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {
   ASSERT_TRUE(Take(1, {{1}}, 0));
   ASSERT_TRUE(Take(1, {}, 1));

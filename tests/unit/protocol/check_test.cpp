@@ -251,6 +251,24 @@ TEST(Check, Observe) {
         good, [&](Observe& m) { m.every_n_ticks = static_cast<std::uint16_t>(ticks); },
         ErrorCode::kOutOfRange, "Observe.every_n_ticks");
   }
+  Observe rings = good;
+  rings.mode = PoseMode::kQuantised;
+  rings.avatars.clear();
+  rings.region = Region{{1.0, 2.0}, 30.0, std::nullopt, {{8.0, 1}, {20.0, 2}}, {}};
+  rings.region->ring_details = {PoseDetail::kAll, PoseDetail::kRoot};
+  Refused<Observe>(
+      rings, [](Observe& m) { m.region->ring_details.pop_back(); }, ErrorCode::kMalformed,
+      "Region.ring_details", 1);
+  Refused<Observe>(
+      rings, [](Observe& m) { m.region->rings.clear(); }, ErrorCode::kMalformed,
+      "Region.ring_details", 2);
+  Refused<Observe>(
+      rings, [](Observe& m) { m.region->ring_details[1] = static_cast<PoseDetail>(3); },
+      ErrorCode::kMalformed, "Region.ring_details", 1);
+  for (const PoseMode mode : {PoseMode::kFull, PoseMode::kMovement}) {
+    Refused<Observe>(
+        rings, [&](Observe& m) { m.mode = mode; }, ErrorCode::kUnsupported, "Region.ring_details");
+  }
   Refused<StopObserving>(
       {1, 2}, [](StopObserving& m) { m.seq = 0; }, ErrorCode::kOutOfRange, "StopObserving.seq");
   Refused<StopObserving>(

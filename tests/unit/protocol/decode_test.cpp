@@ -190,6 +190,32 @@ TEST(Decode, UnknownEnumeratorsAreRefused) {
   ExpectError(MessageType::kRequest, request(0, 3), ErrorCode::kMalformed, "Request.foot", 1);
 }
 
+TEST(Decode, RingsHaveEachADetailOrNone) {
+  FlatBufferBuilder builder;
+  const auto observe = [&](const std::vector<std::uint8_t>& details) {
+    builder.Clear();
+    const std::vector<wire::RateRing> rings{{8.0, 1}, {20.0, 2}};
+    const auto rings_offset = builder.CreateVectorOfStructs(rings);
+    const auto details_offset = builder.CreateVector(details);
+    wire::RegionBuilder region(builder);
+    region.add_radius_m(30.0);
+    region.add_rings(rings_offset);
+    region.add_ring_details(details_offset);
+    return Finished(builder, wire::CreateObserve(builder, 1, 1, 1, wire::PoseMode::Quantised, 0, 1,
+                                                 false, region.Finish()));
+  };
+  for (const std::vector<std::uint8_t>& good : {std::vector<std::uint8_t>{}, {2, 0}}) {
+    const auto message = DecodeMessage({MessageType::kObserve, observe(good)});
+    ASSERT_TRUE(message) << Describe(message.error());
+    EXPECT_EQ(std::get<Observe>(*message).region->ring_details.size(), good.size());
+  }
+  ExpectError(MessageType::kObserve, observe({1}), ErrorCode::kMalformed, "Region.ring_details", 1);
+  ExpectError(MessageType::kObserve, observe({0, 3}), ErrorCode::kMalformed, "Region.ring_details",
+              1);
+  ExpectError(MessageType::kObserve, observe({0, 0, 0, 0, 0}), ErrorCode::kLimitExceeded,
+              "Region.ring_details");
+}
+
 TEST(Decode, UnknownStatusCodesAndBitsPass) {
   FlatBufferBuilder builder;
   const auto reply = Finished(builder, wire::CreateReply(builder, 1, 499));

@@ -14,6 +14,7 @@
 namespace stridewire::server {
 namespace {
 
+using protocol::PoseMode;
 using testing::ElementsAre;
 
 /// Avatars at places; of those in `without` the shard made no pose.
@@ -96,8 +97,8 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
   RegionMembers members;
   protocol::Region region{{0.0, 0.0}, 20.0, 5.0, {{10.0, 1}, {18.0, 3}}};
   constexpr std::uint16_t kEvery = 4;
-  members.Move(region, 8.0, kEvery);
-  EXPECT_EQ(members.every(), 1);
+  members.Move(region, 8.0, kEvery, PoseMode::kFull);
+  EXPECT_EQ(members.every(PoseMode::kFull), 1);
   std::map<AvatarNumber, std::pair<float, float>> at[2];
   std::set<AvatarNumber> inside;
   std::size_t entered_count = 0;
@@ -108,7 +109,7 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
       region.centre_m.z += random.Draw(-4.0, 4.0);
       region.radius_m = random.Draw(12.0, 25.0);
       region.leave_m = tick % 14 == 0 ? std::nullopt : std::optional(random.Draw(0.0, 10.0));
-      members.Move(region, 8.0, kEvery);
+      members.Move(region, 8.0, kEvery, PoseMode::kFull);
     }
     const double leave_at_m = region.radius_m + region.leave_m.value_or(8.0);
     for (int shard = 0; shard < 2; ++shard) {
@@ -161,9 +162,122 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
   EXPECT_GT(left_count, 50u);
 }
 
+// The same of rings that have a detail each: a delivery of each a tick, and in it poses of those alone whom the region
+// asks for in that detail.
+TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
+  const unsigned seed = std::random_device{}();
+  std::cout << "seed " << seed << "\n";
+  Random random(seed);
+  RegionMembers members;
+  protocol::Region region{{0.0, 0.0}, 24.0, 5.0, {{6.0, 2}, {12.0, 3}, {18.0, 6}}, {}};
+  using protocol::PoseDetail;
+  region.ring_details = {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kAll};
+  members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
+  EXPECT_THAT(members.modes(),
+              testing::UnorderedElementsAre(PoseMode::kCompact, PoseMode::kCompactFewer,
+                                            PoseMode::kCompactRoot));
+  EXPECT_EQ(members.every(PoseMode::kCompact), 2);
+  EXPECT_EQ(members.every(PoseMode::kCompactFewer), 3);
+  EXPECT_EQ(members.every(PoseMode::kCompactRoot), 4);
+  EXPECT_EQ(members.every(PoseMode::kQuantised), 0);
+  EXPECT_EQ(members.reach(PoseMode::kCompact), (RegionReach{0.0, 0.0, 18.0, 0.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionReach{0.0, 0.0, 12.0, 6.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionReach{0.0, 0.0, 29.0, 18.0, true}));
+
+  std::map<AvatarNumber, std::pair<float, float>> at;
+  std::set<AvatarNumber> inside;
+  std::map<AvatarNumber, PoseMode> last_mode;
+  int crossed = 0;
+  int left_count = 0;
+  for (std::uint64_t tick = 1; tick <= 900; ++tick) {
+    for (AvatarNumber number = 1; number <= 60; ++number) {
+      const auto found = at.find(number);
+      if (found == at.end()) {
+        at[number] = {static_cast<float>(random.Draw(-40.0, 40.0)),
+                      static_cast<float>(random.Draw(-40.0, 40.0))};
+      } else if (random.Draw(0.0, 1.0) < 0.01) {
+        at.erase(found);
+      } else {
+        found->second.first += static_cast<float>(random.Draw(-1.0, 1.0));
+        found->second.second += static_cast<float>(random.Draw(-1.0, 1.0));
+      }
+    }
+    if (tick % 50 == 0) {
+      region.centre_m.x += random.Draw(-4.0, 4.0);
+      members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
+    }
+    const auto distance_of = [&](AvatarNumber number) {
+      return std::hypot(at.at(number).first - region.centre_m.x,
+                        at.at(number).second - region.centre_m.z);
+    };
+    for (const PoseMode mode :
+         {PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot}) {
+      if (tick % members.every(mode) != 0) continue;
+      const RegionReach reach = members.reach(mode);
+      std::set<AvatarNumber> without;
+      for (const auto& [number, place] : at) {
+        const double distance_m = distance_of(number);
+        if (distance_m > reach.reach_m || (reach.beyond_m > 0.0 && distance_m <= reach.beyond_m)) {
+          without.insert(number);
+        }
+      }
+      PoseDelivery delivery = DeliveryAt(at, tick, 0, without);
+      delivery.mode = mode;
+      const RegionMembers::Change change = members.Update(delivery);
+      std::vector<AvatarNumber> entered;
+      std::vector<AvatarNumber> left;
+      std::vector<AvatarNumber> due;
+      for (AvatarNumber number = 1; number <= 60; ++number) {
+        const bool was = inside.contains(number);
+        const double distance_m = at.contains(number) ? distance_of(number) : 1e9;
+        const auto [every, of] = distance_m <= 6.0    ? std::pair(2u, PoseMode::kCompact)
+                                 : distance_m <= 12.0 ? std::pair(3u, PoseMode::kCompactFewer)
+                                 : distance_m <= 18.0 ? std::pair(6u, PoseMode::kCompact)
+                                                      : std::pair(4u, PoseMode::kCompactRoot);
+        if (was && distance_m > 29.0) left.push_back(number);
+        const bool enters = !was && distance_m <= 24.0 && of == mode;
+        if (enters) entered.push_back(number);
+        if (of == mode && (enters || (was && distance_m <= 29.0 && tick % every == 0))) {
+          due.push_back(number);
+          const auto before = last_mode.find(number);
+          crossed += was && before != last_mode.end() && before->second != mode;
+          last_mode[number] = mode;
+        }
+      }
+      for (const AvatarNumber number : left) {
+        inside.erase(number);
+        last_mode.erase(number);
+      }
+      inside.insert(entered.begin(), entered.end());
+      left_count += static_cast<int>(left.size());
+      ASSERT_TRUE(std::ranges::equal(change.entered, entered)) << tick;
+      ASSERT_TRUE(std::ranges::equal(change.left, left)) << tick;
+      ASSERT_EQ(NumbersOfRows(delivery, change.due), due) << tick;
+    }
+  }
+  EXPECT_GT(crossed, 50);
+  EXPECT_GT(left_count, 50);
+}
+
+// Details that a session has no more are all one mode.
+TEST(RegionMembers, OfOneModeHaveTheWholeReach) {
+  RegionMembers members;
+  protocol::Region region{{1.0, 2.0}, 20.0, 5.0, {{6.0, 2}}, {}};
+  members.Move(region, 8.0, 4, PoseMode::kCompact);
+  const RegionReach whole{1.0, 2.0, 25.0, 0.0, false};
+  EXPECT_EQ(members.reach(PoseMode::kCompact), whole);
+  region.ring_details = {protocol::PoseDetail::kAll};
+  members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
+  EXPECT_NE(members.reach(PoseMode::kCompactRoot), whole);
+  members.ChangeModes([](PoseMode) { return PoseMode::kQuantised; });
+  EXPECT_THAT(members.modes(), ElementsAre(PoseMode::kQuantised));
+  EXPECT_EQ(members.every(PoseMode::kQuantised), 2);
+  EXPECT_EQ(members.reach(PoseMode::kQuantised), whole);
+}
+
 TEST(RegionMembers, EnterWithTheirFirstPose) {
   RegionMembers members;
-  members.Move({{0.0, 0.0}, 10.0, 0.0, {}}, 8.0, 1);
+  members.Move({{0.0, 0.0}, 10.0, 0.0, {}, {}}, 8.0, 1, PoseMode::kFull);
   const std::map<AvatarNumber, std::pair<float, float>> at{{4, {1.0f, 1.0f}}, {5, {2.0f, 0.0f}}};
   PoseDelivery delivery = DeliveryAt(at, 1, 0, {5});
   RegionMembers::Change change = members.Update(delivery);

@@ -316,6 +316,49 @@ TEST(WorldShard, SaysOnceThatItIsEmpty) {
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 4, true, composer, delivery));
 }
 
+TEST(WorldShard, EncodesOfARingThoseInItAndTellsPlacesWhenNobodyIs) {
+  Bench bench;
+  Interest interest{.world = bench.world, .shard = 0, .poses = {}};
+  PoseInterest& full = interest.poses[ModeIndex(PoseMode::kFull)];
+  full.every.some = 1;
+  const auto ring = [&](double reach_m, double beyond_m, bool is_one_of_several) {
+    full.regions = std::make_shared<const std::vector<RegionReach>>(
+        1, RegionReach{0.0, 0.0, reach_m, beyond_m, is_one_of_several});
+    bench.shard.SetInterest(interest);
+  };
+  SpawnPart part;
+  for (AvatarNumber number = 1; number <= 9; ++number) {
+    part.items.push_back({number, {.avatar = number, .start = {{1.0 * number, 0.0, 0.0}, 0.0}}});
+  }
+  bench.Do(std::move(part));
+  bench.shard.Advance(++bench.tick, 1);
+  protocol::PoseBatchComposer composer;
+  PoseDelivery delivery;
+  const auto encoded = [&] {
+    std::vector<AvatarNumber> numbers;
+    for (std::size_t row = 0; row < delivery.rows->size(); ++row) {
+      if (delivery.rows->has_pose(row)) numbers.push_back((*delivery.rows->avatars())[row]);
+    }
+    return numbers;
+  };
+  ring(6.5, 3.5, true);
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
+  EXPECT_THAT(encoded(), ElementsAre(4u, 5u, 6u));
+  ring(6.5, 0.0, true);
+  ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
+  EXPECT_THAT(encoded(), ElementsAre(1u, 2u, 3u, 4u, 5u, 6u));
+  ring(60.0, 50.0, true);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
+    EXPECT_TRUE(encoded().empty());
+    EXPECT_NE(delivery.places, nullptr);
+  }
+  // Of a region of one detail no more than once.
+  ring(0.1, 0.0, false);
+  EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
+  EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
+}
+
 TEST(WorldShard, ReleasesWhatASessionSpawnedUnlessTheWorldIsPersistent) {
   for (const bool persistent : {false, true}) {
     Bench bench;

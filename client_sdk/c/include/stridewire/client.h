@@ -381,8 +381,11 @@ typedef struct stridewire_region {
   double
       leave_m;  ///< Who is inside leaves when further than radius and this; negative: the server chooses.
   const stridewire_rate_ring*
-      rings;          ///< From the inner one on; beyond them the observation's rate.
+      rings;          ///< From the inner one on; beyond them the observation's rate and detail.
   size_t ring_count;  ///< At most STRIDEWIRE_MAX_RATE_RINGS.
+  /// In which detail poses come within each ring, `ring_count` of them; NULL: the observation's, as beyond them. Of
+  /// QUANTISED poses only, and of servers as stridewire_observation.detail.
+  const stridewire_pose_detail* ring_details;
 } stridewire_region;
 
 /// As stridewire_client_observe, of who is in a region: `observation->avatars` is NULL. Who comes and goes is told

@@ -1,5 +1,6 @@
 import type {
-  LayerRequest, MovementRequest, Observation, PoseMode, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox, Vec3
+  LayerRequest, MovementRequest, Observation, PoseDetail, PoseMode, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox,
+  Vec3
 } from '../types';
 import {footChoices, movementTypes, poseDetails, poseModes, roles, takeovers} from './decode';
 import {
@@ -221,13 +222,13 @@ export function observe(observation: Observation): Observe {
   if (!Number.isInteger(everyNTicks) || everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
     throw new Malformed('is not 1 to 3600', 'everyNTicks');
   }
-  const inRegion = observation.region === undefined ? null : region(observation.region);
-  if (inRegion !== null && (observation.avatars?.length ?? 0) > 0) {
-    throw new Malformed('are not needed beside a region', 'avatars');
-  }
   const mode = oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode');
   const detail = oneOf(poseDetails, observation.detail ?? 'all', 'detail');
   if (detail !== 'all' && mode !== 'quantised') throw new Malformed('is of quantised poses only', 'detail');
+  const inRegion = observation.region === undefined ? null : region(observation.region, mode, detail);
+  if (inRegion !== null && (observation.avatars?.length ?? 0) > 0) {
+    throw new Malformed('are not needed beside a region', 'avatars');
+  }
   return {
     type: 'Observe',
     seq: 0n,
@@ -243,7 +244,8 @@ export function observe(observation: Observation): Observe {
   };
 }
 
-export function region(asked: Region): RegionEntry {
+/** A region observed in that mode, and beyond its rings in that detail. */
+export function region(asked: Region, mode: Observe['mode'], beyond: PoseDetail): RegionEntry {
   if (asked === null || typeof asked !== 'object') throw new Malformed('is none', 'region');
   const radiusM = finite(asked.radiusM, 'radiusM', -1);
   if (!(radiusM > 0)) throw new Malformed('is not above 0', 'radiusM');
@@ -261,11 +263,15 @@ export function region(asked: Region): RegionEntry {
     }
     beforeM = toM;
   }
+  const hasDetails = rings.some(({detail}) => detail !== undefined);
+  if (hasDetails && mode !== 'quantised') throw new Malformed('is of quantised poses only', 'rings.detail');
   return {
     x: finite(asked.x, 'x', -1),
     z: finite(asked.z, 'z', -1),
     radiusM,
     leaveM,
     rings: rings.map(({toM, everyNTicks}) => ({toM, everyNTicks})),
+    ringDetails: hasDetails
+        ? rings.map(({detail}, i) => oneOf(poseDetails, detail ?? beyond, 'rings.detail', i)) : [],
   };
 }

@@ -266,6 +266,9 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     if (detail !== 'all' && mode !== 'quantised') {
       throw new Malformed('only quantised poses have levels of detail', 'Observe.detail');
     }
+    if (inRegion !== null && inRegion.ringDetails.length > 0 && mode !== 'quantised') {
+      throw new Malformed('only quantised poses have levels of detail', 'Region.ringDetails');
+    }
     return {
       type: 'Observe',
       seq: id(m.seq(), 'Observe.seq'),
@@ -860,12 +863,19 @@ function region(m: wire.Region | null): RegionEntry | null {
     beforeM = toM;
     rings.push({toM, everyNTicks: everyNTicks(ring.everyNTicks(), 'RateRing.everyNTicks', i)});
   }
+  const details = count(m.ringDetailsLength(), 0, maxRateRings, 'Region.ringDetails');
+  if (details > 0 && details !== length) {
+    throw new Malformed('are not one for each ring', 'Region.ringDetails');
+  }
+  const ringDetails = Array.from({length: details}, (_, i) =>
+      known(poseDetails, m.ringDetails(i)!, 'Region.ringDetails', i));
   return {
     x: finite(centre?.x() ?? 0, 'Region.centreM'),
     z: finite(centre?.z() ?? 0, 'Region.centreM'),
     radiusM,
     leaveM: leaveM === null ? null : notNegative(leaveM, 'Region.leaveM'),
     rings,
+    ringDetails,
   };
 }
 

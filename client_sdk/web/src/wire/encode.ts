@@ -58,11 +58,14 @@ function buildRegion(b: Builder, region: RegionEntry): number {
     wire.RateRing.createRateRing(b, region.rings[i]!.toM, region.rings[i]!.everyNTicks);
   }
   const rings = b.endVector();
+  const details = region.ringDetails.length === 0 ? 0 : wire.Region.createRingDetailsVector(
+      b, region.ringDetails.map((detail) => poseDetails.indexOf(detail)));
   wire.Region.startRegion(b);
   wire.Region.addCentreM(b, wire.GroundPoint.createGroundPoint(b, region.x, region.z));
   wire.Region.addRadiusM(b, region.radiusM);
   if (region.leaveM !== null) wire.Region.addLeaveM(b, region.leaveM);
   wire.Region.addRings(b, rings);
+  if (details !== 0) wire.Region.addRingDetails(b, details);
   return wire.Region.endRegion(b);
 }
 

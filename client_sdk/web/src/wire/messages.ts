@@ -73,6 +73,8 @@ export interface RegionEntry {
   radiusM: number;
   leaveM: number | null;
   rings: {toM: number; everyNTicks: number}[];
+  /** One a ring, or none: the Observe's everywhere. */
+  ringDetails: PoseDetail[];
 }
 export interface StopObserving {
   type: 'StopObserving';

@@ -116,6 +116,9 @@ export function toJson(m: Message): {[name: string]: Json} {
             leave_m: m.region.leaveM,
             rings: m.region.rings.map(({toM, everyNTicks}) => (
                 {to_m: toM, every_n_ticks: everyNTicks})),
+            ...(m.region.ringDetails.length === 0 ? {} : {
+              ring_details: m.region.ringDetails.map((detail) => poseDetails.indexOf(detail)),
+            }),
           },
           replace: m.replace,
         }),

@@ -255,6 +255,9 @@ struct Region {
   double radius_m = 0.0;          ///< Above 0.
   std::optional<double> leave_m;  ///< At least 0; absent: the server chooses.
   std::vector<RateRing> rings;    ///< At most kMaxRateRings. Beyond them: Observe::every_n_ticks.
+  /// In which detail poses come within each ring, beyond them Observe::detail; none: that everywhere. Of quantised
+  /// poses only, and as Observe::detail with kFeatureDetail and kFeatureCompact.
+  std::vector<PoseDetail> ring_details;
   bool operator==(const Region&) const = default;
 };
 
