@@ -1,0 +1,462 @@
+// The part of a session that takes the server's messages.
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "session.h"
+
+namespace stridewire::client {
+
+namespace {
+
+constexpr std::size_t kMaxRtts = 16;
+
+stridewire_status ToStatus(protocol::StatusCode code) {
+  return static_cast<stridewire_status>(code);
+}
+
+void CopyVector(const DVec3& v, double (&out)[3]) {
+  out[0] = v.x;
+  out[1] = v.y;
+  out[2] = v.z;
+}
+
+stridewire_parameters ToParameters(const protocol::ParameterSet& set) {
+  stridewire_parameters out{};
+  out.count = set.count;
+  for (std::size_t i = 0; i < set.count; ++i) {
+    out.names[i] = set.names[i];
+    out.values[i] = set.values[i];
+  }
+  return out;
+}
+
+stridewire_event_type ToEventType(protocol::EventType type) {
+  return static_cast<stridewire_event_type>(STRIDEWIRE_EVENT_ACCEPTED + static_cast<int>(type));
+}
+static_assert(STRIDEWIRE_EVENT_LEFT - STRIDEWIRE_EVENT_ACCEPTED ==
+              static_cast<int>(protocol::EventType::kLeft));
+
+}  // namespace
+
+void Session::Handle(const protocol::Welcome& message, double now_s) {
+  if (state_ != State::kGreeting) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a second welcome", now_s);
+  }
+  if (message.resumed && resume_token_.empty()) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "the server resumed a session that was none", now_s);
+  }
+  if (message.protocol < protocol::kProtocolMin || message.protocol > protocol::kProtocolMax) {
+    return CloseForGood(STRIDEWIRE_VERSION_MISMATCH, "the server speaks another version");
+  }
+  state_ = State::kReady;
+  ready_s_ = now_s;
+  ++connects_;
+  features_ = message.features;
+  limits_ = message.limits;
+  tick_hz_ = message.tick_hz;
+  resume_token_ = message.resume_token;
+  encoder_ = protocol::Encoder(protocol::FrameLimits{
+      .max_control_bytes =
+          std::min<std::size_t>(limits_.max_control_bytes, protocol::kMaxControlBytes),
+      .max_bulk_bytes = std::min<std::size_t>(limits_.max_bulk_bytes, protocol::kMaxBulkBytes)});
+
+  stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_CONNECTED);
+  event.resumed = message.resumed ? 1 : 0;
+  events_.Push(event);
+  if (message.resumed) {
+    ++resumes_;
+    resend_from_ = unanswered_.empty() ? 0 : unanswered_.begin()->first;
+    for (auto& [handle, world] : worlds_) world.view->Break();
+  } else {
+    if (had_session_) events_.Push(MakeEvent(STRIDEWIRE_EVENT_SESSION_LOST));
+    StartAnew();
+  }
+  had_session_ = true;
+  SendPing(now_s);
+}
+
+void Session::StartAnew() {
+  next_seq_ = 1;
+  resend_from_ = 0;
+  last_events_number_ = 0;
+  clock_.Reset();
+
+  // Observe keeps the number its caller waits for.
+  std::map<protocol::SubscriptionId, Command> observing;
+  for (auto& [seq, command] : std::exchange(unanswered_, {})) {
+    if (std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
+    if (std::holds_alternative<protocol::LeaveWorld>(command.message) ||
+        std::holds_alternative<protocol::StopObserving>(command.message)) {
+      Answer(command, STRIDEWIRE_OK);  // Nothing of the session is left to leave or stop.
+      continue;
+    }
+    if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
+      if (observe->replace) {
+        Answer(command, STRIDEWIRE_OK);  // What is observed anew is there already.
+        continue;
+      }
+      if (worlds_.at(command.world).subscriptions.contains(observe->subscription)) {
+        observing.emplace(observe->subscription, std::move(command));
+        continue;
+      }
+    }
+    if (command.own) continue;  // It is given anew below.
+    Answer(command, STRIDEWIRE_SESSION_LOST, "the session was lost before the answer came");
+  }
+
+  for (auto it = worlds_.begin(); it != worlds_.end();) {
+    const stridewire_world handle = it->first;
+    World& world = it->second;
+    if (world.state == World::State::kLeft) {
+      for (const Command& command : std::exchange(world.unsent, {})) {
+        const bool leave = std::holds_alternative<protocol::LeaveWorld>(command.message);
+        Answer(command, leave ? STRIDEWIRE_OK : STRIDEWIRE_SESSION_LOST);
+      }
+      if (!world.join_answered) {
+        Answer(Command{world.join_command, handle, false, 0, {}}, STRIDEWIRE_SESSION_LOST);
+      }
+      it = worlds_.erase(it);
+      continue;
+    }
+    ++it;
+    if (world.state == World::State::kRefused) continue;
+    world.state = World::State::kWanted;
+    world.server_id = 0;
+    world.told_dropped_batches = 0;
+    world.view->Clear();
+    world.view->Break();
+    world.evaluated.reset();
+    TakeTerrain(handle, std::nullopt);
+
+    std::deque<Command> first;
+    for (auto& [id, subscription] : world.subscriptions) {
+      if (subscription.unsent) continue;  // Still waiting in its place.
+      subscription.unsent = true;
+      if (const auto found = observing.find(id); found != observing.end()) {
+        found->second.message = subscription.message;  // A region may have moved since.
+        first.push_back(std::move(found->second));
+      } else {
+        first.push_back(Command{0, handle, true, 0, subscription.message});
+      }
+    }
+    // An own command that was still unsent when the session was lost again is among those anew.
+    std::erase_if(world.unsent, [](const Command& command) {
+      return command.own && std::holds_alternative<protocol::Spawn>(command.message);
+    });
+    if (options_.respawn) {
+      protocol::Spawn spawn;
+      const std::size_t most = std::clamp<std::size_t>(limits_.max_items, 1, protocol::kMaxItems);
+      for (const auto& [avatar, base] : world.spawned) {
+        spawn.items.push_back({avatar, base});
+        if (spawn.items.size() == most) {
+          first.push_back(Command{0, handle, true, 0, std::exchange(spawn, {})});
+        }
+      }
+      if (!spawn.items.empty()) first.push_back(Command{0, handle, true, 0, std::move(spawn)});
+    } else {
+      world.spawned.clear();
+    }
+    world.unsent.insert(world.unsent.begin(), std::make_move_iterator(first.begin()),
+                        std::make_move_iterator(first.end()));
+  }
+}
+
+void Session::Handle(const protocol::WorldInfo& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world before the welcome", now_s);
+  }
+  World* world = nullptr;
+  if (message.seq != 0) {
+    const auto command = unanswered_.find(message.seq);
+    if (command == unanswered_.end()) return;
+    if (!std::holds_alternative<protocol::JoinWorld>(command->second.message)) {
+      return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world in answer to another command", now_s);
+    }
+    world = &worlds_.at(command->second.world);
+  } else {
+    for (auto& [handle, candidate] : worlds_) {
+      if (candidate.name == message.name && candidate.state != World::State::kRefused) {
+        world = &candidate;
+      }
+    }
+    if (world == nullptr) return;
+  }
+  world->server_id = message.world;
+  world->view->SetInfo(message);
+}
+
+void Session::Handle(const protocol::Reply& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "an answer before the welcome", now_s);
+  }
+  const auto found = unanswered_.find(message.seq);
+  if (found == unanswered_.end()) return;  // Answered twice, before and after a resume.
+  const Command command = std::move(found->second);
+  unanswered_.erase(found);
+  World& world = worlds_.at(command.world);
+
+  if (std::holds_alternative<protocol::JoinWorld>(command.message)) {
+    return OnJoinReply(world, message, now_s);
+  }
+  stridewire_status status = ToStatus(message.code);
+  const auto* spawn = std::get_if<protocol::Spawn>(&command.message);
+  for (const protocol::ReplyItem& item : message.items) {
+    const bool chosen = spawn != nullptr && item.index < spawn->items.size() &&
+                        spawn->items[item.index].avatar == 0;
+    // What we spawn anew may still be there: the server lost the session, not the world.
+    const bool still_there = command.own && item.code == protocol::StatusCode::kAvatarExists;
+    if ((item.code == protocol::StatusCode::kOk && !chosen) || still_there) continue;
+    stridewire_event event =
+        MakeEvent(STRIDEWIRE_EVENT_ITEM, command.world, ToStatus(item.code), item.text);
+    event.command = command.id;
+    event.item_index = item.index;
+    event.avatar = item.avatar;
+    event.request_id = item.request_id;
+    events_.Push(event);
+  }
+  if (spawn != nullptr) {
+    OnSpawnReply(world, *spawn, message);
+  } else if (const auto* remove = std::get_if<protocol::Remove>(&command.message)) {
+    OnRemoveReply(world, *remove, message);
+  } else if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
+    OnObserveReply(world, *observe, message);
+  } else if (std::holds_alternative<protocol::StopObserving>(command.message)) {
+    // Not observing is what was wanted.
+    if (status == STRIDEWIRE_NO_SUCH_SUBSCRIPTION) status = STRIDEWIRE_OK;
+  }
+  Answer(command, status, message.text, message.accepted);
+  if (std::holds_alternative<protocol::LeaveWorld>(command.message)) worlds_.erase(command.world);
+}
+
+void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now_s) {
+  stridewire_world handle = 0;
+  for (const auto& [number, candidate] : worlds_) {
+    if (&candidate == &world) handle = number;
+  }
+  const bool joined = reply.code == protocol::StatusCode::kOk;
+  if (joined && world.server_id == 0) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world was joined and not described", now_s);
+  }
+  const Command command{world.join_command, handle, world.join_answered, 0, {}};
+  world.join_answered = true;
+  if (joined) {
+    if (world.state == World::State::kJoining) world.state = World::State::kJoined;
+    events_.Push(MakeEvent(STRIDEWIRE_EVENT_WORLD_JOINED, handle));
+    Answer(command, STRIDEWIRE_OK, reply.text, reply.accepted);
+  } else {
+    world.state = World::State::kRefused;
+    world.server_id = 0;
+    Answer(command, ToStatus(reply.code), reply.text);
+    FailUnsent(world, STRIDEWIRE_NOT_JOINED, reply.text);
+    world.subscriptions.clear();
+    world.view->Clear();
+    TakeTerrain(handle, std::nullopt);
+  }
+}
+
+void Session::TakeTerrain(stridewire_world handle,
+                          const std::optional<protocol::TerrainInfo>& terrain) {
+  World& world = worlds_.at(handle);
+  if (world.terrain == terrain) return;
+  world.terrain = terrain;
+  events_.Push(MakeEvent(STRIDEWIRE_EVENT_TERRAIN, handle));
+}
+
+void Session::Handle(const protocol::WorldTerrain& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a ground before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  if (FindByServerId(message.world, handle) != nullptr) TakeTerrain(handle, message.terrain);
+}
+
+void Session::OnSpawnReply(World& world, const protocol::Spawn& spawn,
+                           const protocol::Reply& reply) {
+  if (reply.code != protocol::StatusCode::kOk) return;
+  for (const protocol::ReplyItem& item : reply.items) {
+    if (item.code != protocol::StatusCode::kOk || item.index >= spawn.items.size()) continue;
+    if (world.spawned.size() >= protocol::kMaxItems) break;
+    world.spawned.try_emplace(item.avatar, spawn.items[item.index].start);
+  }
+}
+
+void Session::OnRemoveReply(World& world, const protocol::Remove& remove,
+                            const protocol::Reply& reply) {
+  if (reply.code != protocol::StatusCode::kOk) return;
+  std::set<std::uint32_t> refused;
+  for (const protocol::ReplyItem& item : reply.items) refused.insert(item.index);
+  for (std::uint32_t i = 0; i < remove.avatars.size(); ++i) {
+    if (refused.contains(i)) continue;
+    world.spawned.erase(remove.avatars[i]);
+    world.view->Remove(remove.avatars[i]);
+  }
+}
+
+void Session::OnObserveReply(World& world, const protocol::Observe& observe,
+                             const protocol::Reply& reply) {
+  if (observe.replace) return;
+  if (reply.code != protocol::StatusCode::kOk) {
+    world.subscriptions.erase(observe.subscription);
+    UpdateFilter(world);
+    return;
+  }
+  // Poses that came before, if any, belong to a subscription that has ended; the server cannot tell
+  // it in a batch that others get too.
+  if (world.subscriptions.size() == 1) world.view->Break();
+}
+
+void Session::Handle(const protocol::PoseBatch& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "poses before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  World* world = FindByServerId(message.info.world, handle);
+  if (world == nullptr || !world->view->has_info() || world->subscriptions.empty()) return;
+  clock_.AddSample(now_s, message.info.server_time_s);
+  const std::uint64_t every_n_ticks = EveryNTicks(*world, message.info.mode);
+  if (Status status = world->view->Take(message, every_n_ticks, counts_); !status) {
+    BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
+  }
+}
+
+void Session::Handle(const protocol::Movements& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "movements before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  World* world = FindByServerId(message.world, handle);
+  if (world == nullptr || world->evaluated == nullptr) return;
+  clock_.AddSample(now_s, message.server_time_s);
+  const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
+  if (Status status = world->view->Take(message, *world->evaluated, every_n_ticks, counts_);
+      !status) {
+    BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
+  }
+}
+
+void Session::Handle(const protocol::LibraryPiece& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a library before the welcome", now_s);
+  }
+  libraries_.OnPiece(message);
+  Pump();
+}
+
+void Session::Handle(const protocol::Events& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "events before the welcome", now_s);
+  }
+  if (message.number != 0) {
+    if (message.number <= last_events_number_) return;  // Sent again, and heard before.
+    last_events_number_ = message.number;
+  }
+  stridewire_world handle = 0;
+  World* world = FindByServerId(message.world, handle);
+  if (world == nullptr) return;
+  for (const protocol::Event& e : message.events) {
+    ++events_received_;
+    FollowSpawned(*world, e);
+    stridewire_event event = MakeEvent(ToEventType(e.type), handle, ToStatus(e.code), e.reason);
+    event.avatar = e.avatar;
+    event.request_id = e.request_id;
+    event.tick = e.tick;
+    event.time_s = e.time_s;
+    event.kind = static_cast<stridewire_movement_kind>(e.kind);
+    event.group = e.group;
+    event.requested = ToParameters(e.requested);
+    event.applied = ToParameters(e.applied);
+    event.extrapolated = e.extrapolated ? 1 : 0;
+    event.clamped = e.clamped ? 1 : 0;
+    event.cut_short = e.cut_short ? 1 : 0;
+    if (e.type == protocol::EventType::kFootStrike) {
+      event.foot =
+          e.foot == protocol::FootSide::kLeft ? STRIDEWIRE_FOOT_LEFT : STRIDEWIRE_FOOT_RIGHT;
+    }
+    CopyVector(e.position_m, event.position_m);
+    CopyVector(e.base.position_m, event.base_position_m);
+    event.base_heading_rad = e.base.heading_rad;
+    events_.Push(event);
+  }
+}
+
+void Session::FollowSpawned(World& world, const protocol::Event& event) {
+  switch (event.type) {
+    case protocol::EventType::kSpawned:
+    case protocol::EventType::kFinished:
+    case protocol::EventType::kIdle:
+      if (const auto ours = world.spawned.find(event.avatar); ours != world.spawned.end()) {
+        ours->second = event.base;
+      }
+      break;
+    case protocol::EventType::kRemoved:
+      world.spawned.erase(event.avatar);
+      world.view->Remove(event.avatar);
+      break;
+    case protocol::EventType::kLeft: world.view->Leave(event.avatar, event.tick); break;
+    default: break;
+  }
+}
+
+void Session::Handle(const protocol::Lagging& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a report before the welcome", now_s);
+  }
+  stridewire_world handle = 0;
+  World* world = FindByServerId(message.world, handle);
+  if (world == nullptr) return;
+  if (message.dropped_batches > world->told_dropped_batches) {
+    dropped_batches_ += message.dropped_batches - world->told_dropped_batches;
+  }
+  world->told_dropped_batches = message.dropped_batches;
+  stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_LAGGING, handle);
+  event.dropped_batches = message.dropped_batches;
+  event.dropped_events = message.dropped_events;
+  events_.Push(event);
+}
+
+void Session::Handle(const protocol::ErrorNotice& message, double now_s) {
+  const stridewire_status status = ToStatus(message.code);
+  if (!message.fatal) {
+    stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_NOTICE, 0, status, message.text);
+    if (const auto command = unanswered_.find(message.seq); command != unanswered_.end()) {
+      event.command = command->second.id;
+      event.world = command->second.world;
+    }
+    events_.Push(event);
+    return;
+  }
+  const int hundred = static_cast<int>(status) / 100;
+  if (hundred == 1 || hundred == 2 || status == STRIDEWIRE_REPLACED) {
+    return CloseForGood(status, message.text);
+  }
+  BreakOff(status, message.text, now_s);
+}
+
+void Session::Handle(const protocol::Pong& message, double now_s) {
+  if (state_ != State::kReady) {
+    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a pong before the welcome", now_s);
+  }
+  clock_.AddSample(now_s, message.server_time_s);
+  const double rtt_s = std::max(0.0, now_s - message.time_s);
+  if (rtts_s_.size() == kMaxRtts) rtts_s_.pop_front();
+  rtts_s_.push_back(rtt_s);
+  if (asked_pings_.erase(message.nonce) > 0) {
+    stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_PONG);
+    event.rtt_s = rtt_s;
+    event.tick = message.tick;
+    event.time_s = message.server_time_s;
+    events_.Push(event);
+  }
+}
+
+void Session::Handle(const protocol::Goodbye& message, double now_s) {
+  const stridewire_status status = ToStatus(message.code);
+  resume_token_.clear();  // The session has ended.
+  const int hundred = static_cast<int>(status) / 100;
+  if (hundred < 3 || status == STRIDEWIRE_REPLACED) return CloseForGood(status, message.text);
+  BreakOff(status, message.text, now_s);
+}
+
+}  // namespace stridewire::client
