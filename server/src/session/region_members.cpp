@@ -14,45 +14,49 @@ void RegionMembers::Move(const protocol::Region& region, double leave_m,
   centre_m_ = region.centre_m;
   radius_m_ = region.radius_m;
   leave_at_m_ = region.radius_m + region.leave_m.value_or(leave_m);
-  rings_.clear();
+  ring_count_ = 0;
   for (std::size_t i = 0; i < region.rings.size(); ++i) {
     const protocol::RateRing& ring = region.rings[i];
-    rings_.push_back({ring.to_m, ring.every_n_ticks,
-                      region.ring_details.empty() ? mode : CompactMode(region.ring_details[i])});
+    rings_[ring_count_++] = {
+        ring.to_m, ring.every_n_ticks,
+        region.ring_details.empty() ? mode : CompactMode(region.ring_details[i])};
   }
-  rings_.push_back({std::numeric_limits<double>::infinity(), every_n_ticks, mode});
+  rings_[ring_count_++] = {std::numeric_limits<double>::infinity(), every_n_ticks, mode};
+  SumUp();
+}
+
+void RegionMembers::SumUp() {
+  every_ = {};
+  for (const Ring& ring : rings()) {
+    std::uint16_t& every = every_[static_cast<std::size_t>(ring.mode)];
+    every = std::gcd(every, ring.every_n_ticks);
+  }
 }
 
 const RegionMembers::Ring& RegionMembers::RingAt(double distance_m2) const {
-  return *std::find_if(rings_.begin(), rings_.end() - 1,
-                       [&](const Ring& ring) { return distance_m2 <= ring.to_m * ring.to_m; });
+  auto ring = rings_.begin();
+  while (distance_m2 > ring->to_m * ring->to_m) ++ring;  // nothing is beyond the last
+  return *ring;
 }
 
 std::vector<PoseMode> RegionMembers::modes() const {
   std::vector<PoseMode> modes;
-  for (const Ring& ring : rings_) {
-    if (std::ranges::find(modes, ring.mode) == modes.end()) modes.push_back(ring.mode);
+  for (std::size_t mode = 0; mode < every_.size(); ++mode) {
+    if (every_[mode] > 0) modes.push_back(static_cast<PoseMode>(mode));
   }
   return modes;
 }
 
-std::uint16_t RegionMembers::every(PoseMode mode) const {
-  std::uint16_t every = 0;
-  for (const Ring& ring : rings_) {
-    if (ring.mode == mode) every = std::gcd(every, ring.every_n_ticks);
-  }
-  return every;
-}
-
 RegionReach RegionMembers::reach(PoseMode mode) const {
   const auto is_of_mode = [&](const Ring& ring) { return ring.mode == mode; };
-  const auto first = std::ranges::find_if(rings_, is_of_mode);
-  const auto last = std::find_if(rings_.rbegin(), rings_.rend(), is_of_mode);
+  const std::span<const Ring> all = rings();
+  const auto first = std::ranges::find_if(all, is_of_mode);
+  const auto last = std::find_if(all.rbegin(), all.rend(), is_of_mode);
   return {.x = centre_m_.x,
           .z = centre_m_.z,
           .reach_m = std::min(last->to_m, leave_at_m_),
-          .beyond_m = first == rings_.begin() ? 0.0 : (first - 1)->to_m,
-          .is_one_of_several = !std::ranges::all_of(rings_, is_of_mode)};
+          .beyond_m = first == all.begin() ? 0.0 : (first - 1)->to_m,
+          .is_one_of_several = !std::ranges::all_of(all, is_of_mode)};
 }
 
 RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
@@ -91,15 +95,17 @@ RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
   left_.clear();
   due_.clear();
   std::size_t kept = 0;
+  const bool is_uniform = ring_count_ == 1;  // most are: nothing is to be looked up
   for (const auto& [row, distance_m2] : near_) {
     const AvatarNumber number = (*lane.avatars)[row];
-    const Ring& ring = RingAt(distance_m2);
+    const Ring& ring = is_uniform ? rings_[0] : RingAt(distance_m2);
+    const bool is_of_mode = is_uniform || ring.mode == mode;
     if (!lane.is_inside[row]) {
       // Just after a region has moved the shard may not know yet that its pose is wanted.
-      if (ring.mode != mode || !has_pose(row)) continue;
+      if (!is_of_mode || !has_pose(row)) continue;
       entered_.push_back(number);
       due_.push_back(row);
-    } else if (ring.mode == mode && has_pose(row) && tick % ring.every_n_ticks == 0) {
+    } else if (is_of_mode && has_pose(row) && tick % ring.every_n_ticks == 0) {
       due_.push_back(row);
     }
     now_.push_back(number);

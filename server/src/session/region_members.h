@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -30,13 +32,16 @@ class RegionMembers {
   /// Puts `function(mode)` in the place of each mode.
   template <typename Function>
   void ChangeModes(Function&& function) {
-    for (Ring& ring : rings_) ring.mode = function(ring.mode);
+    for (Ring& ring : std::span(rings_).first(ring_count_)) ring.mode = function(ring.mode);
+    SumUp();
   }
 
   /// Those of its rings and beyond, each once.
   [[nodiscard]] std::vector<protocol::PoseMode> modes() const;
   /// Of the ticks wanted in a mode those that this divides; 0: no ring is of that mode.
-  [[nodiscard]] std::uint16_t every(protocol::PoseMode mode) const;
+  [[nodiscard]] std::uint16_t every(protocol::PoseMode mode) const {
+    return every_[static_cast<std::size_t>(mode)];
+  }
   /// What holds all rings of that mode, of which there is one.
   [[nodiscard]] RegionReach reach(protocol::PoseMode mode) const;
 
@@ -66,11 +71,16 @@ class RegionMembers {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
   };
   [[nodiscard]] const Ring& RingAt(double distance_m2) const;
+  void SumUp();
 
   protocol::GroundPlace centre_m_;
   double radius_m_ = 0.0;
   double leave_at_m_ = 0.0;
-  std::vector<Ring> rings_{Ring{}};  // growing; the last is what is beyond the others
+  [[nodiscard]] std::span<const Ring> rings() const { return std::span(rings_).first(ring_count_); }
+  std::array<Ring, protocol::kMaxRateRings + 1>
+      rings_;  // growing; the last is what is beyond the others
+  std::size_t ring_count_ = 0;
+  std::array<std::uint16_t, kSentModes.size() + 1> every_{};  // by mode, movement among them
   struct Lane {
     std::vector<AvatarNumber> inside;  // growing
     protocol::PoseRows::Avatars avatars;
