@@ -58,6 +58,15 @@ protocol::Placement Start(AvatarNumber avatar) {
   return {{3.0 * avatar, 0.0, -1.0 * avatar}, 0.3 * avatar};
 }
 
+// One avatar a metre.
+std::vector<protocol::SpawnItem> OnALine(AvatarNumber count) {
+  std::vector<protocol::SpawnItem> items;
+  for (AvatarNumber avatar = 1; avatar <= count; ++avatar) {
+    items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
+  }
+  return items;
+}
+
 // Pose bytes by avatar and number of ticks since its first movement began.
 using PoseStreams = std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>>;
 
@@ -458,11 +467,7 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
 TEST(ServerWorld, ShowsARegionThatMoves) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
-  std::vector<protocol::SpawnItem> items;
-  for (AvatarNumber avatar = 1; avatar <= 60; ++avatar) {
-    items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
-  }
-  ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 60u);
+  ASSERT_EQ(controller.Spawn(world->world, OnALine(60))->accepted, 60u);
 
   RawClient player = server.Enter("w", protocol::Role::kObserver).first;
   std::set<AvatarNumber> inside;
@@ -570,11 +575,7 @@ struct Heard {
 TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
-  std::vector<protocol::SpawnItem> items;
-  for (AvatarNumber avatar = 1; avatar <= 60; ++avatar) {
-    items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
-  }
-  ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 60u);
+  ASSERT_EQ(controller.Spawn(world->world, OnALine(60))->accepted, 60u);
   RawClient player = server.Enter("w", protocol::Role::kObserver).first;
   Heard heard;
   const auto take = [&](const protocol::Message& message) { heard.Take(message); };
