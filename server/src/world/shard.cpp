@@ -116,12 +116,13 @@ void Shard::Tick() {
   inbox_.clear();
   for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
   AnswerQuestions();
+  // Before the replies go out: whoever has one finds the metrics to say the same.
+  UpdateGauges();
   Publish();
 
   metrics_.ticks.Add();
   metrics_.tick.Observe(std::chrono::duration<double>(Clock::now() - begin).count());
   metrics_.cpu_ns.Set(ProcessorTimeOfThreadNs());
-  UpdateGauges();
 }
 
 void Shard::AnswerQuestions() {
