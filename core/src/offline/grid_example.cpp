@@ -103,6 +103,17 @@ void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layo
   }
 }
 
+void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row) {
+  constexpr float kSmallestNorm = 0.1f;
+  const auto padded = static_cast<std::size_t>(layout.padded_joints);
+  for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
+    const Quat q = QuatOf(sum.data(), padded, j);
+    const float norm = std::sqrt(Dot(q, q));
+    if (norm >= kSmallestNorm) SetQuat(row, padded, j, q * (1.0f / norm));
+  }
+  layout.SetRoot(row, layout.RootOf(sum.data()));
+}
+
 Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count) {
   const auto padded = static_cast<std::size_t>(layout.padded_joints);
   Pose pose(joint_count);

@@ -28,6 +28,9 @@ struct GridExample {
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 
+// Sets a row to a weighted sum of rows, rotations made unit. One whose rotations cancel each other stays as it was.
+void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row);
+
 // Pose of a row: root position and yaw put back together.
 [[nodiscard]] Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count);
 

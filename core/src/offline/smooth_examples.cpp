@@ -247,15 +247,15 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   GridCache cache(layout);
   Pose pose(skeleton.joint_count());
   Movement movement;
-  const auto row_floats = static_cast<std::ptrdiff_t>(layout.row_floats);
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   for (GridExample& example : examples) {
     if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, movement)) {
       continue;
     }
     cache.Clear();
     for (int point = 0; point < group.grid_point_count; ++point) {
-      const std::span<const float> row = cache.Row(smooth->group, movement.weights, point);
-      std::copy(row.begin(), row.end(), example.rows.begin() + point * row_floats);
+      SetBlendedRow(cache.Row(smooth->group, movement.weights, point), layout,
+                    &example.rows[static_cast<std::size_t>(point) * row_floats]);
     }
     BlendKeytimes(group.keytimes_s, movement.weights, example.keytimes_s);
     example.heading_change_rad = movement.heading_change_rad;

@@ -30,32 +30,12 @@ Vec3 RotationVector(const Quat& q) {
 std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
                                       int point) {
   const auto slot = static_cast<std::size_t>(point & 3);
-  const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
-  const std::span<float> row = std::span(rows_).subspan(slot * row_floats, row_floats);
+  const std::span<float> row = std::span(rows_).subspan(slot * row_floats_, row_floats_);
   if (points_[slot] == point) return row;
   points_[slot] = point;
-
   const std::size_t n = weights.size();
-  const auto padded = static_cast<std::size_t>(layout_.padded_joints);
-  const auto joint_count = static_cast<std::size_t>(layout_.joint_count);
-  const float* source = &group.grid[static_cast<std::size_t>(point) * n * row_floats];
-  const std::uint32_t degenerate =
-      kernels::BlendRow(source, weights.data(), n, row_floats, padded, joint_count, row.data());
-  if (degenerate == 0) return row;
-
-  // Rotations that cancel each other have no mean; the largest example is at least a pose.
-  degenerate_count_ += degenerate;
-  const auto largest =
-      static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
-  const float* example = source + largest * row_floats;
-  for (std::size_t j = 0; j < joint_count; ++j) {
-    float norm_squared = 0.0f;
-    for (std::size_t c = 0; c < 4; ++c) {
-      norm_squared += row[c * padded + j] * row[c * padded + j];
-    }
-    if (norm_squared > 0.5f) continue;  // Unit: it was not one of them.
-    for (std::size_t c = 0; c < 4; ++c) row[c * padded + j] = example[c * padded + j];
-  }
+  const float* examples = &group.grid[static_cast<std::size_t>(point) * n * row_floats_];
+  kernels::SumRows(examples, weights.data(), n, row_floats_, row.data());
   return row;
 }
 
@@ -149,19 +129,6 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
   movement.warp = TimeWarp(keytimes, group.cells);
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());
-}
-
-void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                       int point, GridCache& cache, PoseSpan out) {
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
-  const std::span<const float> row = cache.Row(group, movement.weights, point);
-  for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    out.rotations[j] = Quat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
-  }
-  const auto [position, yaw_rad] = layout.RootOf(row.data());
-  out.root_position_m =
-      Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, position));
-  out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
 }
 
 BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {

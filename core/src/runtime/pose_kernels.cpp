@@ -18,8 +18,6 @@ HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-constexpr float kSmallestNorm = 0.1f;
-
 void SumRows(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
              std::size_t count, std::size_t row_floats, float* HWY_RESTRICT row) {
   const FloatTag d;
@@ -51,50 +49,22 @@ void SumRows(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weigh
   }
 }
 
-std::uint32_t BlendRow(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
-                       std::size_t count, std::size_t row_floats, std::size_t padded,
-                       std::size_t joint_count, float* HWY_RESTRICT row) {
+void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTRICT weights,
+                 std::size_t row_floats, float* HWY_RESTRICT row) {
   const FloatTag d;
-  const std::size_t width = hn::Lanes(d);
-  // A vector then reaches beyond the row, which `row` has room for and the examples have not.
-  const bool is_narrow = padded < width;
-  if (is_narrow) SumRows(examples, weights, count, row_floats, row);
-  std::uint32_t degenerate = 0;
-  std::size_t next = 0;
-  while (next < padded) {
-    // The last ones go with some before them, as in BlendRotations.
-    const std::size_t j = next + width > padded && !is_narrow ? padded - width : next;
-    Quat4 q = {Float(0.0f), Float(0.0f), Float(0.0f), Float(0.0f)};
-    if (is_narrow) {
-      q = LoadParts(row + j, padded);
-    } else {
-      const float* source = examples + j;
-      for (std::size_t e = 0; e < count; ++e, source += row_floats) {
-        q = q + LoadParts(source, padded) * Float(weights[e]);
-      }
+  for (std::size_t i = 0; i < row_floats; i += hn::Lanes(d)) {
+    auto sum = hn::Mul(hn::Set(d, weights[0]), hn::LoadU(d, points[0] + i));
+    for (std::size_t k = 1; k < 4; ++k) {
+      sum = hn::Add(sum, hn::Mul(hn::Set(d, weights[k]), hn::LoadU(d, points[k] + i)));
     }
-    // Behind the joints comes the root, which is no rotation.
-    const auto is_joint = hn::FirstN(d, joint_count > j ? joint_count - j : 0);
-    const Float norm = Sqrt(Dot(q, q));
-    const hn::Mask<FloatTag> is_sound = hn::Ge(norm.v, hn::Set(d, kSmallestNorm));
-    const Float scale = Select({hn::And(is_joint, is_sound)}, Float(1.0f) / norm, Float(1.0f));
-    if (is_narrow) {
-      StoreParts(q * scale, row + j, padded, hn::FirstN(d, padded));
-    } else {
-      StoreParts(q * scale, row + j, padded);
-    }
-    const auto is_new = hn::Not(hn::FirstN(d, next - j));
-    degenerate += static_cast<std::uint32_t>(
-        hn::CountTrue(d, hn::And(hn::AndNot(is_sound, is_joint), is_new)));
-    next = j + width;
+    hn::StoreU(sum, d, row + i);
   }
-  return degenerate;
 }
 
-void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
+bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
-  const std::size_t padded = blend.padded;
+  Mask is_short = {hn::FirstN(d, 0)};
   std::size_t next = 0;
   while (next < blend.joint_count) {
     // The last ones go with some before them, which come out the same again: no vector is part empty.
@@ -102,17 +72,12 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
                               ? blend.joint_count - width
                               : next;
     next = j + width;
-    const Quat4 first = LoadParts(blend.rows[1] + j, padded);
-    Quat4 q = {Float(0.0f), Float(0.0f), Float(0.0f), Float(0.0f)};
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Quat4 at = LoadParts(blend.rows[k] + j, padded);
-      // Alignment is per grid point, so a track far from the reference may flip between two.
-      const Float weight =
-          Select(Dot(first, at) < Float(0.0f), Float(-blend.weights[k]), Float(blend.weights[k]));
-      q = q + at * weight;
-    }
-    // Lengths multiply: one division at the end serves all.
     const std::size_t left = blend.joint_count - j;
+    Quat4 q = LoadParts(blend.row + j, blend.padded);
+    // Behind the joints comes the root, which is no rotation.
+    const Mask is_small = Dot(q, q) < Float(kSmallestNorm * kSmallestNorm);
+    is_short = is_short || (is_small && Mask{hn::FirstN(d, left)});
+    // Lengths multiply: one division at the end serves all.
     if (blend.difference != nullptr) {
       const Quat4 difference = LoadQuats(blend.difference + 4 * j, left);
       q = Multiply(q, SlerpFromIdentity(difference, Float(blend.fraction)));
@@ -123,6 +88,7 @@ void BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
     }
     StoreQuats(Normalise(q), out + 4 * j, left);
   }
+  return !Any(is_short);
 }
 
 void FindInGrids(std::size_t count, GridTimes& times) {
@@ -223,7 +189,7 @@ HWY_AFTER_NAMESPACE();
 namespace stridewire::kernels {
 
 HWY_EXPORT(SumRows);
-HWY_EXPORT(BlendRow);
+HWY_EXPORT(BlendPoints);
 HWY_EXPORT(BlendRotations);
 HWY_EXPORT(FindInGrids);
 HWY_EXPORT(SinCos);
@@ -234,15 +200,13 @@ void SumRows(const float* examples, const float* weights, std::size_t count, std
   HWY_DYNAMIC_DISPATCH(SumRows)(examples, weights, count, row_floats, row);
 }
 
-std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
-                       std::size_t row_floats, std::size_t padded, std::size_t joint_count,
-                       float* row) {
-  return HWY_DYNAMIC_DISPATCH(BlendRow)(examples, weights, count, row_floats, padded, joint_count,
-                                        row);
+void BlendPoints(const float* const points[4], const float weights[4], std::size_t row_floats,
+                 float* row) {
+  HWY_DYNAMIC_DISPATCH(BlendPoints)(points, weights, row_floats, row);
 }
 
-void BlendRotations(const RotationBlend& blend, float* out) {
-  HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
+bool BlendRotations(const RotationBlend& blend, float* out) {
+  return HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
 }
 
 void FindInGrids(std::size_t count, GridTimes& times) {

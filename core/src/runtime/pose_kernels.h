@@ -18,12 +18,9 @@ inline constexpr std::size_t kBlock = 16;
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row);
 
-/// SumRows, then each of the first `joint_count` quaternions made unit. `padded` joints lie component by component, as
-/// in GridLayout. Returns how many norms fell below 0.1: their components are left as they were summed. All pointers
-/// 4-byte aligned; up to kBlock floats beyond the row are read.
-[[nodiscard]] std::uint32_t BlendRow(const float* examples, const float* weights, std::size_t count,
-                                     std::size_t row_floats, std::size_t padded,
-                                     std::size_t joint_count, float* row);
+/// row = sum of weights[k] * points[k], of four rows, in order.
+void BlendPoints(const float* const points[4], const float weights[4], std::size_t row_floats,
+                 float* row);
 
 /// Where the poses of a block lie in their movements' grids, and how much of the poses before is left: one number a
 /// pose. In doubles and in the order of operations of TimeWarp::GridPosition, CellWeightsAt and EaseOut.
@@ -46,21 +43,23 @@ struct GridTimes {
 };
 void FindInGrids(std::size_t count, GridTimes& times);
 
-/// Local rotations between four grid rows and, while the movement before is eased out, the difference to it.
+/// Rotations of a blended row and, while the movement before is eased out, the difference to it.
 struct RotationBlend {
-  const float* rows[4] =
-      {};  ///< Blended rows around the cell; signs are taken along rows[1]. Read as BlendRow's
-  float weights[4] = {};              ///< Of the rows, 0 for one that is not there
-  std::size_t padded = 0;             ///< Joints in a row
-  std::size_t joint_count = 0;        ///< Joints written
-  const float* difference = nullptr;  ///< [joint] x y z w, or null; see slerp below
-  float fraction = 0.0f;              ///< r := r slerp(1, difference, fraction), in [0, 1]
-  const float* velocity = nullptr;    ///< [joint] x y z rotation vectors a second, or null
-  float seconds = 0.0f;               ///< r := r * rotation along seconds * velocity
+  const float* row;    ///< Summed; `padded` joints lie component by component, as in GridLayout
+  std::size_t padded;  ///< Joints in the row. Up to kBlock floats beyond it are read
+  std::size_t joint_count;  ///< Joints written
+  const float* difference;  ///< [joint] x y z w, or null; see slerp below
+  float fraction;           ///< r := r slerp(1, difference, fraction), in [0, 1]
+  const float* velocity;    ///< [joint] x y z rotation vectors a second, or null
+  float seconds;            ///< r := r * rotation along seconds * velocity
 };
 
-/// out[joint] x y z w, unit. Norms below 1e-12 give the identity.
-void BlendRotations(const RotationBlend& blend, float* out);
+/// out[joint] x y z w, unit. False if a rotation of the row is shorter than kSmallestNorm: rotations that cancel each
+/// other have no mean, and what is written of such a joint means nothing.
+[[nodiscard]] bool BlendRotations(const RotationBlend& blend, float* out);
+
+/// Sums of rotations that are shorter are none.
+inline constexpr float kSmallestNorm = 0.1f;
 
 /// Sine and cosine of `count` angles, the same bits as Sin and Cos of base/trig.h. |x| <= 1e5.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);

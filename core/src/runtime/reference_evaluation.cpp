@@ -35,24 +35,35 @@ Row ExampleRow(const MotionGroup& group, const GridLayout& layout, int point, st
   return {&group.grid[(rows + example) * static_cast<std::size_t>(layout.row_floats)], layout};
 }
 
-LocalPose BlendAtPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                       int point) {
+// All examples at the points of a cell at once: rotations are made unit once.
+LocalPose BlendCell(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                    const CellWeights& cell) {
   LocalPose pose;
   const std::size_t largest = static_cast<std::size_t>(std::ranges::max_element(movement.weights) -
                                                        movement.weights.begin());
   for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
-    Quat sum(0.0f, 0.0f, 0.0f, 0.0f);
-    for (std::size_t e = 0; e < movement.weights.size(); ++e) {
-      sum = sum + movement.weights[e] * ExampleRow(group, layout, point, e).rotation(j);
+    const Quat none(0.0f, 0.0f, 0.0f, 0.0f);
+    Quat sum = none;
+    Quat of_largest = none;
+    for (int k = 0; k < cell.count; ++k) {
+      const float weight = cell.weights[static_cast<std::size_t>(k)];
+      for (std::size_t e = 0; e < movement.weights.size(); ++e) {
+        const Quat q = weight * ExampleRow(group, layout, cell.first + k, e).rotation(j);
+        sum = sum + movement.weights[e] * q;
+        if (e == largest) of_largest = of_largest + q;
+      }
     }
-    pose.rotations.push_back(std::sqrt(Dot(sum, sum)) >= kSmallestNorm
-                                 ? Normalise(sum)
-                                 : ExampleRow(group, layout, point, largest).rotation(j));
+    pose.rotations.push_back(
+        Normalise(std::sqrt(Dot(sum, sum)) >= kSmallestNorm ? sum : of_largest));
   }
-  for (std::size_t e = 0; e < movement.weights.size(); ++e) {
-    const Row row = ExampleRow(group, layout, point, e);
-    pose.position += static_cast<double>(movement.weights[e]) * row.position();
-    pose.yaw_rad += movement.weights[e] * row.yaw();
+  for (int k = 0; k < cell.count; ++k) {
+    for (std::size_t e = 0; e < movement.weights.size(); ++e) {
+      const Row row = ExampleRow(group, layout, cell.first + k, e);
+      const double weight =
+          static_cast<double>(cell.weights[static_cast<std::size_t>(k)]) * movement.weights[e];
+      pose.position += weight * row.position();
+      pose.yaw_rad += weight * row.yaw();
+    }
   }
   return pose;
 }
@@ -113,9 +124,7 @@ void EvaluateMovementByReference(const MotionGroup& group, const GridLayout& lay
                                  const Movement& movement, double time_s, PoseSpan out) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
-  const LocalPose local =
-      Interpolate(cell, [&](int point) { return BlendAtPoint(group, layout, movement, point); });
-  ToWorld(local, movement, time_s, out);
+  ToWorld(BlendCell(group, layout, movement, cell), movement, time_s, out);
   AddDifference(movement, time_s, out);
 }
 

@@ -50,12 +50,12 @@ struct Movement {
   double steer_rad = 0.0;  ///< Turned further than its examples turn, evenly over the movement
   double entered_s = 0.0;  ///< Where it began: later than 0 if it took over in mid-swing
   double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration)
+  std::vector<float> weights;        ///< [example], sum 1
   Pose difference;                   ///< D = P - M(entered_s), world frame
   PoseVelocity difference_velocity;  ///< Of D when the movement was entered
   TimeWarp warp;
   FootPlan feet;  ///< Not active: feet are where the blend has them
 
-  std::vector<float> weights;                          ///< [example], sum 1
   ParameterValues parameters;                          ///< What was asked of it
   std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
   double heading_change_rad = 0.0;                     ///< blended
@@ -65,34 +65,28 @@ struct Movement {
   }
 };
 
-/// The blended grid poses around the present cell. Blending costs n multiply-adds a lane; between
-/// grid points the poses are only interpolated, so a tick blends once a cell. Keeping this or
-/// starting from an empty one gives the same bytes.
+/// The examples' weighted sums at the grid points around the present cell. Summing costs n multiply-adds a number;
+/// between grid points the sums are only interpolated, so a tick sums once a cell. Keeping this or starting from an
+/// empty one gives the same bytes.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
-      : layout_(layout), rows_(static_cast<std::size_t>(4 * layout.row_floats) + kSlackFloats) {}
+      : row_floats_(static_cast<std::size_t>(layout.row_floats)), rows_(4 * row_floats_) {}
 
   /// Forgets the rows: the movement changed.
   void Clear() { points_.fill(-1); }
 
-  /// The blended row of a grid point: quaternions unit, hemisphere that of the group's reference.
+  /// The sum at a grid point. Its quaternions are not unit: what is interpolated between them is made so.
   [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
                                            int point);
 
   /// Asks for the rows' memory: they are read soon.
   void Prefetch() const;
 
-  /// Blends whose norm fell below 0.1, where the example of largest weight was taken instead.
-  [[nodiscard]] std::uint64_t degenerate_count() const { return degenerate_count_; }
-
  private:
-  static constexpr std::size_t kSlackFloats = 16;  // a vector may be read, not used, beyond a row
-
-  GridLayout layout_;
-  std::vector<float> rows_;  // four rows, point p in slot p % 4, and slack
+  std::size_t row_floats_;
+  std::vector<float> rows_;  // four rows, point p in slot p % 4
   std::array<int, 4> points_{-1, -1, -1, -1};
-  std::uint64_t degenerate_count_ = 0;
 };
 
 /// Fills `movement` (its vectors keep their memory) for a group and parameters [d] at a base frame:
@@ -110,7 +104,7 @@ void TakeWeights(const MotionGroup& group, std::span<const double> weights, Move
 /// The rest of StartMovement, for a movement that has group, parameters and weights.
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement);
 
-/// The blended pose at a grid point, which EvaluateBlend interpolates between. Never allocates.
+/// The blended pose at a grid point: EvaluateBlend's there. Never allocates.
 void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        int point, GridCache& cache, PoseSpan out);
 

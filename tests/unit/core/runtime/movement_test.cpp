@@ -119,7 +119,6 @@ TEST_F(MovementTest, ExtrapolatedWeightsStillGiveUnitRotations) {
   for (double t = 0.0; t <= movement.duration_s(); t += 0.01) {
     for (const Quat& q : Blend(movement, t).rotations) ASSERT_NEAR(glm::length(q), 1.0f, 1e-5f);
   }
-  EXPECT_EQ(cache_.degenerate_count(), 0u) << "padding is not a rotation";
 }
 
 TEST_F(MovementTest, BaseAfterIsBelowTheRootAndTurned) {
