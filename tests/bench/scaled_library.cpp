@@ -33,8 +33,7 @@ RawExample BlendOf(const MotionLibrary& library, int group_index, std::mt19937& 
   made.source = "blended";
   made.parameters = parameters;
   made.heading_change_rad = movement.heading_change_rad;
-  made.keytimes_s.assign(movement.keytimes_s.begin(),
-                         movement.keytimes_s.begin() + movement.interval_count + 1);
+  made.keytimes_s = movement.warp.Keytimes();
   made.clip.fps = kFps;
   made.clip.Resize(static_cast<int>(std::ceil(movement.duration_s() * kFps)) + 1,
                    library.skeleton().joint_count());

@@ -80,10 +80,8 @@ inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double f
       std::ranges::fill(movement.weights, 0.0f);
       movement.weights[static_cast<std::size_t>(e)] = 1.0f;
       const auto n = static_cast<std::size_t>(group.interval_count()) + 1;
-      for (std::size_t k = 0; k < n; ++k) {
-        movement.keytimes_s[k] = group.keytimes_s[static_cast<std::size_t>(e) * n + k];
-      }
-      movement.warp = TimeWarp(std::span(movement.keytimes_s).first(n), group.cells);
+      movement.warp =
+          TimeWarp(group.keytimes_s.subspan(static_cast<std::size_t>(e) * n, n), group.cells);
       cache.Clear();
       VelocitySteps steps(library.skeleton(), fps);
       for (double t = 0.0; t < movement.duration_s(); t += 1.0 / fps) {

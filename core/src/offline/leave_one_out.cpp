@@ -227,7 +227,6 @@ class Comparer {
     for (std::size_t e = 0; e < weights.size(); ++e) {
       movement_.heading_change_rad += weights[e] * group_.heading_change_rad[e];
     }
-    movement_.interval_count = group_.interval_count();
     cache_.Clear();
     ParameterValues wanted;
     wanted.count = group_.parameter_count();

@@ -252,9 +252,8 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
                                  ? MeanParameters(library->group(event.group), movement->weights)
                                  : movement->parameters;
           record.weights = movement->weights;
-          for (int i = 0; i <= movement->interval_count; ++i) {
-            record.keytimes_s.push_back(event.time_s +
-                                        movement->keytimes_s[static_cast<std::size_t>(i)]);
+          for (int i = 0; i <= movement->warp.interval_count(); ++i) {
+            record.keytimes_s.push_back(event.time_s + movement->warp.keytime_s(i));
           }
           cache.Clear();
           if (movement->feet.is_active) {

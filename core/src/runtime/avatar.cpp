@@ -186,7 +186,7 @@ void Avatar::PrefetchShown() const {
 void Avatar::PrefetchState() const {
   PrefetchBytes(&time_s_, 2 * kCacheLineBytes);
   PrefetchBytes(&body_.movement, kCacheLineBytes);
-  PrefetchBytes(&body_.movement.keytimes_s, sizeof(body_.movement.keytimes_s));
+  PrefetchBytes(&body_.movement.warp, 2 * kCacheLineBytes);
   PrefetchBytes(&body_.movement.feet.is_active, 1);
 }
 
@@ -514,8 +514,8 @@ Vec3 Avatar::LandingBall(Foot foot) const {
 
 void Avatar::ReportFootStrikes(double before_s, double after_s) {
   const MotionGroup& moving = group();
-  const double strike_s =
-      body_.movement.keytimes_s[ContactKeytimesOf(moving.kind, moving.interval_count()).landing];
+  const double strike_s = body_.movement.warp.keytime_s(
+      ContactKeytimesOf(moving.kind, moving.interval_count()).landing);
   if (!(before_s < strike_s && strike_s <= after_s)) return;
   if (!body_.movement.feet.is_active) body_.Evaluate(strike_s);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

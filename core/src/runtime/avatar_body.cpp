@@ -15,9 +15,9 @@ void MakeRoom(const MotionLibrary& library, Movement& movement) {
 AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
     : library(std::move(of_library)),
       pose(library->skeleton().joint_count()),
+      cache(library->layout()),
       blended_pose(library->skeleton().joint_count()),
-      earlier_pose(library->skeleton().joint_count()),
-      cache(library->layout()) {
+      earlier_pose(library->skeleton().joint_count()) {
   MakeRoom(*library, movement);
 }
 

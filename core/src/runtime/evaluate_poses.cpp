@@ -213,7 +213,8 @@ namespace {
 // Where what is read of a job lies, which Prefetch reads.
 void PrefetchPlaces(const PoseJob& job) {
   const Movement& movement = *job.movement;
-  PrefetchBytes(&movement, offsetof(Movement, feet) + offsetof(FootPlan, packed));
+  PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
+  PrefetchBytes(&movement.feet, offsetof(FootPlan, packed));
   PrefetchBytes(job.cache, sizeof(*job.cache));
   PrefetchBytes(job.shown, sizeof(*job.shown));
 }

@@ -284,12 +284,12 @@ class Planner {
 
 SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
   const double duration_s = movement.duration_s();
-  if (movement.interval_count < 3) return {0.25 * duration_s, 0.9 * duration_s};
-  const ContactKeytimes contact = ContactKeytimesOf(kind, movement.interval_count);
-  const double off_s = movement.keytimes_s[contact.toe_off];
+  if (movement.warp.interval_count() < 3) return {0.25 * duration_s, 0.9 * duration_s};
+  const ContactKeytimes contact = ContactKeytimesOf(kind, movement.warp.interval_count());
+  const double off_s = movement.warp.keytime_s(contact.toe_off);
   SwingTimes times;
   times.release_s = std::max(off_s - kBallLeavesS, 0.5 * off_s);
-  times.land_s = std::min(movement.keytimes_s[contact.landing] + kBallRestsS, duration_s);
+  times.land_s = std::min(movement.warp.keytime_s(contact.landing) + kBallRestsS, duration_s);
   times.release_s = std::min(times.release_s, times.land_s - kShortestSwingS);
   return times;
 }
@@ -318,8 +318,7 @@ FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pos
 }
 
 void StandOn(const FootHolds& holds, Movement& movement) {
-  movement.interval_count = 1;
-  movement.keytimes_s = {0.0, kEaseOutS};
+  movement.warp = TimeWarp(std::array{0.0, kEaseOutS}, std::array{1});
   movement.entered_s = movement.steer_rad = 0.0;
   movement.ease_out_s = kEaseOutS;
   FootPlan& plan = movement.feet;

@@ -76,10 +76,10 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
   const std::size_t n = cells.size();
   std::array<double, kMaxIntervals> length{};
   std::array<double, kMaxIntervals> rate{};  // cells a second in each interval
-  keytimes_s_[0] = keytimes_s[0];
+  knots_[0].time_s = keytimes_s[0];
   for (std::size_t i = 0; i < n; ++i) {
-    keytimes_s_[i + 1] = keytimes_s[i + 1];
-    positions_[i + 1] = positions_[i] + cells[i];
+    knots_[i + 1].time_s = keytimes_s[i + 1];
+    knots_[i + 1].position = knots_[i].position + cells[i];
     length[i] = keytimes_s[i + 1] - keytimes_s[i];
     rate[i] = cells[i] / length[i];
   }
@@ -87,19 +87,25 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
   // monotone. All rates are positive here. Ends: one-sided three-point formula, kept within
   // [0, 3 rate], which is what monotonicity needs.
   if (n == 1) {
-    slopes_[0] = slopes_[1] = rate[0];
+    knots_[0].slope = knots_[1].slope = rate[0];
     return;
   }
   for (std::size_t i = 1; i < n; ++i) {
     const double w1 = 2.0 * length[i] + length[i - 1];
     const double w2 = length[i] + 2.0 * length[i - 1];
-    slopes_[i] = (w1 + w2) / (w1 / rate[i - 1] + w2 / rate[i]);
+    knots_[i].slope = (w1 + w2) / (w1 / rate[i - 1] + w2 / rate[i]);
   }
   const auto end_slope = [](double h0, double h1, double r0, double r1) {
     return std::clamp(((2.0 * h0 + h1) * r0 - h0 * r1) / (h0 + h1), 0.0, 3.0 * r0);
   };
-  slopes_[0] = end_slope(length[0], length[1], rate[0], rate[1]);
-  slopes_[n] = end_slope(length[n - 1], length[n - 2], rate[n - 1], rate[n - 2]);
+  knots_[0].slope = end_slope(length[0], length[1], rate[0], rate[1]);
+  knots_[n].slope = end_slope(length[n - 1], length[n - 2], rate[n - 1], rate[n - 2]);
+}
+
+std::vector<double> TimeWarp::Keytimes() const {
+  std::vector<double> keytimes_s;
+  for (int i = 0; i <= interval_count_; ++i) keytimes_s.push_back(keytime_s(i));
+  return keytimes_s;
 }
 
 double TimeWarp::GridPosition(double time_s) const {
@@ -119,13 +125,13 @@ double TimeWarp::GridPosition(double time_s) const {
 
 double TimeWarp::TimeAt(double grid_position) const {
   const auto n = static_cast<std::size_t>(interval_count_);
-  if (!(grid_position > 0.0)) return keytimes_s_[0];
-  if (grid_position >= positions_[n]) return keytimes_s_[n];
+  if (!(grid_position > 0.0)) return knots_[0].time_s;
+  if (grid_position >= knots_[n].position) return knots_[n].time_s;
   for (std::size_t i = 1; i < n; ++i) {
-    if (grid_position == positions_[i]) return keytimes_s_[i];
+    if (grid_position == knots_[i].position) return knots_[i].time_s;
   }
-  double low = keytimes_s_[0];
-  double high = keytimes_s_[n];
+  double low = knots_[0].time_s;
+  double high = knots_[n].time_s;
   while (high - low > 1e-12) {
     const double middle = 0.5 * (low + high);
     if (middle <= low || middle >= high) break;
@@ -137,8 +143,9 @@ double TimeWarp::TimeAt(double grid_position) const {
 double TimeWarp::GenericTimeAt(double time_s) const {
   const double u = GridPosition(time_s);
   std::size_t i = static_cast<std::size_t>(interval_count_) - 1;
-  while (i > 0 && u < positions_[i]) --i;
-  return static_cast<double>(i) + (u - positions_[i]) / (positions_[i + 1] - positions_[i]);
+  while (i > 0 && u < knots_[i].position) --i;
+  return static_cast<double>(i) +
+         (u - knots_[i].position) / (knots_[i + 1].position - knots_[i].position);
 }
 
 }  // namespace stridewire

@@ -123,9 +123,8 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
   movement.steer_rad = 0.0;
   movement.entered_s = 0.0;
   movement.is_inertial = false;
-  movement.interval_count = group.interval_count();
-  const std::span<double> keytimes =
-      std::span(movement.keytimes_s).first(static_cast<std::size_t>(movement.interval_count) + 1);
+  std::array<double, kMaxIntervals + 1> scratch;
+  const auto keytimes = std::span(scratch).first(group.cells.size() + 1);
   BlendKeytimes(group.keytimes_s, movement.weights, keytimes);
   movement.warp = TimeWarp(keytimes, group.cells);
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s());

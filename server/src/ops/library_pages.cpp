@@ -172,14 +172,12 @@ class Bench {
         for (const float value : {q.x, q.y, q.z, q.w}) rotations.push_back(Short(value));
       }
     }
-    std::vector<double> keytimes(movement_.keytimes_s.begin(),
-                                 movement_.keytimes_s.begin() + movement_.interval_count + 1);
     double weight_sum = 0.0;
     for (const float w : movement_.weights) weight_sum += std::fabs(w);
     return {{"times_s", times},
             {"roots_m", roots},
             {"rotations", rotations},
-            {"keytimes_s", List(keytimes)},
+            {"keytimes_s", List(movement_.warp.Keytimes())},
             {"heading_change_rad", Short(movement_.heading_change_rad)},
             {"weights", List(movement_.weights)},
             {"weight_sum", Short(weight_sum)}};

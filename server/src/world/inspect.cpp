@@ -20,11 +20,9 @@ protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEv
                                     .clamped = event.clamped};
   const Movement* movement = avatar.movement();
   if (movement == nullptr) return current;  // a requested stand
-  const auto keytimes_s =
-      std::span(movement->keytimes_s).first(static_cast<std::size_t>(movement->interval_count) + 1);
-  current.keytimes_s.assign(keytimes_s.begin(), keytimes_s.end());
+  current.keytimes_s = movement->warp.Keytimes();
   current.generic_time = std::clamp(movement->warp.GenericTimeAt(avatar.movement_time_s()), 0.0,
-                                    static_cast<double>(movement->interval_count));
+                                    static_cast<double>(movement->warp.interval_count()));
   current.ease_out_s = movement->ease_out_s;
   const std::size_t weight_count = std::min(movement->weights.size(), protocol::kMaxWeights);
   current.weights.assign(movement->weights.begin(),

@@ -18,7 +18,8 @@ struct AvatarBody {
   explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  Pose pose;  ///< Displayed, but for layers
+  Pose pose;        ///< Displayed, but for layers
+  GridCache cache;  ///< Of the movement
   LayerStack layers;
   Pose layered_pose;  ///< With layers, if there are any; of no size before the first
   bool has_layers = false;
@@ -30,8 +31,7 @@ struct AvatarBody {
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
   Movement movement;  ///< Under way, or the last one
-  GridCache cache;
-  FootHolds holds;  ///< Where the feet stood when the movement began
+  FootHolds holds;    ///< Where the feet stood when the movement began
 
   [[nodiscard]] ConstPoseSpan Shown() const { return has_layers ? layered_pose : pose; }
   [[nodiscard]] const MotionGroup& group() const { return library->group(movement.group); }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
 #include "stridewire/base/error.h"
 
@@ -54,9 +55,10 @@ class TimeWarp {
   /// Generic time at `time_s`: GridPosition expressed in keytime intervals.
   [[nodiscard]] double GenericTimeAt(double time_s) const;
 
-  [[nodiscard]] double duration_s() const {
-    return keytimes_s_[static_cast<std::size_t>(interval_count_)];
-  }
+  [[nodiscard]] int interval_count() const { return interval_count_; }
+  [[nodiscard]] double keytime_s(int i) const { return knots_[static_cast<std::size_t>(i)].time_s; }
+  [[nodiscard]] std::vector<double> Keytimes() const;
+  [[nodiscard]] double duration_s() const { return keytime_s(interval_count_); }
 
   /// The piece of the map between two keytimes.
   struct Piece {
@@ -68,17 +70,22 @@ class TimeWarp {
   [[nodiscard]] Piece PieceAt(double time_s) const {
     std::size_t i = 0;
     for (int k = 1; k < interval_count_; ++k) {
-      i += time_s >= keytimes_s_[static_cast<std::size_t>(k)] ? 1 : 0;
+      i += time_s >= keytime_s(k) ? 1 : 0;
     }
-    return {keytimes_s_[i],    keytimes_s_[i + 1], positions_[i],
-            positions_[i + 1], slopes_[i],         slopes_[i + 1]};
+    const Knot& begin = knots_[i];
+    const Knot& end = knots_[i + 1];
+    return {begin.time_s, end.time_s, begin.position, end.position, begin.slope, end.slope};
   }
 
  private:
+  // Together, so that a tick finds them in few lines of memory.
+  struct Knot {
+    double time_s = 0.0;
+    double position = 0.0;
+    double slope = 0.0;  // du/dt
+  };
   int interval_count_ = 0;
-  std::array<double, kMaxIntervals + 1> keytimes_s_{};
-  std::array<double, kMaxIntervals + 1> positions_{};
-  std::array<double, kMaxIntervals + 1> slopes_{};  // du/dt at the keytimes
+  std::array<Knot, kMaxIntervals + 1> knots_{};
 };
 
 }  // namespace stridewire

@@ -44,7 +44,6 @@ struct PoseVelocity {
 struct Movement {
   // First what each of its poses is made of, in few lines of a cache.
   int group = -1;
-  int interval_count = 0;
   bool is_inertial = false;  ///< There is a difference_velocity
   BaseFrame base;
   double steer_rad = 0.0;  ///< Turned further than its examples turn, evenly over the movement
@@ -53,16 +52,13 @@ struct Movement {
   std::vector<float> weights;        ///< [example], sum 1
   Pose difference;                   ///< D = P - M(entered_s), world frame
   PoseVelocity difference_velocity;  ///< Of D when the movement was entered
-  TimeWarp warp;
-  FootPlan feet;  ///< Not active: feet are where the blend has them
+  TimeWarp warp;                     ///< Of the blended keytimes
+  FootPlan feet;                     ///< Not active: feet are where the blend has them
 
-  ParameterValues parameters;                          ///< What was asked of it
-  std::array<double, kMaxIntervals + 1> keytimes_s{};  ///< blended, K_0 = 0
-  double heading_change_rad = 0.0;                     ///< blended
+  ParameterValues parameters;       ///< What was asked of it
+  double heading_change_rad = 0.0;  ///< blended
 
-  [[nodiscard]] double duration_s() const {
-    return keytimes_s[static_cast<std::size_t>(interval_count)];
-  }
+  [[nodiscard]] double duration_s() const { return warp.duration_s(); }
 };
 
 /// The examples' weighted sums at the grid points around the present cell. Summing costs n multiply-adds a number;

@@ -191,10 +191,9 @@ Figure JointFigure(const MotionLibrary& library, int group_index) {
     const Movement& movement = player.movement();
     for (int k = 0; k <= kCurvePoints; ++k) {
       const double g = static_cast<double>(intervals) * k / kCurvePoints;
-      const auto i = static_cast<std::size_t>(std::min(static_cast<int>(g), intervals - 1));
-      const double time_s =
-          movement.keytimes_s[i] +
-          (g - static_cast<double>(i)) * (movement.keytimes_s[i + 1] - movement.keytimes_s[i]);
+      const int i = std::min(static_cast<int>(g), intervals - 1);
+      const double time_s = movement.warp.keytime_s(i) +
+                            (g - i) * (movement.warp.keytime_s(i + 1) - movement.warp.keytime_s(i));
       block += Number(g);
       for (const double angle : LegAngles(library.skeleton(), stick.Place(player.At(time_s)))) {
         block.append(" ").append(Number(std::round(10.0 * angle) / 10.0));
