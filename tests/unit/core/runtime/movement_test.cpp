@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numeric>
@@ -118,6 +119,22 @@ TEST_F(MovementTest, ExtrapolatedWeightsStillGiveUnitRotations) {
   const Movement movement = Start(0, std::array{-2.0, 3.0});
   for (double t = 0.0; t <= movement.duration_s(); t += 0.01) {
     for (const Quat& q : Blend(movement, t).rotations) ASSERT_NEAR(glm::length(q), 1.0f, 1e-5f);
+  }
+}
+
+TEST_F(MovementTest, RotationsThatCancelAreThoseOfTheLargestExample) {
+  Movement cancels = Start(0, std::array{-0.35, 0.45});
+  std::ranges::fill(cancels.weights, 0.0f);
+  Movement alone = cancels;
+  cancels.weights[2] = 0.51f;
+  cancels.weights[3] = -0.5f;
+  alone.weights[2] = 1.0f;
+  const double time_s = 0.4 * cancels.duration_s();
+  const Pose pose = Blend(cancels, time_s);
+  cache_.Clear();
+  const Pose largest = Blend(alone, time_s);
+  for (std::size_t j = 1; j < pose.rotations.size(); ++j) {
+    EXPECT_LT(AngleBetween(pose.rotations[j], largest.rotations[j]), 1e-5) << j;
   }
 }
 
