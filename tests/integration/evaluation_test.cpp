@@ -16,6 +16,7 @@
 #include "stridewire/base/trig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/reference_evaluation.h"
 
 namespace stridewire {
@@ -195,6 +196,40 @@ TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
       }
     }
   }
+}
+
+TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
+  constexpr unsigned kSeed = 9;
+  constexpr std::size_t kCrowd = 37;
+  DrawnCrowd crowd(library_, kCrowd, kSeed);
+  std::vector<Movement> movements(kCrowd);
+  std::vector<GridCache> caches(kCrowd, GridCache(library_->layout()));
+  std::vector<Pose> shown(kCrowd, Pose(library_->skeleton().joint_count()));
+  std::vector<Pose> blended = shown;
+  Pose alone = shown.front();
+  GridCache cache(library_->layout());
+  int poses = 0;
+  for (int tick = 0; tick < 200; ++tick) {
+    crowd.Advance();
+    std::vector<PoseJob> jobs;
+    for (const Avatar& avatar : crowd.avatars()) {
+      if (avatar.movement() == nullptr) continue;
+      const std::size_t i = jobs.size();
+      movements[i] = *avatar.movement();
+      caches[i].Clear();
+      jobs.push_back({&movements[i], avatar.movement_time_s(), &caches[i], &shown[i], &blended[i]});
+    }
+    EvaluatePoses(*library_, jobs);
+    for (const PoseJob& job : jobs) {
+      cache.Clear();
+      EvaluateMovement(library_->group(job.movement->group), library_->layout(), *job.movement,
+                       job.time_s, cache, alone);
+      ASSERT_EQ(alone.root_position_m, job.blended->root_position_m) << "seed " << kSeed;
+      ASSERT_EQ(alone.rotations, job.blended->rotations) << "seed " << kSeed;
+      ++poses;
+    }
+  }
+  EXPECT_GT(poses, 3000);
 }
 
 INSTANTIATE_TEST_SUITE_P(Libraries, EvaluationOf,

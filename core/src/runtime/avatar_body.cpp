@@ -27,18 +27,18 @@ void AvatarBody::Evaluate(double time_s) {
 }
 
 void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
-  const auto corrections = [&](double at_s) {
+  const auto corrections = [&](double at_s, const Pose& blended) {
     return movement.feet.is_active
-               ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended_pose)
+               ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
                : FeetCorrection{};
   };
   if (keeps_speed) {
-    Evaluate(time_s - kJoinStepS);
-    earlier_pose = blended_pose;
-    earlier_feet[1] = corrections(time_s - kJoinStepS);
+    const double earlier_s = time_s - kJoinStepS;
+    EvaluateMovement(group(), library->layout(), movement, earlier_s, cache, earlier_pose);
+    earlier_feet[1] = corrections(earlier_s, earlier_pose);
   }
   Evaluate(time_s);
-  earlier_feet[0] = corrections(time_s);
+  earlier_feet[0] = corrections(time_s, blended_pose);
   // Planting that has not set in yet sets in anew.
   begins_planting = movement.feet.is_active && time_s < movement.entered_s + movement.feet.settle_s;
   if (begins_planting) TakeForBlended(time_s, keeps_speed);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "cell_weights.h"
 #include "pose_kernels.h"
 #include "prefetch.h"
 
@@ -173,12 +174,17 @@ void EvaluateAlone(const MotionGroup& group, const GridLayout& layout, const Mov
   FinishAlone(group, layout, movement, place, row, out);
 }
 
+// What PlaceFinder finds, of one pose.
 Place PlaceAt(const MotionGroup& group, const Movement& movement, double time_s) {
-  PlaceFinder finder;
-  Place place;
-  finder.Set(0, group, movement, time_s);
-  finder.Find(1, &place);
-  return place;
+  const CellWeights cell =
+      CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
+  const double eased = (time_s - movement.entered_s) / movement.ease_out_s;
+  return {.first_point = cell.first,
+          .weights = cell.weights,
+          .fraction = static_cast<float>(EaseOut(eased)),
+          .slope_s = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased)),
+          .steered = EaseOut(time_s / movement.warp.duration_s()),
+          .is_eased = eased < 1.0};
 }
 
 }  // namespace
