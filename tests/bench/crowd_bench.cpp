@@ -208,6 +208,23 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   for (std::size_t i = 0; i < count; ++i) y[i] += w * x[i];
 }
 
+// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts them.
+class LineAligned {
+ public:
+  explicit LineAligned(std::size_t count) : floats_(count + kLineFloats) {
+    void* at = floats_.data();
+    std::size_t bytes = floats_.size() * sizeof(float);
+    begin_ = static_cast<float*>(
+        std::align(kLineFloats * sizeof(float), count * sizeof(float), at, bytes));
+  }
+  [[nodiscard]] float* data() { return begin_; }
+
+ private:
+  static constexpr std::size_t kLineFloats = 16;
+  std::vector<float> floats_;
+  float* begin_;
+};
+
 // The floor: the bytes that evaluating a pose can not do without, each read once and given one multiply-add. At 30
 // cells a second every second tick blends a row of all examples; each reads four rows, plan and difference, and
 // writes a pose.
@@ -216,22 +233,23 @@ void Floor(benchmark::State& state, const Library& library) {
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);
   const std::size_t examples = static_cast<std::size_t>(group.example_count);
-  const std::size_t own = 4 * row + sizeof(PackedFootPlan) / sizeof(float) + row;
-  std::vector<float> rows(count * own, 1.0f);
-  std::vector<float> pose(row);
-  std::vector<float> poses(count * row);
+  // Plan and difference in whole lines, too.
+  const std::size_t plan = (sizeof(PackedFootPlan) / sizeof(float) + 15) / 16 * 16;
+  const std::size_t own = 4 * row + plan + row;
+  LineAligned rows(count * own);
+  LineAligned poses(count * row);
   std::size_t tick = 0;
   for (auto _ : state) {
     ++tick;
     for (std::size_t i = 0; i < count; ++i) {
-      float* mine = &rows[i * own];
+      float* mine = rows.data() + i * own;
       if (((i + tick) & 1) == 0) {
         const std::size_t point = (i + tick / 2) % static_cast<std::size_t>(group.grid_point_count);
         for (std::size_t e = 0; e < examples; ++e) {
           MultiplyAdd(&group.grid[(point * examples + e) * row], 1e-3f, mine, row);
         }
       }
-      float* out = &poses[i * row];
+      float* out = poses.data() + i * row;
       for (std::size_t k = 0; k + row <= own; k += row) MultiplyAdd(mine + k, 0.25f, out, row);
     }
     benchmark::DoNotOptimize(poses.data());
