@@ -86,19 +86,26 @@ void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layo
   const auto padded = static_cast<std::size_t>(layout.padded_joints);
   GridExample& reference = examples[MedoidIndex(examples)];
   const std::size_t points = reference.rows.size() / row_floats;
-  const auto align = [&](float* row, const float* to, std::size_t j) {
-    const Quat q = QuatOf(row, padded, j);
-    if (Dot(q, QuatOf(to, padded, j)) < 0.0f) SetQuat(row, padded, j, -q);
+  const auto flip = [&](float* row, std::size_t j) {
+    SetQuat(row, padded, j, -QuatOf(row, padded, j));
+  };
+  const auto dot = [&](const float* row, const float* to, std::size_t j) {
+    return Dot(QuatOf(row, padded, j), QuatOf(to, padded, j));
   };
   for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
-    for (std::size_t p = 1; p < points; ++p) {
-      align(&reference.rows[p * row_floats], &reference.rows[(p - 1) * row_floats], j);
+    for (GridExample& example : examples) {
+      for (std::size_t p = 1; p < points; ++p) {
+        float* row = &example.rows[p * row_floats];
+        if (dot(row, row - row_floats, j) < 0.0f) flip(row, j);
+      }
     }
     for (GridExample& example : examples) {
-      if (&example == &reference) continue;
+      float along = 0.0f;
       for (std::size_t p = 0; p < points; ++p) {
-        align(&example.rows[p * row_floats], &reference.rows[p * row_floats], j);
+        along += dot(&example.rows[p * row_floats], &reference.rows[p * row_floats], j);
       }
+      if (along >= 0.0f) continue;
+      for (std::size_t p = 0; p < points; ++p) flip(&example.rows[p * row_floats], j);
     }
   }
 }

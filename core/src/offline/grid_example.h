@@ -22,9 +22,9 @@ struct GridExample {
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout);
 
-// Flips rotations into the hemisphere of one example (the one nearest to the mean parameters), grid
-// point by grid point; that example's own tracks are continuous in sign. The reference must not
-// depend on the weights, or the blend would jump where it changes.
+// Makes each joint's track continuous in sign, then flips whole tracks into the hemisphere of one example (the one
+// nearest to the mean parameters). Point by point, one that turns half a turn away from it would jump, and with it the
+// blend that is interpolated between points. The reference must not depend on the weights, for the same reason.
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "grid_example.h"
 #include "stridewire/offline/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/library_writer.h"
@@ -223,6 +224,57 @@ TEST_F(SmoothExamples, TheRadiusFactorIsPartOfTheFile) {
     const auto refused = written(bad);
     ASSERT_FALSE(refused.has_value()) << bad;
     EXPECT_NE(Describe(refused.error()).find("radius factor"), std::string::npos);
+  }
+}
+
+// One joint that turns about one axis: to `end_rad` over the grid, from 0.
+GridExample Turning(const GridLayout& layout, int points, double parameter, double end_rad) {
+  GridExample example;
+  example.parameters = {parameter};
+  example.rows.resize(static_cast<std::size_t>(points * layout.row_floats));
+  for (int p = 0; p < points; ++p) {
+    const double half = 0.5 * end_rad * p / (points - 1);
+    float* row = &example.rows[static_cast<std::size_t>(p * layout.row_floats)];
+    row[0] = static_cast<float>(std::sin(half));
+    row[3 * layout.padded_joints] = static_cast<float>(std::cos(half));
+  }
+  return example;
+}
+
+TEST(AlignHemispheres, KeepsTracksContinuousHoweverFarTheyTurnFromTheReference) {
+  const GridLayout layout(1);
+  constexpr int kPoints = 9;
+  // The one in the middle is the reference; the last passes half a turn from it on its way.
+  std::vector<GridExample> examples = {Turning(layout, kPoints, 0.0, -0.4),
+                                       Turning(layout, kPoints, 1.0, 0.2),
+                                       Turning(layout, kPoints, 2.0, 4.5)};
+  const auto quat = [&](const GridExample& example, int p) {
+    const float* row = &example.rows[static_cast<std::size_t>(p * layout.row_floats)];
+    const int padded = layout.padded_joints;
+    return Quat(row[3 * padded], row[0], row[padded], row[2 * padded]);
+  };
+  // As captures come: signs at random.
+  for (std::size_t e = 0; e < examples.size(); ++e) {
+    for (int p = 0; p < kPoints; ++p) {
+      if ((static_cast<std::size_t>(p) * 7 + e * 3) % 5 < 2) continue;
+      for (int c = 0; c < 4; ++c) {
+        float& part =
+            examples[e]
+                .rows[static_cast<std::size_t>(p * layout.row_floats + c * layout.padded_joints)];
+        part = -part;
+      }
+    }
+  }
+  AlignHemispheres(examples, layout, 1);
+  for (const GridExample& example : examples) {
+    float along = 0.0f;
+    for (int p = 0; p < kPoints; ++p) {
+      along += Dot(quat(example, p), quat(examples[1], p));
+      if (p > 0) {
+        EXPECT_GT(Dot(quat(example, p), quat(example, p - 1)), 0.9f) << p;
+      }
+    }
+    EXPECT_GT(along, 0.0f);
   }
 }
 
