@@ -10,8 +10,6 @@
 namespace stridewire {
 namespace {
 
-constexpr double kSmallestBlendNorm = 0.1;  // below it GridCache takes the largest example
-
 DVec3 Turn(double sine, double cosine, const DVec3& v) {
   return {cosine * v.x + sine * v.z, v.y, cosine * v.z - sine * v.x};
 }
@@ -86,7 +84,7 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
   const auto padded = static_cast<std::size_t>(layout_.padded_joints);
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
   const float* rows = Rows(is_end);
-  std::array<float, kMaxRowFloats> sum;
+  std::array<float, kernels::kMaxRowFloats> sum;
   kernels::SumRows(rows, movement.weights.data(), movement.weights.size(), row_floats, sum.data());
 
   End& end = ends_[is_end ? 1 : 0];
@@ -105,7 +103,7 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
       DQuat blended = rotation_of(sum.data());
       double norm = std::sqrt(glm::dot(blended, blended));
       link.per_norm = 1.0 / norm;
-      if (norm < kSmallestBlendNorm) {
+      if (norm < kernels::kSmallestNorm) {  // as EvaluateBlend
         const auto largest = static_cast<std::size_t>(
             std::max_element(movement.weights.begin(), movement.weights.end()) -
             movement.weights.begin());

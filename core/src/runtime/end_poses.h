@@ -28,8 +28,6 @@ class EndPoses {
   void MeasureSlopes(std::span<double> slopes) const;
 
  private:
-  static constexpr std::size_t kMaxRowFloats = 4 * (static_cast<std::size_t>(kMaxJoints) + 8);
-
   // A joint of a chain. `arm` is where the ball is from the joint in the joint's own axes, `ball` the same in its
   // parent's.
   struct Link {

@@ -12,9 +12,6 @@ namespace {
 
 using kernels::kBlock;
 
-// Room for a blended row, and for what BlendRotations reads beyond it.
-constexpr std::size_t kMaxRowFloats = 4 * (static_cast<std::size_t>(kMaxJoints) + 8) + kBlock;
-
 // Where a pose lies in its movement's grid, and how much is left of the poses before.
 struct Place {
   int first_point;               // of the four that are interpolated
@@ -158,7 +155,8 @@ void FinishPoses(const GridLayout& layout, std::span<const BlendedRow> blends) {
   }
 }
 
-using RowScratch = std::array<float, kMaxRowFloats>;
+// Room for a blended row, and for what BlendRotations reads beyond it.
+using RowScratch = std::array<float, kernels::kMaxRowFloats + kBlock>;
 
 void FinishAlone(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                  const Place& place, RowScratch& row, PoseSpan out) {

@@ -13,6 +13,8 @@ namespace stridewire::kernels {
 
 /// Rows have a multiple of so many floats; batches have so many avatars at most.
 inline constexpr std::size_t kBlock = 16;
+/// The longest row of a grid.
+inline constexpr std::size_t kMaxRowFloats = 4 * (static_cast<std::size_t>(kMaxJoints) + 8);
 
 /// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order.
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
