@@ -34,7 +34,7 @@ std::string BytesOf(ConstPoseSpan pose) {
 
 bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef __SANITIZE_ADDRESS__
 constexpr int kFewer = 10;  // of all: twenty times as slow
 #else
 constexpr int kFewer = 1;

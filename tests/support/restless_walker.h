@@ -15,7 +15,7 @@ struct RestlessWalker {
 inline void PrintTo(const RestlessWalker& walker, std::ostream* out) { *out << walker.name; }
 
 /// How many a test has.
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#ifdef __SANITIZE_ADDRESS__
 inline constexpr int kRestlessWalkers = 3;  // one thread, twenty times as slow
 #else
 inline constexpr int kRestlessWalkers = 15;
