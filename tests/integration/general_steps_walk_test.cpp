@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <vector>
 
 #include "captured_library.h"
@@ -103,7 +104,7 @@ struct Looks {
   double least_knee_deg = 180.0;
   double most_knee_deg = 0.0;
   double nearest_legs_m = 1.0;
-  double deepest_m = 0.0;        // of heel, ball or tip of the toes below the ground
+  double deepest_m = 0.0;        // of heel, ball or tip of the toes below ground; NaN: unknown
   double largest_drift_m = 0.0;  // of a planted ball
   int extrapolated = 0;
   int clamped = 0;
@@ -122,12 +123,14 @@ Looks LookAt(const char* name, const Library& library, const Steps& steps) {
   std::vector<Foothold> holds;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) holds.push_back({legs.Sole(foot)[1].z, 0.0});
   bool level = true;
+  bool is_along_z = true;
   for (const MovementRecord& record : synthesis->movements) {
     if (record.request_id != 0) {
       looks.groups.insert(record.group);
       looks.extrapolated += record.extrapolated;
       looks.clamped += record.clamped;
       looks.end = record.base;
+      is_along_z = is_along_z && std::fabs(record.base.heading_rad) < 0.1;
     }
     for (const PlantRecord& plant : record.plants) {
       looks.largest_drift_m = std::max(looks.largest_drift_m, plant.drift_m);
@@ -150,6 +153,8 @@ Looks LookAt(const char* name, const Library& library, const Steps& steps) {
     }
     looks.nearest_legs_m = std::min(looks.nearest_legs_m, legs.LegDistance());
   }
+  // Treads of a winding stair are not told by z.
+  if (!level && !is_along_z) looks.deepest_m = std::numeric_limits<double>::quiet_NaN();
   std::printf(
       "%-28s knees %4.1f to %5.1f deg, legs %.3f m apart, %.3f m into the ground, balls drift %.3f "
       "m, "
