@@ -1,7 +1,9 @@
 // The fast evaluation beside the plain one, and on every instruction set this machine has.
 
 #include <gtest/gtest.h>
+#include <xxhash.h>
 
+#include <cstdint>
 #include <cstring>
 #include <map>
 #include <string>
@@ -15,6 +17,7 @@
 #include "rough_ground.h"
 #include "stridewire/base/trig.h"
 #include "stridewire/offline/open_library.h"
+#include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/reference_evaluation.h"
@@ -57,6 +60,20 @@ TEST(Evaluation, SinesAreThoseOfTheScalarCode) {
       }
     }
   }
+}
+
+// All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does as well, and then movement
+// mode gets another feature bit: who evaluates movements by the old formulas would show other poses than the server
+// (decision 0021).
+TEST(Evaluation, IsWhatMovementModeStandsFor) {
+  DrawnCrowd crowd(LibraryOf({}), 24, 10);
+  std::string bytes;
+  for (int tick = 0; tick < 300; ++tick) {
+    crowd.Advance();
+    for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
+  }
+  EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0xc0dbd3585b9133cau);
+  EXPECT_EQ(protocol::kFeatureMovementMode, 8u);
 }
 
 class EvaluationOf : public testing::TestWithParam<Source> {

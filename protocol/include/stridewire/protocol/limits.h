@@ -10,10 +10,11 @@ inline constexpr std::uint16_t kProtocolMin = 1;
 inline constexpr std::uint16_t kProtocolMax = 1;
 
 /// Feature bits of Hello and Welcome: what both sides set may be used. Unknown bits are ignored.
-inline constexpr std::uint64_t kFeatureResume = 1;        ///< Sessions outlive a connection.
-inline constexpr std::uint64_t kFeatureEventReplay = 2;   ///< Events missed are sent again.
-inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuantised.
-inline constexpr std::uint64_t kFeatureMovementMode = 8;  ///< PoseMode::kMovement, FetchLibrary.
+inline constexpr std::uint64_t kFeatureResume = 1;       ///< Sessions outlive a connection.
+inline constexpr std::uint64_t kFeatureEventReplay = 2;  ///< Events missed are sent again.
+inline constexpr std::uint64_t kFeatureQuantised = 4;    ///< PoseMode::kQuantised.
+/// PoseMode::kMovement, FetchLibrary. Both sides evaluate movements by the same formulas: when these change, another bit.
+inline constexpr std::uint64_t kFeatureMovementMode = 8;
 inline constexpr std::uint64_t kFeatureInspect = 16;      ///< InspectAvatar, AvatarState.
 inline constexpr std::uint64_t kFeatureTerrain = 32;      ///< SetTerrain, WorldTerrain.
 inline constexpr std::uint64_t kFeatureFootprints = 64;   ///< Steps to a place (StepMovement::at).
