@@ -16,15 +16,10 @@ function(stridewire_test name)
     STRIDEWIRE_MOCAP_DIR="${PROJECT_SOURCE_DIR}/../shared/mocap")
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR}/tests/support)
   stridewire_target(${name})
-  stridewire_cold(${name})
+  stridewire_cold(${name} COMPUTES)
   set_target_properties(${name} PROPERTIES UNITY_BUILD ${STRIDEWIRE_TOGETHER}
                         UNITY_BUILD_BATCH_SIZE 0)
   target_compile_options(${name} PRIVATE ${STRIDEWIRE_TEST_OPTIONS})
-  if(STRIDEWIRE_SANITIZE MATCHES undefined)
-    # A check of each pointer that a test follows: two fifths of the time to compile it, for what the address sanitizer
-    # sees as well. What is tested has them.
-    target_compile_options(${name} PRIVATE -fno-sanitize=null,alignment,object-size)
-  endif()
   if(STRIDEWIRE_SANITIZE MATCHES thread AND NOT ARG_THREADS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
