@@ -47,11 +47,6 @@ function(stridewire_cold target)
   if(STRIDEWIRE_SANITIZE AND NOT ARG_COMPUTES)
     target_compile_options(${target} PRIVATE -O0)
   endif()
-  if(STRIDEWIRE_SANITIZE MATCHES undefined)
-    # A check of each pointer that is followed is two fifths of the time to compile it, and the address sanitizer sees
-    # what it is for as well.
-    target_compile_options(${target} PRIVATE -fno-sanitize=null,alignment,object-size)
-  endif()
 endfunction()
 
 # stridewire_cold_part(TARGET): makes TARGET_cold, for those sources of TARGET that are cold; they see what the others
