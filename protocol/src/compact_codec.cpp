@@ -208,10 +208,12 @@ void CompactCodec::Block::Add(const Vec3& root_position_m, std::span<const Quat>
     rotations_.resize(4 * kBlock * rotations.size());
   joint_count_ = rotations.size();
   for (int c = 0; c < 3; ++c) roots_m_[c][size_] = root_position_m[c];
-  float* to = rotations_.data() + 4 * size_;
+  float* to = rotations_.data() + size_;
   for (const Quat& q : rotations) {
-    std::memcpy(to, &q.x, 16);
-    to += 4 * kBlock;
+    for (const float value : {q.x, q.y, q.z, q.w}) {
+      *to = value;
+      to += kBlock;
+    }
   }
   ++size_;
 }
@@ -219,10 +221,12 @@ void CompactCodec::Block::Add(const Vec3& root_position_m, std::span<const Quat>
 void CompactCodec::Block::Get(std::size_t i, Vec3& root_position_m,
                               std::span<Quat> rotations) const {
   for (int c = 0; c < 3; ++c) root_position_m[c] = roots_m_[c][i];
-  const float* from = rotations_.data() + 4 * i;
+  const float* from = rotations_.data() + i;
   for (Quat& q : rotations) {
-    std::memcpy(&q.x, from, 16);
-    from += 4 * kBlock;
+    for (float* value : {&q.x, &q.y, &q.z, &q.w}) {
+      *value = *from;
+      from += kBlock;
+    }
   }
 }
 
@@ -236,12 +240,16 @@ void CompactCodec::Block::CopyBytes(std::size_t i, std::span<std::byte> out) con
 
 void CompactCodec::Encode(Block& block) const {
   STRIDEWIRE_CHECK(block.size_ == 0 || block.joint_count_ == joints_.size());
-  // Lanes without a pose hold one from before, or zeros.
-  block.rotations_.resize(std::max(block.rotations_.size(), 4 * kBlock * joints_.size()));
+  Encode({&block.roots_m_[0][0], block.rotations_.data(), block.size_}, block);
+}
+
+void CompactCodec::Encode(const Lanes& poses, Block& block) const {
+  STRIDEWIRE_CHECK(poses.count <= kBlock);
+  block.size_ = poses.count;
   block.errors_.resize(std::max(block.errors_.size(), 3 * kBlock * joints_.size()));
   block.words_.resize(std::max(block.words_.size(), (pose_bytes_ + 15) / 16 * 4 * kBlock));
   EncodeCompact(joints_.data(), joints_.size(),
-                {&block.roots_m_[0][0], block.rotations_.data(), block.errors_.data(),
+                {poses.count, poses.roots_m, poses.rotations, block.errors_.data(),
                  block.words_.data(), block.fits_});
 }
 

@@ -110,7 +110,7 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
   const DI di;
   const std::size_t width = hn::Lanes(d);
   const V one = hn::Set(d, 1.0f);
-  for (std::size_t lane = 0; lane < kBlock; lane += width) {
+  for (std::size_t lane = 0; lane < work.count; lane += width) {
     BitWriter writer(work.words, lane);
     auto fits = hn::Eq(one, one);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -126,8 +126,9 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
     V ez = ex;
     for (std::size_t j = 0; j < joint_count; ++j) {
       const CompactJoint& joint = joints[j];
-      Rotation q;
-      hn::LoadInterleaved4(d, work.rotations + 4 * (j * kBlock + lane), q.x, q.y, q.z, q.w);
+      const float* rotation = work.rotations + 4 * j * kBlock + lane;
+      Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
+                    hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
       const V squared =
           hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)), hn::Mul(q.w, q.w));
       fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));

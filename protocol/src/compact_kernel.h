@@ -9,8 +9,9 @@ namespace stridewire::protocol {
 
 /// A block of CompactCodec::kBlock poses: arrays as in CompactCodec::Block.
 struct CompactWork {
+  std::size_t count;       // The first poses; others mean nothing.
   const float* roots_m;    // [x y z][pose]
-  const float* rotations;  // [joint][pose][x y z w]
+  const float* rotations;  // [joint][x y z w][pose]
   float* errors;           // [joint][x y z][pose]
   std::uint32_t* words;    // [word / 4][pose][word % 4]
   std::uint32_t* fits;     // [pose]: not 0

@@ -52,6 +52,18 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
   return {};
 }
 
+void PoseRows::AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std::byte> pose) {
+  STRIDEWIRE_CHECK(size() < avatars_->size());
+  EncodeBlock();
+  const std::size_t begin = begins_.back();
+  flags &= static_cast<std::uint8_t>(~kPoseWide);
+  flags_.push_back(is_wide ? flags | kPoseWide : flags);
+  begins_.push_back(begin + pose.size());
+  if (pose.empty()) return;
+  std::ranges::copy(pose, Room(begin, pose.size()).begin());
+  ++pose_count_;
+}
+
 std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
   if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
   return std::span(bytes_).subspan(begin, length);

@@ -55,6 +55,13 @@ class CompactCodec {
   /// Bytes of a pose.
   [[nodiscard]] std::size_t pose_bytes() const { return pose_bytes_; }
 
+  /// Poses side by side, of which the first `count` are there: all of joint_count() joints.
+  struct Lanes {
+    const float* roots_m;    ///< [x y z][kBlock]
+    const float* rotations;  ///< [joint][x y z w][kBlock]
+    std::size_t count;       ///< At most kBlock
+  };
+
   /// Up to kBlock poses on their way to be encoded, and what came of it. Keep one: only Encode of a codec with more
   /// joints than any before allocates.
   class Block {
@@ -64,7 +71,7 @@ class CompactCodec {
     void Clear() { size_ = 0; }
     /// Copies a pose in; there is room for kBlock.
     void Add(const Vec3& root_position_m, std::span<const Quat> rotations);
-    /// The pose as it was added.
+    /// The pose as it was added to it.
     void Get(std::size_t i, Vec3& root_position_m, std::span<Quat> rotations) const;
     /// After Encode: the pose is one that these codes can tell.
     [[nodiscard]] bool fits(std::size_t i) const { return fits_[i] != 0; }
@@ -76,7 +83,7 @@ class CompactCodec {
     std::size_t size_ = 0;
     std::size_t joint_count_ = 0;
     float roots_m_[3][kBlock] = {};
-    std::vector<float> rotations_;      // [joint][pose][x y z w]
+    std::vector<float> rotations_;      // [joint][x y z w][pose]
     std::vector<float> errors_;         // [joint][x y z][pose]
     std::vector<std::uint32_t> words_;  // [word / 4][pose][word % 4]
     std::uint32_t fits_[kBlock] = {};
@@ -85,6 +92,8 @@ class CompactCodec {
   /// Encodes what was added, all of joint_count() joints. Not every pose fits: one whose joints turn out of the codes'
   /// ranges, whose root is beyond kMaxRootM, or with a number that is not finite or a quaternion not unit within 1e-5.
   void Encode(Block& block) const;
+  /// The same of poses that lie elsewhere; of the block's own nothing is left.
+  void Encode(const Lanes& poses, Block& block) const;
 
   /// Reads one pose of pose_bytes() bytes, of any alignment; `rotations` has joint_count() entries and come back unit to
   /// float32. kShapeMismatch: another size; kOutOfRange: the root; kMalformed: bits that no encoder writes.

@@ -38,6 +38,9 @@ class PoseRows {
   /// Compact poses are copied, to be encoded together: which of them are none shows after Finish.
   [[nodiscard]] Status Add(std::uint8_t flags, const Vec3& root_position_m,
                            std::span<const Quat> rotations);
+  /// Makes the next row of bytes that are encoded already, in info().mode or, wide, in kQuantised; none: a row without a
+  /// pose. There must be an avatar left.
+  void AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std::byte> pose);
   /// Makes the rows before the `row`th without a pose.
   void SkipTo(std::size_t row);
   /// After the last row: now they may be read.
