@@ -6,7 +6,10 @@ namespace stridewire::client {
 
 MovementView::MovementView(std::shared_ptr<const MotionLibrary> library, double tick_s,
                            std::size_t max_avatars)
-    : library_(std::move(library)), tick_s_(tick_s), max_avatars_(max_avatars) {}
+    : library_(std::move(library)),
+      tick_s_(tick_s),
+      max_avatars_(max_avatars),
+      evaluator_(*library_, 1) {}
 
 std::size_t MovementView::avatar_count() const {
   std::size_t count = 0;
@@ -63,7 +66,7 @@ Status MovementView::Take(const protocol::Movements& message, PoseScreen& screen
       const auto told = shard.avatars.find(avatar);
       if (told == shard.avatars.end()) continue;
       AvatarReplica* replica = told->second.replica.get();
-      AvatarReplica::AdvanceAll(std::span(&replica, 1), tick_s_);
+      AvatarReplica::AdvanceAll(std::span(&replica, 1), tick_s_, evaluator_);
       Show(message, avatar, told->second, screen);
     }
     return {};
@@ -72,7 +75,7 @@ Status MovementView::Take(const protocol::Movements& message, PoseScreen& screen
   shard.parts_taken = 0;
   shard.step = message.step;
   for (auto& [avatar, told] : shard.avatars) scratch_.push_back(told.replica.get());
-  AvatarReplica::AdvanceAll(scratch_, tick_s_);
+  AvatarReplica::AdvanceAll(scratch_, tick_s_, evaluator_);
   if (message.more_steps > 0) return {};
   for (auto& [avatar, told] : shard.avatars) Show(message, avatar, told, screen);
   return {};

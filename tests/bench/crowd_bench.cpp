@@ -14,9 +14,10 @@
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
-#include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/pose_code.h"
 #include "stridewire/runtime/reference_evaluation.h"
+#include "stridewire/runtime/stretch_queue.h"
+#include "world/poses_ahead.h"
 
 namespace stridewire {
 namespace {
@@ -24,13 +25,20 @@ namespace {
 using Library = std::shared_ptr<const MotionLibrary>;
 
 constexpr double kTickS = 1.0 / 60.0;
-constexpr std::size_t kAtOnce = 64;  // Evaluated, then encoded while the cache has them.
-constexpr int kKinds = 240;          // Different steps, so that no branch is learnt by heart.
+constexpr int kKinds = 240;  // Different steps, so that no branch is learnt by heart.
 
 // Steps of real walks, each at another time of its own, played again and again.
 class Steps {
  public:
-  Steps(const Library& library, int count, bool plants_feet) : library_(library) {
+  struct Walker {
+    const Movement* movement;
+    double time_s;
+    double duration_s;
+    std::uint32_t number;
+    std::uint32_t course = 1;
+  };
+
+  Steps(const Library& library, int count, bool plants_feet) {
     std::mt19937 random(1);
     std::vector<Movement> kinds;
     Avatar avatar(library, {}, {.foot_planting = plants_feet});
@@ -46,49 +54,34 @@ class Steps {
       }
     }
     examples_ = static_cast<double>(library->group(kinds.back().group).example_count);
-    const int joints = library->skeleton().joint_count();
     walkers_.reserve(static_cast<std::size_t>(count));
+    movements_.reserve(static_cast<std::size_t>(count));
     for (int i = 0; i < count; ++i) {
-      const Movement& kind = kinds[static_cast<std::size_t>(i) % kKinds];
+      const Movement& movement =
+          movements_.emplace_back(kinds[static_cast<std::size_t>(i) % kKinds]);
       const double part = static_cast<double>(random() % 1000) / 1000.0;
-      walkers_.push_back(
-          {kind, GridCache(library->layout()), Pose(joints), part * kind.duration_s()});
+      walkers_.push_back({&movement, part * movement.duration_s(), movement.duration_s(),
+                          static_cast<std::uint32_t>(i)});
     }
+  }
+
+  // To the next tick.
+  void Advance() {
     for (Walker& walker : walkers_) {
-      jobs_.push_back({&walker.movement, 0.0, &walker.cache, &walker.shown});
-    }
-  }
-
-  // The next tick's poses of some.
-  void Evaluate(std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      Walker& walker = walkers_[i];
       walker.time_s += kTickS;
-      if (walker.time_s > walker.movement.duration_s()) {
-        walker.time_s -= walker.movement.duration_s();
-        walker.cache.Clear();
+      if (walker.time_s > walker.duration_s) {
+        walker.time_s -= walker.duration_s;
+        ++walker.course;
       }
-      jobs_[i].time_s = walker.time_s;
     }
-    EvaluatePoses(*library_, std::span(jobs_).subspan(begin, end - begin));
   }
-  void Evaluate() { Evaluate(0, walkers_.size()); }
-
-  struct Walker {
-    Movement movement;
-    GridCache cache;
-    Pose shown;
-    double time_s;
-  };
-  [[nodiscard]] std::span<Walker> walkers() { return walkers_; }
-  [[nodiscard]] const MotionLibrary& library() const { return *library_; }
+  [[nodiscard]] std::span<const Walker> walkers() const { return walkers_; }
   [[nodiscard]] double examples() const { return examples_; }
 
  private:
-  Library library_;
   double examples_ = 0.0;
+  std::vector<Movement> movements_;
   std::vector<Walker> walkers_;
-  std::vector<PoseJob> jobs_;
 };
 
 void Count(benchmark::State& state, const Steps& steps, int count) {
@@ -96,10 +89,35 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
+// Poses of each tick, evaluated some ticks ahead as the server does (server::PosesAhead), and not kept.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
   const auto count = static_cast<int>(state.range(0));
-  Steps steps(library, count, plants_feet);
-  for (auto _ : state) steps.Evaluate();
+  Steps steps(library, count / state.threads(), plants_feet);
+  constexpr int kAhead = static_cast<int>(server::PosesAhead::kMost);
+  struct Ahead {
+    std::uint32_t course = 0;
+    int left = 0;
+  };
+  std::vector<Ahead> ahead(steps.walkers().size());
+  StretchEvaluator evaluator(*library, kAhead);
+  StretchQueue queue;
+  std::uint32_t tick = 0;
+  for (auto _ : state) {
+    ++tick;
+    steps.Advance();
+    for (const Steps::Walker& walker : steps.walkers()) {
+      Ahead& poses = ahead[walker.number];
+      if (poses.course == walker.course && --poses.left > 0) continue;
+      const int most = kAhead - static_cast<int>((tick + walker.number) % kAhead);
+      const int wanted = StretchCount(*walker.movement, walker.time_s, kTickS, 1, most);
+      poses = {walker.course, wanted};
+      queue.Add({walker.movement, walker.time_s, kTickS}, wanted, walker.number);
+    }
+    queue.Evaluate(evaluator, [](auto&&, int, const PoseLanes& poses) {
+      benchmark::DoNotOptimize(poses.rotations());
+      benchmark::ClobberMemory();
+    });
+  }
   Count(state, steps, count);
 }
 
@@ -111,7 +129,12 @@ void WholePose(benchmark::State& state, const Library& library) {
   for (const Joint& joint : library->skeleton().joints) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));
   }
-  const auto codec = protocol::CompactCodec::Make(ChoosePoseCode(*library).joints, parents).value();
+  const auto codecs =
+      protocol::CompactCodecs::Make(ChoosePoseCode(*library).joints, parents, {}).value();
+  server::PosesAhead ahead(std::make_shared<server::PoseScratch>(library), &codecs);
+  constexpr auto kMode = protocol::PoseMode::kCompact;
+  ahead.SetModes(std::array{kMode}, 1);
+  std::vector<server::PosesAhead::Place> kept(steps.walkers().size());
   std::vector<protocol::AvatarNumber> numbers(steps.walkers().size());
   std::iota(numbers.begin(), numbers.end(), 1u);
   const auto avatars = std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers);
@@ -121,19 +144,22 @@ void WholePose(benchmark::State& state, const Library& library) {
   protocol::PoseBatchComposer composer;
   protocol::PoseBatchInfo info;
   info.world = 1;
-  info.mode = protocol::PoseMode::kCompact;
+  info.mode = kMode;
   info.joint_count = static_cast<std::uint16_t>(parents.size());
   std::vector<std::byte> frame;
-  for (auto _ : state) {
+  const auto tick = [&]() -> Status {
     ++info.tick;
-    Status status = rows.Begin(info, avatars, &codec);
-    for (std::size_t i = 0; i < steps.walkers().size() && status;) {
-      const std::size_t some = std::min(i + kAtOnce, steps.walkers().size());
-      steps.Evaluate(i, some);
-      for (; i < some && status; ++i) {
-        const Pose& pose = steps.walkers()[i].shown;
-        status = rows.Add(0, pose.root_position_m, pose.rotations);
-      }
+    steps.Advance();
+    ahead.Begin(info.tick, kTickS);
+    for (const Steps::Walker& walker : steps.walkers()) {
+      if (ahead.Has(kept[walker.number], walker.course)) continue;
+      ahead.Want(kept[walker.number], walker.course, *walker.movement, walker.time_s);
+    }
+    ahead.Finish(kept.size());
+    Status status = rows.Begin(info, avatars, codecs.Find(kMode));
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      const server::PosesAhead::Encoded encoded = ahead.Of(kept[i], kMode);
+      rows.AddEncoded(0, encoded.is_wide, encoded.bytes);
     }
     rows.Finish();
     std::span<const std::uint32_t> left = all;
@@ -144,16 +170,14 @@ void WholePose(benchmark::State& state, const Library& library) {
       left = left.subspan(part.size());
       benchmark::DoNotOptimize(frame.data());
     }
-    if (!status) return state.SkipWithError(status.error().text);
+    return status;
+  };
+  // Until each has had its turn.
+  for (std::size_t i = 0; i < 2 * server::PosesAhead::kMost; ++i) (void)tick();
+  for (auto _ : state) {
+    if (const Status status = tick(); !status) return state.SkipWithError(status.error().text);
+    if (rows.pose_count() != kept.size()) return state.SkipWithError("poses are missing");
   }
-  Count(state, steps, count);
-}
-
-// The same crowd spread over shards: threads that share nothing but the library. Items count for all of them.
-void EvaluateOnShards(benchmark::State& state, const Library& library) {
-  const int count = static_cast<int>(state.range(0)) / state.threads();
-  Steps steps(library, count, true);
-  for (auto _ : state) steps.Evaluate();
   Count(state, steps, count);
 }
 
@@ -177,25 +201,20 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
   Pose measured(library->skeleton().joint_count());
   std::vector<Movement> movements(kSteps);
-  std::vector<GridCache> caches(kSteps, GridCache(library->layout()));
-  std::vector<Pose> poses(kSteps, measured);
   for (Movement& movement : movements) movement.difference = measured;
-  std::array<PoseJob, kSteps> jobs;
+  StretchEvaluator evaluator(*library, kFrames);
+  std::array<PoseStretch, kSteps> stretches;
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
       CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
                      movements[i]);
       StartWeighted(group, {}, movements[i]);
-      caches[i].Clear();
-      jobs[i] = {&movements[i], 0.0, &caches[i], &poses[i]};
+      stretches[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
     }
+    evaluator.Begin(stretches, kFrames);
     for (int frame = 0; frame < kFrames; ++frame) {
-      for (PoseJob& job : jobs) {
-        job.time_s = job.movement->duration_s() * frame / (kFrames - 1);
-      }
-      EvaluatePoses(*library, jobs);
-      benchmark::DoNotOptimize(poses.data());
+      benchmark::DoNotOptimize(evaluator.Next().roots_m());
     }
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kSteps));
@@ -261,11 +280,12 @@ void Floor(benchmark::State& state, const Library& library) {
 void ReferencePoses(benchmark::State& state, const Library& library, bool samples_examples) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, false);
+  Pose shown(library->skeleton().joint_count());
   for (auto _ : state) {
-    for (Steps::Walker& walker : steps.walkers()) {
-      const MotionGroup& group = library->group(walker.movement.group);
+    for (const Steps::Walker& walker : steps.walkers()) {
+      const MotionGroup& group = library->group(walker.movement->group);
       (samples_examples ? EvaluateMovementBySampling : EvaluateMovementByReference)(
-          group, library->layout(), walker.movement, walker.time_s, walker.shown);
+          group, library->layout(), *walker.movement, walker.time_s, shown);
     }
   }
   Count(state, steps, count);
@@ -287,8 +307,8 @@ void RegisterCrowd(const std::string& name, const Library& library) {
   Register(name + "/crowd/evaluate", EvaluateCrowd, library, false);
   Register(name + "/crowd/evaluate_and_plant", EvaluateCrowd, library, true);
   Register(name + "/crowd/whole_pose", WholePose, library);
-  benchmark::RegisterBenchmark((name + "/shards/evaluate_and_plant").c_str(), EvaluateOnShards,
-                               library)
+  benchmark::RegisterBenchmark((name + "/shards/evaluate_and_plant").c_str(), EvaluateCrowd,
+                               library, true)
       ->Arg(10000)
       ->Threads(1)
       ->Threads(2)

@@ -152,7 +152,8 @@ void EvaluatePose(benchmark::State& state, const Library& library, int group_ind
 /// A crowd that walks without an end; what is random is the same every time.
 class Crowd {
  public:
-  Crowd(const Library& library, int size, const AvatarOptions& options = {}) {
+  Crowd(const Library& library, int size, const AvatarOptions& options = {})
+      : evaluator_(*library, 1) {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
@@ -167,7 +168,7 @@ class Crowd {
     }
     all_.clear();
     for (Avatar& avatar : avatars_) all_.push_back(&avatar);
-    Avatar::AdvanceAll(all_, kTickS);
+    Avatar::AdvanceAll(all_, kTickS, evaluator_);
   }
 
   [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
@@ -183,6 +184,7 @@ class Crowd {
   std::mt19937 random_{1};
   std::vector<Avatar> avatars_;
   std::vector<Avatar*> all_;
+  StretchEvaluator evaluator_;
 };
 
 void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {

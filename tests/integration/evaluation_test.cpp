@@ -19,8 +19,8 @@
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/reference_evaluation.h"
+#include "stridewire/runtime/stretch_queue.h"
 
 namespace stridewire {
 namespace {
@@ -215,16 +215,22 @@ TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
   }
 }
 
+// What is displayed of a movement, worked out for this one pose.
+Pose ShownAlone(const MotionLibrary& library, const Movement& movement, double time_s) {
+  Pose pose(library.skeleton().joint_count());
+  GridCache cache(library.layout());
+  EvaluateMovement(library.group(movement.group), library.layout(), movement, time_s, cache, pose);
+  PlantFeet(library.leg_rig(), movement, time_s, pose);
+  return pose;
+}
+
 TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
   constexpr unsigned kSeed = 9;
   constexpr std::size_t kCrowd = 37;
   DrawnCrowd crowd(library_, kCrowd, kSeed);
   std::vector<Movement> movements(kCrowd);
-  std::vector<GridCache> caches(kCrowd, GridCache(library_->layout()));
   std::vector<Pose> shown(kCrowd, Pose(library_->skeleton().joint_count()));
-  std::vector<Pose> blended = shown;
-  Pose alone = shown.front();
-  GridCache cache(library_->layout());
+  StretchEvaluator evaluator(*library_, 1);
   int poses = 0;
   for (int tick = 0; tick < 200; ++tick) {
     crowd.Advance();
@@ -233,20 +239,89 @@ TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
       if (avatar.movement() == nullptr) continue;
       const std::size_t i = jobs.size();
       movements[i] = *avatar.movement();
-      caches[i].Clear();
-      jobs.push_back({&movements[i], avatar.movement_time_s(), &caches[i], &shown[i], &blended[i]});
+      jobs.push_back({&movements[i], avatar.movement_time_s(), &shown[i]});
     }
-    EvaluatePoses(*library_, jobs);
+    EvaluatePoses(evaluator, jobs);
     for (const PoseJob& job : jobs) {
-      cache.Clear();
-      EvaluateMovement(library_->group(job.movement->group), library_->layout(), *job.movement,
-                       job.time_s, cache, alone);
-      ASSERT_EQ(alone.root_position_m, job.blended->root_position_m) << "seed " << kSeed;
-      ASSERT_EQ(alone.rotations, job.blended->rotations) << "seed " << kSeed;
+      const Pose alone = ShownAlone(*library_, *job.movement, job.time_s);
+      ASSERT_EQ(alone.root_position_m, job.shown->root_position_m) << "seed " << kSeed;
+      ASSERT_EQ(alone.rotations, job.shown->rotations) << "seed " << kSeed;
       ++poses;
     }
   }
   EXPECT_GT(poses, 3000);
+}
+
+// Poses of ticks to come, on every instruction set: of movements just begun and half over, on level and on rough ground,
+// planted or not, taken over and settling.
+TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
+  constexpr unsigned kSeed = 10;
+  constexpr std::size_t kCrowd = 41;
+  Random random(kSeed);
+  for (const std::int64_t set : InstructionSets()) {
+    const OnlyInstructionSet only(set);
+    DrawnCrowd crowd(library_, kCrowd, kSeed);
+    std::vector<Movement> movements(kCrowd);
+    StretchEvaluator evaluator(*library_, 12);
+    StretchQueue queue;
+    Pose pose(library_->skeleton().joint_count());
+    int poses = 0;
+    int settling = 0;
+    std::array<int, 2> planted{};
+    for (int tick = 0; tick < 120; ++tick) {
+      crowd.Advance();
+      if (tick % 3 != 0) continue;
+      std::uint32_t tag = 0;
+      std::size_t wanted = 0;
+      for (const Avatar& avatar : crowd.avatars()) {
+        if (avatar.movement() == nullptr) continue;
+        movements[tag] = *avatar.movement();
+        const int apart = 1 + static_cast<int>(random.Draw(0.0, 3.0));
+        const int most = 1 + static_cast<int>(random.Draw(0.0, 12.0));
+        const double step_s = random.Draw(0.005, 0.05);
+        const int count =
+            StretchCount(movements[tag], avatar.movement_time_s(), step_s, apart, most);
+        ASSERT_LE(count, most);
+        queue.Add({&movements[tag], avatar.movement_time_s(), step_s, apart}, count, tag);
+        wanted += static_cast<std::size_t>(count);
+        ++tag;
+      }
+      std::vector<double> time_s(tag);
+      std::size_t seen = 0;
+      queue.Evaluate(evaluator, [&](std::span<const StretchQueue::Item> items, int at,
+                                    const PoseLanes& lanes) {
+        for (std::size_t i = 0; i < items.size(); ++i) {
+          const StretchQueue::Item& item = items[i];
+          if (at >= item.count) continue;
+          const PoseStretch& stretch = item.stretch;
+          double& now_s = time_s[item.tag];
+          if (at == 0) now_s = stretch.time_s;
+          for (int t = 0; at > 0 && t < stretch.ticks_apart; ++t) now_s += stretch.step_s;
+          ASSERT_TRUE(at == 0 || now_s <= stretch.movement->duration_s() + 1e-9);
+          lanes.Get(i, pose);
+          const Pose alone = ShownAlone(*library_, *stretch.movement, now_s);
+          ASSERT_EQ(alone.root_position_m, pose.root_position_m)
+              << hwy::TargetName(set) << ", tick " << tick << ", pose " << at << ", seed " << kSeed;
+          ASSERT_TRUE(std::memcmp(alone.rotations.data(), pose.rotations.data(),
+                                  pose.rotations.size() * sizeof(Quat)) == 0)
+              << hwy::TargetName(set) << ", tick " << tick << ", pose " << at << ", seed " << kSeed;
+          ++seen;
+          const FootPlan& feet = stretch.movement->feet;
+          ++planted[feet.is_active ? 1 : 0];
+          settling += feet.is_active && now_s < stretch.movement->entered_s + feet.settle_s;
+        }
+      });
+      if (HasFatalFailure()) return;
+      EXPECT_EQ(seen, wanted);
+      EXPECT_TRUE(queue.empty());
+      poses += static_cast<int>(seen);
+    }
+    std::printf("%s: %d poses, %d not planted, %d settling\n", hwy::TargetName(set), poses,
+                planted[0], settling);
+    EXPECT_GT(poses, 2000);
+    EXPECT_GT(planted[0], 100);
+    EXPECT_GT(settling, 5);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Libraries, EvaluationOf,

@@ -93,9 +93,9 @@ struct Figures {
   std::size_t poses = 0;
 };
 
-void Advance(AvatarReplica& replica, double dt_s) {
+void Advance(AvatarReplica& replica, StretchEvaluator& evaluator, double dt_s) {
   AvatarReplica* one = &replica;
-  AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s);
+  AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s, evaluator);
 }
 
 int Begun(const Avatar& avatar) {
@@ -118,6 +118,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
   Random random(kSeed);
+  StretchEvaluator evaluator(*library_, 1);
   Figures figures;
   constexpr int kTicks = 3000;
   for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
@@ -147,8 +148,8 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
         ASSERT_EQ(Refusal(*late, state), "") << "tick " << tick << " of " << round;
         joins_at = tick + static_cast<int>(random.Draw(1.0, 200.0));
       }
-      Advance(first, manner.tick_s);
-      Advance(*late, manner.tick_s);
+      Advance(first, evaluator, manner.tick_s);
+      Advance(*late, evaluator, manner.tick_s);
       ASSERT_TRUE(IsSame(first.pose(), avatar.pose()))
           << "tick " << tick << " of " << round << ", seed " << kSeed;
       ASSERT_TRUE(IsSame(late->pose(), avatar.pose()))
@@ -244,13 +245,14 @@ TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
       std::vector<AvatarReplica> replicas(kAvatars, AvatarReplica(library_));
       std::vector<AvatarReplica*> all;
       for (AvatarReplica& replica : replicas) all.push_back(&replica);
+      StretchEvaluator evaluator(*library_, 1);
       for (std::size_t t = 0; t < ticks.size(); ++t) {
         for (std::size_t i = 0; i < kAvatars; ++i) {
           const Bytes& record = ticks[t].records[i];
           if (record.empty()) continue;
           ASSERT_EQ(Refusal(replicas[i], record), "");
         }
-        AvatarReplica::AdvanceAll(all, manner.tick_s);
+        AvatarReplica::AdvanceAll(all, manner.tick_s, evaluator);
         for (std::size_t i = 0; i < kAvatars; ++i) {
           ASSERT_TRUE(BytesOf(replicas[i].pose()) == ticks[t].poses[i])
               << hwy::TargetName(told_on) << " shown on " << hwy::TargetName(shown_on) << ", tick "
@@ -275,6 +277,7 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
   const Library library = LibraryOf({});
   Restless restless(library, random);
   AvatarReplica replica(library);
+  StretchEvaluator evaluator(*library, 1);
   Bytes record;
   for (int tick = 0; tick < 3000; ++tick) {
     restless.Stir();
@@ -284,7 +287,7 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
     const std::size_t before = counted_memory::LiveBytes();
     counted_memory::ResetPeak();
     const bool is_taken = !is_changed || replica.Apply(record).has_value();
-    Advance(replica, 1.0 / 60.0);
+    Advance(replica, evaluator, 1.0 / 60.0);
     ASSERT_TRUE(is_taken);
     ASSERT_LE(counted_memory::PeakBytes(), before) << "tick " << tick << ", seed " << kSeed;
   }
@@ -295,6 +298,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   const Library library = LibraryOf({});
+  StretchEvaluator evaluator(*library, 1);
   const auto below = [&](std::size_t n) {
     return static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(n)));
   };
@@ -323,7 +327,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
       const bool is_taken = other.Apply(damaged).has_value();
       (is_taken ? shown : refused) += 1;
       EXPECT_EQ(other.is_known(), is_taken);
-      Advance(other, 1.0 / 60.0);
+      Advance(other, evaluator, 1.0 / 60.0);
       // What was cut short or is too long is never taken.
       Bytes shorter = record;
       shorter.resize(below(record.size()));
@@ -332,7 +336,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
       longer.push_back(std::byte{0});
       EXPECT_FALSE(AvatarReplica(replica).Apply(longer).has_value()) << "seed " << kSeed;
       (void)replica.Apply(record);
-      Advance(replica, 1.0 / 60.0);
+      Advance(replica, evaluator, 1.0 / 60.0);
     }
   }
   std::printf("seed %u; %d refused, %d shown\n", kSeed, refused, shown);
@@ -349,9 +353,10 @@ TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
   Bytes change;
   ASSERT_TRUE(AppendChange(avatar, change));
   AvatarReplica replica(library);
+  StretchEvaluator evaluator(*library, 1);
   EXPECT_FALSE(replica.is_known());
   EXPECT_EQ(replica.Apply(change).error().code, ErrorCode::kNotFound);
-  Advance(replica, 1.0 / 60.0);
+  Advance(replica, evaluator, 1.0 / 60.0);
   EXPECT_FALSE(replica.is_known());
 }
 

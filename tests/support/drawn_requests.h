@@ -70,7 +70,7 @@ inline void DrawLayer(Random& random, Avatar& avatar) {
 class DrawnCrowd {
  public:
   DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed)
-      : random_(seed) {
+      : random_(seed), evaluator_(*library, 1) {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, DrawBase(random_),
                             AvatarOptions{.terrain = i % 2 == 0 ? nullptr : RoughGround(random_)});
@@ -79,6 +79,29 @@ class DrawnCrowd {
 
   /// A sixtieth of a second, `at_once` avatars together, the last ones fewer.
   void Advance(std::size_t at_once = 1000) {
+    DrawRequests();
+    std::vector<Avatar*> some;
+    for (Avatar& avatar : avatars_) {
+      some.push_back(&avatar);
+      if (some.size() < at_once && &avatar != &avatars_.back()) continue;
+      Avatar::AdvanceAll(some, 1.0 / 60.0, evaluator_);
+      some.clear();
+    }
+  }
+
+  /// The same without poses (Avatar::AdvanceStates).
+  void AdvanceStates() {
+    DrawRequests();
+    std::vector<Avatar*> all;
+    for (Avatar& avatar : avatars_) all.push_back(&avatar);
+    Avatar::AdvanceStates(all, 1.0 / 60.0);
+  }
+
+  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+  [[nodiscard]] std::vector<Avatar>& avatars() { return avatars_; }
+
+ private:
+  void DrawRequests() {
     for (Avatar& avatar : avatars_) {
       if (Draws(random_, 0.01)) DrawLayer(random_, avatar);
       if (Draws(random_, 0.003)) (void)avatar.SetFootPlanting(!avatar.foot_planting());
@@ -86,19 +109,10 @@ class DrawnCrowd {
         (void)avatar.Enqueue(DrawRequest(random_, avatar));
       }
     }
-    std::vector<Avatar*> some;
-    for (Avatar& avatar : avatars_) {
-      some.push_back(&avatar);
-      if (some.size() < at_once && &avatar != &avatars_.back()) continue;
-      Avatar::AdvanceAll(some, 1.0 / 60.0);
-      some.clear();
-    }
   }
 
-  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
-
- private:
   Random random_;
+  StretchEvaluator evaluator_;
   std::vector<Avatar> avatars_;
 };
 

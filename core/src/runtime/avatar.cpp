@@ -37,6 +37,7 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
 
 void Avatar::Teleport(const BaseFrame& start) {
   base_ = start;
+  ++course_;
   const Pose& stand = body_.library->stand_pose();
   body_.pose = stand;
   body_.pose.root_position_m =
@@ -140,46 +141,50 @@ FootState Avatar::MeasureFeet() const {
 }
 
 void Avatar::Advance(double dt_s) {
-  Avatar* self = this;
-  AdvanceAll(std::span(&self, 1), dt_s);
+  AdvanceState(dt_s);
+  body_.layers.Advance(*body_.library, dt_s);
+  ShowPose();
 }
 
-void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s) {
-  // Few enough that what one pass brings into the nearest cache is there for the next.
-  constexpr std::size_t kAtOnce = 16;
-  std::array<PoseJob, kAtOnce> jobs;
+void Avatar::ShowPose() {
+  if (is_moving_) body_.Evaluate(movement_time_s_);
+  body_.ShowLayers();
+}
+
+void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s) {
+  constexpr std::size_t kAhead = 16;
+  for (std::size_t i = 0; i < avatars.size(); ++i) {
+    if (i + kAhead < avatars.size()) avatars[i + kAhead]->PrefetchState();
+    avatars[i]->AdvanceState(dt_s);
+    avatars[i]->body_.layers.Advance(*avatars[i]->body_.library, dt_s);
+  }
+}
+
+void Avatar::ShowPoses(std::span<Avatar* const> avatars, StretchEvaluator& evaluator) {
+  std::array<PoseJob, PoseLanes::kLanes> jobs;
   while (!avatars.empty()) {
-    const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), kAtOnce));
-    const MotionLibrary& library = *block.front()->body_.library;
+    const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), jobs.size()));
     std::size_t moving = 0;
-    std::size_t ahead = block.size();
     for (Avatar* avatar : block) {
-      STRIDEWIRE_CHECK(avatar->body_.library.get() == &library);
-      if (ahead < avatars.size()) avatars[ahead++]->PrefetchState();
-      avatar->AdvanceState(dt_s);
-      if (avatar->is_moving_) {
-        jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.cache,
-                          &avatar->body_.pose};
-      }
+      if (!avatar->is_moving_) continue;
+      jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
     }
-    EvaluatePoses(library, std::span(jobs).first(moving));
-    for (Avatar* avatar : block) {
-      avatar->body_.layers.Advance(library, dt_s);
-      avatar->body_.ShowLayers();
-    }
+    EvaluatePoses(evaluator, std::span(jobs).first(moving));
+    for (Avatar* avatar : block) avatar->body_.ShowLayers();
     avatars = avatars.subspan(block.size());
   }
 }
 
-void Avatar::PrefetchWhereShown() const {
-  PrefetchBytes(&body_.pose, sizeof(body_.pose));
-  PrefetchBytes(&body_.has_layers, sizeof(body_.has_layers));
-  PrefetchBytes(&is_moving_, sizeof(is_moving_));
+void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
+                        StretchEvaluator& evaluator) {
+  AdvanceStates(avatars, dt_s);
+  ShowPoses(avatars, evaluator);
 }
 
-void Avatar::PrefetchShown() const {
-  const ConstPoseSpan shown = pose();
-  PrefetchBytes(shown.rotations.data(), shown.rotations.size_bytes());
+void Avatar::PrefetchCourse() const {
+  PrefetchBytes(&course_, sizeof(course_));
+  PrefetchBytes(&is_moving_, sizeof(is_moving_));
+  PrefetchBytes(&body_.layers, 1);
 }
 
 // What AdvanceState reads of an avatar that goes on walking.
@@ -426,6 +431,7 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
 
+  ++course_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;
@@ -466,6 +472,7 @@ void Avatar::FinishMovement(double at_s) {
   KeepJoin(at_s);
   Leave(at_s, false);
   movement_time_s_ = at_s;
+  ++course_;
   // Without planting the base is the root's own and rises by what the library says.
   const BaseFrame before = base_;
   base_ = BaseAfter(body_.movement, body_.pose);

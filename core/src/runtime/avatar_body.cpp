@@ -15,15 +15,16 @@ void MakeRoom(const MotionLibrary& library, Movement& movement) {
 AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
     : library(std::move(of_library)),
       pose(library->skeleton().joint_count()),
-      cache(library->layout()),
       blended_pose(library->skeleton().joint_count()),
       earlier_pose(library->skeleton().joint_count()) {
   MakeRoom(*library, movement);
 }
 
 void AvatarBody::Evaluate(double time_s) {
-  const PoseJob job{&movement, time_s, &cache, &pose, &blended_pose};
-  EvaluatePoses(*library, std::span(&job, 1));
+  GridCache cache(library->layout());
+  EvaluateMovement(group(), library->layout(), movement, time_s, cache, blended_pose);
+  pose = blended_pose;
+  PlantFeet(library->leg_rig(), movement, time_s, pose);
 }
 
 void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
@@ -34,6 +35,7 @@ void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
   };
   if (keeps_speed) {
     const double earlier_s = time_s - kJoinStepS;
+    GridCache cache(library->layout());
     EvaluateMovement(group(), library->layout(), movement, earlier_s, cache, earlier_pose);
     earlier_feet[1] = corrections(earlier_s, earlier_pose);
   }
@@ -61,7 +63,6 @@ void AvatarBody::KeepHolds(double time_s) {
 }
 
 void AvatarBody::StartWeighted(const BaseFrame& base) {
-  cache.Clear();
   stridewire::StartWeighted(group(), base, movement);
 }
 
@@ -74,9 +75,10 @@ template <typename Landing>
 void AvatarBody::JoinTo(const Landing& landing, bool keeps_speed) {
   std::optional<ConstPoseSpan> earlier;
   if (keeps_speed) earlier.emplace(earlier_pose);
+  GridCache cache(library->layout());
   if (plants_feet) {
     PlanFeet(*library, holds, landing, {blended_pose, earlier}, cache, pose, movement);
-    KeepFeetGoing(keeps_speed);
+    KeepFeetGoing(keeps_speed, cache);
     if (begins_planting) SettleFrom(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;
@@ -99,7 +101,7 @@ void AvatarBody::Join(const LandingChoice& choice, bool keeps_speed) {
 }
 
 // The corrections of the movement just planned go on from those before it.
-void AvatarBody::KeepFeetGoing(bool keeps_speed) {
+void AvatarBody::KeepFeetGoing(bool keeps_speed, GridCache& cache) {
   const auto corrections = [&](double time_s) {
     EvaluateMovement(group(), library->layout(), movement, time_s, cache, pose);
     return CorrectFeet(library->skeleton(), library->leg_rig(), movement, time_s, pose);

@@ -75,7 +75,6 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
             .reason = "the footprint is out of reach",
             .missed = missed});
   std::swap(body_.movement, kept_.front().movement);
-  body_.cache.Clear();
   body_.pose = kept_.front().pose;
   return false;
 }
@@ -120,14 +119,14 @@ FootprintMiss Avatar::MissOf(const Footprint& asked) {
     return feet;
   };
 
+  GridCache cache(body_.library->layout());
   FootprintMiss worst{asked};
   const double land_s = body_.movement.feet.foot(moving).land_s;
   const double stands_s = body_.movement.duration_s() - land_s;
   const int looks = stands_s > 0.0 ? kLooks : 1;
   for (int look = 0; look < looks; ++look) {
     const double time_s = land_s + stands_s * look / std::max(looks - 1, 1);
-    EvaluateMovement(group(), body_.library->layout(), body_.movement, time_s, body_.cache,
-                     body_.pose);
+    EvaluateMovement(group(), body_.library->layout(), body_.movement, time_s, cache, body_.pose);
     std::array<BlendedFoot, 2> planned = feet_of_pose();
     for (std::size_t f = 0; f < 2; ++f) {
       planned[f].ball_m +=

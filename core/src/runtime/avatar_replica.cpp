@@ -288,7 +288,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   reader.Finish();
 }
 
-void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s) {
+void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
+                               StretchEvaluator& evaluator) {
   constexpr std::size_t kAtOnce = 16;  // as Avatar::AdvanceAll
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {
@@ -299,10 +300,9 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double 
       STRIDEWIRE_CHECK(&replica->library() == &library);
       if (!replica->is_known_ || !replica->is_moving_) continue;
       if (!replica->is_told_) replica->movement_time_s_ += dt_s;
-      jobs[moving++] = {&replica->body_.movement, replica->movement_time_s_, &replica->body_.cache,
-                        &replica->body_.pose};
+      jobs[moving++] = {&replica->body_.movement, replica->movement_time_s_, &replica->body_.pose};
     }
-    EvaluatePoses(library, std::span(jobs).first(moving));
+    EvaluatePoses(evaluator, std::span(jobs).first(moving));
     for (AvatarReplica* replica : block) {
       if (!replica->is_known_) continue;
       if (!replica->are_layers_told_) replica->body_.layers.Advance(library, dt_s);

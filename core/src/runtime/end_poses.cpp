@@ -84,7 +84,7 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
   const auto padded = static_cast<std::size_t>(layout_.padded_joints);
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
   const float* rows = Rows(is_end);
-  std::array<float, kernels::kMaxRowFloats> sum;
+  std::array<float, kMaxRowFloats> sum;
   kernels::SumRows(rows, movement.weights.data(), movement.weights.size(), row_floats, sum.data());
 
   End& end = ends_[is_end ? 1 : 0];

@@ -369,14 +369,11 @@ void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseS
   if (!movement.feet.is_active) return;
   const PackedFootPlan plan = PackFootPlan(movement);
   const DVec3& base = movement.base.position_m;
-  float* root = &pose.root_position_m.x;
-  const kernels::PlantJob job{.plan = plan.data(),
-                              .time_s = time_s,
-                              .base_m = {base.x, base.y, base.z},
-                              .root_m = root,
-                              .rotations = &pose.rotations[0].x,
-                              .root_out_m = root};
-  kernels::PlantPoses(rig, &job, 1);
+  kernels::PlantOne(rig, {.plan = plan.data(),
+                          .time_s = time_s,
+                          .base_m = {base.x, base.y, base.z},
+                          .root_m = &pose.root_position_m.x,
+                          .rotations = &pose.rotations[0].x});
   Unsettle(rig, movement, time_s, pose);
 }
 

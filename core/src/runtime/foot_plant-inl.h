@@ -28,20 +28,6 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// Where four floats of each job's plan are, or of one of its rotations.
-struct PlanAddress {
-  const PlantJob* jobs;
-  std::size_t at;
-  HWY_INLINE const float* operator()(std::size_t i) const { return jobs[i].plan + at; }
-};
-struct JointAddress {
-  const PlantJob* jobs;
-  std::size_t joint;
-  HWY_INLINE float* operator()(std::size_t i) const { return jobs[i].rotations + 4 * joint; }
-};
-
-HWY_INLINE Vec3x XyzOf(Quat4 q) { return {q.x, q.y, q.z}; }
-
 // A FootTrack and its FootRest, as PackFootPlan lays them out.
 struct Track {
   Vec3x from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
@@ -51,11 +37,11 @@ struct Track {
   Float rest_over_s, release_s, land_s;
 };
 
-HWY_INLINE Track LoadTrack(const PlantJob* jobs, std::size_t at) {
+HWY_INLINE Track LoadTrack(const float* plan) {
   Track t;
   const auto next = [&]() HWY_ATTR {
-    const Quat4 four = GatherQuats(PlanAddress{jobs, at});
-    at += 4;
+    const Quat4 four = LoadQuat(plan);
+    plan += 4 * kBlock;
     return four;
   };
   Quat4 q = next();
@@ -96,12 +82,12 @@ struct Common {
 struct LegLanes {
   Vec3x positions[kMaxLegChain];
   Quat4 rotations[kMaxLegChain];
-  Vec3x ball, toe_tip, heel;
+  Vec3x ball;
 };
 
 HWY_INLINE Vec3x Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const PlantJob* jobs, Quat4 root,
+HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const float* rotations, Quat4 root,
                             LegLanes& out) {
   out.positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
   out.rotations[0] = root;
@@ -109,12 +95,10 @@ HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const PlantJob* jobs, Qu
     out.positions[i] =
         out.positions[i - 1] + Rotate(out.rotations[i - 1], Same(bones.offsets_m[i]));
     out.rotations[i] =
-        Multiply(out.rotations[i - 1], GatherQuats(JointAddress{jobs, bones.joints[i]}));
+        Multiply(out.rotations[i - 1], LoadQuat(rotations + bones.joints[i] * 4 * kBlock));
   }
   const std::size_t last = bones.count - 1;
   out.ball = out.positions[last] + Rotate(out.rotations[last], Same(bones.ball_m));
-  out.toe_tip = out.positions[last] + Rotate(out.rotations[last], Same(bones.toe_tip_m));
-  out.heel = out.positions[bones.ankle] + Rotate(out.rotations[bones.ankle], Same(bones.heel_m));
 }
 
 struct Correction {
@@ -197,9 +181,13 @@ HWY_INLINE Float DepthBelow(Vec3x print, Vec3x normal, const LegRig::Bones& bone
         print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) / normal.y;
     return ground + Float(rest_m) / normal.y - at.y;
   };
+  const std::size_t last = bones.count - 1;
+  const Vec3x toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
+  const Vec3x heel =
+      leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Same(bones.heel_m));
   const Float depth =
-      Max(Max(depth_of(leg.ball, bones.ball_height_m), depth_of(leg.heel, bones.ball_height_m)),
-          depth_of(leg.toe_tip, bones.toe_height_m));
+      Max(Max(depth_of(leg.ball, bones.ball_height_m), depth_of(heel, bones.ball_height_m)),
+          depth_of(toe_tip, bones.toe_height_m));
   return near * SmoothMax(Float(0.0f), depth, static_cast<float>(kSoftGroundM));
 }
 
@@ -264,34 +252,39 @@ HWY_INLINE LegRotations SolveLeg(const LegRig::Bones& bones, const LegLanes& leg
           Normalise(Multiply(Conjugate(before_ankle), ankle_rotation))};
 }
 
-// As many as a vector has lanes; what comes of the first `lanes` is kept.
-void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
-  const FloatTag d;
-  HWY_ALIGN float buffer[4 * kBlock] = {};
+// As many as a vector has lanes, from `lane` on.
+void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
+  const DoubleTag d;
+  const hn::Rebind<float, DoubleTag> floats;
+  const std::size_t doubles = hn::Lanes(d);
+  const std::size_t width = hn::Lanes(FloatTag());
+  const float* plan = block.plan + lane;
+  float* rotations = block.rotations + lane;
   Common common;
   {
-    constexpr std::size_t kAt = 2 * kPackedTrackFloats;
-    Quat4 q = GatherQuats(PlanAddress{jobs, kAt});
+    const float* at = plan + 2 * kPackedTrackFloats * kBlock;
+    Quat4 q = LoadQuat(at);
     common.root_rest = XyzOf(q), common.steer = q.w;
-    q = GatherQuats(PlanAddress{jobs, kAt + 4});
+    q = LoadQuat(at + 4 * kBlock);
     common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
-    q = GatherQuats(PlanAddress{jobs, kAt + 8});
+    q = LoadQuat(at + 8 * kBlock);
     common.entered_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.settle_s = q.w;
   }
-  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const PlantJob& job = jobs[i];
+  HWY_ALIGN float local_m[3 * kBlock];
+  HWY_ALIGN float times_s[kBlock];
+  for (std::size_t i = 0; i < width; i += doubles) {
     for (std::size_t c = 0; c < 3; ++c) {
-      buffer[4 * i + c] = static_cast<float>(static_cast<double>(job.root_m[c]) - job.base_m[c]);
+      const auto world = hn::PromoteTo(d, hn::LoadU(floats, block.root_m + c * kBlock + lane + i));
+      const auto base = hn::LoadU(d, block.base_m + c * kBlock + lane + i);
+      hn::StoreU(hn::DemoteTo(floats, hn::Sub(world, base)), floats, local_m + c * kBlock + i);
     }
-    buffer[4 * i + 3] = static_cast<float>(job.time_s);
+    hn::StoreU(hn::DemoteTo(floats, hn::LoadU(d, block.time_s + lane + i)), floats, times_s + i);
   }
-  Quat4 start;
-  hn::LoadInterleaved4(d, buffer, start.x.v, start.y.v, start.z.v, start.w.v);
-  const Vec3x root = XyzOf(start);
-  common.time_s = start.w;
+  const Vec3x root = LoadVec3(local_m);
+  common.time_s = LoadLanes(times_s);
 
-  const Quat4 root_rotation = GatherQuats(JointAddress{jobs, 0});
+  const Quat4 root_rotation = LoadQuat(rotations);
   LegLanes legs[2];
   Correction corrections[2];
   Vec3x ankles[2];
@@ -299,14 +292,14 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   for (std::size_t f = 0; f < 2; ++f) {
     const LegRig::Bones& bones = rig.bones[f];
     LegLanes& leg = legs[f];
-    EvaluateLeg(bones, jobs, root_rotation, leg);
+    EvaluateLeg(bones, rotations, root_rotation, leg);
     const Vec3x ankle = leg.positions[bones.ankle];
     const Vec3x sole = leg.ball - ankle;
     const Float heading = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
     const Float flatness = bones.foot_m < kSmallestBoneM
                                ? Float(0.0f)
                                : Sqrt(sole.x * sole.x + sole.z * sole.z) / Float(bones.foot_m);
-    const Track track = LoadTrack(jobs, f * kPackedTrackFloats);
+    const Track track = LoadTrack(plan + f * kPackedTrackFloats * kBlock);
     const Vec3x ball = root + leg.ball;
     Correction& c = corrections[f];
     c = CorrectFoot(common, track, ball, heading, flatness);
@@ -361,40 +354,75 @@ void PlantSome(const LegRig& rig, const PlantJob* jobs, std::size_t lanes) {
   shift.y = shift.y - lower;
 
   // The root is shown in floats of the world: the legs reach from where that is.
-  hn::StoreInterleaved4(shift.x.v, shift.y.v, shift.z.v, shift.z.v, d, buffer);
-  for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-    const PlantJob& job = jobs[i];
+  HWY_ALIGN float shifts_m[3 * kBlock];
+  StoreLanes(shift.x, shifts_m);
+  StoreLanes(shift.y, shifts_m + kBlock);
+  StoreLanes(shift.z, shifts_m + 2 * kBlock);
+  for (std::size_t i = 0; i < width; i += doubles) {
     for (std::size_t c = 0; c < 3; ++c) {
-      const double world =
-          static_cast<double>(job.root_m[c]) + static_cast<double>(buffer[4 * i + c]);
-      const auto shown = static_cast<float>(world);
-      buffer[4 * i + c] = static_cast<float>(static_cast<double>(shown) - job.base_m[c]);
-      if (i < lanes) job.root_out_m[c] = shown;
+      float* root_m = block.root_m + c * kBlock + lane + i;
+      const auto by = hn::PromoteTo(d, hn::LoadU(floats, shifts_m + c * kBlock + i));
+      const auto shown =
+          hn::DemoteTo(floats, hn::Add(hn::PromoteTo(d, hn::LoadU(floats, root_m)), by));
+      hn::StoreU(shown, floats, root_m);
+      const auto base = hn::LoadU(d, block.base_m + c * kBlock + lane + i);
+      hn::StoreU(hn::DemoteTo(floats, hn::Sub(hn::PromoteTo(d, shown), base)), floats,
+                 local_m + c * kBlock + i);
     }
   }
-  Quat4 moved;
-  hn::LoadInterleaved4(d, buffer, moved.x.v, moved.y.v, moved.z.v, moved.w.v);
+  const Vec3x moved = LoadVec3(local_m);
   for (std::size_t f = 0; f < 2; ++f) {
     const LegRig::Bones& bones = rig.bones[f];
     const LegLanes& leg = legs[f];
     const Quat4 ankle_rotation = Multiply(corrections[f].turn, leg.rotations[bones.ankle]);
-    const LegRotations solved = SolveLeg(bones, leg, ankles[f] - XyzOf(moved), ankle_rotation);
-    ScatterQuats(solved.hip, lanes, JointAddress{jobs, bones.joints[bones.hip]});
-    ScatterQuats(solved.knee, lanes, JointAddress{jobs, bones.joints[bones.knee]});
-    ScatterQuats(solved.ankle, lanes, JointAddress{jobs, bones.joints[bones.ankle]});
+    const LegRotations solved = SolveLeg(bones, leg, ankles[f] - moved, ankle_rotation);
+    StoreQuat(solved.hip, rotations + bones.joints[bones.hip] * 4 * kBlock);
+    StoreQuat(solved.knee, rotations + bones.joints[bones.knee] * 4 * kBlock);
+    StoreQuat(solved.ankle, rotations + bones.joints[bones.ankle] * 4 * kBlock);
   }
 }
 
-void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count) {
-  const std::size_t width = hn::Lanes(FloatTag());
-  std::size_t i = 0;
-  for (; i + width <= count; i += width) PlantSome(rig, jobs + i, width);
-  if (i == count) return;
-  // Lanes nobody asked for do as the first does.
-  PlantJob last[kBlock];
-  for (std::size_t lane = 0; lane < width; ++lane)
-    last[lane] = jobs[i + lane < count ? i + lane : i];
-  PlantSome(rig, last, count - i);
+void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
+  for (std::size_t lane = 0; lane < count; lane += hn::Lanes(FloatTag())) {
+    PlantSome(rig, block, lane);
+  }
+}
+
+// The same number in the lanes of one vector.
+HWY_INLINE void Spread(const float* from, std::size_t count, float* to) {
+  const FloatTag d;
+  for (std::size_t i = 0; i < count; ++i) hn::Store(hn::Set(d, from[i]), d, to + i * kBlock);
+}
+
+// One pose in all lanes of a vector, of which the first is kept.
+void PlantOne(const LegRig& rig, const PlantJob& job) {
+  HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
+  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // of which those of the legs are used
+  HWY_ALIGN double time_s[kBlock];
+  HWY_ALIGN double base_m[3 * kBlock];
+  HWY_ALIGN float root_m[3 * kBlock];
+  Spread(job.plan, kPackedPlanFloats, plan);
+  Spread(job.root_m, 3, root_m);
+  for (const LegRig::Bones& bones : rig.bones) {
+    for (std::size_t i = 0; i < bones.count; ++i) {
+      const std::size_t joint = bones.joints[i];
+      Spread(job.rotations + 4 * joint, 4, rotations + joint * 4 * kBlock);
+    }
+  }
+  for (std::size_t i = 0; i < hn::Lanes(FloatTag()); ++i) {
+    time_s[i] = job.time_s;
+    for (std::size_t c = 0; c < 3; ++c) base_m[c * kBlock + i] = job.base_m[c];
+  }
+  PlantSome(rig, {plan, time_s, base_m, root_m, rotations}, 0);
+  for (std::size_t c = 0; c < 3; ++c) job.root_m[c] = root_m[c * kBlock];
+  for (const LegRig::Bones& bones : rig.bones) {
+    for (const std::size_t place : {bones.hip, bones.knee, bones.ankle}) {
+      const std::size_t joint = bones.joints[place];
+      for (std::size_t c = 0; c < 4; ++c) {
+        job.rotations[4 * joint + c] = rotations[(joint * 4 + c) * kBlock];
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -79,6 +79,10 @@ HWY_INLINE Quat4 operator+(Quat4 a, Quat4 b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
 }
 HWY_INLINE Quat4 operator*(Quat4 a, Float s) { return {a.x * s, a.y * s, a.z * s, a.w * s}; }
+HWY_INLINE Quat4 Select(Mask mask, Quat4 yes, Quat4 no) {
+  return {Select(mask, yes.x, no.x), Select(mask, yes.y, no.y), Select(mask, yes.z, no.z),
+          Select(mask, yes.w, no.w)};
+}
 HWY_INLINE Float Dot(Quat4 a, Quat4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
 HWY_INLINE Quat4 Conjugate(Quat4 q) { return {-q.x, -q.y, -q.z, q.w}; }
 HWY_INLINE Quat4 Multiply(Quat4 a, Quat4 b) {
@@ -128,16 +132,26 @@ HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
 
 // slerp(1, q, fraction) along the short arc. With m = |xyz| / (1 + w), the tangent of a quarter of the angle, half of
 // it is 2 atan m: all that is needed of the sines are even functions, and nothing is divided by a small sine.
-HWY_INLINE Quat4 SlerpFromIdentity(Quat4 q, Float fraction) {
+struct SlerpParts {
+  Float square;    // |xyz|^2
+  Float per_sine;  // half the angle by its sine, negative if the long arc is turned round
+};
+HWY_INLINE SlerpParts SlerpPartsOf(Quat4 q) {
   const Mask is_long = q.w < Float(0.0f);
   const Float sign = Select(is_long, Float(-1.0f), Float(1.0f));
   const Float beside = Float(1.0f) / (Float(1.0f) + Abs(q.w));
   const Float xx = q.x * q.x + q.y * q.y + q.z * q.z;
   const Float per_sine = Float(2.0f) * beside * AtanOverX(Min(xx * beside * beside, Float(1.0f)));
-  const Float k = fraction * per_sine;
-  const Float square = xx * k * k;
-  const Float s = sign * k * SinOverX(square);
-  return {q.x * s, q.y * s, q.z * s, CosNearZero(square)};
+  return {xx, sign * per_sine};
+}
+HWY_INLINE Quat4 SlerpOf(Float x, Float y, Float z, SlerpParts parts, Float fraction) {
+  const Float k = fraction * parts.per_sine;
+  const Float square = parts.square * k * k;
+  const Float s = k * SinOverX(square);
+  return {x * s, y * s, z * s, CosNearZero(square)};
+}
+HWY_INLINE Quat4 SlerpFromIdentity(Quat4 q, Float fraction) {
+  return SlerpOf(q.x, q.y, q.z, SlerpPartsOf(q), fraction);
 }
 
 // Angle of (x, y) in [-pi, pi]; 0 for (0, 0).
@@ -297,6 +311,25 @@ HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
   hn::LoadInterleaved3(d, at, v.x.v, v.y.v, v.z.v);
   return v;
 }
+
+// Numbers of the first of a vector's lanes.
+HWY_INLINE Float LoadLanes(const float* at) { return Float(hn::LoadU(FloatTag(), at)); }
+HWY_INLINE void StoreLanes(Float value, float* at) { hn::StoreU(value.v, FloatTag(), at); }
+HWY_INLINE Vec3x LoadVec3(const float* at) {
+  return {LoadLanes(at), LoadLanes(at + kBlock), LoadLanes(at + 2 * kBlock)};
+}
+HWY_INLINE Quat4 LoadQuat(const float* at) {
+  return {LoadLanes(at), LoadLanes(at + kBlock), LoadLanes(at + 2 * kBlock),
+          LoadLanes(at + 3 * kBlock)};
+}
+HWY_INLINE void StoreQuat(Quat4 q, float* at) {
+  StoreLanes(q.x, at);
+  StoreLanes(q.y, at + kBlock);
+  StoreLanes(q.z, at + 2 * kBlock);
+  StoreLanes(q.w, at + 3 * kBlock);
+}
+
+HWY_INLINE Vec3x XyzOf(Quat4 q) { return {q.x, q.y, q.z}; }
 
 // Sine and cosine with the operations of base/trig.cpp, in their order.
 HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cosine) {

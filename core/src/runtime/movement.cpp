@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "pose_kernels.h"
-#include "prefetch.h"
 #include "stridewire/runtime/cardinal_basis.h"
 
 namespace stridewire {
@@ -38,8 +37,6 @@ std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const 
   kernels::SumRows(examples, weights.data(), n, row_floats_, row.data());
   return row;
 }
-
-void GridCache::Prefetch() const { PrefetchBytes(rows_.data(), rows_.size() * sizeof(float)); }
 
 double EaseOut(double s) {
   if (s <= 0.0) return 1.0;

@@ -13,40 +13,60 @@
 #include "foot_plant-inl.h"
 #include "hwy/highway.h"
 #include "lanes-inl.h"
+#include "pose_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-void SumRows(const float* HWY_RESTRICT examples, const float* HWY_RESTRICT weights,
-             std::size_t count, std::size_t row_floats, float* HWY_RESTRICT row) {
+// kVectors vectors from `source` on of the rows of kRows movements, summed side by side: an addition waits for the one
+// before, and what is read of the library serves all.
+template <std::size_t kRows, std::size_t kVectors>
+HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
+                           std::size_t count, std::size_t row_floats, float* const* rows,
+                           std::size_t at) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
+  hn::Vec<FloatTag> sums[kRows][kVectors];
+  for (std::size_t r = 0; r < kRows; ++r) {
+    for (std::size_t v = 0; v < kVectors; ++v) sums[r][v] = hn::Zero(d);
+  }
+  source += at;
+  for (std::size_t e = 0; e < count; ++e, source += row_floats) {
+    hn::Vec<FloatTag> w[kRows];
+    for (std::size_t r = 0; r < kRows; ++r) w[r] = hn::Set(d, weights[r][e]);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      const auto x = hn::LoadU(d, source + v * width);
+      for (std::size_t r = 0; r < kRows; ++r) sums[r][v] = hn::Add(sums[r][v], hn::Mul(w[r], x));
+    }
+  }
+  for (std::size_t r = 0; r < kRows; ++r) {
+    for (std::size_t v = 0; v < kVectors; ++v) hn::StoreU(sums[r][v], d, rows[r] + at + v * width);
+  }
+}
+
+// Rows of kRows movements at one grid point.
+template <std::size_t kRows>
+HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, std::size_t count,
+                          std::size_t row_floats, float* const* rows) {
+  const std::size_t width = hn::Lanes(FloatTag());
   std::size_t i = 0;
-  // Four sums at a time: additions wait for the one before.
-  for (; i + 4 * width <= row_floats; i += 4 * width) {
-    auto s0 = hn::Zero(d), s1 = s0, s2 = s0, s3 = s0;
-    const float* source = examples + i;
-    for (std::size_t e = 0; e < count; ++e, source += row_floats) {
-      const auto w = hn::Set(d, weights[e]);
-      s0 = hn::Add(s0, hn::Mul(w, hn::LoadU(d, source)));
-      s1 = hn::Add(s1, hn::Mul(w, hn::LoadU(d, source + width)));
-      s2 = hn::Add(s2, hn::Mul(w, hn::LoadU(d, source + 2 * width)));
-      s3 = hn::Add(s3, hn::Mul(w, hn::LoadU(d, source + 3 * width)));
+  const auto take = [&]<std::size_t kVectors>() HWY_ATTR {
+    for (; i + kVectors * width <= row_floats; i += kVectors * width) {
+      SumVectors<kRows, kVectors>(examples, weights, count, row_floats, rows, i);
     }
-    hn::StoreU(s0, d, row + i);
-    hn::StoreU(s1, d, row + i + width);
-    hn::StoreU(s2, d, row + i + 2 * width);
-    hn::StoreU(s3, d, row + i + 3 * width);
-  }
-  for (; i < row_floats; i += width) {
-    auto sum = hn::Zero(d);
-    const float* source = examples + i;
-    for (std::size_t e = 0; e < count; ++e, source += row_floats) {
-      sum = hn::Add(sum, hn::Mul(hn::Set(d, weights[e]), hn::LoadU(d, source)));
-    }
-    hn::StoreU(sum, d, row + i);
-  }
+  };
+  // As many sums as there are registers for.
+  if constexpr (kRows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
+  if constexpr (kRows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
+  take.template operator()<4>();
+  take.template operator()<2>();
+  take.template operator()<1>();
+}
+
+void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
+             float* row) {
+  SumRowsOf<1>(examples, &weights, count, row_floats, &row);
 }
 
 void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTRICT weights,
@@ -58,6 +78,54 @@ void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTR
       sum = hn::Add(sum, hn::Mul(hn::Set(d, weights[k]), hn::LoadU(d, points[k] + i)));
     }
     hn::StoreU(sum, d, row + i);
+  }
+}
+
+void BlendRun(const GridRun& run) {
+  const auto last = static_cast<std::size_t>(run.point_count) - 1;
+  std::size_t next[kBlock] = {};  // pose of each lane
+  const auto first_of = [&](std::size_t i) HWY_ATTR {
+    return static_cast<std::size_t>(run.places[next[i]].first_point[run.lane + i]);
+  };
+  const auto ring_of = [&](std::size_t i, std::size_t point)
+                           HWY_ATTR { return run.ring + (i * 4 + (point & 3)) * run.row_floats; };
+  std::size_t point = last;
+  for (std::size_t i = 0; i < run.lanes; ++i) point = point < first_of(i) ? point : first_of(i);
+  for (std::size_t left = run.lanes; left > 0; ++point) {
+    const float* examples = run.grid + point * run.examples * run.row_floats;
+    const float* weights[kBlock];
+    float* sums[kBlock];
+    std::size_t passing[kBlock];  // lanes that need this point
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < run.lanes; ++i) {
+      if (next[i] == run.poses || point < first_of(i)) continue;
+      weights[count] = run.weights[run.lane + i];
+      sums[count] = ring_of(i, point);
+      passing[count++] = i;
+    }
+    std::size_t i = 0;
+    for (; i + 2 <= count; i += 2) {
+      SumRowsOf<2>(examples, weights + i, run.examples, run.row_floats, sums + i);
+    }
+    if (i < count) SumRows(examples, weights[i], run.examples, run.row_floats, sums[i]);
+    for (std::size_t p = 0; p < count; ++p) {
+      const std::size_t lane = passing[p];
+      for (; next[lane] < run.poses; ++next[lane]) {
+        const std::size_t first = first_of(lane);
+        if ((first + 3 < last ? first + 3 : last) != point) break;
+        // A point behind the last weighs nothing, but is read.
+        const float* points[4];
+        float part[4];
+        const GridPlaces& place = run.places[next[lane]];
+        for (std::size_t k = 0; k < 4; ++k) {
+          points[k] = ring_of(lane, first + k < last ? first + k : last);
+          part[k] = place.weights[k][run.lane + lane];
+        }
+        BlendPoints(points, part, run.row_floats,
+                    run.rows + (next[lane] * kBlock + run.lane + lane) * run.row_floats);
+      }
+      left -= next[lane] == run.poses;
+    }
   }
 }
 
@@ -91,7 +159,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   return !Any(is_short);
 }
 
-void FindInGrids(std::size_t count, GridTimes& times) {
+void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
   const std::size_t width = hn::Lanes(d);
@@ -145,23 +213,24 @@ void FindInGrids(std::size_t count, GridTimes& times) {
                               auto w = hn::IfThenElse(is_last, at_last, within);
                               w = hn::IfThenElse(is_first, at_first, w);
                               w = hn::IfThenElse(is_pair, pair, w);
-                              hn::Store(hn::DemoteTo(floats, w), floats, times.weights[k] + i);
+                              hn::Store(hn::DemoteTo(floats, w), floats, places.weights[k] + i);
                             };
     weight(0, hn::Sub(one, f), hn::Add(left, three_before), hn::Add(before, after), before);
     weight(1, f, hn::Sub(right, three_before), hn::Sub(left, three_after), left);
     weight(2, zero, hn::Add(after, before), hn::Add(right, three_after), right);
     weight(3, zero, zero, zero, after);
-    hn::Store(hn::IfThenElse(is_first, zero, hn::Sub(cell, one)), d, times.first_point + i);
+    hn::Store(hn::IfThenElse(is_first, zero, hn::Sub(cell, one)), d, places.first_point + i);
 
-    hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, times.steered + i);
+    hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, places.steered + i);
     const auto over = hn::Load(d, times.ease_out_s + i);
     const auto eased = hn::Div(hn::Sub(time, hn::Load(d, times.entered_s + i)), over);
     const auto part = hn::Min(hn::Max(eased, zero), one);
     const auto rest = hn::Sub(one, part);
-    hn::Store(eased, d, times.eased + i);
-    hn::Store(hn::DemoteTo(floats, ease_out(eased)), floats, times.fraction + i);
+    hn::Store(hn::DemoteTo(floats, hn::IfThenElseZero(hn::Lt(eased, one), one)), floats,
+              places.is_eased + i);
+    hn::Store(hn::DemoteTo(floats, ease_out(eased)), floats, places.fraction + i);
     hn::Store(hn::DemoteTo(floats, hn::Mul(over, hn::Mul(hn::Mul(part, rest), rest))), floats,
-              times.slope_s + i);
+              places.slope_s + i);
   }
 }
 
@@ -190,10 +259,15 @@ namespace stridewire::kernels {
 
 HWY_EXPORT(SumRows);
 HWY_EXPORT(BlendPoints);
+HWY_EXPORT(BlendRun);
 HWY_EXPORT(BlendRotations);
 HWY_EXPORT(FindInGrids);
 HWY_EXPORT(SinCos);
-HWY_EXPORT(PlantPoses);
+HWY_EXPORT(Transpose);
+HWY_EXPORT(PrepareEase);
+HWY_EXPORT(FinishLanes);
+HWY_EXPORT(PlantLanes);
+HWY_EXPORT(PlantOne);
 
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row) {
@@ -205,21 +279,37 @@ void BlendPoints(const float* const points[4], const float weights[4], std::size
   HWY_DYNAMIC_DISPATCH(BlendPoints)(points, weights, row_floats, row);
 }
 
+void BlendRun(const GridRun& run) { HWY_DYNAMIC_DISPATCH(BlendRun)(run); }
+
 bool BlendRotations(const RotationBlend& blend, float* out) {
   return HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
 }
 
-void FindInGrids(std::size_t count, GridTimes& times) {
-  HWY_DYNAMIC_DISPATCH(FindInGrids)(count, times);
+void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) {
+  HWY_DYNAMIC_DISPATCH(FindInGrids)(count, times, places);
 }
 
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines) {
   HWY_DYNAMIC_DISPATCH(SinCos)(angles_rad, count, sines, cosines);
 }
 
-void PlantPoses(const LegRig& rig, const PlantJob* jobs, std::size_t count) {
-  HWY_DYNAMIC_DISPATCH(PlantPoses)(rig, jobs, count);
+void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to) {
+  HWY_DYNAMIC_DISPATCH(Transpose)(from, count, lanes, to);
 }
+
+void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease) {
+  HWY_DYNAMIC_DISPATCH(PrepareEase)(difference, joint_count, lanes, ease);
+}
+
+bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
+  return HWY_DYNAMIC_DISPATCH(FinishLanes)(blend, root_m, rotations);
+}
+
+void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(PlantLanes)(rig, block, count);
+}
+
+void PlantOne(const LegRig& rig, const PlantJob& job) { HWY_DYNAMIC_DISPATCH(PlantOne)(rig, job); }
 
 }  // namespace stridewire::kernels
 

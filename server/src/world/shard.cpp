@@ -220,8 +220,16 @@ std::span<Session* const> Shard::WatchersOf(WorldId world) const {
 WorldShard& Shard::WorldOf(const std::shared_ptr<World>& world) {
   std::unique_ptr<WorldShard>& entry = worlds_[world->id];
   if (entry == nullptr) {
+    std::erase_if(scratch_, [](const auto& item) { return item.second.expired(); });
+    std::weak_ptr<PoseScratch>& kept = scratch_[world->library.get()];
+    std::shared_ptr<PoseScratch> scratch = kept.lock();
+    if (scratch == nullptr) {
+      scratch = std::make_shared<PoseScratch>(world->library);
+      kept = scratch;
+    }
     entry = std::make_unique<WorldShard>(world, index_, shard_count(), config_.limits.max_queue,
-                                         clock_, budget_, metrics_, config_.limits.max_bulk_bytes);
+                                         clock_, budget_, metrics_, config_.limits.max_bulk_bytes,
+                                         std::move(scratch));
   }
   return *entry;
 }

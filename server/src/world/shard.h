@@ -129,6 +129,7 @@ class Shard : public SessionHost {
   std::vector<Inspection> questions_;
   std::vector<StatesQuestion> states_questions_;
   std::map<WorldId, std::unique_ptr<WorldShard>> worlds_;
+  std::map<const MotionLibrary*, std::weak_ptr<PoseScratch>> scratch_;  // of its worlds' libraries
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   std::map<WorldId, std::vector<Session*>> watchers_;  // sessions that want poses or events
   std::map<WorldId, Interest> told_interest_;          // what the other shards know of this one's

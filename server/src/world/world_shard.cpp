@@ -34,13 +34,16 @@ ReplyItem NoSuchAvatar(std::uint32_t index, AvatarNumber avatar, protocol::Reque
 
 WorldShard::WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
                        const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
-                       std::size_t max_bulk_bytes)
+                       std::size_t max_bulk_bytes, std::shared_ptr<PoseScratch> scratch)
     : world_(std::move(world)),
       shard_(shard),
       max_queue_(max_queue),
       clock_(clock),
       budget_(budget),
       metrics_(metrics),
+      ahead_(
+          scratch != nullptr ? std::move(scratch) : std::make_shared<PoseScratch>(world_->library),
+          world_->codes == nullptr ? nullptr : &world_->codes->codecs),
       interests_(static_cast<std::size_t>(shard_count)),
       max_bulk_bytes_(max_bulk_bytes),
       ground_(world_->ground.Get()) {}
@@ -291,7 +294,7 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
-    Avatar::AdvanceAll(advancing_, step_s);
+    Avatar::AdvanceStates(advancing_, step_s);
     ++step_;
     --more_steps_;
     if (movements_wanted_) TellMovements();
@@ -327,6 +330,18 @@ void WorldShard::SetInterest(const Interest& interest) {
       max_every_ = std::max({max_every_, every.whole, every.some});
     }
   }
+  // Compact poses of ticks that somebody has a use for.
+  std::vector<PoseMode> compact;
+  int ticks_apart = movement_places_wanted_ ? 1 : 0;
+  for (std::size_t mode = 0; mode < observed.size(); ++mode) {
+    if (!observed[mode]) continue;
+    if (protocol::IsCompact(kSentModes[mode])) compact.push_back(kSentModes[mode]);
+    for (const Interest& shard : interests_) {
+      const PoseInterest::Every& every = shard.poses[mode].every;
+      ticks_apart = std::gcd(ticks_apart, std::gcd<int>(every.whole, every.some));
+    }
+  }
+  ahead_.SetModes(compact, std::max(ticks_apart, 1));
   for (std::size_t mode = 0; mode < observed.size(); ++mode) {
     // Who wants avatars that are not here, or not any more, is told once.
     last_had_poses_[mode] =
@@ -532,18 +547,39 @@ bool WorldShard::HasRegionsOfSeveral(PoseMode mode) const {
   });
 }
 
+// Sees to it that these rows' avatars have their encoded poses of this step, and perhaps of some to come.
+void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
+  constexpr std::size_t kAhead = 16;
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  ahead_.Begin(step_, clock_.tick_s());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (i + kAhead < rows.size()) {
+      const Entry& later = *in_order[rows[i + kAhead]].entry;
+      later.avatar.PrefetchCourse();
+      ahead_.Prefetch(later.ahead);
+    }
+    Entry& entry = *in_order[rows[i]].entry;
+    ahead_.Ask(entry.ahead, entry.avatar);
+  }
+  ahead_.Finish(rows.size());
+}
+
+// Evaluates the poses of these rows' avatars.
+void WorldShard::ShowPoses(std::span<const std::uint32_t> rows) {
+  const std::span<const InOrder> in_order = AvatarsInOrder();
+  shown_.clear();
+  for (const std::uint32_t row : rows) shown_.push_back(&in_order[row].entry->avatar);
+  Avatar::ShowPoses(shown_, ahead_.evaluator());
+}
+
 std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
   if (places_ != nullptr && places_tick_ == tick) return places_;
   const std::span<const InOrder> in_order = AvatarsInOrder();
   auto places = std::make_shared<Places>();
   places->Begin(world_->interest_cell_m, in_order.size());
-  constexpr std::size_t kAhead = 4;
+  KeepPoses(all_rows_);
   for (std::size_t i = 0; i < in_order.size(); ++i) {
-    if (i + 2 * kAhead < in_order.size()) {
-      in_order[i + 2 * kAhead].entry->avatar.PrefetchWhereShown();
-    }
-    if (i + kAhead < in_order.size()) in_order[i + kAhead].entry->avatar.PrefetchShown();
-    const Vec3& root_m = in_order[i].entry->avatar.pose().root_position_m;
+    const Vec3 root_m = ahead_.RootOf(in_order[i].entry->ahead);
     places->Add(static_cast<std::uint32_t>(i), root_m.x, root_m.z);
   }
   places->Sort();
@@ -600,21 +636,28 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
        .joint_count = static_cast<std::uint16_t>(world_->library->skeleton().joint_count())},
       numbers_, world_->codes == nullptr ? nullptr : world_->codes->codecs.Find(mode));
   STRIDEWIRE_CHECK(begun.has_value());
-  constexpr std::size_t kAhead = 4;
+  const bool is_compact = protocol::IsCompact(mode);
+  if (is_compact) {
+    KeepPoses(wanted);
+  } else {
+    ShowPoses(wanted);
+  }
+  constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const Entry& entry = *in_order[wanted[i]].entry;
-    // In two strides: where a pose lies is told by the avatar.
-    if (i + 2 * kAhead < wanted.size()) {
-      in_order[wanted[i + 2 * kAhead]].entry->avatar.PrefetchWhereShown();
-    }
-    if (i + kAhead < wanted.size()) in_order[wanted[i + kAhead]].entry->avatar.PrefetchShown();
+    if (i + kAhead < wanted.size()) in_order[wanted[i + kAhead]].entry->avatar.PrefetchCourse();
     std::uint8_t flags = 0;
     // Long enough to stand in a batch of the observer who takes the fewest.
     if (tick < entry.spawn_tick + max_every_) flags |= protocol::kPoseDiscontinuity;
     if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
-    const ConstPoseSpan pose = entry.avatar.pose();
     rows.SkipTo(wanted[i]);
-    (void)rows.Add(flags, pose.root_position_m, pose.rotations);
+    if (is_compact) {
+      const PosesAhead::Encoded encoded = ahead_.Of(entry.ahead, mode);
+      rows.AddEncoded(flags, encoded.is_wide, encoded.bytes);
+    } else {
+      const ConstPoseSpan pose = entry.avatar.pose();
+      (void)rows.Add(flags, pose.root_position_m, pose.rotations);
+    }
   }
   rows.SkipTo(in_order.size());
   rows.Finish();

@@ -13,6 +13,7 @@
 #include "stridewire/runtime/avatar.h"
 #include "world/mail.h"
 #include "world/pose_frames.h"
+#include "world/poses_ahead.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
 
@@ -28,10 +29,11 @@ inline constexpr double kMaxSpawnHeadingRad = 10'000.0;
 /// An avatar takes about 10 KB and its queue (docs/SERVER.md, "Memory").
 class WorldShard {
  public:
-  /// Borrows budget and metrics.
+  /// Borrows budget and metrics. `scratch` is of the world's library and this thread's; null: one of its own.
   WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
              const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
-             std::size_t max_bulk_bytes = protocol::kMaxBulkBytes);
+             std::size_t max_bulk_bytes = protocol::kMaxBulkBytes,
+             std::shared_ptr<PoseScratch> scratch = nullptr);
   ~WorldShard();
   WorldShard(const WorldShard&) = delete;
   WorldShard& operator=(const WorldShard&) = delete;
@@ -86,6 +88,7 @@ class WorldShard {
     SessionId owner = 0;
     std::uint64_t spawn_tick = 0;
     double time_s = 0.0;  // avatar time, added up exactly as the avatar does
+    PosesAhead::Place ahead;
   };
   struct InOrder {
     AvatarNumber number;
@@ -105,6 +108,8 @@ class WorldShard {
   std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
   bool HasRegions(protocol::PoseMode mode) const;
   bool HasRegionsOfSeveral(protocol::PoseMode mode) const;
+  void KeepPoses(std::span<const std::uint32_t> rows);
+  void ShowPoses(std::span<const std::uint32_t> rows);
   std::shared_ptr<const Places> PlacesAt(std::uint64_t tick);
   std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const Places& places);
   void TellMovements();
@@ -119,6 +124,7 @@ class WorldShard {
   TickClock clock_;
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
+  PosesAhead ahead_;                       // before the avatars, whose places are in it
   std::map<AvatarNumber, Entry> avatars_;  // in order, so that batches and events are
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
@@ -148,6 +154,7 @@ class WorldShard {
   std::vector<protocol::Movements> movements_;  // of steps not taken yet
   std::shared_ptr<const Ground> ground_;        // null: flat
   std::deque<GroundPart> grounds_;              // from later ticks on
+  std::vector<Avatar*> shown_;                  // scratch
   // By mode.
   std::array<bool, kSentModes.size()> last_had_poses_{};
   std::array<RowsPool, kSentModes.size()> rows_;

@@ -15,6 +15,7 @@
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
+#include "stridewire/runtime/pose_stretch.h"
 #include "stridewire/runtime/request_plan.h"
 #include "stridewire/runtime/walk_planner.h"
 #include "stridewire/runtime/way_planner.h"
@@ -140,13 +141,19 @@ class Avatar {
 
   /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
   /// bit of any pose depends on who else is there.
-  static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s);
+  static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
+                         StretchEvaluator& evaluator);
+
+  /// AdvanceAll but for the poses, for who has them evaluated otherwise (PoseStretch): pose() is none of now until
+  /// ShowPose.
+  static void AdvanceStates(std::span<Avatar* const> avatars, double dt_s);
+  /// Evaluates pose().
+  void ShowPose();
+  /// The same for many avatars of one library together.
+  static void ShowPoses(std::span<Avatar* const> avatars, StretchEvaluator& evaluator);
 
   /// Displayed, in the world.
   [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
-  /// For who reads the poses of many: asks for the memory of pose() and idle(), and before that for where it is.
-  void PrefetchWhereShown() const;
-  void PrefetchShown() const;
   [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
   /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or SetLayer it is that of
   /// pose().
@@ -165,6 +172,11 @@ class Avatar {
   /// The movement under way, null while standing; valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
+  /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as it stays, all that is
+  /// displayed but layers follows from movement() and its time, or stands still.
+  [[nodiscard]] std::uint64_t course() const { return course_; }
+  /// For who asks many: course(), movement(), layers() and idle() are read soon.
+  void PrefetchCourse() const;
   /// The kStarted event of the movement or requested stand under way, null while just standing.
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
@@ -220,6 +232,7 @@ class Avatar {
   double moved_until_s_ = -1.0;  // avatar time
   double time_s_ = 0.0;          // avatar time
   double movement_time_s_ = 0.0;
+  std::uint64_t course_ = 0;
   AvatarChange change_;       // of the last Advance
   AvatarChange next_change_;  // told with the next
 

@@ -4,7 +4,6 @@
 #include <memory>
 #include <optional>
 
-#include "stridewire/runtime/evaluate_poses.h"
 #include "stridewire/runtime/foot_planner.h"
 #include "stridewire/runtime/layer_stack.h"
 #include "stridewire/runtime/motion_library.h"
@@ -18,8 +17,7 @@ struct AvatarBody {
   explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  Pose pose;        ///< Displayed, but for layers
-  GridCache cache;  ///< Of the movement
+  Pose pose;  ///< Displayed, but for layers
   LayerStack layers;
   Pose layered_pose;  ///< With layers, if there are any; of no size before the first
   bool has_layers = false;
@@ -63,7 +61,7 @@ struct AvatarBody {
   void ShowLayers();
 
  private:
-  void KeepFeetGoing(bool keeps_speed);
+  void KeepFeetGoing(bool keeps_speed, GridCache& cache);
   template <typename Landing>
   void JoinTo(const Landing& landing, bool keeps_speed);
 };

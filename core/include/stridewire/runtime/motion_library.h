@@ -92,6 +92,9 @@ struct GridLayout {
   }
 };
 
+/// The longest row of a grid.
+inline constexpr std::size_t kMaxRowFloats = 4 * (static_cast<std::size_t>(kMaxJoints) + 8);
+
 /// Examples that can be blended with each other: one kind, one set of parameters, the same number
 /// of keytimes, one grid. All spans point into the library's bytes.
 ///

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+
+/// Poses side by side, one a lane: as vectors make, plant and encode them.
+class PoseLanes {
+ public:
+  static constexpr std::size_t kLanes = 16;
+
+  explicit PoseLanes(int joint_count) : numbers_(3 + 4 * static_cast<std::size_t>(joint_count)) {}
+
+  [[nodiscard]] std::size_t joint_count() const { return (numbers_.size() - 3) / 4; }
+  /// [x y z][kLanes], in the world.
+  [[nodiscard]] float* roots_m() { return numbers_[0].of; }
+  [[nodiscard]] const float* roots_m() const { return numbers_[0].of; }
+  /// [joint][x y z w][kLanes].
+  [[nodiscard]] float* rotations() { return numbers_[0].of + 3 * kLanes; }
+  [[nodiscard]] const float* rotations() const { return numbers_[0].of + 3 * kLanes; }
+
+  [[nodiscard]] Vec3 root_m(std::size_t lane) const {
+    return {numbers_[0].of[lane], numbers_[1].of[lane], numbers_[2].of[lane]};
+  }
+  /// One of them; `pose` has joint_count() rotations.
+  void Get(std::size_t lane, PoseSpan pose) const;
+  void Set(std::size_t lane, ConstPoseSpan pose);
+
+ private:
+  // A line of the cache.
+  struct alignas(64) Numbers {
+    float of[kLanes] = {};
+  };
+  std::vector<Numbers> numbers_;
+};
+
+}  // namespace stridewire

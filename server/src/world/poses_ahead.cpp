@@ -1,0 +1,223 @@
+#include "world/poses_ahead.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+#include "stridewire/base/check.h"
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire::server {
+
+using protocol::PoseMode;
+
+namespace {
+
+constexpr std::size_t kRootBytes = sizeof(Vec3);
+constexpr unsigned kModes = 4;  // bits of each kind in Kept::flags
+
+}  // namespace
+
+PoseScratch::PoseScratch(std::shared_ptr<const MotionLibrary> of_library)
+    : library(std::move(of_library)),
+      evaluator(*library, static_cast<int>(PosesAhead::kMost)),
+      taken(library->skeleton().joint_count()),
+      pose(library->skeleton().joint_count()) {}
+
+PosesAhead::PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs)
+    : scratch_(std::move(scratch)),
+      codecs_(codecs),
+      pose_bytes_(kRootBytes),
+      wide_bytes_(protocol::PoseBytes(PoseMode::kQuantised, scratch_->taken.joint_count())) {}
+
+void PosesAhead::SetModes(std::span<const PoseMode> compact_modes, int ticks_apart) {
+  STRIDEWIRE_CHECK(compact_modes.size() <= kModes && ticks_apart >= 1);
+  std::vector<Mode> modes;
+  std::size_t at = kRootBytes;
+  for (const PoseMode mode : compact_modes) {
+    const protocol::CompactCodec* codec = codecs_ == nullptr ? nullptr : codecs_->Find(mode);
+    if (codec == nullptr) continue;
+    modes.push_back({mode, codec, at});
+    at += codec->pose_bytes();
+  }
+  const bool is_same = ticks_apart == ticks_apart_ &&
+                       std::ranges::equal(modes, modes_, {}, &Mode::mode, &Mode::mode);
+  if (is_same) return;
+  modes_ = std::move(modes);
+  pose_bytes_ = at;
+  ticks_apart_ = ticks_apart;
+  ++layout_;
+  for (std::vector<std::byte>& plane : planes_) {
+    plane.clear();
+    plane.resize(kept_.size() * pose_bytes_);
+    plane.shrink_to_fit();
+  }
+}
+
+void PosesAhead::Begin(std::uint64_t step, double step_s) {
+  STRIDEWIRE_CHECK(wanted_.empty() && taken_count_ == 0);
+  step_ = step;
+  plane_ = static_cast<std::uint8_t>(step / static_cast<std::uint64_t>(ticks_apart_) % kMost);
+  step_s_ = step_s;
+}
+
+void PosesAhead::MakePlace(Place& place) {
+  if (place.of_ != nullptr) return;
+  if (free_.empty()) {
+    // By a quarter: planes are large.
+    const std::size_t first = kept_.size();
+    const std::size_t places = std::max<std::size_t>(kPlacesOfATurn, first + first / 4);
+    kept_.reserve(places);
+    kept_.resize(places);
+    for (std::vector<std::byte>& plane : planes_) {
+      plane.reserve(places * pose_bytes_);
+      plane.resize(places * pose_bytes_);
+    }
+    // The lowest are taken first, so that places follow the order of avatars.
+    for (std::size_t i = places; i > first; --i) free_.push_back(static_cast<std::uint32_t>(i - 1));
+  }
+  place.of_ = this;
+  place.index_ = free_.back();
+  free_.pop_back();
+}
+
+void PosesAhead::Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays) {
+  Kept& kept = kept_[place];
+  kept.course = course;
+  kept.first_step = step_;
+  kept.layout = layout_;
+  kept.count = static_cast<std::uint8_t>(count);
+  kept.first_plane = plane_;
+  kept.stays = stays;
+  kept.flags = {};
+  if (kept.wide != nullptr) kept.wide->clear();
+}
+
+void PosesAhead::Ask(Place& place, Avatar& avatar) {
+  // Layers go on by themselves, whatever the avatar does.
+  const bool has_layers = !avatar.layers().empty();
+  if (!has_layers && Has(place, avatar.course())) return;
+  if (const Movement* movement = avatar.movement(); movement != nullptr && !has_layers) {
+    Want(place, avatar.course(), *movement, avatar.movement_time_s());
+    return;
+  }
+  avatar.ShowPose();
+  Take(place, avatar.course(), avatar.pose(), !has_layers);
+}
+
+void PosesAhead::Want(Place& place, std::uint64_t course, const Movement& movement, double time_s) {
+  MakePlace(place);
+  const std::size_t turn = place.index_ / kPlacesOfATurn;
+  const auto most = static_cast<int>(kMost - (plane_ + turn) % kMost);
+  const int count = StretchCount(movement, time_s, step_s_, ticks_apart_, most);
+  kept_[place.index_].course = course;
+  wanted_.push_back({place.index_,
+                     count,
+                     {&movement, time_s, step_s_, ticks_apart_},
+                     most == static_cast<int>(kMost)});
+  wanted_poses_ += static_cast<std::size_t>(count);
+}
+
+void PosesAhead::Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays) {
+  MakePlace(place);
+  Start(place.index_, course, 1, stays);
+  scratch_->taken.Set(taken_count_, pose);
+  taken_for_[taken_count_++] = place.index_;
+  if (taken_count_ == kLanes) KeepTaken();
+}
+
+void PosesAhead::KeepTaken() {
+  Keep(scratch_->taken, std::span(taken_for_).first(taken_count_), 0);
+  taken_count_ = 0;
+}
+
+void PosesAhead::Finish(std::size_t shown) {
+  if (taken_count_ > 0) KeepTaken();
+  // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it was sent elsewhere,
+  // those whose turn it is not get one only: a tick makes hardly more than two poses an avatar.
+  const bool is_crowd_new = wanted_poses_ > 2 * shown + kLanes * kMost;
+  for (Wanted& wanted : wanted_) {
+    if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
+    Start(wanted.place, kept_[wanted.place].course, static_cast<std::size_t>(wanted.count), false);
+    scratch_->queue.Add(wanted.stretch, wanted.count, wanted.place);
+  }
+  wanted_.clear();
+  wanted_poses_ = 0;
+  std::array<std::uint32_t, kLanes> places;
+  scratch_->queue.Evaluate(scratch_->evaluator, [&](std::span<const StretchQueue::Item> items,
+                                                    int pose, const PoseLanes& lanes) {
+    for (std::size_t i = 0; i < items.size(); ++i) {
+      places[i] = pose < items[i].count ? items[i].tag : kNobody;
+    }
+    Keep(lanes, std::span(places).first(items.size()), static_cast<std::size_t>(pose));
+  });
+}
+
+void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places,
+                      std::size_t pose) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (places[i] == kNobody) continue;
+    const Vec3 root_m = lanes.root_m(i);
+    std::memcpy(BytesOf(places[i], pose), &root_m, kRootBytes);
+  }
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    const Mode& mode = modes_[m];
+    mode.codec->Encode({lanes.roots_m(), lanes.rotations(), places.size()}, scratch_->block);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i] == kNobody) continue;
+      if (scratch_->block.fits(i)) {
+        scratch_->block.CopyBytes(i,
+                                  {BytesOf(places[i], pose) + mode.at, mode.codec->pose_bytes()});
+      } else {
+        KeepWide(lanes, i, kept_[places[i]], pose, m);
+      }
+    }
+  }
+}
+
+void PosesAhead::KeepWide(const PoseLanes& lanes, std::size_t lane, Kept& kept, std::size_t pose,
+                          std::size_t mode) {
+  lanes.Get(lane, scratch_->pose);
+  if (kept.wide == nullptr) kept.wide = std::make_unique<std::vector<std::byte>>();
+  const std::size_t at = kept.wide->size();
+  kept.wide->resize(at + wide_bytes_);
+  const bool is_told =
+      protocol::EncodePose(PoseMode::kQuantised, scratch_->pose.root_position_m,
+                           scratch_->pose.rotations, std::span(*kept.wide).subspan(at))
+          .has_value();
+  if (!is_told) kept.wide->resize(at);
+  kept.flags[pose] |= static_cast<std::uint8_t>(1u << (is_told ? mode : mode + kModes));
+}
+
+PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
+  STRIDEWIRE_CHECK(place.of_ == this);
+  const Kept& kept = kept_[place.index_];
+  const std::size_t pose = PoseOf(kept);
+  std::size_t m = 0;
+  while (m < modes_.size() && modes_[m].mode != mode) ++m;
+  STRIDEWIRE_CHECK(m < modes_.size() && pose < kept.count);
+  const unsigned flags = kept.flags[pose];
+  if (flags == 0) {
+    return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
+  }
+  if ((flags >> (m + kModes) & 1u) != 0) return {};
+  if ((flags >> m & 1u) == 0) {
+    return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
+  }
+  // Behind those of the poses before, and of the modes before.
+  constexpr unsigned kWide = (1u << kModes) - 1;
+  auto before = static_cast<std::size_t>(std::popcount(flags & kWide & ((1u << m) - 1)));
+  for (std::size_t p = 0; p < pose; ++p) {
+    before += static_cast<std::size_t>(std::popcount(kept.flags[p] & kWide));
+  }
+  return {std::span(*kept.wide).subspan(before * wide_bytes_, wide_bytes_), true};
+}
+
+Vec3 PosesAhead::RootOf(const Place& place) const {
+  Vec3 root_m;
+  std::memcpy(&root_m, BytesOf(place.index_, PoseOf(kept_[place.index_])), kRootBytes);
+  return root_m;
+}
+
+}  // namespace stridewire::server

@@ -1,0 +1,186 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "stridewire/protocol/compact_codecs.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/stretch_queue.h"
+
+namespace stridewire::server {
+
+/// What poses of a library are evaluated and encoded in. One serves all worlds of a thread.
+struct PoseScratch {
+  explicit PoseScratch(std::shared_ptr<const MotionLibrary> of_library);
+
+  std::shared_ptr<const MotionLibrary> library;
+  StretchEvaluator evaluator;  ///< Of PosesAhead::kMost
+  StretchQueue queue;
+  PoseLanes taken;
+  Pose pose;
+  protocol::CompactCodec::Block block;
+};
+
+/// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
+/// is made of is brought into the cache, blended and unpacked once in kMost ticks; in each tick its turn is other
+/// avatars'. Who is sent elsewhere meanwhile is evaluated anew. One a world and shard; not thread-safe.
+///
+///   ahead.Begin(step, step_s);
+///   for each avatar: ahead.Ask(place, avatar)
+///   ahead.Finish(avatars);
+///   for each avatar: … ahead.Of(place, mode) …
+///
+/// What is kept of a tick lies together, in the order of places:
+///
+///   tick 16   [ avatar 0: root, pose in each mode ][ avatar 1 ] …     one plane for each of kMost ticks,
+///   tick 17   [ avatar 0 ][ avatar 1 ] …                              used again and again
+///   …
+///   standing  [ avatar 0 ][ avatar 1 ] …                              of who stands, for all ticks
+class PosesAhead {
+ public:
+  static constexpr std::size_t kMost = 8;
+
+  /// Where an avatar's poses are kept. Given back when the avatar goes, before PosesAhead does.
+  class Place {
+   public:
+    Place() = default;
+    ~Place() {
+      if (of_ != nullptr) of_->free_.push_back(index_);
+    }
+    Place(Place&& other) noexcept : of_(std::exchange(other.of_, nullptr)), index_(other.index_) {}
+    Place& operator=(Place&& other) noexcept {
+      std::swap(of_, other.of_);
+      std::swap(index_, other.index_);
+      return *this;
+    }
+
+   private:
+    friend class PosesAhead;
+    PosesAhead* of_ = nullptr;
+    std::uint32_t index_ = 0;
+  };
+
+  /// `codecs` may be null: of a world without compact poses only roots are kept. They outlive it.
+  PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
+  PosesAhead(const PosesAhead&) = delete;
+  PosesAhead& operator=(const PosesAhead&) = delete;
+
+  /// In which modes poses are told, and every how many ticks. What was kept for others is nothing any more.
+  void SetModes(std::span<const protocol::PoseMode> compact_modes, int ticks_apart);
+
+  /// The step that poses are asked for from now on, and how long steps are.
+  void Begin(std::uint64_t step, double step_s);
+
+  /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is until then.
+  void Ask(Place& place, Avatar& avatar);
+
+  // What Ask does, for who has no avatar.
+  /// Poses of this step are there already.
+  [[nodiscard]] bool Has(const Place& place, std::uint64_t course) const {
+    if (place.of_ == nullptr) return false;
+    const Kept& kept = kept_[place.index_];
+    return kept.course == course && kept.layout == layout_ &&
+           (kept.stays || PoseOf(kept) < kept.count);
+  }
+  /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where it is until Finish.
+  void Want(Place& place, std::uint64_t course, const Movement& movement, double time_s);
+  /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at any more.
+  void Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays);
+
+  /// Now they are there. `shown`: how many avatars are shown in this step, those that had their poses among them.
+  void Finish(std::size_t shown);
+
+  struct Encoded {
+    std::span<const std::byte> bytes;  ///< Empty: the pose can not be told
+    bool is_wide = false;              ///< As in kQuantised (kPoseWide)
+  };
+  /// This step's, of who has it. `mode` is one of SetModes.
+  [[nodiscard]] Encoded Of(const Place& place, protocol::PoseMode mode) const;
+  [[nodiscard]] Vec3 RootOf(const Place& place) const;
+  /// Asks for the memory that Has and Of read.
+  void Prefetch(const Place& place) const {
+    if (place.of_ != nullptr) __builtin_prefetch(&kept_[place.index_]);
+  }
+
+  [[nodiscard]] StretchEvaluator& evaluator() { return scratch_->evaluator; }
+
+ private:
+  static constexpr std::size_t kLanes = PoseLanes::kLanes;
+  static constexpr std::size_t kStanding = kMost;  // plane
+  // Places that lie together have their turns together: what is written then does, too.
+  static constexpr std::uint32_t kPlacesOfATurn = 64;
+  struct Mode {
+    protocol::PoseMode mode;
+    const protocol::CompactCodec* codec;
+    std::size_t at;  // in the bytes of a pose
+  };
+  // What is known of the poses of one place: a line of the cache.
+  struct alignas(64) Kept {
+    std::uint64_t course = 0;      // they follow from
+    std::uint64_t first_step = 0;  // of the world
+    std::uint32_t layout = 0;      // 0: nothing is kept
+    std::uint8_t count = 0;
+    std::uint8_t first_plane = 0;
+    bool stays = false;
+    // [pose]: bit m: that of mode m is wide; m + 4: there is none
+    std::array<std::uint8_t, kMost> flags{};
+    std::unique_ptr<std::vector<std::byte>> wide;  // by pose and mode; null: none yet
+  };
+  struct Wanted {
+    std::uint32_t place;
+    int count;
+    PoseStretch stretch;
+    bool is_its_turn;
+  };
+
+  // Which of those kept is of this step; more than there are if none.
+  [[nodiscard]] std::size_t PoseOf(const Kept& kept) const {
+    if (kept.stays) return 0;
+    const std::uint64_t steps = step_ - kept.first_step;
+    const auto apart = static_cast<std::uint64_t>(ticks_apart_);
+    return apart == 1 ? steps : steps % apart == 0 ? steps / apart : kMost;
+  }
+  [[nodiscard]] std::size_t PlaneOf(const Kept& kept, std::size_t pose) const {
+    return kept.stays ? kStanding : (kept.first_plane + pose) % kMost;
+  }
+  [[nodiscard]] const std::byte* BytesOf(std::uint32_t place, std::size_t pose) const {
+    return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
+  }
+  [[nodiscard]] std::byte* BytesOf(std::uint32_t place, std::size_t pose) {
+    return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
+  }
+  void MakePlace(Place& place);
+  void Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays);
+  void KeepTaken();
+  // Encodes poses side by side and keeps them; of kNobody nothing is kept.
+  static constexpr std::uint32_t kNobody = ~0u;
+  void Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places, std::size_t pose);
+  void KeepWide(const PoseLanes& lanes, std::size_t lane, Kept& kept, std::size_t pose,
+                std::size_t mode);
+
+  std::shared_ptr<PoseScratch> scratch_;
+  const protocol::CompactCodecs* codecs_;
+  std::vector<Mode> modes_;
+  std::size_t pose_bytes_;  // of a pose in all modes
+  std::size_t wide_bytes_;
+  int ticks_apart_ = 1;
+  std::uint32_t layout_ = 1;
+  std::uint64_t step_ = 0;
+  std::uint8_t plane_ = 0;  // of this step
+  double step_s_ = 0.0;
+
+  std::vector<Kept> kept_;                                // [place]
+  std::array<std::vector<std::byte>, kMost + 1> planes_;  // [place]: pose_bytes_ each
+  std::vector<std::uint32_t> free_;                       // places of nobody
+
+  std::vector<Wanted> wanted_;
+  std::size_t wanted_poses_ = 0;
+  std::array<std::uint32_t, kLanes> taken_for_{};
+  std::size_t taken_count_ = 0;
+};
+
+}  // namespace stridewire::server

@@ -1,0 +1,188 @@
+#include "world/poses_ahead.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <numeric>
+#include <vector>
+
+#include "captured_library.h"
+#include "drawn_requests.h"
+#include "stridewire/protocol/pose_rows.h"
+#include "world/pose_codes.h"
+
+namespace stridewire::server {
+namespace {
+
+using protocol::PoseMode;
+
+constexpr std::size_t kCrowd = 30;
+
+// Poses encoded tick by tick, of avatars that evaluate each of their own.
+class Encoder {
+ public:
+  explicit Encoder(const PoseCodes& codes) : codes_(codes) {
+    std::vector<protocol::AvatarNumber> numbers(kCrowd);
+    std::iota(numbers.begin(), numbers.end(), 1u);
+    numbers_ = std::make_shared<const std::vector<protocol::AvatarNumber>>(std::move(numbers));
+  }
+
+  const protocol::PoseRows& Encode(PoseMode mode, std::span<const Avatar> avatars) {
+    protocol::PoseBatchInfo info;
+    info.world = 1;
+    info.mode = mode;
+    info.joint_count = static_cast<std::uint16_t>(codes_.joints.size());
+    EXPECT_TRUE(rows_.Begin(info, numbers_, codes_.codecs.Find(mode)));
+    for (const Avatar& avatar : avatars) {
+      EXPECT_TRUE(rows_.Add(0, avatar.pose().root_position_m, avatar.pose().rotations));
+    }
+    rows_.Finish();
+    return rows_;
+  }
+
+ private:
+  const PoseCodes& codes_;
+  protocol::PoseRows::Avatars numbers_;
+  protocol::PoseRows rows_;
+};
+
+// Two crowds that are asked for the same: one evaluates every pose, the other is told ahead.
+class Ahead {
+ public:
+  Ahead(const std::shared_ptr<const MotionLibrary>& library, unsigned seed,
+        std::shared_ptr<const PoseCodes> codes = nullptr)
+      : codes_(codes != nullptr ? std::move(codes) : MakePoseCodes(*library)),
+        eager_(library, kCrowd, seed),
+        told_(library, kCrowd, seed),
+        poses_(std::make_shared<PoseScratch>(library), &codes_->codecs),
+        places_(kCrowd),
+        encoder_(*codes_) {}
+
+  PosesAhead& poses() { return poses_; }
+  std::vector<PosesAhead::Place>& places() { return places_; }
+
+  void Advance() {
+    eager_.Advance();
+    told_.AdvanceStates();
+    ++step_;
+  }
+
+  // Asks for all poses of this step and holds them against those of the others.
+  void Compare(std::span<const PoseMode> modes) {
+    poses_.Begin(step_, 1.0 / 60.0);
+    for (std::size_t i = 0; i < kCrowd; ++i) {
+      const Avatar& avatar = told_.avatars()[i];
+      found_ += avatar.layers().empty() && avatar.movement() != nullptr &&
+                poses_.Has(places_[i], avatar.course());
+      poses_.Ask(places_[i], told_.avatars()[i]);
+    }
+    poses_.Finish(kCrowd);
+    for (std::size_t i = 0; i < kCrowd; ++i) {
+      ASSERT_EQ(poses_.RootOf(places_[i]), eager_.avatars()[i].pose().root_position_m)
+          << "step " << step_ << ", avatar " << i;
+    }
+    for (const PoseMode mode : modes) {
+      const protocol::PoseRows& rows = encoder_.Encode(mode, eager_.avatars());
+      for (std::size_t i = 0; i < kCrowd; ++i) {
+        const PosesAhead::Encoded told = poses_.Of(places_[i], mode);
+        ASSERT_TRUE(std::ranges::equal(told.bytes, rows.poses(i, i)))
+            << "step " << step_ << ", avatar " << i << ", mode " << static_cast<int>(mode);
+        ASSERT_EQ(told.is_wide, (rows.flags(i) & protocol::kPoseWide) != 0);
+        wide_ += told.is_wide;
+        ++poses_compared_;
+      }
+    }
+  }
+
+  [[nodiscard]] int wide() const { return wide_; }
+  [[nodiscard]] int found() const { return found_; }  // of poses of movements, made before
+  [[nodiscard]] int compared() const { return poses_compared_; }
+
+ private:
+  std::shared_ptr<const PoseCodes> codes_;
+  DrawnCrowd eager_;
+  DrawnCrowd told_;
+  PosesAhead poses_;
+  std::vector<PosesAhead::Place> places_;
+  Encoder encoder_;
+  std::uint64_t step_ = 100;
+  int wide_ = 0;
+  int found_ = 0;
+  int poses_compared_ = 0;
+};
+
+constexpr std::array kAll{PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot};
+
+// Codes by which a bent knee can not be told.
+std::shared_ptr<const PoseCodes> CodesForStraightKnees(const MotionLibrary& library) {
+  auto codes = std::make_shared<PoseCodes>(*MakePoseCodes(library));
+  std::vector<std::int16_t> parents;
+  for (const Joint& joint : library.skeleton().joints) {
+    parents.push_back(static_cast<std::int16_t>(joint.parent));
+  }
+  for (const Leg& leg : library.skeleton().legs) {
+    codes->joints[static_cast<std::size_t>(leg.knee)].least_w = 0.98f;
+  }
+  codes->codecs =
+      protocol::CompactCodecs::Make(codes->joints, parents, codes->fewer_joints).value();
+  return codes;
+}
+
+TEST(PosesAhead, AreTheBytesOfEachTicksOwn) {
+  constexpr unsigned kSeed = 20261124;
+  SCOPED_TRACE(testing::Message() << "seed " << kSeed);
+  const auto library = LibraryOf({});
+  for (const bool has_wide : {false, true}) {
+    Ahead ahead(library, kSeed, has_wide ? CodesForStraightKnees(*library) : nullptr);
+    ahead.poses().SetModes(kAll, 1);
+    for (int tick = 0; tick < 400; ++tick) {
+      ahead.Advance();
+      ahead.Compare(kAll);
+      if (HasFatalFailure()) return;
+    }
+    std::printf("%d poses, %d wide; of movements %d made in an earlier tick\n", ahead.compared(),
+                ahead.wide(), ahead.found());
+    EXPECT_GT(ahead.found(), 2000);
+    if (has_wide) {
+      EXPECT_GT(ahead.wide(), 1000);
+    }
+  }
+}
+
+TEST(PosesAhead, AreThoseOfTheTicksThatAreWanted) {
+  Ahead ahead(LibraryOf({}), 5);
+  int apart = 1;
+  std::span<const PoseMode> modes;
+  for (int tick = 0; tick < 600; ++tick) {
+    if (tick % 100 == 0) {
+      apart = std::array{1, 3, 2, 7, 1, 4}[static_cast<std::size_t>(tick / 100)];
+      modes = std::span(kAll).first(static_cast<std::size_t>(tick / 100 % 4));
+      ahead.poses().SetModes(modes, apart);
+    }
+    ahead.Advance();
+    // Now and then one is left out.
+    if (tick % apart != 0 || tick % 37 == 0) continue;
+    ahead.Compare(modes);
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(ahead.found(), 500);
+}
+
+TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
+  Ahead ahead(LibraryOf({}), 6);
+  ahead.poses().SetModes(kAll, 1);
+  for (std::size_t tick = 0; tick < 200; ++tick) {
+    ahead.Advance();
+    for (std::size_t i = 0; i < kCrowd; i += 3) {
+      if ((tick + i) % 5 != 0) continue;
+      // The place given back last is the next one's.
+      ahead.places()[i] = {};
+      ahead.places()[(i + 7) % kCrowd] = {};
+    }
+    ahead.Compare(kAll);
+    if (HasFatalFailure()) return;
+  }
+}
+
+}  // namespace
+}  // namespace stridewire::server
