@@ -163,12 +163,17 @@ class Crowd {
   }
 
   void Advance() {
+    AdvanceStates();
+    Avatar::ShowPoses(all_, evaluator_);
+  }
+  /// Without poses.
+  void AdvanceStates() {
     for (Avatar& avatar : avatars_) {
       if (avatar.queue_size() < 2) Refill(avatar);
     }
     all_.clear();
     for (Avatar& avatar : avatars_) all_.push_back(&avatar);
-    Avatar::AdvanceAll(all_, kTickS, evaluator_);
+    Avatar::AdvanceStates(all_, kTickS);
   }
 
   [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
@@ -190,6 +195,13 @@ class Crowd {
 void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {
   Crowd crowd(library, count, {.foot_planting = plants_feet});
   for (auto _ : state) crowd.Advance();
+  state.SetItemsProcessed(state.iterations() * count);
+}
+
+/// What a tick costs beside the poses: movements ended, planned and begun.
+void AdvanceStates(benchmark::State& state, const Library& library, int count) {
+  Crowd crowd(library, count);
+  for (auto _ : state) crowd.AdvanceStates();
   state.SetItemsProcessed(state.iterations() * count);
 }
 
@@ -447,6 +459,7 @@ void RegisterAll(const std::string& path, const Library& library) {
   }
   for (const int count : {1000, 10000}) {
     Register(name + "/advance_crowd/" + std::to_string(count), AdvanceCrowd, library, count, true);
+    Register(name + "/advance_states/" + std::to_string(count), AdvanceStates, library, count);
   }
   Register(name + "/advance_crowd_unplanted/1000", AdvanceCrowd, library, kCrowd, false);
   RegisterCrowd(name, library);

@@ -76,46 +76,69 @@ class Planner {
     }
     return feet;
   }
-  FeetAt Blended(double time_s) {
-    EvaluateBlend(group_, library_.layout(), movement_, time_s, cache_, pose_);
-    return FeetOf(pose_);
-  }
   FeetAt Eased(double time_s) {
     EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
     return FeetOf(pose_);
+  }
+  // Mostly it is about one foot, or about balls alone: a heading costs more than all the rest.
+  BlendedFoot EasedFoot(double time_s, Foot foot) {
+    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+    LegPose leg;
+    EvaluateLeg(skeleton_, rig_, pose_, foot, leg);
+    return FootOf(rig_, foot, DVec3(pose_.root_position_m), leg);
+  }
+  DVec3 Ball(Foot foot) const {
+    return DVec3(pose_.root_position_m) + DVec3(BallOfLeg(skeleton_, rig_, pose_, foot));
+  }
+  DVec3 EasedBall(double time_s, Foot foot) {
+    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+    return Ball(foot);
+  }
+  // From one ball to the other where the blend ends.
+  DVec3 EndVector(Foot from, Foot to) {
+    EvaluateBlend(group_, library_.layout(), movement_, movement_.duration_s(), cache_, pose_);
+    return Ball(to) - Ball(from);
   }
 
   // The base below which the feet that stay stand where they do.
   void HangBase(const FootHolds& holds, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
-    const FeetAt start = Blended(0.0);
-    std::array<double, 2> lowest_m{start[0].ball_m.y, start[1].ball_m.y};
+    std::array<DVec3, 2> start_m;
+    std::array<double, 2> lowest_m;
+    EvaluateBlend(group_, library_.layout(), movement_, 0.0, cache_, pose_);
+    for (const Foot foot : staying) {
+      const auto f = static_cast<std::size_t>(foot);
+      start_m[f] = Ball(foot);
+      lowest_m[f] = start_m[f].y;
+    }
     for (const double part : kStanceSamples) {
-      const FeetAt feet = Blended(part * stance_end_s);
-      for (std::size_t f = 0; f < 2; ++f) lowest_m[f] = std::min(lowest_m[f], feet[f].ball_m.y);
+      EvaluateBlend(group_, library_.layout(), movement_, part * stance_end_s, cache_, pose_);
+      for (const Foot foot : staying) {
+        const auto f = static_cast<std::size_t>(foot);
+        lowest_m[f] = std::min(lowest_m[f], Ball(foot).y);
+      }
     }
     DVec3 position(0.0);
     for (const Foot foot : staying) {
       const auto f = static_cast<std::size_t>(foot);
       const DVec3 stands = holds[f].print.position_m;
-      position += DVec3(stands.x - start[f].ball_m.x,
+      position += DVec3(stands.x - start_m[f].x,
                         stands.y + rig_.sides[f].ball_height_m +
                             SlopeRise(rig_.sides[f], holds[f].normal) - lowest_m[f],
-                        stands.z - start[f].ball_m.z);
+                        stands.z - start_m[f].z);
     }
     movement_.base.position_m = position / static_cast<double>(staying.size());
   }
 
-  // Where and how the moving foot of a step lands; where the eased pose has the feet then.
-  FeetAt ChooseLanding(const FootHolds& holds, const LandingWish& wish, Foot moving) {
+  // Where and how the moving foot of a step lands; where the eased pose has it then.
+  BlendedFoot ChooseLanding(const FootHolds& holds, const LandingWish& wish, Foot moving) {
     const RequestPlan& request = wish.request;
     FootPlan& plan = movement_.feet;
     const auto m = static_cast<std::size_t>(moving);
     const std::size_t x = 1 - m;
     const double end_heading_rad =
         movement_.base.heading_rad + movement_.heading_change_rad + movement_.steer_rad;
-    const FeetAt end = Blended(movement_.duration_s());
-    const DVec3 blended = RotateYaw(-end_heading_rad, end[m].ball_m - end[x].ball_m);
+    const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
     // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
     const double aside_m =
         std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement_.base.position_m).x,
@@ -131,8 +154,8 @@ class Planner {
     const double rise_m = vector.y;
     track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
     double turn_rad = 0.0;
-    const FeetAt landing = Eased(track.land_s);
-    const double landing_rad = landing[m].heading_rad;
+    const BlendedFoot landing = EasedFoot(track.land_s, moving);
+    const double landing_rad = landing.heading_rad;
     if (request.exact) {
       DVec3 residual = request.exact->position_m - track.to.position_m;
       const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
@@ -166,38 +189,35 @@ class Planner {
 
   // Where the feet of a jump land.
   std::array<DVec3, 2> ChooseJumpLanding(const FootHolds& holds, const RequestPlan& request) {
-    const FeetAt end = Blended(movement_.duration_s());
     const DVec3 centre =
         0.5 * (holds[0].print.position_m + holds[1].print.position_m) +
         RotateYaw(movement_.base.heading_rad,
                   DVec3(0.0, ValueOr(group_, request.applied, ParameterName::kHeight, 0.0),
                         ValueOr(group_, request.applied, ParameterName::kLength, 0.0)));
-    const DVec3 apart = 0.5 * (end[0].ball_m - end[1].ball_m);
+    const DVec3 apart = 0.5 * EndVector(Foot::kRight, Foot::kLeft);
     const DVec3 flat(apart.x, 0.0, apart.z);
     return {centre + 1.0 * flat, centre + -1.0 * flat};
   }
 
   // Offsets and their velocities at release and landing, so that the way between is smooth.
-  void JoinSwing(Foot foot, const FeetAt& landing, FootTrack& track) {
-    const auto f = static_cast<std::size_t>(foot);
+  void JoinSwing(Foot foot, const BlendedFoot& landing, FootTrack& track) {
     const auto velocity_at = [&](double time_s) {
       const double from_s = std::max(0.0, time_s - kVelocityStepS);
       const double to_s = std::min(movement_.duration_s(), time_s + kVelocityStepS);
-      return (Eased(to_s)[f].ball_m - Eased(from_s)[f].ball_m) / (to_s - from_s);
+      return (EasedBall(to_s, foot) - EasedBall(from_s, foot)) / (to_s - from_s);
     };
     track.release_velocity_m_s = -velocity_at(track.release_s);
-    const BlendedFoot released = Eased(track.release_s)[f];
+    const BlendedFoot released = EasedFoot(track.release_s, foot);
     track.release_offset_m = track.from.position_m - released.ball_m;
     const FootCorrection at_release = CorrectFoot(movement_, foot, track.release_s, released);
     track.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
     track.land_velocity_m_s = -velocity_at(track.land_s);
-    track.land_offset_m = track.to.position_m - landing[f].ball_m;
+    track.land_offset_m = track.to.position_m - landing.ball_m;
   }
 
   // How far the swinging foot must be pushed outward, at most of its swing, to pass the standing leg.
   double PushAside(Foot moving) {
     const FootTrack& track = movement_.feet.foot(moving);
-    const auto f = static_cast<std::size_t>(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
     const DVec3 stands = movement_.feet.foot(OtherFoot(moving)).from.position_m;
     const auto vector = [&](const DVec3& ball, double part) {
@@ -212,7 +232,7 @@ class Planner {
     double push_m = 0.0;
     for (const double part : kSwingSamples) {
       const double time_s = track.release_s + part * (track.land_s - track.release_s);
-      const BlendedFoot blended = Eased(time_s)[f];
+      const BlendedFoot blended{.ball_m = EasedBall(time_s, moving)};  // its heading moves no ball
       const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
       const DVec3 apart = vector(ball, part);
       if (std::fabs(apart.z) > kPassingM) continue;
@@ -402,11 +422,11 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
 
   if (is_step) {
     FootTrack& track = plan.feet[m];
-    Planner::FeetAt landing;
+    BlendedFoot landing;
     if (wish == nullptr) {
-      landing = planner.Eased(times.land_s);
+      landing = planner.EasedFoot(times.land_s, moving);
       track.to.position_m = chosen.to_m[m];
-      track.to.heading_rad = landing[m].heading_rad + chosen.turn_rad;
+      track.to.heading_rad = landing.heading_rad + chosen.turn_rad;
       track.turn_rad[2] = chosen.turn_rad;
       if (chosen.is_on_terrain) track.normals[1] = chosen.normal;
       track.height_m[2] = chosen.height_m;
@@ -440,7 +460,7 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
     track.to.heading_rad = landing[f].heading_rad;
     track.turn_rad[2] = 0.0;
     track.height_m[2] = 0.0;
-    planner.JoinSwing(foot, landing, track);
+    planner.JoinSwing(foot, landing[f], track);
   }
 }
 

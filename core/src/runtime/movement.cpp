@@ -28,7 +28,7 @@ Vec3 RotationVector(const Quat& q) {
 
 std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
                                       int point) {
-  const auto slot = static_cast<std::size_t>(point & 3);
+  const std::size_t slot = static_cast<std::size_t>(point) & (slot_count_ - 1);
   const std::span<float> row = std::span(rows_).subspan(slot * row_floats_, row_floats_);
   if (points_[slot] == point) return row;
   points_[slot] = point;

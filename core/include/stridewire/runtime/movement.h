@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -61,13 +63,16 @@ struct Movement {
   [[nodiscard]] double duration_s() const { return warp.duration_s(); }
 };
 
-/// The examples' weighted sums at the grid points around the present cell. Summing costs n multiply-adds a number;
-/// between grid points the sums are only interpolated, so a tick sums once a cell. Keeping this or starting from an
+/// The examples' weighted sums at the grid points a pose needs. Summing costs n multiply-adds a number;
+/// between grid points the sums are only interpolated. Keeping this or starting from an
 /// empty one gives the same bytes. Some kilobytes, for the stack: it allocates nothing.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
-      : row_floats_(static_cast<std::size_t>(layout.row_floats)) {}
+      : row_floats_(static_cast<std::size_t>(layout.row_floats)),
+        slot_count_(std::min(kMaxSlots, std::bit_floor(rows_.size() / row_floats_))) {
+    Clear();
+  }
 
   /// Forgets the rows: the movement changed.
   void Clear() { points_.fill(-1); }
@@ -77,10 +82,13 @@ class GridCache {
                                            int point);
 
  private:
+  // Of most movements all points; of the longest rows the four around one place.
+  static constexpr std::size_t kMaxSlots = 32;
   std::size_t row_floats_;
+  std::size_t slot_count_;  // a power of two
   std::array<float, 4 * kMaxRowFloats>
-      rows_;  // four rows, point p in slot p % 4; not all of them filled
-  std::array<int, 4> points_{-1, -1, -1, -1};
+      rows_;                           // point p in slot p % slot_count_; not all are filled
+  std::array<int, kMaxSlots> points_;  // [slot], -1: none
 };
 
 /// Fills `movement` (its vectors keep their memory) for a group and parameters [d] at a base frame:
