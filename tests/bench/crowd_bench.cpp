@@ -99,6 +99,7 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
     int left = 0;
   };
   std::vector<Ahead> ahead(steps.walkers().size());
+  std::vector<const Steps::Walker*> due;
   StretchEvaluator evaluator(*library, kAhead);
   StretchQueue queue;
   std::uint32_t tick = 0;
@@ -108,11 +109,16 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
     for (const Steps::Walker& walker : steps.walkers()) {
       Ahead& poses = ahead[walker.number];
       if (poses.course == walker.course && --poses.left > 0) continue;
-      const int most = kAhead - static_cast<int>((tick + walker.number) % kAhead);
-      const int wanted = StretchCount(*walker.movement, walker.time_s, kTickS, 1, most);
-      poses = {walker.course, wanted};
-      queue.Add({walker.movement, walker.time_s, kTickS}, wanted, walker.number);
+      StretchEvaluator::PrefetchTimes(*walker.movement);
+      due.push_back(&walker);
     }
+    for (const Steps::Walker* walker : due) {
+      const int most = kAhead - static_cast<int>((tick + walker->number) % kAhead);
+      const int wanted = StretchCount(*walker->movement, walker->time_s, kTickS, 1, most);
+      ahead[walker->number] = {walker->course, wanted};
+      queue.Add({walker->movement, walker->time_s, kTickS}, wanted, walker->number);
+    }
+    due.clear();
     queue.Evaluate(evaluator, [](auto&&, int, const PoseLanes& poses) {
       benchmark::DoNotOptimize(poses.rotations());
       benchmark::ClobberMemory();
@@ -244,34 +250,45 @@ class LineAligned {
   float* begin_;
 };
 
-// The floor: the bytes that evaluating a pose can not do without, each read once and given one multiply-add. At 30
-// cells a second every second tick blends a row of all examples; each reads four rows, plan and difference, and
-// writes a pose.
+// The floor: the bytes that poses can not do without when eight of a movement's are made at once, each read and given one
+// multiply-add. At 30 cells a second such a stretch passes seven grid points, each with a row of all examples; each pose
+// is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
 void Floor(benchmark::State& state, const Library& library) {
+  constexpr std::size_t kPoses = server::PosesAhead::kMost;
+  constexpr std::size_t kPoints = kPoses / 2 + 3;
   const auto count = static_cast<std::size_t>(state.range(0));
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);
-  const std::size_t examples = static_cast<std::size_t>(group.example_count);
+  const auto examples = static_cast<std::size_t>(group.example_count);
+  const std::size_t points = static_cast<std::size_t>(group.grid_point_count) - kPoints;
   // Plan and difference in whole lines, too.
   const std::size_t plan = (sizeof(PackedFootPlan) / sizeof(float) + 15) / 16 * 16;
-  const std::size_t own = 4 * row + plan + row;
-  LineAligned rows(count * own);
-  LineAligned poses(count * row);
+  const std::size_t own = plan + row;
+  LineAligned owns(count * own);
+  LineAligned told(count * kPoses * row / 4);
+  LineAligned sums(kPoints * row);
+  LineAligned pose(std::max(own, row));
   std::size_t tick = 0;
   for (auto _ : state) {
     ++tick;
-    for (std::size_t i = 0; i < count; ++i) {
-      float* mine = rows.data() + i * own;
-      if (((i + tick) & 1) == 0) {
-        const std::size_t point = (i + tick / 2) % static_cast<std::size_t>(group.grid_point_count);
+    for (std::size_t i = tick % kPoses; i < count; i += kPoses) {
+      const std::size_t first = (i + tick) % points;
+      for (std::size_t p = 0; p < kPoints; ++p) {
         for (std::size_t e = 0; e < examples; ++e) {
-          MultiplyAdd(&group.grid[(point * examples + e) * row], 1e-3f, mine, row);
+          MultiplyAdd(&group.grid[((first + p) * examples + e) * row], 1e-3f, sums.data() + p * row,
+                      row);
         }
       }
-      float* out = poses.data() + i * row;
-      for (std::size_t k = 0; k + row <= own; k += row) MultiplyAdd(mine + k, 0.25f, out, row);
+      MultiplyAdd(owns.data() + i * own, 0.25f, pose.data(), own);
+      for (std::size_t k = 0; k < kPoses; ++k) {
+        for (std::size_t j = 0; j < 4; ++j) {
+          MultiplyAdd(sums.data() + (k / 2 + j) * row, 0.25f, pose.data(), row);
+        }
+        MultiplyAdd(pose.data(), 0.25f, told.data() + (i * kPoses + k) * row / 4, row / 4);
+      }
     }
-    benchmark::DoNotOptimize(poses.data());
+    benchmark::DoNotOptimize(told.data());
+    benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(count));
 }

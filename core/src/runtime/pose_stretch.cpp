@@ -305,6 +305,12 @@ const PoseLanes& StretchEvaluator::Next() {
   return work.poses;
 }
 
+void StretchEvaluator::PrefetchTimes(const Movement& movement) {
+  PrefetchBytes(&movement, kCacheLineBytes);
+  PrefetchBytes(&movement.warp, 2 * kCacheLineBytes);
+  PrefetchBytes(&movement.feet, 1);
+}
+
 void StretchEvaluator::PrefetchPlaces(const Movement& movement) {
   PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
   PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));

@@ -15,7 +15,7 @@ using protocol::PoseMode;
 namespace {
 
 constexpr std::size_t kRootBytes = sizeof(Vec3);
-constexpr unsigned kModes = 4;  // bits of each kind in Kept::flags
+constexpr unsigned kModes = 4;  // bits of each kind in Others::flags
 
 }  // namespace
 
@@ -47,7 +47,9 @@ void PosesAhead::SetModes(std::span<const PoseMode> compact_modes, int ticks_apa
   modes_ = std::move(modes);
   pose_bytes_ = at;
   ticks_apart_ = ticks_apart;
-  ++layout_;
+  if (++layout_ == 0) layout_ = 1;
+  for (Kept& kept : kept_) kept.layout = 0;
+  others_.clear();
   for (std::vector<std::byte>& plane : planes_) {
     plane.clear();
     plane.resize(kept_.size() * pose_bytes_);
@@ -67,7 +69,7 @@ void PosesAhead::MakePlace(Place& place) {
   if (free_.empty()) {
     // By a quarter: planes are large.
     const std::size_t first = kept_.size();
-    const std::size_t places = std::max<std::size_t>(kPlacesOfATurn, first + first / 4);
+    const std::size_t places = std::max<std::size_t>(64, first + first / 4);
     kept_.reserve(places);
     kept_.resize(places);
     for (std::vector<std::byte>& plane : planes_) {
@@ -84,14 +86,13 @@ void PosesAhead::MakePlace(Place& place) {
 
 void PosesAhead::Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays) {
   Kept& kept = kept_[place];
-  kept.course = course;
-  kept.first_step = step_;
-  kept.layout = layout_;
-  kept.count = static_cast<std::uint8_t>(count);
-  kept.first_plane = plane_;
-  kept.stays = stays;
-  kept.flags = {};
-  if (kept.wide != nullptr) kept.wide->clear();
+  if (kept.is_any_other) others_.erase(place);
+  kept = {.first_step = step_,
+          .course = static_cast<std::uint32_t>(course),
+          .layout = layout_,
+          .count = static_cast<std::uint8_t>(count),
+          .first_plane = plane_,
+          .stays = stays};
 }
 
 void PosesAhead::Ask(Place& place, Avatar& avatar) {
@@ -108,15 +109,10 @@ void PosesAhead::Ask(Place& place, Avatar& avatar) {
 
 void PosesAhead::Want(Place& place, std::uint64_t course, const Movement& movement, double time_s) {
   MakePlace(place);
-  const std::size_t turn = place.index_ / kPlacesOfATurn;
-  const auto most = static_cast<int>(kMost - (plane_ + turn) % kMost);
-  const int count = StretchCount(movement, time_s, step_s_, ticks_apart_, most);
-  kept_[place.index_].course = course;
-  wanted_.push_back({place.index_,
-                     count,
-                     {&movement, time_s, step_s_, ticks_apart_},
-                     most == static_cast<int>(kMost)});
-  wanted_poses_ += static_cast<std::size_t>(count);
+  kept_[place.index_].course = static_cast<std::uint32_t>(course);
+  kept_[place.index_].count = 0;
+  StretchEvaluator::PrefetchTimes(movement);
+  wanted_.push_back({place.index_, 0, {&movement, time_s, step_s_, ticks_apart_}, false});
 }
 
 void PosesAhead::Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays) {
@@ -134,16 +130,24 @@ void PosesAhead::KeepTaken() {
 
 void PosesAhead::Finish(std::size_t shown) {
   if (taken_count_ > 0) KeepTaken();
+  std::size_t poses = 0;
+  for (Wanted& wanted : wanted_) {
+    const std::size_t turn = wanted.place / kPlacesOfATurn;
+    const std::size_t most = kMost - (plane_ + turn) % kMost;
+    wanted.is_its_turn = most == kMost;
+    wanted.count = StretchCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
+                                ticks_apart_, static_cast<int>(most));
+    poses += static_cast<std::size_t>(wanted.count);
+  }
   // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it was sent elsewhere,
   // those whose turn it is not get one only: a tick makes hardly more than two poses an avatar.
-  const bool is_crowd_new = wanted_poses_ > 2 * shown + kLanes * kMost;
+  const bool is_crowd_new = poses > 2 * shown + kLanes * kMost;
   for (Wanted& wanted : wanted_) {
     if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
     Start(wanted.place, kept_[wanted.place].course, static_cast<std::size_t>(wanted.count), false);
     scratch_->queue.Add(wanted.stretch, wanted.count, wanted.place);
   }
   wanted_.clear();
-  wanted_poses_ = 0;
   std::array<std::uint32_t, kLanes> places;
   scratch_->queue.Evaluate(scratch_->evaluator, [&](std::span<const StretchQueue::Item> items,
                                                     int pose, const PoseLanes& lanes) {
@@ -170,24 +174,25 @@ void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> pla
         scratch_->block.CopyBytes(i,
                                   {BytesOf(places[i], pose) + mode.at, mode.codec->pose_bytes()});
       } else {
-        KeepWide(lanes, i, kept_[places[i]], pose, m);
+        KeepWide(lanes, i, places[i], pose, m);
       }
     }
   }
 }
 
-void PosesAhead::KeepWide(const PoseLanes& lanes, std::size_t lane, Kept& kept, std::size_t pose,
-                          std::size_t mode) {
+void PosesAhead::KeepWide(const PoseLanes& lanes, std::size_t lane, std::uint32_t place,
+                          std::size_t pose, std::size_t mode) {
   lanes.Get(lane, scratch_->pose);
-  if (kept.wide == nullptr) kept.wide = std::make_unique<std::vector<std::byte>>();
-  const std::size_t at = kept.wide->size();
-  kept.wide->resize(at + wide_bytes_);
+  kept_[place].is_any_other = 1;
+  Others& others = others_[place];
+  const std::size_t at = others.wide.size();
+  others.wide.resize(at + wide_bytes_);
   const bool is_told =
       protocol::EncodePose(PoseMode::kQuantised, scratch_->pose.root_position_m,
-                           scratch_->pose.rotations, std::span(*kept.wide).subspan(at))
+                           scratch_->pose.rotations, std::span(others.wide).subspan(at))
           .has_value();
-  if (!is_told) kept.wide->resize(at);
-  kept.flags[pose] |= static_cast<std::uint8_t>(1u << (is_told ? mode : mode + kModes));
+  if (!is_told) others.wide.resize(at);
+  others.flags[pose] |= static_cast<std::uint8_t>(1u << (is_told ? mode : mode + kModes));
 }
 
 PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
@@ -197,21 +202,25 @@ PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
   std::size_t m = 0;
   while (m < modes_.size() && modes_[m].mode != mode) ++m;
   STRIDEWIRE_CHECK(m < modes_.size() && pose < kept.count);
-  const unsigned flags = kept.flags[pose];
-  if (flags == 0) {
-    return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
-  }
-  if ((flags >> (m + kModes) & 1u) != 0) return {};
-  if ((flags >> m & 1u) == 0) {
-    return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
+  if (kept.is_any_other) return OtherOf(place.index_, pose, m);
+  return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
+}
+
+PosesAhead::Encoded PosesAhead::OtherOf(std::uint32_t place, std::size_t pose,
+                                        std::size_t mode) const {
+  const Others& others = others_.at(place);
+  const unsigned flags = others.flags[pose];
+  if ((flags >> (mode + kModes) & 1u) != 0) return {};
+  if ((flags >> mode & 1u) == 0) {
+    return {{BytesOf(place, pose) + modes_[mode].at, modes_[mode].codec->pose_bytes()}};
   }
   // Behind those of the poses before, and of the modes before.
   constexpr unsigned kWide = (1u << kModes) - 1;
-  auto before = static_cast<std::size_t>(std::popcount(flags & kWide & ((1u << m) - 1)));
+  auto before = static_cast<std::size_t>(std::popcount(flags & kWide & ((1u << mode) - 1)));
   for (std::size_t p = 0; p < pose; ++p) {
-    before += static_cast<std::size_t>(std::popcount(kept.flags[p] & kWide));
+    before += static_cast<std::size_t>(std::popcount(others.flags[p] & kWide));
   }
-  return {std::span(*kept.wide).subspan(before * wide_bytes_, wide_bytes_), true};
+  return {std::span(others.wide).subspan(before * wide_bytes_, wide_bytes_), true};
 }
 
 Vec3 PosesAhead::RootOf(const Place& place) const {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -83,7 +84,7 @@ class PosesAhead {
   [[nodiscard]] bool Has(const Place& place, std::uint64_t course) const {
     if (place.of_ == nullptr) return false;
     const Kept& kept = kept_[place.index_];
-    return kept.course == course && kept.layout == layout_ &&
+    return kept.course == static_cast<std::uint32_t>(course) && kept.layout == layout_ &&
            (kept.stays || PoseOf(kept) < kept.count);
   }
   /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where it is until Finish.
@@ -101,10 +102,6 @@ class PosesAhead {
   /// This step's, of who has it. `mode` is one of SetModes.
   [[nodiscard]] Encoded Of(const Place& place, protocol::PoseMode mode) const;
   [[nodiscard]] Vec3 RootOf(const Place& place) const;
-  /// Asks for the memory that Has and Of read.
-  void Prefetch(const Place& place) const {
-    if (place.of_ != nullptr) __builtin_prefetch(&kept_[place.index_]);
-  }
 
   [[nodiscard]] StretchEvaluator& evaluator() { return scratch_->evaluator; }
 
@@ -112,23 +109,27 @@ class PosesAhead {
   static constexpr std::size_t kLanes = PoseLanes::kLanes;
   static constexpr std::size_t kStanding = kMost;  // plane
   // Places that lie together have their turns together: what is written then does, too.
-  static constexpr std::uint32_t kPlacesOfATurn = 64;
+  static constexpr std::uint32_t kPlacesOfATurn = 8;
   struct Mode {
     protocol::PoseMode mode;
     const protocol::CompactCodec* codec;
     std::size_t at;  // in the bytes of a pose
   };
-  // What is known of the poses of one place: a line of the cache.
-  struct alignas(64) Kept {
-    std::uint64_t course = 0;      // they follow from
+  // What every tick asks of the poses of one place.
+  struct Kept {
     std::uint64_t first_step = 0;  // of the world
-    std::uint32_t layout = 0;      // 0: nothing is kept
+    std::uint32_t course = 0;      // they follow from, the low bits
+    std::uint16_t layout = 0;      // 0: nothing is kept
     std::uint8_t count = 0;
-    std::uint8_t first_plane = 0;
-    bool stays = false;
-    // [pose]: bit m: that of mode m is wide; m + 4: there is none
-    std::array<std::uint8_t, kMost> flags{};
-    std::unique_ptr<std::vector<std::byte>> wide;  // by pose and mode; null: none yet
+    std::uint8_t first_plane : 4 = 0;
+    std::uint8_t stays : 1 = 0;
+    std::uint8_t is_any_other : 1 = 0;  // than the mode's own bytes: see Others
+  };
+  static_assert(sizeof(Kept) == 16);
+  // Of a place some of whose poses are wide or can not be told.
+  struct Others {
+    std::array<std::uint8_t, kMost> flags{};  // [pose]: bit m: wide in mode m; m + 4: there is none
+    std::vector<std::byte> wide;              // by pose and mode
   };
   struct Wanted {
     std::uint32_t place;
@@ -159,8 +160,9 @@ class PosesAhead {
   // Encodes poses side by side and keeps them; of kNobody nothing is kept.
   static constexpr std::uint32_t kNobody = ~0u;
   void Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places, std::size_t pose);
-  void KeepWide(const PoseLanes& lanes, std::size_t lane, Kept& kept, std::size_t pose,
+  void KeepWide(const PoseLanes& lanes, std::size_t lane, std::uint32_t place, std::size_t pose,
                 std::size_t mode);
+  [[nodiscard]] Encoded OtherOf(std::uint32_t place, std::size_t pose, std::size_t mode) const;
 
   std::shared_ptr<PoseScratch> scratch_;
   const protocol::CompactCodecs* codecs_;
@@ -168,17 +170,17 @@ class PosesAhead {
   std::size_t pose_bytes_;  // of a pose in all modes
   std::size_t wide_bytes_;
   int ticks_apart_ = 1;
-  std::uint32_t layout_ = 1;
+  std::uint16_t layout_ = 1;
   std::uint64_t step_ = 0;
   std::uint8_t plane_ = 0;  // of this step
   double step_s_ = 0.0;
 
   std::vector<Kept> kept_;                                // [place]
   std::array<std::vector<std::byte>, kMost + 1> planes_;  // [place]: pose_bytes_ each
+  std::unordered_map<std::uint32_t, Others> others_;      // by place
   std::vector<std::uint32_t> free_;                       // places of nobody
 
   std::vector<Wanted> wanted_;
-  std::size_t wanted_poses_ = 0;
   std::array<std::uint32_t, kLanes> taken_for_{};
   std::size_t taken_count_ = 0;
 };

@@ -554,9 +554,7 @@ void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
   ahead_.Begin(step_, clock_.tick_s());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kAhead < rows.size()) {
-      const Entry& later = *in_order[rows[i + kAhead]].entry;
-      later.avatar.PrefetchCourse();
-      ahead_.Prefetch(later.ahead);
+      in_order[rows[i + kAhead]].entry->avatar.PrefetchCourse();
     }
     Entry& entry = *in_order[rows[i]].entry;
     ahead_.Ask(entry.ahead, entry.avatar);

@@ -40,7 +40,9 @@ class StretchEvaluator {
   /// The next pose of each stretch, in its lane. Other lanes mean nothing.
   [[nodiscard]] const PoseLanes& Next();
 
-  /// Asks for the memory that Begin reads of a movement: first where it is, later what lies there.
+  /// Asks for the memory that is read of a movement: what StretchCount and StretchQueue::Add look at, then what Begin
+  /// does, and at last what lies elsewhere.
+  static void PrefetchTimes(const Movement& movement);
   static void PrefetchPlaces(const Movement& movement);
   static void Prefetch(const PoseStretch& stretch);
 
