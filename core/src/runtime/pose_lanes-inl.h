@@ -47,6 +47,7 @@ void PrepareEase(const float* difference, std::size_t joint_count, std::size_t l
 struct Easing {
   bool is_any = false;
   bool is_any_inertial = false;
+  bool are_all = false;  // eased, and inertial: nothing is to be selected
   Mask is_eased, is_inertial;
   Float fraction, half_s;
 };
@@ -60,8 +61,9 @@ HWY_INLINE Quat4 Ease(Quat4 q, const Easing& easing, const LaneBlend& blend, std
                  {.square = parts.w, .per_sine = LoadLanes(ease + 4 * kBlock)}, easing.fraction));
   if (easing.is_any_inertial) {
     const Vec3x along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * easing.half_s;
-    eased = Select(easing.is_inertial, Multiply(eased, {along.x, along.y, along.z, Float(1.0f)}),
-                   eased);
+    const Quat4 along_it = Multiply(eased, {along.x, along.y, along.z, Float(1.0f)});
+    if (easing.are_all) return along_it;
+    eased = Select(easing.is_inertial, along_it, eased);
   }
   return Select(easing.is_eased, eased, q);
 }
@@ -101,7 +103,7 @@ void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, fl
 
 bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
   const std::size_t width = hn::Lanes(FloatTag());
-  Mask is_short = {hn::FirstN(FloatTag(), 0)};
+  bool is_any_short = false;
   for (std::size_t lane = 0; lane < blend.lanes; lane += width) {
     const Float half = 0.5f;
     Easing easing;
@@ -115,10 +117,12 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
         easing.is_inertial = easing.is_eased && LoadLanes(blend.is_inertial + lane) > half;
         easing.is_any_inertial = Any(easing.is_inertial);
         easing.half_s = half * LoadLanes(blend.slope_s + lane);
+        easing.are_all = !Any(LoadLanes(blend.is_eased + lane) < half ||
+                              LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    const Mask is_there = {hn::FirstN(FloatTag(), blend.lanes - lane)};
-    HWY_ALIGN float local[4 * kBlock] = {};  // root x, y, z, yaw
+    Float shortest = kSmallestNorm * kSmallestNorm;  // squared
+    HWY_ALIGN float local[4 * kBlock] = {};          // root x, y, z, yaw
     // Joints in fours; behind the last comes the root.
     for (std::size_t first = 0; first <= blend.joint_count; first += 4) {
       Quat4 parts[4];  // [component]: of four joints
@@ -138,12 +142,14 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
           StoreQuat(q, local);
           break;
         }
-        is_short = is_short || (Dot(q, q) < Float(kSmallestNorm * kSmallestNorm) && is_there);
+        shortest = Float(hn::Min(Dot(q, q).v, shortest.v));
         // Lengths multiply: one division at the end serves all.
         if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
         StoreQuat(Normalise(q), rotations + joint * 4 * kBlock + lane);
       }
     }
+    const Mask is_there = {hn::FirstN(FloatTag(), blend.lanes - lane)};
+    is_any_short |= Any(shortest < Float(kSmallestNorm * kSmallestNorm) && is_there);
     HWY_ALIGN float sines[kBlock];
     HWY_ALIGN float cosines[kBlock];
     PlaceRoots(blend, local, lane, root_m, sines, cosines);
@@ -162,7 +168,7 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
     StoreLanes(eased.y, root_m + kBlock + lane);
     StoreLanes(eased.z, root_m + 2 * kBlock + lane);
   }
-  return !Any(is_short);
+  return !is_any_short;
 }
 
 }  // namespace
