@@ -91,8 +91,9 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
 
 // Poses of each tick, evaluated some ticks ahead as the server does (server::PosesAhead), and not kept.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
-  const auto count = static_cast<int>(state.range(0));
-  Steps steps(library, count / state.threads(), plants_feet);
+  // Spread over shards: threads that share nothing but the library.
+  const int count = static_cast<int>(state.range(0)) / state.threads();
+  Steps steps(library, count, plants_feet);
   constexpr int kAhead = static_cast<int>(server::PosesAhead::kMost);
   struct Ahead {
     std::uint32_t course = 0;
