@@ -67,9 +67,9 @@ void PosesAhead::Begin(std::uint64_t step, double step_s) {
 void PosesAhead::MakePlace(Place& place) {
   if (place.of_ != nullptr) return;
   if (free_.empty()) {
-    // By a quarter: planes are large.
+    // By an eighth: planes are large.
     const std::size_t first = kept_.size();
-    const std::size_t places = std::max<std::size_t>(64, first + first / 4);
+    const std::size_t places = std::max<std::size_t>(64, first + first / 8);
     kept_.reserve(places);
     kept_.resize(places);
     for (std::vector<std::byte>& plane : planes_) {
