@@ -26,7 +26,7 @@ inline constexpr double kMaxSpawnHeadingRad = 10'000.0;
 /// The avatars of one world that live on one shard. Knows no socket and no thread: time is an
 /// argument, and what it makes is taken from it.
 ///
-/// An avatar takes about 10 KB and its queue (docs/SERVER.md, "Memory").
+/// An avatar takes about 8 KB and its queue (docs/SERVER.md, "Memory").
 class WorldShard {
  public:
   /// Borrows budget and metrics. `scratch` is of the world's library and this thread's; null: one of its own.
