@@ -26,47 +26,47 @@ HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 #endif
 }
 
-// kVectors vectors from `source` on of the rows of kRows movements, summed side by side: an addition waits for the one
+// Vectors vectors from `source` on of the rows of Rows movements, summed side by side: an addition waits for the one
 // before, and what is read of the library serves all.
-template <std::size_t kRows, std::size_t kVectors>
+template <std::size_t Rows, std::size_t Vectors>
 HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
                            std::size_t count, std::size_t row_floats, float* const* rows,
                            std::size_t at) {
   const FloatTag d;
   const std::size_t width = hn::Lanes(d);
-  hn::Vec<FloatTag> sums[kRows][kVectors];
-  for (std::size_t r = 0; r < kRows; ++r) {
-    for (std::size_t v = 0; v < kVectors; ++v) sums[r][v] = hn::Zero(d);
+  hn::Vec<FloatTag> sums[Rows][Vectors];
+  for (std::size_t r = 0; r < Rows; ++r) {
+    for (std::size_t v = 0; v < Vectors; ++v) sums[r][v] = hn::Zero(d);
   }
   source += at;
   for (std::size_t e = 0; e < count; ++e, source += row_floats) {
-    hn::Vec<FloatTag> w[kRows];
-    for (std::size_t r = 0; r < kRows; ++r) w[r] = hn::Set(d, weights[r][e]);
-    for (std::size_t v = 0; v < kVectors; ++v) {
+    hn::Vec<FloatTag> w[Rows];
+    for (std::size_t r = 0; r < Rows; ++r) w[r] = hn::Set(d, weights[r][e]);
+    for (std::size_t v = 0; v < Vectors; ++v) {
       auto x = hn::LoadU(d, source + v * width);
       StayInRegister(x);
-      for (std::size_t r = 0; r < kRows; ++r) sums[r][v] = hn::Add(sums[r][v], hn::Mul(w[r], x));
+      for (std::size_t r = 0; r < Rows; ++r) sums[r][v] = hn::Add(sums[r][v], hn::Mul(w[r], x));
     }
   }
-  for (std::size_t r = 0; r < kRows; ++r) {
-    for (std::size_t v = 0; v < kVectors; ++v) hn::StoreU(sums[r][v], d, rows[r] + at + v * width);
+  for (std::size_t r = 0; r < Rows; ++r) {
+    for (std::size_t v = 0; v < Vectors; ++v) hn::StoreU(sums[r][v], d, rows[r] + at + v * width);
   }
 }
 
-// Rows of kRows movements at one grid point.
-template <std::size_t kRows>
+// Rows of Rows movements at one grid point.
+template <std::size_t Rows>
 HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, std::size_t count,
                           std::size_t row_floats, float* const* rows) {
   const std::size_t width = hn::Lanes(FloatTag());
   std::size_t i = 0;
-  const auto take = [&]<std::size_t kVectors>() HWY_ATTR {
-    for (; i + kVectors * width <= row_floats; i += kVectors * width) {
-      SumVectors<kRows, kVectors>(examples, weights, count, row_floats, rows, i);
+  const auto take = [&]<std::size_t Vectors>() HWY_ATTR {
+    for (; i + Vectors * width <= row_floats; i += Vectors * width) {
+      SumVectors<Rows, Vectors>(examples, weights, count, row_floats, rows, i);
     }
   };
   // As many sums as there are registers for.
-  if constexpr (kRows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
-  if constexpr (kRows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
+  if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
+  if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
   take.template operator()<4>();
   take.template operator()<2>();
   take.template operator()<1>();
