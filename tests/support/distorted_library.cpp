@@ -72,11 +72,8 @@ double Uniform(std::mt19937& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random()) + 0.5) / 4294967296.0;
 }
 
-}  // namespace
-
-std::shared_ptr<const MotionLibrary> MakeDistortedLibrary(int parameter_count, int example_count,
-                                                          double reach_m, std::uint32_t seed) {
-  std::mt19937 random(seed);
+RawLibrary DrawLibrary(int parameter_count, int example_count, double reach_m,
+                       std::mt19937& random) {
   RawLibrary raw;
   raw.skeleton = MakeSkeleton();
   raw.stand_pose = Pose(7);
@@ -140,12 +137,24 @@ std::shared_ptr<const MotionLibrary> MakeDistortedLibrary(int parameter_count, i
     if (!is_near) group.examples.push_back(std::move(example));
   }
   raw.groups.push_back(std::move(group));
-  auto library = LibraryBuilder{}.Build(raw);
-  if (!library) {
+  return raw;
+}
+
+}  // namespace
+
+std::shared_ptr<const MotionLibrary> MakeDistortedLibrary(int parameter_count, int example_count,
+                                                          double reach_m, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  // Of one more example than parameters some lie in a plane, nearly: such a library is refused, and drawn again.
+  constexpr int kMaxDraws = 20;
+  for (int draw = 1;; ++draw) {
+    auto library =
+        LibraryBuilder{}.Build(DrawLibrary(parameter_count, example_count, reach_m, random));
+    if (library) return *library;
+    if (draw < kMaxDraws) continue;
     std::fprintf(stderr, "distorted library: %s\n", Describe(library.error()).c_str());
     std::abort();
   }
-  return *library;
 }
 
 ParameterValues PointInHull(const MotionGroup& group, std::mt19937& random) {

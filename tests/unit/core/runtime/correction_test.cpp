@@ -59,32 +59,41 @@ struct Scratch {
 
 std::uint32_t Seed() { return std::random_device{}(); }
 
+// How far poses of these weights are from what is measured without poses, metres: theirs are floats, and too few
+// examples may have weights of a thousand that place the root a hundred metres from where the feet end up.
+double RoundingM(double weight_sum) {
+  return 1e-6 * std::max(1.0, weight_sum / kMaxCorrectedWeightSum);
+}
+
 class InDimensions : public testing::TestWithParam<int> {};
 
 TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
-  const auto library = MakeDistortedLibrary(d, d == 1 ? 5 : 6 * d + 4, 0.6, seed);
-  const MotionGroup& group = library->group(0);
   std::mt19937 random(seed);
-  Scratch scratch(*library);
   double largest_m = 0.0;
-  for (int i = 0; i < 200; ++i) {
-    const ParameterValues wanted = PointInHull(group, random);
-    const double miss_m = LargestDifference(group, wanted, scratch.Measure(*library, wanted));
-    largest_m = std::max(largest_m, miss_m);
-    const Correction correction = scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
-    EXPECT_NEAR(correction.initial_error_m, miss_m, 1e-6);
-    EXPECT_LE(correction.iterations, d <= 2 ? 3 : 8);
-    EXPECT_LT(correction.error_m, 1e-4) << "point " << i;
-    // What it says is what is measured.
-    EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)), correction.error_m,
-                1e-6);
-    EXPECT_EQ(scratch.movement.parameters.values, wanted.values);
-    EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
+  for (int l = 0; l < 4; ++l) {
+    const auto library = MakeDistortedLibrary(d, d == 1 ? 5 : 6 * d + 4, 0.6, random());
+    const MotionGroup& group = library->group(0);
+    Scratch scratch(*library);
+    for (int i = 0; i < 50; ++i) {
+      const ParameterValues wanted = PointInHull(group, random);
+      const double miss_m = LargestDifference(group, wanted, scratch.Measure(*library, wanted));
+      largest_m = std::max(largest_m, miss_m);
+      const Correction correction =
+          scratch.Correct(*library, wanted, DefaultCorrectionLimits(group));
+      EXPECT_NEAR(correction.initial_error_m, miss_m, 1e-6);
+      EXPECT_LE(correction.iterations, d <= 2 ? 3 : 8);
+      EXPECT_LT(correction.error_m, 1e-4) << "library " << l << " point " << i;
+      // What it says is what is measured.
+      EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)),
+                  correction.error_m, 1e-6);
+      EXPECT_EQ(scratch.movement.parameters.values, wanted.values);
+      EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
+    }
   }
-  // Else nothing was there to correct: of 7,000 random libraries one misses by 0.2 mm, the others by more.
+  // Else nothing was there to correct: of 600 random libraries one misses by 0.09 mm at most, four in a row do not.
   EXPECT_GT(largest_m, 1e-4);
 }
 
@@ -111,8 +120,8 @@ TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
         scratch.Correct(*library, wanted, {.max_iterations = static_cast<int>(random() % 12)});
     EXPECT_LE(correction.error_m, correction.initial_error_m);
     EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)), correction.error_m,
-                1e-6);
-    EXPECT_LE(scratch.WeightSum(), std::max(kMaxCorrectedWeightSum, weight_sum) + 1e-6);
+                RoundingM(scratch.WeightSum()));
+    EXPECT_LE(scratch.WeightSum(), std::max(kMaxCorrectedWeightSum, weight_sum) * (1.0 + 1e-6));
   }
 }
 
