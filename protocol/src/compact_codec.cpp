@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 #include "compact_kernel.h"
 #include "smallest_three.h"
@@ -80,6 +81,47 @@ bool TakeRanged(BitReader& reader, const CompactJoint& joint, Quat& q) {
                        joint.reference[2]);
   q = reference * Quat(std::sqrt(w_squared), v[0], v[1], v[2]);
   return true;
+}
+
+// Numbers behind one another in words of 32 bits.
+class WordPlan {
+ public:
+  void Put(std::size_t row, int bits) {
+    parts_.push_back({static_cast<std::uint16_t>(row), static_cast<std::int8_t>(fill_)});
+    fill_ += bits;
+    bits_ += static_cast<std::size_t>(bits);
+    if (fill_ < 32) return;
+    parts_.back().ends_word = true;
+    fill_ -= 32;
+    if (fill_ == 0) return;
+    parts_.push_back({static_cast<std::uint16_t>(row), static_cast<std::int8_t>(fill_ - bits)});
+  }
+  [[nodiscard]] std::size_t bits() const { return bits_; }
+
+  // Zeros after the last up to four whole words.
+  std::vector<CompactPart> Finish() {
+    if (fill_ > 0) parts_.back().ends_word = true;
+    const std::size_t words = (bits_ + 31) / 32;
+    for (std::size_t i = words; i % 4 != 0; ++i) parts_.push_back({kZeroRow, 0, true});
+    return std::move(parts_);
+  }
+
+ private:
+  std::vector<CompactPart> parts_;
+  int fill_ = 0;
+  std::size_t bits_ = 0;
+};
+
+// Joints as far from the root as each other together: none of them waits for another.
+std::vector<std::uint16_t> ByDepth(std::span<const std::int16_t> parents) {
+  std::vector<int> depths;
+  std::vector<std::uint16_t> order;
+  for (const std::int16_t parent : parents) {
+    order.push_back(static_cast<std::uint16_t>(depths.size()));
+    depths.push_back(parent < 0 ? 0 : depths[static_cast<std::size_t>(parent)] + 1);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::uint16_t joint) { return depths[joint]; });
+  return order;
 }
 
 }  // namespace
@@ -163,8 +205,10 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
   }
   CompactCodec codec;
   codec.joints_.resize(codes.size());
-  std::size_t bits = 0;
+  WordPlan words;
+  for (std::size_t c = 0; c < 3; ++c) words.Put(c, 32);
   for (std::size_t j = 0; j < codes.size(); ++j) {
+    const std::size_t row = kJointRows + 4 * j;
     const RotationCode& code = codes[j];
     CompactJoint& joint = codec.joints_[j];
     joint.parent = parents[j];
@@ -187,7 +231,8 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
     if (code.free_bits > 0) {
       joint.steps[0] = kSqrt2 * static_cast<float>((1 << (code.free_bits - 1)) - 1);
       joint.step[0] = 1.0f / joint.steps[0];
-      bits += 2 + 3 * std::size_t{code.free_bits};
+      words.Put(row + 3, 2);
+      for (std::size_t c = 0; c < 3; ++c) words.Put(row + c, code.free_bits);
       continue;
     }
     for (std::size_t c = 0; c < 3; ++c) {
@@ -195,25 +240,23 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
       joint.step[c] = code.step[static_cast<int>(c)];
       joint.steps[c] = 1.0f / joint.step[c];
       joint.bits[c] = code.bits[c];
-      bits += code.bits[c];
+      if (code.bits[c] > 0) words.Put(row + c, code.bits[c]);
     }
   }
-  codec.pose_bytes_ = kRootBytes + 2 * ((bits + 15) / 16);
+  codec.pose_bytes_ = 2 * ((words.bits() + 15) / 16);
+  codec.parts_ = words.Finish();
+  codec.order_ = ByDepth(parents);
   return codec;
 }
 
 void CompactCodec::Block::Add(const Vec3& root_position_m, std::span<const Quat> rotations) {
   STRIDEWIRE_CHECK(size_ < kBlock);
-  if (rotations_.size() < 4 * kBlock * rotations.size())
-    rotations_.resize(4 * kBlock * rotations.size());
+  if (rotations_.size() < 4 * rotations.size()) rotations_.resize(4 * rotations.size());
   joint_count_ = rotations.size();
   for (int c = 0; c < 3; ++c) roots_m_[c][size_] = root_position_m[c];
-  float* to = rotations_.data() + size_;
+  Floats* to = rotations_.data();
   for (const Quat& q : rotations) {
-    for (const float value : {q.x, q.y, q.z, q.w}) {
-      *to = value;
-      to += kBlock;
-    }
+    for (const float value : {q.x, q.y, q.z, q.w}) (to++)->of[size_] = value;
   }
   ++size_;
 }
@@ -221,17 +264,14 @@ void CompactCodec::Block::Add(const Vec3& root_position_m, std::span<const Quat>
 void CompactCodec::Block::Get(std::size_t i, Vec3& root_position_m,
                               std::span<Quat> rotations) const {
   for (int c = 0; c < 3; ++c) root_position_m[c] = roots_m_[c][i];
-  const float* from = rotations_.data() + i;
+  const Floats* from = rotations_.data();
   for (Quat& q : rotations) {
-    for (float* value : {&q.x, &q.y, &q.z, &q.w}) {
-      *value = *from;
-      from += kBlock;
-    }
+    for (float* value : {&q.x, &q.y, &q.z, &q.w}) *value = (from++)->of[i];
   }
 }
 
 void CompactCodec::Block::CopyBytes(std::size_t i, std::span<std::byte> out) const {
-  const std::uint32_t* from = words_.data() + 4 * i;
+  const std::uint32_t* from = words_.front().of + 4 * i;
   std::size_t at = 0;
   for (; at + 16 <= out.size(); at += 16, from += 4 * kBlock)
     std::memcpy(out.data() + at, from, 16);
@@ -240,17 +280,24 @@ void CompactCodec::Block::CopyBytes(std::size_t i, std::span<std::byte> out) con
 
 void CompactCodec::Encode(Block& block) const {
   STRIDEWIRE_CHECK(block.size_ == 0 || block.joint_count_ == joints_.size());
-  Encode({&block.roots_m_[0][0], block.rotations_.data(), block.size_}, block);
+  Encode({&block.roots_m_[0][0], block.rotations_.empty() ? nullptr : block.rotations_.front().of,
+          block.size_},
+         block);
 }
 
 void CompactCodec::Encode(const Lanes& poses, Block& block) const {
   STRIDEWIRE_CHECK(poses.count <= kBlock);
   block.size_ = poses.count;
-  block.errors_.resize(std::max(block.errors_.size(), 3 * kBlock * joints_.size()));
-  block.words_.resize(std::max(block.words_.size(), (pose_bytes_ + 15) / 16 * 4 * kBlock));
-  EncodeCompact(joints_.data(), joints_.size(),
-                {poses.count, poses.roots_m, poses.rotations, block.errors_.data(),
-                 block.words_.data(), block.fits_});
+  const std::size_t joints = joints_.size();
+  if (block.errors_.size() < 3 * joints) {
+    block.numbers_.resize(kJointRows + 4 * joints);
+    block.errors_.resize(3 * joints);
+  }
+  const std::size_t words = (pose_bytes_ + 15) / 16 * 4;
+  if (block.words_.size() < words) block.words_.resize(words);
+  EncodeCompact({joints_, order_, parts_},
+                {poses.count, poses.roots_m, poses.rotations, block.errors_.front().of,
+                 block.numbers_.front().of, block.words_.front().of, block.fits_});
 }
 
 Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m,

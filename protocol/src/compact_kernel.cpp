@@ -39,48 +39,28 @@ struct Rotation {
 
 HWY_INLINE V Sum3(V a, V b, V c) { return hn::Add(hn::Add(a, b), c); }
 
-// Numbers of some bits behind one another, a pose a lane; words leave in fours.
-class BitWriter {
- public:
-  BitWriter(std::uint32_t* words, std::size_t lane) : to_(words + 4 * lane) {
-    word_ = hn::Zero(DU());
+// Puts numbers of some bits behind one another, a pose a lane.
+HWY_INLINE void WriteWords(std::span<const CompactPart> parts, const std::uint32_t* numbers,
+                           std::uint32_t* words) {
+  const DU du;
+  for (std::size_t i = 0; i < parts.size(); words += 4 * kBlock) {
+    const auto next = [&]() HWY_ATTR {
+      VU word = hn::Zero(du);
+      for (bool is_more = true; is_more; ++i) {
+        const VU number = hn::LoadU(du, numbers + std::size_t{parts[i].row} * kBlock);
+        word = hn::Or(word, parts[i].left < 0 ? hn::ShiftRightSame(number, -parts[i].left)
+                                              : hn::ShiftLeftSame(number, parts[i].left));
+        is_more = !parts[i].ends_word;
+      }
+      return word;
+    };
+    const VU first = next();
+    const VU second = next();
+    const VU third = next();
+    const VU fourth = next();
+    hn::StoreInterleaved4(first, second, third, fourth, du, words);
   }
-
-  HWY_INLINE void Put(VI value, int bits) {
-    const DU du;
-    const VU u = hn::BitCast(du, value);
-    word_ = hn::Or(word_, hn::ShiftLeftSame(u, fill_));
-    fill_ += bits;
-    if (fill_ < 32) return;
-    fill_ -= 32;
-    PutWord(word_);
-    word_ = fill_ > 0 ? hn::ShiftRightSame(u, bits - fill_) : hn::Zero(du);
-  }
-
-  HWY_INLINE void PutWord(VU word) {
-    const DU du;
-    const std::size_t width = hn::Lanes(du);
-    hn::Store(word, du, pending_ + count_ * width);
-    if (++count_ < 4) return;
-    hn::StoreInterleaved4(hn::Load(du, pending_), hn::Load(du, pending_ + width),
-                          hn::Load(du, pending_ + 2 * width), hn::Load(du, pending_ + 3 * width),
-                          du, to_);
-    to_ += 4 * kBlock;
-    count_ = 0;
-  }
-
-  HWY_INLINE void Finish() {
-    if (fill_ > 0) PutWord(word_);
-    while (count_ != 0) PutWord(hn::Zero(DU()));
-  }
-
- private:
-  HWY_ALIGN std::uint32_t pending_[4 * kBlock];
-  std::uint32_t* to_;
-  VU word_;
-  int fill_ = 0;
-  std::size_t count_ = 0;
-};
+}
 
 // |value| below 2^22 of a component told in steps, as float and as integer.
 struct Steps {
@@ -105,27 +85,30 @@ HWY_INLINE VI RootSteps(V metres) {
   return hn::ConvertTo(DI(), hn::CopySign(hn::Add(whole, up), scaled));
 }
 
-void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const CompactWork& work) {
+// What is told of each joint is found first and written behind one another then. A joint waits long for its parent's
+// error: those that lie next to each other in the order are worked on together, which a machine does by itself.
+void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
   const D d;
   const DI di;
   const std::size_t width = hn::Lanes(d);
   const V one = hn::Set(d, 1.0f);
   for (std::size_t lane = 0; lane < work.count; lane += width) {
-    BitWriter writer(work.words, lane);
     auto fits = hn::Eq(one, one);
     for (std::size_t c = 0; c < 3; ++c) {
       const V metres = hn::LoadU(d, work.roots_m + c * kBlock + lane);
       // False for what is no number as well.
       fits = hn::And(fits, hn::Le(hn::Abs(metres), hn::Set(d, kMaxRootM)));
-      writer.PutWord(hn::BitCast(DU(), RootSteps(hn::IfThenElseZero(fits, metres))));
+      hn::StoreU(hn::BitCast(DU(), RootSteps(hn::IfThenElseZero(fits, metres))), DU(),
+                 work.numbers + c * kBlock + lane);
     }
     // Not 0 where a number needs more bits than it has.
     VI excess = hn::Zero(di);
-    V ex = hn::Zero(d);  // what is left to make up for of the joint before
-    V ey = ex;
-    V ez = ex;
-    for (std::size_t j = 0; j < joint_count; ++j) {
-      const CompactJoint& joint = joints[j];
+    for (const std::size_t j : plan.order) {
+      const CompactJoint& joint = plan.joints[j];
+      std::uint32_t* numbers = work.numbers + (kJointRows + 4 * j) * kBlock + lane;
+      const auto keep = [&](std::size_t c, VI value) HWY_ATTR {
+        hn::StoreU(hn::BitCast(DU(), value), DU(), numbers + c * kBlock);
+      };
       const float* rotation = work.rotations + 4 * j * kBlock + lane;
       Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
                     hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
@@ -135,13 +118,11 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
       if (joint.is_left_out) continue;
       if (joint.parent >= 0) {
         // e q, where e = (ex, ey, ez, 1): an angle of a thousandth or two.
-        if (static_cast<std::size_t>(joint.parent) + 1 != j) {
-          const float* error =
-              work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
-          ex = hn::LoadU(d, error);
-          ey = hn::LoadU(d, error + kBlock);
-          ez = hn::LoadU(d, error + 2 * kBlock);
-        }
+        const float* error =
+            work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
+        const V ex = hn::LoadU(d, error);
+        const V ey = hn::LoadU(d, error + kBlock);
+        const V ez = hn::LoadU(d, error + 2 * kBlock);
         const Rotation p = q;
         q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
@@ -174,18 +155,18 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
         const int most = (1 << (joint.free_bits - 1)) - 1;
         const V to_steps = hn::Set(d, joint.steps[0]);
         const V to_number = hn::Set(d, joint.step[0]);
-        writer.Put(index, 2);
-        const auto tell = [&](V component) HWY_ATTR {
+        keep(3, index);
+        const auto tell = [&](V component, std::size_t c) HWY_ATTR {
           Steps steps = RoundToSteps(hn::Mul(component, to_steps));
           const V limit = hn::Set(d, static_cast<float>(most));
           steps.number = hn::Max(hn::Min(steps.number, limit), hn::Neg(limit));
           steps.integer = hn::Max(hn::Min(steps.integer, hn::Set(di, most)), hn::Set(di, -most));
-          writer.Put(hn::Add(steps.integer, hn::Set(di, most + 1)), joint.free_bits);
+          keep(c, hn::Add(steps.integer, hn::Set(di, most + 1)));
           return hn::Mul(steps.number, to_number);
         };
-        const V a = tell(hn::IfThenElse(is_0, q.y, q.x));
-        const V b = tell(hn::IfThenElse(is_0_or_1, q.z, q.y));
-        const V c = tell(hn::IfThenElse(is_3, q.z, q.w));
+        const V a = tell(hn::IfThenElse(is_0, q.y, q.x), 0);
+        const V b = tell(hn::IfThenElse(is_0_or_1, q.z, q.y), 1);
+        const V c = tell(hn::IfThenElse(is_3, q.z, q.w), 2);
         const V left = hn::Sqrt(
             hn::Max(hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(a, a), hn::Mul(b, b), hn::Mul(c, c)))));
         told.x = hn::IfThenElse(is_0, left, a);
@@ -216,7 +197,7 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
           const Steps steps =
               RoundToSteps(hn::Mul(hn::Sub(value, low), hn::Set(d, joint.steps[c])));
           excess = hn::Or(excess, hn::ShiftRightSame(steps.integer, joint.bits[c]));
-          if (joint.bits[c] > 0) writer.Put(steps.integer, joint.bits[c]);
+          keep(c, steps.integer);
           return hn::Add(low, hn::Mul(steps.number, hn::Set(d, joint.step[c])));
         };
         told.x = tell(q.x, 0);
@@ -230,18 +211,18 @@ void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const Co
       }
       if (!joint.bears_others) continue;
       // conj(told) q: from what is told to what is.
-      ex = hn::Sub(hn::Sub(hn::Mul(told.w, q.x), hn::Mul(told.x, q.w)),
-                   hn::Sub(hn::Mul(told.y, q.z), hn::Mul(told.z, q.y)));
-      ey = hn::Sub(hn::Sub(hn::Mul(told.w, q.y), hn::Mul(told.y, q.w)),
-                   hn::Sub(hn::Mul(told.z, q.x), hn::Mul(told.x, q.z)));
-      ez = hn::Sub(hn::Sub(hn::Mul(told.w, q.z), hn::Mul(told.z, q.w)),
-                   hn::Sub(hn::Mul(told.x, q.y), hn::Mul(told.y, q.x)));
+      const V ex = hn::Sub(hn::Sub(hn::Mul(told.w, q.x), hn::Mul(told.x, q.w)),
+                           hn::Sub(hn::Mul(told.y, q.z), hn::Mul(told.z, q.y)));
+      const V ey = hn::Sub(hn::Sub(hn::Mul(told.w, q.y), hn::Mul(told.y, q.w)),
+                           hn::Sub(hn::Mul(told.z, q.x), hn::Mul(told.x, q.z)));
+      const V ez = hn::Sub(hn::Sub(hn::Mul(told.w, q.z), hn::Mul(told.z, q.w)),
+                           hn::Sub(hn::Mul(told.x, q.y), hn::Mul(told.y, q.x)));
       float* error = work.errors + j * 3 * kBlock + lane;
       hn::StoreU(ex, d, error);
       hn::StoreU(ey, d, error + kBlock);
       hn::StoreU(ez, d, error + 2 * kBlock);
     }
-    writer.Finish();
+    WriteWords(plan.parts, work.numbers + lane, work.words + 4 * lane);
     const auto is_exact = hn::RebindMask(d, hn::Eq(excess, hn::Zero(di)));
     const VI told = hn::IfThenElseZero(hn::RebindMask(di, hn::And(fits, is_exact)), hn::Set(di, 1));
     hn::StoreU(hn::BitCast(DU(), told), DU(), work.fits + lane);
@@ -258,8 +239,8 @@ namespace stridewire::protocol {
 
 HWY_EXPORT(EncodeCompact);
 
-void EncodeCompact(const CompactJoint* joints, std::size_t joint_count, const CompactWork& work) {
-  HWY_DYNAMIC_DISPATCH(EncodeCompact)(joints, joint_count, work);
+void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
+  HWY_DYNAMIC_DISPATCH(EncodeCompact)(plan, work);
 }
 
 }  // namespace stridewire::protocol

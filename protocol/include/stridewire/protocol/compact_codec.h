@@ -34,6 +34,13 @@ struct CompactJoint {
   bool is_left_out = false;  ///< Decoded to `reference`, however it is turned.
 };
 
+/// What a 32-bit word of a pose has of one number.
+struct CompactPart {
+  std::uint16_t row = 0;  ///< Of the number, among those of a pose
+  std::int8_t left = 0;   ///< Bits it is shifted by, to the right if negative
+  bool ends_word = false;
+};
+
 /// PoseMode::kCompact (STANDARD.md, "Poses"): the root as in kQuantised, then every joint's bits behind one another, the
 /// first of a number in the lowest bits, in little-endian words of 16 bits. What is left of the last word is 0.
 ///
@@ -80,12 +87,20 @@ class CompactCodec {
 
    private:
     friend class CompactCodec;
+    // One number of each pose: a line of the cache, so that no vector lies across two.
+    struct alignas(64) Floats {
+      float of[kBlock];
+    };
+    struct alignas(64) Words {
+      std::uint32_t of[kBlock];
+    };
     std::size_t size_ = 0;
     std::size_t joint_count_ = 0;
     float roots_m_[3][kBlock] = {};
-    std::vector<float> rotations_;      // [joint][x y z w][pose]
-    std::vector<float> errors_;         // [joint][x y z][pose]
-    std::vector<std::uint32_t> words_;  // [word / 4][pose][word % 4]
+    std::vector<Floats> rotations_;  // [joint][x y z w]
+    std::vector<Floats> errors_;     // [joint][x y z]
+    std::vector<Words> numbers_;     // [CompactPart::row]
+    std::vector<Words> words_;       // [word / 4]: [pose][word % 4]
     std::uint32_t fits_[kBlock] = {};
   };
 
@@ -104,6 +119,8 @@ class CompactCodec {
   CompactCodec() = default;
 
   std::vector<CompactJoint> joints_;
+  std::vector<std::uint16_t> order_;  // of encoding
+  std::vector<CompactPart> parts_;    // of a pose's words, one after the other
   std::size_t pose_bytes_ = 0;
 };
 
