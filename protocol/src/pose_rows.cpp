@@ -13,7 +13,6 @@ namespace stridewire::protocol {
 Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars, const CompactCodec* codec) {
   STRIDEWIRE_CHECK(avatars != nullptr);
   codec_ = codec;
-  block_.Clear();
   info_ = info;
   avatars_ = std::move(avatars);
   flags_.clear();
@@ -30,23 +29,31 @@ Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars, const Compact
 
 Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
                      std::span<const Quat> rotations) {
-  STRIDEWIRE_CHECK(size() < avatars_->size());
-  const std::size_t begin = begins_.back();
-  flags_.push_back(flags);
-  begins_.push_back(begin);
+  AddEncoded(flags, false, {});
   if (rotations.size() != info_.joint_count) {
     return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints", "PoseBatch.poses",
                 static_cast<std::int64_t>(rotations.size()));
   }
-  if (IsCompact(info_.mode)) {
-    block_rows_[block_.size()] = size() - 1;
+  const std::size_t begin = begins_.back();
+  PoseMode mode = info_.mode;
+  std::size_t length = 0;
+  if (IsCompact(mode)) {
+    block_.Clear();
     block_.Add(root_position_m, rotations);
-    if (block_.size() == CompactCodec::kBlock) EncodeBlock();
-    return {};
+    codec_->Encode(block_);
+    if (block_.fits(0)) {
+      length = codec_->pose_bytes();
+      block_.CopyBytes(0, Room(begin, length));
+    } else {
+      flags_.back() |= kPoseWide;
+      mode = PoseMode::kQuantised;
+    }
   }
-  const std::size_t length = PoseBytes(info_.mode, rotations.size());
-  const Status status = EncodePose(info_.mode, root_position_m, rotations, Room(begin, length));
-  if (!status) return status;
+  if (length == 0) {
+    length = PoseBytes(mode, rotations.size());
+    const Status status = EncodePose(mode, root_position_m, rotations, Room(begin, length));
+    if (!status) return status;
+  }
   begins_.back() = begin + length;
   ++pose_count_;
   return {};
@@ -54,9 +61,8 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
 
 void PoseRows::AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std::byte> pose) {
   STRIDEWIRE_CHECK(size() < avatars_->size());
-  EncodeBlock();
   const std::size_t begin = begins_.back();
-  flags &= static_cast<std::uint8_t>(~kPoseWide);
+  if (IsCompact(info_.mode)) flags &= static_cast<std::uint8_t>(~kPoseWide);
   flags_.push_back(is_wide ? flags | kPoseWide : flags);
   begins_.push_back(begin + pose.size());
   if (pose.empty()) return;
@@ -68,38 +74,6 @@ std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
   if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
   return std::span(bytes_).subspan(begin, length);
 }
-
-void PoseRows::EncodeBlock() {
-  if (block_.size() == 0) return;
-  codec_->Encode(block_);
-  std::size_t row = block_rows_[0];
-  for (std::size_t i = 0; i < block_.size(); ++i) {
-    // Rows between that have no pose begin where the next does.
-    for (; row < block_rows_[i]; ++row) begins_[row + 1] = begins_[row];
-    const std::size_t begin = begins_[row];
-    std::size_t length = codec_->pose_bytes();
-    flags_[row] &= static_cast<std::uint8_t>(~kPoseWide);
-    if (block_.fits(i)) {
-      block_.CopyBytes(i, Room(begin, length));
-    } else {
-      length = PoseBytes(PoseMode::kQuantised, info_.joint_count);
-      Vec3 root_position_m;
-      scratch_.resize(info_.joint_count);
-      block_.Get(i, root_position_m, scratch_);
-      if (EncodePose(PoseMode::kQuantised, root_position_m, scratch_, Room(begin, length))) {
-        flags_[row] |= kPoseWide;
-      } else {
-        length = 0;
-      }
-    }
-    pose_count_ += length > 0 ? 1 : 0;
-    begins_[++row] = begin + length;
-  }
-  for (; row < size(); ++row) begins_[row + 1] = begins_[row];
-  block_.Clear();
-}
-
-void PoseRows::Finish() { EncodeBlock(); }
 
 void PoseRows::SkipTo(std::size_t row) {
   STRIDEWIRE_CHECK(row <= avatars_->size());

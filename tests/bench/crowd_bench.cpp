@@ -168,7 +168,6 @@ void WholePose(benchmark::State& state, const Library& library) {
       const server::PosesAhead::Encoded encoded = ahead.Of(kept[i], kMode);
       rows.AddEncoded(0, encoded.is_wide, encoded.bytes);
     }
-    rows.Finish();
     std::span<const std::uint32_t> left = all;
     while (!left.empty() && status) {
       const auto part = left.first(composer.Fitting(rows, left));

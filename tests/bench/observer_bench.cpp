@@ -76,7 +76,6 @@ struct Crowd {
       places->Add(row, root_m.x, root_m.z);
     }
     STRIDEWIRE_CHECK(status.has_value());
-    rows->Finish();
     places->Sort();
     std::vector<std::uint32_t> all(kAvatars);
     std::iota(all.begin(), all.end(), 0u);

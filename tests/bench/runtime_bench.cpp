@@ -369,7 +369,6 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
       if (!status) break;
       status = rows.Add(0, avatar.pose().root_position_m, avatar.pose().rotations);
     }
-    rows.Finish();
     if (status) status = composer.Compose(rows, all, {}, frame);
     if (!status) return state.SkipWithError(status.error().text);
     benchmark::DoNotOptimize(frame.data());

@@ -123,7 +123,6 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
     (void)rows.Add(a.flags, a.root_position_m.value_or(RootAt(info.server_time_s, a.avatar)),
                    rotations);
   }
-  rows.Finish();
   std::vector<std::byte> frame;
   (void)protocol::PoseBatchComposer().Compose(rows, all, {.is_partial = is_partial}, frame);
   return frame;

@@ -658,7 +658,6 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
     }
   }
   rows.SkipTo(in_order.size());
-  rows.Finish();
   metrics_.poses_encoded.Add(rows.pose_count());
   metrics_.pose_errors.Add(wanted.size() - rows.pose_count());
 

@@ -183,7 +183,6 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
   ASSERT_TRUE(rows.Add(0, Vec3(2.0f), pose));
   pose[1] = kIdentityQuat;
   ASSERT_TRUE(rows.Add(0, Vec3(3.0f), pose));
-  rows.Finish();
   std::vector<std::byte> frame;
   ASSERT_TRUE(
       protocol::PoseBatchComposer().Compose(rows, std::vector<std::uint32_t>{0, 1, 2}, {}, frame));

@@ -136,10 +136,10 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
       }
       const Vec3 root(is_bad(a) ? std::numeric_limits<float>::quiet_NaN() : 0.5f, 0.0f, 0.0f);
       // The caller's flags do not say how a pose is told.
-      ASSERT_TRUE(rows.Add(a % 8, root, std::array{YawRotation(a), YawRotation(turn(a))}));
+      const Status status = rows.Add(a % 8, root, std::array{YawRotation(a), YawRotation(turn(a))});
+      ASSERT_EQ(status.has_value(), !is_bad(a)) << a;
     }
     rows.SkipTo(100);
-    rows.Finish();
     const auto has_pose = [&](AvatarNumber a) { return !is_skipped(a) && !is_bad(a); };
     EXPECT_EQ(rows.pose_count(),
               static_cast<std::size_t>(std::ranges::count_if(avatars, has_pose)));

@@ -36,7 +36,6 @@ class Encoder {
     for (const Avatar& avatar : avatars) {
       EXPECT_TRUE(rows_.Add(0, avatar.pose().root_position_m, avatar.pose().rotations));
     }
-    rows_.Finish();
     return rows_;
   }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -28,14 +27,14 @@ class PoseRows {
   using Avatars = std::shared_ptr<const std::vector<AvatarNumber>>;
 
   /// Starts anew; drops what was there. `info` with part 0 of 1; `avatars` not null, growing, none of them
-  /// 0. Compact rows need the world's codec, which has to live until Finish. Errors as Check(PoseBatch), or
+  /// 0. Compact rows need the world's codec, which has to live as long as poses are added. Errors as Check(PoseBatch), or
   /// kInvalidArgument: no codec, or one of another number of joints.
   [[nodiscard]] Status Begin(const PoseBatchInfo& info, Avatars avatars,
                              const CompactCodec* codec = nullptr);
 
   /// Makes the next row: the pose of the next avatar, encoded by EncodePose with its errors, after which
   /// the row is there but empty. kShapeMismatch: another number of joints. There must be an avatar left.
-  /// Compact poses are copied, to be encoded together: which of them are none shows after Finish.
+  /// A compact pose that does not fit is a wide one. Who has many encodes them side by side (CompactCodec).
   [[nodiscard]] Status Add(std::uint8_t flags, const Vec3& root_position_m,
                            std::span<const Quat> rotations);
   /// Makes the next row of bytes that are encoded already, in info().mode or, wide, in kQuantised; none: a row without a
@@ -43,8 +42,6 @@ class PoseRows {
   void AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std::byte> pose);
   /// Makes the rows before the `row`th without a pose.
   void SkipTo(std::size_t row);
-  /// After the last row: now they may be read.
-  void Finish();
 
   [[nodiscard]] const PoseBatchInfo& info() const { return info_; }
   [[nodiscard]] const Avatars& avatars() const { return avatars_; }
@@ -64,13 +61,9 @@ class PoseRows {
   std::vector<std::byte> bytes_;  // longer than what is used of it, so that it is not zeroed again
   std::size_t pose_count_ = 0;
 
-  // Compact: the poses on their way, and their rows.
-  void EncodeBlock();
   std::span<std::byte> Room(std::size_t begin, std::size_t length);
-  const CompactCodec* codec_ = nullptr;
+  const CompactCodec* codec_ = nullptr;  // of compact poses
   CompactCodec::Block block_;
-  std::array<std::size_t, CompactCodec::kBlock> block_rows_{};
-  std::vector<Quat> scratch_;
 };
 
 /// Puts rows into frames: copies, nothing is encoded again. Keeps its memory between frames: once warm
