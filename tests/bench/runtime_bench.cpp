@@ -212,7 +212,7 @@ void PlanWalkSteps(benchmark::State& state, const Library& library, bool is_roug
     TerrainData data;
     for (int i = 0; i < 400; ++i) {
       const double x = -10.0 + (i % 20);
-      const double z = -10.0 + (i / 20);
+      const double z = -10.0 + static_cast<double>(i / 20);
       data.boxes.push_back({{x, z}, {x + 0.7, z + 0.7}, 0.03 * (i % 5)});
     }
     terrain = Terrain::Make(std::move(data)).value();
