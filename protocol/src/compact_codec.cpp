@@ -21,7 +21,7 @@ constexpr float kLeastToldW = 0.9f;
 
 constexpr std::size_t kRootBytes = 12;
 
-// Reads what the kernel's BitWriter wrote.
+// Reads what the kernel's WriteWords wrote.
 class BitReader {
  public:
   explicit BitReader(std::span<const std::byte> words) : words_(words) {}
