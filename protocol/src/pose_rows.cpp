@@ -6,6 +6,7 @@
 
 #include "frame_builder.h"
 #include "stridewire/base/check.h"
+#include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::protocol {
@@ -134,9 +135,7 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
     if (last + kAhead < picked.size()) {
       const std::span<const std::byte> later =
           rows.poses(picked[last + kAhead], picked[last + kAhead]);
-      for (std::size_t byte = 0; byte < later.size(); byte += 64) {
-        __builtin_prefetch(later.data() + byte);
-      }
+      PrefetchBytes(later.data(), later.size());
     }
     const std::span<const std::byte> run = rows.poses(picked[i], picked[last]);
     if (!run.empty()) std::memcpy(poses, run.data(), run.size());

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <utility>
 
-#include "prefetch.h"
 #include "stridewire/base/check.h"
+#include "stridewire/base/prefetch.h"
 #include "stridewire/runtime/contact_keytimes.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/foot_vector.h"

@@ -5,8 +5,8 @@
 
 #include "grid_blend.h"
 #include "pose_kernels.h"
-#include "prefetch.h"
 #include "stridewire/base/check.h"
+#include "stridewire/base/prefetch.h"
 
 namespace stridewire {
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
+#include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::server {
@@ -153,19 +154,13 @@ void PosesAhead::Finish(std::size_t shown) {
                                                     int pose, const PoseLanes& lanes) {
     for (std::size_t i = 0; i < items.size(); ++i) {
       places[i] = pose < items[i].count ? items[i].tag : kNobody;
-      if (pose + 1 < items[i].count) {
-        PrefetchBytesOf(items[i].tag, static_cast<std::size_t>(pose) + 1);
-      }
+      // Planes are large: who writes into one without having asked for it before waits.
+      const int next = pose + 1;
+      if (next >= items[i].count) continue;
+      PrefetchBytes(BytesOf(items[i].tag, static_cast<std::size_t>(next)), pose_bytes_);
     }
     Keep(lanes, std::span(places).first(items.size()), static_cast<std::size_t>(pose));
   });
-}
-
-// Planes are large: who writes into one without having asked for it before waits.
-void PosesAhead::PrefetchBytesOf(std::uint32_t place, std::size_t pose) const {
-  const std::byte* to = BytesOf(place, pose);
-  for (std::size_t byte = 0; byte < pose_bytes_; byte += 64) __builtin_prefetch(to + byte, 1);
-  __builtin_prefetch(to + pose_bytes_ - 1, 1);
 }
 
 void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places,

@@ -154,7 +154,6 @@ class PosesAhead {
   [[nodiscard]] std::byte* BytesOf(std::uint32_t place, std::size_t pose) {
     return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
   }
-  void PrefetchBytesOf(std::uint32_t place, std::size_t pose) const;
   void MakePlace(Place& place);
   void Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays);
   void KeepTaken();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace stridewire {
 
@@ -8,8 +9,9 @@ inline constexpr std::size_t kCacheLineBytes = 64;
 
 /// Asks for memory that is read soon. Changes nothing that can be seen but time.
 inline void PrefetchBytes(const void* at, std::size_t bytes) {
-  const auto* line = static_cast<const char*>(at);
-  for (std::size_t i = 0; i < bytes; i += kCacheLineBytes) __builtin_prefetch(line + i);
+  const auto* from = static_cast<const char*>(at);
+  const std::size_t in_line = reinterpret_cast<std::uintptr_t>(at) % kCacheLineBytes;
+  for (std::size_t i = 0; i < in_line + bytes; i += kCacheLineBytes) __builtin_prefetch(from + i);
 }
 
 }  // namespace stridewire
