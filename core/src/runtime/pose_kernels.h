@@ -86,7 +86,7 @@ void SinCos(const double* angles_rad, std::size_t count, double* sines, double* 
 /// Poses of up to kBlock movements side by side, a movement a lane: an array [n][kBlock] holds a number of each. What
 /// stands in lanes of nobody is read, but means nothing.
 
-/// to[i][lane] = from[lane][i] for `count` floats, 4 or more. `from` has kBlock entries, none of them null.
+/// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
 /// What does not change of a difference while it is eased out, [joint][kEaseFloats][kBlock]: x y z of the rotation, and

@@ -21,6 +21,12 @@ struct RowAddress {
 };
 
 void Transpose(const float* const* from, std::size_t count, std::size_t lanes, float* to) {
+  if (count < 4) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t lane = 0; lane < lanes; ++lane) to[i * kBlock + lane] = from[lane][i];
+    }
+    return;
+  }
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     for (std::size_t next = 0; next < count;) {
       // The last four go with some before them.

@@ -210,14 +210,7 @@ void StretchEvaluator::Work::TakeEasing() {
   if (!is_eased) return;
   kernels::Transpose(differences.data(), 4 * joints, lanes, FloatsOf(transposed));
   kernels::PrepareEase(FloatsOf(transposed), joints, lanes, FloatsOf(ease));
-  if (!is_inertial) return;
-  if (joints > 1) {
-    kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
-    return;
-  }
-  for (std::size_t i = 0; i < lanes; ++i) {  // fewer floats than are transposed at once
-    for (std::size_t c = 0; c < 3; ++c) velocity[c].of[i] = velocities[i][c];
-  }
+  if (is_inertial) kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
 }
 
 void StretchEvaluator::Work::Finish(std::size_t pose) {
