@@ -80,21 +80,19 @@ GridExample AverageExamples(const std::vector<GridExample>& examples, std::span<
   mean.source += " and " + std::to_string(members.size() - 1) + " like it";
 
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   const int joint_count = skeleton.joint_count();
   for (std::size_t begin = 0; begin < rows.size(); begin += row_floats) {
     for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
-      double* q = &rows[begin + j];
-      const double norm = std::sqrt(q[0] * q[0] + q[padded] * q[padded] +
-                                    q[2 * padded] * q[2 * padded] + q[3 * padded] * q[3 * padded]);
+      const std::size_t at = begin + 4 * j;
+      double* q = &rows[at];
+      const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
       if (norm < 0.1) {  // no mean: keep the first member's rotation
         for (std::size_t c = 0; c < 4; ++c) {
-          q[c * padded] =
-              examples[static_cast<std::size_t>(members[0])].rows[begin + j + c * padded];
+          q[c] = examples[static_cast<std::size_t>(members[0])].rows[at + c];
         }
         continue;
       }
-      for (std::size_t c = 0; c < 4; ++c) q[c * padded] /= norm;
+      for (std::size_t c = 0; c < 4; ++c) q[c] /= norm;
     }
   }
   std::transform(rows.begin(), rows.end(), mean.rows.begin(),

@@ -8,17 +8,6 @@
 namespace stridewire {
 namespace {
 
-Quat QuatOf(const float* row, std::size_t padded, std::size_t j) {
-  return Quat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
-}
-
-void SetQuat(float* row, std::size_t padded, std::size_t j, const Quat& q) {
-  row[j] = q.x;
-  row[padded + j] = q.y;
-  row[2 * padded + j] = q.z;
-  row[3 * padded + j] = q.w;
-}
-
 std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
   const std::size_t d = examples.front().parameters.size();
   std::vector<double> mean(d, 0.0);
@@ -60,7 +49,6 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
   result.source = example.source;
   result.mirrored = example.mirrored;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
 
   Pose pose(clip.joint_count);
@@ -73,7 +61,7 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
     pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
-      SetQuat(row, padded, j, Normalise(pose.rotations[j]));
+      GridLayout::SetRotation(row, j, Normalise(pose.rotations[j]));
     }
     layout.SetRoot(row, {DVec3(pose.root_position_m), yaw_rad});
   }
@@ -83,14 +71,13 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count) {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   GridExample& reference = examples[MedoidIndex(examples)];
   const std::size_t points = reference.rows.size() / row_floats;
   const auto flip = [&](float* row, std::size_t j) {
-    SetQuat(row, padded, j, -QuatOf(row, padded, j));
+    GridLayout::SetRotation(row, j, -GridLayout::RotationOf(row, j));
   };
   const auto dot = [&](const float* row, const float* to, std::size_t j) {
-    return Dot(QuatOf(row, padded, j), QuatOf(to, padded, j));
+    return Dot(GridLayout::RotationOf(row, j), GridLayout::RotationOf(to, j));
   };
   for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
     for (GridExample& example : examples) {
@@ -112,20 +99,18 @@ void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layo
 
 void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row) {
   constexpr float kSmallestNorm = 0.1f;
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
-    const Quat q = QuatOf(sum.data(), padded, j);
+    const Quat q = GridLayout::RotationOf(sum.data(), j);
     const float norm = std::sqrt(Dot(q, q));
-    if (norm >= kSmallestNorm) SetQuat(row, padded, j, q * (1.0f / norm));
+    if (norm >= kSmallestNorm) GridLayout::SetRotation(row, j, q * (1.0f / norm));
   }
   layout.SetRoot(row, layout.RootOf(sum.data()));
 }
 
 Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count) {
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   Pose pose(joint_count);
   for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
-    pose.rotations[j] = QuatOf(row.data(), padded, j);
+    pose.rotations[j] = GridLayout::RotationOf(row.data(), j);
   }
   const auto [position, yaw_rad] = layout.RootOf(row.data());
   pose.root_position_m = Vec3(position);

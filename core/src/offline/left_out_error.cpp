@@ -72,7 +72,6 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
       applied_, weights_);
 
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
-  const auto padded = static_cast<std::size_t>(layout_.padded_joints);
   blend_.rows.assign(target.rows.size(), 0.0f);
   for (std::size_t e = 0; e < set.examples.size(); ++e) {
     const auto w = static_cast<float>(weights_[e]);
@@ -85,16 +84,16 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
   error.duration_s -= target.keytimes_s.back();
   for (std::size_t begin = 0; begin < blend_.rows.size(); begin += kEveryPoint * row_floats) {
     for (std::size_t j = 0; j < static_cast<std::size_t>(skeleton_.joint_count()); ++j) {
-      float* q = &blend_.rows[begin + j];
-      const float norm = std::sqrt(q[0] * q[0] + q[padded] * q[padded] +
-                                   q[2 * padded] * q[2 * padded] + q[3 * padded] * q[3 * padded]);
+      const std::size_t at = begin + 4 * j;
+      float* q = &blend_.rows[at];
+      const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
       if (norm < 0.1f) {  // no mean: as one of them has it
         for (std::size_t c = 0; c < 4; ++c) {
-          q[c * padded] = set.examples.front()->rows[begin + j + c * padded];
+          q[c] = set.examples.front()->rows[at + c];
         }
         continue;
       }
-      for (std::size_t c = 0; c < 4; ++c) q[c * padded] /= norm;
+      for (std::size_t c = 0; c < 4; ++c) q[c] /= norm;
     }
   }
   const std::vector<Vec3> made = JointPositions(blend_, layout_, skeleton_);

@@ -85,9 +85,8 @@ class MomentReader {
     const auto n = static_cast<std::size_t>(group.example_count);
     const std::size_t row = static_cast<std::size_t>(point) * n + static_cast<std::size_t>(example);
     const float* x = &group.grid[row * static_cast<std::size_t>(layout_.row_floats)];
-    const auto padded = static_cast<std::size_t>(layout_.padded_joints);
     for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
-      pose_.rotations[j] = Quat(x[3 * padded + j], x[j], x[padded + j], x[2 * padded + j]);
+      pose_.rotations[j] = GridLayout::RotationOf(x, j);
     }
     const auto [position, yaw_rad] = layout_.RootOf(x);
     pose_.root_position_m = Vec3(position);

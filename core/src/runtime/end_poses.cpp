@@ -18,8 +18,6 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 class EndPoses::Gradient {
  public:
-  explicit Gradient(std::size_t padded) : padded_(padded) {}
-
   // By the four parts of a joint's quaternion, or of the root behind them.
   void Add(int joint, const DVec3& by_xyz, double by_w) {
     const auto j = static_cast<std::size_t>(joint);
@@ -37,8 +35,8 @@ class EndPoses::Gradient {
   [[nodiscard]] double Of(const float* row) const {
     std::array<double, 4> sums{};
     for (std::size_t i = 0; i < joint_count_; ++i) {
-      const float* at = row + joints_[i].joint;
-      for (std::size_t c = 0; c < 4; ++c) sums[c] += joints_[i].by[c] * at[c * padded_];
+      const float* at = row + 4 * joints_[i].joint;
+      for (std::size_t c = 0; c < 4; ++c) sums[c] += joints_[i].by[c] * at[c];
     }
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
   }
@@ -48,7 +46,6 @@ class EndPoses::Gradient {
     std::size_t joint;
     std::array<double, 4> by;
   };
-  std::size_t padded_;
   std::size_t joint_count_ = 0;
   std::array<Parts, 2 * static_cast<std::size_t>(kMaxJoints) + 1> joints_;
 };
@@ -81,7 +78,6 @@ void EndPoses::Blend(const Movement& movement) {
 }
 
 void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
-  const auto padded = static_cast<std::size_t>(layout_.padded_joints);
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
   const float* rows = Rows(is_end);
   std::array<float, kMaxRowFloats> sum;
@@ -96,18 +92,15 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
     DVec3 arm(skeleton_.legs[f].ball_offset_m);
     for (std::size_t i = 0; i < lengths_[f]; ++i) {
       const auto j = static_cast<std::size_t>(chains_[f][i]);
-      const auto rotation_of = [&](const float* row) {
-        return DQuat(row[3 * padded + j], row[j], row[padded + j], row[2 * padded + j]);
-      };
       Link& link = end.links[f][i];
-      DQuat blended = rotation_of(sum.data());
+      DQuat blended(GridLayout::RotationOf(sum.data(), j));
       double norm = std::sqrt(glm::dot(blended, blended));
       link.per_norm = 1.0 / norm;
       if (norm < kernels::kSmallestNorm) {  // as EvaluateBlend
         const auto largest = static_cast<std::size_t>(
             std::max_element(movement.weights.begin(), movement.weights.end()) -
             movement.weights.begin());
-        blended = rotation_of(rows + largest * row_floats);
+        blended = DQuat(GridLayout::RotationOf(rows + largest * row_floats, j));
         norm = std::sqrt(glm::dot(blended, blended));
         link.per_norm = 0.0;  // it changes as nothing says
       }
@@ -167,7 +160,7 @@ void EndPoses::MeasureSlopes(std::span<double> slopes) const {
     const std::span<double> out = slopes.subspan(l * n, n);
     std::fill(out.begin(), out.end(), 0.0);
     const auto add = [&](bool is_end, const DVec3& left, const DVec3& right) {
-      Gradient gradient(static_cast<std::size_t>(layout_.padded_joints));
+      Gradient gradient;
       AddGradient(ends_[is_end ? 1 : 0], 0, left, gradient);
       AddGradient(ends_[is_end ? 1 : 0], 1, right, gradient);
       const float* rows = Rows(is_end);

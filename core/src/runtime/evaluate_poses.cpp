@@ -12,23 +12,22 @@ namespace stridewire {
 
 void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                  const GridPlace& place, float* row) {
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   const std::vector<float>& weights = movement.weights;
   const auto largest =
       static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
   for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
     float square = 0.0f;
-    for (std::size_t c = 0; c < 4; ++c) square += row[c * padded + j] * row[c * padded + j];
+    for (std::size_t i = 4 * j; i < 4 * j + 4; ++i) square += row[i] * row[i];
     if (square >= kernels::kSmallestNorm * kernels::kSmallestNorm) continue;
-    for (std::size_t c = 0; c < 4; ++c) {
-      float& sum = row[c * padded + j];
+    for (std::size_t i = 4 * j; i < 4 * j + 4; ++i) {
+      float& sum = row[i];
       sum = 0.0f;
       for (int k = 0; k < 4; ++k) {
         const auto examples = static_cast<std::size_t>(PointOf(group, place, k)) *
                               static_cast<std::size_t>(group.example_count);
         sum += place.weights[static_cast<std::size_t>(k)] *
-               group.grid[(examples + largest) * row_floats + c * padded + j];
+               group.grid[(examples + largest) * row_floats + i];
       }
     }
   }
@@ -45,8 +44,7 @@ struct Place {
   bool is_eased;   // there is something left of the difference
 };
 
-// Room for a blended row, and for what BlendRotations reads beyond it.
-using RowScratch = std::array<float, kMaxRowFloats + kernels::kBlock>;
+using RowScratch = std::array<float, kMaxRowFloats>;
 
 // Makes rotations unit, adds what is left of the poses before and takes the pose into the world.
 void FinishPose(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
@@ -54,7 +52,6 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   const bool is_inertial = place.is_eased && movement.is_inertial;
   const kernels::RotationBlend rotations = {
       .row = row.data(),
-      .padded = static_cast<std::size_t>(layout.padded_joints),
       .joint_count = static_cast<std::size_t>(layout.joint_count),
       .difference = place.is_eased ? &movement.difference.rotations[0].x : nullptr,
       .fraction = place.fraction,

@@ -179,27 +179,6 @@ HWY_INLINE Quat4 YawRotation(Float yaw) {
   return {Float(0.0f), half * SinOverX(square), Float(0.0f), CosNearZero(square)};
 }
 
-// Components of the joints from `at` on, which lie `stride` floats apart.
-HWY_INLINE Quat4 LoadParts(const float* at, std::size_t stride) {
-  const FloatTag d;
-  return {Float(hn::LoadU(d, at)), Float(hn::LoadU(d, at + stride)),
-          Float(hn::LoadU(d, at + 2 * stride)), Float(hn::LoadU(d, at + 3 * stride))};
-}
-HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride) {
-  const FloatTag d;
-  hn::StoreU(q.x.v, d, at);
-  hn::StoreU(q.y.v, d, at + stride);
-  hn::StoreU(q.z.v, d, at + 2 * stride);
-  hn::StoreU(q.w.v, d, at + 3 * stride);
-}
-HWY_INLINE void StoreParts(Quat4 q, float* at, std::size_t stride, hn::Mask<FloatTag> lanes) {
-  const FloatTag d;
-  hn::BlendedStore(q.x.v, lanes, d, at);
-  hn::BlendedStore(q.y.v, lanes, d, at + stride);
-  hn::BlendedStore(q.z.v, lanes, d, at + 2 * stride);
-  hn::BlendedStore(q.w.v, lanes, d, at + 3 * stride);
-}
-
 // Quaternions x y z w one behind the other; of the last lanes only `left` are there.
 HWY_INLINE Quat4 LoadQuats(const float* at, std::size_t left) {
   const FloatTag d;

@@ -259,7 +259,6 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
                 MotionGroup& group) {
   const auto n = static_cast<std::size_t>(group.example_count);
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   group.grid = ToSpan(from.grid());
   if (group.grid.size() != static_cast<std::size_t>(group.grid_point_count) * n * row_floats) {
     return Fail(ErrorCode::kMalformed, "a group's grid has the wrong size");
@@ -279,9 +278,8 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
                   static_cast<std::int64_t>(row / row_floats));
     }
     for (std::size_t j = 0; j < joints; ++j) {
-      const double norm = std::sqrt(double{x[j]} * x[j] + double{x[padded + j]} * x[padded + j] +
-                                    double{x[2 * padded + j]} * x[2 * padded + j] +
-                                    double{x[3 * padded + j]} * x[3 * padded + j]);
+      const DQuat rotation(GridLayout::RotationOf(x, j));
+      const double norm = std::sqrt(glm::dot(rotation, rotation));
       if (std::fabs(norm - 1.0) > kUnitTolerance) {
         return Fail(ErrorCode::kMalformed, "a stored rotation is not of unit length",
                     static_cast<std::int64_t>(j));

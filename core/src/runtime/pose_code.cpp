@@ -31,12 +31,10 @@ template <typename Callback>
 void ForEachRotation(const MotionLibrary& library, std::size_t joint, const Callback& callback) {
   const GridLayout& layout = library.layout();
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
-  const auto padded = static_cast<std::size_t>(layout.padded_joints);
   callback(DQuat(library.stand_pose().rotations[joint]));
   for (const MotionGroup& group : library.groups()) {
-    for (std::size_t at = joint; at < group.grid.size(); at += row_floats) {
-      const float* row = group.grid.data() + at;
-      callback(DQuat(row[3 * padded], row[0], row[padded], row[2 * padded]));
+    for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
+      callback(DQuat(GridLayout::RotationOf(group.grid.data() + row, joint)));
     }
   }
   for (const LayerClip& layer : library.layers()) {

@@ -149,8 +149,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
                               : next;
     next = j + width;
     const std::size_t left = blend.joint_count - j;
-    Quat4 q = LoadParts(blend.row + j, blend.padded);
-    // Behind the joints comes the root, which is no rotation.
+    Quat4 q = LoadQuats(blend.row + 4 * j, left);
     const Mask is_small = Dot(q, q) < Float(kSmallestNorm * kSmallestNorm);
     is_short = is_short || (is_small && Mask{hn::FirstN(d, left)});
     // Lengths multiply: one division at the end serves all.

@@ -64,9 +64,8 @@ void BlendRun(const GridRun& run);
 
 /// Rotations of a blended row and, while the movement before is eased out, the difference to it.
 struct RotationBlend {
-  const float* row;    ///< Summed; `padded` joints lie component by component, as in GridLayout
-  std::size_t padded;  ///< Joints in the row. Up to kBlock floats beyond it are read
-  std::size_t joint_count;  ///< Joints written
+  const float* row;  ///< Summed, as in GridLayout
+  std::size_t joint_count;
   const float* difference;  ///< [joint] x y z w, or null; see slerp below
   float fraction;           ///< r := r slerp(1, difference, fraction), in [0, 1]
   const float* velocity;    ///< [joint] x y z rotation vectors a second, or null
@@ -98,7 +97,6 @@ void PrepareEase(const float* difference, std::size_t joint_count, std::size_t l
 /// Blended rows of a block on their way to be its poses in the world.
 struct LaneBlend {
   const float* const* rows;  ///< [lane]: a row as in GridLayout, kBlock of them
-  std::size_t padded;        ///< Joints in a row
   std::size_t joint_count;
   std::size_t lanes;
   const double* base_m;       ///< [x y z][kBlock]

@@ -128,32 +128,15 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
       }
     }
     Float shortest = kSmallestNorm * kSmallestNorm;  // squared
-    HWY_ALIGN float local[4 * kBlock] = {};          // root x, y, z, yaw
-    // Joints in fours; behind the last comes the root.
-    for (std::size_t first = 0; first <= blend.joint_count; first += 4) {
-      Quat4 parts[4];  // [component]: of four joints
-      for (std::size_t c = 0; c < 4; ++c) {
-        parts[c] = GatherQuats(RowAddress{blend.rows + lane, c * blend.padded + first});
-      }
-      const auto joint_of = [&](Float Quat4::* of) HWY_ATTR {
-        return Quat4{parts[0].*of, parts[1].*of, parts[2].*of, parts[3].*of};
-      };
-      const Quat4 four[4] = {joint_of(&Quat4::x), joint_of(&Quat4::y), joint_of(&Quat4::z),
-                             joint_of(&Quat4::w)};
-      for (std::size_t i = 0; i < 4; ++i) {
-        const std::size_t joint = first + i;
-        Quat4 q = four[i];
-        if (joint > blend.joint_count) break;
-        if (joint == blend.joint_count) {
-          StoreQuat(q, local);
-          break;
-        }
-        shortest = Float(hn::Min(Dot(q, q).v, shortest.v));
-        // Lengths multiply: one division at the end serves all.
-        if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
-        StoreQuat(Normalise(q), rotations + joint * 4 * kBlock + lane);
-      }
+    for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
+      Quat4 q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
+      shortest = Float(hn::Min(Dot(q, q).v, shortest.v));
+      // Lengths multiply: one division at the end serves all.
+      if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
+      StoreQuat(Normalise(q), rotations + joint * 4 * kBlock + lane);
     }
+    HWY_ALIGN float local[4 * kBlock];  // root x, y, z, yaw
+    StoreQuat(GatherQuats(RowAddress{blend.rows + lane, 4 * blend.joint_count}), local);
     const Mask is_there = {hn::FirstN(FloatTag(), blend.lanes - lane)};
     is_any_short |= Any(shortest < Float(kSmallestNorm * kSmallestNorm) && is_there);
     HWY_ALIGN float sines[kBlock];

@@ -219,7 +219,6 @@ void StretchEvaluator::Work::Finish(std::size_t pose) {
   const kernels::GridPlaces& at = places[pose];
   const kernels::LaneBlend blend = {
       .rows = of_lanes.data(),
-      .padded = static_cast<std::size_t>(library.layout().padded_joints),
       .joint_count = joints,
       .lanes = lanes,
       .base_m = base_m[0].of,

@@ -11,14 +11,11 @@ namespace {
 
 constexpr float kSmallestNorm = 0.1f;
 
-// One row of a grid, component by component.
+// One row of a grid.
 struct Row {
   const float* floats;
   const GridLayout& layout;
-  [[nodiscard]] Quat rotation(std::size_t j) const {
-    const auto padded = static_cast<std::size_t>(layout.padded_joints);
-    return {floats[3 * padded + j], floats[j], floats[padded + j], floats[2 * padded + j]};
-  }
+  [[nodiscard]] Quat rotation(std::size_t j) const { return GridLayout::RotationOf(floats, j); }
   [[nodiscard]] DVec3 position() const { return layout.RootOf(floats).position_m; }
   [[nodiscard]] double yaw() const { return layout.RootOf(floats).yaw_rad; }
 };

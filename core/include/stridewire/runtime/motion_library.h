@@ -65,35 +65,45 @@ struct Parameter {
 };
 
 /// Grid row: one example's pose at one grid point, as floats
-///   x[joints] root x, zeros   y[joints] root y, zeros   z[joints] root z, zeros   w[joints] root yaw, zeros
-/// of `padded` floats each: the joint count and one, rounded up to 8. Joint 0's quaternion is the root rotation with
-/// its yaw taken off on the left (r = q_yaw * rest); the yaw is an unwrapped scalar, so examples
-/// may differ by more than half a turn. Positions and yaw are relative to the base frame.
+///   [joint] x y z w,  root x y z, root yaw,  zeros up to a multiple of 16.
+/// Joint 0's quaternion is the root rotation with its yaw taken off on the left (r = q_yaw * rest); the yaw is an
+/// unwrapped scalar, so examples may differ by more than half a turn. Positions and yaw are relative to the base frame.
 struct GridLayout {
   int joint_count = 0;
-  int padded_joints = 0;
   int row_floats = 0;
   explicit constexpr GridLayout(int joints = 0)
-      : joint_count(joints), padded_joints((joints + 8) / 8 * 8), row_floats(padded_joints * 4) {}
+      : joint_count(joints), row_floats((4 * (joints + 1) + 15) / 16 * 16) {}
+  /// Of a row of an example it is unit; of a sum of rows it need not be.
+  [[nodiscard]] static Quat RotationOf(const float* row, std::size_t joint) {
+    const float* q = row + 4 * joint;
+    return {q[3], q[0], q[1], q[2]};
+  }
+  static void SetRotation(float* row, std::size_t joint, const Quat& rotation) {
+    float* q = row + 4 * joint;
+    q[0] = rotation.x;
+    q[1] = rotation.y;
+    q[2] = rotation.z;
+    q[3] = rotation.w;
+  }
   struct Root {
     DVec3 position_m;
     double yaw_rad;
   };
   [[nodiscard]] Root RootOf(const float* row) const {
-    const float* x = row + joint_count;
-    return {DVec3(x[0], x[padded_joints], x[2 * padded_joints]), x[3 * padded_joints]};
+    const float* x = row + 4 * joint_count;
+    return {DVec3(x[0], x[1], x[2]), x[3]};
   }
   void SetRoot(float* row, const Root& root) const {
-    float* x = row + joint_count;
+    float* x = row + 4 * joint_count;
     x[0] = static_cast<float>(root.position_m.x);
-    x[padded_joints] = static_cast<float>(root.position_m.y);
-    x[2 * padded_joints] = static_cast<float>(root.position_m.z);
-    x[3 * padded_joints] = static_cast<float>(root.yaw_rad);
+    x[1] = static_cast<float>(root.position_m.y);
+    x[2] = static_cast<float>(root.position_m.z);
+    x[3] = static_cast<float>(root.yaw_rad);
   }
 };
 
 /// The longest row of a grid.
-inline constexpr std::size_t kMaxRowFloats = 4 * (static_cast<std::size_t>(kMaxJoints) + 8);
+inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
 /// Examples that can be blended with each other: one kind, one set of parameters, the same number
 /// of keytimes, one grid. All spans point into the library's bytes.
@@ -134,7 +144,7 @@ struct MotionGroup {
 /// FlatBuffers table (`core/schema/motion_library.fbs`) whose float arrays are 64-byte aligned.
 class MotionLibrary {
  public:
-  static constexpr int kFormatVersion = 2;
+  static constexpr int kFormatVersion = 3;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
   static constexpr int kMaxGroups = 256;
   static constexpr int kMaxExamples = 4096;    ///< A group.

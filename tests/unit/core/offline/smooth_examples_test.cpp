@@ -236,7 +236,7 @@ GridExample Turning(const GridLayout& layout, int points, double parameter, doub
     const double half = 0.5 * end_rad * p / (points - 1);
     float* row = &example.rows[static_cast<std::size_t>(p * layout.row_floats)];
     row[0] = static_cast<float>(std::sin(half));
-    row[3 * layout.padded_joints] = static_cast<float>(std::cos(half));
+    row[3] = static_cast<float>(std::cos(half));
   }
   return example;
 }
@@ -249,18 +249,15 @@ TEST(AlignHemispheres, KeepsTracksContinuousHoweverFarTheyTurnFromTheReference) 
                                        Turning(layout, kPoints, 1.0, 0.2),
                                        Turning(layout, kPoints, 2.0, 4.5)};
   const auto quat = [&](const GridExample& example, int p) {
-    const float* row = &example.rows[static_cast<std::size_t>(p * layout.row_floats)];
-    const int padded = layout.padded_joints;
-    return Quat(row[3 * padded], row[0], row[padded], row[2 * padded]);
+    return GridLayout::RotationOf(&example.rows[static_cast<std::size_t>(p * layout.row_floats)],
+                                  0);
   };
   // As captures come: signs at random.
   for (std::size_t e = 0; e < examples.size(); ++e) {
     for (int p = 0; p < kPoints; ++p) {
       if ((static_cast<std::size_t>(p) * 7 + e * 3) % 5 < 2) continue;
       for (int c = 0; c < 4; ++c) {
-        float& part =
-            examples[e]
-                .rows[static_cast<std::size_t>(p * layout.row_floats + c * layout.padded_joints)];
+        float& part = examples[e].rows[static_cast<std::size_t>(p * layout.row_floats + c)];
         part = -part;
       }
     }
