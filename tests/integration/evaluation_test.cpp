@@ -62,6 +62,148 @@ TEST(Evaluation, SinesAreThoseOfTheScalarCode) {
   }
 }
 
+Quat DrawRotation(Random& random, double largest_rad) {
+  DVec3 axis;
+  do {
+    axis = {random.Draw(-1.0, 1.0), random.Draw(-1.0, 1.0), random.Draw(-1.0, 1.0)};
+  } while (glm::length(axis) < 0.1);
+  const double half = 0.5 * random.Draw(0.0, largest_rad);
+  const DVec3 xyz = glm::normalize(axis) * std::sin(half);
+  return Quat(DQuat(std::cos(half), xyz.x, xyz.y, xyz.z));
+}
+
+double AngleBetween(const DQuat& a, const DQuat& b) {
+  const DQuat turn = glm::conjugate(a) * b;
+  return 2.0 * std::atan2(glm::length(DVec3(turn.x, turn.y, turn.z)), std::fabs(turn.w));
+}
+
+// Of what movements leave of the poses before, the largest are halves of a turn.
+TEST(Evaluation, EasesOutDifferencesOfAnySize) {
+  constexpr unsigned kSeed = 20261125;
+  constexpr std::size_t kJoints = 37;
+  Random random(kSeed);
+  double worst_rad = 0.0;
+  for (int round = 0; round < 2000; ++round) {
+    std::vector<Quat> row(kJoints);
+    std::vector<Quat> differences(kJoints);
+    for (Quat& q : row) q = DrawRotation(random, 3.1) * static_cast<float>(random.Draw(0.2, 1.5));
+    for (Quat& q : differences) {
+      q = DrawRotation(random, round % 4 == 0 ? 3.14159 : 1.0);
+      if (random.Draw(0.0, 1.0) < 0.5) q = -q;
+    }
+    const double fraction = round % 7 == 0 ? 1.0 : random.Draw(0.0, 1.0);
+    std::vector<Quat> eased(kJoints);
+    ASSERT_TRUE(kernels::BlendRotations({.row = &row[0].x,
+                                         .joint_count = kJoints,
+                                         .difference = &differences[0].x,
+                                         .fraction = static_cast<float>(fraction),
+                                         .velocity = nullptr,
+                                         .seconds = 0.0f},
+                                        &eased[0].x));
+    for (std::size_t j = 0; j < kJoints; ++j) {
+      DQuat difference = glm::normalize(DQuat(differences[j]));
+      if (difference.w < 0.0) difference = -difference;
+      const DVec3 xyz(difference.x, difference.y, difference.z);
+      const double half = std::atan2(glm::length(xyz), difference.w);
+      const DVec3 part =
+          glm::length(xyz) > 0.0 ? glm::normalize(xyz) * std::sin(fraction * half) : DVec3(0.0);
+      const DQuat expected =
+          glm::normalize(DQuat(row[j])) * DQuat(std::cos(fraction * half), part.x, part.y, part.z);
+      ASSERT_NEAR(Dot(eased[j], eased[j]), 1.0f, 1e-6f) << "seed " << kSeed;
+      worst_rad = std::max(worst_rad, AngleBetween(expected, DQuat(eased[j])));
+    }
+  }
+  std::printf("%.2g rad off at most\n", worst_rad);
+  EXPECT_LT(worst_rad, 1e-6) << "seed " << kSeed;
+}
+
+// Sixteen rows side by side, all of which are eased out and go on as fast as they did.
+struct Sixteen {
+  static constexpr std::size_t kJoints = 5;
+  static constexpr std::size_t kRowFloats = GridLayout(kJoints).row_floats;
+  using Lanes = std::array<float, kernels::kBlock>;
+  using DoubleLanes = std::array<double, kernels::kBlock>;
+
+  explicit Sixteen(Random& random) {
+    for (std::size_t i = 0; i < kernels::kBlock; ++i) {
+      for (std::size_t j = 0; j < kJoints; ++j) {
+        GridLayout::SetRotation(rows[i].data(), j, DrawRotation(random, 3.0));
+        const Quat difference = DrawRotation(random, 3.1);
+        for (std::size_t c = 0; c < 4; ++c) differences[4 * j + c][i] = (&difference.x)[c];
+        for (std::size_t c = 0; c < 3; ++c) {
+          velocities[3 * j + c][i] = static_cast<float>(random.Draw(-30.0, 30.0));
+        }
+      }
+      fraction[i] = static_cast<float>(random.Draw(0.0, 1.0));
+      slope_s[i] = static_cast<float>(random.Draw(0.0, 0.2));
+    }
+    kernels::PrepareEase(differences[0].data(), kJoints, kernels::kBlock, ease[0].data());
+    kernels::FindFastest(velocities[0].data(), kJoints, kernels::kBlock, fastest.data());
+  }
+
+  [[nodiscard]] bool Finish() {
+    std::array<const float*, kernels::kBlock> of_lanes;
+    for (std::size_t i = 0; i < kernels::kBlock; ++i) of_lanes[i] = rows[i].data();
+    return kernels::FinishLanes({.rows = of_lanes.data(),
+                                 .joint_count = kJoints,
+                                 .lanes = kernels::kBlock,
+                                 .base_m = zeros[0].data(),
+                                 .heading_rad = zeros[0].data(),
+                                 .sine = zeros[0].data(),
+                                 .cosine = ones.data(),
+                                 .steer_rad = zeros[0].data(),
+                                 .steered = zeros[0].data(),
+                                 .ease = ease[0].data(),
+                                 .velocity = velocities[0].data(),
+                                 .fastest = fastest.data(),
+                                 .root_ease_m = no_root[0].data(),
+                                 .root_ease_m_s = no_root[0].data(),
+                                 .fraction = fraction.data(),
+                                 .slope_s = slope_s.data(),
+                                 .is_eased = all.data(),
+                                 .is_inertial = all.data()},
+                                roots_m[0].data(), rotations[0].data());
+  }
+
+  static constexpr Lanes All() {
+    Lanes lanes;
+    lanes.fill(1.0f);
+    return lanes;
+  }
+  alignas(64) std::array<std::array<float, kRowFloats>, kernels::kBlock> rows{};
+  alignas(64) std::array<Lanes, 4 * kJoints> differences{};
+  alignas(64) std::array<Lanes, 3 * kJoints> velocities{};
+  alignas(64) std::array<Lanes, kernels::kEaseFloats * kJoints> ease{};
+  alignas(64) Lanes fastest{}, fraction{}, slope_s{};
+  alignas(64) Lanes all = All();
+  alignas(64) std::array<Lanes, 3> no_root{};
+  alignas(64) std::array<DoubleLanes, 3> zeros{};
+  alignas(64) DoubleLanes ones{1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+  alignas(64) std::array<Lanes, 3> roots_m{};
+  alignas(64) std::array<Lanes, 4 * kJoints> rotations{};
+};
+
+// What is left of the poses before makes rotations longer before they are made unit: one that is too short to have a
+// mean must be seen through it.
+TEST(Evaluation, SeesARotationTooShortInEveryLaneAndJoint) {
+  constexpr unsigned kSeed = 20261126;
+  Random random(kSeed);
+  for (const std::int64_t set : InstructionSets()) {
+    const OnlyInstructionSet only(set);
+    for (int round = 0; round < 2000; ++round) {
+      Sixteen poses(random);
+      ASSERT_TRUE(poses.Finish()) << hwy::TargetName(set) << ", seed " << kSeed;
+      const auto lane = static_cast<std::size_t>(random.Draw(0.0, 15.999));
+      const auto joint = static_cast<std::size_t>(random.Draw(0.0, 4.999));
+      float* row = poses.rows[lane].data();
+      const Quat q = GridLayout::RotationOf(row, joint);
+      GridLayout::SetRotation(row, joint, q * static_cast<float>(random.Draw(0.01, 0.0999)));
+      ASSERT_FALSE(poses.Finish())
+          << hwy::TargetName(set) << ", lane " << lane << ", joint " << joint << ", seed " << kSeed;
+    }
+  }
+}
+
 // All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does as well, and then movement
 // mode gets another feature bit: who evaluates movements by the old formulas would show other poses than the server
 // (decision 0021).
@@ -72,8 +214,8 @@ TEST(Evaluation, IsWhatMovementModeStandsFor) {
     crowd.Advance();
     for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
   }
-  EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0xc0dbd3585b9133cau);
-  EXPECT_EQ(protocol::kFeatureMovementMode, 8u);
+  EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0x75cf2fbe2c99a5d5u);
+  EXPECT_EQ(protocol::kFeatureMovementMode, 32'768u);
 }
 
 class EvaluationOf : public testing::TestWithParam<Source> {

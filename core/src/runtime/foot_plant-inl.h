@@ -23,6 +23,10 @@ HWY_INLINE Float EaseOutSlope(Float s) {
   const Float r = Float(1.0f) - in;
   return in * r * r;
 }
+// By a length that is known, without dividing.
+HWY_INLINE Float Over(Float x, double length) {
+  return x * Float(static_cast<float>(1.0 / length));
+}
 HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   const Float d = a - b;
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
@@ -76,6 +80,7 @@ struct Common {
   Vec3x root_rest, root_rest_velocity;
   Float steer, duration_s, entered_s, ease_out_s, keeps_above_ground, settle_s;
   Float time_s;
+  Float per_duration, per_ease_out;  // 1 / s
 };
 
 // A leg by forward kinematics, relative to the root and in world axes.
@@ -87,18 +92,36 @@ struct LegLanes {
 
 HWY_INLINE Vec3x Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-HWY_INLINE void EvaluateLeg(const LegRig::Bones& bones, const float* rotations, Quat4 root,
-                            LegLanes& out) {
-  out.positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
-  out.rotations[0] = root;
-  for (std::size_t i = 1; i < bones.count; ++i) {
-    out.positions[i] =
-        out.positions[i - 1] + Rotate(out.rotations[i - 1], Same(bones.offsets_m[i]));
-    out.rotations[i] =
-        Multiply(out.rotations[i - 1], LoadQuat(rotations + bones.joints[i] * 4 * kBlock));
+// Whatever is done to a leg waits for what was done before, so both legs take each step together: a processor works on
+// one while the other waits.
+template <typename Step>
+HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
+  step(rig.bones[0], std::size_t{0});
+  step(rig.bones[1], std::size_t{1});
+}
+
+HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, Quat4 root,
+                             LegLanes* legs) {
+  std::size_t longest = 0;
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    legs[f].positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
+    legs[f].rotations[0] = root;
+    longest = longest > bones.count ? longest : bones.count;
+  });
+  for (std::size_t i = 1; i < longest; ++i) {
+    ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+      if (i >= bones.count) return;
+      LegLanes& leg = legs[f];
+      leg.positions[i] =
+          leg.positions[i - 1] + Rotate(leg.rotations[i - 1], Same(bones.offsets_m[i]));
+      leg.rotations[i] =
+          Multiply(leg.rotations[i - 1], LoadQuat(rotations + bones.joints[i] * 4 * kBlock));
+    });
   }
-  const std::size_t last = bones.count - 1;
-  out.ball = out.positions[last] + Rotate(out.rotations[last], Same(bones.ball_m));
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const std::size_t last = bones.count - 1;
+    legs[f].ball = legs[f].positions[last] + Rotate(legs[f].rotations[last], Same(bones.ball_m));
+  });
 }
 
 struct Correction {
@@ -109,7 +132,7 @@ struct Correction {
 };
 
 HWY_INLINE Float Steered(const Common& common, Float at_s) {
-  return common.steer * (Float(1.0f) - EaseOut(at_s / common.duration_s));
+  return common.steer * (Float(1.0f) - EaseOut(at_s * common.per_duration));
 }
 
 HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3x ball,
@@ -134,12 +157,13 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
                        track.aside * (across * across);
   c.offset = Select(is_planted, print - ball, flying);
   const Float since_s = t - common.entered_s;
-  const Float settled = one - EaseOut(since_s / common.ease_out_s);
+  const Float settled = one - EaseOut(since_s * common.per_ease_out);
   const Float rise = track.height.z - track.height.y;
   const Float rise_from = Select(rise > zero, zero, Float(static_cast<float>(kSinkFrom)));
-  const Float risen = one - EaseOut((s - rise_from) / Float(static_cast<float>(1.0 - kSinkFrom)));
+  const Float risen = one - EaseOut(Over(s - rise_from, 1.0 - kSinkFrom));
   const Float ends = static_cast<float>(kLiftEnds);
-  const Float lifted = (one - EaseOut(s / ends)) * EaseOut((s - (one - ends)) / ends);
+  const Float lifted =
+      (one - EaseOut(Over(s, kLiftEnds))) * EaseOut(Over(s - (one - ends), kLiftEnds));
   c.offset.y = track.height.x + settled * (track.height.y - track.height.x) + rise * risen +
                track.lift * lifted;
 
@@ -154,8 +178,8 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
   c.offset = c.offset + track.rest_offset * value + track.rest_velocity * slope;
   free = free + value * track.rest_turn + slope * track.rest_turn_s;
   const Float held = WrapAngle(print_heading - heading - free);
-  const Float hold = one - EaseOut((flatness - Float(static_cast<float>(kHeelUp))) /
-                                   Float(static_cast<float>(kSoleDown - kHeelUp)));
+  const Float hold =
+      one - EaseOut(Over(flatness - Float(static_cast<float>(kHeelUp)), kSoleDown - kHeelUp));
   const Float turn =
       Select(is_planted, free + hold * held, free + (one - turned) * track.release_turn);
 
@@ -163,7 +187,8 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
   const Vec3x normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
   c.turn = Multiply(Normalise({normal.z, zero, -normal.x, one + normal.y}),
                     YawRotation(WrapAngle(turn)));
-  c.root = c.offset * track.root_weight + track.root_shift * (one - EaseOut(t / common.duration_s));
+  c.root =
+      c.offset * track.root_weight + track.root_shift * (one - EaseOut(t * common.per_duration));
   return c;
 }
 
@@ -173,13 +198,14 @@ HWY_INLINE Float DepthBelow(Vec3x print, Vec3x normal, const LegRig::Bones& bone
   const Float dx = ball.x - print.x;
   const Float dz = ball.z - print.z;
   const Float away = Sqrt(dx * dx + dz * dz);
-  const Float near = EaseOut((away - Float(static_cast<float>(kNearPrintM))) /
-                             Float(static_cast<float>(kFarFromPrintM - kNearPrintM)));
+  const Float near =
+      EaseOut(Over(away - Float(static_cast<float>(kNearPrintM)), kFarFromPrintM - kNearPrintM));
+  const Float per_rise = Float(1.0f) / normal.y;
   const auto depth_of = [&](Vec3x point, float rest_m) HWY_ATTR {
     const Vec3x at = ball + Rotate(turn, point - leg.ball);
     const Float ground =
-        print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) / normal.y;
-    return ground + Float(rest_m) / normal.y - at.y;
+        print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) * per_rise;
+    return ground + Float(rest_m) * per_rise - at.y;
   };
   const std::size_t last = bones.count - 1;
   const Vec3x toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
@@ -202,7 +228,7 @@ HWY_INLINE Vec3x KneeAxis(Vec3x thigh, Vec3x shank, Quat4 hip_rotation) {
   const Vec3x plane = Cross(thigh, shank) * (Float(1.0f) / scale);
   const Float sine = Sqrt(Dot(plane, plane));
   const Float s =
-      Clamp((Float(kBentSine) - sine) / Float(kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
+      Clamp(Over(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
   const Vec3x reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
   const Mask is_backward = Dot(plane, reference) < Float(0.0f);
   const Float forward = Select(is_backward, Float(0.0f), Float(1.0f));
@@ -210,46 +236,70 @@ HWY_INLINE Vec3x KneeAxis(Vec3x thigh, Vec3x shank, Quat4 hip_rotation) {
   return plane * forward + reference * (Float(kReferenceWeight) * weight);
 }
 
-struct LegRotations {
-  Quat4 hip, knee, ankle;
+// What is unit but for rounding made so: a step of Newton's is as good as a root and a division.
+HWY_INLINE Quat4 NearlyUnit(Quat4 q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
+
+// Where an ankle is to be, from the root, and how it is turned there.
+struct AnkleGoal {
+  Vec3x at_m;
+  Quat4 rotation;
 };
 
-HWY_INLINE LegRotations SolveLeg(const LegRig::Bones& bones, const LegLanes& leg, Vec3x ankle_m,
-                                 Quat4 ankle_rotation) {
-  const std::size_t hip = bones.hip;
-  const std::size_t knee = bones.knee;
-  const std::size_t ankle = bones.ankle;
-  const Vec3x thigh = leg.positions[knee] - leg.positions[hip];
-  const Vec3x shank = leg.positions[ankle] - leg.positions[knee];
-  const float l1 = bones.thigh_m;
-  const float l2 = bones.shank_m;
-
-  const Vec3x reach = ankle_m - leg.positions[hip];
-  const Float distance = Sqrt(Dot(reach, reach));
-  const Mask is_away = distance > Float(1e-6f);
-  const Float per_distance = Float(1.0f) / Max(distance, Float(1e-6f));
-  const Vec3x u = Select(is_away, reach * per_distance, {Float(0.0f), Float(-1.0f), Float(0.0f)});
-  const float shortest = (l1 > l2 ? l1 - l2 : l2 - l1) + 1e-3f * (l1 + l2);
-  const Float d = Clamp(distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
-
-  const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
-  const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
-  Vec3x pole = Cross(u, KneeAxis(thigh, shank, leg.rotations[hip]));
-  const Float pole_length = Sqrt(Dot(pole, pole));
-  const Mask has_pole = pole_length > Float(1e-6f);
-  pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),
-                {Float(0.0f), Float(0.0f), Float(1.0f)});
-  const Vec3x new_thigh = u * a + pole * h;
-  const Vec3x new_shank = u * d - new_thigh;
-
-  const Quat4 turn_thigh = ShortestArc(thigh, new_thigh);
-  const Quat4 turn_shank = Multiply(ShortestArc(Rotate(turn_thigh, shank), new_shank), turn_thigh);
-  const Quat4 before_hip = leg.rotations[hip - 1];
-  const Quat4 before_knee = Multiply(turn_thigh, leg.rotations[knee - 1]);
-  const Quat4 before_ankle = Multiply(turn_shank, leg.rotations[ankle - 1]);
-  return {Normalise(Multiply(Conjugate(before_hip), Multiply(turn_thigh, leg.rotations[hip]))),
-          Normalise(Multiply(Conjugate(before_knee), Multiply(turn_shank, leg.rotations[knee]))),
-          Normalise(Multiply(Conjugate(before_ankle), ankle_rotation))};
+// Bends both legs so that their ankles are where they are to be, and stores what of the rotations changes.
+HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGoal* goals,
+                          float* rotations) {
+  struct Work {
+    Vec3x thigh, shank, towards, new_thigh, new_shank;
+    Float distance;
+    Quat4 turn_thigh, turn_shank;
+  } work[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
+    Work& w = work[f];
+    w.thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
+    w.shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
+    const Vec3x reach = goals[f].at_m - leg.positions[bones.hip];
+    w.distance = Sqrt(Dot(reach, reach));
+    const Mask is_away = w.distance > Float(1e-6f);
+    const Float per_distance = Float(1.0f) / Max(w.distance, Float(1e-6f));
+    w.towards = Select(is_away, reach * per_distance, {Float(0.0f), Float(-1.0f), Float(0.0f)});
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    Work& w = work[f];
+    const float l1 = bones.thigh_m;
+    const float l2 = bones.shank_m;
+    const float shortest = (l1 > l2 ? l1 - l2 : l2 - l1) + 1e-3f * (l1 + l2);
+    const Float d = Clamp(w.distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
+    const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
+    const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
+    Vec3x pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, legs[f].rotations[bones.hip]));
+    const Float pole_length = Sqrt(Dot(pole, pole));
+    const Mask has_pole = pole_length > Float(1e-6f);
+    pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),
+                  {Float(0.0f), Float(0.0f), Float(1.0f)});
+    w.new_thigh = w.towards * a + pole * h;
+    w.new_shank = w.towards * d - w.new_thigh;
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
+    work[f].turn_thigh = ShortestArc(work[f].thigh, work[f].new_thigh);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
+    Work& w = work[f];
+    w.turn_shank = Multiply(ShortestArc(Rotate(w.turn_thigh, w.shank), w.new_shank), w.turn_thigh);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
+    const Work& w = work[f];
+    const auto store = [&](std::size_t place, Quat4 before, Quat4 rotation) HWY_ATTR {
+      StoreQuat(NearlyUnit(Multiply(Conjugate(before), rotation)),
+                rotations + bones.joints[place] * 4 * kBlock);
+    };
+    store(bones.hip, leg.rotations[bones.hip - 1],
+          Multiply(w.turn_thigh, leg.rotations[bones.hip]));
+    store(bones.knee, Multiply(w.turn_thigh, leg.rotations[bones.knee - 1]),
+          Multiply(w.turn_shank, leg.rotations[bones.knee]));
+    store(bones.ankle, Multiply(w.turn_shank, leg.rotations[bones.ankle - 1]), goals[f].rotation);
+  });
 }
 
 // As many as a vector has lanes, from `lane` on.
@@ -270,6 +320,8 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     q = LoadQuat(at + 8 * kBlock);
     common.entered_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.settle_s = q.w;
+    common.per_duration = Float(1.0f) / common.duration_s;
+    common.per_ease_out = Float(1.0f) / common.ease_out_s;
   }
   HWY_ALIGN float local_m[3 * kBlock];
   HWY_ALIGN float times_s[kBlock];
@@ -289,25 +341,27 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   Correction corrections[2];
   Vec3x ankles[2];
   Vec3x shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
-  for (std::size_t f = 0; f < 2; ++f) {
-    const LegRig::Bones& bones = rig.bones[f];
-    LegLanes& leg = legs[f];
-    EvaluateLeg(bones, rotations, root_rotation, leg);
-    const Vec3x ankle = leg.positions[bones.ankle];
-    const Vec3x sole = leg.ball - ankle;
-    const Float heading = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
-    const Float flatness = bones.foot_m < kSmallestBoneM
-                               ? Float(0.0f)
-                               : Sqrt(sole.x * sole.x + sole.z * sole.z) / Float(bones.foot_m);
+  Float headings[2];
+  Float flatnesses[2];
+  EvaluateLegs(rig, rotations, root_rotation, legs);
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const Vec3x sole = legs[f].ball - legs[f].positions[bones.ankle];
+    headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
+    flatnesses[f] = bones.foot_m < kSmallestBoneM
+                        ? Float(0.0f)
+                        : Over(Sqrt(sole.x * sole.x + sole.z * sole.z), bones.foot_m);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
     const Track track = LoadTrack(plan + f * kPackedTrackFloats * kBlock);
     const Vec3x ball = root + leg.ball;
     Correction& c = corrections[f];
-    c = CorrectFoot(common, track, ball, heading, flatness);
+    c = CorrectFoot(common, track, ball, headings[f], flatnesses[f]);
     const Mask keeps_above = common.keeps_above_ground > Float(0.0f);
     if (Any(keeps_above)) {
       const Float second =
-          Float(1.0f) - EaseOut((c.swing - Float(static_cast<float>(kGroundFrom))) /
-                                Float(static_cast<float>(kGroundOver)));
+          Float(1.0f) -
+          EaseOut(Over(c.swing - Float(static_cast<float>(kGroundFrom)), kGroundOver));
       const Vec3x at = ball + c.offset;
       const Float lift = (Float(1.0f) - second) *
                              DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
@@ -322,15 +376,15 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
       c.offset.y = c.offset.y + lifted;
       c.root.y = c.root.y + lifted * track.root_weight;
     }
-    ankles[f] = ball + c.offset + Rotate(c.turn, ankle - leg.ball);
+    ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
-  }
+  });
   const Float since_s = common.time_s - common.entered_s;
-  const Float flat = EaseOut(since_s / Float(static_cast<float>(kRootShiftS)));
+  const Float flat = EaseOut(Over(since_s, kRootShiftS));
   const Float rise =
       EaseOut(since_s / Max(Float(static_cast<float>(kRootShiftS)),
                             Float(static_cast<float>(kRootRisePart)) * common.duration_s));
-  const Float speed = common.ease_out_s * EaseOutSlope(since_s / common.ease_out_s);
+  const Float speed = common.ease_out_s * EaseOutSlope(since_s * common.per_ease_out);
   shift = shift +
           Vec3x{flat * common.root_rest.x, rise * common.root_rest.y, flat * common.root_rest.z} +
           common.root_rest_velocity * speed;
@@ -371,15 +425,11 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     }
   }
   const Vec3x moved = LoadVec3(local_m);
-  for (std::size_t f = 0; f < 2; ++f) {
-    const LegRig::Bones& bones = rig.bones[f];
-    const LegLanes& leg = legs[f];
-    const Quat4 ankle_rotation = Multiply(corrections[f].turn, leg.rotations[bones.ankle]);
-    const LegRotations solved = SolveLeg(bones, leg, ankles[f] - moved, ankle_rotation);
-    StoreQuat(solved.hip, rotations + bones.joints[bones.hip] * 4 * kBlock);
-    StoreQuat(solved.knee, rotations + bones.joints[bones.knee] * 4 * kBlock);
-    StoreQuat(solved.ankle, rotations + bones.joints[bones.ankle] * 4 * kBlock);
-  }
+  AnkleGoal goals[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    goals[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
+  });
+  SolveLegs(rig, legs, goals, rotations);
 }
 
 void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {

@@ -155,7 +155,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
     // Lengths multiply: one division at the end serves all.
     if (blend.difference != nullptr) {
       const Quat4 difference = LoadQuats(blend.difference + 4 * j, left);
-      q = Multiply(q, SlerpFromIdentity(difference, Float(blend.fraction)));
+      q = Multiply(q, SlerpOf(SlerpPartsOf(difference), Float(blend.fraction)));
     }
     if (blend.velocity != nullptr) {
       const Vec3x along = LoadVectors(blend.velocity + 3 * j, left) * Float(0.5f * blend.seconds);
@@ -169,6 +169,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
 void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
+  const hn::Rebind<std::int32_t, DoubleTag> integers;
   const std::size_t width = hn::Lanes(d);
   const auto number = [d](double value) HWY_ATTR { return hn::Set(d, value); };
   const auto zero = number(0.0);
@@ -226,7 +227,8 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
     weight(1, f, hn::Sub(right, three_before), hn::Sub(left, three_after), left);
     weight(2, zero, hn::Add(after, before), hn::Add(right, three_after), right);
     weight(3, zero, zero, zero, after);
-    hn::Store(hn::IfThenElse(is_first, zero, hn::Sub(cell, one)), d, places.first_point + i);
+    hn::Store(hn::DemoteTo(integers, hn::IfThenElse(is_first, zero, hn::Sub(cell, one))), integers,
+              places.first_point + i);
 
     hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, places.steered + i);
     const auto over = hn::Load(d, times.ease_out_s + i);
@@ -272,6 +274,7 @@ HWY_EXPORT(FindInGrids);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(Transpose);
 HWY_EXPORT(PrepareEase);
+HWY_EXPORT(FindFastest);
 HWY_EXPORT(FinishLanes);
 HWY_EXPORT(PlantLanes);
 HWY_EXPORT(PlantOne);
@@ -306,6 +309,11 @@ void Transpose(const float* const from[kBlock], std::size_t count, std::size_t l
 
 void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease) {
   HWY_DYNAMIC_DISPATCH(PrepareEase)(difference, joint_count, lanes, ease);
+}
+
+void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes,
+                 float* fastest) {
+  HWY_DYNAMIC_DISPATCH(FindFastest)(velocity, joint_count, lanes, fastest);
 }
 
 bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {

@@ -33,12 +33,12 @@ struct GridTimes {
 };
 /// Where its poses lie in their grids, and how much of the poses before is left.
 struct GridPlaces {
-  alignas(64) double first_point[kBlock];  ///< Of the rows that are interpolated
-  alignas(64) float weights[4][kBlock];    ///< Of them, in order; 0 for one that is not there
-  alignas(64) double steered[kBlock];      ///< EaseOut of the part of the movement behind
-  alignas(64) float is_eased[kBlock];      ///< 1 while there is something left to ease out, or 0
-  alignas(64) float fraction[kBlock];      ///< EaseOut of the part of the easing out behind
-  alignas(64) float slope_s[kBlock];       ///< EaseOutSlope of it, times ease_out_s
+  alignas(64) std::int32_t first_point[kBlock];  ///< Of the rows that are interpolated
+  alignas(64) float weights[4][kBlock];          ///< Of them, in order; 0 for one that is not there
+  alignas(64) double steered[kBlock];            ///< EaseOut of the part of the movement behind
+  alignas(64) float is_eased[kBlock];  ///< 1 while there is something left to ease out, or 0
+  alignas(64) float fraction[kBlock];  ///< EaseOut of the part of the easing out behind
+  alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of it, times ease_out_s
 };
 /// In doubles and in the order of operations of TimeWarp::GridPosition, CellWeightsAt and EaseOut.
 void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places);
@@ -88,11 +88,13 @@ void SinCos(const double* angles_rad, std::size_t count, double* sines, double* 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
-/// What does not change of a difference while it is eased out, [joint][kEaseFloats][kBlock]: x y z of the rotation, and
-/// square and factor of SlerpFromIdentity, which takes the short arc.
-inline constexpr std::size_t kEaseFloats = 5;
+/// What does not change of a difference while it is eased out, [joint][kEaseFloats][kBlock]: the rotation vector of half
+/// the short arc, and the square of its length.
+inline constexpr std::size_t kEaseFloats = 4;
 /// `difference`: [joint][x y z w][kBlock].
 void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease);
+/// fastest[lane] = the square of the longest of `velocity`, [joint][x y z][kBlock].
+void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes, float* fastest);
 
 /// Blended rows of a block on their way to be its poses in the world.
 struct LaneBlend {
@@ -108,6 +110,7 @@ struct LaneBlend {
   // What is left of the poses before, while any lane has something left:
   const float* ease;           ///< PrepareEase, or null
   const float* velocity;       ///< [joint][x y z][kBlock], or null: no lane is inertial
+  const float* fastest;        ///< FindFastest of it
   const float* root_ease_m;    ///< [x y z][kBlock]
   const float* root_ease_m_s;  ///< The same of its velocity
   const float* fraction;       ///< GridPlaces
@@ -117,7 +120,7 @@ struct LaneBlend {
 };
 
 /// Makes rotations unit, adds what is left of the poses before and takes the poses into the world: roots
-/// [x y z][kBlock], rotations [joint][x y z w][kBlock]. False if a rotation of some lane's row is shorter than
+/// [x y z][kBlock], rotations [joint][x y z w][kBlock]. False if a rotation of some lane's row may be shorter than
 /// kSmallestNorm (BlendRotations).
 [[nodiscard]] bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations);
 

@@ -42,10 +42,21 @@ void PrepareEase(const float* difference, std::size_t joint_count, std::size_t l
     for (std::size_t j = 0; j < joint_count; ++j) {
       const Quat4 q = LoadQuat(difference + j * 4 * kBlock + lane);
       const SlerpParts parts = SlerpPartsOf(q);
-      float* to = ease + j * kEaseFloats * kBlock + lane;
-      StoreQuat({q.x, q.y, q.z, parts.square}, to);
-      StoreLanes(parts.per_sine, to + 4 * kBlock);
+      StoreQuat({parts.half.x, parts.half.y, parts.half.z, parts.square},
+                ease + j * kEaseFloats * kBlock + lane);
     }
+  }
+}
+
+void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes,
+                 float* fastest) {
+  for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
+    Float most = 0.0f;
+    for (std::size_t j = 0; j < joint_count; ++j) {
+      const Vec3x v = LoadVec3(velocity + j * 3 * kBlock + lane);
+      most = Max(most, Dot(v, v));
+    }
+    StoreLanes(most, fastest + lane);
   }
 }
 
@@ -60,11 +71,8 @@ struct Easing {
 
 HWY_INLINE Quat4 Ease(Quat4 q, const Easing& easing, const LaneBlend& blend, std::size_t joint,
                       std::size_t lane) {
-  const float* ease = blend.ease + joint * kEaseFloats * kBlock + lane;
-  const Quat4 parts = LoadQuat(ease);
-  Quat4 eased = Multiply(
-      q, SlerpOf(parts.x, parts.y, parts.z,
-                 {.square = parts.w, .per_sine = LoadLanes(ease + 4 * kBlock)}, easing.fraction));
+  const Quat4 ease = LoadQuat(blend.ease + joint * kEaseFloats * kBlock + lane);
+  Quat4 eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, easing.fraction));
   if (easing.is_any_inertial) {
     const Vec3x along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * easing.half_s;
     const Quat4 along_it = Multiply(eased, {along.x, along.y, along.z, Float(1.0f)});
@@ -127,18 +135,37 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
                               LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    Float shortest = kSmallestNorm * kSmallestNorm;  // squared
+    // What is left of the poses before makes rotations longer, at most so much: squares.
+    Float shortest = kSmallestNorm * kSmallestNorm;
+    if (easing.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
+    if (easing.is_any_inertial) {
+      const Float along = easing.half_s * easing.half_s * LoadLanes(blend.fastest + lane);
+      shortest = shortest * (Float(1.0f) + along);
+    }
+    Float least = shortest;
+    const auto make_unit = [&](Quat4 q, float* unit) HWY_ATTR {
+      const Float square = Dot(q, q);
+      least = Float(hn::Min(square.v, least.v));
+      StoreQuat(UnitOf(q, square), unit);
+    };
+    // A rotation is made unit while the next is blended: each waits long for what it is made of.
+    Quat4 last = {half, half, half, half};
+    float* to = rotations + lane;
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
       Quat4 q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
-      shortest = Float(hn::Min(Dot(q, q).v, shortest.v));
       // Lengths multiply: one division at the end serves all.
       if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
-      StoreQuat(Normalise(q), rotations + joint * 4 * kBlock + lane);
+      if (joint > 0) {
+        make_unit(last, to);
+        to += 4 * kBlock;
+      }
+      last = q;
     }
+    make_unit(last, to);
     HWY_ALIGN float local[4 * kBlock];  // root x, y, z, yaw
     StoreQuat(GatherQuats(RowAddress{blend.rows + lane, 4 * blend.joint_count}), local);
     const Mask is_there = {hn::FirstN(FloatTag(), blend.lanes - lane)};
-    is_any_short |= Any(shortest < Float(kSmallestNorm * kSmallestNorm) && is_there);
+    is_any_short |= Any(least < shortest && is_there);
     HWY_ALIGN float sines[kBlock];
     HWY_ALIGN float cosines[kBlock];
     PlaceRoots(blend, local, lane, root_m, sines, cosines);

@@ -74,7 +74,7 @@ struct StretchEvaluator::Work {
   }
   [[nodiscard]] GridPlace PlaceOf(std::size_t pose, std::size_t lane) const {
     const kernels::GridPlaces& of = places[pose];
-    return {static_cast<int>(of.first_point[lane]),
+    return {of.first_point[lane],
             {of.weights[0][lane], of.weights[1][lane], of.weights[2][lane], of.weights[3][lane]}};
   }
   [[nodiscard]] const Movement& movement(std::size_t lane) const {
@@ -111,6 +111,7 @@ struct StretchEvaluator::Work {
   std::vector<LaneFloats> ease;        // [joint][number]
   std::vector<LaneFloats> velocity;    // [joint][x y z]
   std::array<LaneFloats, 3> root_ease_m, root_ease_m_s;
+  LaneFloats fastest;
   LaneFloats is_inertial_lane;
   std::vector<float> none;  // of who has no difference
   PoseLanes poses;
@@ -210,7 +211,9 @@ void StretchEvaluator::Work::TakeEasing() {
   if (!is_eased) return;
   kernels::Transpose(differences.data(), 4 * joints, lanes, FloatsOf(transposed));
   kernels::PrepareEase(FloatsOf(transposed), joints, lanes, FloatsOf(ease));
-  if (is_inertial) kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
+  if (!is_inertial) return;
+  kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
+  kernels::FindFastest(FloatsOf(velocity), joints, lanes, fastest.of);
 }
 
 void StretchEvaluator::Work::Finish(std::size_t pose) {
@@ -229,6 +232,7 @@ void StretchEvaluator::Work::Finish(std::size_t pose) {
       .steered = at.steered,
       .ease = is_eased ? FloatsOf(ease) : nullptr,
       .velocity = is_eased && is_inertial ? FloatsOf(velocity) : nullptr,
+      .fastest = fastest.of,
       .root_ease_m = root_ease_m[0].of,
       .root_ease_m_s = root_ease_m_s[0].of,
       .fraction = at.fraction,

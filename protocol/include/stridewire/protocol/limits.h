@@ -10,11 +10,9 @@ inline constexpr std::uint16_t kProtocolMin = 1;
 inline constexpr std::uint16_t kProtocolMax = 1;
 
 /// Feature bits of Hello and Welcome: what both sides set may be used. Unknown bits are ignored.
-inline constexpr std::uint64_t kFeatureResume = 1;       ///< Sessions outlive a connection.
-inline constexpr std::uint64_t kFeatureEventReplay = 2;  ///< Events missed are sent again.
-inline constexpr std::uint64_t kFeatureQuantised = 4;    ///< PoseMode::kQuantised.
-/// PoseMode::kMovement, FetchLibrary. Both sides evaluate movements by the same formulas: when these change, another bit.
-inline constexpr std::uint64_t kFeatureMovementMode = 8;
+inline constexpr std::uint64_t kFeatureResume = 1;        ///< Sessions outlive a connection.
+inline constexpr std::uint64_t kFeatureEventReplay = 2;   ///< Events missed are sent again.
+inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuantised.
 inline constexpr std::uint64_t kFeatureInspect = 16;      ///< InspectAvatar, AvatarState.
 inline constexpr std::uint64_t kFeatureTerrain = 32;      ///< SetTerrain, WorldTerrain.
 inline constexpr std::uint64_t kFeatureFootprints = 64;   ///< Steps to a place (StepMovement::at).
@@ -26,6 +24,9 @@ inline constexpr std::uint64_t kFeaturePlanting = 2048;   ///< SetPlanting.
 inline constexpr std::uint64_t kFeatureCompact = 4096;    ///< PoseMode::kCompact.
 inline constexpr std::uint64_t kFeatureDetail = 8192;     ///< Observe::detail.
 inline constexpr std::uint64_t kFeatureRegions = 16'384;  ///< Observe::region, kEntered, kLeft.
+/// PoseMode::kMovement, FetchLibrary. Both sides evaluate movements by the same formulas: when these change, another bit.
+/// 8 stood for those before library format 3.
+inline constexpr std::uint64_t kFeatureMovementMode = 32'768;
 
 /// Limits of the wire. What breaks one is refused whole, with kLimitExceeded.
 inline constexpr std::size_t kMaxHelloBytes = std::size_t{16} << 10;   ///< Payload of Hello.
