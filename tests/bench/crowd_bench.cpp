@@ -94,14 +94,14 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   // Spread over shards: threads that share nothing but the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
   Steps steps(library, count, plants_feet);
-  constexpr int kAhead = static_cast<int>(server::PosesAhead::kMost);
+  const auto turns = static_cast<int>(server::PosesAhead::TurnsOf(steps.walkers().size()));
   struct Ahead {
     std::uint32_t course = 0;
     int left = 0;
   };
   std::vector<Ahead> ahead(steps.walkers().size());
   std::vector<const Steps::Walker*> due;
-  StretchEvaluator evaluator(*library, kAhead);
+  StretchEvaluator evaluator(*library, turns);
   StretchQueue queue;
   std::uint32_t tick = 0;
   for (auto _ : state) {
@@ -114,7 +114,7 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
       due.push_back(&walker);
     }
     for (const Steps::Walker* walker : due) {
-      const int most = kAhead - static_cast<int>((tick + walker->number) % kAhead);
+      const int most = turns - static_cast<int>(tick + walker->number) % turns;
       const int wanted = StretchCount(*walker->movement, walker->time_s, kTickS, 1, most);
       ahead[walker->number] = {walker->course, wanted};
       queue.Add({walker->movement, walker->time_s, kTickS}, wanted, walker->number);
@@ -250,41 +250,41 @@ class LineAligned {
   float* begin_;
 };
 
-// The floor: the bytes that poses can not do without when eight of a movement's are made at once, each read and given one
-// multiply-add. At 30 cells a second such a stretch passes seven grid points, each with a row of all examples; each pose
-// is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
+// The floor: the bytes that poses can not do without when as many of a movement's are made at once, each read and given
+// one multiply-add. At 30 cells a second a stretch of eight passes seven grid points, one of sixteen eleven, each with a
+// row of all examples; each pose is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
 void Floor(benchmark::State& state, const Library& library) {
-  constexpr std::size_t kPoses = server::PosesAhead::kMost;
-  constexpr std::size_t kPoints = kPoses / 2 + 3;
   const auto count = static_cast<std::size_t>(state.range(0));
+  const std::size_t poses = server::PosesAhead::TurnsOf(count);
+  const std::size_t passed = poses / 2 + 3;
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);
   const auto examples = static_cast<std::size_t>(group.example_count);
-  const std::size_t points = static_cast<std::size_t>(group.grid_point_count) - kPoints;
+  const std::size_t points = static_cast<std::size_t>(group.grid_point_count) - passed;
   // Plan and difference in whole lines, too.
   const std::size_t plan = (sizeof(PackedFootPlan) / sizeof(float) + 15) / 16 * 16;
   const std::size_t own = plan + row;
   LineAligned owns(count * own);
-  LineAligned told(count * kPoses * row / 4);
-  LineAligned sums(kPoints * row);
+  LineAligned told(count * poses * row / 4);
+  LineAligned sums(passed * row);
   LineAligned pose(std::max(own, row));
   std::size_t tick = 0;
   for (auto _ : state) {
     ++tick;
-    for (std::size_t i = tick % kPoses; i < count; i += kPoses) {
+    for (std::size_t i = tick % poses; i < count; i += poses) {
       const std::size_t first = (i + tick) % points;
-      for (std::size_t p = 0; p < kPoints; ++p) {
+      for (std::size_t p = 0; p < passed; ++p) {
         for (std::size_t e = 0; e < examples; ++e) {
           MultiplyAdd(&group.grid[((first + p) * examples + e) * row], 1e-3f, sums.data() + p * row,
                       row);
         }
       }
       MultiplyAdd(owns.data() + i * own, 0.25f, pose.data(), own);
-      for (std::size_t k = 0; k < kPoses; ++k) {
+      for (std::size_t k = 0; k < poses; ++k) {
         for (std::size_t j = 0; j < 4; ++j) {
           MultiplyAdd(sums.data() + (k / 2 + j) * row, 0.25f, pose.data(), row);
         }
-        MultiplyAdd(pose.data(), 0.25f, told.data() + (i * kPoses + k) * row / 4, row / 4);
+        MultiplyAdd(pose.data(), 0.25f, told.data() + (i * poses + k) * row / 4, row / 4);
       }
     }
     benchmark::DoNotOptimize(told.data());

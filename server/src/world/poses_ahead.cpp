@@ -93,7 +93,18 @@ void PosesAhead::Start(std::uint32_t place, std::uint64_t course, std::size_t co
           .layout = layout_,
           .count = static_cast<std::uint8_t>(count),
           .first_plane = plane_,
-          .stays = stays};
+          .stays = stays,
+          .cuts = kept.cuts};
+}
+
+// Who is sent elsewhere again and again makes few poses in vain.
+std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t course) const {
+  constexpr std::uint8_t kMostCuts = 3;
+  if (kept.layout != layout_ || kept.stays || kept.count == 0) return kept.cuts;
+  if (kept.course != static_cast<std::uint32_t>(course) && PoseOf(kept) < kept.count) {
+    return std::min<std::uint8_t>(kept.cuts + 1, kMostCuts);
+  }
+  return kept.cuts > 0 ? kept.cuts - 1 : 0;
 }
 
 void PosesAhead::Ask(Place& place, Avatar& avatar) {
@@ -110,8 +121,10 @@ void PosesAhead::Ask(Place& place, Avatar& avatar) {
 
 void PosesAhead::Want(Place& place, std::uint64_t course, const Movement& movement, double time_s) {
   MakePlace(place);
-  kept_[place.index_].course = static_cast<std::uint32_t>(course);
-  kept_[place.index_].count = 0;
+  Kept& kept = kept_[place.index_];
+  kept.cuts = CutsAfter(kept, course);
+  kept.course = static_cast<std::uint32_t>(course);
+  kept.count = 0;
   StretchEvaluator::PrefetchTimes(movement);
   wanted_.push_back({place.index_, 0, {&movement, time_s, step_s_, ticks_apart_}, false});
 }
@@ -132,10 +145,12 @@ void PosesAhead::KeepTaken() {
 void PosesAhead::Finish(std::size_t shown) {
   if (taken_count_ > 0) KeepTaken();
   std::size_t poses = 0;
+  const std::size_t turns = TurnsOf(shown);
   for (Wanted& wanted : wanted_) {
     const std::size_t turn = wanted.place / kPlacesOfATurn;
-    const std::size_t most = kMost - (plane_ + turn) % kMost;
-    wanted.is_its_turn = most == kMost;
+    const std::size_t left = turns - (plane_ + turn) % turns;
+    const std::size_t most = std::min(left, kMost >> kept_[wanted.place].cuts);
+    wanted.is_its_turn = left == turns;
     wanted.count = StretchCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
                                 ticks_apart_, static_cast<int>(most));
     poses += static_cast<std::size_t>(wanted.count);

@@ -28,7 +28,8 @@ struct PoseScratch {
 
 /// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
 /// is made of is brought into the cache, blended and unpacked once in kMost ticks; in each tick its turn is other
-/// avatars'. Who is sent elsewhere meanwhile is evaluated anew. One a world and shard; not thread-safe.
+/// avatars'. Who is sent elsewhere meanwhile is evaluated anew, and less far ahead the next time. One a world and shard;
+/// not thread-safe.
 ///
 ///   ahead.Begin(step, step_s);
 ///   for each avatar: ahead.Ask(place, avatar)
@@ -43,7 +44,11 @@ struct PoseScratch {
 ///   standing  [ avatar 0 ][ avatar 1 ] …                              of who stands, for all ticks
 class PosesAhead {
  public:
-  static constexpr std::size_t kMost = 8;
+  static constexpr std::size_t kMost = 16;
+  /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would not fill the lanes.
+  [[nodiscard]] static constexpr std::size_t TurnsOf(std::size_t shown) {
+    return shown < 2048 ? kMost / 2 : kMost;
+  }
 
   /// Where an avatar's poses are kept. Given back when the avatar goes, before PosesAhead does.
   class Place {
@@ -124,8 +129,9 @@ class PosesAhead {
     std::uint8_t first_plane : 4 = 0;
     std::uint8_t stays : 1 = 0;
     std::uint8_t is_any_other : 1 = 0;  // than the mode's own bytes: see Others
+    std::uint8_t cuts : 2 = 0;  // kMost >> cuts are made at once: more whenever some were in vain
   };
-  static_assert(sizeof(Kept) == 16);
+  static_assert(sizeof(Kept) == 16 && kMost <= 16);
   // Of a place some of whose poses are wide or can not be told.
   struct Others {
     std::array<std::uint8_t, kMost> flags{};  // [pose]: bit m: wide in mode m; m + 4: there is none
@@ -155,6 +161,7 @@ class PosesAhead {
     return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
   }
   void MakePlace(Place& place);
+  [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t course) const;
   void Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays);
   void KeepTaken();
   // Encodes poses side by side and keeps them; of kNobody nothing is kept.

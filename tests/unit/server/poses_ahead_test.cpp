@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "captured_library.h"
@@ -49,12 +50,13 @@ class Encoder {
 class Ahead {
  public:
   Ahead(const std::shared_ptr<const MotionLibrary>& library, unsigned seed,
-        std::shared_ptr<const PoseCodes> codes = nullptr)
+        std::shared_ptr<const PoseCodes> codes = nullptr, std::size_t shown = kCrowd)
       : codes_(codes != nullptr ? std::move(codes) : MakePoseCodes(*library)),
         eager_(library, kCrowd, seed),
         told_(library, kCrowd, seed),
         poses_(std::make_shared<PoseScratch>(library), &codes_->codecs),
         places_(kCrowd),
+        shown_(shown),
         encoder_(*codes_) {}
 
   PosesAhead& poses() { return poses_; }
@@ -75,7 +77,7 @@ class Ahead {
                 poses_.Has(places_[i], avatar.course());
       poses_.Ask(places_[i], told_.avatars()[i]);
     }
-    poses_.Finish(kCrowd);
+    poses_.Finish(shown_);
     for (std::size_t i = 0; i < kCrowd; ++i) {
       ASSERT_EQ(poses_.RootOf(places_[i]), eager_.avatars()[i].pose().root_position_m)
           << "step " << step_ << ", avatar " << i;
@@ -103,6 +105,7 @@ class Ahead {
   DrawnCrowd told_;
   PosesAhead poses_;
   std::vector<PosesAhead::Place> places_;
+  std::size_t shown_;  // as if there were so many
   Encoder encoder_;
   std::uint64_t step_ = 100;
   int wide_ = 0;
@@ -131,8 +134,9 @@ TEST(PosesAhead, AreTheBytesOfEachTicksOwn) {
   constexpr unsigned kSeed = 20261124;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   const auto library = LibraryOf({});
-  for (const bool has_wide : {false, true}) {
-    Ahead ahead(library, kSeed, has_wide ? CodesForStraightKnees(*library) : nullptr);
+  for (const auto& [has_wide, shown] :
+       {std::pair{false, kCrowd}, std::pair{true, kCrowd}, std::pair{true, std::size_t{10'000}}}) {
+    Ahead ahead(library, kSeed, has_wide ? CodesForStraightKnees(*library) : nullptr, shown);
     ahead.poses().SetModes(kAll, 1);
     for (int tick = 0; tick < 400; ++tick) {
       ahead.Advance();
@@ -181,6 +185,49 @@ TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
     ahead.Compare(kAll);
     if (HasFatalFailure()) return;
   }
+}
+
+// How many poses are made for so many ticks of an avatar whose movement gives way to another every few of them.
+int EvaluatedIn(int ticks, int ticks_of_a_course, const Avatar& avatar,
+                const std::shared_ptr<PoseScratch>& scratch) {
+  PosesAhead poses(scratch, nullptr);
+  poses.SetModes({}, 1);
+  PosesAhead::Place place;
+  int evaluated = 0;
+  int kept = 0;
+  for (int tick = 0; tick < ticks; ++tick) {
+    const auto course = static_cast<std::uint64_t>(1 + tick / ticks_of_a_course);
+    poses.Begin(static_cast<std::uint64_t>(tick), 1e-4);
+    if (!poses.Has(place, course)) {
+      poses.Want(place, course, *avatar.movement(), avatar.movement_time_s());
+      poses.Finish(10'000);
+      kept = 0;
+      while (true) {
+        poses.Begin(static_cast<std::uint64_t>(tick + kept), 1e-4);
+        if (!poses.Has(place, course)) break;
+        ++kept;
+      }
+      evaluated += kept;
+    } else {
+      poses.Finish(10'000);
+    }
+  }
+  return evaluated;
+}
+
+TEST(PosesAhead, OfWhoIsSentElsewhereAgainAndAgainFewAreInVain) {
+  const auto library = LibraryOf({});
+  Avatar avatar(library, {}, {});
+  ASSERT_TRUE(avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = 0.6}}));
+  avatar.Advance(0.1);
+  ASSERT_NE(avatar.movement(), nullptr);
+  const auto scratch = std::make_shared<PoseScratch>(library);
+  constexpr int kTicks = 960;
+  // Nobody interferes: each pose is made once, but for those after the last tick.
+  EXPECT_LE(EvaluatedIn(kTicks, kTicks, avatar, scratch), kTicks + 15);
+  // In every tick: hardly more than two for one, once that is known.
+  EXPECT_LE(EvaluatedIn(kTicks, 1, avatar, scratch), 2 * kTicks + kTicks / 8);
+  EXPECT_LE(EvaluatedIn(kTicks, 3, avatar, scratch), 2 * kTicks);
 }
 
 }  // namespace
