@@ -188,28 +188,22 @@ TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
 }
 
 // How many poses are made for so many ticks of an avatar whose movement gives way to another every few of them.
-int EvaluatedIn(int ticks, int ticks_of_a_course, const Avatar& avatar,
-                const std::shared_ptr<PoseScratch>& scratch) {
+std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
+                          const Avatar& avatar, const std::shared_ptr<PoseScratch>& scratch) {
+  constexpr std::size_t kShown = 10'000;
+  constexpr double kTickS = 1e-4;
   PosesAhead poses(scratch, nullptr);
   poses.SetModes({}, 1);
   PosesAhead::Place place;
-  int evaluated = 0;
-  int kept = 0;
-  for (int tick = 0; tick < ticks; ++tick) {
-    const auto course = static_cast<std::uint64_t>(1 + tick / ticks_of_a_course);
-    poses.Begin(static_cast<std::uint64_t>(tick), 1e-4);
-    if (!poses.Has(place, course)) {
-      poses.Want(place, course, *avatar.movement(), avatar.movement_time_s());
-      poses.Finish(10'000);
-      kept = 0;
-      while (true) {
-        poses.Begin(static_cast<std::uint64_t>(tick + kept), 1e-4);
-        if (!poses.Has(place, course)) break;
-        ++kept;
-      }
-      evaluated += kept;
-    } else {
-      poses.Finish(10'000);
+  std::uint64_t evaluated = 0;
+  for (std::uint64_t tick = 0; tick < ticks; ++tick) {
+    const std::uint64_t course = 1 + tick / ticks_of_a_course;
+    poses.Begin(tick, kTickS);
+    if (poses.Has(place, course)) continue;
+    poses.Want(place, course, *avatar.movement(), avatar.movement_time_s());
+    poses.Finish(kShown);
+    for (std::uint64_t ahead = 0; poses.Has(place, course); ++ahead, ++evaluated) {
+      poses.Begin(tick + ahead + 1, kTickS);
     }
   }
   return evaluated;
@@ -222,7 +216,7 @@ TEST(PosesAhead, OfWhoIsSentElsewhereAgainAndAgainFewAreInVain) {
   avatar.Advance(0.1);
   ASSERT_NE(avatar.movement(), nullptr);
   const auto scratch = std::make_shared<PoseScratch>(library);
-  constexpr int kTicks = 960;
+  constexpr std::uint64_t kTicks = 960;
   // Nobody interferes: each pose is made once, but for those after the last tick.
   EXPECT_LE(EvaluatedIn(kTicks, kTicks, avatar, scratch), kTicks + 15);
   // In every tick: hardly more than two for one, once that is known.
