@@ -142,11 +142,11 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         take(q.y, 1);
         take(q.z, 2);
         take(q.w, 3);
-        const V sign = hn::CopySign(one, largest);
-        q.x = hn::Mul(q.x, sign);
-        q.y = hn::Mul(q.y, sign);
-        q.z = hn::Mul(q.z, sign);
-        q.w = hn::Mul(q.w, sign);
+        const V sign = hn::And(largest, hn::SignBit(d));
+        q.x = hn::Xor(q.x, sign);
+        q.y = hn::Xor(q.y, sign);
+        q.z = hn::Xor(q.z, sign);
+        q.w = hn::Xor(q.w, sign);
         const auto is_0 = hn::RebindMask(d, hn::Eq(index, hn::Zero(di)));
         const auto is_1 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 1)));
         const auto is_2 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 2)));
@@ -181,16 +181,16 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         const Rotation p = q;
         // conj(reference) q
         q.w = hn::Add(hn::Mul(rw, p.w), Sum3(hn::Mul(rx, p.x), hn::Mul(ry, p.y), hn::Mul(rz, p.z)));
-        const V sign = hn::CopySign(one, q.w);
+        const V sign = hn::And(q.w, hn::SignBit(d));
         const auto component = [&](V u, V v, V w, V ru, V rv, V r) HWY_ATTR {
           // rw u - ru w - (rv w' - rw' v) along one axis
-          return hn::Mul(sign, hn::Sub(hn::Sub(hn::Mul(rw, u), hn::Mul(ru, p.w)),
+          return hn::Xor(sign, hn::Sub(hn::Sub(hn::Mul(rw, u), hn::Mul(ru, p.w)),
                                        hn::Sub(hn::Mul(rv, w), hn::Mul(r, v))));
         };
         q.x = component(p.x, p.y, p.z, rx, ry, rz);
         q.y = component(p.y, p.z, p.x, ry, rz, rx);
         q.z = component(p.z, p.x, p.y, rz, rx, ry);
-        q.w = hn::Mul(q.w, sign);
+        q.w = hn::Abs(q.w);
         fits = hn::And(fits, hn::Ge(q.w, hn::Set(d, joint.least_w)));
         const auto tell = [&](V value, std::size_t c) HWY_ATTR {
           const V low = hn::Set(d, joint.low[c]);
