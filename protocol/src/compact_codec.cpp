@@ -295,9 +295,10 @@ void CompactCodec::Encode(const Lanes& poses, Block& block) const {
   }
   const std::size_t words = (pose_bytes_ + 15) / 16 * 4;
   if (block.words_.size() < words) block.words_.resize(words);
-  EncodeCompact({joints_, order_, parts_},
-                {poses.count, poses.roots_m, poses.rotations, block.errors_.front().of,
-                 block.numbers_.front().of, block.words_.front().of, block.fits_});
+  EncodeCompact(
+      {joints_, order_, parts_},
+      {poses.count, poses.are_unit, poses.roots_m, poses.rotations, block.errors_.front().of,
+       block.numbers_.front().of, block.words_.front().of, block.fits_});
 }
 
 Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m,

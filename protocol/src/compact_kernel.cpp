@@ -112,9 +112,12 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       const float* rotation = work.rotations + 4 * j * kBlock + lane;
       Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
                     hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
-      const V squared =
-          hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)), hn::Mul(q.w, q.w));
-      fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
+      // Of a ranged joint no numbers are seen by its w as well.
+      if (!work.are_unit || joint.free_bits > 0) {
+        const V squared = hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)),
+                                  hn::Mul(q.w, q.w));
+        fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
+      }
       if (joint.is_left_out) continue;
       if (joint.parent >= 0) {
         // e q, where e = (ex, ey, ez, 1): an angle of a thousandth or two.

@@ -22,6 +22,7 @@ struct CompactPlan {
 /// A block of CompactCodec::kBlock poses: arrays as in CompactCodec::Block.
 struct CompactWork {
   std::size_t count;       // The first poses; others mean nothing.
+  bool are_unit;           // CompactCodec::Lanes::are_unit
   const float* roots_m;    // [x y z][pose]
   const float* rotations;  // [joint][x y z w][pose]
   float* errors;           // [joint][x y z][pose]

@@ -142,6 +142,39 @@ TEST(CompactCodec, WhatItCannotTellDoesNotFit) {
   EXPECT_FALSE(fits(Vec3(0.0f), pose));
 }
 
+// Who says that rotations are unit is not asked for their lengths, and told nothing of what is no number for all that.
+TEST(CompactCodec, WhatIsSaidToBeUnitIsTheSameBytesAndNoNumbersDoNotFit) {
+  const CompactCodec codec = Codec();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  alignas(64) std::array<std::array<float, CompactCodec::kBlock>, 3> roots{};
+  alignas(64) std::array<std::array<float, CompactCodec::kBlock>, 12> rotations{};
+  const auto set = [&](std::size_t lane, const std::vector<Quat>& pose) {
+    for (std::size_t j = 0; j < pose.size(); ++j) {
+      for (std::size_t c = 0; c < 4; ++c) rotations[4 * j + c][lane] = (&pose[j].x)[c];
+    }
+  };
+  std::size_t lane = 0;
+  for (std::size_t joint = 0; joint < 3; ++joint) {
+    for (const Quat& bad : {Quat(nan, 0, 0, 0), Quat(1, 0, nan, 0), Quat(1, infinity, 0, 0),
+                            Quat(infinity, 0, 0, 0)}) {
+      std::vector<Quat> pose = SomePose();
+      pose[joint] = bad;
+      set(lane++, pose);
+    }
+  }
+  for (std::size_t good = lane; good < CompactCodec::kBlock; ++good) set(good, SomePose());
+  CompactCodec::Block block;
+  codec.Encode({roots[0].data(), rotations[0].data(), CompactCodec::kBlock, true}, block);
+  for (std::size_t i = 0; i < CompactCodec::kBlock; ++i) {
+    ASSERT_EQ(block.fits(i), i >= lane) << i;
+    if (i < lane) continue;
+    std::vector<std::byte> bytes(codec.pose_bytes());
+    block.CopyBytes(i, bytes);
+    EXPECT_EQ(bytes, BytesOf(codec, Vec3(0.0f), SomePose()));
+  }
+}
+
 TEST(CompactCodec, PosesOfABlockDoNotMind) {
   const CompactCodec codec = Codec();
   CompactCodec::Block block;

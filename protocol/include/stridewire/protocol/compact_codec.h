@@ -67,6 +67,8 @@ class CompactCodec {
     const float* roots_m;    ///< [x y z][kBlock]
     const float* rotations;  ///< [joint][x y z w][kBlock]
     std::size_t count;       ///< At most kBlock
+    /// Rotations are unit, as who evaluates poses makes them, or no numbers at all: their lengths are not looked at.
+    bool are_unit = false;
   };
 
   /// Up to kBlock poses on their way to be encoded, and what came of it. Keep one: only Encode of a codec with more
