@@ -231,10 +231,11 @@ TEST_F(SmoothExamples, TheRadiusFactorIsPartOfTheFile) {
 GridExample Turning(const GridLayout& layout, int points, double parameter, double end_rad) {
   GridExample example;
   example.parameters = {parameter};
-  example.rows.resize(static_cast<std::size_t>(points * layout.row_floats));
+  example.rows.resize(static_cast<std::size_t>(points) *
+                      static_cast<std::size_t>(layout.row_floats));
   for (int p = 0; p < points; ++p) {
     const double half = 0.5 * end_rad * p / (points - 1);
-    float* row = &example.rows[static_cast<std::size_t>(p * layout.row_floats)];
+    float* row = example.rows.data() + p * layout.row_floats;
     row[0] = static_cast<float>(std::sin(half));
     row[3] = static_cast<float>(std::cos(half));
   }
@@ -249,17 +250,14 @@ TEST(AlignHemispheres, KeepsTracksContinuousHoweverFarTheyTurnFromTheReference) 
                                        Turning(layout, kPoints, 1.0, 0.2),
                                        Turning(layout, kPoints, 2.0, 4.5)};
   const auto quat = [&](const GridExample& example, int p) {
-    return GridLayout::RotationOf(&example.rows[static_cast<std::size_t>(p * layout.row_floats)],
-                                  0);
+    return GridLayout::RotationOf(example.rows.data() + p * layout.row_floats, 0);
   };
   // As captures come: signs at random.
   for (std::size_t e = 0; e < examples.size(); ++e) {
     for (int p = 0; p < kPoints; ++p) {
       if ((static_cast<std::size_t>(p) * 7 + e * 3) % 5 < 2) continue;
-      for (int c = 0; c < 4; ++c) {
-        float& part = examples[e].rows[static_cast<std::size_t>(p * layout.row_floats + c)];
-        part = -part;
-      }
+      float* row = examples[e].rows.data() + p * layout.row_floats;
+      GridLayout::SetRotation(row, 0, -GridLayout::RotationOf(row, 0));
     }
   }
   AlignHemispheres(examples, layout, 1);
