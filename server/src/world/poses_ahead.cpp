@@ -187,7 +187,11 @@ void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> pla
   }
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     const Mode& mode = modes_[m];
-    mode.codec->Encode({lanes.roots_m(), lanes.rotations(), places.size(), true}, scratch_->block);
+    mode.codec->Encode({.roots_m = lanes.roots_m(),
+                        .rotations = lanes.rotations(),
+                        .count = places.size(),
+                        .are_unit = true},
+                       scratch_->block);
     for (std::size_t i = 0; i < places.size(); ++i) {
       if (places[i] == kNobody) continue;
       if (scratch_->block.fits(i)) {
