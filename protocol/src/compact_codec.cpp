@@ -223,6 +223,7 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
     joint.reference[1] = code.reference.y;
     joint.reference[2] = code.reference.z;
     joint.reference[3] = code.reference.w;
+    joint.is_turned = code.reference != kIdentityQuat;
     joint.is_left_out =
         !told.empty() && !std::ranges::binary_search(told, static_cast<std::uint16_t>(j));
     if (joint.is_left_out) continue;

@@ -37,7 +37,21 @@ struct Rotation {
   V x, y, z, w;
 };
 
+struct Vector {
+  V x, y, z;
+};
+
 HWY_INLINE V Sum3(V a, V b, V c) { return hn::Add(hn::Add(a, b), c); }
+
+// The vector part of conj(a) b.
+HWY_INLINE Vector ConjugateTimes(const Rotation& a, const Rotation& b) {
+  const auto along = [&](V au, V av, V aw, V bu, V bv, V bw) HWY_ATTR {
+    return hn::Sub(hn::Sub(hn::Mul(a.w, bu), hn::Mul(au, b.w)),
+                   hn::Sub(hn::Mul(av, bw), hn::Mul(aw, bv)));
+  };
+  return {along(a.x, a.y, a.z, b.x, b.y, b.z), along(a.y, a.z, a.x, b.y, b.z, b.x),
+          along(a.z, a.x, a.y, b.z, b.x, b.y)};
+}
 
 // Puts numbers of some bits behind one another, a pose a lane.
 HWY_INLINE void WriteWords(std::span<const CompactPart> parts, const std::uint32_t* numbers,
@@ -130,9 +144,18 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
         q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
-        q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
+        // Of others w is not told, and what it is used for needs no more than two digits of it.
+        if (joint.free_bits > 0 || joint.is_turned) {
+          q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
+        }
       }
-      Rotation told;
+      float* error = work.errors + j * 3 * kBlock + lane;
+      // From what is told to what is: the vector part of conj(told) q.
+      const auto keep_error = [&](Vector e) HWY_ATTR {
+        hn::StoreU(e.x, d, error);
+        hn::StoreU(e.y, d, error + kBlock);
+        hn::StoreU(e.z, d, error + 2 * kBlock);
+      };
       if (joint.free_bits > 0) {
         // The smallest three, as quantise_kernel.cpp has them with 15 bits.
         V largest = q.x;
@@ -172,58 +195,49 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         const V c = tell(hn::IfThenElse(is_3, q.z, q.w), 2);
         const V left = hn::Sqrt(
             hn::Max(hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(a, a), hn::Mul(b, b), hn::Mul(c, c)))));
-        told.x = hn::IfThenElse(is_0, left, a);
-        told.y = hn::IfThenElse(is_1, left, hn::IfThenElse(is_0, a, b));
-        told.z = hn::IfThenElse(is_2, left, hn::IfThenElse(is_3, c, b));
-        told.w = hn::IfThenElse(is_3, left, c);
+        if (!joint.bears_others) continue;
+        const Rotation told = {
+            hn::IfThenElse(is_0, left, a), hn::IfThenElse(is_1, left, hn::IfThenElse(is_0, a, b)),
+            hn::IfThenElse(is_2, left, hn::IfThenElse(is_3, c, b)), hn::IfThenElse(is_3, left, c)};
+        keep_error(ConjugateTimes(told, q));
       } else {
-        const V rx = hn::Set(d, joint.reference[0]);
-        const V ry = hn::Set(d, joint.reference[1]);
-        const V rz = hn::Set(d, joint.reference[2]);
-        const V rw = hn::Set(d, joint.reference[3]);
-        const Rotation p = q;
-        // conj(reference) q
-        q.w = hn::Add(hn::Mul(rw, p.w), Sum3(hn::Mul(rx, p.x), hn::Mul(ry, p.y), hn::Mul(rz, p.z)));
+        if (joint.is_turned) {
+          const Rotation r = {hn::Set(d, joint.reference[0]), hn::Set(d, joint.reference[1]),
+                              hn::Set(d, joint.reference[2]), hn::Set(d, joint.reference[3])};
+          const Vector v = ConjugateTimes(r, q);
+          const V w = hn::Add(hn::Mul(r.w, q.w),
+                              Sum3(hn::Mul(r.x, q.x), hn::Mul(r.y, q.y), hn::Mul(r.z, q.z)));
+          q = {v.x, v.y, v.z, w};
+        }
         const V sign = hn::And(q.w, hn::SignBit(d));
-        const auto component = [&](V u, V v, V w, V ru, V rv, V r) HWY_ATTR {
-          // rw u - ru w - (rv w' - rw' v) along one axis
-          return hn::Xor(sign, hn::Sub(hn::Sub(hn::Mul(rw, u), hn::Mul(ru, p.w)),
-                                       hn::Sub(hn::Mul(rv, w), hn::Mul(r, v))));
-        };
-        q.x = component(p.x, p.y, p.z, rx, ry, rz);
-        q.y = component(p.y, p.z, p.x, ry, rz, rx);
-        q.z = component(p.z, p.x, p.y, rz, rx, ry);
+        q.x = hn::Xor(sign, q.x);
+        q.y = hn::Xor(sign, q.y);
+        q.z = hn::Xor(sign, q.z);
         q.w = hn::Abs(q.w);
         fits = hn::And(fits, hn::Ge(q.w, hn::Set(d, joint.least_w)));
+        // What a component is more than what is told of it.
         const auto tell = [&](V value, std::size_t c) HWY_ATTR {
-          const V low = hn::Set(d, joint.low[c]);
-          const Steps steps =
-              RoundToSteps(hn::Mul(hn::Sub(value, low), hn::Set(d, joint.steps[c])));
-          excess = hn::Or(excess, hn::ShiftRightSame(steps.integer, joint.bits[c]));
-          keep(c, steps.integer);
-          return hn::Add(low, hn::Mul(steps.number, hn::Set(d, joint.step[c])));
+          const V steps =
+              hn::Mul(hn::Sub(value, hn::Set(d, joint.low[c])), hn::Set(d, joint.steps[c]));
+          const Steps told = RoundToSteps(steps);
+          excess = hn::Or(excess, hn::ShiftRightSame(told.integer, joint.bits[c]));
+          keep(c, told.integer);
+          return hn::Mul(hn::Sub(steps, told.number), hn::Set(d, joint.step[c]));
         };
-        told.x = tell(q.x, 0);
-        told.y = tell(q.y, 1);
-        told.z = tell(q.z, 2);
-        if (joint.bears_others) {
-          told.w = hn::Sqrt(hn::Max(
-              hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(told.x, told.x), hn::Mul(told.y, told.y),
-                                             hn::Mul(told.z, told.z)))));
-        }
+        const V dx = tell(q.x, 0);
+        const V dy = tell(q.y, 1);
+        const V dz = tell(q.z, 2);
+        if (!joint.bears_others) continue;
+        // With v = (x, y, z), told v - d and so w + v.d / w: w d + v (v.d) / w - v x d, but for what is as small as d d.
+        const V per_w = hn::Div(one, q.w);
+        const V along = Sum3(hn::Mul(q.x, dx), hn::Mul(q.y, dy), hn::Mul(q.z, dz));
+        const auto component = [&](V u, V v, V w, V du, V dv, V dw) HWY_ATTR {
+          return hn::Add(hn::Sub(hn::Add(hn::Mul(q.w, du), hn::Mul(w, dv)), hn::Mul(v, dw)),
+                         hn::Mul(hn::Mul(u, per_w), along));
+        };
+        keep_error({component(q.x, q.y, q.z, dx, dy, dz), component(q.y, q.z, q.x, dy, dz, dx),
+                    component(q.z, q.x, q.y, dz, dx, dy)});
       }
-      if (!joint.bears_others) continue;
-      // conj(told) q: from what is told to what is.
-      const V ex = hn::Sub(hn::Sub(hn::Mul(told.w, q.x), hn::Mul(told.x, q.w)),
-                           hn::Sub(hn::Mul(told.y, q.z), hn::Mul(told.z, q.y)));
-      const V ey = hn::Sub(hn::Sub(hn::Mul(told.w, q.y), hn::Mul(told.y, q.w)),
-                           hn::Sub(hn::Mul(told.z, q.x), hn::Mul(told.x, q.z)));
-      const V ez = hn::Sub(hn::Sub(hn::Mul(told.w, q.z), hn::Mul(told.z, q.w)),
-                           hn::Sub(hn::Mul(told.x, q.y), hn::Mul(told.y, q.x)));
-      float* error = work.errors + j * 3 * kBlock + lane;
-      hn::StoreU(ex, d, error);
-      hn::StoreU(ey, d, error + kBlock);
-      hn::StoreU(ez, d, error + 2 * kBlock);
     }
     WriteWords(plan.parts, work.numbers + lane, work.words + 4 * lane);
     const auto is_exact = hn::RebindMask(d, hn::Eq(excess, hn::Zero(di)));

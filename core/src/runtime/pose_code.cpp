@@ -18,6 +18,8 @@ constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
 // Joints that come nearer to half a turn than this turn every way.
 constexpr double kMinSeenW = 0.4;
+// A joint turned by less than 9 degrees on average is told as it is: a turn less for who encodes it, and no more bits.
+constexpr float kLittleTurnedW = 0.997f;
 
 // A joint's error as an angle: of one that bears others, which make up for it, and of one at an end.
 constexpr double kMostInnerRad = 0.002;
@@ -77,6 +79,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   RotationRange range;
   range.reference = Normalise(Quat(static_cast<float>(sum.w), static_cast<float>(sum.x),
                                    static_cast<float>(sum.y), static_cast<float>(sum.z)));
+  if (std::abs(range.reference.w) > kLittleTurnedW) range.reference = kIdentityQuat;
   const DQuat back = glm::conjugate(DQuat(range.reference));
   DVec3 low(1.0);
   DVec3 high(-1.0);

@@ -30,6 +30,7 @@ struct CompactJoint {
   std::int32_t free_bits = 0;  ///< 0: not free
   float least_w = 0.0f;
   std::int32_t parent = -1;  ///< -1: none
+  bool is_turned = false;    ///< `reference` is not 1
   bool bears_others = false;
   bool is_left_out = false;  ///< Decoded to `reference`, however it is turned.
 };
