@@ -279,6 +279,10 @@ void CompactCodec::Block::CopyBytes(std::size_t i, std::span<std::byte> out) con
   std::memcpy(out.data() + at, from, out.size() - at);
 }
 
+void CompactCodec::Block::StreamBytes(std::size_t i, std::size_t pieces, std::byte* to) const {
+  StreamWords(words_.front().of + 4 * i, pieces, to);
+}
+
 void CompactCodec::Encode(Block& block) const {
   STRIDEWIRE_CHECK(block.size_ == 0 || block.joint_count_ == joints_.size());
   Encode({&block.roots_m_[0][0], block.rotations_.empty() ? nullptr : block.rotations_.front().of,
@@ -294,7 +298,7 @@ void CompactCodec::Encode(const Lanes& poses, Block& block) const {
     block.numbers_.resize(kJointRows + 4 * joints);
     block.errors_.resize(3 * joints);
   }
-  const std::size_t words = (pose_bytes_ + 15) / 16 * 4;
+  const std::size_t words = (pieces() + kMostBehind) * 4;
   if (block.words_.size() < words) block.words_.resize(words);
   EncodeCompact(
       {joints_, order_, parts_},

@@ -246,6 +246,16 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
   }
 }
 
+void StreamWords(const std::uint32_t* words, std::size_t fours, std::byte* to) {
+  const hn::CappedTag<std::uint32_t, 4> d;
+  auto* out = reinterpret_cast<std::uint32_t*>(to);
+  for (std::size_t i = 0; i < fours; ++i, words += 4 * kBlock, out += 4) {
+    for (std::size_t k = 0; k < 4; k += hn::Lanes(d)) {
+      hn::Stream(hn::LoadU(d, words + k), d, out + k);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace stridewire::protocol::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -255,9 +265,14 @@ HWY_AFTER_NAMESPACE();
 namespace stridewire::protocol {
 
 HWY_EXPORT(EncodeCompact);
+HWY_EXPORT(StreamWords);
 
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
   HWY_DYNAMIC_DISPATCH(EncodeCompact)(plan, work);
+}
+
+void StreamWords(const std::uint32_t* words, std::size_t fours, std::byte* to) {
+  HWY_DYNAMIC_DISPATCH(StreamWords)(words, fours, to);
 }
 
 }  // namespace stridewire::protocol

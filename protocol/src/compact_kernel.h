@@ -34,4 +34,7 @@ struct CompactWork {
 /// Vectors of any width (Google Highway) give the same bytes.
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work);
 
+/// Copies the words of one pose, four after four, past the caches. `to` is a multiple of 16.
+void StreamWords(const std::uint32_t* words, std::size_t fours, std::byte* to);
+
 }  // namespace stridewire::protocol

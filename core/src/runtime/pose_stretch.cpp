@@ -316,7 +316,9 @@ void StretchEvaluator::PrefetchTimes(const Movement& movement) {
 
 void StretchEvaluator::PrefetchPlaces(const Movement& movement) {
   PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
-  PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));
+  if (movement.feet.is_active) {
+    PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));
+  }
 }
 
 void StretchEvaluator::Prefetch(const PoseStretch& stretch) {

@@ -17,6 +17,9 @@ namespace {
 
 constexpr std::size_t kRootBytes = sizeof(Vec3);
 constexpr unsigned kModes = 4;  // bits of each kind in Others::flags
+constexpr std::size_t kPieceBytes = protocol::CompactCodec::kPieceBytes;
+static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMostBehind + 1);
+static_assert(std::tuple_size_v<decltype(PoseScratch::blocks)> == kModes);
 
 }  // namespace
 
@@ -35,33 +38,43 @@ PosesAhead::PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::Com
 void PosesAhead::SetModes(std::span<const PoseMode> compact_modes, int ticks_apart) {
   STRIDEWIRE_CHECK(compact_modes.size() <= kModes && ticks_apart >= 1);
   std::vector<Mode> modes;
-  std::size_t at = kRootBytes;
+  std::size_t at = 0;
   for (const PoseMode mode : compact_modes) {
     const protocol::CompactCodec* codec = codecs_ == nullptr ? nullptr : codecs_->Find(mode);
     if (codec == nullptr) continue;
-    modes.push_back({mode, codec, at});
-    at += codec->pose_bytes();
+    modes.push_back({mode, codec, at, codec->pieces()});
+    at += codec->pieces() * kPieceBytes;
   }
+  // Whole lines.
+  for (; at % kCacheLineBytes != 0; at += kPieceBytes) ++modes.back().pieces;
   const bool is_same = ticks_apart == ticks_apart_ &&
                        std::ranges::equal(modes, modes_, {}, &Mode::mode, &Mode::mode);
   if (is_same) return;
   modes_ = std::move(modes);
-  pose_bytes_ = at;
+  pose_bytes_ = modes_.empty() ? kRootBytes : at;
   ticks_apart_ = ticks_apart;
+  Forget();
+}
+
+void PosesAhead::Forget() {
   if (++layout_ == 0) layout_ = 1;
   for (Kept& kept : kept_) kept.layout = 0;
   others_.clear();
-  for (std::vector<std::byte>& plane : planes_) {
-    plane.clear();
-    plane.resize(kept_.size() * pose_bytes_);
-    plane.shrink_to_fit();
+  for (std::size_t i = 0; i < planes_.size(); ++i) {
+    planes_[i].clear();
+    if (i < ring_ || i == kStanding) planes_[i].resize(LinesOf(kept_.size()));
+    planes_[i].shrink_to_fit();
   }
 }
 
 void PosesAhead::Begin(std::uint64_t step, double step_s) {
   STRIDEWIRE_CHECK(wanted_.empty() && taken_count_ == 0);
+  if (ring_ == kMost && kept_.size() > kMany) {
+    ring_ = kMost / 2;
+    Forget();
+  }
   step_ = step;
-  plane_ = static_cast<std::uint8_t>(step / static_cast<std::uint64_t>(ticks_apart_) % kMost);
+  plane_ = static_cast<std::uint8_t>(step / static_cast<std::uint64_t>(ticks_apart_) % ring_);
   step_s_ = step_s;
 }
 
@@ -73,9 +86,10 @@ void PosesAhead::MakePlace(Place& place) {
     const std::size_t places = std::max<std::size_t>(64, first + first / 8);
     kept_.reserve(places);
     kept_.resize(places);
-    for (std::vector<std::byte>& plane : planes_) {
-      plane.reserve(places * pose_bytes_);
-      plane.resize(places * pose_bytes_);
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      if (i >= ring_ && i != kStanding) continue;
+      planes_[i].reserve(LinesOf(places));
+      planes_[i].resize(LinesOf(places));
     }
     // The lowest are taken first, so that places follow the order of avatars.
     for (std::size_t i = places; i > first; --i) free_.push_back(static_cast<std::uint32_t>(i - 1));
@@ -145,11 +159,11 @@ void PosesAhead::KeepTaken() {
 void PosesAhead::Finish(std::size_t shown) {
   if (taken_count_ > 0) KeepTaken();
   std::size_t poses = 0;
-  const std::size_t turns = TurnsOf(shown);
+  const std::size_t turns = std::min(TurnsOf(shown), ring_);
   for (Wanted& wanted : wanted_) {
     const std::size_t turn = wanted.place / kPlacesOfATurn;
     const std::size_t left = turns - (plane_ + turn) % turns;
-    const std::size_t most = std::min(left, kMost >> kept_[wanted.place].cuts);
+    const std::size_t most = std::min(left, ring_ >> kept_[wanted.place].cuts);
     wanted.is_its_turn = left == turns;
     wanted.count = StretchCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
                                 ticks_apart_, static_cast<int>(most));
@@ -169,10 +183,6 @@ void PosesAhead::Finish(std::size_t shown) {
                                                     int pose, const PoseLanes& lanes) {
     for (std::size_t i = 0; i < items.size(); ++i) {
       places[i] = pose < items[i].count ? items[i].tag : kNobody;
-      // Planes are large: who writes into one without having asked for it before waits.
-      const int next = pose + 1;
-      if (next >= items[i].count) continue;
-      PrefetchBytes(BytesOf(items[i].tag, static_cast<std::size_t>(next)), pose_bytes_);
     }
     Keep(lanes, std::span(places).first(items.size()), static_cast<std::size_t>(pose));
   });
@@ -180,26 +190,26 @@ void PosesAhead::Finish(std::size_t shown) {
 
 void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places,
                       std::size_t pose) {
+  for (std::size_t m = 0; m < modes_.size(); ++m) {
+    modes_[m].codec->Encode({.roots_m = lanes.roots_m(),
+                             .rotations = lanes.rotations(),
+                             .count = places.size(),
+                             .are_unit = true},
+                            scratch_->blocks[m]);
+  }
   for (std::size_t i = 0; i < places.size(); ++i) {
     if (places[i] == kNobody) continue;
-    const Vec3 root_m = lanes.root_m(i);
-    std::memcpy(BytesOf(places[i], pose), &root_m, kRootBytes);
-  }
-  for (std::size_t m = 0; m < modes_.size(); ++m) {
-    const Mode& mode = modes_[m];
-    mode.codec->Encode({.roots_m = lanes.roots_m(),
-                        .rotations = lanes.rotations(),
-                        .count = places.size(),
-                        .are_unit = true},
-                       scratch_->block);
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      if (places[i] == kNobody) continue;
-      if (scratch_->block.fits(i)) {
-        scratch_->block.CopyBytes(i,
-                                  {BytesOf(places[i], pose) + mode.at, mode.codec->pose_bytes()});
-      } else {
-        KeepWide(lanes, i, places[i], pose, m);
-      }
+    std::byte* to = BytesOf(places[i], pose);
+    if (modes_.empty()) {
+      const Vec3 root_m = lanes.root_m(i);
+      std::memcpy(to, &root_m, kRootBytes);
+      continue;
+    }
+    for (std::size_t m = 0; m < modes_.size(); ++m) {
+      scratch_->blocks[m].StreamBytes(i, modes_[m].pieces, to + modes_[m].at);
+    }
+    for (std::size_t m = 0; m < modes_.size(); ++m) {
+      if (!scratch_->blocks[m].fits(i)) KeepWide(lanes, i, places[i], pose, m);
     }
   }
 }
@@ -226,6 +236,12 @@ PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
   std::size_t m = 0;
   while (m < modes_.size() && modes_[m].mode != mode) ++m;
   STRIDEWIRE_CHECK(m < modes_.size() && pose < kept.count);
+  // Planes are read one place after the other, and page by page: the processor does not ask ahead over the end of one.
+  constexpr std::size_t kReadAhead = 8;
+  if (const std::size_t next = place.index_ + kReadAhead; next < kept_.size()) {
+    PrefetchBytes(planes_[plane_].front().of + next * pose_bytes_ + modes_[m].at,
+                  modes_[m].codec->pose_bytes());
+  }
   if (kept.is_any_other) return OtherOf(place.index_, pose, m);
   return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
 }
@@ -248,8 +264,18 @@ PosesAhead::Encoded PosesAhead::OtherOf(std::uint32_t place, std::size_t pose,
 }
 
 Vec3 PosesAhead::RootOf(const Place& place) const {
+  const Kept& kept = kept_[place.index_];
+  const std::byte* bytes = BytesOf(place.index_, PoseOf(kept));
   Vec3 root_m;
-  std::memcpy(&root_m, BytesOf(place.index_, PoseOf(kept_[place.index_])), kRootBytes);
+  if (modes_.empty()) {
+    std::memcpy(&root_m, bytes, kRootBytes);
+    return root_m;
+  }
+  // All modes begin with it; a pose that can be told only by a wide one, too.
+  const bool is_told =
+      !kept.is_any_other || (others_.at(place.index_).flags[PoseOf(kept)] >> kModes) == 0;
+  const std::span<const std::byte, kRootBytes> root(bytes, kRootBytes);
+  if (!is_told || !protocol::DecodeRoot(root, root_m)) root_m = Vec3(protocol::kMaxRootM);
   return root_m;
 }
 

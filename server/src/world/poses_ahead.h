@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/stretch_queue.h"
@@ -23,7 +24,8 @@ struct PoseScratch {
   StretchQueue queue;
   PoseLanes taken;
   Pose pose;
-  protocol::CompactCodec::Block block;
+  /// Of each mode.
+  std::array<protocol::CompactCodec::Block, 4> blocks;
 };
 
 /// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
@@ -38,17 +40,22 @@ struct PoseScratch {
 ///
 /// What is kept of a tick lies together, in the order of places:
 ///
-///   tick 16   [ avatar 0: root, pose in each mode ][ avatar 1 ] …     one plane for each of kMost ticks,
-///   tick 17   [ avatar 0 ][ avatar 1 ] …                              used again and again
+///   tick 16   [ avatar 0: pose in each mode ][ avatar 1 ] …   one plane for each of kMost ticks,
+///   tick 17   [ avatar 0 ][ avatar 1 ] …                      used again and again
 ///   …
-///   standing  [ avatar 0 ][ avatar 1 ] …                              of who stands, for all ticks
+///   standing  [ avatar 0 ][ avatar 1 ] …                      of who stands, for all ticks
+///
+/// It is more than caches hold: each avatar has cache lines of its own, which are written whole and past the caches, and
+/// are asked for before they are read.
 class PosesAhead {
  public:
   static constexpr std::size_t kMost = 16;
   /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would not fill the lanes.
   [[nodiscard]] static constexpr std::size_t TurnsOf(std::size_t shown) {
-    return shown < 2048 ? kMost / 2 : kMost;
+    return shown < 2048 || shown > kMany ? kMost / 2 : kMost;
   }
+  /// Of so many avatars and more there are planes of kMost / 2 ticks only, for their memory.
+  static constexpr std::size_t kMany = 32'768;
 
   /// Where an avatar's poses are kept. Given back when the avatar goes, before PosesAhead does.
   class Place {
@@ -70,7 +77,7 @@ class PosesAhead {
     std::uint32_t index_ = 0;
   };
 
-  /// `codecs` may be null: of a world without compact poses only roots are kept. They outlive it.
+  /// `codecs` may be null: of a world without compact poses only roots are kept, as without modes. They outlive it.
   PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
   PosesAhead(const PosesAhead&) = delete;
   PosesAhead& operator=(const PosesAhead&) = delete;
@@ -106,6 +113,7 @@ class PosesAhead {
   };
   /// This step's, of who has it. `mode` is one of SetModes.
   [[nodiscard]] Encoded Of(const Place& place, protocol::PoseMode mode) const;
+  /// As it is told; of a pose that can not be, beyond where any can.
   [[nodiscard]] Vec3 RootOf(const Place& place) const;
 
   [[nodiscard]] StretchEvaluator& evaluator() { return scratch_->evaluator; }
@@ -113,12 +121,16 @@ class PosesAhead {
  private:
   static constexpr std::size_t kLanes = PoseLanes::kLanes;
   static constexpr std::size_t kStanding = kMost;  // plane
-  // Places that lie together have their turns together: what is written then does, too.
+  // Places that lie together have their turns together.
   static constexpr std::uint32_t kPlacesOfATurn = 8;
+  struct alignas(kCacheLineBytes) Line {
+    std::byte of[kCacheLineBytes];
+  };
   struct Mode {
     protocol::PoseMode mode;
     const protocol::CompactCodec* codec;
-    std::size_t at;  // in the bytes of a pose
+    std::size_t at;      // in the bytes of a pose
+    std::size_t pieces;  // CompactCodec::Block::StreamBytes
   };
   // What every tick asks of the poses of one place.
   struct Kept {
@@ -152,13 +164,18 @@ class PosesAhead {
     return apart == 1 ? steps : steps % apart == 0 ? steps / apart : kMost;
   }
   [[nodiscard]] std::size_t PlaneOf(const Kept& kept, std::size_t pose) const {
-    return kept.stays ? kStanding : (kept.first_plane + pose) % kMost;
+    return kept.stays ? kStanding : (kept.first_plane + pose) % ring_;
   }
   [[nodiscard]] const std::byte* BytesOf(std::uint32_t place, std::size_t pose) const {
-    return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
+    return planes_[PlaneOf(kept_[place], pose)].front().of + place * pose_bytes_;
   }
   [[nodiscard]] std::byte* BytesOf(std::uint32_t place, std::size_t pose) {
-    return planes_[PlaneOf(kept_[place], pose)].data() + place * pose_bytes_;
+    return planes_[PlaneOf(kept_[place], pose)].front().of + place * pose_bytes_;
+  }
+  // Nothing of what was kept is any more; planes are as large as they have to be.
+  void Forget();
+  [[nodiscard]] std::size_t LinesOf(std::size_t places) const {
+    return (places * pose_bytes_ + kCacheLineBytes - 1) / kCacheLineBytes;
   }
   void MakePlace(Place& place);
   [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t course) const;
@@ -174,18 +191,19 @@ class PosesAhead {
   std::shared_ptr<PoseScratch> scratch_;
   const protocol::CompactCodecs* codecs_;
   std::vector<Mode> modes_;
-  std::size_t pose_bytes_;  // of a pose in all modes
+  std::size_t pose_bytes_;  // of a pose in all modes: whole lines, or a root
   std::size_t wide_bytes_;
   int ticks_apart_ = 1;
+  std::size_t ring_ = kMost;  // planes that ticks take turns in
   std::uint16_t layout_ = 1;
   std::uint64_t step_ = 0;
   std::uint8_t plane_ = 0;  // of this step
   double step_s_ = 0.0;
 
-  std::vector<Kept> kept_;                                // [place]
-  std::array<std::vector<std::byte>, kMost + 1> planes_;  // [place]: pose_bytes_ each
-  std::unordered_map<std::uint32_t, Others> others_;      // by place
-  std::vector<std::uint32_t> free_;                       // places of nobody
+  std::vector<Kept> kept_;                            // [place]
+  std::array<std::vector<Line>, kMost + 1> planes_;   // [place]: pose_bytes_ each
+  std::unordered_map<std::uint32_t, Others> others_;  // by place
+  std::vector<std::uint32_t> free_;                   // places of nobody
 
   std::vector<Wanted> wanted_;
   std::array<std::uint32_t, kLanes> taken_for_{};

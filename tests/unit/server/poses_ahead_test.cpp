@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -78,8 +80,11 @@ class Ahead {
       poses_.Ask(places_[i], told_.avatars()[i]);
     }
     poses_.Finish(shown_);
+    // As it is told, where it is told.
+    const float most_m = modes.empty() ? 0.0f : 0.51f / protocol::kRootStepsPerM;
     for (std::size_t i = 0; i < kCrowd; ++i) {
-      ASSERT_EQ(poses_.RootOf(places_[i]), eager_.avatars()[i].pose().root_position_m)
+      const Vec3 off_m = poses_.RootOf(places_[i]) - eager_.avatars()[i].pose().root_position_m;
+      ASSERT_LE(std::max({std::abs(off_m.x), std::abs(off_m.y), std::abs(off_m.z)}), most_m)
           << "step " << step_ << ", avatar " << i;
     }
     for (const PoseMode mode : modes) {
@@ -95,6 +100,31 @@ class Ahead {
     }
   }
 
+  // So many others stand around from now on.
+  void AddStanding(std::size_t count) {
+    const ConstPoseSpan pose = told_.avatars()[0].pose();
+    poses_.Begin(step_, 1.0 / 60.0);
+    for (std::size_t i = 0; i < count; ++i) poses_.Take(standing_.emplace_back(), 1, pose, true);
+    poses_.Finish(shown_);
+  }
+
+  // In how many steps from this one on somebody who walks has a pose.
+  std::uint64_t StepsKept() {
+    std::uint64_t steps = 0;
+    const auto is_kept = [&](std::size_t i) {
+      return told_.avatars()[i].movement() != nullptr &&
+             poses_.Has(places_[i], told_.avatars()[i].course());
+    };
+    bool is_any = true;
+    for (; is_any; ++steps) {
+      poses_.Begin(step_ + steps, 1.0 / 60.0);
+      is_any = false;
+      for (std::size_t i = 0; i < kCrowd; ++i) is_any |= is_kept(i);
+    }
+    poses_.Begin(step_, 1.0 / 60.0);
+    return steps - 1;
+  }
+
   [[nodiscard]] int wide() const { return wide_; }
   [[nodiscard]] int found() const { return found_; }  // of poses of movements, made before
   [[nodiscard]] int compared() const { return poses_compared_; }
@@ -105,6 +135,7 @@ class Ahead {
   DrawnCrowd told_;
   PosesAhead poses_;
   std::vector<PosesAhead::Place> places_;
+  std::vector<PosesAhead::Place> standing_;
   std::size_t shown_;  // as if there were so many
   Encoder encoder_;
   std::uint64_t step_ = 100;
@@ -185,6 +216,50 @@ TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
     ahead.Compare(kAll);
     if (HasFatalFailure()) return;
   }
+}
+
+TEST(PosesAhead, OfVeryManyFewerTicksAreKept) {
+  Ahead ahead(LibraryOf({}), 7, nullptr, 10'000);
+  ahead.poses().SetModes(kAll, 1);
+  std::uint64_t most = 0;
+  const auto walk = [&] {
+    most = 0;
+    for (int tick = 0; tick < 100; ++tick) {
+      ahead.Advance();
+      ahead.Compare(kAll);
+      if (HasFatalFailure()) return;
+      most = std::max(most, ahead.StepsKept());
+    }
+  };
+  walk();
+  EXPECT_EQ(most, PosesAhead::kMost);
+  ahead.AddStanding(PosesAhead::kMany + 1);
+  const int before = ahead.found();
+  walk();
+  EXPECT_EQ(most, PosesAhead::kMost / 2);
+  EXPECT_GT(ahead.found() - before, 500);
+}
+
+TEST(PosesAhead, WhoseRootCanNotBeToldIsNowhereNear) {
+  const auto library = LibraryOf({});
+  const auto codes = MakePoseCodes(*library);
+  PosesAhead poses(std::make_shared<PoseScratch>(library), &codes->codecs);
+  poses.SetModes(kAll, 1);
+  Pose pose = library->stand_pose();
+  std::vector<PosesAhead::Place> places(3);
+  poses.Begin(1, 1.0 / 60.0);
+  std::size_t i = 0;
+  for (const float x :
+       {2.0f * protocol::kMaxRootM, std::numeric_limits<float>::quiet_NaN(), 3.0f}) {
+    pose.root_position_m.x = x;
+    poses.Take(places[i++], 1, pose, true);
+  }
+  poses.Finish(3);
+  EXPECT_EQ(poses.RootOf(places[0]), Vec3(protocol::kMaxRootM));
+  EXPECT_EQ(poses.RootOf(places[1]), Vec3(protocol::kMaxRootM));
+  EXPECT_EQ(poses.RootOf(places[2]).x, 3.0f);
+  EXPECT_TRUE(poses.Of(places[0], PoseMode::kCompact).bytes.empty());
+  EXPECT_FALSE(poses.Of(places[2], PoseMode::kCompact).bytes.empty());
 }
 
 // How many poses are made for so many ticks of an avatar whose movement gives way to another every few of them.

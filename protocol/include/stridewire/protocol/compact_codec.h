@@ -51,6 +51,9 @@ class CompactCodec {
  public:
   /// Poses that are encoded together.
   static constexpr std::size_t kBlock = 16;
+  /// Of Block::StreamBytes.
+  static constexpr std::size_t kPieceBytes = 16;
+  static constexpr std::size_t kMostBehind = 3;
 
   /// `parents` has one entry a joint, -1 for the first, then below its own index. `told`: the joints that are told;
   /// none: all. Errors as CheckRotationCodes and CheckFewerJoints, kShapeMismatch: not as many parents; kOutOfRange:
@@ -62,6 +65,7 @@ class CompactCodec {
   [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
   /// Bytes of a pose.
   [[nodiscard]] std::size_t pose_bytes() const { return pose_bytes_; }
+  [[nodiscard]] std::size_t pieces() const { return (pose_bytes_ + kPieceBytes - 1) / kPieceBytes; }
 
   /// Poses side by side, of which the first `count` are there: all of joint_count() joints.
   struct Lanes {
@@ -87,6 +91,10 @@ class CompactCodec {
     [[nodiscard]] bool fits(std::size_t i) const { return fits_[i] != 0; }
     /// After Encode: its bytes, pose_bytes() of them; without meaning unless it fits.
     void CopyBytes(std::size_t i, std::span<std::byte> out) const;
+    /// The same past the caches, which keep what is at hand, for who reads it much later: pieces of kPieceBytes, up to
+    /// kMostBehind more than its bytes take, which mean nothing. `to` is a multiple of kPieceBytes; lines of the cache
+    /// ought to be filled from one end to the other, for half of one is slow.
+    void StreamBytes(std::size_t i, std::size_t pieces, std::byte* to) const;
 
    private:
     friend class CompactCodec;
