@@ -72,7 +72,12 @@ void PoseRows::AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std:
 }
 
 std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
-  if (bytes_.size() < begin + length) bytes_.resize(std::max(2 * bytes_.size(), begin + length));
+  if (bytes_.size() < begin + length) {
+    // By an eighth: of many they are megabytes.
+    const std::size_t room = std::max(begin + length, bytes_.size() + bytes_.size() / 8);
+    bytes_.reserve(room);
+    bytes_.resize(room);
+  }
   return std::span(bytes_).subspan(begin, length);
 }
 

@@ -157,12 +157,12 @@ void WholePose(benchmark::State& state, const Library& library) {
   const auto tick = [&]() -> Status {
     ++info.tick;
     steps.Advance();
-    ahead.Begin(info.tick, kTickS);
+    ahead.Begin(info.tick, kTickS, kept.size());
     for (const Steps::Walker& walker : steps.walkers()) {
       if (ahead.Has(kept[walker.number], walker.course)) continue;
       ahead.Want(kept[walker.number], walker.course, *walker.movement, walker.time_s);
     }
-    ahead.Finish(kept.size());
+    ahead.Finish();
     Status status = rows.Begin(info, avatars, codecs.Find(kMode));
     for (std::size_t i = 0; i < kept.size(); ++i) {
       const server::PosesAhead::Encoded encoded = ahead.Of(kept[i], kMode);

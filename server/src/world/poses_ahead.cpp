@@ -67,23 +67,24 @@ void PosesAhead::Forget() {
   }
 }
 
-void PosesAhead::Begin(std::uint64_t step, double step_s) {
+void PosesAhead::Begin(std::uint64_t step, double step_s, std::size_t shown) {
   STRIDEWIRE_CHECK(wanted_.empty() && taken_count_ == 0);
-  if (ring_ == kMost && kept_.size() > kMany) {
+  if (ring_ == kMost && std::max(kept_.size(), shown) > kMany) {
     ring_ = kMost / 2;
     Forget();
   }
   step_ = step;
   plane_ = static_cast<std::uint8_t>(step / static_cast<std::uint64_t>(ticks_apart_) % ring_);
   step_s_ = step_s;
+  shown_ = shown;
 }
 
 void PosesAhead::MakePlace(Place& place) {
   if (place.of_ != nullptr) return;
   if (free_.empty()) {
-    // By an eighth: planes are large.
+    // For all that are shown, or by an eighth: planes are large.
     const std::size_t first = kept_.size();
-    const std::size_t places = std::max<std::size_t>(64, first + first / 8);
+    const std::size_t places = std::max({std::size_t{64}, shown_, first + first / 8});
     kept_.reserve(places);
     kept_.resize(places);
     for (std::size_t i = 0; i < planes_.size(); ++i) {
@@ -156,10 +157,10 @@ void PosesAhead::KeepTaken() {
   taken_count_ = 0;
 }
 
-void PosesAhead::Finish(std::size_t shown) {
+void PosesAhead::Finish() {
   if (taken_count_ > 0) KeepTaken();
   std::size_t poses = 0;
-  const std::size_t turns = std::min(TurnsOf(shown), ring_);
+  const std::size_t turns = std::min(TurnsOf(shown_), ring_);
   for (Wanted& wanted : wanted_) {
     const std::size_t turn = wanted.place / kPlacesOfATurn;
     const std::size_t left = turns - (plane_ + turn) % turns;
@@ -171,7 +172,7 @@ void PosesAhead::Finish(std::size_t shown) {
   }
   // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it was sent elsewhere,
   // those whose turn it is not get one only: a tick makes hardly more than two poses an avatar.
-  const bool is_crowd_new = poses > 2 * shown + kLanes * kMost;
+  const bool is_crowd_new = poses > 2 * shown_ + kLanes * kMost;
   for (Wanted& wanted : wanted_) {
     if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
     Start(wanted.place, kept_[wanted.place].course, static_cast<std::size_t>(wanted.count), false);

@@ -33,9 +33,9 @@ struct PoseScratch {
 /// avatars'. Who is sent elsewhere meanwhile is evaluated anew, and less far ahead the next time. One a world and shard;
 /// not thread-safe.
 ///
-///   ahead.Begin(step, step_s);
+///   ahead.Begin(step, step_s, avatars);
 ///   for each avatar: ahead.Ask(place, avatar)
-///   ahead.Finish(avatars);
+///   ahead.Finish();
 ///   for each avatar: … ahead.Of(place, mode) …
 ///
 /// What is kept of a tick lies together, in the order of places:
@@ -85,8 +85,9 @@ class PosesAhead {
   /// In which modes poses are told, and every how many ticks. What was kept for others is nothing any more.
   void SetModes(std::span<const protocol::PoseMode> compact_modes, int ticks_apart);
 
-  /// The step that poses are asked for from now on, and how long steps are.
-  void Begin(std::uint64_t step, double step_s);
+  /// The step that poses are asked for from now on, how long steps are, and how many avatars are shown in this one: those
+  /// that have their poses among them.
+  void Begin(std::uint64_t step, double step_s, std::size_t shown);
 
   /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is until then.
   void Ask(Place& place, Avatar& avatar);
@@ -104,8 +105,8 @@ class PosesAhead {
   /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at any more.
   void Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays);
 
-  /// Now they are there. `shown`: how many avatars are shown in this step, those that had their poses among them.
-  void Finish(std::size_t shown);
+  /// Now they are there.
+  void Finish();
 
   struct Encoded {
     std::span<const std::byte> bytes;  ///< Empty: the pose can not be told
@@ -199,6 +200,7 @@ class PosesAhead {
   std::uint64_t step_ = 0;
   std::uint8_t plane_ = 0;  // of this step
   double step_s_ = 0.0;
+  std::size_t shown_ = 0;
 
   std::vector<Kept> kept_;                            // [place]
   std::array<std::vector<Line>, kMost + 1> planes_;   // [place]: pose_bytes_ each

@@ -551,7 +551,7 @@ bool WorldShard::HasRegionsOfSeveral(PoseMode mode) const {
 void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
   constexpr std::size_t kAhead = 16;
   const std::span<const InOrder> in_order = AvatarsInOrder();
-  ahead_.Begin(step_, clock_.tick_s());
+  ahead_.Begin(step_, clock_.tick_s(), rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kAhead < rows.size()) {
       in_order[rows[i + kAhead]].entry->avatar.PrefetchCourse();
@@ -559,7 +559,7 @@ void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
     Entry& entry = *in_order[rows[i]].entry;
     ahead_.Ask(entry.ahead, entry.avatar);
   }
-  ahead_.Finish(rows.size());
+  ahead_.Finish();
 }
 
 // Evaluates the poses of these rows' avatars.

@@ -72,14 +72,14 @@ class Ahead {
 
   // Asks for all poses of this step and holds them against those of the others.
   void Compare(std::span<const PoseMode> modes) {
-    poses_.Begin(step_, 1.0 / 60.0);
+    poses_.Begin(step_, 1.0 / 60.0, shown_);
     for (std::size_t i = 0; i < kCrowd; ++i) {
       const Avatar& avatar = told_.avatars()[i];
       found_ += avatar.layers().empty() && avatar.movement() != nullptr &&
                 poses_.Has(places_[i], avatar.course());
       poses_.Ask(places_[i], told_.avatars()[i]);
     }
-    poses_.Finish(shown_);
+    poses_.Finish();
     // As it is told, where it is told.
     const float most_m = modes.empty() ? 0.0f : 0.51f / protocol::kRootStepsPerM;
     for (std::size_t i = 0; i < kCrowd; ++i) {
@@ -103,9 +103,9 @@ class Ahead {
   // So many others stand around from now on.
   void AddStanding(std::size_t count) {
     const ConstPoseSpan pose = told_.avatars()[0].pose();
-    poses_.Begin(step_, 1.0 / 60.0);
+    poses_.Begin(step_, 1.0 / 60.0, shown_);
     for (std::size_t i = 0; i < count; ++i) poses_.Take(standing_.emplace_back(), 1, pose, true);
-    poses_.Finish(shown_);
+    poses_.Finish();
   }
 
   // In how many steps from this one on somebody who walks has a pose.
@@ -117,11 +117,11 @@ class Ahead {
     };
     bool is_any = true;
     for (; is_any; ++steps) {
-      poses_.Begin(step_ + steps, 1.0 / 60.0);
+      poses_.Begin(step_ + steps, 1.0 / 60.0, shown_);
       is_any = false;
       for (std::size_t i = 0; i < kCrowd; ++i) is_any |= is_kept(i);
     }
-    poses_.Begin(step_, 1.0 / 60.0);
+    poses_.Begin(step_, 1.0 / 60.0, shown_);
     return steps - 1;
   }
 
@@ -247,14 +247,14 @@ TEST(PosesAhead, WhoseRootCanNotBeToldIsNowhereNear) {
   poses.SetModes(kAll, 1);
   Pose pose = library->stand_pose();
   std::vector<PosesAhead::Place> places(3);
-  poses.Begin(1, 1.0 / 60.0);
+  poses.Begin(1, 1.0 / 60.0, places.size());
   std::size_t i = 0;
   for (const float x :
        {2.0f * protocol::kMaxRootM, std::numeric_limits<float>::quiet_NaN(), 3.0f}) {
     pose.root_position_m.x = x;
     poses.Take(places[i++], 1, pose, true);
   }
-  poses.Finish(3);
+  poses.Finish();
   EXPECT_EQ(poses.RootOf(places[0]), Vec3(protocol::kMaxRootM));
   EXPECT_EQ(poses.RootOf(places[1]), Vec3(protocol::kMaxRootM));
   EXPECT_EQ(poses.RootOf(places[2]).x, 3.0f);
@@ -273,12 +273,12 @@ std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
   std::uint64_t evaluated = 0;
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
     const std::uint64_t course = 1 + tick / ticks_of_a_course;
-    poses.Begin(tick, kTickS);
+    poses.Begin(tick, kTickS, kShown);
     if (poses.Has(place, course)) continue;
     poses.Want(place, course, *avatar.movement(), avatar.movement_time_s());
-    poses.Finish(kShown);
+    poses.Finish();
     for (std::uint64_t ahead = 0; poses.Has(place, course); ++ahead, ++evaluated) {
-      poses.Begin(tick + ahead + 1, kTickS);
+      poses.Begin(tick + ahead + 1, kTickS, kShown);
     }
   }
   return evaluated;
