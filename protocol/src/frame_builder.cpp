@@ -2,21 +2,39 @@
 
 namespace stridewire::protocol {
 
-Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
-                   const FrameLimits& limits, std::vector<std::byte>& frame) {
-  const std::size_t size = builder.GetSize();
-  const std::size_t padding = (kPayloadAlignment - size % kPayloadAlignment) % kPayloadAlignment;
+namespace {
+
+std::size_t PaddingOf(std::size_t size) {
+  return (kPayloadAlignment - size % kPayloadAlignment) % kPayloadAlignment;
+}
+
+}  // namespace
+
+Status BeginFrame(std::size_t size, MessageType type, const FrameLimits& limits,
+                  std::vector<std::byte>& frame) {
+  const std::size_t padding = PaddingOf(size);
   if (size + padding > MaxPayloadBytes(type, limits)) {
     return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
                 std::string(MessageTypeName(type)), static_cast<std::int64_t>(size + padding));
   }
   std::array<std::byte, kFrameHeaderBytes> header;
   WriteFrameHeader({type, static_cast<std::uint32_t>(size + padding)}, header);
-  const auto* payload = reinterpret_cast<const std::byte*>(builder.GetBufferPointer());
   frame.reserve(frame.size() + header.size() + size + padding);
   frame.insert(frame.end(), header.begin(), header.end());
+  return {};
+}
+
+void EndFrame(std::size_t size, std::vector<std::byte>& frame) {
+  frame.insert(frame.end(), PaddingOf(size), std::byte{0});
+}
+
+Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
+                   const FrameLimits& limits, std::vector<std::byte>& frame) {
+  const std::size_t size = builder.GetSize();
+  if (const Status begun = BeginFrame(size, type, limits, frame); !begun) return begun;
+  const auto* payload = reinterpret_cast<const std::byte*>(builder.GetBufferPointer());
   frame.insert(frame.end(), payload, payload + size);
-  frame.insert(frame.end(), padding, std::byte{0});
+  EndFrame(size, frame);
   return {};
 }
 

@@ -12,6 +12,12 @@ namespace stridewire::protocol {
 [[nodiscard]] Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
                                  const FrameLimits& limits, std::vector<std::byte>& frame);
 
+/// The same in parts, for a message of `size` bytes some of which are not in a builder: BeginFrame appends the header and makes
+/// room for the rest, the caller appends the message, EndFrame its padding.
+[[nodiscard]] Status BeginFrame(std::size_t size, MessageType type, const FrameLimits& limits,
+                                std::vector<std::byte>& frame);
+void EndFrame(std::size_t size, std::vector<std::byte>& frame);
+
 /// Table, vtable, vector lengths and padding of a batch stay below this.
 inline constexpr std::size_t kPoseBatchOverheadBytes = 128;
 

@@ -88,6 +88,28 @@ void PoseRows::SkipTo(std::size_t row) {
   begins_.resize(row + 1, begins_.back());
 }
 
+namespace {
+
+// Rows that follow each other are copied at once. The processor fetches ahead within them, not to the next one picked.
+void AppendPoses(const PoseRows& rows, std::span<const std::uint32_t> picked,
+                 std::vector<std::byte>& frame) {
+  constexpr std::size_t kAhead = 4;
+  for (std::size_t i = 0; i < picked.size();) {
+    std::size_t last = i;
+    while (last + 1 < picked.size() && picked[last + 1] == picked[last] + 1) ++last;
+    if (last + kAhead < picked.size()) {
+      const std::span<const std::byte> later =
+          rows.poses(picked[last + kAhead], picked[last + kAhead]);
+      PrefetchBytes(later.data(), later.size());
+    }
+    const std::span<const std::byte> run = rows.poses(picked[i], picked[last]);
+    frame.insert(frame.end(), run.begin(), run.end());
+    i = last + 1;
+  }
+}
+
+}  // namespace
+
 struct PoseBatchComposer::Impl {
   FrameLimits limits;
   flatbuffers::FlatBufferBuilder builder;
@@ -129,24 +151,9 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
 
   flatbuffers::FlatBufferBuilder& builder = impl_->builder;
   builder.Clear();
+  // The builder only makes room for the poses, at the end of the payload: they are copied once, into the frame.
   std::uint8_t* poses = nullptr;
   const auto poses_offset = builder.CreateUninitializedVector<std::uint8_t>(length, &poses);
-  // Rows that follow each other are copied at once. The processor fetches ahead within them, not to the next
-  // one picked.
-  constexpr std::size_t kAhead = 4;
-  for (std::size_t i = 0; i < picked.size();) {
-    std::size_t last = i;
-    while (last + 1 < picked.size() && picked[last + 1] == picked[last] + 1) ++last;
-    if (last + kAhead < picked.size()) {
-      const std::span<const std::byte> later =
-          rows.poses(picked[last + kAhead], picked[last + kAhead]);
-      PrefetchBytes(later.data(), later.size());
-    }
-    const std::span<const std::byte> run = rows.poses(picked[i], picked[last]);
-    if (!run.empty()) std::memcpy(poses, run.data(), run.size());
-    poses += run.size();
-    i = last + 1;
-  }
   std::uint8_t* flags = nullptr;
   const auto flags_offset = builder.CreateUninitializedVector<std::uint8_t>(count, &flags);
   for (const std::uint32_t row : picked) {
@@ -160,7 +167,18 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
     }
   }
   builder.Finish(BuildPoseBatch(builder, info, avatars_offset, flags_offset, poses_offset));
-  return AppendFrame(builder, MessageType::kPoseBatch, impl_->limits, frame);
+
+  const std::size_t size = builder.GetSize();
+  const Status begun = BeginFrame(size, MessageType::kPoseBatch, impl_->limits, frame);
+  if (!begun) return begun;
+  const auto* payload = reinterpret_cast<const std::byte*>(builder.GetBufferPointer());
+  // An offset leads back from the end, to the vector's length before its bytes.
+  const std::byte* room = payload + size - poses_offset.o + sizeof(flatbuffers::uoffset_t);
+  frame.insert(frame.end(), payload, room);
+  AppendPoses(rows, picked, frame);
+  frame.insert(frame.end(), room + length, payload + size);
+  EndFrame(size, frame);
+  return {};
 }
 
 }  // namespace stridewire::protocol
