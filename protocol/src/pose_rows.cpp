@@ -1,7 +1,6 @@
 #include "stridewire/protocol/pose_rows.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "frame_builder.h"

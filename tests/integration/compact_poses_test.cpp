@@ -292,6 +292,22 @@ TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
   }
 }
 
+TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
+  const PoseCode code = ChoosePoseCode(*LibraryOf({}));
+  int as_they_are = 0;
+  for (std::size_t j = 1; j < code.joints.size(); ++j) {
+    const RotationCode& joint = code.joints[j];
+    if (joint.free_bits > 0) continue;
+    as_they_are += joint.reference == kIdentityQuat;
+    if (joint.reference != kIdentityQuat) {
+      EXPECT_LE(std::abs(joint.reference.w), 0.997f) << j;
+    }
+  }
+  // Spine, neck, head, shoulders, hands and toes.
+  EXPECT_GE(as_they_are, 10);
+  EXPECT_LT(as_they_are, static_cast<int>(code.joints.size()) - 4);  // but not thighs, knees, arms
+}
+
 // Any tree of joints that turn any way within any ranges: what is stated is kept.
 TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
   const unsigned seed = std::random_device{}();

@@ -16,10 +16,9 @@ using protocol::PoseMode;
 namespace {
 
 constexpr std::size_t kRootBytes = sizeof(Vec3);
-constexpr unsigned kModes = 4;  // bits of each kind in Others::flags
+constexpr unsigned kModes = PoseScratch::kModes;  // bits of each kind in Others::flags
 constexpr std::size_t kPieceBytes = protocol::CompactCodec::kPieceBytes;
 static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMostBehind + 1);
-static_assert(std::tuple_size_v<decltype(PoseScratch::blocks)> == kModes);
 
 }  // namespace
 
@@ -60,10 +59,20 @@ void PosesAhead::Forget() {
   if (++layout_ == 0) layout_ = 1;
   for (Kept& kept : kept_) kept.layout = 0;
   others_.clear();
+  for (std::vector<Line>& plane : planes_) {
+    plane.clear();
+    plane.shrink_to_fit();
+  }
+  SizePlanes();
+}
+
+void PosesAhead::SizePlanes() {
+  const std::size_t bytes = kept_.size() * pose_bytes_;
+  const std::size_t lines = (bytes + kCacheLineBytes - 1) / kCacheLineBytes;
   for (std::size_t i = 0; i < planes_.size(); ++i) {
-    planes_[i].clear();
-    if (i < ring_ || i == kStanding) planes_[i].resize(LinesOf(kept_.size()));
-    planes_[i].shrink_to_fit();
+    if (i >= ring_ && i != kStanding) continue;
+    planes_[i].reserve(lines);
+    planes_[i].resize(lines);
   }
 }
 
@@ -87,11 +96,7 @@ void PosesAhead::MakePlace(Place& place) {
     const std::size_t places = std::max({std::size_t{64}, shown_, first + first / 8});
     kept_.reserve(places);
     kept_.resize(places);
-    for (std::size_t i = 0; i < planes_.size(); ++i) {
-      if (i >= ring_ && i != kStanding) continue;
-      planes_[i].reserve(LinesOf(places));
-      planes_[i].resize(LinesOf(places));
-    }
+    SizePlanes();
     // The lowest are taken first, so that places follow the order of avatars.
     for (std::size_t i = places; i > first; --i) free_.push_back(static_cast<std::uint32_t>(i - 1));
   }
@@ -240,8 +245,7 @@ PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
   // Planes are read one place after the other, and page by page: the processor does not ask ahead over the end of one.
   constexpr std::size_t kReadAhead = 8;
   if (const std::size_t next = place.index_ + kReadAhead; next < kept_.size()) {
-    PrefetchBytes(planes_[plane_].front().of + next * pose_bytes_ + modes_[m].at,
-                  modes_[m].codec->pose_bytes());
+    PrefetchBytes(BytesIn(plane_, next) + modes_[m].at, modes_[m].codec->pose_bytes());
   }
   if (kept.is_any_other) return OtherOf(place.index_, pose, m);
   return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};

@@ -24,8 +24,8 @@ struct PoseScratch {
   StretchQueue queue;
   PoseLanes taken;
   Pose pose;
-  /// Of each mode.
-  std::array<protocol::CompactCodec::Block, 4> blocks;
+  static constexpr std::size_t kModes = 4;
+  std::array<protocol::CompactCodec::Block, kModes> blocks;
 };
 
 /// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
@@ -54,7 +54,7 @@ class PosesAhead {
   [[nodiscard]] static constexpr std::size_t TurnsOf(std::size_t shown) {
     return shown < 2048 || shown > kMany ? kMost / 2 : kMost;
   }
-  /// Of so many avatars and more there are planes of kMost / 2 ticks only, for their memory.
+  /// Of more avatars there are planes of kMost / 2 ticks only, for their memory.
   static constexpr std::size_t kMany = 32'768;
 
   /// Where an avatar's poses are kept. Given back when the avatar goes, before PosesAhead does.
@@ -167,17 +167,19 @@ class PosesAhead {
   [[nodiscard]] std::size_t PlaneOf(const Kept& kept, std::size_t pose) const {
     return kept.stays ? kStanding : (kept.first_plane + pose) % ring_;
   }
+  [[nodiscard]] const std::byte* BytesIn(std::size_t plane, std::size_t place) const {
+    return reinterpret_cast<const std::byte*>(planes_[plane].data()) + place * pose_bytes_;
+  }
   [[nodiscard]] const std::byte* BytesOf(std::uint32_t place, std::size_t pose) const {
-    return planes_[PlaneOf(kept_[place], pose)].front().of + place * pose_bytes_;
+    return BytesIn(PlaneOf(kept_[place], pose), place);
   }
   [[nodiscard]] std::byte* BytesOf(std::uint32_t place, std::size_t pose) {
-    return planes_[PlaneOf(kept_[place], pose)].front().of + place * pose_bytes_;
+    return const_cast<std::byte*>(std::as_const(*this).BytesOf(place, pose));
   }
-  // Nothing of what was kept is any more; planes are as large as they have to be.
+  // Nothing of what was kept is any more.
   void Forget();
-  [[nodiscard]] std::size_t LinesOf(std::size_t places) const {
-    return (places * pose_bytes_ + kCacheLineBytes - 1) / kCacheLineBytes;
-  }
+  // Room for all places in the planes that are used, no more.
+  void SizePlanes();
   void MakePlace(Place& place);
   [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t course) const;
   void Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays);
