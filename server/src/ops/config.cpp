@@ -232,6 +232,8 @@ std::vector<ConfigKey> MakeKeys() {
   limit("starts_per_tick",
         "Avatars one command sets going in a tick; others begin in the next ones",
         &Limits::starts_per_tick, 16, 1'000'000);
+  limit("spawns_per_tick", "Avatars a shard makes in a tick; others are made in the next ones",
+        &Limits::spawns_per_tick, 1, 1'000'000);
   limit("messages_per_s", "Messages of one session a second; beyond, reading pauses",
         &Limits::messages_per_s, 1, 100'000'000);
   limit("max_pending_commands", "Commands of one session not answered yet; beyond, reading pauses",

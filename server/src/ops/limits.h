@@ -38,6 +38,7 @@ struct Limits {
   int requests_per_s = 50'000;     ///< Items of commands; more are refused.
   int request_burst = 65'536;      ///< How many at once.
   int starts_per_tick = 128;       ///< Avatars a command sets going in one tick, of all shards.
+  int spawns_per_tick = 512;       ///< Avatars a shard makes in one tick, of all sessions.
   int messages_per_s = 4000;       ///< Messages of any kind; beyond, reading pauses.
   int max_pending_commands = 256;  ///< Not answered yet; beyond, reading pauses.
 
@@ -71,6 +72,7 @@ enum class Limit : std::uint8_t {
   kQueue,
   kRequestsPerSecond,
   kStartsPerTick,
+  kSpawnsPerTick,
   kMessagesPerSecond,
   kPendingCommands,
   kControlBuffer,
@@ -100,6 +102,7 @@ inline constexpr std::array<std::string_view, static_cast<std::size_t>(Limit::kC
      "max_queue",
      "requests_per_s",
      "starts_per_tick",
+     "spawns_per_tick",
      "messages_per_s",
      "max_pending_commands",
      "control_buffer",

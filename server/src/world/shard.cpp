@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <ctime>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
@@ -108,12 +109,7 @@ void Shard::Tick() {
   tick_ = tick;
 
   TellNamed();
-  for (const WorldCommand& command : inbox_) {
-    CommandResult result = WorldOf(command.world).Execute(command, tick);
-    if (command.seq == 0) continue;
-    outgoing_[static_cast<std::size_t>(command.from_shard)].results.push_back(std::move(result));
-  }
-  inbox_.clear();
+  RunCommands();
   for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
   AnswerQuestions();
   // Before the replies go out: whoever has one finds the metrics to say the same.
@@ -123,6 +119,59 @@ void Shard::Tick() {
   metrics_.ticks.Add();
   metrics_.tick.Observe(std::chrono::duration<double>(Clock::now() - begin).count());
   metrics_.cpu_ns.Set(ProcessorTimeOfThreadNs());
+}
+
+// What a tick takes, in order. Of who spawns more than that the rest waits for the next tick, and what it sent behind it.
+void Shard::RunCommands() {
+  std::map<SessionId, std::size_t> may_spawn;
+  for (const WorldCommand& command : inbox_) {
+    if (std::holds_alternative<SpawnPart>(command.part)) may_spawn[command.session] = 0;
+  }
+  const auto most = static_cast<std::size_t>(config_.limits.spawns_per_tick);
+  const std::size_t share =
+      std::max<std::size_t>(1, most / std::max<std::size_t>(1, may_spawn.size()));
+  for (auto& [session, count] : may_spawn) count = share;
+
+  std::vector<WorldCommand> waiting;
+  std::set<SessionId> waits;
+  for (WorldCommand& command : inbox_) {
+    // A ground has a tick of its own.
+    if (waits.contains(command.session) && !std::holds_alternative<GroundPart>(command.part)) {
+      waiting.push_back(std::move(command));
+      continue;
+    }
+    std::vector<SpawnPart::Item> rest;
+    auto* spawn = std::get_if<SpawnPart>(&command.part);
+    if (spawn != nullptr) {
+      std::size_t& left = may_spawn[command.session];
+      if (spawn->items.size() > left) {
+        const auto first = spawn->items.begin() + static_cast<std::ptrdiff_t>(left);
+        rest.assign(first, spawn->items.end());
+        spawn->items.erase(first, spawn->items.end());
+      }
+      left -= spawn->items.size();
+    }
+    CommandResult result = WorldOf(command.world).Execute(command, tick_);
+    if (const auto begun = spawning_.find(command.session);
+        spawn != nullptr && begun != spawning_.end()) {
+      result.accepted += begun->second.accepted;
+      result.items.insert(result.items.begin(),
+                          std::make_move_iterator(begun->second.items.begin()),
+                          std::make_move_iterator(begun->second.items.end()));
+      spawning_.erase(begun);
+    } else if (!rest.empty()) {
+      metrics_.Reached(Limit::kSpawnsPerTick, rest.size());
+    }
+    if (!rest.empty()) {
+      spawn->items = std::move(rest);
+      spawning_[command.session] = std::move(result);
+      waits.insert(command.session);
+      waiting.push_back(std::move(command));
+    } else if (command.seq != 0) {
+      outgoing_[static_cast<std::size_t>(command.from_shard)].results.push_back(std::move(result));
+    }
+  }
+  inbox_ = std::move(waiting);
 }
 
 void Shard::AnswerQuestions() {

@@ -98,6 +98,7 @@ class Shard : public SessionHost {
 
   void ScheduleTick();
   void Tick();
+  void RunCommands();
   void AnswerQuestions();
   void Publish();
   void Receive(TickMail&& mail);
@@ -126,6 +127,8 @@ class Shard : public SessionHost {
 
   std::uint64_t tick_ = 0;
   std::vector<WorldCommand> inbox_;
+  std::map<SessionId, CommandResult>
+      spawning_;  // what has come of spawns that go on in the next tick
   std::vector<Inspection> questions_;
   std::vector<StatesQuestion> states_questions_;
   std::map<WorldId, std::unique_ptr<WorldShard>> worlds_;

@@ -197,6 +197,50 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
   EXPECT_EQ(held(), expected);
 }
 
+TEST(ServerWorld, MakesACrowdOverSomeTicks) {
+  constexpr AvatarNumber kCrowd = 60;
+  server::Config config = TestConfig(2);
+  config.limits.spawns_per_tick = 4;
+  TestServer server(config);
+  auto [crowd, world] = server.Enter("crowd");
+  auto [other, same_world] = server.Enter("other");
+  std::vector<protocol::SpawnItem> spawns;
+  for (AvatarNumber avatar = 1; avatar <= kCrowd; ++avatar)
+    spawns.push_back({avatar, Start(avatar)});
+  spawns.push_back({7, Start(7)});  // lives already
+  const protocol::Seq spawn_seq = crowd.NextSeq();
+  crowd.Send(protocol::Spawn{.seq = spawn_seq, .world = world->world, .items = spawns});
+  // What is sent behind it is done behind it.
+  const protocol::Seq ask_seq = crowd.NextSeq();
+  crowd.Send(protocol::Request{
+      .seq = ask_seq,
+      .world = world->world,
+      .items = {{.avatar = kCrowd, .request_id = 1, .movement = protocol::StepMovement{}}}});
+  const auto other_reply = other.Spawn(same_world->world, {{1000, Start(1)}});
+  ASSERT_TRUE(other_reply);
+  EXPECT_EQ(other_reply->accepted, 1u);
+  std::vector<Reply> replies;
+  while (replies.size() < 2) {
+    const auto message = crowd.Receive();
+    ASSERT_TRUE(message);
+    if (const auto* reply = std::get_if<Reply>(&*message)) replies.push_back(*reply);
+  }
+  // The shard of the avatar asked may be done a tick before the other one.
+  if (replies[0].seq == ask_seq) std::swap(replies[0], replies[1]);
+  EXPECT_EQ(replies[0].seq, spawn_seq);
+  EXPECT_EQ(replies[0].accepted, kCrowd);
+  ASSERT_EQ(replies[0].items.size(), spawns.size());
+  for (std::uint32_t i = 0; i < spawns.size(); ++i) {
+    EXPECT_EQ(replies[0].items[i].index, i);
+    EXPECT_EQ(replies[0].items[i].code, i < kCrowd ? StatusCode::kOk : StatusCode::kAvatarExists);
+  }
+  EXPECT_EQ(replies[1].seq, ask_seq);
+  EXPECT_EQ(replies[1].accepted, 1u);
+  // All but those of each shard's first tick, which the other client may have had a share of.
+  EXPECT_GE(server.metrics().Sum(Limit::kSpawnsPerTick), kCrowd + 1 - 2 * 4);
+  EXPECT_LE(server.metrics().Sum(Limit::kSpawnsPerTick), kCrowd + 1 - 2 * 2);
+}
+
 TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
   constexpr int kAvatars = 6;
   const PoseStreams one = PlayOnServer(1, kAvatars, PoseMode::kFull);
