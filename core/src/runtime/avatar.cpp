@@ -46,7 +46,7 @@ void Avatar::Teleport(const BaseFrame& start) {
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
   closing_steps_ = 0;
   body_.blended_pose = body_.pose;
-  moved_until_s_ = -1.0;
+  moved_until_s_ = quiet_until_s_ = -1.0;
   body_.plants_feet = foot_planting();
   body_.begins_planting = false;
   if (body_.plants_feet) {
@@ -83,6 +83,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
   const double held_until_s = hold_until_s_;
   if (request.takeover != Takeover::kNone) {
     CancelQueue();
+    quiet_until_s_ = -1.0;
     takes_over_ = request.takeover == Takeover::kNow && is_moving_ &&
                   !std::holds_alternative<StandRequest>(request.movement);
     if (is_in_stand_) stand_left_s_ = 0.0;
@@ -108,6 +109,7 @@ Status Avatar::SetLayer(const LayerRequest& request) {
   if (Status status = body_.layers.Set(*body_.library, request); !status) return status;
   body_.layered_pose.rotations.resize(body_.pose.rotations.size());
   next_change_.has_layers = true;
+  quiet_until_s_ = -1.0;
   return {};
 }
 
@@ -142,7 +144,6 @@ FootState Avatar::MeasureFeet() const {
 
 void Avatar::Advance(double dt_s) {
   AdvanceState(dt_s);
-  body_.layers.Advance(*body_.library, dt_s);
   ShowPose();
 }
 
@@ -154,9 +155,11 @@ void Avatar::ShowPose() {
 void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s) {
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
-    if (i + kAhead < avatars.size()) avatars[i + kAhead]->PrefetchState();
+    if (i + 2 * kAhead < avatars.size()) avatars[i + 2 * kAhead]->PrefetchQuiet();
+    if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysQuiet(dt_s)) {
+      avatars[i + kAhead]->PrefetchState();
+    }
     avatars[i]->AdvanceState(dt_s);
-    avatars[i]->body_.layers.Advance(*avatars[i]->body_.library, dt_s);
   }
 }
 
@@ -181,15 +184,11 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
   ShowPoses(avatars, evaluator);
 }
 
-void Avatar::PrefetchCourse() const {
-  PrefetchBytes(&course_, sizeof(course_));
-  PrefetchBytes(&is_moving_, sizeof(is_moving_));
-  PrefetchBytes(&body_.layers, 1);
-}
-
-// What AdvanceState reads of an avatar that goes on walking.
+// What AdvanceEventfully reads of an avatar that goes on walking.
 void Avatar::PrefetchState() const {
-  PrefetchBytes(&time_s_, 2 * kCacheLineBytes);
+  PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
+  PrefetchBytes(&events_, sizeof(events_));
+  PrefetchBytes(&body_.layers, sizeof(body_.layers));
   PrefetchBytes(&body_.movement, kCacheLineBytes);
   PrefetchBytes(&body_.movement.warp, 2 * kCacheLineBytes);
   PrefetchBytes(&body_.movement.feet.is_active, 1);
@@ -198,6 +197,27 @@ void Avatar::PrefetchState() const {
 // All of Advance but the pose at its end.
 void Avatar::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
+  if (StaysQuiet(dt_s)) {
+    movement_time_s_ += dt_s;
+    time_s_ += dt_s;
+    return;
+  }
+  AdvanceEventfully(dt_s);
+  body_.layers.Advance(*body_.library, dt_s);
+  quiet_until_s_ = QuietUntil();
+}
+
+// From an Advance on in which nothing happened.
+double Avatar::QuietUntil() const {
+  const bool is_quiet = is_moving_ && !takes_over_ && body_.layers.empty() && events_.empty() &&
+                        change_ == AvatarChange{};
+  if (!is_quiet) return -1.0;
+  const double strike_s = StrikeTime();
+  return movement_time_s_ < strike_s ? std::min(strike_s, body_.movement.duration_s())
+                                     : body_.movement.duration_s();
+}
+
+void Avatar::AdvanceEventfully(double dt_s) {
   events_.clear();
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
@@ -519,10 +539,14 @@ Vec3 Avatar::LandingBall(Foot foot) const {
   return Vec3(print.x, print.y + body_.library->leg_rig().side(foot).ball_height_m, print.z);
 }
 
+double Avatar::StrikeTime() const {
+  return body_.movement.warp.keytime_s(
+      ContactKeytimesOf(group().kind, group().interval_count()).landing);
+}
+
 void Avatar::ReportFootStrikes(double before_s, double after_s) {
   const MotionGroup& moving = group();
-  const double strike_s = body_.movement.warp.keytime_s(
-      ContactKeytimesOf(moving.kind, moving.interval_count()).landing);
+  const double strike_s = StrikeTime();
   if (!(before_s < strike_s && strike_s <= after_s)) return;
   if (!body_.movement.feet.is_active) body_.Evaluate(strike_s);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

@@ -299,14 +299,14 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
     --more_steps_;
     if (movements_wanted_) TellMovements();
     const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
+    if (!events_wanted_) continue;
     for (const auto& [number, entry] : in_order) {
-      entry->time_s += step_s;
-      if (!events_wanted_) continue;
+      if (entry->avatar.is_quiet()) continue;
       for (const AvatarEvent& happened : entry->avatar.events()) {
         protocol::Event& event = events_.emplace_back(ToWire(happened, *world_->library));
         event.avatar = number;
         event.tick = step_tick;
-        event.time_s = clock_.TickTime(step_tick) - (entry->time_s - happened.time_s);
+        event.time_s = clock_.TickTime(step_tick) - (entry->avatar.time_s() - happened.time_s);
       }
     }
   }
@@ -418,6 +418,7 @@ void WorldShard::TellMovements() {
   for (const AvatarNumber number : gone_) add(number, protocol::kMovementGone);
   gone_.clear();
   for (const auto& [number, entry] : in_order) {
+    if (entry->avatar.is_quiet()) continue;
     if (!AppendChange(entry->avatar, movements_.back().records)) continue;
     const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().is_any;
     add(number, is_new ? protocol::kPoseDiscontinuity : 0);
@@ -500,7 +501,7 @@ protocol::AvatarState WorldShard::Inspect(AvatarNumber avatar, std::uint64_t tic
     const Entry& entry = it->second;
     state = server::Inspect(entry.avatar, max_site_bytes);
     if (state.movement) {
-      state.movement->started_s += clock_.TickTime(tick) - entry.time_s;
+      state.movement->started_s += clock_.TickTime(tick) - entry.avatar.time_s();
     }
     for (protocol::RequestItem& item : state.queue) item.avatar = avatar;
   }
@@ -554,7 +555,7 @@ void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
   ahead_.Begin(step_, clock_.tick_s(), rows.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (i + kAhead < rows.size()) {
-      in_order[rows[i + kAhead]].entry->avatar.PrefetchCourse();
+      Prefetch(*in_order[rows[i + kAhead]].entry);
     }
     Entry& entry = *in_order[rows[i]].entry;
     ahead_.Ask(entry.ahead, entry.avatar);
@@ -643,7 +644,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const Entry& entry = *in_order[wanted[i]].entry;
-    if (i + kAhead < wanted.size()) in_order[wanted[i + kAhead]].entry->avatar.PrefetchCourse();
+    if (i + kAhead < wanted.size()) Prefetch(*in_order[wanted[i + kAhead]].entry);
     std::uint8_t flags = 0;
     // Long enough to stand in a batch of the observer who takes the fewest.
     if (tick < entry.spawn_tick + max_every_) flags |= protocol::kPoseDiscontinuity;
