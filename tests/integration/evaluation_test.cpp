@@ -11,6 +11,7 @@
 
 #include "captured_library.h"
 #include "drawn_requests.h"
+#include "foot_sampler.h"
 #include "instruction_sets.h"
 #include "pose_kernels.h"
 #include "random.h"
@@ -75,6 +76,70 @@ Quat DrawRotation(Random& random, double largest_rad) {
 double AngleBetween(const DQuat& a, const DQuat& b) {
   const DQuat turn = glm::conjugate(a) * b;
   return 2.0 * std::atan2(glm::length(DVec3(turn.x, turn.y, turn.z)), std::fabs(turn.w));
+}
+
+// What planning looks at side by side is what poses evaluated one by one have.
+TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
+  constexpr unsigned kSeed = 20261126;
+  const Library library = OpenLibrary("builtin").value();
+  const LegRig& rig = library->leg_rig();
+  Random random(kSeed);
+  Pose pose(library->skeleton().joint_count());
+  Pose scratch = pose;
+  int sampled = 0;
+  for (int walk = 0; walk < 40; ++walk) {
+    Avatar avatar(library, {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
+                            random.Draw(-4.0, 4.0)});
+    for (int step = 0; step < 6; ++step) {
+      const bool jumps = random.Draw(0.0, 1.0) < 0.2;
+      MovementRequest request;
+      if (jumps) {
+        request.movement = JumpRequest{.length_m = random.Draw(0.3, 1.5)};
+      } else {
+        request.movement =
+            StepRequest{.length_m = random.Draw(0.0, 0.7), .turn_rad = random.Draw(-0.5, 0.5)};
+      }
+      ASSERT_TRUE(avatar.Enqueue(request));
+    }
+    for (int look = 0; look < 12; ++look) {
+      const auto ticks = static_cast<int>(random.Draw(1.0, 12.0));
+      for (int tick = 0; tick < ticks; ++tick) avatar.Advance(1.0 / 60.0);
+      if (avatar.movement() == nullptr) continue;
+      Movement movement = *avatar.movement();
+      if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);  // no mean
+      std::vector<double> times_s(static_cast<std::size_t>(random.Draw(1.0, 16.99)));
+      for (double& time_s : times_s) {
+        time_s = random.Draw(0.0, random.Draw(0.0, 1.0) < 0.5 ? 0.3 : movement.duration_s() + 0.01);
+      }
+      const auto eased =
+          static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(times_s.size()) + 0.99));
+      for (const std::int64_t set : InstructionSets()) {
+        const OnlyInstructionSet only(set);
+        SCOPED_TRACE(::testing::Message() << "seed " << kSeed << ", walk " << walk << ", look "
+                                          << look << ", " << hwy::TargetName(set));
+        GridCache cache(library->layout());
+        FootSampler sampler(*library, cache, scratch);
+        sampler.Sample(movement, times_s, eased);
+        GridCache own(library->layout());
+        for (std::size_t i = 0; i < times_s.size(); ++i) {
+          (i < eased ? EvaluateMovement : EvaluateBlend)(
+              library->group(movement.group), library->layout(), movement, times_s[i], own, pose);
+          for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+            LegPose leg;
+            EvaluateLeg(library->skeleton(), rig, pose, foot, leg);
+            const BlendedFoot expected = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
+            ASSERT_EQ(sampler.Ball(i, foot), expected.ball_m) << i;
+            const BlendedFoot found = sampler.FootAt(i, foot);
+            ASSERT_EQ(found.ball_m, expected.ball_m) << i;
+            ASSERT_EQ(found.heading_rad, expected.heading_rad) << i;
+            ASSERT_EQ(found.flatness, expected.flatness) << i;
+          }
+        }
+      }
+      ++sampled;
+    }
+  }
+  EXPECT_GT(sampled, 300);
 }
 
 // Of what movements leave of the poses before, the largest are halves of a turn.

@@ -77,8 +77,8 @@ void AvatarBody::JoinTo(const Landing& landing, bool keeps_speed) {
   if (keeps_speed) earlier.emplace(earlier_pose);
   GridCache cache(library->layout());
   if (plants_feet) {
-    PlanFeet(*library, holds, landing, {blended_pose, earlier}, cache, pose, movement);
-    KeepFeetGoing(keeps_speed, cache);
+    KeepFeetGoing(keeps_speed, PlanFeet(*library, holds, landing, {blended_pose, earlier}, cache,
+                                        pose, movement));
     if (begins_planting) SettleFrom(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;
@@ -101,15 +101,11 @@ void AvatarBody::Join(const LandingChoice& choice, bool keeps_speed) {
 }
 
 // The corrections of the movement just planned go on from those before it.
-void AvatarBody::KeepFeetGoing(bool keeps_speed, GridCache& cache) {
-  const auto corrections = [&](double time_s) {
-    EvaluateMovement(group(), library->layout(), movement, time_s, cache, pose);
-    return CorrectFeet(library->skeleton(), library->leg_rig(), movement, time_s, pose);
-  };
+void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
   const double entered_s = movement.entered_s;
-  std::array<FeetCorrection, 2> planned{corrections(entered_s)};
+  std::array<FeetCorrection, 2> planned{CorrectFeet(movement, entered_s, blended[0])};
   if (keeps_speed) {
-    planned[1] = corrections(entered_s + kJoinStepS);
+    planned[1] = CorrectFeet(movement, entered_s + kJoinStepS, blended[1]);
   } else {
     planned[1] = planned[0];
     earlier_feet[1] = earlier_feet[0];

@@ -137,19 +137,26 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
   return correction;
 }
 
-FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
-                           double time_s, ConstPoseSpan pose) {
+FeetCorrection CorrectFeet(const Movement& movement, double time_s, const FeetAt& blended) {
   FeetCorrection corrections;
-  LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    EvaluateLeg(skeleton, rig, pose, foot, leg);
-    FootCorrection& correction = corrections.feet[static_cast<std::size_t>(foot)];
-    correction =
-        CorrectFoot(movement, foot, time_s, FootOf(rig, foot, DVec3(pose.root_position_m), leg));
-    corrections.root_m += RootShare(correction);
+    const auto f = static_cast<std::size_t>(foot);
+    corrections.feet[f] = CorrectFoot(movement, foot, time_s, blended[f]);
+    corrections.root_m += RootShare(corrections.feet[f]);
   }
   corrections.root_m += RootRest(movement, time_s);
   return corrections;
+}
+
+FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
+                           double time_s, ConstPoseSpan pose) {
+  FeetAt blended;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(skeleton, rig, pose, foot, leg);
+    blended[static_cast<std::size_t>(foot)] = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
+  }
+  return CorrectFeet(movement, time_s, blended);
 }
 
 void GoOnFrom(const std::array<FeetCorrection, 2>& before,

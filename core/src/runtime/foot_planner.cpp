@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "foot_sampler.h"
 #include "stridewire/runtime/contact_keytimes.h"
 
 namespace stridewire {
@@ -63,9 +64,8 @@ class Planner {
         group_(library.group(movement.group)),
         cache_(cache),
         pose_(pose),
-        movement_(movement) {}
-
-  using FeetAt = std::array<BlendedFoot, 2>;
+        movement_(movement),
+        sampler_(library, cache, pose) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -76,56 +76,61 @@ class Planner {
     }
     return feet;
   }
-  FeetAt Eased(double time_s) {
-    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
-    return FeetOf(pose_);
+  // Looks at all times of a movement that has its difference that matter for its plan.
+  void Look(const SwingTimes& swing) {
+    const auto around = [&](double time_s, std::size_t before) {
+      times_s_[before] = std::max(0.0, time_s - kVelocityStepS);
+      times_s_[before + 1] = time_s;
+      times_s_[before + 2] = std::min(movement_.duration_s(), time_s + kVelocityStepS);
+    };
+    around(swing.release_s, kRelease - 1);
+    around(swing.land_s, kLanding - 1);
+    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
+      times_s_[kSwing + i] = swing.release_s + kSwingSamples[i] * (swing.land_s - swing.release_s);
+    }
+    times_s_[kEntry] = movement_.entered_s;
+    times_s_[kEntry + 1] = movement_.entered_s + kJoinStepS;
+    times_s_[kBlendedEnd] = movement_.duration_s();
+    sampler_.Sample(movement_, times_s_, kBlendedEnd);
   }
-  // Mostly it is about one foot, or about balls alone: a heading costs more than all the rest.
-  BlendedFoot EasedFoot(double time_s, Foot foot) {
-    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
-    LegPose leg;
-    EvaluateLeg(skeleton_, rig_, pose_, foot, leg);
-    return FootOf(rig_, foot, DVec3(pose_.root_position_m), leg);
+  FeetAt Landing() const {
+    return {sampler_.FootAt(kLanding, Foot::kLeft), sampler_.FootAt(kLanding, Foot::kRight)};
   }
-  DVec3 Ball(Foot foot) const {
-    return DVec3(pose_.root_position_m) + DVec3(BallOfLeg(skeleton_, rig_, pose_, foot));
-  }
-  DVec3 EasedBall(double time_s, Foot foot) {
-    EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
-    return Ball(foot);
+  std::array<FeetAt, 2> Entry() const {
+    std::array<FeetAt, 2> entry;
+    for (std::size_t i = 0; i < 2; ++i) {
+      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+        entry[i][static_cast<std::size_t>(foot)] = sampler_.FootAt(kEntry + i, foot);
+      }
+    }
+    return entry;
   }
   // From one ball to the other where the blend ends.
-  DVec3 EndVector(Foot from, Foot to) {
-    EvaluateBlend(group_, library_.layout(), movement_, movement_.duration_s(), cache_, pose_);
-    return Ball(to) - Ball(from);
+  DVec3 EndVector(Foot from, Foot to) const {
+    return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
   // The base below which the feet that stay stand where they do.
   void HangBase(const FootHolds& holds, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
-    std::array<DVec3, 2> start_m;
-    std::array<double, 2> lowest_m;
-    EvaluateBlend(group_, library_.layout(), movement_, 0.0, cache_, pose_);
-    for (const Foot foot : staying) {
-      const auto f = static_cast<std::size_t>(foot);
-      start_m[f] = Ball(foot);
-      lowest_m[f] = start_m[f].y;
+    std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
+    for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
+      times_s[i + 1] = kStanceSamples[i] * stance_end_s;
     }
-    for (const double part : kStanceSamples) {
-      EvaluateBlend(group_, library_.layout(), movement_, part * stance_end_s, cache_, pose_);
-      for (const Foot foot : staying) {
-        const auto f = static_cast<std::size_t>(foot);
-        lowest_m[f] = std::min(lowest_m[f], Ball(foot).y);
-      }
-    }
+    sampler_.Sample(movement_, times_s, 0);
     DVec3 position(0.0);
     for (const Foot foot : staying) {
       const auto f = static_cast<std::size_t>(foot);
       const DVec3 stands = holds[f].print.position_m;
-      position += DVec3(stands.x - start_m[f].x,
+      const DVec3 start = sampler_.Ball(0, foot);
+      double lowest_m = start.y;
+      for (std::size_t i = 1; i < times_s.size(); ++i) {
+        lowest_m = std::min(lowest_m, sampler_.Ball(i, foot).y);
+      }
+      position += DVec3(stands.x - start.x,
                         stands.y + rig_.sides[f].ball_height_m +
-                            SlopeRise(rig_.sides[f], holds[f].normal) - lowest_m[f],
-                        stands.z - start_m[f].z);
+                            SlopeRise(rig_.sides[f], holds[f].normal) - lowest_m,
+                        stands.z - start.z);
     }
     movement_.base.position_m = position / static_cast<double>(staying.size());
   }
@@ -154,7 +159,7 @@ class Planner {
     const double rise_m = vector.y;
     track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
     double turn_rad = 0.0;
-    const BlendedFoot landing = EasedFoot(track.land_s, moving);
+    const BlendedFoot landing = sampler_.FootAt(kLanding, moving);
     const double landing_rad = landing.heading_rad;
     if (request.exact) {
       DVec3 residual = request.exact->position_m - track.to.position_m;
@@ -201,17 +206,16 @@ class Planner {
 
   // Offsets and their velocities at release and landing, so that the way between is smooth.
   void JoinSwing(Foot foot, const BlendedFoot& landing, FootTrack& track) {
-    const auto velocity_at = [&](double time_s) {
-      const double from_s = std::max(0.0, time_s - kVelocityStepS);
-      const double to_s = std::min(movement_.duration_s(), time_s + kVelocityStepS);
-      return (EasedBall(to_s, foot) - EasedBall(from_s, foot)) / (to_s - from_s);
+    const auto velocity_around = [&](std::size_t time) {
+      const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
+      return way_m / (times_s_[time + 1] - times_s_[time - 1]);
     };
-    track.release_velocity_m_s = -velocity_at(track.release_s);
-    const BlendedFoot released = EasedFoot(track.release_s, foot);
+    track.release_velocity_m_s = -velocity_around(kRelease);
+    const BlendedFoot released = sampler_.FootAt(kRelease, foot);
     track.release_offset_m = track.from.position_m - released.ball_m;
     const FootCorrection at_release = CorrectFoot(movement_, foot, track.release_s, released);
     track.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
-    track.land_velocity_m_s = -velocity_at(track.land_s);
+    track.land_velocity_m_s = -velocity_around(kLanding);
     track.land_offset_m = track.to.position_m - landing.ball_m;
   }
 
@@ -230,9 +234,11 @@ class Planner {
       return 0.0;
     }
     double push_m = 0.0;
-    for (const double part : kSwingSamples) {
-      const double time_s = track.release_s + part * (track.land_s - track.release_s);
-      const BlendedFoot blended{.ball_m = EasedBall(time_s, moving)};  // its heading moves no ball
+    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
+      const double part = kSwingSamples[i];
+      const double time_s = times_s_[kSwing + i];
+      const BlendedFoot blended{
+          .ball_m = sampler_.Ball(kSwing + i, moving)};  // its heading moves no ball
       const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
       const DVec3 apart = vector(ball, part);
       if (std::fabs(apart.z) > kPassingM) continue;
@@ -245,7 +251,8 @@ class Planner {
   // What brings the root above a place by the end of the movement.
   DVec3 RootShift(const DVec3& place_m) {
     const double end_s = movement_.duration_s();
-    const FeetAt feet = Eased(end_s);
+    EvaluateMovement(group_, library_.layout(), movement_, end_s, cache_, pose_);
+    const FeetAt feet = FeetOf(pose_);
     DVec3 shift = place_m - DVec3(pose_.root_position_m);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const FootCorrection correction =
@@ -298,6 +305,16 @@ class Planner {
   GridCache& cache_;
   PoseSpan pose_;
   Movement& movement_;
+  FootSampler sampler_;
+
+  // Times that Look looks at; kRelease and kLanding are between one before and one after them.
+  static constexpr std::size_t kRelease = 1;
+  static constexpr std::size_t kLanding = 4;
+  static constexpr std::size_t kSwing = 6;
+  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();  // and kJoinStepS later
+  static constexpr std::size_t kBlendedEnd = kEntry + 2;  // without what is left of the pose before
+  static_assert(kBlendedEnd < FootSampler::kMost);
+  std::array<double, kBlendedEnd + 1> times_s_;
 };
 
 }  // namespace
@@ -359,9 +376,10 @@ namespace {
 
 // A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
 // so that whoever is told what was chosen has the same plan.
-void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWish* wish,
-          const LandingChoice& chosen, const JoinFrom& join, GridCache& cache, PoseSpan pose,
-          Movement& movement) {
+std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
+                           const LandingWish* wish, const LandingChoice& chosen,
+                           const JoinFrom& join, GridCache& cache, PoseSpan pose,
+                           Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
   Planner planner(library, cache, pose, movement);
   const bool is_step = IsStep(group.kind);
@@ -387,13 +405,14 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
 
   // D = P - M, with P what was before.
   EvaluateBlend(group, library.layout(), movement, movement.entered_s, cache, movement.difference);
-  const Planner::FeetAt start = planner.FeetOf(movement.difference);
-  const Planner::FeetAt was = planner.FeetOf(join.before);
+  const FeetAt start = planner.FeetOf(movement.difference);
+  const FeetAt was = planner.FeetOf(join.before);
   Subtract(join.before, movement.difference, movement.difference);
   if (join.earlier) {
     SetDifferenceVelocity(group, library.layout(), join.before, *join.earlier, cache, pose,
                           movement);
   }
+  planner.Look(times);
 
   FootPlan& plan = movement.feet;
   plan = {};
@@ -424,7 +443,7 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
     FootTrack& track = plan.feet[m];
     BlendedFoot landing;
     if (wish == nullptr) {
-      landing = planner.EasedFoot(times.land_s, moving);
+      landing = planner.Landing()[m];
       track.to.position_m = chosen.to_m[m];
       track.to.heading_rad = landing.heading_rad + chosen.turn_rad;
       track.turn_rad[2] = chosen.turn_rad;
@@ -438,7 +457,7 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
       track.lift_m = chosen.lift_m;
       track.aside_m = chosen.aside_m;
       track.root_shift_m = chosen.root_shift_m;
-      return;
+      return planner.Entry();
     }
     const double push_m = planner.PushAside(moving);
     if (wish->terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish->terrain);
@@ -447,12 +466,12 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
                                 DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
     }
     if (wish->request.root_m) track.root_shift_m = planner.RootShift(*wish->request.root_m);
-    return;
+    return planner.Entry();
   }
 
   std::array<DVec3, 2> to_m = chosen.to_m;
   if (wish != nullptr) to_m = planner.ChooseJumpLanding(holds, wish->request);
-  const Planner::FeetAt landing = planner.Eased(times.land_s);
+  const FeetAt landing = planner.Landing();
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
     FootTrack& track = plan.feet[f];
@@ -462,18 +481,21 @@ void Plan(const MotionLibrary& library, const FootHolds& holds, const LandingWis
     track.height_m[2] = 0.0;
     planner.JoinSwing(foot, landing[f], track);
   }
+  return planner.Entry();
 }
 
 }  // namespace
 
-void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
-              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
-  Plan(library, holds, &wish, {}, join, cache, pose, movement);
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+                               const LandingWish& wish, const JoinFrom& join, GridCache& cache,
+                               PoseSpan pose, Movement& movement) {
+  return Plan(library, holds, &wish, {}, join, cache, pose, movement);
 }
 
-void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingChoice& choice,
-              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement) {
-  Plan(library, holds, nullptr, choice, join, cache, pose, movement);
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+                               const LandingChoice& choice, const JoinFrom& join, GridCache& cache,
+                               PoseSpan pose, Movement& movement) {
+  return Plan(library, holds, nullptr, choice, join, cache, pose, movement);
 }
 
 LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {

@@ -100,8 +100,10 @@ HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[1], std::size_t{1});
 }
 
-HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, Quat4 root,
-                             LegLanes* legs) {
+// `joints`: those that `rotations` has.
+HWY_INLINE void EvaluateLegs(
+    const LegRig& rig, const float* rotations, Quat4 root, LegLanes* legs,
+    const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
   std::size_t longest = 0;
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     legs[f].positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
@@ -115,13 +117,30 @@ HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, Quat4 ro
       leg.positions[i] =
           leg.positions[i - 1] + Rotate(leg.rotations[i - 1], Same(bones.offsets_m[i]));
       leg.rotations[i] =
-          Multiply(leg.rotations[i - 1], LoadQuat(rotations + bones.joints[i] * 4 * kBlock));
+          Multiply(leg.rotations[i - 1], LoadQuat(rotations + (bones.*joints)[i] * 4 * kBlock));
     });
   }
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const std::size_t last = bones.count - 1;
     legs[f].ball = legs[f].positions[last] + Rotate(legs[f].rotations[last], Same(bones.ball_m));
   });
+}
+
+void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+              float* ankles_m) {
+  for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
+    LegLanes legs[2];
+    EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs, &LegRig::Bones::among);
+    ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+      const auto put = [&](Vec3x v, float* to) HWY_ATTR {
+        StoreLanes(v.x, to);
+        StoreLanes(v.y, to + kBlock);
+        StoreLanes(v.z, to + 2 * kBlock);
+      };
+      put(legs[f].ball, balls_m + f * 3 * kBlock + lane);
+      put(legs[f].positions[bones.ankle], ankles_m + f * 3 * kBlock + lane);
+    });
+  }
 }
 
 struct Correction {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "foot_plant_constants.h"
 #include "stridewire/base/trig.h"
@@ -40,11 +41,18 @@ void Copy(const Vec3& from, float (&to)[3]) {
   to[2] = from.z;
 }
 
-LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& side) {
+std::vector<int> Sorted(std::vector<int> joints) {
+  std::ranges::sort(joints);
+  return joints;
+}
+
+LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& side,
+                      const std::vector<int>& joints) {
   LegRig::Bones bones;
   bones.count = side.chain.size();
   for (std::size_t i = 0; i < bones.count; ++i) {
     bones.joints[i] = static_cast<std::size_t>(side.chain[i]);
+    bones.among[i] = static_cast<std::size_t>(PlaceOf(joints, side.chain[i]));
     Copy(skeleton.joints[bones.joints[i]].offset_m, bones.offsets_m[i]);
   }
   bones.hip = static_cast<std::size_t>(side.hip);
@@ -107,8 +115,11 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
                   Vec3(behind.x, sole.y, behind.z);
   }
   if (rig.is_usable) {
+    std::ranges::set_union(Sorted(rig.sides[0].chain), Sorted(rig.sides[1].chain),
+                           std::back_inserter(rig.joints));
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      rig.bones[static_cast<std::size_t>(foot)] = BonesOf(skeleton, foot, rig.side(foot));
+      rig.bones[static_cast<std::size_t>(foot)] =
+          BonesOf(skeleton, foot, rig.side(foot), rig.joints);
     }
   }
   return rig;

@@ -276,6 +276,7 @@ HWY_EXPORT(Transpose);
 HWY_EXPORT(PrepareEase);
 HWY_EXPORT(FindFastest);
 HWY_EXPORT(FinishLanes);
+HWY_EXPORT(FindFeet);
 HWY_EXPORT(PlantLanes);
 HWY_EXPORT(PlantOne);
 
@@ -318,6 +319,11 @@ void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lan
 
 bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
   return HWY_DYNAMIC_DISPATCH(FinishLanes)(blend, root_m, rotations);
+}
+
+void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+              float* ankles_m) {
+  HWY_DYNAMIC_DISPATCH(FindFeet)(rig, rotations, lanes, balls_m, ankles_m);
 }
 
 void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {

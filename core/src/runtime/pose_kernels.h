@@ -124,6 +124,11 @@ struct LaneBlend {
 /// kSmallestNorm (BlendRotations).
 [[nodiscard]] bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations);
 
+/// Balls and ankles of both legs, relative to the root and in world axes: [foot][x y z][kBlock] each. `rotations` as of
+/// FinishLanes, of LegRig::joints alone. `rig` is usable.
+void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+              float* ankles_m);
+
 /// A block of poses whose feet are planted, in place.
 struct PlantBlock {
   const float* plan;     ///< [number of PackedFootPlan][kBlock]

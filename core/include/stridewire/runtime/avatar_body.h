@@ -61,7 +61,7 @@ struct AvatarBody {
   void ShowLayers();
 
  private:
-  void KeepFeetGoing(bool keeps_speed, GridCache& cache);
+  void KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended);
   template <typename Landing>
   void JoinTo(const Landing& landing, bool keeps_speed);
 };

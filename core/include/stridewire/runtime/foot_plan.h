@@ -100,6 +100,9 @@ struct BlendedFoot {
   double flatness = 1.0;      ///< LegPose::Flatness
 };
 
+/// Of both feet at a time, indexed by Foot.
+using FeetAt = std::array<BlendedFoot, 2>;
+
 /// Corrections of one foot at a time.
 struct FootCorrection {
   DVec3 offset_m = DVec3(0.0);
@@ -125,6 +128,8 @@ struct FeetCorrection {
   std::array<FootCorrection, 2> feet;  ///< Indexed by Foot.
   DVec3 root_m = DVec3(0.0);           ///< Added to the root, before legs too short lower it
 };
+[[nodiscard]] FeetCorrection CorrectFeet(const Movement& movement, double time_s,
+                                         const FeetAt& blended);
 [[nodiscard]] FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig,
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);

@@ -55,9 +55,11 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// foot that stays (for a jump: the middle of both) is where it stands and nothing drifts; its
 /// difference pose; and `movement.feet`.
 ///
-/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates.
-void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingWish& wish,
-              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement);
+/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
+/// where the blended and eased pose has the feet when the movement is entered, and kJoinStepS later.
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+                               const LandingWish& wish, const JoinFrom& join, GridCache& cache,
+                               PoseSpan pose, Movement& movement);
 
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
 /// needed to make it again.
@@ -79,8 +81,9 @@ struct LandingChoice {
 
 /// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
 /// change is not needed.
-void PlanFeet(const MotionLibrary& library, const FootHolds& holds, const LandingChoice& choice,
-              const JoinFrom& join, GridCache& cache, PoseSpan pose, Movement& movement);
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+                               const LandingChoice& choice, const JoinFrom& join, GridCache& cache,
+                               PoseSpan pose, Movement& movement);
 
 /// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
 [[nodiscard]] FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement,

@@ -30,6 +30,7 @@ struct LegRig {
   struct Bones {
     std::size_t count = 0;               ///< Joints of the chain
     std::size_t joints[kMaxLegChain]{};  ///< [place in chain]
+    std::size_t among[kMaxLegChain]{};   ///< The same, as places in LegRig::joints
     float offsets_m[kMaxLegChain][3]{};  ///< [place in chain]: in the frame of the one before
     std::size_t hip = 0;                 ///< Places in the chain
     std::size_t knee = 0;
@@ -47,6 +48,8 @@ struct LegRig {
 
   std::array<Side, 2> sides;   ///< Indexed by Foot.
   std::array<Bones, 2> bones;  ///< Indexed by Foot; of a usable rig.
+  static constexpr std::size_t kMaxJointsOfLegs = 2 * kMaxLegChain - 1;
+  std::vector<int> joints;  ///< Of both chains, growing: the root is the first. Of a usable rig.
   /// Whether each leg is a chain hip, knee, ankle, ball with lengths to bend. If not, feet are not planted.
   bool is_usable = false;
 
