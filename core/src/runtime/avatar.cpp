@@ -152,7 +152,9 @@ void Avatar::ShowPose() {
   body_.ShowLayers();
 }
 
-void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s) {
+void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
+                           std::vector<std::uint32_t>* eventful) {
+  if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
     if (i + 2 * kAhead < avatars.size()) avatars[i + 2 * kAhead]->PrefetchQuiet();
@@ -160,6 +162,9 @@ void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s) {
       avatars[i + kAhead]->PrefetchState();
     }
     avatars[i]->AdvanceState(dt_s);
+    if (eventful != nullptr && !avatars[i]->is_quiet()) {
+      eventful->push_back(static_cast<std::uint32_t>(i));
+    }
   }
 }
 

@@ -294,14 +294,14 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
-    Avatar::AdvanceStates(advancing_, step_s);
+    Avatar::AdvanceStates(advancing_, step_s, &eventful_);
     ++step_;
     --more_steps_;
     if (movements_wanted_) TellMovements();
     const std::uint64_t step_tick = tick - static_cast<std::uint64_t>(steps - step);
     if (!events_wanted_) continue;
-    for (const auto& [number, entry] : in_order) {
-      if (entry->avatar.is_quiet()) continue;
+    for (const std::uint32_t row : eventful_) {
+      const auto& [number, entry] = in_order[row];
       for (const AvatarEvent& happened : entry->avatar.events()) {
         protocol::Event& event = events_.emplace_back(ToWire(happened, *world_->library));
         event.avatar = number;
@@ -375,7 +375,9 @@ bool WorldShard::HasInterest() const {
 
 std::shared_ptr<const std::vector<protocol::Event>> WorldShard::TakeEvents() {
   if (events_.empty()) return nullptr;
-  return std::make_shared<const std::vector<protocol::Event>>(std::exchange(events_, {}));
+  auto events = std::make_shared<const std::vector<protocol::Event>>(std::exchange(events_, {}));
+  events_.reserve(events->size());  // the next tick has about as many
+  return events;
 }
 
 void WorldShard::Gone(AvatarNumber avatar) {
@@ -417,8 +419,8 @@ void WorldShard::TellMovements() {
   };
   for (const AvatarNumber number : gone_) add(number, protocol::kMovementGone);
   gone_.clear();
-  for (const auto& [number, entry] : in_order) {
-    if (entry->avatar.is_quiet()) continue;
+  for (const std::uint32_t row : eventful_) {
+    const auto& [number, entry] = in_order[row];
     if (!AppendChange(entry->avatar, movements_.back().records)) continue;
     const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().is_any;
     add(number, is_new ? protocol::kPoseDiscontinuity : 0);

@@ -133,6 +133,8 @@ class WorldShard {
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
   std::vector<Avatar*> advancing_;
+  std::vector<std::uint32_t>
+      eventful_;  // rows to which something may have happened in the last step
   protocol::PoseRows::Avatars numbers_;
   std::vector<std::uint32_t> all_rows_;
   bool is_order_known_ = false;

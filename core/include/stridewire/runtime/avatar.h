@@ -148,8 +148,9 @@ class Avatar {
                          StretchEvaluator& evaluator);
 
   /// AdvanceAll but for the poses, for who has them evaluated otherwise (PoseStretch): pose() is none of now until
-  /// ShowPose.
-  static void AdvanceStates(std::span<Avatar* const> avatars, double dt_s);
+  /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
+  static void AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
+                            std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
   void ShowPose();
   /// The same for many avatars of one library together.
