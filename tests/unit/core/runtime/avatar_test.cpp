@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stridewire/offline/library_builder.h"
+#include "stridewire/offline/open_library.h"
 #include "stridewire/runtime/foot_vector.h"
 #include "toy_library.h"
 
@@ -272,6 +273,56 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
   for (int i = 0; i < 200; ++i) avatar.Advance(kTickS);
   EXPECT_TRUE(avatar.idle());
   EXPECT_GT(avatar.pose().root_position_m.z, 0.1f);
+}
+
+// Quiet is who goes on walking: what ends that is told at once, what happens never while it lasts.
+TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
+  const auto library = OpenLibrary("builtin").value();
+  Avatar avatar(library, {});
+  EXPECT_FALSE(avatar.is_quiet());
+  for (int i = 0; i < 4; ++i)
+    ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{.length_m = 0.5}}));
+  int quiet = 0;
+  int eventful = 0;
+  const auto advance = [&] {
+    Avatar* const one = &avatar;
+    std::vector<std::uint32_t> places{7};
+    const std::uint64_t course = avatar.course();
+    const double time_s = avatar.time_s();
+    Avatar::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
+    EXPECT_EQ(avatar.time_s(), time_s + 1.0 / 60.0);
+    EXPECT_EQ(places.empty(), avatar.is_quiet());
+    if (!avatar.is_quiet()) {
+      eventful += !avatar.events().empty();
+      return;
+    }
+    ++quiet;
+    EXPECT_TRUE(avatar.events().empty());
+    EXPECT_EQ(avatar.change(), AvatarChange{});
+    EXPECT_EQ(avatar.course(), course);
+    EXPECT_NE(avatar.movement(), nullptr);
+    EXPECT_TRUE(avatar.layers().empty());
+    EXPECT_FALSE(avatar.idle());
+  };
+  const auto walk_on = [&] {
+    for (int tick = 0; tick < 60 && !avatar.is_quiet(); ++tick) advance();
+    EXPECT_TRUE(avatar.is_quiet());
+  };
+  for (int tick = 0; tick < 100; ++tick) advance();
+  EXPECT_GT(quiet, 60);
+  EXPECT_GE(eventful, 4);  // two steps started, two feet struck
+
+  walk_on();
+  ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}, .takeover = Takeover::kNow}));
+  EXPECT_FALSE(avatar.is_quiet());
+  ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}}));
+  walk_on();
+  ASSERT_TRUE(avatar.SetLayer({.layer = 0}));
+  EXPECT_FALSE(avatar.is_quiet());
+  advance();
+  EXPECT_FALSE(avatar.is_quiet());
+  avatar.Teleport({});
+  EXPECT_FALSE(avatar.is_quiet());
 }
 
 }  // namespace
