@@ -192,7 +192,7 @@ void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
 // What AdvanceEventfully reads of an avatar that goes on walking.
 void Avatar::PrefetchState() const {
   PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
-  PrefetchBytes(&events_, sizeof(events_));
+  PrefetchBytes(&events_, 1);
   PrefetchBytes(&body_.layers, sizeof(body_.layers));
   PrefetchBytes(&body_.movement, kCacheLineBytes);
   PrefetchBytes(&body_.movement.warp, 2 * kCacheLineBytes);

@@ -245,8 +245,7 @@ class Avatar {
   // All that an uneventful tick asks, in one cache line.
   alignas(kCacheLineBytes) double time_s_ = 0.0;  // avatar time
   double movement_time_s_ = 0.0;
-  double quiet_until_s_ =
-      -1.0;  // movement time before which nothing happens; less than it is: not known
+  double quiet_until_s_ = -1.0;  // movement time; until then nothing happens
   std::uint64_t course_ = 0;
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
