@@ -154,10 +154,10 @@ void Shard::RunCommands() {
     CommandResult result = WorldOf(command.world).Execute(command, tick_);
     if (const auto begun = spawning_.find(command.session);
         spawn != nullptr && begun != spawning_.end()) {
-      result.accepted += begun->second.accepted;
-      result.items.insert(result.items.begin(),
-                          std::make_move_iterator(begun->second.items.begin()),
-                          std::make_move_iterator(begun->second.items.end()));
+      CommandResult all = std::move(begun->second);
+      all.accepted += result.accepted;
+      std::ranges::move(result.items, std::back_inserter(all.items));
+      result = std::move(all);
       spawning_.erase(begun);
     } else if (!rest.empty()) {
       metrics_.Reached(Limit::kSpawnsPerTick, rest.size());
