@@ -38,14 +38,8 @@ void FindPlaces(const MotionGroup& group, const Movement& movement, std::span<co
                 Lanes& lanes) {
   kernels::GridTimes& t = lanes.times;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const TimeWarp::Piece piece = movement.warp.PieceAt(times_s[i]);
     t.time_s[i] = times_s[i];
-    t.begin_s[i] = piece.begin_s;
-    t.end_s[i] = piece.end_s;
-    t.begin[i] = piece.begin;
-    t.end[i] = piece.end;
-    t.begin_slope[i] = piece.begin_slope;
-    t.end_slope[i] = piece.end_slope;
+    SetPiece(movement.warp.PieceAt(times_s[i]), i, t);
   }
   Fill<double>(t.last_cell, group.grid_point_count - 2);
   Fill(t.duration_s, movement.warp.duration_s());

@@ -19,6 +19,16 @@ struct GridPlace {
   return std::min(place.first_point + k, group.grid_point_count - 1);
 }
 
+/// The piece of a movement's warp that a lane's time is in.
+inline void SetPiece(const TimeWarp::Piece& piece, std::size_t lane, kernels::GridTimes& times) {
+  times.begin_s[lane] = piece.begin_s;
+  times.end_s[lane] = piece.end_s;
+  times.begin[lane] = piece.begin;
+  times.end[lane] = piece.end;
+  times.begin_slope[lane] = piece.begin_slope;
+  times.end_slope[lane] = piece.end_slope;
+}
+
 /// row = the blended row there. Its rotations are not unit.
 inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                      const GridPlace& place, GridCache& cache, float* row) {

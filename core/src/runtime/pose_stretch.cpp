@@ -122,13 +122,7 @@ struct StretchEvaluator::Work {
 void StretchEvaluator::Work::FindPlaces() {
   kernels::GridTimes& t = grid_times;
   const auto take_piece = [&](std::size_t i) {
-    const TimeWarp::Piece piece = movement(i).warp.PieceAt(t.time_s[i]);
-    t.begin_s[i] = piece.begin_s;
-    t.end_s[i] = piece.end_s;
-    t.begin[i] = piece.begin;
-    t.end[i] = piece.end;
-    t.begin_slope[i] = piece.begin_slope;
-    t.end_slope[i] = piece.end_slope;
+    SetPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
   };
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
