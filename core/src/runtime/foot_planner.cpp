@@ -93,18 +93,11 @@ class Planner {
     times_s_[kBlendedEnd] = movement_.duration_s();
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
   }
-  FeetAt Landing() const {
-    return {sampler_.FootAt(kLanding, Foot::kLeft), sampler_.FootAt(kLanding, Foot::kRight)};
+  FeetAt LookedAt(std::size_t time) const {
+    return {sampler_.FootAt(time, Foot::kLeft), sampler_.FootAt(time, Foot::kRight)};
   }
-  std::array<FeetAt, 2> Entry() const {
-    std::array<FeetAt, 2> entry;
-    for (std::size_t i = 0; i < 2; ++i) {
-      for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-        entry[i][static_cast<std::size_t>(foot)] = sampler_.FootAt(kEntry + i, foot);
-      }
-    }
-    return entry;
-  }
+  FeetAt Landing() const { return LookedAt(kLanding); }
+  std::array<FeetAt, 2> Entry() const { return {LookedAt(kEntry), LookedAt(kEntry + 1)}; }
   // From one ball to the other where the blend ends.
   DVec3 EndVector(Foot from, Foot to) const {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);

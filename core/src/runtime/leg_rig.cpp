@@ -155,17 +155,6 @@ void EvaluateLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose
   out.heel_m = out.positions_m[ankle] + out.world_rotations[ankle] * rig.side(foot).heel_m;
 }
 
-Vec3 BallOfLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, Foot foot) {
-  Vec3 position(0.0f);
-  Quat rotation = pose.rotations[0];
-  for (const int joint : std::span(rig.side(foot).chain).subspan(1)) {
-    const auto j = static_cast<std::size_t>(joint);
-    position = position + rotation * skeleton.joints[j].offset_m;
-    rotation = rotation * pose.rotations[j];
-  }
-  return position + rotation * skeleton.leg(foot).ball_offset_m;
-}
-
 void SolveLeg(const LegRig& rig, Foot foot, const LegPose& leg, const Vec3& ankle_m,
               const Quat& ankle_rotation, PoseSpan pose) {
   const LegRig::Side& side = rig.side(foot);

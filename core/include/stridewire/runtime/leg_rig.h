@@ -80,10 +80,6 @@ struct LegPose {
 void EvaluateLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, Foot foot,
                  LegPose& out);
 
-/// The ball alone: LegPose::ball_m of the same.
-[[nodiscard]] Vec3 BallOfLeg(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
-                             Foot foot);
-
 /// Puts the ankle of a leg at `ankle_m` (relative to the root) with world rotation
 /// `ankle_rotation`: two-bone inverse kinematics in the knee plane of `leg`, the pose as it is. The
 /// knee never bends backward. A target beyond `kMaxLegExtension` of the leg is approached as far as
