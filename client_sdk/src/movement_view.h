@@ -64,7 +64,7 @@ class MovementView {
   std::size_t max_avatars_;
   std::map<std::uint16_t, Shard> shards_;
   std::vector<AvatarReplica*> scratch_;
-  StretchEvaluator evaluator_;
+  SoaPoseEvaluator evaluator_;
 };
 
 }  // namespace stridewire::client

@@ -16,7 +16,7 @@
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/pose_code.h"
 #include "stridewire/runtime/reference_evaluation.h"
-#include "stridewire/runtime/stretch_queue.h"
+#include "stridewire/runtime/evaluation_batcher.h"
 #include "world/poses_ahead.h"
 
 namespace stridewire {
@@ -101,8 +101,8 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   };
   std::vector<Ahead> ahead(steps.walkers().size());
   std::vector<const Steps::Walker*> due;
-  StretchEvaluator evaluator(*library, turns);
-  StretchQueue queue;
+  SoaPoseEvaluator evaluator(*library, turns);
+  EvaluationBatcher queue;
   std::uint32_t tick = 0;
   for (auto _ : state) {
     ++tick;
@@ -110,17 +110,17 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
     for (const Steps::Walker& walker : steps.walkers()) {
       Ahead& poses = ahead[walker.number];
       if (poses.course == walker.course && --poses.left > 0) continue;
-      StretchEvaluator::PrefetchTimes(*walker.movement);
+      SoaPoseEvaluator::PrefetchTimes(*walker.movement);
       due.push_back(&walker);
     }
     for (const Steps::Walker* walker : due) {
       const int most = turns - static_cast<int>(tick + walker->number) % turns;
-      const int wanted = StretchCount(*walker->movement, walker->time_s, kTickS, 1, most);
+      const int wanted = SampleRunCount(*walker->movement, walker->time_s, kTickS, 1, most);
       ahead[walker->number] = {walker->course, wanted};
       queue.Add({walker->movement, walker->time_s, kTickS}, wanted, walker->number);
     }
     due.clear();
-    queue.Evaluate(evaluator, [](auto&&, int, const PoseLanes& poses) {
+    queue.Evaluate(evaluator, [](auto&&, int, const SoaPose& poses) {
       benchmark::DoNotOptimize(poses.rotations());
       benchmark::ClobberMemory();
     });
@@ -208,8 +208,8 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   Pose measured(library->skeleton().joint_count());
   std::vector<Movement> movements(kSteps);
   for (Movement& movement : movements) movement.difference = measured;
-  StretchEvaluator evaluator(*library, kFrames);
-  std::array<PoseStretch, kSteps> stretches;
+  SoaPoseEvaluator evaluator(*library, kFrames);
+  std::array<SampleRun, kSteps> stretches;
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {

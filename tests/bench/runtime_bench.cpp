@@ -189,7 +189,7 @@ class Crowd {
   std::mt19937 random_{1};
   std::vector<Avatar> avatars_;
   std::vector<Avatar*> all_;
-  StretchEvaluator evaluator_;
+  SoaPoseEvaluator evaluator_;
 };
 
 void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {

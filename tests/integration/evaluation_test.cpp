@@ -21,7 +21,7 @@
 #include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/reference_evaluation.h"
-#include "stridewire/runtime/stretch_queue.h"
+#include "stridewire/runtime/evaluation_batcher.h"
 
 namespace stridewire {
 namespace {
@@ -437,7 +437,7 @@ TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
   DrawnCrowd crowd(library_, kCrowd, kSeed);
   std::vector<Movement> movements(kCrowd);
   std::vector<Pose> shown(kCrowd, Pose(library_->skeleton().joint_count()));
-  StretchEvaluator evaluator(*library_, 1);
+  SoaPoseEvaluator evaluator(*library_, 1);
   int poses = 0;
   for (int tick = 0; tick < 200; ++tick) {
     crowd.Advance();
@@ -469,8 +469,8 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
     const OnlyInstructionSet only(set);
     DrawnCrowd crowd(library_, kCrowd, kSeed);
     std::vector<Movement> movements(kCrowd);
-    StretchEvaluator evaluator(*library_, 12);
-    StretchQueue queue;
+    SoaPoseEvaluator evaluator(*library_, 12);
+    EvaluationBatcher queue;
     Pose pose(library_->skeleton().joint_count());
     int poses = 0;
     int settling = 0;
@@ -487,7 +487,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
         const int most = 1 + static_cast<int>(random.Draw(0.0, 12.0));
         const double step_s = random.Draw(0.005, 0.05);
         const int count =
-            StretchCount(movements[tag], avatar.movement_time_s(), step_s, apart, most);
+            SampleRunCount(movements[tag], avatar.movement_time_s(), step_s, apart, most);
         ASSERT_LE(count, most);
         queue.Add({&movements[tag], avatar.movement_time_s(), step_s, apart}, count, tag);
         wanted += static_cast<std::size_t>(count);
@@ -495,12 +495,12 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
       }
       std::vector<double> time_s(tag);
       std::size_t seen = 0;
-      queue.Evaluate(evaluator, [&](std::span<const StretchQueue::Item> items, int at,
-                                    const PoseLanes& lanes) {
+      queue.Evaluate(evaluator, [&](std::span<const EvaluationBatcher::Item> items, int at,
+                                    const SoaPose& lanes) {
         for (std::size_t i = 0; i < items.size(); ++i) {
-          const StretchQueue::Item& item = items[i];
+          const EvaluationBatcher::Item& item = items[i];
           if (at >= item.count) continue;
-          const PoseStretch& stretch = item.stretch;
+          const SampleRun& stretch = item.stretch;
           double& now_s = time_s[item.tag];
           if (at == 0) now_s = stretch.time_s;
           for (int t = 0; at > 0 && t < stretch.ticks_apart; ++t) now_s += stretch.step_s;

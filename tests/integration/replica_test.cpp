@@ -93,7 +93,7 @@ struct Figures {
   std::size_t poses = 0;
 };
 
-void Advance(AvatarReplica& replica, StretchEvaluator& evaluator, double dt_s) {
+void Advance(AvatarReplica& replica, SoaPoseEvaluator& evaluator, double dt_s) {
   AvatarReplica* one = &replica;
   AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s, evaluator);
 }
@@ -118,7 +118,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
   Random random(kSeed);
-  StretchEvaluator evaluator(*library_, 1);
+  SoaPoseEvaluator evaluator(*library_, 1);
   Figures figures;
   constexpr int kTicks = 3000;
   for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
@@ -245,7 +245,7 @@ TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
       std::vector<AvatarReplica> replicas(kAvatars, AvatarReplica(library_));
       std::vector<AvatarReplica*> all;
       for (AvatarReplica& replica : replicas) all.push_back(&replica);
-      StretchEvaluator evaluator(*library_, 1);
+      SoaPoseEvaluator evaluator(*library_, 1);
       for (std::size_t t = 0; t < ticks.size(); ++t) {
         for (std::size_t i = 0; i < kAvatars; ++i) {
           const Bytes& record = ticks[t].records[i];
@@ -277,7 +277,7 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
   const Library library = LibraryOf({});
   Restless restless(library, random);
   AvatarReplica replica(library);
-  StretchEvaluator evaluator(*library, 1);
+  SoaPoseEvaluator evaluator(*library, 1);
   Bytes record;
   for (int tick = 0; tick < 3000; ++tick) {
     restless.Stir();
@@ -298,7 +298,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   const Library library = LibraryOf({});
-  StretchEvaluator evaluator(*library, 1);
+  SoaPoseEvaluator evaluator(*library, 1);
   const auto below = [&](std::size_t n) {
     return static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(n)));
   };
@@ -353,7 +353,7 @@ TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
   Bytes change;
   ASSERT_TRUE(AppendChange(avatar, change));
   AvatarReplica replica(library);
-  StretchEvaluator evaluator(*library, 1);
+  SoaPoseEvaluator evaluator(*library, 1);
   EXPECT_FALSE(replica.is_known());
   EXPECT_EQ(replica.Apply(change).error().code, ErrorCode::kNotFound);
   Advance(replica, evaluator, 1.0 / 60.0);

@@ -112,7 +112,7 @@ class DrawnCrowd {
   }
 
   Random random_;
-  StretchEvaluator evaluator_;
+  SoaPoseEvaluator evaluator_;
   std::vector<Avatar> avatars_;
 };
 

@@ -168,8 +168,8 @@ void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
   }
 }
 
-void Avatar::ShowPoses(std::span<Avatar* const> avatars, StretchEvaluator& evaluator) {
-  std::array<PoseJob, PoseLanes::kLanes> jobs;
+void Avatar::ShowPoses(std::span<Avatar* const> avatars, SoaPoseEvaluator& evaluator) {
+  std::array<PoseJob, SoaPose::kLanes> jobs;
   while (!avatars.empty()) {
     const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), jobs.size()));
     std::size_t moving = 0;
@@ -184,7 +184,7 @@ void Avatar::ShowPoses(std::span<Avatar* const> avatars, StretchEvaluator& evalu
 }
 
 void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
-                        StretchEvaluator& evaluator) {
+                        SoaPoseEvaluator& evaluator) {
   AdvanceStates(avatars, dt_s);
   ShowPoses(avatars, evaluator);
 }

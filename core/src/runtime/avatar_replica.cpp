@@ -289,7 +289,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 }
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
-                               StretchEvaluator& evaluator) {
+                               SoaPoseEvaluator& evaluator) {
   constexpr std::size_t kAtOnce = 16;  // as Avatar::AdvanceAll
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {

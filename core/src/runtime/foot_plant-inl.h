@@ -8,7 +8,7 @@
 #endif
 
 #include "foot_plant_constants.h"
-#include "lanes-inl.h"
+#include "simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
@@ -34,9 +34,9 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
 
 // A FootTrack and its FootRest, as PackFootPlan lays them out.
 struct Track {
-  Vec3x from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
-  Vec3x normals[2];
-  Vec3x rest_offset, rest_velocity, root_shift;
+  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
+  SoaVec3 normals[2];
+  SoaVec3 rest_offset, rest_velocity, root_shift;
   Float from_heading, to_heading, release_turn, root_weight, lift, rest_turn, rest_turn_s;
   Float rest_over_s, release_s, land_s;
 };
@@ -44,11 +44,11 @@ struct Track {
 HWY_INLINE Track LoadTrack(const float* plan) {
   Track t;
   const auto next = [&]() HWY_ATTR {
-    const Quat4 four = LoadQuat(plan);
+    const SoaQuat four = LoadQuat(plan);
     plan += 4 * kBlock;
     return four;
   };
-  Quat4 q = next();
+  SoaQuat q = next();
   t.from = XyzOf(q), t.from_heading = q.w;
   q = next();
   t.to = XyzOf(q), t.to_heading = q.w;
@@ -77,7 +77,7 @@ HWY_INLINE Track LoadTrack(const float* plan) {
 
 // What all of a movement's plan shares.
 struct Common {
-  Vec3x root_rest, root_rest_velocity;
+  SoaVec3 root_rest, root_rest_velocity;
   Float steer, duration_s, entered_s, ease_out_s, keeps_above_ground, settle_s;
   Float time_s;
   Float per_duration, per_ease_out;  // 1 / s
@@ -85,12 +85,12 @@ struct Common {
 
 // A leg by forward kinematics, relative to the root and in world axes.
 struct LegLanes {
-  Vec3x positions[kMaxLegChain];
-  Quat4 rotations[kMaxLegChain];
-  Vec3x ball;
+  SoaVec3 positions[kMaxLegChain];
+  SoaQuat rotations[kMaxLegChain];
+  SoaVec3 ball;
 };
 
-HWY_INLINE Vec3x Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
+HWY_INLINE SoaVec3 Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
 // Whatever is done to a leg waits for what was done before, so both legs take each step together: a processor works on
 // one while the other waits.
@@ -102,7 +102,7 @@ HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
 
 // `joints`: those that `rotations` has.
 HWY_INLINE void EvaluateLegs(
-    const LegRig& rig, const float* rotations, Quat4 root, LegLanes* legs,
+    const LegRig& rig, const float* rotations, SoaQuat root, LegLanes* legs,
     const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
   std::size_t longest = 0;
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
@@ -132,7 +132,7 @@ void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, floa
     LegLanes legs[2];
     EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs, &LegRig::Bones::among);
     ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-      const auto put = [&](Vec3x v, float* to) HWY_ATTR {
+      const auto put = [&](SoaVec3 v, float* to) HWY_ATTR {
         StoreLanes(v.x, to);
         StoreLanes(v.y, to + kBlock);
         StoreLanes(v.z, to + 2 * kBlock);
@@ -144,17 +144,17 @@ void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, floa
 }
 
 struct Correction {
-  Vec3x offset;
+  SoaVec3 offset;
   Float swing;
-  Quat4 turn;  // of the foot
-  Vec3x root;  // what the root goes along with it
+  SoaQuat turn;  // of the foot
+  SoaVec3 root;  // what the root goes along with it
 };
 
 HWY_INLINE Float Steered(const Common& common, Float at_s) {
   return common.steer * (Float(1.0f) - EaseOut(at_s * common.per_duration));
 }
 
-HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3x ball,
+HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaVec3 ball,
                                   Float heading, Float flatness) {
   const Float one = 1.0f;
   const Float zero = 0.0f;
@@ -167,10 +167,10 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
 
   Correction c;
   c.swing = s;
-  const Vec3x print = Select(has_landed, track.to, track.from);
+  const SoaVec3 print = Select(has_landed, track.to, track.from);
   const Float print_heading = Select(has_landed, track.to_heading, track.from_heading);
   const Float across = Float(4.0f) * s * r;
-  const Vec3x flying = track.release_offset * ((one + s + s) * r * r) +
+  const SoaVec3 flying = track.release_offset * ((one + s + s) * r * r) +
                        track.land_offset * (s * s * (one + r + r)) +
                        (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
                        track.aside * (across * across);
@@ -202,8 +202,8 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
   const Float turn =
       Select(is_planted, free + hold * held, free + (one - turned) * track.release_turn);
 
-  const Vec3x tilt = track.normals[0] * (one - turned) + track.normals[1] * turned;
-  const Vec3x normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
+  const SoaVec3 tilt = track.normals[0] * (one - turned) + track.normals[1] * turned;
+  const SoaVec3 normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
   c.turn = Multiply(Normalise({normal.z, zero, -normal.x, one + normal.y}),
                     YawRotation(WrapAngle(turn)));
   c.root =
@@ -212,23 +212,23 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, Vec3
 }
 
 // How deep a sole is below the ground a print lies on, taken for a plane; less the further it is away.
-HWY_INLINE Float DepthBelow(Vec3x print, Vec3x normal, const LegRig::Bones& bones,
-                            const LegLanes& leg, Vec3x ball, Quat4 turn) {
+HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
+                            const LegLanes& leg, SoaVec3 ball, SoaQuat turn) {
   const Float dx = ball.x - print.x;
   const Float dz = ball.z - print.z;
   const Float away = Sqrt(dx * dx + dz * dz);
   const Float near =
       EaseOut(Over(away - Float(static_cast<float>(kNearPrintM)), kFarFromPrintM - kNearPrintM));
   const Float per_rise = Float(1.0f) / normal.y;
-  const auto depth_of = [&](Vec3x point, float rest_m) HWY_ATTR {
-    const Vec3x at = ball + Rotate(turn, point - leg.ball);
+  const auto depth_of = [&](SoaVec3 point, float rest_m) HWY_ATTR {
+    const SoaVec3 at = ball + Rotate(turn, point - leg.ball);
     const Float ground =
         print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) * per_rise;
     return ground + Float(rest_m) * per_rise - at.y;
   };
   const std::size_t last = bones.count - 1;
-  const Vec3x toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
-  const Vec3x heel =
+  const SoaVec3 toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
+  const SoaVec3 heel =
       leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Same(bones.heel_m));
   const Float depth =
       Max(Max(depth_of(leg.ball, bones.ball_height_m), depth_of(heel, bones.ball_height_m)),
@@ -236,19 +236,19 @@ HWY_INLINE Float DepthBelow(Vec3x print, Vec3x normal, const LegRig::Bones& bone
   return near * SmoothMax(Float(0.0f), depth, static_cast<float>(kSoftGroundM));
 }
 
-HWY_INLINE Quat4 ShortestArc(Vec3x from, Vec3x to) {
+HWY_INLINE SoaQuat ShortestArc(SoaVec3 from, SoaVec3 to) {
   const Float scale = Sqrt(Dot(from, from) * Dot(to, to));
-  const Vec3x axis = Cross(from, to);
+  const SoaVec3 axis = Cross(from, to);
   return Normalise({axis.x, axis.y, axis.z, scale + Dot(from, to)});
 }
 
-HWY_INLINE Vec3x KneeAxis(Vec3x thigh, Vec3x shank, Quat4 hip_rotation) {
+HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) {
   const Float scale = Sqrt(Dot(thigh, thigh) * Dot(shank, shank));
-  const Vec3x plane = Cross(thigh, shank) * (Float(1.0f) / scale);
+  const SoaVec3 plane = Cross(thigh, shank) * (Float(1.0f) / scale);
   const Float sine = Sqrt(Dot(plane, plane));
   const Float s =
       Clamp(Over(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
-  const Vec3x reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
+  const SoaVec3 reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
   const Mask is_backward = Dot(plane, reference) < Float(0.0f);
   const Float forward = Select(is_backward, Float(0.0f), Float(1.0f));
   const Float weight = Select(is_backward, Float(1.0f), s * s * (Float(3.0f) - Float(2.0f) * s));
@@ -256,28 +256,28 @@ HWY_INLINE Vec3x KneeAxis(Vec3x thigh, Vec3x shank, Quat4 hip_rotation) {
 }
 
 // What is unit but for rounding made so: a step of Newton's is as good as a root and a division.
-HWY_INLINE Quat4 NearlyUnit(Quat4 q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
+HWY_INLINE SoaQuat NearlyUnit(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
 
 // Where an ankle is to be, from the root, and how it is turned there.
 struct AnkleGoal {
-  Vec3x at_m;
-  Quat4 rotation;
+  SoaVec3 at_m;
+  SoaQuat rotation;
 };
 
 // Bends both legs so that their ankles are where they are to be, and stores what of the rotations changes.
 HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGoal* goals,
                           float* rotations) {
   struct Work {
-    Vec3x thigh, shank, towards, new_thigh, new_shank;
+    SoaVec3 thigh, shank, towards, new_thigh, new_shank;
     Float distance;
-    Quat4 turn_thigh, turn_shank;
+    SoaQuat turn_thigh, turn_shank;
   } work[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const LegLanes& leg = legs[f];
     Work& w = work[f];
     w.thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
     w.shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
-    const Vec3x reach = goals[f].at_m - leg.positions[bones.hip];
+    const SoaVec3 reach = goals[f].at_m - leg.positions[bones.hip];
     w.distance = Sqrt(Dot(reach, reach));
     const Mask is_away = w.distance > Float(1e-6f);
     const Float per_distance = Float(1.0f) / Max(w.distance, Float(1e-6f));
@@ -291,7 +291,7 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGo
     const Float d = Clamp(w.distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
     const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
     const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
-    Vec3x pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, legs[f].rotations[bones.hip]));
+    SoaVec3 pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, legs[f].rotations[bones.hip]));
     const Float pole_length = Sqrt(Dot(pole, pole));
     const Mask has_pole = pole_length > Float(1e-6f);
     pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),
@@ -309,7 +309,7 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGo
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const LegLanes& leg = legs[f];
     const Work& w = work[f];
-    const auto store = [&](std::size_t place, Quat4 before, Quat4 rotation) HWY_ATTR {
+    const auto store = [&](std::size_t place, SoaQuat before, SoaQuat rotation) HWY_ATTR {
       StoreQuat(NearlyUnit(Multiply(Conjugate(before), rotation)),
                 rotations + bones.joints[place] * 4 * kBlock);
     };
@@ -332,7 +332,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   Common common;
   {
     const float* at = plan + 2 * kPackedTrackFloats * kBlock;
-    Quat4 q = LoadQuat(at);
+    SoaQuat q = LoadQuat(at);
     common.root_rest = XyzOf(q), common.steer = q.w;
     q = LoadQuat(at + 4 * kBlock);
     common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
@@ -352,19 +352,19 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     }
     hn::StoreU(hn::DemoteTo(floats, hn::LoadU(d, block.time_s + lane + i)), floats, times_s + i);
   }
-  const Vec3x root = LoadVec3(local_m);
+  const SoaVec3 root = LoadVec3(local_m);
   common.time_s = LoadLanes(times_s);
 
-  const Quat4 root_rotation = LoadQuat(rotations);
+  const SoaQuat root_rotation = LoadQuat(rotations);
   LegLanes legs[2];
   Correction corrections[2];
-  Vec3x ankles[2];
-  Vec3x shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
+  SoaVec3 ankles[2];
+  SoaVec3 shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
   Float headings[2];
   Float flatnesses[2];
   EvaluateLegs(rig, rotations, root_rotation, legs);
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    const Vec3x sole = legs[f].ball - legs[f].positions[bones.ankle];
+    const SoaVec3 sole = legs[f].ball - legs[f].positions[bones.ankle];
     headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
     flatnesses[f] = bones.foot_m < kSmallestBoneM
                         ? Float(0.0f)
@@ -373,7 +373,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const LegLanes& leg = legs[f];
     const Track track = LoadTrack(plan + f * kPackedTrackFloats * kBlock);
-    const Vec3x ball = root + leg.ball;
+    const SoaVec3 ball = root + leg.ball;
     Correction& c = corrections[f];
     c = CorrectFoot(common, track, ball, headings[f], flatnesses[f]);
     const Mask keeps_above = common.keeps_above_ground > Float(0.0f);
@@ -381,7 +381,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
       const Float second =
           Float(1.0f) -
           EaseOut(Over(c.swing - Float(static_cast<float>(kGroundFrom)), kGroundOver));
-      const Vec3x at = ball + c.offset;
+      const SoaVec3 at = ball + c.offset;
       const Float lift = (Float(1.0f) - second) *
                              DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
                          second * DepthBelow(track.to, track.normals[1], bones, leg, at, c.turn);
@@ -405,20 +405,20 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
                             Float(static_cast<float>(kRootRisePart)) * common.duration_s));
   const Float speed = common.ease_out_s * EaseOutSlope(since_s * common.per_ease_out);
   shift = shift +
-          Vec3x{flat * common.root_rest.x, rise * common.root_rest.y, flat * common.root_rest.z} +
+          SoaVec3{flat * common.root_rest.x, rise * common.root_rest.y, flat * common.root_rest.z} +
           common.root_rest_velocity * speed;
 
   Float lower = 0.0f;
   for (std::size_t f = 0; f < 2; ++f) {
     const LegRig::Bones& bones = rig.bones[f];
-    const Vec3x hip = legs[f].positions[bones.hip];
-    const Vec3x blended = legs[f].positions[bones.ankle] - hip;
+    const SoaVec3 hip = legs[f].positions[bones.hip];
+    const SoaVec3 blended = legs[f].positions[bones.ankle] - hip;
     const float length = bones.thigh_m + bones.shank_m;
     const Float allowed = Min(
         SmoothMax(Sqrt(Dot(blended, blended)), Float(static_cast<float>(kEasyExtension) * length),
                   static_cast<float>(kSoftM)),
         Float(static_cast<float>(kLongestExtension) * length));
-    const Vec3x reach = ankles[f] - (root + shift + hip);
+    const SoaVec3 reach = ankles[f] - (root + shift + hip);
     const Float drop_squared = allowed * allowed - (reach.x * reach.x + reach.z * reach.z);
     const float deepest = 0.5f * length;
     const Float drop = Sqrt(Max(drop_squared, Float(deepest * deepest)));
@@ -443,7 +443,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
                  local_m + c * kBlock + i);
     }
   }
-  const Vec3x moved = LoadVec3(local_m);
+  const SoaVec3 moved = LoadVec3(local_m);
   AnkleGoal goals[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     goals[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};

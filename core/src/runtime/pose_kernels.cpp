@@ -12,8 +12,8 @@
 // Behind foreach_target.h, which includes this file once for each instruction set.
 #include "foot_plant-inl.h"
 #include "hwy/highway.h"
-#include "lanes-inl.h"
-#include "pose_lanes-inl.h"
+#include "simd_math-inl.h"
+#include "soa_pose-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
@@ -149,16 +149,16 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
                               : next;
     next = j + width;
     const std::size_t left = blend.joint_count - j;
-    Quat4 q = LoadQuats(blend.row + 4 * j, left);
+    SoaQuat q = LoadQuats(blend.row + 4 * j, left);
     const Mask is_small = Dot(q, q) < Float(kSmallestNorm * kSmallestNorm);
     is_short = is_short || (is_small && Mask{hn::FirstN(d, left)});
     // Lengths multiply: one division at the end serves all.
     if (blend.difference != nullptr) {
-      const Quat4 difference = LoadQuats(blend.difference + 4 * j, left);
+      const SoaQuat difference = LoadQuats(blend.difference + 4 * j, left);
       q = Multiply(q, SlerpOf(SlerpPartsOf(difference), Float(blend.fraction)));
     }
     if (blend.velocity != nullptr) {
-      const Vec3x along = LoadVectors(blend.velocity + 3 * j, left) * Float(0.5f * blend.seconds);
+      const SoaVec3 along = LoadVectors(blend.velocity + 3 * j, left) * Float(0.5f * blend.seconds);
       q = Multiply(q, {along.x, along.y, along.z, Float(1.0f)});
     }
     StoreQuats(Normalise(q), out + 4 * j, left);

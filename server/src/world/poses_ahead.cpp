@@ -145,7 +145,7 @@ void PosesAhead::Want(Place& place, std::uint64_t course, const Movement& moveme
   kept.cuts = CutsAfter(kept, course);
   kept.course = static_cast<std::uint32_t>(course);
   kept.count = 0;
-  StretchEvaluator::PrefetchTimes(movement);
+  SoaPoseEvaluator::PrefetchTimes(movement);
   wanted_.push_back({place.index_, 0, {&movement, time_s, step_s_, ticks_apart_}, false});
 }
 
@@ -171,7 +171,7 @@ void PosesAhead::Finish() {
     const std::size_t left = turns - (plane_ + turn) % turns;
     const std::size_t most = std::min(left, ring_ >> kept_[wanted.place].cuts);
     wanted.is_its_turn = left == turns;
-    wanted.count = StretchCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
+    wanted.count = SampleRunCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
                                 ticks_apart_, static_cast<int>(most));
     poses += static_cast<std::size_t>(wanted.count);
   }
@@ -185,8 +185,8 @@ void PosesAhead::Finish() {
   }
   wanted_.clear();
   std::array<std::uint32_t, kLanes> places;
-  scratch_->queue.Evaluate(scratch_->evaluator, [&](std::span<const StretchQueue::Item> items,
-                                                    int pose, const PoseLanes& lanes) {
+  scratch_->queue.Evaluate(scratch_->evaluator, [&](std::span<const EvaluationBatcher::Item> items,
+                                                    int pose, const SoaPose& lanes) {
     for (std::size_t i = 0; i < items.size(); ++i) {
       places[i] = pose < items[i].count ? items[i].tag : kNobody;
     }
@@ -194,7 +194,7 @@ void PosesAhead::Finish() {
   });
 }
 
-void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places,
+void PosesAhead::Keep(const SoaPose& lanes, std::span<const std::uint32_t> places,
                       std::size_t pose) {
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     modes_[m].codec->Encode({.roots_m = lanes.roots_m(),
@@ -220,7 +220,7 @@ void PosesAhead::Keep(const PoseLanes& lanes, std::span<const std::uint32_t> pla
   }
 }
 
-void PosesAhead::KeepWide(const PoseLanes& lanes, std::size_t lane, std::uint32_t place,
+void PosesAhead::KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place,
                           std::size_t pose, std::size_t mode) {
   lanes.Get(lane, scratch_->pose);
   kept_[place].is_any_other = 1;

@@ -11,7 +11,7 @@
 #include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/stretch_queue.h"
+#include "stridewire/runtime/evaluation_batcher.h"
 
 namespace stridewire::server {
 
@@ -20,9 +20,9 @@ struct PoseScratch {
   explicit PoseScratch(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  StretchEvaluator evaluator;  ///< Of PosesAhead::kMost
-  StretchQueue queue;
-  PoseLanes taken;
+  SoaPoseEvaluator evaluator;  ///< Of PosesAhead::kMost
+  EvaluationBatcher queue;
+  SoaPose taken;
   Pose pose;
   static constexpr std::size_t kModes = 4;
   std::array<protocol::CompactCodec::Block, kModes> blocks;
@@ -117,10 +117,10 @@ class PosesAhead {
   /// As it is told; of a pose that can not be, beyond where any can.
   [[nodiscard]] Vec3 RootOf(const Place& place) const;
 
-  [[nodiscard]] StretchEvaluator& evaluator() { return scratch_->evaluator; }
+  [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }
 
  private:
-  static constexpr std::size_t kLanes = PoseLanes::kLanes;
+  static constexpr std::size_t kLanes = SoaPose::kLanes;
   static constexpr std::size_t kStanding = kMost;  // plane
   // Places that lie together have their turns together.
   static constexpr std::uint32_t kPlacesOfATurn = 8;
@@ -153,7 +153,7 @@ class PosesAhead {
   struct Wanted {
     std::uint32_t place;
     int count;
-    PoseStretch stretch;
+    SampleRun stretch;
     bool is_its_turn;
   };
 
@@ -186,8 +186,8 @@ class PosesAhead {
   void KeepTaken();
   // Encodes poses side by side and keeps them; of kNobody nothing is kept.
   static constexpr std::uint32_t kNobody = ~0u;
-  void Keep(const PoseLanes& lanes, std::span<const std::uint32_t> places, std::size_t pose);
-  void KeepWide(const PoseLanes& lanes, std::size_t lane, std::uint32_t place, std::size_t pose,
+  void Keep(const SoaPose& lanes, std::span<const std::uint32_t> places, std::size_t pose);
+  void KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place, std::size_t pose,
                 std::size_t mode);
   [[nodiscard]] Encoded OtherOf(std::uint32_t place, std::size_t pose, std::size_t mode) const;
 

@@ -16,7 +16,7 @@
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/pose_stretch.h"
+#include "stridewire/runtime/soa_pose_evaluator.h"
 #include "stridewire/runtime/request_plan.h"
 #include "stridewire/runtime/walk_planner.h"
 #include "stridewire/runtime/way_planner.h"
@@ -145,16 +145,16 @@ class Avatar {
   /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
   /// bit of any pose depends on who else is there.
   static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
-                         StretchEvaluator& evaluator);
+                         SoaPoseEvaluator& evaluator);
 
-  /// AdvanceAll but for the poses, for who has them evaluated otherwise (PoseStretch): pose() is none of now until
+  /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none of now until
   /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
   static void AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
                             std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
   void ShowPose();
   /// The same for many avatars of one library together.
-  static void ShowPoses(std::span<Avatar* const> avatars, StretchEvaluator& evaluator);
+  static void ShowPoses(std::span<Avatar* const> avatars, SoaPoseEvaluator& evaluator);
 
   /// Displayed, in the world.
   [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }

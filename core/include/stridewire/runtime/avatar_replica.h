@@ -7,7 +7,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/avatar_body.h"
-#include "stridewire/runtime/pose_stretch.h"
+#include "stridewire/runtime/soa_pose_evaluator.h"
 
 namespace stridewire {
 
@@ -31,7 +31,7 @@ class AvatarReplica {
   /// Goes on by one tick of the avatars', and shows it. All have the same library; those of which nothing is known stay
   /// so.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
-                         StretchEvaluator& evaluator);
+                         SoaPoseEvaluator& evaluator);
 
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// Displayed after AdvanceAll, in the world; anything while nothing is known.

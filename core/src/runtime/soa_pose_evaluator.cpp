@@ -1,4 +1,4 @@
-#include "stridewire/runtime/pose_stretch.h"
+#include "stridewire/runtime/soa_pose_evaluator.h"
 
 #include <algorithm>
 #include <array>
@@ -11,9 +11,9 @@
 namespace stridewire {
 
 using kernels::kBlock;
-static_assert(PoseLanes::kLanes == kBlock);
+static_assert(SoaPose::kLanes == kBlock);
 
-void PoseLanes::Get(std::size_t lane, PoseSpan pose) const {
+void SoaPose::Get(std::size_t lane, PoseSpan pose) const {
   pose.root_position_m = root_m(lane);
   for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
     const Numbers* q = &numbers_[3 + 4 * j];
@@ -21,7 +21,7 @@ void PoseLanes::Get(std::size_t lane, PoseSpan pose) const {
   }
 }
 
-void PoseLanes::Set(std::size_t lane, ConstPoseSpan pose) {
+void SoaPose::Set(std::size_t lane, ConstPoseSpan pose) {
   for (int c = 0; c < 3; ++c) {
     numbers_[static_cast<std::size_t>(c)].of[lane] = pose.root_position_m[c];
   }
@@ -35,7 +35,7 @@ void PoseLanes::Set(std::size_t lane, ConstPoseSpan pose) {
   }
 }
 
-struct StretchEvaluator::Work {
+struct SoaPoseEvaluator::Work {
   struct alignas(64) LaneFloats {
     float of[kBlock] = {};
   };
@@ -90,7 +90,7 @@ struct StretchEvaluator::Work {
   int max_count;
 
   // Of the block under way:
-  std::array<PoseStretch, kBlock> stretches;
+  std::array<SampleRun, kBlock> stretches;
   std::size_t lanes = 0;
   std::size_t count = 0;
   std::size_t next = 0;
@@ -114,12 +114,12 @@ struct StretchEvaluator::Work {
   LaneFloats fastest;
   LaneFloats is_inertial_lane;
   std::vector<float> none;  // of who has no difference
-  PoseLanes poses;
+  SoaPose poses;
   Pose one;  // scratch
 };
 
 // Where each pose lies in its grid.
-void StretchEvaluator::Work::FindPlaces() {
+void SoaPoseEvaluator::Work::FindPlaces() {
   kernels::GridTimes& t = grid_times;
   const auto take_piece = [&](std::size_t i) {
     SetPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
@@ -147,7 +147,7 @@ void StretchEvaluator::Work::FindPlaces() {
   }
 }
 
-void StretchEvaluator::Work::BlendRows() {
+void SoaPoseEvaluator::Work::BlendRows() {
   std::array<const float*, kBlock> weights;
   for (std::size_t i = 0; i < lanes; ++i) weights[i] = movement(i).weights.data();
   for (std::size_t i = 0; i < lanes;) {
@@ -168,7 +168,7 @@ void StretchEvaluator::Work::BlendRows() {
   }
 }
 
-void StretchEvaluator::Work::TakePlans() {
+void SoaPoseEvaluator::Work::TakePlans() {
   settles = false;
   std::array<const float*, kBlock> plans;
   for (std::size_t i = 0; i < kBlock; ++i) {
@@ -180,7 +180,7 @@ void StretchEvaluator::Work::TakePlans() {
 }
 
 // What is left of the poses before.
-void StretchEvaluator::Work::TakeEasing() {
+void SoaPoseEvaluator::Work::TakeEasing() {
   is_eased = is_inertial = false;
   std::array<const float*, kBlock> differences;
   std::array<const float*, kBlock> velocities;
@@ -210,7 +210,7 @@ void StretchEvaluator::Work::TakeEasing() {
   kernels::FindFastest(FloatsOf(velocity), joints, lanes, fastest.of);
 }
 
-void StretchEvaluator::Work::Finish(std::size_t pose) {
+void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
   std::array<const float*, kBlock> of_lanes;
   for (std::size_t i = 0; i < kBlock; ++i) of_lanes[i] = RowOf(pose, i);
   const kernels::GridPlaces& at = places[pose];
@@ -240,7 +240,7 @@ void StretchEvaluator::Work::Finish(std::size_t pose) {
   (void)kernels::FinishLanes(blend, poses.roots_m(), poses.rotations());
 }
 
-void StretchEvaluator::Work::Unsettle(std::size_t pose) {
+void SoaPoseEvaluator::Work::Unsettle(std::size_t pose) {
   for (std::size_t i = 0; i < lanes; ++i) {
     if (movement(i).feet.settle_s == 0.0) continue;
     poses.Get(i, one);
@@ -249,17 +249,17 @@ void StretchEvaluator::Work::Unsettle(std::size_t pose) {
   }
 }
 
-StretchEvaluator::StretchEvaluator(const MotionLibrary& library, int max_count)
+SoaPoseEvaluator::SoaPoseEvaluator(const MotionLibrary& library, int max_count)
     : work_(std::make_unique<Work>(library, max_count)) {
   STRIDEWIRE_CHECK(max_count >= 1);
 }
-StretchEvaluator::~StretchEvaluator() = default;
-StretchEvaluator::StretchEvaluator(StretchEvaluator&&) noexcept = default;
-StretchEvaluator& StretchEvaluator::operator=(StretchEvaluator&&) noexcept = default;
+SoaPoseEvaluator::~SoaPoseEvaluator() = default;
+SoaPoseEvaluator::SoaPoseEvaluator(SoaPoseEvaluator&&) noexcept = default;
+SoaPoseEvaluator& SoaPoseEvaluator::operator=(SoaPoseEvaluator&&) noexcept = default;
 
-int StretchEvaluator::max_count() const { return work_->max_count; }
+int SoaPoseEvaluator::max_count() const { return work_->max_count; }
 
-void StretchEvaluator::Begin(std::span<const PoseStretch> stretches, int count) {
+void SoaPoseEvaluator::Begin(std::span<const SampleRun> stretches, int count) {
   Work& work = *work_;
   STRIDEWIRE_CHECK(!stretches.empty() && stretches.size() <= kBlock);
   STRIDEWIRE_CHECK(count >= 1 && count <= work.max_count);
@@ -284,7 +284,7 @@ void StretchEvaluator::Begin(std::span<const PoseStretch> stretches, int count) 
   work.BlendRows();
 }
 
-const PoseLanes& StretchEvaluator::Next() {
+const SoaPose& SoaPoseEvaluator::Next() {
   Work& work = *work_;
   STRIDEWIRE_CHECK(work.next < work.count);
   const std::size_t pose = work.next++;
@@ -302,20 +302,20 @@ const PoseLanes& StretchEvaluator::Next() {
   return work.poses;
 }
 
-void StretchEvaluator::PrefetchTimes(const Movement& movement) {
+void SoaPoseEvaluator::PrefetchTimes(const Movement& movement) {
   PrefetchBytes(&movement, kCacheLineBytes);
   PrefetchBytes(&movement.warp, 2 * kCacheLineBytes);
   PrefetchBytes(&movement.feet, 1);
 }
 
-void StretchEvaluator::PrefetchPlaces(const Movement& movement) {
+void SoaPoseEvaluator::PrefetchPlaces(const Movement& movement) {
   PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
   if (movement.feet.is_active) {
     PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));
   }
 }
 
-void StretchEvaluator::Prefetch(const PoseStretch& stretch) {
+void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
   const Movement& movement = *stretch.movement;
   PrefetchBytes(movement.weights.data(), movement.weights.size() * sizeof(float));
   if (stretch.time_s < movement.entered_s + movement.ease_out_s) {
@@ -326,16 +326,16 @@ void StretchEvaluator::Prefetch(const PoseStretch& stretch) {
   }
 }
 
-void EvaluatePoses(StretchEvaluator& evaluator, std::span<const PoseJob> jobs) {
+void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
   // Those whose feet are planted go together, and the others.
   for (const bool is_planted : {false, true}) {
-    std::array<PoseStretch, kBlock> stretches;
+    std::array<SampleRun, kBlock> stretches;
     std::array<Pose*, kBlock> shown;
     std::size_t lanes = 0;
     const auto evaluate = [&] {
       if (lanes == 0) return;
       evaluator.Begin(std::span(stretches).first(lanes), 1);
-      const PoseLanes& poses = evaluator.Next();
+      const SoaPose& poses = evaluator.Next();
       for (std::size_t i = 0; i < lanes; ++i) poses.Get(i, *shown[i]);
       lanes = 0;
     };

@@ -8,11 +8,11 @@
 namespace stridewire {
 
 /// Poses side by side, one a lane: as vectors make, plant and encode them.
-class PoseLanes {
+class SoaPose {
  public:
   static constexpr std::size_t kLanes = 16;
 
-  explicit PoseLanes(int joint_count) : numbers_(3 + 4 * static_cast<std::size_t>(joint_count)) {}
+  explicit SoaPose(int joint_count) : numbers_(3 + 4 * static_cast<std::size_t>(joint_count)) {}
 
   [[nodiscard]] std::size_t joint_count() const { return (numbers_.size() - 3) / 4; }
   /// [x y z][kLanes], in the world.

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/stretch_queue.h"
+#include "stridewire/runtime/evaluation_batcher.h"
 
 #include "stridewire/base/check.h"
 
@@ -13,7 +13,7 @@ constexpr std::uint32_t kParts = 64;  // of a movement
 
 }  // namespace
 
-int StretchCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
+int SampleRunCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
                  int most) {
   const double apart_s = step_s * ticks_apart;
   const double left = (movement.duration_s() - time_s) / apart_s;
@@ -21,7 +21,7 @@ int StretchCount(const Movement& movement, double time_s, double step_s, int tic
   return std::max(1, static_cast<int>(left) + 1);
 }
 
-void StretchQueue::Add(const PoseStretch& stretch, int count, std::uint32_t tag) {
+void EvaluationBatcher::Add(const SampleRun& stretch, int count, std::uint32_t tag) {
   STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
   const Movement& movement = *stretch.movement;
   const double part = std::clamp(stretch.time_s / movement.duration_s(), 0.0, 1.0);
@@ -33,7 +33,7 @@ void StretchQueue::Add(const PoseStretch& stretch, int count, std::uint32_t tag)
   items_.push_back({stretch, key, tag, count});
 }
 
-void StretchQueue::Sort() {
+void EvaluationBatcher::Sort() {
   places_.resize(items_.size());
   sorted_.resize(items_.size());
   order_.resize(items_.size());
@@ -49,8 +49,8 @@ void StretchQueue::Sort() {
   for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = items_[places_[i].item];
 }
 
-std::span<const StretchQueue::Item> StretchQueue::BlockAt(std::size_t begin) const {
-  std::size_t end = std::min(begin + PoseLanes::kLanes, order_.size());
+std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
+  std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
   const bool is_planted = order_[begin].stretch.movement->feet.is_active;
   // Planted ones come last, so that the first that is otherwise is the end.
   while (order_[end - 1].stretch.movement->feet.is_active != is_planted) --end;
@@ -58,15 +58,15 @@ std::span<const StretchQueue::Item> StretchQueue::BlockAt(std::size_t begin) con
 }
 
 // A part of the blocks to come in the time of each pose: first where what they read lies, then that.
-void StretchQueue::PrefetchBehind(std::size_t end, int pose, int count) const {
-  const std::size_t lanes = PoseLanes::kLanes;
+void EvaluationBatcher::PrefetchBehind(std::size_t end, int pose, int count) const {
+  const std::size_t lanes = SoaPose::kLanes;
   const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);
   const auto last = static_cast<std::size_t>(pose + 1) * lanes / static_cast<std::size_t>(count);
   for (std::size_t i = first; i < last; ++i) {
     if (end + lanes + i < order_.size()) {
-      StretchEvaluator::PrefetchPlaces(*order_[end + lanes + i].stretch.movement);
+      SoaPoseEvaluator::PrefetchPlaces(*order_[end + lanes + i].stretch.movement);
     }
-    if (end + i < order_.size()) StretchEvaluator::Prefetch(order_[end + i].stretch);
+    if (end + i < order_.size()) SoaPoseEvaluator::Prefetch(order_[end + i].stretch);
   }
 }
 

@@ -58,51 +58,51 @@ HWY_INLINE Float Clamp(Float a, Float low, Float high) { return Min(Max(a, low),
 HWY_INLINE bool Any(Mask mask) { return !hn::AllFalse(FloatTag(), mask.m); }
 
 // Vec3 and Quat of the scalar code, by lanes.
-struct Vec3x {
+struct SoaVec3 {
   Float x, y, z;
 };
-HWY_INLINE Vec3x operator+(Vec3x a, Vec3x b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-HWY_INLINE Vec3x operator-(Vec3x a, Vec3x b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-HWY_INLINE Vec3x operator*(Vec3x a, Float s) { return {a.x * s, a.y * s, a.z * s}; }
-HWY_INLINE Float Dot(Vec3x a, Vec3x b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-HWY_INLINE Vec3x Cross(Vec3x a, Vec3x b) {
+HWY_INLINE SoaVec3 operator+(SoaVec3 a, SoaVec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+HWY_INLINE SoaVec3 operator-(SoaVec3 a, SoaVec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+HWY_INLINE SoaVec3 operator*(SoaVec3 a, Float s) { return {a.x * s, a.y * s, a.z * s}; }
+HWY_INLINE Float Dot(SoaVec3 a, SoaVec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+HWY_INLINE SoaVec3 Cross(SoaVec3 a, SoaVec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
-HWY_INLINE Vec3x Select(Mask mask, Vec3x yes, Vec3x no) {
+HWY_INLINE SoaVec3 Select(Mask mask, SoaVec3 yes, SoaVec3 no) {
   return {Select(mask, yes.x, no.x), Select(mask, yes.y, no.y), Select(mask, yes.z, no.z)};
 }
 
-struct Quat4 {
+struct SoaQuat {
   Float x, y, z, w;
 };
-HWY_INLINE Quat4 operator+(Quat4 a, Quat4 b) {
+HWY_INLINE SoaQuat operator+(SoaQuat a, SoaQuat b) {
   return {a.x + b.x, a.y + b.y, a.z + b.z, a.w + b.w};
 }
-HWY_INLINE Quat4 operator*(Quat4 a, Float s) { return {a.x * s, a.y * s, a.z * s, a.w * s}; }
-HWY_INLINE Quat4 Select(Mask mask, Quat4 yes, Quat4 no) {
+HWY_INLINE SoaQuat operator*(SoaQuat a, Float s) { return {a.x * s, a.y * s, a.z * s, a.w * s}; }
+HWY_INLINE SoaQuat Select(Mask mask, SoaQuat yes, SoaQuat no) {
   return {Select(mask, yes.x, no.x), Select(mask, yes.y, no.y), Select(mask, yes.z, no.z),
           Select(mask, yes.w, no.w)};
 }
-HWY_INLINE Float Dot(Quat4 a, Quat4 b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
-HWY_INLINE Quat4 Conjugate(Quat4 q) { return {-q.x, -q.y, -q.z, q.w}; }
-HWY_INLINE Quat4 Multiply(Quat4 a, Quat4 b) {
+HWY_INLINE Float Dot(SoaQuat a, SoaQuat b) { return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w; }
+HWY_INLINE SoaQuat Conjugate(SoaQuat q) { return {-q.x, -q.y, -q.z, q.w}; }
+HWY_INLINE SoaQuat Multiply(SoaQuat a, SoaQuat b) {
   return {
       a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y, a.w * b.y + a.y * b.w + a.z * b.x - a.x * b.z,
       a.w * b.z + a.z * b.w + a.x * b.y - a.y * b.x, a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z};
 }
-HWY_INLINE Vec3x Rotate(Quat4 q, Vec3x v) {
-  const Vec3x u = {q.x, q.y, q.z};
-  const Vec3x t = Cross(u, v);
+HWY_INLINE SoaVec3 Rotate(SoaQuat q, SoaVec3 v) {
+  const SoaVec3 u = {q.x, q.y, q.z};
+  const SoaVec3 t = Cross(u, v);
   return v + (t * q.w + Cross(u, t)) * Float(2.0f);
 }
 // Of a quaternion and Dot of it with itself.
-HWY_INLINE Quat4 UnitOf(Quat4 q, Float square) {
+HWY_INLINE SoaQuat UnitOf(SoaQuat q, Float square) {
   const Float norm = Sqrt(square);
   const Mask is_sound = norm > Float(1e-12f);
   const Float scale = Select(is_sound, Float(1.0f) / norm, Float(0.0f));
   return {q.x * scale, q.y * scale, q.z * scale, Select(is_sound, q.w * scale, Float(1.0f))};
 }
-HWY_INLINE Quat4 Normalise(Quat4 q) { return UnitOf(q, Dot(q, q)); }
+HWY_INLINE SoaQuat Normalise(SoaQuat q) { return UnitOf(q, Dot(q, q)); }
 
 // Polynomials by interpolation at Chebyshev's nodes; errors below 2e-8, the last digit of a float.
 HWY_INLINE Float AtanOverX(Float square) {  // |x| <= 1
@@ -135,10 +135,10 @@ HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
 // slerp(1, q, fraction) along the short arc. With m = |xyz| / (1 + w), the tangent of a quarter of the angle, half of
 // it is 2 atan m: nothing is divided by a small sine.
 struct SlerpParts {
-  Vec3x half;    // the rotation vector of half the angle
+  SoaVec3 half;    // the rotation vector of half the angle
   Float square;  // |half|^2
 };
-HWY_INLINE SlerpParts SlerpPartsOf(Quat4 q) {
+HWY_INLINE SlerpParts SlerpPartsOf(SoaQuat q) {
   const Mask is_long = q.w < Float(0.0f);
   const Float sign = Select(is_long, Float(-1.0f), Float(1.0f));
   const Float beside = Float(1.0f) / (Float(1.0f) + Abs(q.w));
@@ -146,13 +146,13 @@ HWY_INLINE SlerpParts SlerpPartsOf(Quat4 q) {
   // Half the angle by its sine, negative if the long arc is turned round.
   const Float per_sine =
       sign * Float(2.0f) * beside * AtanOverX(Min(xx * beside * beside, Float(1.0f)));
-  return {Vec3x{q.x, q.y, q.z} * per_sine, xx * per_sine * per_sine};
+  return {SoaVec3{q.x, q.y, q.z} * per_sine, xx * per_sine * per_sine};
 }
 // The rotation, of a length between 1 and 1.12: all that counts is the tangent of half its angle, and a quotient of two
 // short polynomials is nearer to that than sine and cosine of the same length to theirs. By interpolation at
 // Chebyshev's nodes of the square of half the angle; the error of the angle is below 2e-8.
 constexpr float kLongestSlerp = 1.12f;
-HWY_INLINE Quat4 SlerpOf(SlerpParts parts, Float fraction) {
+HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   const Float square = parts.square * (fraction * fraction);
   Float sine = 2.061795443e-03f;  // by half the angle
   sine = sine * square - Float(1.216445714e-01f);
@@ -161,7 +161,7 @@ HWY_INLINE Quat4 SlerpOf(SlerpParts parts, Float fraction) {
   cosine = cosine * square + Float(2.038776688e-02f);
   cosine = cosine * square - Float(4.549778998e-01f);
   cosine = cosine * square + Float(1.0f);
-  const Vec3x xyz = parts.half * (fraction * sine);
+  const SoaVec3 xyz = parts.half * (fraction * sine);
   return {xyz.x, xyz.y, xyz.z, cosine};
 }
 
@@ -184,14 +184,14 @@ HWY_INLINE Float WrapAngle(Float angle) {
 }
 
 // Rotation about +Y by an angle in [-pi, pi].
-HWY_INLINE Quat4 YawRotation(Float yaw) {
+HWY_INLINE SoaQuat YawRotation(Float yaw) {
   const Float half = Float(0.5f) * yaw;
   const Float square = half * half;
   return {Float(0.0f), half * SinOverX(square), Float(0.0f), CosNearZero(square)};
 }
 
 // Quaternions x y z w one behind the other; of the last lanes only `left` are there.
-HWY_INLINE Quat4 LoadQuats(const float* at, std::size_t left) {
+HWY_INLINE SoaQuat LoadQuats(const float* at, std::size_t left) {
   const FloatTag d;
   HWY_ALIGN float buffer[4 * kBlock];
   if (left < hn::Lanes(d)) {
@@ -199,11 +199,11 @@ HWY_INLINE Quat4 LoadQuats(const float* at, std::size_t left) {
     std::memcpy(buffer, at, left * 4 * sizeof(float));
     at = buffer;
   }
-  Quat4 q;
+  SoaQuat q;
   hn::LoadInterleaved4(d, at, q.x.v, q.y.v, q.z.v, q.w.v);
   return q;
 }
-HWY_INLINE void StoreQuats(Quat4 q, float* at, std::size_t left) {
+HWY_INLINE void StoreQuats(SoaQuat q, float* at, std::size_t left) {
   const FloatTag d;
   if (left >= hn::Lanes(d)) {
     hn::StoreInterleaved4(q.x.v, q.y.v, q.z.v, q.w.v, d, at);
@@ -253,16 +253,16 @@ HWY_INLINE void StoreBlocks(Tag d, hn::Vec<Tag> v, std::size_t first, std::size_
   }
 }
 template <typename Address>
-HWY_INLINE Quat4 GatherQuats(Address address) {
+HWY_INLINE SoaQuat GatherQuats(Address address) {
   const FloatTag d;
-  Quat4 q = {Float(LoadBlocks(d, 0, address)), Float(LoadBlocks(d, 1, address)),
+  SoaQuat q = {Float(LoadBlocks(d, 0, address)), Float(LoadBlocks(d, 1, address)),
              Float(LoadBlocks(d, 2, address)), Float(LoadBlocks(d, 3, address))};
   TransposeBlocks(q.x.v, q.y.v, q.z.v, q.w.v);
   return q;
 }
 // The way back, of the first `lanes`.
 template <typename Address>
-HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
+HWY_INLINE void ScatterQuats(SoaQuat q, std::size_t lanes, Address address) {
   const FloatTag d;
   TransposeBlocks(q.x.v, q.y.v, q.z.v, q.w.v);
   StoreBlocks(d, q.x.v, 0, lanes, address);
@@ -272,7 +272,7 @@ HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
 }
 #else
 template <typename Address>
-HWY_INLINE Quat4 GatherQuats(Address address) {
+HWY_INLINE SoaQuat GatherQuats(Address address) {
   const FloatTag d;
   HWY_ALIGN float buffer[4 * kBlock];
   for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
@@ -281,7 +281,7 @@ HWY_INLINE Quat4 GatherQuats(Address address) {
   return LoadQuats(buffer, kBlock);
 }
 template <typename Address>
-HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
+HWY_INLINE void ScatterQuats(SoaQuat q, std::size_t lanes, Address address) {
   HWY_ALIGN float buffer[4 * kBlock];
   StoreQuats(q, buffer, kBlock);
   for (std::size_t i = 0; i < lanes; ++i) {
@@ -289,7 +289,7 @@ HWY_INLINE void ScatterQuats(Quat4 q, std::size_t lanes, Address address) {
   }
 }
 #endif
-HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
+HWY_INLINE SoaVec3 LoadVectors(const float* at, std::size_t left) {
   const FloatTag d;
   HWY_ALIGN float buffer[3 * kBlock];
   if (left < hn::Lanes(d)) {
@@ -297,7 +297,7 @@ HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
     std::memcpy(buffer, at, left * 3 * sizeof(float));
     at = buffer;
   }
-  Vec3x v;
+  SoaVec3 v;
   hn::LoadInterleaved3(d, at, v.x.v, v.y.v, v.z.v);
   return v;
 }
@@ -305,21 +305,21 @@ HWY_INLINE Vec3x LoadVectors(const float* at, std::size_t left) {
 // Numbers of the first of a vector's lanes.
 HWY_INLINE Float LoadLanes(const float* at) { return Float(hn::LoadU(FloatTag(), at)); }
 HWY_INLINE void StoreLanes(Float value, float* at) { hn::StoreU(value.v, FloatTag(), at); }
-HWY_INLINE Vec3x LoadVec3(const float* at) {
+HWY_INLINE SoaVec3 LoadVec3(const float* at) {
   return {LoadLanes(at), LoadLanes(at + kBlock), LoadLanes(at + 2 * kBlock)};
 }
-HWY_INLINE Quat4 LoadQuat(const float* at) {
+HWY_INLINE SoaQuat LoadQuat(const float* at) {
   return {LoadLanes(at), LoadLanes(at + kBlock), LoadLanes(at + 2 * kBlock),
           LoadLanes(at + 3 * kBlock)};
 }
-HWY_INLINE void StoreQuat(Quat4 q, float* at) {
+HWY_INLINE void StoreQuat(SoaQuat q, float* at) {
   StoreLanes(q.x, at);
   StoreLanes(q.y, at + kBlock);
   StoreLanes(q.z, at + 2 * kBlock);
   StoreLanes(q.w, at + 3 * kBlock);
 }
 
-HWY_INLINE Vec3x XyzOf(Quat4 q) { return {q.x, q.y, q.z}; }
+HWY_INLINE SoaVec3 XyzOf(SoaQuat q) { return {q.x, q.y, q.z}; }
 
 // Sine and cosine with the operations of base/trig.cpp, in their order.
 HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cosine) {

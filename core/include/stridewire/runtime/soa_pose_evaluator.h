@@ -5,46 +5,46 @@
 #include <span>
 
 #include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/pose_lanes.h"
+#include "stridewire/runtime/soa_pose.h"
 
 namespace stridewire {
 
 /// Poses of one movement that follow each other. All that can be seen of a movement is settled when it begins, so a
 /// server need not come back to it for every tick: what a pose is made of is brought into the cache, blended and
 /// unpacked once for several of them.
-struct PoseStretch {
+struct SampleRun {
   const Movement* movement = nullptr;  ///< Its feet, if planted, packed (FootPlan::packed)
   double time_s = 0.0;                 ///< Of the first pose; clamped to the movement
   double step_s = 0.0;  ///< From one tick to the next; times are summed up tick by tick
   int ticks_apart = 1;  ///< From one pose to the next
 };
 
-/// Evaluates stretches, up to PoseLanes::kLanes side by side: EvaluateMovement's poses with the feet planted, the same
+/// Evaluates stretches, up to SoaPose::kLanes side by side: EvaluateMovement's poses with the feet planted, the same
 /// bytes whatever else is evaluated with them. Not thread-safe; allocates when it is made and never again.
 ///
 ///   evaluator.Begin(stretches, count);
 ///   for (int i = 0; i < count; ++i) Use(evaluator.Next());
-class StretchEvaluator {
+class SoaPoseEvaluator {
  public:
   /// `library` outlives it. `max_count`: poses of a stretch, at least 1.
-  StretchEvaluator(const MotionLibrary& library, int max_count);
-  ~StretchEvaluator();
-  StretchEvaluator(StretchEvaluator&&) noexcept;
-  StretchEvaluator& operator=(StretchEvaluator&&) noexcept;
+  SoaPoseEvaluator(const MotionLibrary& library, int max_count);
+  ~SoaPoseEvaluator();
+  SoaPoseEvaluator(SoaPoseEvaluator&&) noexcept;
+  SoaPoseEvaluator& operator=(SoaPoseEvaluator&&) noexcept;
 
   [[nodiscard]] int max_count() const;
 
   /// Whose `count` poses come next, at least one stretch; either all of them have their feet planted or none. What they
   /// point to lives until the last of them came.
-  void Begin(std::span<const PoseStretch> stretches, int count);
+  void Begin(std::span<const SampleRun> stretches, int count);
   /// The next pose of each stretch, in its lane. Other lanes mean nothing.
-  [[nodiscard]] const PoseLanes& Next();
+  [[nodiscard]] const SoaPose& Next();
 
-  /// Asks for the memory that is read of a movement: what StretchCount and StretchQueue::Add look at, then what Begin
+  /// Asks for the memory that is read of a movement: what SampleRunCount and EvaluationBatcher::Add look at, then what Begin
   /// does, and at last what lies elsewhere.
   static void PrefetchTimes(const Movement& movement);
   static void PrefetchPlaces(const Movement& movement);
-  static void Prefetch(const PoseStretch& stretch);
+  static void Prefetch(const SampleRun& stretch);
 
  private:
   struct Work;
@@ -59,6 +59,6 @@ struct PoseJob {
 };
 
 /// Single poses, as many side by side as there are lanes. Never allocates.
-void EvaluatePoses(StretchEvaluator& evaluator, std::span<const PoseJob> jobs);
+void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs);
 
 }  // namespace stridewire

@@ -7,7 +7,7 @@
 #define STRIDEWIRE_POSE_LANES_INL_H
 #endif
 
-#include "lanes-inl.h"
+#include "simd_math-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
@@ -40,7 +40,7 @@ void Transpose(const float* const* from, std::size_t count, std::size_t lanes, f
 void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     for (std::size_t j = 0; j < joint_count; ++j) {
-      const Quat4 q = LoadQuat(difference + j * 4 * kBlock + lane);
+      const SoaQuat q = LoadQuat(difference + j * 4 * kBlock + lane);
       const SlerpParts parts = SlerpPartsOf(q);
       StoreQuat({parts.half.x, parts.half.y, parts.half.z, parts.square},
                 ease + j * kEaseFloats * kBlock + lane);
@@ -53,7 +53,7 @@ void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lan
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     Float most = 0.0f;
     for (std::size_t j = 0; j < joint_count; ++j) {
-      const Vec3x v = LoadVec3(velocity + j * 3 * kBlock + lane);
+      const SoaVec3 v = LoadVec3(velocity + j * 3 * kBlock + lane);
       most = Max(most, Dot(v, v));
     }
     StoreLanes(most, fastest + lane);
@@ -69,13 +69,13 @@ struct Easing {
   Float fraction, half_s;
 };
 
-HWY_INLINE Quat4 Ease(Quat4 q, const Easing& easing, const LaneBlend& blend, std::size_t joint,
+HWY_INLINE SoaQuat Ease(SoaQuat q, const Easing& easing, const LaneBlend& blend, std::size_t joint,
                       std::size_t lane) {
-  const Quat4 ease = LoadQuat(blend.ease + joint * kEaseFloats * kBlock + lane);
-  Quat4 eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, easing.fraction));
+  const SoaQuat ease = LoadQuat(blend.ease + joint * kEaseFloats * kBlock + lane);
+  SoaQuat eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, easing.fraction));
   if (easing.is_any_inertial) {
-    const Vec3x along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * easing.half_s;
-    const Quat4 along_it = Multiply(eased, {along.x, along.y, along.z, Float(1.0f)});
+    const SoaVec3 along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * easing.half_s;
+    const SoaQuat along_it = Multiply(eased, {along.x, along.y, along.z, Float(1.0f)});
     if (easing.are_all) return along_it;
     eased = Select(easing.is_inertial, along_it, eased);
   }
@@ -143,16 +143,16 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
       shortest = shortest * (Float(1.0f) + along);
     }
     Float least = shortest;
-    const auto make_unit = [&](Quat4 q, float* unit) HWY_ATTR {
+    const auto make_unit = [&](SoaQuat q, float* unit) HWY_ATTR {
       const Float square = Dot(q, q);
       least = Float(hn::Min(square.v, least.v));
       StoreQuat(UnitOf(q, square), unit);
     };
     // A rotation is made unit while the next is blended: each waits long for what it is made of.
-    Quat4 last = {half, half, half, half};
+    SoaQuat last = {half, half, half, half};
     float* to = rotations + lane;
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
-      Quat4 q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
+      SoaQuat q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
       // Lengths multiply: one division at the end serves all.
       if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
       if (joint > 0) {
@@ -169,11 +169,11 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
     HWY_ALIGN float sines[kBlock];
     HWY_ALIGN float cosines[kBlock];
     PlaceRoots(blend, local, lane, root_m, sines, cosines);
-    const Quat4 turn = {Float(0.0f), LoadLanes(sines), Float(0.0f), LoadLanes(cosines)};
+    const SoaQuat turn = {Float(0.0f), LoadLanes(sines), Float(0.0f), LoadLanes(cosines)};
     StoreQuat(Multiply(turn, LoadQuat(rotations + lane)), rotations + lane);
     if (!easing.is_any) continue;
-    const Vec3x root = LoadVec3(root_m + lane);
-    Vec3x eased = root + LoadVec3(blend.root_ease_m + lane) * easing.fraction;
+    const SoaVec3 root = LoadVec3(root_m + lane);
+    SoaVec3 eased = root + LoadVec3(blend.root_ease_m + lane) * easing.fraction;
     if (easing.is_any_inertial) {
       eased = Select(easing.is_inertial,
                      eased + LoadVec3(blend.root_ease_m_s + lane) * LoadLanes(blend.slope_s + lane),
