@@ -46,7 +46,7 @@ void Avatar::Teleport(const BaseFrame& start) {
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
   closing_steps_ = 0;
   body_.blended_pose = body_.pose;
-  moved_until_s_ = quiet_until_s_ = -1.0;
+  moved_until_s_ = next_event_s_ = -1.0;
   body_.plants_feet = foot_planting();
   body_.begins_planting = false;
   if (body_.plants_feet) {
@@ -83,7 +83,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
   const double held_until_s = hold_until_s_;
   if (request.takeover != Takeover::kNone) {
     CancelQueue();
-    quiet_until_s_ = -1.0;
+    next_event_s_ = -1.0;
     takes_over_ = request.takeover == Takeover::kNow && is_moving_ &&
                   !std::holds_alternative<StandRequest>(request.movement);
     if (is_in_stand_) stand_left_s_ = 0.0;
@@ -109,7 +109,7 @@ Status Avatar::SetLayer(const LayerRequest& request) {
   if (Status status = body_.layers.Set(*body_.library, request); !status) return status;
   body_.layered_pose.rotations.resize(body_.pose.rotations.size());
   next_change_.has_layers = true;
-  quiet_until_s_ = -1.0;
+  next_event_s_ = -1.0;
   return {};
 }
 
@@ -157,12 +157,12 @@ void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
   if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
-    if (i + 2 * kAhead < avatars.size()) avatars[i + 2 * kAhead]->PrefetchQuiet();
-    if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysQuiet(dt_s)) {
+    if (i + 2 * kAhead < avatars.size()) avatars[i + 2 * kAhead]->PrefetchTickState();
+    if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysEventFree(dt_s)) {
       avatars[i + kAhead]->PrefetchState();
     }
     avatars[i]->AdvanceState(dt_s);
-    if (eventful != nullptr && !avatars[i]->is_quiet()) {
+    if (eventful != nullptr && !avatars[i]->is_event_free()) {
       eventful->push_back(static_cast<std::uint32_t>(i));
     }
   }
@@ -202,21 +202,21 @@ void Avatar::PrefetchState() const {
 // All of Advance but the pose at its end.
 void Avatar::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
-  if (StaysQuiet(dt_s)) {
+  if (StaysEventFree(dt_s)) {
     movement_time_s_ += dt_s;
     time_s_ += dt_s;
     return;
   }
   AdvanceEventfully(dt_s);
   body_.layers.Advance(*body_.library, dt_s);
-  quiet_until_s_ = QuietUntil();
+  next_event_s_ = NextEventTime();
 }
 
 // From an Advance on in which nothing happened.
-double Avatar::QuietUntil() const {
-  const bool is_quiet = is_moving_ && !takes_over_ && body_.layers.empty() && events_.empty() &&
+double Avatar::NextEventTime() const {
+  const bool is_event_free = is_moving_ && !takes_over_ && body_.layers.empty() && events_.empty() &&
                         change_ == AvatarChange{};
-  if (!is_quiet) return -1.0;
+  if (!is_event_free) return -1.0;
   const double strike_s = StrikeTime();
   return movement_time_s_ < strike_s ? std::min(strike_s, body_.movement.duration_s())
                                      : body_.movement.duration_s();

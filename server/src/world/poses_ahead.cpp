@@ -129,7 +129,7 @@ std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t course) const
 
 void PosesAhead::Ask(Place& place, Avatar& avatar) {
   // Layers go on by themselves, whatever the avatar does.
-  const bool has_layers = !avatar.is_quiet() && !avatar.layers().empty();
+  const bool has_layers = !avatar.is_event_free() && !avatar.layers().empty();
   if (!has_layers && Has(place, avatar.course())) return;
   if (const Movement* movement = avatar.movement(); movement != nullptr && !has_layers) {
     Want(place, avatar.course(), *movement, avatar.movement_time_s());

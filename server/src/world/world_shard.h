@@ -91,7 +91,7 @@ class WorldShard {
   };
   // What Encode reads of who is quiet.
   static void Prefetch(const Entry& entry) {
-    entry.avatar.PrefetchQuiet();
+    entry.avatar.PrefetchTickState();
     PrefetchBytes(&entry.spawn_tick, sizeof(entry.spawn_tick) + sizeof(entry.ahead));
   }
   struct InOrder {

@@ -183,9 +183,9 @@ class Avatar {
   [[nodiscard]] std::uint64_t course() const { return course_; }
   /// Moving without layers, and nothing has happened in the last Advance: events() and change() tell nothing. Of who is
   /// quiet, time_s(), course(), movement_time_s() and idle() lie in one cache line.
-  [[nodiscard]] bool is_quiet() const { return movement_time_s_ < quiet_until_s_; }
+  [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// For who asks many: that line is read soon.
-  void PrefetchQuiet() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
+  void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
   /// The kStarted event of the movement or requested stand under way, null while just standing.
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
@@ -205,10 +205,10 @@ class Avatar {
   [[nodiscard]] FootState MeasureFeet() const;
   void AdvanceState(double dt_s);
   // Nothing happens in an Advance: it moves time only.
-  [[nodiscard]] bool StaysQuiet(double dt_s) const {
-    return movement_time_s_ + dt_s < quiet_until_s_;
+  [[nodiscard]] bool StaysEventFree(double dt_s) const {
+    return movement_time_s_ + dt_s < next_event_s_;
   }
-  [[nodiscard]] double QuietUntil() const;
+  [[nodiscard]] double NextEventTime() const;
   void AdvanceEventfully(double dt_s);
   void PrefetchState() const;
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
@@ -245,7 +245,7 @@ class Avatar {
   // All that an uneventful tick asks, in one cache line.
   alignas(kCacheLineBytes) double time_s_ = 0.0;  // avatar time
   double movement_time_s_ = 0.0;
-  double quiet_until_s_ = -1.0;  // movement time; until then nothing happens
+  double next_event_s_ = -1.0;  // movement time; until then nothing happens
   std::uint64_t course_ = 0;
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;

@@ -279,7 +279,7 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
 TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
   const auto library = OpenLibrary("builtin").value();
   Avatar avatar(library, {});
-  EXPECT_FALSE(avatar.is_quiet());
+  EXPECT_FALSE(avatar.is_event_free());
   for (int i = 0; i < 4; ++i)
     ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{.length_m = 0.5}}));
   int quiet = 0;
@@ -291,8 +291,8 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
     const double time_s = avatar.time_s();
     Avatar::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
     EXPECT_EQ(avatar.time_s(), time_s + 1.0 / 60.0);
-    EXPECT_EQ(places.empty(), avatar.is_quiet());
-    if (!avatar.is_quiet()) {
+    EXPECT_EQ(places.empty(), avatar.is_event_free());
+    if (!avatar.is_event_free()) {
       eventful += !avatar.events().empty();
       return;
     }
@@ -305,8 +305,8 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
     EXPECT_FALSE(avatar.idle());
   };
   const auto walk_on = [&] {
-    for (int tick = 0; tick < 60 && !avatar.is_quiet(); ++tick) advance();
-    EXPECT_TRUE(avatar.is_quiet());
+    for (int tick = 0; tick < 60 && !avatar.is_event_free(); ++tick) advance();
+    EXPECT_TRUE(avatar.is_event_free());
   };
   for (int tick = 0; tick < 100; ++tick) advance();
   EXPECT_GT(quiet, 60);
@@ -314,15 +314,15 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
 
   walk_on();
   ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}, .takeover = Takeover::kNow}));
-  EXPECT_FALSE(avatar.is_quiet());
+  EXPECT_FALSE(avatar.is_event_free());
   ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}}));
   walk_on();
   ASSERT_TRUE(avatar.SetLayer({.layer = 0}));
-  EXPECT_FALSE(avatar.is_quiet());
+  EXPECT_FALSE(avatar.is_event_free());
   advance();
-  EXPECT_FALSE(avatar.is_quiet());
+  EXPECT_FALSE(avatar.is_event_free());
   avatar.Teleport({});
-  EXPECT_FALSE(avatar.is_quiet());
+  EXPECT_FALSE(avatar.is_event_free());
 }
 
 }  // namespace
