@@ -35,7 +35,7 @@ class Steps {
     double time_s;
     double duration_s;
     std::uint32_t number;
-    std::uint32_t course = 1;
+    std::uint32_t revision = 1;
   };
 
   Steps(const Library& library, int count, bool plants_feet) {
@@ -71,7 +71,7 @@ class Steps {
       walker.time_s += kTickS;
       if (walker.time_s > walker.duration_s) {
         walker.time_s -= walker.duration_s;
-        ++walker.course;
+        ++walker.revision;
       }
     }
   }
@@ -96,7 +96,7 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   Steps steps(library, count, plants_feet);
   const auto turns = static_cast<int>(server::PosesAhead::TurnsOf(steps.walkers().size()));
   struct Ahead {
-    std::uint32_t course = 0;
+    std::uint32_t revision = 0;
     int left = 0;
   };
   std::vector<Ahead> ahead(steps.walkers().size());
@@ -109,14 +109,14 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
     steps.Advance();
     for (const Steps::Walker& walker : steps.walkers()) {
       Ahead& poses = ahead[walker.number];
-      if (poses.course == walker.course && --poses.left > 0) continue;
+      if (poses.revision == walker.revision && --poses.left > 0) continue;
       SoaPoseEvaluator::PrefetchTimes(*walker.movement);
       due.push_back(&walker);
     }
     for (const Steps::Walker* walker : due) {
       const int most = turns - static_cast<int>(tick + walker->number) % turns;
       const int wanted = SampleRunCount(*walker->movement, walker->time_s, kTickS, 1, most);
-      ahead[walker->number] = {walker->course, wanted};
+      ahead[walker->number] = {walker->revision, wanted};
       queue.Add({walker->movement, walker->time_s, kTickS}, wanted, walker->number);
     }
     due.clear();
@@ -159,8 +159,8 @@ void WholePose(benchmark::State& state, const Library& library) {
     steps.Advance();
     ahead.Begin(info.tick, kTickS, kept.size());
     for (const Steps::Walker& walker : steps.walkers()) {
-      if (ahead.Has(kept[walker.number], walker.course)) continue;
-      ahead.Want(kept[walker.number], walker.course, *walker.movement, walker.time_s);
+      if (ahead.Has(kept[walker.number], walker.revision)) continue;
+      ahead.Want(kept[walker.number], walker.revision, *walker.movement, walker.time_s);
     }
     ahead.Finish();
     Status status = rows.Begin(info, avatars, codecs.Find(kMode));

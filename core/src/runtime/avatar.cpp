@@ -37,7 +37,7 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
 
 void Avatar::Teleport(const BaseFrame& start) {
   base_ = start;
-  ++course_;
+  ++revision_;
   const Pose& stand = body_.library->stand_pose();
   body_.pose = stand;
   body_.pose.root_position_m =
@@ -456,7 +456,7 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
 
-  ++course_;
+  ++revision_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;
@@ -497,7 +497,7 @@ void Avatar::FinishMovement(double at_s) {
   KeepJoin(at_s);
   Leave(at_s, false);
   movement_time_s_ = at_s;
-  ++course_;
+  ++revision_;
   // Without planting the base is the root's own and rises by what the library says.
   const BaseFrame before = base_;
   base_ = BaseAfter(body_.movement, body_.pose);

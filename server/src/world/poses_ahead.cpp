@@ -105,11 +105,11 @@ void PosesAhead::MakePlace(Place& place) {
   free_.pop_back();
 }
 
-void PosesAhead::Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays) {
+void PosesAhead::Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays) {
   Kept& kept = kept_[place];
   if (kept.is_any_other) others_.erase(place);
   kept = {.first_step = step_,
-          .course = static_cast<std::uint32_t>(course),
+          .revision = static_cast<std::uint32_t>(revision),
           .layout = layout_,
           .count = static_cast<std::uint8_t>(count),
           .first_plane = plane_,
@@ -118,10 +118,10 @@ void PosesAhead::Start(std::uint32_t place, std::uint64_t course, std::size_t co
 }
 
 // Who is sent elsewhere again and again makes few poses in vain.
-std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t course) const {
+std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t revision) const {
   constexpr std::uint8_t kMostCuts = 3;
   if (kept.layout != layout_ || kept.stays || kept.count == 0) return kept.cuts;
-  if (kept.course != static_cast<std::uint32_t>(course) && PoseOf(kept) < kept.count) {
+  if (kept.revision != static_cast<std::uint32_t>(revision) && PoseOf(kept) < kept.count) {
     return std::min<std::uint8_t>(kept.cuts + 1, kMostCuts);
   }
   return kept.cuts > 0 ? kept.cuts - 1 : 0;
@@ -130,28 +130,28 @@ std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t course) const
 void PosesAhead::Ask(Place& place, Avatar& avatar) {
   // Layers go on by themselves, whatever the avatar does.
   const bool has_layers = !avatar.is_event_free() && !avatar.layers().empty();
-  if (!has_layers && Has(place, avatar.course())) return;
+  if (!has_layers && Has(place, avatar.revision())) return;
   if (const Movement* movement = avatar.movement(); movement != nullptr && !has_layers) {
-    Want(place, avatar.course(), *movement, avatar.movement_time_s());
+    Want(place, avatar.revision(), *movement, avatar.movement_time_s());
     return;
   }
   avatar.ShowPose();
-  Take(place, avatar.course(), avatar.pose(), !has_layers);
+  Take(place, avatar.revision(), avatar.pose(), !has_layers);
 }
 
-void PosesAhead::Want(Place& place, std::uint64_t course, const Movement& movement, double time_s) {
+void PosesAhead::Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s) {
   MakePlace(place);
   Kept& kept = kept_[place.index_];
-  kept.cuts = CutsAfter(kept, course);
-  kept.course = static_cast<std::uint32_t>(course);
+  kept.cuts = CutsAfter(kept, revision);
+  kept.revision = static_cast<std::uint32_t>(revision);
   kept.count = 0;
   SoaPoseEvaluator::PrefetchTimes(movement);
   wanted_.push_back({place.index_, 0, {&movement, time_s, step_s_, ticks_apart_}, false});
 }
 
-void PosesAhead::Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays) {
+void PosesAhead::Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays) {
   MakePlace(place);
-  Start(place.index_, course, 1, stays);
+  Start(place.index_, revision, 1, stays);
   scratch_->taken.Set(taken_count_, pose);
   taken_for_[taken_count_++] = place.index_;
   if (taken_count_ == kLanes) KeepTaken();
@@ -180,7 +180,7 @@ void PosesAhead::Finish() {
   const bool is_crowd_new = poses > 2 * shown_ + kLanes * kMost;
   for (Wanted& wanted : wanted_) {
     if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
-    Start(wanted.place, kept_[wanted.place].course, static_cast<std::size_t>(wanted.count), false);
+    Start(wanted.place, kept_[wanted.place].revision, static_cast<std::size_t>(wanted.count), false);
     scratch_->queue.Add(wanted.stretch, wanted.count, wanted.place);
   }
   wanted_.clear();

@@ -94,16 +94,16 @@ class PosesAhead {
 
   // What Ask does, for who has no avatar.
   /// Poses of this step are there already.
-  [[nodiscard]] bool Has(const Place& place, std::uint64_t course) const {
+  [[nodiscard]] bool Has(const Place& place, std::uint64_t revision) const {
     if (place.of_ == nullptr) return false;
     const Kept& kept = kept_[place.index_];
-    return kept.course == static_cast<std::uint32_t>(course) && kept.layout == layout_ &&
+    return kept.revision == static_cast<std::uint32_t>(revision) && kept.layout == layout_ &&
            (kept.stays || PoseOf(kept) < kept.count);
   }
   /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where it is until Finish.
-  void Want(Place& place, std::uint64_t course, const Movement& movement, double time_s);
+  void Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s);
   /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at any more.
-  void Take(Place& place, std::uint64_t course, ConstPoseSpan pose, bool stays);
+  void Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays);
 
   /// Now they are there.
   void Finish();
@@ -136,7 +136,7 @@ class PosesAhead {
   // What every tick asks of the poses of one place.
   struct Kept {
     std::uint64_t first_step = 0;  // of the world
-    std::uint32_t course = 0;      // they follow from, the low bits
+    std::uint32_t revision = 0;      // they follow from, the low bits
     std::uint16_t layout = 0;      // 0: nothing is kept
     std::uint8_t count = 0;
     std::uint8_t first_plane : 4 = 0;
@@ -181,8 +181,8 @@ class PosesAhead {
   // Room for all places in the planes that are used, no more.
   void SizePlanes();
   void MakePlace(Place& place);
-  [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t course) const;
-  void Start(std::uint32_t place, std::uint64_t course, std::size_t count, bool stays);
+  [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t revision) const;
+  void Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays);
   void KeepTaken();
   // Encodes poses side by side and keeps them; of kNobody nothing is kept.
   static constexpr std::uint32_t kNobody = ~0u;

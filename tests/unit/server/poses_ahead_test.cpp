@@ -76,7 +76,7 @@ class Ahead {
     for (std::size_t i = 0; i < kCrowd; ++i) {
       const Avatar& avatar = told_.avatars()[i];
       found_ += avatar.layers().empty() && avatar.movement() != nullptr &&
-                poses_.Has(places_[i], avatar.course());
+                poses_.Has(places_[i], avatar.revision());
       poses_.Ask(places_[i], told_.avatars()[i]);
     }
     poses_.Finish();
@@ -113,7 +113,7 @@ class Ahead {
     std::uint64_t steps = 0;
     const auto is_kept = [&](std::size_t i) {
       return told_.avatars()[i].movement() != nullptr &&
-             poses_.Has(places_[i], told_.avatars()[i].course());
+             poses_.Has(places_[i], told_.avatars()[i].revision());
     };
     bool is_any = true;
     for (; is_any; ++steps) {
@@ -272,12 +272,12 @@ std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
   PosesAhead::Place place;
   std::uint64_t evaluated = 0;
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
-    const std::uint64_t course = 1 + tick / ticks_of_a_course;
+    const std::uint64_t revision = 1 + tick / ticks_of_a_course;
     poses.Begin(tick, kTickS, kShown);
-    if (poses.Has(place, course)) continue;
-    poses.Want(place, course, *avatar.movement(), avatar.movement_time_s());
+    if (poses.Has(place, revision)) continue;
+    poses.Want(place, revision, *avatar.movement(), avatar.movement_time_s());
     poses.Finish();
-    for (std::uint64_t ahead = 0; poses.Has(place, course); ++ahead, ++evaluated) {
+    for (std::uint64_t ahead = 0; poses.Has(place, revision); ++ahead, ++evaluated) {
       poses.Begin(tick + ahead + 1, kTickS, kShown);
     }
   }

@@ -180,9 +180,9 @@ class Avatar {
   [[nodiscard]] double time_s() const { return time_s_; }
   /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as it stays, all that is
   /// displayed but layers follows from movement() and its time, or stands still.
-  [[nodiscard]] std::uint64_t course() const { return course_; }
+  [[nodiscard]] std::uint64_t revision() const { return revision_; }
   /// Moving without layers, and nothing has happened in the last Advance: events() and change() tell nothing. Of who is
-  /// quiet, time_s(), course(), movement_time_s() and idle() lie in one cache line.
+  /// quiet, time_s(), revision(), movement_time_s() and idle() lie in one cache line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// For who asks many: that line is read soon.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
@@ -246,7 +246,7 @@ class Avatar {
   alignas(kCacheLineBytes) double time_s_ = 0.0;  // avatar time
   double movement_time_s_ = 0.0;
   double next_event_s_ = -1.0;  // movement time; until then nothing happens
-  std::uint64_t course_ = 0;
+  std::uint64_t revision_ = 0;
   // One of: a movement under way, a requested stand, or just standing.
   bool is_moving_ = false;
   bool is_in_stand_ = false;

@@ -287,7 +287,7 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
   const auto advance = [&] {
     Avatar* const one = &avatar;
     std::vector<std::uint32_t> places{7};
-    const std::uint64_t course = avatar.course();
+    const std::uint64_t revision = avatar.revision();
     const double time_s = avatar.time_s();
     Avatar::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
     EXPECT_EQ(avatar.time_s(), time_s + 1.0 / 60.0);
@@ -299,7 +299,7 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
     ++quiet;
     EXPECT_TRUE(avatar.events().empty());
     EXPECT_EQ(avatar.change(), AvatarChange{});
-    EXPECT_EQ(avatar.course(), course);
+    EXPECT_EQ(avatar.revision(), revision);
     EXPECT_NE(avatar.movement(), nullptr);
     EXPECT_TRUE(avatar.layers().empty());
     EXPECT_FALSE(avatar.idle());
