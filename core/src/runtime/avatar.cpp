@@ -307,17 +307,17 @@ bool Avatar::StartNext() {
     AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
     return true;
   }
-  StartOnTheWay();
+  StartTransitionPath();
   return true;
 }
 
 // The step or jump at the queue's head, or a step that has to go before it.
-void Avatar::StartOnTheWay() {
+void Avatar::StartTransitionPath() {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue saw to it that the library has the kind
-  const Way way =
-      FindWay(*body_.library, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
+  const TransitionPath way =
+      FindTransitionPath(*body_.library, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
   if (way.is_inserted) {
     StartInserted(*way.plan);
   } else if (way.plan) {
@@ -328,7 +328,7 @@ void Avatar::StartOnTheWay() {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
               .base = base_,
-              .reason = NoWayReason(group().kind, body_.library->group(direct->group).kind)});
+              .reason = NoPathReason(group().kind, body_.library->group(direct->group).kind)});
   }
 }
 

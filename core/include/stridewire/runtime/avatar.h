@@ -19,7 +19,7 @@
 #include "stridewire/runtime/soa_pose_evaluator.h"
 #include "stridewire/runtime/request_plan.h"
 #include "stridewire/runtime/walk_planner.h"
-#include "stridewire/runtime/way_planner.h"
+#include "stridewire/runtime/transition_path.h"
 
 namespace stridewire {
 
@@ -214,7 +214,7 @@ class Avatar {
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
   void GoOnWalking();
-  void StartOnTheWay();
+  void StartTransitionPath();
   void StartInserted(const RequestPlan& plan);
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;

@@ -27,7 +27,7 @@ struct Stance {
 };
 
 /// What comes next on the way to a step or jump: the movement asked for, or a step that has to go before it.
-struct Way {
+struct TransitionPath {
   std::optional<RequestPlan> plan;  ///< Empty: there is no way
   bool is_inserted = false;
 };
@@ -43,10 +43,10 @@ struct Way {
 /// - Footprints are met as they are, by the foot that they are for.
 ///
 /// Searched in breadth: at most 14 calls of PlanStep and 14 more for the request. Never allocates.
-[[nodiscard]] Way FindWay(const MotionLibrary& library, const MovementRequest& request,
+[[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
                           const std::optional<RequestPlan>& direct, const Stance& stance);
 
 /// Why there is none: "no way leads from step_left to jump in this library". Static storage.
-[[nodiscard]] const char* NoWayReason(MovementKind from, MovementKind to);
+[[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire

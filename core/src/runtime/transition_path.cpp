@@ -1,4 +1,4 @@
-#include "stridewire/runtime/way_planner.h"
+#include "stridewire/runtime/transition_path.h"
 
 #include <algorithm>
 #include <array>
@@ -22,18 +22,18 @@ constexpr double kMaxStartMissM = 0.25;
 constexpr double kWorthAStepM = 0.25;
 constexpr double kWorthClosingM = 0.03;
 
-class WayFinder {
+class TransitionPathFinder {
  public:
-  WayFinder(const MotionLibrary& library, const MovementRequest& request)
+  TransitionPathFinder(const MotionLibrary& library, const MovementRequest& request)
       : library_(library),
         stand_{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)},
         step_(std::get_if<StepRequest>(&request.movement)),
         jump_(std::get_if<JumpRequest>(&request.movement)) {}
 
-  [[nodiscard]] Way Find(const std::optional<RequestPlan>& direct, const Stance& stance) const {
+  [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct, const Stance& stance) const {
     if (step_ != nullptr && step_->at) return {direct};
     const bool can_begin = direct && CanBegin(*direct, stance);
-    const Way as_it_is{can_begin ? direct : std::nullopt};
+    const TransitionPath as_it_is{can_begin ? direct : std::nullopt};
     if (can_begin && !BeginsWithFeetApart(*direct, stance)) return as_it_is;
     // What can begin may be made better by one step; what cannot takes as many as it needs.
     const double most_cost_m = can_begin ? WorthAStepM(CostM(*direct, stance)) : HUGE_VAL;
@@ -135,12 +135,12 @@ bool AreFeetApart(const FootState& feet, const FootState& stand) {
   return std::fabs(apart.z) > kFeetApartForwardM || std::fabs(apart.x) > kFeetApartAsideM;
 }
 
-Way FindWay(const MotionLibrary& library, const MovementRequest& request,
+TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
             const std::optional<RequestPlan>& direct, const Stance& stance) {
-  return WayFinder(library, request).Find(direct, stance);
+  return TransitionPathFinder(library, request).Find(direct, stance);
 }
 
-const char* NoWayReason(MovementKind from, MovementKind to) {
+const char* NoPathReason(MovementKind from, MovementKind to) {
   static constexpr std::array<std::array<const char*, 3>, 3> kReasons{
       {{"no way leads from step_left to step_left in this library",
         "no way leads from step_left to step_right in this library",
