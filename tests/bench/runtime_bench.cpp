@@ -221,7 +221,7 @@ void PlanWalkSteps(benchmark::State& state, const Library& library, bool is_roug
     WalkRequest walk;
     WalkStance stance;
   };
-  const WalkGait& gait = library->walk_gait();
+  const LocomotionProfile& gait = library->locomotion_profile();
   std::mt19937 random(1);
   const auto draw = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(random() % 1000) / 1000.0;

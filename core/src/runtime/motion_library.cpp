@@ -540,7 +540,7 @@ Status MotionLibrary::Load() {
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
   }
-  walk_gait_ = MakeWalkGait(*this);
+  locomotion_profile_ = MakeLocomotionProfile(*this);
   if (const auto* from = root.transitions()) {
     std::vector<Transition> transitions;
     for (const fb::Transition* t : *from) {

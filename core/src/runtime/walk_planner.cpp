@@ -5,7 +5,7 @@
 
 #include "stridewire/base/trig.h"
 #include "stridewire/runtime/foot_planner.h"
-#include "walk_course.h"
+#include "walk_steering.h"
 
 namespace stridewire {
 namespace {
@@ -63,7 +63,7 @@ constexpr double kMetresPerRadianLeft = 0.3;
 class StepPlanner {
  public:
   StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance)
-      : library_(library), gait_(library.walk_gait()), terrain_(terrain), stance_(stance) {}
+      : library_(library), gait_(library.locomotion_profile()), terrain_(terrain), stance_(stance) {}
 
   void Begin(bool is_strict) {
     is_strict_ = is_strict;
@@ -98,7 +98,7 @@ class StepPlanner {
   }
 
   // Whether both feet can stand as the goal has them.
-  bool GoalIsGood(const WalkCourse& course) {
+  bool GoalIsGood(const WalkSteering& course) {
     double heights_m[2];
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const Footprint print = OnGround(course.GoalPrint(foot));
@@ -190,7 +190,7 @@ class StepPlanner {
   }
 
   const MotionLibrary& library_;
-  const WalkGait& gait_;
+  const LocomotionProfile& gait_;
   const Terrain* terrain_;
   const WalkStance& stance_;
   Foot moving_ = Foot::kLeft;
@@ -214,7 +214,7 @@ WalkDecision Refuse(const char* reason) {
 WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                           const WalkRequest& walk, const WalkStance& stance,
                           WalkProgress& progress) {
-  WalkCourse course(library.walk_gait(), walk, stance);
+  WalkSteering course(library.locomotion_profile(), walk, stance);
   course.PassWaypoints(progress.next_waypoint);
   const double there_m = stance.is_exact ? kThereM : kRoughlyThereM;
   const double there_rad = stance.is_exact ? kThereRad : kRoughlyThereRad;

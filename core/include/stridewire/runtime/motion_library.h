@@ -16,7 +16,7 @@
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
 #include "stridewire/runtime/transition.h"
-#include "stridewire/runtime/walk_gait.h"
+#include "stridewire/runtime/locomotion_profile.h"
 
 namespace stridewire {
 
@@ -186,7 +186,7 @@ class MotionLibrary {
   /// The skeleton's legs, for planting.
   [[nodiscard]] const LegRig& leg_rig() const { return leg_rig_; }
   /// How its examples walk, for walks to a place.
-  [[nodiscard]] const WalkGait& walk_gait() const { return walk_gait_; }
+  [[nodiscard]] const LocomotionProfile& locomotion_profile() const { return locomotion_profile_; }
   /// 32 lower-case hex digits: XXH3-128 of the payload.
   [[nodiscard]] const std::string& hash() const { return hash_; }
   /// The whole file, header included: what `Open` read and what may be written elsewhere.
@@ -206,7 +206,7 @@ class MotionLibrary {
   std::vector<Transition> transitions_;
   Pose stand_pose_;
   LegRig leg_rig_;
-  WalkGait walk_gait_;
+  LocomotionProfile locomotion_profile_;
   std::string hash_;
   int max_example_count_ = 0;
   std::span<const std::byte> bytes_;  // mapped or allocated, 64-byte aligned

@@ -1,4 +1,4 @@
-#include "walk_course.h"
+#include "walk_steering.h"
 
 #include <algorithm>
 #include <cmath>
@@ -58,20 +58,20 @@ double TurnWithin(double turn_rad, Foot moving, const TurnLimits& limits) {
 
 }  // namespace
 
-WalkCourse::WalkCourse(const WalkGait& gait, const WalkRequest& walk, const WalkStance& stance)
+WalkSteering::WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance)
     : gait_(gait), walk_(walk), stance_(stance) {
   goal_.position_m = walk.position_m;
   goal_.heading_rad = UnwrapAngle(walk.heading_rad, stance.heading_rad);
 }
 
-DVec3 WalkCourse::FootOffset(Foot foot, double width_m) const {
+DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
   const DVec3 left = gait_.stand_feet_m[0];
   const DVec3 right = gait_.stand_feet_m[1];
   return {0.5 * (left.x + right.x) + 0.5 * Outward(foot) * width_m, 0.0,
           foot == Foot::kLeft ? left.z : right.z};
 }
 
-WalkCourse::Body WalkCourse::BodyOver(Foot fixed) const {
+WalkSteering::Body WalkSteering::BodyOver(Foot fixed) const {
   const DVec3 apart =
       RotateYaw(-stance_.heading_rad, At(fixed).position_m - At(OtherFoot(fixed)).position_m);
   const double width_m =
@@ -83,29 +83,29 @@ WalkCourse::Body WalkCourse::BodyOver(Foot fixed) const {
   return body;
 }
 
-WalkCourse::Body WalkCourse::BodyNow() const {
+WalkSteering::Body WalkSteering::BodyNow() const {
   const Body left = BodyOver(Foot::kLeft);
   const Body right = BodyOver(Foot::kRight);
   return {0.5 * (left.position_m + right.position_m), stance_.heading_rad};
 }
 
-Footprint WalkCourse::GoalPrint(Foot foot) const {
+Footprint WalkSteering::GoalPrint(Foot foot) const {
   return {goal_.position_m + RotateYaw(goal_.heading_rad, FootOffset(foot, gait_.stand_m)),
           goal_.heading_rad};
 }
 
-bool WalkCourse::IsAtGoal(Foot foot, double within_m, double within_rad) const {
+bool WalkSteering::IsAtGoal(Foot foot, double within_m, double within_rad) const {
   const Footprint goal = GoalPrint(foot);
   return Length(At(foot).position_m - goal.position_m) <= within_m &&
          std::fabs(WrapAngle(At(foot).heading_rad - goal.heading_rad)) <= within_rad;
 }
 
-bool WalkCourse::IsThere(double within_m, double within_rad) const {
+bool WalkSteering::IsThere(double within_m, double within_rad) const {
   return IsAtGoal(Foot::kLeft, within_m, within_rad) &&
          IsAtGoal(Foot::kRight, within_m, within_rad);
 }
 
-void WalkCourse::PassWaypoints(std::size_t& next) const {
+void WalkSteering::PassWaypoints(std::size_t& next) const {
   const Body body = BodyNow();
   while (next < walk_.waypoints_m.size() &&
          Length(walk_.waypoints_m[next] - body.position_m) <= kPassWaypointM) {
@@ -113,7 +113,7 @@ void WalkCourse::PassWaypoints(std::size_t& next) const {
   }
 }
 
-double WalkCourse::LeftM(std::size_t next_waypoint) const {
+double WalkSteering::LeftM(std::size_t next_waypoint) const {
   double left_m = 0.0;
   DVec3 from = BodyNow().position_m;
   for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
@@ -123,17 +123,17 @@ double WalkCourse::LeftM(std::size_t next_waypoint) const {
   return left_m + Length(goal_.position_m - from);
 }
 
-double WalkCourse::LeftRad() const {
+double WalkSteering::LeftRad() const {
   return std::fabs(WrapAngle(goal_.heading_rad - stance_.heading_rad));
 }
 
-double WalkCourse::StepM() const {
+double WalkSteering::StepM() const {
   if (!walk_.speed_m_s) return gait_.step_m;
   const double step_s = stance_.last_step_s > 0.0 ? stance_.last_step_s : kFirstStepS;
   return std::clamp(*walk_.speed_m_s * step_s, kShortestStepM, gait_.longest_m);
 }
 
-double WalkCourse::Bearing(const Body& body, std::size_t next_waypoint) const {
+double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const {
   if (next_waypoint < walk_.waypoints_m.size()) {
     return HeadingTo(walk_.waypoints_m[next_waypoint] - body.position_m);
   }
@@ -148,7 +148,7 @@ double WalkCourse::Bearing(const Body& body, std::size_t next_waypoint) const {
 }
 
 // Whether stepping aside or backward, or turning on the spot, takes fewer steps than walking there.
-bool WalkCourse::Shifts(const Body& body, bool is_last_leg) const {
+bool WalkSteering::Shifts(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = goal_.position_m - body.position_m;
   const double left_m = Length(way);
@@ -170,7 +170,7 @@ bool WalkCourse::Shifts(const Body& body, bool is_last_leg) const {
   return shifting <= walking;
 }
 
-std::span<const Foot> WalkCourse::Feet(std::size_t next_waypoint) {
+std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
   const Foot expected = OtherFoot(stance_.last_moved);
   feet_ = {expected, stance_.last_moved};
   const Body left = BodyOver(Foot::kLeft);
@@ -203,7 +203,7 @@ std::span<const Foot> WalkCourse::Feet(std::size_t next_waypoint) {
   return feet_;
 }
 
-WalkStep WalkCourse::Next(Foot moving, std::size_t next_waypoint, double part,
+WalkStep WalkSteering::Next(Foot moving, std::size_t next_waypoint, double part,
                           double bend_rad) const {
   const Body body = BodyOver(OtherFoot(moving));
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
@@ -214,7 +214,7 @@ WalkStep WalkCourse::Next(Foot moving, std::size_t next_waypoint, double part,
   return Walk(body, moving, next_waypoint, part, bend_rad);
 }
 
-WalkStep WalkCourse::LandAtGoal(Foot moving) const {
+WalkStep WalkSteering::LandAtGoal(Foot moving) const {
   const DVec3 fixed_m = BodyOver(OtherFoot(moving)).position_m;
   const bool is_there = IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad);
   return {GoalPrint(moving), is_there ? goal_.position_m : 0.5 * (fixed_m + goal_.position_m),
@@ -222,7 +222,7 @@ WalkStep WalkCourse::LandAtGoal(Foot moving) const {
 }
 
 // Part of the way to the goal, for a foot that does not get there at once.
-WalkStep WalkCourse::LandNearer(Foot moving, double part) const {
+WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
   WalkStep step = LandAtGoal(moving);
   const Footprint& from = At(moving);
   step.print.position_m = from.position_m + part * (step.print.position_m - from.position_m);
@@ -232,7 +232,7 @@ WalkStep WalkCourse::LandNearer(Foot moving, double part) const {
   return step;
 }
 
-WalkStep WalkCourse::Land(const Body& body, Foot moving) const {
+WalkStep WalkSteering::Land(const Body& body, Foot moving) const {
   const DVec3 fixed = At(OtherFoot(moving)).position_m;
   const DVec3 local = RotateYaw(-body.heading_rad, body.position_m - fixed);
   // Who strides walks narrow, who stands stands wide.
@@ -250,7 +250,7 @@ WalkStep WalkCourse::Land(const Body& body, Foot moving) const {
   return step;
 }
 
-WalkStep WalkCourse::Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
+WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
                           double bend_rad) const {
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   const double away_rad = WrapAngle(Bearing(body, next_waypoint) + bend_rad - body.heading_rad);
@@ -273,7 +273,7 @@ WalkStep WalkCourse::Walk(const Body& body, Foot moving, std::size_t next_waypoi
   return Land(next, moving);
 }
 
-WalkStep WalkCourse::Shift(const Body& body, Foot moving, double part, double bend_rad) const {
+WalkStep WalkSteering::Shift(const Body& body, Foot moving, double part, double bend_rad) const {
   DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
   local = RotateYaw(bend_rad, local);
   const double turn_rad = WrapAngle(goal_.heading_rad - body.heading_rad);

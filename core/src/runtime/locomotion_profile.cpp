@@ -1,4 +1,4 @@
-#include "stridewire/runtime/walk_gait.h"
+#include "stridewire/runtime/locomotion_profile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,8 +17,8 @@ constexpr double kLeastWidthM = 0.08;
 
 }  // namespace
 
-WalkGait MakeWalkGait(const MotionLibrary& library) {
-  WalkGait gait;
+LocomotionProfile MakeLocomotionProfile(const MotionLibrary& library) {
+  LocomotionProfile gait;
   const Pose& stand = library.stand_pose();
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     DVec3 ball = DVec3(BallPosition(library.skeleton(), stand, foot)) -

@@ -20,9 +20,9 @@ struct WalkStep {
 ///
 /// The body is taken to be where the foot that stays has it, as if the other stood beside it. A step
 /// moves it on by one part of the way left, in equal parts.
-class WalkCourse {
+class WalkSteering {
  public:
-  WalkCourse(const WalkGait& gait, const WalkRequest& walk, const WalkStance& stance);
+  WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance);
 
   /// Counts waypoints on that have been reached.
   void PassWaypoints(std::size_t& next) const;
@@ -66,7 +66,7 @@ class WalkCourse {
   [[nodiscard]] WalkStep LandAtGoal(Foot moving) const;
   [[nodiscard]] WalkStep LandNearer(Foot moving, double part) const;
 
-  const WalkGait& gait_;
+  const LocomotionProfile& gait_;
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;
