@@ -361,8 +361,8 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
   if (!IsList(movements, count)) return STRIDEWIRE_INVALID_ARGUMENT;
   for (const stridewire_movement& m : std::span(movements, count)) {
     if (m.type < STRIDEWIRE_STEP || m.type > STRIDEWIRE_WALK || m.foot < STRIDEWIRE_FOOT_AUTO ||
-        m.foot > STRIDEWIRE_FOOT_RIGHT || m.takeover < STRIDEWIRE_QUEUED ||
-        m.takeover > STRIDEWIRE_NOW || m.waypoint_count > STRIDEWIRE_MAX_WAYPOINTS ||
+        m.foot > STRIDEWIRE_FOOT_RIGHT || m.interrupt < STRIDEWIRE_QUEUED ||
+        m.interrupt > STRIDEWIRE_NOW || m.waypoint_count > STRIDEWIRE_MAX_WAYPOINTS ||
         (m.type == STRIDEWIRE_WALK && m.waypoint_count != 0 && m.waypoints_m == nullptr) ||
         (m.must_be_met != 0 && (m.type != STRIDEWIRE_STEP || m.has_at == 0))) {
       return STRIDEWIRE_INVALID_ARGUMENT;
@@ -373,7 +373,7 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
     message.items.reserve(count);
     for (const stridewire_movement& m : std::span(movements, count)) {
       protocol::RequestItem item{
-          m.avatar, m.request_id, {}, static_cast<protocol::Takeover>(m.takeover)};
+          m.avatar, m.request_id, {}, static_cast<protocol::Interrupt>(m.interrupt)};
       switch (m.type) {
         case STRIDEWIRE_STEP: {
           protocol::StepMovement step;

@@ -136,7 +136,7 @@ bool Session::Understands(const CommandMessage& message) const {
   const bool knows_takeovers = (features_ & protocol::kFeatureTakeovers) != 0;
   const bool knows_refusals = (features_ & protocol::kFeatureRefusals) != 0;
   return std::ranges::none_of(request->items, [&](const protocol::RequestItem& item) {
-    if (item.takeover != protocol::Takeover::kNone && !knows_takeovers) return true;
+    if (item.interrupt != protocol::Interrupt::kNone && !knows_takeovers) return true;
     if (std::holds_alternative<protocol::WalkMovement>(item.movement)) return !knows_walks;
     const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
     if (step == nullptr) return false;

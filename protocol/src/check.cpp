@@ -121,7 +121,7 @@ void CheckParameters(Findings& found, const ParameterSet& set, const char* field
 void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t index) {
   found.Id(item.avatar, "Request.avatar", index);
   found.Id(item.request_id, "Request.request_id", index);
-  found.Known(item.takeover, Takeover::kNow, "Request.takeover", index);
+  found.Known(item.interrupt, Interrupt::kNow, "Request.takeover", index);
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
     found.Known(step->foot, FootChoice::kRight, "Request.foot", index);
     found.Finite(step->length_m, "Request.length_m", index);

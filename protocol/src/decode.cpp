@@ -141,7 +141,7 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
             std::size_t index) {
   item.avatar = w.avatar();
   item.request_id = w.request_id();
-  item.takeover = static_cast<Takeover>(w.takeover());
+  item.interrupt = static_cast<Interrupt>(w.takeover());
   switch (w.type()) {
     case wire::MovementType::Step: {
       StepMovement step{static_cast<FootChoice>(w.foot()), w.length_m(), std::nullopt, w.height_m(),

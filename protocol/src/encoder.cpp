@@ -98,7 +98,7 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
   }
   return wire::CreateRequestItem(b, item.avatar, item.request_id, type, foot, length_m, side_m,
                                  height_m, turn_rad, seconds, at ? &*at : nullptr, heading_rad,
-                                 waypoints, speed_m_s, static_cast<wire::Takeover>(item.takeover),
+                                 waypoints, speed_m_s, static_cast<wire::Takeover>(item.interrupt),
                                  must_be_met);
 }
 

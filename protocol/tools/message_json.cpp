@@ -67,7 +67,7 @@ Json Item(const RequestItem& item) {
   Json json = {{"avatar", item.avatar},
                {"request_id", Wide(item.request_id)},
                {"type", item.movement.index()},
-               {"takeover", Number(item.takeover)}};
+               {"takeover", Number(item.interrupt)}};
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
     json["foot"] = Number(step->foot);
     if (step->at) {

@@ -357,8 +357,8 @@ std::vector<SampleMessage> SampleMessages() {
     add("request_walks", walks);
 
     Request takeovers{15, 3, {}};
-    takeovers.items.push_back({41, 1010, StepMovement{.length_m = 0.5}, Takeover::kNow});
-    takeovers.items.push_back({42, 1011, JumpMovement{1.0, 0.0, 0.0}, Takeover::kAfterMovement});
+    takeovers.items.push_back({41, 1010, StepMovement{.length_m = 0.5}, Interrupt::kNow});
+    takeovers.items.push_back({42, 1011, JumpMovement{1.0, 0.0, 0.0}, Interrupt::kAfterMovement});
     add("request_takeovers", takeovers);
 
     Request refusals{18, 3, {}};
@@ -367,7 +367,7 @@ std::vector<SampleMessage> SampleMessages() {
             .must_be_met = true};
     refusals.items.push_back({41, 1012, step});
     step.at->heading_rad.reset();
-    refusals.items.push_back({42, 1013, step, Takeover::kNow});
+    refusals.items.push_back({42, 1013, step, Interrupt::kNow});
     add("request_refusals", refusals);
 
     TerrainInfo terrain;

@@ -278,7 +278,7 @@ TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
   }
   const Foot moving = MovingFoot(avatar_.started()->kind);
   MovementRequest request = StepOnto(5, moving, {0.0, 0.0, 9.0}, 0.0);
-  request.takeover = Takeover::kNow;
+  request.interrupt = Interrupt::kNow;
   ASSERT_TRUE(avatar_.Enqueue(request).has_value());
   other_.CancelQueue();
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 1);
@@ -292,7 +292,7 @@ TEST_F(RefusalOfBuiltin, ASwingIsRedirectedToWhatItReaches) {
   }
   for (int i = 0; i < 4; ++i) avatar_.Advance(kTickS);
   MovementRequest request = StepOnto(4, Foot::kLeft, {0.2, 0.0, 0.4}, 0.1);
-  request.takeover = Takeover::kNow;
+  request.interrupt = Interrupt::kNow;
   ASSERT_TRUE(avatar_.Enqueue(request).has_value());
   avatar_.Advance(kTickS);
   ASSERT_EQ(avatar_.events().size(), 2u);

@@ -22,7 +22,7 @@ constexpr double kTickS = 1.0 / kFps;
 
 MovementRequest RandomRequest(const RestlessWalker& walker, const Avatar& avatar, Random& random) {
   MovementRequest request{
-      1, {}, random.Draw(0, 1) < 0.6 ? Takeover::kNow : Takeover::kAfterMovement};
+      1, {}, random.Draw(0, 1) < 0.6 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
   if (what < 0.6) {
     request.movement = StepRequest{.length_m = random.Draw(0.0, walker.longest_m),

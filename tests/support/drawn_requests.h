@@ -49,7 +49,7 @@ inline MovementRequest DrawRequest(Random& random, const Avatar& avatar) {
     request.movement = StandRequest{Draws(random, 0.3) ? 0.0 : random.Draw(0.0, 0.5)};
   }
   if (Draws(random, 0.4)) {
-    request.takeover = Draws(random, 0.7) ? Takeover::kNow : Takeover::kAfterMovement;
+    request.interrupt = Draws(random, 0.7) ? Interrupt::kNow : Interrupt::kAfterMovement;
   }
   return request;
 }

@@ -81,10 +81,10 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
     }
   }
   const double held_until_s = hold_until_s_;
-  if (request.takeover != Takeover::kNone) {
+  if (request.interrupt != Interrupt::kNone) {
     CancelQueue();
     next_event_s_ = -1.0;
-    takes_over_ = request.takeover == Takeover::kNow && is_moving_ &&
+    interrupts_ = request.interrupt == Interrupt::kNow && is_moving_ &&
                   !std::holds_alternative<StandRequest>(request.movement);
     if (is_in_stand_) stand_left_s_ = 0.0;
   }
@@ -126,7 +126,7 @@ int Avatar::CancelQueue() {
   queue_.clear();
   queue_head_ = 0;
   walk_ = {};
-  takes_over_ = false;
+  interrupts_ = false;
   hold_until_s_ = 0.0;
   return dropped;
 }
@@ -214,7 +214,7 @@ void Avatar::AdvanceState(double dt_s) {
 
 // From an Advance on in which nothing happened.
 double Avatar::NextEventTime() const {
-  const bool is_event_free = is_moving_ && !takes_over_ && body_.layers.empty() && events_.empty() &&
+  const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() && events_.empty() &&
                         change_ == AvatarChange{};
   if (!is_event_free) return -1.0;
   const double strike_s = StrikeTime();
@@ -271,7 +271,7 @@ bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
 }
 
 bool Avatar::StartNext() {
-  takes_over_ = false;
+  interrupts_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
   if (is_walking_ && (is_empty || stand != nullptr)) {

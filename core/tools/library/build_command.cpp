@@ -159,7 +159,7 @@ int RunBuild(const BuildCommand& command) {
     return Complain("--left-ankle and --right-ankle belong together: give both or none");
   }
 
-  const Interrupt interrupt;
+  const InterruptSignal interrupt_signal;
   Progress progress("building");
   const char* const stopped = "stopped; nothing was written";
   LibraryAssembler assembler(options);
@@ -178,7 +178,7 @@ int RunBuild(const BuildCommand& command) {
     progress.Show(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
     const auto capture = reading.get();
     reading = start_reading(i + 1);
-    if (Interrupt::IsAsked()) return Complain(stopped, kExitFailure);
+    if (InterruptSignal::IsAsked()) return Complain(stopped, kExitFailure);
     Extraction unreadable;
     if (!capture) {
       unreadable.path = path;
@@ -202,7 +202,7 @@ int RunBuild(const BuildCommand& command) {
   const auto library = builder.Build(*raw);
   progress.Hide();
   if (!library) return ComplainOfInput(library.error());
-  if (Interrupt::IsAsked()) return Complain(stopped, kExitFailure);
+  if (InterruptSignal::IsAsked()) return Complain(stopped, kExitFailure);
   if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
     return ComplainOfOutput(status.error());
   }

@@ -20,7 +20,7 @@ constexpr auto kSilence = std::chrono::milliseconds(500);
 
 }  // namespace
 
-Interrupt::Interrupt() {
+InterruptSignal::InterruptSignal() {
   g_is_asked = 0;
   struct sigaction action{};
   action.sa_handler = Ask;
@@ -30,12 +30,12 @@ Interrupt::Interrupt() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-Interrupt::~Interrupt() {
+InterruptSignal::~InterruptSignal() {
   std::signal(SIGINT, SIG_DFL);
   std::signal(SIGTERM, SIG_DFL);
 }
 
-bool Interrupt::IsAsked() { return g_is_asked != 0; }
+bool InterruptSignal::IsAsked() { return g_is_asked != 0; }
 
 Progress::Progress(std::string what)
     : what_(std::move(what)),

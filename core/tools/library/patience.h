@@ -7,12 +7,12 @@ namespace stridewire {
 
 // While it lives, Ctrl-C and SIGTERM only ask the work to stop, so that it can leave no half file; a
 // second one ends the program at once. One at a time.
-class Interrupt {
+class InterruptSignal {
  public:
-  Interrupt();
-  ~Interrupt();
-  Interrupt(const Interrupt&) = delete;
-  Interrupt& operator=(const Interrupt&) = delete;
+  InterruptSignal();
+  ~InterruptSignal();
+  InterruptSignal(const InterruptSignal&) = delete;
+  InterruptSignal& operator=(const InterruptSignal&) = delete;
 
   [[nodiscard]] static bool IsAsked();
 };

@@ -35,7 +35,7 @@ void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefineme
 }  // namespace
 
 int RunRefine(const RefineCommand& command) {
-  const Interrupt interrupt;
+  const InterruptSignal interrupt_signal;
   if (IsSameFile(command.out, command.library)) {
     return Complain("--out: " + command.out + " is the library to refine");
   }
@@ -52,11 +52,11 @@ int RunRefine(const RefineCommand& command) {
   options.max_pseudoexamples = command.max_pseudoexamples;
   options.progress = [&](double done) {
     progress.Show(done);
-    return !Interrupt::IsAsked();
+    return !InterruptSignal::IsAsked();
   };
   const auto refined = Refine(*library, options);
   progress.Hide();
-  if (Interrupt::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+  if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
   if (!refined) return ComplainOfInput(refined.error());
   if (Status status = WriteFile(command.out, refined->library->bytes()); !status) {
     return ComplainOfOutput(status.error());

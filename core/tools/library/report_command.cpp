@@ -67,7 +67,7 @@ Json RealismToJson(const MotionLibrary& captured, const std::vector<LeaveOneOut>
 std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>& paths) {
   LibraryAssembler assembler;
   for (const std::string& path : paths) {
-    if (Interrupt::IsAsked()) return nullptr;
+    if (InterruptSignal::IsAsked()) return nullptr;
     const auto capture = ReadBvh(path);
     if (!capture) {
       ComplainOfInput(capture.error());
@@ -104,7 +104,7 @@ Status WriteReport(const Report& report, const std::filesystem::path& folder) {
 }  // namespace
 
 int RunReport(const ReportCommand& command) {
-  const Interrupt interrupt;
+  const InterruptSignal interrupt_signal;
   std::error_code failed;
   const std::filesystem::path folder = command.out;
   if (std::filesystem::exists(folder, failed) && !std::filesystem::is_directory(folder, failed)) {
@@ -116,7 +116,7 @@ int RunReport(const ReportCommand& command) {
   std::shared_ptr<const MotionLibrary> captured;
   if (!command.captures.empty()) {
     captured = ReadCaptures(command.captures);
-    if (Interrupt::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+    if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
     if (captured == nullptr) return kExitBadInput;
   }
 
@@ -129,10 +129,10 @@ int RunReport(const ReportCommand& command) {
                             .captured = captured,
                             .progress = [&](double done) {
                               progress.Show(done);
-                              return !Interrupt::IsAsked();
+                              return !InterruptSignal::IsAsked();
                             }});
   progress.Hide();
-  if (Interrupt::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+  if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
   if (!report) {
     return report.error().code == ErrorCode::kOutOfRange ? ComplainOfInput(report.error())
                                                          : ComplainOfOutput(report.error());

@@ -40,7 +40,7 @@ const char* FeatureMissing(const std::vector<protocol::RequestItem>& items,
       return "footprints";
     }
     if (is_walk && (features & protocol::kFeatureWalks) == 0) return "walks";
-    if (item.takeover != protocol::Takeover::kNone &&
+    if (item.interrupt != protocol::Interrupt::kNone &&
         (features & protocol::kFeatureTakeovers) == 0) {
       return "takeovers";
     }

@@ -75,7 +75,7 @@ BaseFrame FromWire(const protocol::Placement& placement) {
 MovementRequest FromWire(const protocol::RequestItem& item) {
   MovementRequest request;
   request.id = item.request_id;
-  request.takeover = static_cast<Takeover>(item.takeover);
+  request.interrupt = static_cast<Interrupt>(item.interrupt);
   std::visit(
       [&]<typename T>(const T& movement) {
         if constexpr (std::is_same_v<T, protocol::StepMovement>) {
@@ -107,7 +107,7 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
 protocol::RequestItem ToWire(const MovementRequest& request) {
   protocol::RequestItem item;
   item.request_id = request.id;
-  item.takeover = static_cast<protocol::Takeover>(request.takeover);
+  item.interrupt = static_cast<protocol::Interrupt>(request.interrupt);
   std::visit(
       [&]<typename T>(const T& movement) {
         if constexpr (std::is_same_v<T, StepRequest>) {

@@ -135,7 +135,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
     const std::uint32_t hold_ticks = StartTickOf(asked.avatar, part.over_ticks);
     held += hold_ticks > 0;
     ReplyItem refused{.index = item.index, .avatar = asked.avatar, .request_id = asked.request_id};
-    if (asked.takeover == protocol::Takeover::kNone && avatar.queue_size() >= max_queue_) {
+    if (asked.interrupt == protocol::Interrupt::kNone && avatar.queue_size() >= max_queue_) {
       metrics_.Reached(Limit::kQueue);
       refused.code = StatusCode::kQueueFull;
       refused.text = "the avatar's queue is full";

@@ -175,7 +175,7 @@ class Crowd {
     EXPECT_TRUE(client_.Request(world_, {{.avatar = avatar,
                                           .request_id = 7,
                                           .movement = protocol::StepMovement{.length_m = 0.6},
-                                          .takeover = protocol::Takeover::kNow}}));
+                                          .interrupt = protocol::Interrupt::kNow}}));
     client_.Send(protocol::SetLayers{
         .seq = client_.NextSeq(), .world = world_, .items = {{avatar, "wave"}}});
     client_.Send(protocol::SetPlanting{

@@ -689,12 +689,12 @@ TEST(ServerSession, AResumedSessionHearsOfTheGroundThatIs) {
 // What a client of before terrain, footprints and walks is answered when it asks for the movement.
 std::optional<StatusCode> WhatOldClientsHear(
     TestServer& server, const decltype(protocol::RequestItem::movement)& movement,
-    protocol::Takeover takeover = protocol::Takeover::kNone) {
+    protocol::Interrupt interrupt = protocol::Interrupt::kNone) {
   RawClient old = server.Connect();
   if (!old.SayHello(protocol::kFeatureQuantised)) return {};
   const auto world = old.Join("hall");
   if (!world) return {};
-  const auto reply = old.Request(world->world, {{1, 9, movement, takeover}});
+  const auto reply = old.Request(world->world, {{1, 9, movement, interrupt}});
   if (!reply) return {};
   return reply->code;
 }
@@ -732,7 +732,7 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
   ASSERT_TRUE(client_.Request(
       world_, {{1, 7, protocol::StandMovement{100.0}}, {1, 8, protocol::StandMovement{1.0}}}));
   const protocol::RequestItem now{1, 9, protocol::StepMovement{.length_m = 0.3},
-                                  protocol::Takeover::kNow};
+                                  protocol::Interrupt::kNow};
   const auto reply = client_.Request(world_, {now});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->accepted, 1u);
@@ -748,7 +748,7 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
     }
   }
   EXPECT_EQ(finished, (std::vector<protocol::RequestId>{7, 9}));
-  EXPECT_EQ(WhatOldClientsHear(server_, protocol::StepMovement{}, protocol::Takeover::kNow),
+  EXPECT_EQ(WhatOldClientsHear(server_, protocol::StepMovement{}, protocol::Interrupt::kNow),
             StatusCode::kUnsupported);
   EXPECT_NE(WhatOldClientsHear(server_, protocol::StepMovement{}), StatusCode::kUnsupported);
 }

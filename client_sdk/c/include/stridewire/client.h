@@ -234,12 +234,12 @@ typedef enum stridewire_foot {
 } stridewire_foot;
 
 /// When a movement begins, and what becomes of those before it.
-typedef enum stridewire_takeover {
+typedef enum stridewire_interrupt {
   STRIDEWIRE_QUEUED = 0,          ///< After all that is queued.
   STRIDEWIRE_AFTER_MOVEMENT = 1,  ///< After the movement under way; the queue is dropped.
   STRIDEWIRE_NOW = 2,             ///< As soon as feet allow; the queue is dropped.
   STRIDEWIRE_TAKEOVER_MAX = 0x7fffffff
-} stridewire_takeover;
+} stridewire_interrupt;
 
 typedef struct stridewire_movement {
   uint32_t avatar;      ///< Not 0.
@@ -260,7 +260,7 @@ typedef struct stridewire_movement {
   size_t waypoint_count;      ///< At most STRIDEWIRE_MAX_WAYPOINTS.
   uint8_t has_speed;          ///< Walk: 0: as is comfortable.
   double speed_m_s;  ///< Walk, if has_speed: 0.05 to 5, as near as the library's steps come.
-  stridewire_takeover takeover;
+  stridewire_interrupt interrupt;
   uint8_t
       must_be_met;  ///< Step, only if has_at: 1: when it cannot land there it is REJECTED, not done elsewhere.
 } stridewire_movement;

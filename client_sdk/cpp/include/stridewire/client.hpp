@@ -65,7 +65,7 @@ inline stridewire_movement OrNot(stridewire_movement step_to) {
 }
 /// The same movement, which takes over from what the avatar does.
 inline stridewire_movement Now(stridewire_movement movement) {
-  movement.takeover = STRIDEWIRE_NOW;
+  movement.interrupt = STRIDEWIRE_NOW;
   return movement;
 }
 /// A walk to a place and heading.

@@ -253,7 +253,7 @@ class Avatar {
   bool is_idle_reported_ = false;
   bool was_idle_ = false;        // after the Advance before
   bool is_walking_ = false;      // a step left the feet apart: close before standing
-  bool takes_over_ = false;      // the request at the queue's head does not wait for the end
+  bool interrupts_ = false;      // the request at the queue's head does not wait for the end
   bool is_exact_ = false;        // the step under way lands where it was sent
   int closing_steps_ = 0;        // of our own in a row, the movement under way included
   double hold_until_s_ = 0.0;    // avatar time

@@ -53,7 +53,7 @@ struct WalkRequest {
 };
 
 /// When a request begins, and what becomes of those before it.
-enum class Takeover : std::uint8_t {
+enum class Interrupt : std::uint8_t {
   kNone,           ///< After all that is queued
   kAfterMovement,  ///< After the movement under way; what is queued is dropped, a stand or walk ends
   /// At once if both feet stand, else when they have landed; what is queued is dropped. A step of the foot
@@ -65,7 +65,7 @@ enum class Takeover : std::uint8_t {
 struct MovementRequest {
   std::uint64_t id = 0;  ///< The caller's; comes back in events.
   std::variant<StepRequest, JumpRequest, StandRequest, WalkRequest> movement;
-  Takeover takeover = Takeover::kNone;
+  Interrupt interrupt = Interrupt::kNone;
 };
 
 /// Limits on what may be asked for, far outside what any library spans: meaning, not taste.

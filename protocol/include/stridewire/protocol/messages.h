@@ -33,7 +33,7 @@ using Seq = std::uint64_t;
 enum class Role : std::uint8_t { kController = 0, kObserver = 1 };
 enum class FootChoice : std::uint8_t { kAuto = 0, kLeft = 1, kRight = 2 };
 /// When a request begins, and what becomes of those before it.
-enum class Takeover : std::uint8_t {
+enum class Interrupt : std::uint8_t {
   kNone = 0,  ///< After all that is queued.
   kAfterMovement =
       1,     ///< After the movement under way; the queue is dropped, a stand or walk ends.
@@ -146,7 +146,7 @@ struct RequestItem {
   AvatarNumber avatar = 0;   ///< Not 0.
   RequestId request_id = 0;  ///< Not 0; comes back in events.
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
-  Takeover takeover = Takeover::kNone;  ///< Another one only with kFeatureTakeovers.
+  Interrupt interrupt = Interrupt::kNone;  ///< Another one only with kFeatureTakeovers.
   bool operator==(const RequestItem&) const = default;
 };
 

@@ -229,8 +229,8 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   const auto begun = [&](std::uint64_t id) {
     return avatar_.started() != nullptr && avatar_.started()->request_id == id;
   };
-  const auto ask = [&](std::uint64_t id, int hold_ticks, Takeover takeover = Takeover::kNone) {
-    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, takeover}, hold_ticks * kTickS));
+  const auto ask = [&](std::uint64_t id, int hold_ticks, Interrupt interrupt = Interrupt::kNone) {
+    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, hold_ticks * kTickS));
   };
   ask(1, 5);
   ask(2, 100);  // goes on from the one before: not held
@@ -242,18 +242,18 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   ticks_until([&] { return avatar_.idle(); });
 
   // Asked again and again it does not wait for ever, and a smaller command is not held by a larger one.
-  ask(4, 10, Takeover::kNow);
+  ask(4, 10, Interrupt::kNow);
   for (int i = 0; i < 5; ++i) avatar_.Advance(kTickS);
-  ask(5, 10, Takeover::kNow);
+  ask(5, 10, Interrupt::kNow);
   EXPECT_EQ(ticks_until([&] { return begun(5); }), 6);
   ticks_until([&] { return avatar_.idle(); });
   ask(6, 10);
-  ask(7, 0, Takeover::kNow);
+  ask(7, 0, Interrupt::kNow);
   EXPECT_EQ(ticks_until([&] { return begun(7); }), 1);
 
   // Who moves is not taken over before.
   avatar_.Advance(kTickS);
-  ask(8, 4, Takeover::kNow);
+  ask(8, 4, Interrupt::kNow);
   EXPECT_EQ(ticks_until([&] { return begun(8); }), 5);
 }
 
@@ -313,7 +313,7 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
   EXPECT_GE(eventful, 4);  // two steps started, two feet struck
 
   walk_on();
-  ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}, .takeover = Takeover::kNow}));
+  ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}, .interrupt = Interrupt::kNow}));
   EXPECT_FALSE(avatar.is_event_free());
   ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}}));
   walk_on();

@@ -24,7 +24,7 @@ constexpr double kTickS = 1.0 / kFps;
 MovementRequest RandomRequest(const RestlessWalker& walker, const Avatar& avatar, std::uint64_t id,
                               Random& random) {
   MovementRequest request{
-      id, {}, random.Draw(0, 1) < 0.8 ? Takeover::kNow : Takeover::kAfterMovement};
+      id, {}, random.Draw(0, 1) < 0.8 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
   if (what < 0.6) {
     StepRequest step;
@@ -51,7 +51,7 @@ struct Figures {
   int cut_short = 0;
   double largest_drift_m = 0.0;  // of a foot from where it stood when it was said to stand
   std::vector<double>
-      at_cuts;  // largest change of a joint's angular velocity at each takeover, rad/s
+      at_cuts;  // largest change of a joint's angular velocity at each interrupt, rad/s
   double largest_at_joins = 0.0;  // wherever a movement begins
   double largest_elsewhere = 0.0;
 };
@@ -198,8 +198,8 @@ class TakeOverOfBuiltin : public testing::Test {
     for (int i = 0; i < 6; ++i) avatar_.Advance(kTickS);
   }
   void TakeOverBy(decltype(MovementRequest::movement) movement,
-                  Takeover takeover = Takeover::kNow) {
-    ASSERT_TRUE(avatar_.Enqueue({2, std::move(movement), takeover}).has_value());
+                  Interrupt interrupt = Interrupt::kNow) {
+    ASSERT_TRUE(avatar_.Enqueue({2, std::move(movement), interrupt}).has_value());
   }
 
   Avatar avatar_{OpenLibrary("builtin").value(), BaseFrame{}};
@@ -273,7 +273,7 @@ TEST_F(TakeOverOfBuiltin, AStandOrWhateverWaitsDropsTheQueueAndFinishesTheMoveme
     if (stands) {
       TakeOverBy(StandRequest{0.1});
     } else {
-      TakeOverBy(StepRequest{.length_m = 0.3}, Takeover::kAfterMovement);
+      TakeOverBy(StepRequest{.length_m = 0.3}, Interrupt::kAfterMovement);
     }
     EXPECT_EQ(avatar_.queue_size(), 1);
     const auto events = AdvanceUntil([&] { return avatar_.idle(); });
