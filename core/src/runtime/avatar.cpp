@@ -65,8 +65,8 @@ void Avatar::Teleport(const BaseFrame& start) {
   next_change_.is_any = true;
 }
 
-Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
-  STRIDEWIRE_CHECK(hold_s >= 0.0);
+Status Avatar::Enqueue(const MovementRequest& request, double start_delay_s) {
+  STRIDEWIRE_CHECK(start_delay_s >= 0.0);
   if (Status status = ValidateRequest(*body_.library, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
@@ -80,7 +80,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
       events_.reserve(kMaxEventsPerAdvance);  // refusals may come many at once
     }
   }
-  const double held_until_s = hold_until_s_;
+  const double earlier_start_s = start_not_before_s_;
   if (request.interrupt != Interrupt::kNone) {
     CancelQueue();
     next_event_s_ = -1.0;
@@ -89,8 +89,8 @@ Status Avatar::Enqueue(const MovementRequest& request, double hold_s) {
     if (is_in_stand_) stand_left_s_ = 0.0;
   }
   if (queue_size() == 0) {
-    hold_until_s_ = time_s_ + hold_s;
-    if (held_until_s > time_s_) hold_until_s_ = std::min(hold_until_s_, held_until_s);
+    start_not_before_s_ = time_s_ + start_delay_s;
+    if (earlier_start_s > time_s_) start_not_before_s_ = std::min(start_not_before_s_, earlier_start_s);
   }
   if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
@@ -127,7 +127,7 @@ int Avatar::CancelQueue() {
   queue_head_ = 0;
   walk_ = {};
   interrupts_ = false;
-  hold_until_s_ = 0.0;
+  start_not_before_s_ = 0.0;
   return dropped;
 }
 
@@ -292,8 +292,8 @@ bool Avatar::StartNext() {
     return false;
   }
 
-  if (IsHeld() && last_group_ == body_.library->groups().size()) return false;
-  hold_until_s_ = 0.0;
+  if (IsStartDelayed() && last_group_ == body_.library->groups().size()) return false;
+  start_not_before_s_ = 0.0;
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {

@@ -17,13 +17,13 @@ double Avatar::Landed() const {
 }
 
 double Avatar::EndOfMovement() const {
-  return interrupts_ && !IsHeld() ? std::min(Landed(), body_.movement.duration_s())
+  return interrupts_ && !IsStartDelayed() ? std::min(Landed(), body_.movement.duration_s())
                                   : body_.movement.duration_s();
 }
 
 // The foot in the air is the one that the request at the queue's head moves, and far from landing.
 bool Avatar::RedirectsSwing() const {
-  if (!interrupts_ || IsHeld() || !IsStep(group().kind) || body_.plants_feet != foot_planting()) {
+  if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) || body_.plants_feet != foot_planting()) {
     return false;
   }
   const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);

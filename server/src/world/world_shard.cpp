@@ -132,14 +132,14 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
       continue;
     }
     Avatar& avatar = it->second.avatar;
-    const std::uint32_t hold_ticks = StartTickOf(asked.avatar, part.over_ticks);
-    held += hold_ticks > 0;
+    const std::uint32_t delay_ticks = StartTickOf(asked.avatar, part.over_ticks);
+    held += delay_ticks > 0;
     ReplyItem refused{.index = item.index, .avatar = asked.avatar, .request_id = asked.request_id};
     if (asked.interrupt == protocol::Interrupt::kNone && avatar.queue_size() >= max_queue_) {
       metrics_.Reached(Limit::kQueue);
       refused.code = StatusCode::kQueueFull;
       refused.text = "the avatar's queue is full";
-    } else if (const Status status = avatar.Enqueue(FromWire(asked), hold_ticks * clock_.tick_s());
+    } else if (const Status status = avatar.Enqueue(FromWire(asked), delay_ticks * clock_.tick_s());
                !status) {
       refused.code = ToStatusCode(status.error().code);
       refused.text = status.error().text;

@@ -112,9 +112,9 @@ class Avatar {
   /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
   /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
   ///
-  /// `hold_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
+  /// `start_delay_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
   /// before. What goes on from a movement is never held. One who is held already is not held longer.
-  [[nodiscard]] Status Enqueue(const MovementRequest& request, double hold_s = 0.0);
+  [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
   /// Drops what has not started; the current movement goes on to its end. Returns how many.
   int CancelQueue();
@@ -200,7 +200,7 @@ class Avatar {
 
   void AddEvent(const AvatarEvent& event);
   // Times are sums of ticks: a hold of whole ticks ends with the last of them.
-  [[nodiscard]] bool IsHeld() const { return time_s_ + 1e-6 < hold_until_s_; }
+  [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
   [[nodiscard]] FootState MeasureFeet() const;
   void AdvanceState(double dt_s);
@@ -256,7 +256,7 @@ class Avatar {
   bool interrupts_ = false;      // the request at the queue's head does not wait for the end
   bool is_exact_ = false;        // the step under way lands where it was sent
   int closing_steps_ = 0;        // of our own in a row, the movement under way included
-  double hold_until_s_ = 0.0;    // avatar time
+  double start_not_before_s_ = 0.0;    // avatar time
   double moved_until_s_ = -1.0;  // avatar time
 
   AvatarOptions options_;

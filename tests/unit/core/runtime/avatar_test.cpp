@@ -229,8 +229,8 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   const auto begun = [&](std::uint64_t id) {
     return avatar_.started() != nullptr && avatar_.started()->request_id == id;
   };
-  const auto ask = [&](std::uint64_t id, int hold_ticks, Interrupt interrupt = Interrupt::kNone) {
-    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, hold_ticks * kTickS));
+  const auto ask = [&](std::uint64_t id, int delay_ticks, Interrupt interrupt = Interrupt::kNone) {
+    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, delay_ticks * kTickS));
   };
   ask(1, 5);
   ask(2, 100);  // goes on from the one before: not held
