@@ -364,7 +364,7 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
         m.foot > STRIDEWIRE_FOOT_RIGHT || m.interrupt < STRIDEWIRE_QUEUED ||
         m.interrupt > STRIDEWIRE_NOW || m.waypoint_count > STRIDEWIRE_MAX_WAYPOINTS ||
         (m.type == STRIDEWIRE_WALK && m.waypoint_count != 0 && m.waypoints_m == nullptr) ||
-        (m.must_be_met != 0 && (m.type != STRIDEWIRE_STEP || m.has_at == 0))) {
+        (m.exact_only != 0 && (m.type != STRIDEWIRE_STEP || m.has_at == 0))) {
       return STRIDEWIRE_INVALID_ARGUMENT;
     }
   }
@@ -381,7 +381,7 @@ stridewire_status stridewire_client_request(stridewire_client* client, stridewir
           if (m.has_at != 0) {
             step.at.emplace().position_m = DVec3(m.at_m[0], m.at_m[1], m.at_m[2]);
             if (m.has_heading != 0) step.at->heading_rad = m.heading_rad;
-            step.must_be_met = m.must_be_met != 0;
+            step.exact_only = m.exact_only != 0;
             item.movement = step;
             break;
           }

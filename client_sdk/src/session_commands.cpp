@@ -140,7 +140,7 @@ bool Session::Understands(const CommandMessage& message) const {
     if (std::holds_alternative<protocol::WalkMovement>(item.movement)) return !knows_walks;
     const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
     if (step == nullptr) return false;
-    return (step->at.has_value() && !knows_footprints) || (step->must_be_met && !knows_refusals);
+    return (step->at.has_value() && !knows_footprints) || (step->exact_only && !knows_refusals);
   });
 }
 

@@ -132,7 +132,7 @@ void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t ind
       found.FiniteVector(step->at->position_m, "Request.at_m", index);
       found.Finite(step->at->heading_rad.value_or(0.0), "Request.heading_rad", index);
     }
-    found.That(step->at || !step->must_be_met, ErrorCode::kMalformed,
+    found.That(step->at || !step->exact_only, ErrorCode::kMalformed,
                "must be met and is not there", "Request.at_m", index);
   } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     found.Finite(jump->length_m, "Request.length_m", index);

@@ -151,7 +151,7 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
         step = {.foot = step.foot, .at = Footprint{FromWire(w.at_m()), std::nullopt}};
         if (const auto heading = w.heading_rad()) step.at->heading_rad = *heading;
       }
-      step.must_be_met = w.must_be_met();
+      step.exact_only = w.must_be_met();
       item.movement = step;
       break;
     }

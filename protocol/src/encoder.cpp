@@ -62,14 +62,14 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
   auto type = wire::MovementType::Stand;
   auto foot = wire::FootChoice::Auto;
   double length_m = 0.0, height_m = 0.0, turn_rad = 0.0, seconds = 0.0;
-  bool must_be_met = false;
+  bool exact_only = false;
   flatbuffers::Optional<double> side_m, heading_rad, speed_m_s;
   std::optional<wire::Vec3> at;
   Offset<flatbuffers::Vector<const wire::Vec3*>> waypoints;
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
     type = wire::MovementType::Step;
     foot = static_cast<wire::FootChoice>(step->foot);
-    must_be_met = step->must_be_met;
+    exact_only = step->exact_only;
     if (step->at) {
       at = ToWire(step->at->position_m);
       heading_rad = step->at->heading_rad;
@@ -99,7 +99,7 @@ Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
   return wire::CreateRequestItem(b, item.avatar, item.request_id, type, foot, length_m, side_m,
                                  height_m, turn_rad, seconds, at ? &*at : nullptr, heading_rad,
                                  waypoints, speed_m_s, static_cast<wire::Takeover>(item.interrupt),
-                                 must_be_met);
+                                 exact_only);
 }
 
 Offset<wire::Request> Build(FlatBufferBuilder& b, const Request& m) {

@@ -73,7 +73,7 @@ Json Item(const RequestItem& item) {
     if (step->at) {
       json["at_m"] = Vector(step->at->position_m);
       json["heading_rad"] = step->at->heading_rad ? Json(*step->at->heading_rad) : Json(nullptr);
-      json["must_be_met"] = step->must_be_met;
+      json["must_be_met"] = step->exact_only;
       return json;
     }
     json["length_m"] = step->length_m;

@@ -364,7 +364,7 @@ std::vector<SampleMessage> SampleMessages() {
     Request refusals{18, 3, {}};
     step = {.foot = FootChoice::kRight,
             .at = Footprint{DVec3(0.5, 0.0, 1.25), 0.25},
-            .must_be_met = true};
+            .exact_only = true};
     refusals.items.push_back({41, 1012, step});
     step.at->heading_rad.reset();
     refusals.items.push_back({42, 1013, step, Interrupt::kNow});

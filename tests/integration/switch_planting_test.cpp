@@ -236,7 +236,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
 TEST(SwitchPlantingOff, WhatMustBeMetIsRefusedAtOnceOrWhenItsTurnComes) {
   Avatar avatar(LibraryOf({}), BaseFrame{});
   const MovementRequest must{
-      2, StepRequest{.foot = Foot::kRight, .at = {{{-0.1, 0.0, 0.9}, 0.0}}, .must_be_met = true}};
+      2, StepRequest{.foot = Foot::kRight, .at = {{{-0.1, 0.0, 0.9}, 0.0}}, .exact_only = true}};
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}}).has_value());
   ASSERT_TRUE(avatar.Enqueue(must).has_value());
   avatar.Advance(kTickS);

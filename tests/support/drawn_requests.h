@@ -37,7 +37,7 @@ inline MovementRequest DrawRequest(Random& random, const Avatar& avatar) {
                              Draws(random, 0.5)
                                  ? std::optional(avatar.base().heading_rad + random.Draw(-0.5, 0.5))
                                  : std::nullopt},
-        .must_be_met = Draws(random, 0.5)};
+        .exact_only = Draws(random, 0.5)};
   } else if (kind < 0.8) {
     request.movement =
         WalkRequest{.position_m = avatar.base().position_m +

@@ -89,7 +89,7 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
     }
   }
   if (field.Find("at_m") != nullptr) {
-    if (auto ok = ReadFlag(field, "must_be_met", step.must_be_met); !ok) return ok;
+    if (auto ok = ReadFlag(field, "must_be_met", step.exact_only); !ok) return ok;
     return ReadFootprint(field, step.at.emplace());
   }
   for (const char* key : {"heading_rad", "must_be_met"}) {

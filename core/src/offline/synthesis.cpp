@@ -267,7 +267,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
         result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
                                 event.reason, event.time_s, event.base});
       } else if (event.missed) {
-        result.refusals.push_back(
+        result.unreachable_footprints.push_back(
             {event.request_id, DescribeRejection(event), event.time_s, *event.missed});
       } else if (event.type == AvatarEventType::kRejected) {
         return std::unexpected(Rejected(event, requests, layers));

@@ -71,7 +71,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double start_delay_s) {
   if (queue_size() >= kMaxQueue) {
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
   }
-  if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->must_be_met) {
+  if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->exact_only) {
     if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
     if (kept_.empty()) {
       kept_.resize(1);

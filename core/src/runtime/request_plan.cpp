@@ -261,7 +261,7 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
     if (step->at && !within(step->at->heading_rad.value_or(0.0), kMaxWalkHeadingRad)) {
       return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
     }
-    if (step->must_be_met && !step->at) {
+    if (step->exact_only && !step->at) {
       return Fail(ErrorCode::kInvalidArgument, "must_be_met has a meaning only beside at_m",
                   "step");
     }

@@ -97,7 +97,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
                                {"base", BaseToJson(walk.base)}});
     }
     json["refusals"] = Json::array();
-    for (const RefusalRecord& refusal : synthesis->refusals) {
+    for (const UnreachableFootprint& refusal : synthesis->unreachable_footprints) {
       const Footprint& nearest = refusal.missed.nearest;
       json["refusals"].push_back(
           {{"request", refusal.request_id - 1},
@@ -123,7 +123,7 @@ int RunSynthesize(const SynthesizeCommand& command) {
     std::printf("; movements[%llu] does not arrive: %s",
                 static_cast<unsigned long long>(walk.request_id - 1), walk.reason.c_str());
   }
-  for (const RefusalRecord& refusal : synthesis->refusals) {
+  for (const UnreachableFootprint& refusal : synthesis->unreachable_footprints) {
     std::printf("; movements[%llu] is left out: %s",
                 static_cast<unsigned long long>(refusal.request_id - 1), refusal.reason.c_str());
   }

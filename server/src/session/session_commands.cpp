@@ -44,7 +44,7 @@ const char* FeatureMissing(const std::vector<protocol::RequestItem>& items,
         (features & protocol::kFeatureTakeovers) == 0) {
       return "takeovers";
     }
-    if (step != nullptr && step->must_be_met && (features & protocol::kFeatureRefusals) == 0) {
+    if (step != nullptr && step->exact_only && (features & protocol::kFeatureRefusals) == 0) {
       return "refusals";
     }
   }

@@ -89,7 +89,7 @@ MovementRequest FromWire(const protocol::RequestItem& item) {
           if (movement.at) {
             step.at = FootprintRequest{movement.at->position_m, movement.at->heading_rad};
           }
-          step.must_be_met = movement.must_be_met;
+          step.exact_only = movement.exact_only;
           request.movement = step;
         } else if constexpr (std::is_same_v<T, protocol::JumpMovement>) {
           request.movement = JumpRequest{movement.length_m, movement.height_m, movement.turn_rad};
@@ -123,7 +123,7 @@ protocol::RequestItem ToWire(const MovementRequest& request) {
           if (movement.at) {
             step = {.foot = step.foot,
                     .at = protocol::Footprint{movement.at->position_m, movement.at->heading_rad},
-                    .must_be_met = movement.must_be_met};
+                    .exact_only = movement.exact_only};
           }
           item.movement = step;
         } else if constexpr (std::is_same_v<T, JumpRequest>) {

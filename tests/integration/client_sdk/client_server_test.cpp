@@ -771,12 +771,12 @@ TEST(ClientAndServer, AStepOutOfReachIsRejectedIfItMustBeMet) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
-  EXPECT_EQ(user.client.Request(user.world, {client::OrNot(client::Step(1, 7, 0.5))}).status(),
+  EXPECT_EQ(user.client.Request(user.world, {client::ExactOnly(client::Step(1, 7, 0.5))}).status(),
             STRIDEWIRE_INVALID_ARGUMENT);
   ASSERT_TRUE(user.client.Request(
       user.world,
-      {client::OrNot(client::StepTo(1, 7, 1.1, 0.0, 5.0, 0.0, STRIDEWIRE_FOOT_LEFT)),
-       client::OrNot(client::StepTo(1, 8, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT))}));
+      {client::ExactOnly(client::StepTo(1, 7, 1.1, 0.0, 5.0, 0.0, STRIDEWIRE_FOOT_LEFT)),
+       client::ExactOnly(client::StepTo(1, 8, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT))}));
   const auto rejected = user.Next(STRIDEWIRE_EVENT_REJECTED);
   ASSERT_TRUE(rejected);
   EXPECT_EQ(rejected->request_id, 7u);

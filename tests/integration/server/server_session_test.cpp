@@ -755,7 +755,7 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
 
 TEST_F(ServerSessionOfOne, FootprintsThatMustBeMetAreMetOrRejected) {
   protocol::StepMovement far{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0},
-                             .must_be_met = true};
+                             .exact_only = true};
   protocol::StepMovement near = far;
   near.at->position_m.z = 0.45;
   ASSERT_TRUE(client_.Request(world_, {{1, 7, far}, {1, 8, near}}));
@@ -792,7 +792,7 @@ TEST_F(ServerSessionOfOne, RefusalsAreAFeatureOfTheirOwn) {
   const auto taken = before.Request(world->world, {{1, 9, step}});
   ASSERT_TRUE(taken);
   EXPECT_EQ(taken->accepted, 1u);
-  step.must_be_met = true;
+  step.exact_only = true;
   const auto refused = before.Request(world->world, {{1, 10, step}});
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->code, StatusCode::kUnsupported);
@@ -908,7 +908,7 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
 
   const protocol::StepMovement must{.foot = protocol::FootChoice::kLeft,
                                     .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0},
-                                    .must_be_met = true};
+                                    .exact_only = true};
   const auto sliding = client.Request(world->world, {{1, 7, must}, {2, 8, must}});
   ASSERT_TRUE(sliding);
   EXPECT_EQ(sliding->accepted, 1u);

@@ -497,7 +497,7 @@ TEST_F(SessionTest, SendsGroundsFootprintsAndWalksToAServerThatKnowsThem) {
 TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
   protocol::Request request = StepOf(1, 9);
   protocol::StepMovement step{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5},
-                              .must_be_met = true};
+                              .exact_only = true};
   request.items[0].movement = step;
   const stridewire_world world = Joined();
   EXPECT_EQ(session_->Request(world, request, command_), STRIDEWIRE_OK);
@@ -511,7 +511,7 @@ TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
   const auto events = Events();
   ASSERT_EQ(events.size(), 1u);
   EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
-  step.must_be_met = false;
+  step.exact_only = false;
   request.items[0].movement = step;
   EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
   EXPECT_EQ(Sent().size(), 1u);

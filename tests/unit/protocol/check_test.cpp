@@ -521,7 +521,7 @@ TEST(Check, AvatarState) {
 }
 
 TEST(Check, WhatMustBeMetIsThere) {
-  Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .must_be_met = true}}}};
+  Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .exact_only = true}}}};
   EXPECT_TRUE(Check(message).has_value());
   std::get<StepMovement>(message.items[0].movement).at.reset();
   const Status status = Check(message);

@@ -262,7 +262,7 @@ typedef struct stridewire_movement {
   double speed_m_s;  ///< Walk, if has_speed: 0.05 to 5, as near as the library's steps come.
   stridewire_interrupt interrupt;
   uint8_t
-      must_be_met;  ///< Step, only if has_at: 1: when it cannot land there it is REJECTED, not done elsewhere.
+      exact_only;  ///< Step, only if has_at: 1: when it cannot land there it is REJECTED, not done elsewhere.
 } stridewire_movement;
 
 #define STRIDEWIRE_MAX_WAYPOINTS 64

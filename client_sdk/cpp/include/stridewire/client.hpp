@@ -59,8 +59,8 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   return m;
 }
 /// The same step, which is rejected rather than done when its place is out of reach.
-inline stridewire_movement OrNot(stridewire_movement step_to) {
-  step_to.must_be_met = 1;
+inline stridewire_movement ExactOnly(stridewire_movement step_to) {
+  step_to.exact_only = 1;
   return step_to;
 }
 /// The same movement, which takes over from what the avatar does.

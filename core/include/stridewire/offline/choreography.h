@@ -38,7 +38,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 /// y = 0). A step and a jump need `length_m`, a stand `seconds`; the rest may be left out. A key
 /// that is not listed here is an error, so is one that stands twice. A step's `at_m`, where the ball
 /// of its foot lands in the world, stands instead of length, side, height and turn; the `heading_rad`
-/// of that footprint may be left out, and so may `must_be_met`, with which the step is left out if that is out of
+/// of that footprint may be left out, and so may `exact_only`, with which the step is left out if that is out of
 /// reach. A `walk_to` needs position and heading. A `layer` takes no time: it begins, changes or (`off`) ends when the
 /// movement after it begins; it needs a `name`.
 struct Choreography {

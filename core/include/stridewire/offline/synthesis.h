@@ -53,11 +53,11 @@ struct WalkRecord {
 };
 
 /// A step that was not played, since it would have missed a footprint it had to meet.
-struct RefusalRecord {
+struct UnreachableFootprint {
   std::uint64_t request_id = 0;
   std::string reason;
   double time_s = 0.0;
-  FootprintMiss missed;
+  FootprintError missed;
 };
 
 /// A layer that begins, changes or ends when a movement of the list begins.
@@ -75,7 +75,7 @@ struct Synthesis {
   Clip clip;  ///< World poses; frame 0 is the stand before the first tick
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
-  std::vector<RefusalRecord> refusals;
+  std::vector<UnreachableFootprint> unreachable_footprints;
 };
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;

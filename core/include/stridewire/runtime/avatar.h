@@ -50,7 +50,7 @@ struct AvatarChange {
 };
 
 /// By what a step would have missed the footprint it had to meet.
-struct FootprintMiss {
+struct FootprintError {
   Footprint nearest;  ///< What it would have landed on, less what the other foot had given way
   double distance_m = 0.0;  ///< From it to the one asked for
   double turn_rad = 0.0;    ///< The same of the heading, 0 or more
@@ -72,7 +72,7 @@ struct AvatarEvent {
   BaseFrame base;                ///< kFinished: base frame after the movement
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
   const char* reason = "";                   ///< kRejected: a sentence, static storage
-  std::optional<FootprintMiss> missed;       ///< kRejected: of a footprint that had to be met
+  std::optional<FootprintError> missed;       ///< kRejected: of a footprint that had to be met
 };
 
 /// Why a request was rejected: the reason, for a footprint followed by the nearest, as in "the footprint is out of
@@ -224,9 +224,9 @@ class Avatar {
   void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
   [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
                                    double swing_part);
-  [[nodiscard]] FootprintMiss NearestInReach(const Footprint& asked, const FootprintMiss& missed,
+  [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
                                              double swing_part);
-  [[nodiscard]] FootprintMiss MissOf(const Footprint& asked);
+  [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
   [[nodiscard]] double EndOfMovement() const;
   [[nodiscard]] double Landed() const;
   [[nodiscard]] bool RedirectsSwing() const;

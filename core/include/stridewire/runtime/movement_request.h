@@ -29,7 +29,7 @@ struct StepRequest {
   std::optional<FootprintRequest> at;
   /// Only with `at`: if that is out of reach when the step is about to start, it is rejected instead of landing
   /// as near as it can.
-  bool must_be_met = false;
+  bool exact_only = false;
 };
 
 struct JumpRequest {

@@ -116,7 +116,7 @@ struct StepMovement {
   /// Lands here, if there is one; then length, side, height and turn are not sent.
   std::optional<Footprint> at;
   /// Only with `at` and kFeatureRefusals: rejected when it is about to start and `at` is out of reach.
-  bool must_be_met = false;
+  bool exact_only = false;
   bool operator==(const StepMovement&) const = default;
 };
 

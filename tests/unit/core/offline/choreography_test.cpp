@@ -118,8 +118,8 @@ TEST(ParseChoreography, ReadsFootprints) {
   const auto& second = std::get<StepRequest>(read->movements[1].movement);
   ASSERT_TRUE(second.at.has_value());
   EXPECT_FALSE(second.at->heading_rad.has_value());
-  EXPECT_FALSE(first.must_be_met);
-  EXPECT_TRUE(second.must_be_met);
+  EXPECT_FALSE(first.exact_only);
+  EXPECT_TRUE(second.exact_only);
 }
 
 TEST(ParseChoreography, ReadsWalks) {
@@ -232,9 +232,9 @@ const BadText kBadTexts[] = {
     {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.heading_rad: has a meaning only beside at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"must_be_met":true}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.must_be_met: has a meaning only beside at_m"},
+     "c.json: movements[0].step.exact_only: has a meaning only beside at_m"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"must_be_met":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.must_be_met: is neither true nor false"},
+     "c.json: movements[0].step.exact_only: is neither true nor false"},
     {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
     {R"({"movements":[{"step":{"foot":1,"length_m":0.5}}]})", ErrorCode::kMalformed,

@@ -23,9 +23,9 @@ constexpr double kTickS = 1.0 / 60.0;
 constexpr double kDegrees = 180.0 / M_PI;
 
 MovementRequest StepOnto(std::uint64_t id, Foot foot, const DVec3& place_m, double heading_rad,
-                         bool must_be_met = true) {
+                         bool exact_only = true) {
   return {id,
-          StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .must_be_met = must_be_met}};
+          StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
 }
 
 BlendedFoot SeenFoot(const Avatar& avatar, Foot foot) {
@@ -341,7 +341,7 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
 }
 
 TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
-  const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .must_be_met = true}};
+  const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
   EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "must_be_met has a meaning only beside at_m");
   Avatar sliding(library_, BaseFrame{}, {.foot_planting = false});
@@ -362,10 +362,10 @@ TEST_F(RefusalOfBuiltin, SynthesisTellsWhatItLeftOut) {
       {3, StepRequest{.length_m = 0.5}}};
   const auto synthesis = Synthesize(library_, BaseFrame{}, requests, 60.0);
   ASSERT_TRUE(synthesis.has_value());
-  ASSERT_EQ(synthesis->refusals.size(), 1u);
-  EXPECT_EQ(synthesis->refusals[0].request_id, 2u);
-  EXPECT_GT(synthesis->refusals[0].missed.distance_m, 3.0);
-  EXPECT_EQ(synthesis->refusals[0].time_s, synthesis->movements[1].start_s);
+  ASSERT_EQ(synthesis->unreachable_footprints.size(), 1u);
+  EXPECT_EQ(synthesis->unreachable_footprints[0].request_id, 2u);
+  EXPECT_GT(synthesis->unreachable_footprints[0].missed.distance_m, 3.0);
+  EXPECT_EQ(synthesis->unreachable_footprints[0].time_s, synthesis->movements[1].start_s);
   EXPECT_EQ(synthesis->movements[1].request_id, 3u);
   EXPECT_TRUE(synthesis->walks.empty());
 }

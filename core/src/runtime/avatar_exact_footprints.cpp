@@ -24,7 +24,7 @@ constexpr double kOvershoot = 1.5;
 
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
-bool IsMet(const FootprintMiss& missed) {
+bool IsMet(const FootprintError& missed) {
   return missed.distance_m <= kMetM && missed.turn_rad <= kMetRad;
 }
 
@@ -32,7 +32,7 @@ bool IsMet(const FootprintMiss& missed) {
 
 std::string DescribeRejection(const AvatarEvent& event) {
   if (!event.missed) return event.reason;
-  const FootprintMiss& missed = *event.missed;
+  const FootprintError& missed = *event.missed;
   const DVec3 nearest = missed.nearest.position_m;
   char text[201];
   std::snprintf(text, sizeof text,
@@ -49,7 +49,7 @@ std::string DescribeRejection(const AvatarEvent& event) {
 bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
                            double swing_part) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
-  if (step == nullptr || !step->must_be_met) {
+  if (step == nullptr || !step->exact_only) {
     PlanMovement(plan, swing_part);
     return true;
   }
@@ -63,7 +63,7 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
   kept_.front().pose = body_.pose;  // of the same size: no allocation
   std::swap(body_.movement, kept_.front().movement);
   PlanMovement(plan, swing_part);
-  FootprintMiss missed = MissOf(*plan.exact);
+  FootprintError missed = LandingErrorFrom(*plan.exact);
   if (IsMet(missed)) return true;
   missed = NearestInReach(*plan.exact, missed, swing_part);
   AddEvent({.type = AvatarEventType::kRejected,
@@ -80,11 +80,11 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
 }
 
 // A footprint near one that was missed that the step just planned would meet were it sent there.
-FootprintMiss Avatar::NearestInReach(const Footprint& asked, const FootprintMiss& missed,
+FootprintError Avatar::NearestInReach(const Footprint& asked, const FootprintError& missed,
                                      double swing_part) {
   const Foot moving = MovingFoot(group().kind);
   Footprint tried = asked;
-  FootprintMiss off = missed;
+  FootprintError off = missed;
   for (int i = 0; i < kMaxTries && !IsMet(off); ++i) {
     const double further = i == 0 ? 1.0 : kOvershoot;
     tried.position_m += further * (off.nearest.position_m - tried.position_m);
@@ -93,7 +93,7 @@ FootprintMiss Avatar::NearestInReach(const Footprint& asked, const FootprintMiss
         {.movement = StepRequest{.foot = moving,
                                  .at = FootprintRequest{tried.position_m, tried.heading_rad}}});
     PlanMovement(*plan, swing_part);
-    off = MissOf(*plan->exact);
+    off = LandingErrorFrom(*plan->exact);
   }
   const DVec3 away_m = asked.position_m - off.nearest.position_m;
   return {off.nearest, std::sqrt(glm::dot(away_m, away_m)),
@@ -103,7 +103,7 @@ FootprintMiss Avatar::NearestInReach(const Footprint& asked, const FootprintMiss
 // Where the step just planned brings its foot. What the plan misses is not all of it: that legs are too short for a
 // step up or down shows in the pose only. If there the other foot gives way instead, the one would have landed as
 // far off had the other stayed.
-FootprintMiss Avatar::MissOf(const Footprint& asked) {
+FootprintError Avatar::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();
   const Foot moving = MovingFoot(group().kind);
@@ -120,7 +120,7 @@ FootprintMiss Avatar::MissOf(const Footprint& asked) {
   };
 
   GridCache cache(body_.library->layout());
-  FootprintMiss worst{asked};
+  FootprintError worst{asked};
   const double land_s = body_.movement.feet.foot(moving).land_s;
   const double stands_s = body_.movement.duration_s() - land_s;
   const int looks = stands_s > 0.0 ? kLooks : 1;
