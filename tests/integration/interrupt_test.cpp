@@ -114,12 +114,12 @@ class Observer {
   bool stood_[2] = {false, false};
 };
 
-Figures InterruptAll(const RestlessWalker& walker, const Library& library, JoinKind join,
+Figures InterruptAll(const RestlessWalker& walker, const Library& library, BlendKind blend,
                      int avatars, double seconds, unsigned seed) {
   Figures figures;
   for (int i = 0; i < avatars; ++i) {
     Random random(seed + static_cast<unsigned>(i));
-    Avatar avatar(library, BaseFrame{}, {.join = join});
+    Avatar avatar(library, BaseFrame{}, {.blend = blend});
     Observer observer(avatar, figures);
     double next_s = 0.0;
     std::uint64_t id = 0;
@@ -152,8 +152,8 @@ TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
   const char* asked = std::getenv("STRIDEWIRE_AVATARS");
   const int avatars = asked == nullptr ? kRestlessWalkers : std::atoi(asked);
   const double examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps).joint_rad_s;
-  for (const JoinKind join : {JoinKind::kCubic, JoinKind::kInertial}) {
-    const Figures figures = InterruptAll(walker, library, join, avatars, 60.0, seed);
+  for (const BlendKind blend : {BlendKind::kCubic, BlendKind::kInertialization}) {
+    const Figures figures = InterruptAll(walker, library, blend, avatars, 60.0, seed);
     ASSERT_GT(figures.at_cuts.size(), 5u * static_cast<unsigned>(avatars));
     std::printf(
         "%s, %s: seed %u, %d avatars, %d requests in mid-movement, %d cut short; drift %.4f mm; "
@@ -161,13 +161,13 @@ TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
         "%.2f rad/s at takeovers (median; %.2f the worst of a hundred), at most %.2f where "
         "movements begin, "
         "%.2f elsewhere, %.2f in the examples (ratio %.2f)\n",
-        walker.name, join == JoinKind::kCubic ? "cubic" : "inertial", seed, avatars,
+        walker.name, blend == BlendKind::kCubic ? "cubic" : "inertial", seed, avatars,
         figures.requests, figures.cut_short, 1e3 * figures.largest_drift_m,
         figures.at_cuts[figures.at_cuts.size() / 2],
         figures.at_cuts[figures.at_cuts.size() * 99 / 100], figures.largest_at_joins,
         figures.largest_elsewhere, examples, figures.largest_at_joins / examples);
     EXPECT_LE(figures.largest_drift_m, 1e-3);
-    if (join == JoinKind::kInertial) {
+    if (blend == BlendKind::kInertialization) {
       EXPECT_LE(figures.largest_at_joins, 1.5 * examples);
     }
   }

@@ -56,7 +56,7 @@ class Restless {
         avatar_(std::move(library), DrawBase(random),
                 {.run_time_correction = Draws(0.7),
                  .foot_planting = Draws(0.8),
-                 .join = Draws(0.8) ? JoinKind::kInertial : JoinKind::kCubic,
+                 .blend = Draws(0.8) ? BlendKind::kInertialization : BlendKind::kCubic,
                  .terrain = Draws(0.5) ? RoughGround(random) : nullptr}) {}
 
   // What is done to it between two ticks.

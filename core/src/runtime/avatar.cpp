@@ -445,7 +445,7 @@ void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
     body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // Who stood has no speed to keep.
-  body_.Join(LandingWish{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
+  body_.BlendIn(LandingWish{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
 }
 
 // What was planned is under way.
@@ -494,7 +494,7 @@ void Avatar::KeepToLine(const DVec3& line_m) {
 void Avatar::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
-  KeepJoin(at_s);
+  CaptureBlendSource(at_s);
   Leave(at_s, false);
   movement_time_s_ = at_s;
   ++revision_;

@@ -27,14 +27,14 @@ void AvatarBody::Evaluate(double time_s) {
   PlantFeet(library->leg_rig(), movement, time_s, pose);
 }
 
-void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
+void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   const auto corrections = [&](double at_s, const Pose& blended) {
     return movement.feet.is_active
                ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
                : FeetCorrection{};
   };
   if (keeps_speed) {
-    const double earlier_s = time_s - kJoinStepS;
+    const double earlier_s = time_s - kBlendStepS;
     GridCache cache(library->layout());
     EvaluateMovement(group(), library->layout(), movement, earlier_s, cache, earlier_pose);
     earlier_feet[1] = corrections(earlier_s, earlier_pose);
@@ -48,7 +48,7 @@ void AvatarBody::KeepJoin(double time_s, bool keeps_speed) {
 
 void AvatarBody::TakeForBlended(double time_s, bool keeps_speed) {
   if (keeps_speed) {
-    Evaluate(time_s - kJoinStepS);
+    Evaluate(time_s - kBlendStepS);
     earlier_pose = pose;
     Evaluate(time_s);
   }
@@ -72,7 +72,7 @@ void AvatarBody::EnterAt(double time_s) {
 }
 
 template <typename Landing>
-void AvatarBody::JoinTo(const Landing& landing, bool keeps_speed) {
+void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   std::optional<ConstPoseSpan> earlier;
   if (keeps_speed) earlier.emplace(earlier_pose);
   GridCache cache(library->layout());
@@ -94,10 +94,10 @@ void AvatarBody::JoinTo(const Landing& landing, bool keeps_speed) {
   }
 }
 
-void AvatarBody::Join(const LandingWish& wish, bool keeps_speed) { JoinTo(wish, keeps_speed); }
+void AvatarBody::BlendIn(const LandingWish& wish, bool keeps_speed) { BlendInAt(wish, keeps_speed); }
 
-void AvatarBody::Join(const LandingChoice& choice, bool keeps_speed) {
-  JoinTo(choice, keeps_speed);
+void AvatarBody::BlendIn(const LandingChoice& choice, bool keeps_speed) {
+  BlendInAt(choice, keeps_speed);
 }
 
 // The corrections of the movement just planned go on from those before it.
@@ -105,7 +105,7 @@ void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& bl
   const double entered_s = movement.entered_s;
   std::array<FeetCorrection, 2> planned{CorrectFeet(movement, entered_s, blended[0])};
   if (keeps_speed) {
-    planned[1] = CorrectFeet(movement, entered_s + kJoinStepS, blended[1]);
+    planned[1] = CorrectFeet(movement, entered_s + kBlendStepS, blended[1]);
   } else {
     planned[1] = planned[0];
     earlier_feet[1] = earlier_feet[0];

@@ -37,11 +37,11 @@ bool Avatar::RedirectsSwing() const {
 }
 
 // What a movement that begins at `time_s` of this one goes on from.
-void Avatar::KeepJoin(double time_s) {
+void Avatar::CaptureBlendSource(double time_s) {
   const bool keeps_speed =
-      options_.join == JoinKind::kInertial && time_s - body_.movement.entered_s >= kJoinStepS;
+      options_.blend == BlendKind::kInertialization && time_s - body_.movement.entered_s >= kBlendStepS;
   moved_until_s_ = keeps_speed ? time_s_ : -1.0;
-  body_.KeepJoin(time_s, keeps_speed);
+  body_.CaptureBlendSource(time_s, keeps_speed);
 }
 
 // Tells who shows the avatar elsewhere that the movement under way is left at `time_s`. One that began in the same
@@ -67,7 +67,7 @@ void Avatar::RedirectSwing() {
   CancelQueue();
   auto& step = std::get<StepRequest>(request.movement);
   step.foot = MovingFoot(group().kind);
-  KeepJoin(movement_time_s_);
+  CaptureBlendSource(movement_time_s_);
   const auto plan = PlanRequest(request);
   STRIDEWIRE_CHECK(plan.has_value());
   const AvatarEvent left{.type = AvatarEventType::kFinished,

@@ -191,7 +191,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
       reader.Refuse("a movement record ends a movement outside of it");
     }
     if (!reader.ok()) return;
-    body_.KeepJoin(left_s, (flags & record::kLeftKeepsSpeed) != 0);
+    body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
     if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.KeepHolds(left_s);
     is_moving_ = false;
   }
@@ -217,7 +217,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
       return;
     }
     body_.EnterAt(entered_s);
-    body_.Join(choice, (flags & record::kKeepsSpeed) != 0);
+    body_.BlendIn(choice, (flags & record::kKeepsSpeed) != 0);
     body_.begins_planting = false;
     movement_time_s_ = time_s;
     is_moving_ = is_told_ = true;

@@ -162,7 +162,7 @@ FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Mo
 void GoOnFrom(const std::array<FeetCorrection, 2>& before,
               const std::array<FeetCorrection, 2>& planned, Movement& movement) {
   FootPlan& plan = movement.feet;
-  const double per_s = 1.0 / kJoinStepS;
+  const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
     const FootTrack& track = plan.feet[f];
     const bool is_planted = track.IsPlanted(movement.entered_s);
@@ -190,7 +190,7 @@ void GoOnFrom(const std::array<FeetCorrection, 2>& before,
     for (std::size_t f = 0; f < 2; ++f) {
       const FootRest& rest = plan.rests[f];
       root[i] += planned[i].feet[f].root_weight *
-                 (rest.offset_m + static_cast<double>(i) * kJoinStepS * rest.offset_m_s);
+                 (rest.offset_m + static_cast<double>(i) * kBlendStepS * rest.offset_m_s);
     }
   }
   plan.root_rest_m = before[0].root_m - root[0];

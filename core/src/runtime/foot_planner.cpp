@@ -89,7 +89,7 @@ class Planner {
       times_s_[kSwing + i] = swing.release_s + kSwingSamples[i] * (swing.land_s - swing.release_s);
     }
     times_s_[kEntry] = movement_.entered_s;
-    times_s_[kEntry + 1] = movement_.entered_s + kJoinStepS;
+    times_s_[kEntry + 1] = movement_.entered_s + kBlendStepS;
     times_s_[kBlendedEnd] = movement_.duration_s();
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
   }
@@ -198,7 +198,7 @@ class Planner {
   }
 
   // Offsets and their velocities at release and landing, so that the way between is smooth.
-  void JoinSwing(Foot foot, const BlendedFoot& landing, FootTrack& track) {
+  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrack& track) {
     const auto velocity_around = [&](std::size_t time) {
       const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
       return way_m / (times_s_[time + 1] - times_s_[time - 1]);
@@ -304,7 +304,7 @@ class Planner {
   static constexpr std::size_t kRelease = 1;
   static constexpr std::size_t kLanding = 4;
   static constexpr std::size_t kSwing = 6;
-  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();  // and kJoinStepS later
+  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();  // and kBlendStepS later
   static constexpr std::size_t kBlendedEnd = kEntry + 2;  // without what is left of the pose before
   static_assert(kBlendedEnd < FootSampler::kMost);
   std::array<double, kBlendedEnd + 1> times_s_;
@@ -371,7 +371,7 @@ namespace {
 // so that whoever is told what was chosen has the same plan.
 std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
                            const LandingWish* wish, const LandingChoice& chosen,
-                           const JoinFrom& join, GridCache& cache, PoseSpan pose,
+                           const BlendSource& source, GridCache& cache, PoseSpan pose,
                            Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
   Planner planner(library, cache, pose, movement);
@@ -399,10 +399,10 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
   // D = P - M, with P what was before.
   EvaluateBlend(group, library.layout(), movement, movement.entered_s, cache, movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
-  const FeetAt was = planner.FeetOf(join.before);
-  Subtract(join.before, movement.difference, movement.difference);
-  if (join.earlier) {
-    SetDifferenceVelocity(group, library.layout(), join.before, *join.earlier, cache, pose,
+  const FeetAt was = planner.FeetOf(source.before);
+  Subtract(source.before, movement.difference, movement.difference);
+  if (source.earlier) {
+    SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, cache, pose,
                           movement);
   }
   planner.Look(times);
@@ -445,7 +445,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
     } else {
       landing = planner.ChooseLanding(holds, *wish, moving);
     }
-    planner.JoinSwing(moving, landing, track);
+    planner.BlendSwing(moving, landing, track);
     if (wish == nullptr) {
       track.lift_m = chosen.lift_m;
       track.aside_m = chosen.aside_m;
@@ -472,7 +472,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
     track.to.heading_rad = landing[f].heading_rad;
     track.turn_rad[2] = 0.0;
     track.height_m[2] = 0.0;
-    planner.JoinSwing(foot, landing[f], track);
+    planner.BlendSwing(foot, landing[f], track);
   }
   return planner.Entry();
 }
@@ -480,15 +480,15 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
 }  // namespace
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
-                               const LandingWish& wish, const JoinFrom& join, GridCache& cache,
+                               const LandingWish& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
-  return Plan(library, holds, &wish, {}, join, cache, pose, movement);
+  return Plan(library, holds, &wish, {}, source, cache, pose, movement);
 }
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
-                               const LandingChoice& choice, const JoinFrom& join, GridCache& cache,
+                               const LandingChoice& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
-  return Plan(library, holds, nullptr, choice, join, cache, pose, movement);
+  return Plan(library, holds, nullptr, choice, source, cache, pose, movement);
 }
 
 LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {

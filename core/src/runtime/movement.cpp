@@ -54,10 +54,10 @@ void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, C
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
   // Before its beginning a movement is taken to go on as it begins.
-  const bool is_reflected = movement.entered_s < kJoinStepS;
+  const bool is_reflected = movement.entered_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
-                movement.entered_s + (is_reflected ? kJoinStepS : -kJoinStepS), cache, scratch);
-  const auto per_s = static_cast<float>(1.0 / kJoinStepS);
+                movement.entered_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);
+  const auto per_s = static_cast<float>(1.0 / kBlendStepS);
   const Pose& difference = movement.difference;
   const Vec3 entered_m = before.root_position_m - difference.root_position_m;
   const Vec3 blend_m =

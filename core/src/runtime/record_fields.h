@@ -22,9 +22,9 @@ enum Flag : std::uint16_t {
   kLeft = 1 << 5,            // the movement before was left
   kLeftAtEnd = 1 << 6,       // at its end: the time is not told
   kIsRedirected = 1 << 7,    // in mid-swing: feet stand where they stood
-  kLeftKeepsSpeed = 1 << 8,  // as told to AvatarBody::KeepJoin
+  kLeftKeepsSpeed = 1 << 8,  // as told to AvatarBody::CaptureBlendSource
   // Of a change; of the state of who stands, whether what was kept keeps a speed.
-  kKeepsSpeed = 1 << 9,  // as told to AvatarBody::Join
+  kKeepsSpeed = 1 << 9,  // as told to AvatarBody::BlendIn
   // Of a movement that began.
   kIsEntered = 1 << 10,  // later than at its beginning
   kIsSteered = 1 << 11,
@@ -152,7 +152,7 @@ void PlanFields(Stream& stream, P& plan) {
 // Whether something of the difference pose may still be asked for.
 inline bool NeedsDifference(const Movement& movement, double movement_time_s) {
   // Twice the step that a join looks back by: no rounding decides.
-  return movement_time_s - 2.0 * kJoinStepS < movement.entered_s + movement.ease_out_s;
+  return movement_time_s - 2.0 * kBlendStepS < movement.entered_s + movement.ease_out_s;
 }
 
 template <typename Stream, typename M>

@@ -42,8 +42,8 @@ struct AvatarChange {
   bool is_idle_other = false;      ///< idle() is not what it was
   bool is_left_at_end = false;     ///< The one before ended, and did not give way
   bool is_redirected = false;      ///< The other began in mid-swing of the one before
-  bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::KeepJoin)
-  bool begun_keeps_speed = false;  ///< How the other was joined (AvatarBody::Join)
+  bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::CaptureBlendSource)
+  bool begun_keeps_speed = false;  ///< How the other was joined (AvatarBody::BlendIn)
   double left_s = 0.0;             ///< When the one before was left, its own time
 
   bool operator==(const AvatarChange&) const = default;
@@ -85,7 +85,7 @@ struct AvatarOptions {
   /// Feet stand still where they land (PlanFeet); off, they are where the blend has them. See SetFootPlanting.
   bool foot_planting = true;
   /// How movements begin.
-  JoinKind join = JoinKind::kInertial;
+  BlendKind blend = BlendKind::kInertialization;
   /// The ground feet land on; null: level, at the height an avatar is put at, and rising only as
   /// requests say.
   std::shared_ptr<const Terrain> terrain;
@@ -232,7 +232,7 @@ class Avatar {
   [[nodiscard]] bool RedirectsSwing() const;
   void RedirectSwing();
   void SwitchPlanting();
-  void KeepJoin(double time_s);
+  void CaptureBlendSource(double time_s);
   void Leave(double time_s, bool is_redirected);
   void FinishMovement(double at_s);
   void KeepToLine(const DVec3& line_m);

@@ -25,7 +25,7 @@ struct AvatarBody {
   bool begins_planting = false;  ///< The movement that begins next is the first planted
   Pose blended_pose;  ///< Where a movement ended or gave way: the same before feet were planted
   /// What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
-  /// begins then and keeps their speed, kJoinStepS before, as well as the blended pose.
+  /// begins then and keeps their speed, kBlendStepS before, as well as the blended pose.
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
   Movement movement;  ///< Under way, or the last one
@@ -38,13 +38,13 @@ struct AvatarBody {
   void Evaluate(double time_s);
 
   /// What a movement that begins at `time_s` of this one goes on from. Leaves blended_pose at `time_s`.
-  void KeepJoin(double time_s, bool keeps_speed);
+  void CaptureBlendSource(double time_s, bool keeps_speed);
 
   /// What is displayed at a time of the movement is taken for what the blend has then: whatever of it is to end is
   /// eased out, and feet need no correction.
   void TakeForBlended(double time_s, bool keeps_speed);
 
-  /// Where feet that are planted stand when the movement ends at `time_s`; KeepJoin came before.
+  /// Where feet that are planted stand when the movement ends at `time_s`; CaptureBlendSource came before.
   void KeepHolds(double time_s);
 
   /// Goes on with a movement that has its weights, from `base`.
@@ -54,8 +54,8 @@ struct AvatarBody {
   void EnterAt(double time_s);
 
   /// Plans the feet of the movement just started, if they are planted, and what of the pose before is eased out.
-  void Join(const LandingWish& wish, bool keeps_speed);
-  void Join(const LandingChoice& choice, bool keeps_speed);
+  void BlendIn(const LandingWish& wish, bool keeps_speed);
+  void BlendIn(const LandingChoice& choice, bool keeps_speed);
 
   /// Lays the layers over the pose.
   void ShowLayers();
@@ -63,7 +63,7 @@ struct AvatarBody {
  private:
   void KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended);
   template <typename Landing>
-  void JoinTo(const Landing& landing, bool keeps_speed);
+  void BlendInAt(const Landing& landing, bool keeps_speed);
 };
 
 /// Room for any movement of a library.

@@ -134,8 +134,8 @@ struct FeetCorrection {
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);
 
-/// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kJoinStepS
-/// earlier. `planned` is what the plan itself corrects when the movement is entered, and kJoinStepS later. The
+/// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kBlendStepS
+/// earlier. `planned` is what the plan itself corrects when the movement is entered, and kBlendStepS later. The
 /// same twice: from rest.
 void GoOnFrom(const std::array<FeetCorrection, 2>& before,
               const std::array<FeetCorrection, 2>& planned, Movement& movement);

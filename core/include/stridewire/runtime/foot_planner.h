@@ -39,9 +39,9 @@ struct LandingWish {
 };
 
 /// What a movement goes on from.
-struct JoinFrom {
+struct BlendSource {
   ConstPoseSpan before;                  ///< Blended and eased, without planting
-  std::optional<ConstPoseSpan> earlier;  ///< The same kJoinStepS before, if its speed is to be kept
+  std::optional<ConstPoseSpan> earlier;  ///< The same kBlendStepS before, if its speed is to be kept
 };
 
 /// A footprint further from where the library's step ends than the request says is approached so far
@@ -56,9 +56,9 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// difference pose; and `movement.feet`.
 ///
 /// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
-/// where the blended and eased pose has the feet when the movement is entered, and kJoinStepS later.
+/// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
-                               const LandingWish& wish, const JoinFrom& join, GridCache& cache,
+                               const LandingWish& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
@@ -82,7 +82,7 @@ struct LandingChoice {
 /// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
 /// change is not needed.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
-                               const LandingChoice& choice, const JoinFrom& join, GridCache& cache,
+                               const LandingChoice& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
 /// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.

@@ -30,9 +30,9 @@ inline constexpr double kMaxSteerRad = 0.3;
 inline constexpr double kEaseOutS = 0.2;
 
 /// How what is displayed is brought onto a movement that begins.
-enum class JoinKind : std::uint8_t {
+enum class BlendKind : std::uint8_t {
   kCubic,     ///< The difference fades from rest (paper, Eq. (5)): joints may change speed at once.
-  kInertial,  ///< It goes on as fast as it did while it fades: no joint changes its speed at once.
+  kInertialization,  ///< It goes on as fast as it did while it fades: no joint changes its speed at once.
 };
 
 /// How fast a pose changes: of each joint as a rotation vector in the joint's own frame.
@@ -127,10 +127,10 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 [[nodiscard]] double EaseOutSlope(double s);
 
 /// Poses this far apart tell how fast they change.
-inline constexpr double kJoinStepS = 0.004;
+inline constexpr double kBlendStepS = 0.004;
 
 /// Sets the velocity of a difference pose that is there, from `before`, which was displayed when the movement
-/// was entered, and `earlier`, kJoinStepS before that. `scratch` has one rotation a joint. Never allocates if
+/// was entered, and `earlier`, kBlendStepS before that. `scratch` has one rotation a joint. Never allocates if
 /// the velocity has room for all joints.
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
