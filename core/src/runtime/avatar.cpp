@@ -50,9 +50,9 @@ void Avatar::Teleport(const BaseFrame& start) {
   body_.plants_feet = foot_planting();
   body_.begins_planting = false;
   if (body_.plants_feet) {
-    body_.holds = HoldsOf(body_.library->skeleton(), body_.library->leg_rig(), body_.pose,
+    body_.locks = FootLocksOf(body_.library->skeleton(), body_.library->leg_rig(), body_.pose,
                           start.position_m.y, options_.terrain.get());
-    StandOn(body_.holds, body_.movement);
+    StandOn(body_.locks, body_.movement);
     body_.earlier_feet[0] = CorrectFeet(body_.library->skeleton(), body_.library->leg_rig(),
                                         body_.movement, 0.0, body_.blended_pose);
     PlantFeet(body_.library->leg_rig(), body_.movement, 0.0, body_.pose);
@@ -351,7 +351,7 @@ void Avatar::GoOnWalking() {
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
     stance.feet[f] =
-        body_.plants_feet ? body_.holds[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+        body_.plants_feet ? body_.locks[f].print : Footprint{StandsAt(foot), base_.heading_rad};
   }
   stance.heading_rad = base_.heading_rad;
   stance.last_moved = last_moved_;
@@ -379,7 +379,7 @@ void Avatar::GoOnWalking() {
 
 // Where the ball of a foot is between two movements.
 DVec3 Avatar::StandsAt(Foot foot) const {
-  return body_.plants_feet ? body_.holds[static_cast<std::size_t>(foot)].print.position_m
+  return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
@@ -389,7 +389,7 @@ double Avatar::RiseAhead(const StepRequest& step) const {
   const auto f = static_cast<std::size_t>(foot);
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
   const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
-  const DVec3 stands = body_.holds[1 - f].print.position_m;
+  const DVec3 stands = body_.locks[1 - f].print.position_m;
   const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
                                          DVec3(outward * side_m, 0.0, step.length_m));
   return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
@@ -505,9 +505,9 @@ void Avatar::FinishMovement(double at_s) {
   if (!has_moved) base_.heading_rad = before.heading_rad;
   if (body_.movement.feet.is_active) {
     if (!is_exact_) KeepToLine(before.position_m);
-    body_.KeepHolds(at_s);
-    const auto& left = body_.holds[0].print.position_m;
-    const auto& right = body_.holds[1].print.position_m;
+    body_.CaptureFootLocks(at_s);
+    const auto& left = body_.locks[0].print.position_m;
+    const auto& right = body_.locks[1].print.position_m;
     if (IsStep(finished.kind)) {
       const Foot landed = has_moved ? MovingFoot(finished.kind) : last_moved_;
       base_.position_m.y = (landed == Foot::kLeft ? left : right).y;

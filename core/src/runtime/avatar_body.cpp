@@ -42,7 +42,7 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   Evaluate(time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
   // Planting that has not set in yet sets in anew.
-  begins_planting = movement.feet.is_active && time_s < movement.entered_s + movement.feet.settle_s;
+  begins_planting = movement.feet.is_active && time_s < movement.entered_s + movement.feet.plant_fade_s;
   if (begins_planting) TakeForBlended(time_s, keeps_speed);
 }
 
@@ -56,10 +56,10 @@ void AvatarBody::TakeForBlended(double time_s, bool keeps_speed) {
   earlier_feet = {};
 }
 
-void AvatarBody::KeepHolds(double time_s) {
-  holds = HoldsAt(*library, movement, time_s, blended_pose);
+void AvatarBody::CaptureFootLocks(double time_s) {
+  locks = FootLocksAt(*library, movement, time_s, blended_pose);
   if (!begins_planting) return;
-  for (FootHold& hold : holds) hold.height_m = hold.turn_rad = 0.0;
+  for (FootLock& hold : locks) hold.height_m = hold.turn_rad = 0.0;
 }
 
 void AvatarBody::StartWeighted(const BaseFrame& base) {
@@ -77,9 +77,9 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   if (keeps_speed) earlier.emplace(earlier_pose);
   GridCache cache(library->layout());
   if (plants_feet) {
-    KeepFeetGoing(keeps_speed, PlanFeet(*library, holds, landing, {blended_pose, earlier}, cache,
+    KeepFeetGoing(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, cache,
                                         pose, movement));
-    if (begins_planting) SettleFrom(library->leg_rig(), blended_pose, movement, pose);
+    if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;
   }

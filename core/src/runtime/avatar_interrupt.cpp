@@ -92,9 +92,9 @@ void Avatar::SwitchPlanting() {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();
   const Terrain* terrain = options_.terrain.get();
-  body_.holds = HoldsOf(skeleton, rig, body_.pose, base_.position_m.y, terrain);
+  body_.locks = FootLocksOf(skeleton, rig, body_.pose, base_.position_m.y, terrain);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    FootHold& hold = body_.holds[static_cast<std::size_t>(foot)];
+    FootLock& hold = body_.locks[static_cast<std::size_t>(foot)];
     hold.height_m = 0.0;
     hold.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;

@@ -192,7 +192,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     }
     if (!reader.ok()) return;
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
-    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.KeepHolds(left_s);
+    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.CaptureFootLocks(left_s);
     is_moving_ = false;
   }
   if (has_begun) {
@@ -239,7 +239,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     reader.Refuse("a movement record plants feet that the library has not");
     return;
   }
-  if (body_.plants_feet) record::HoldFields(reader, body_.holds);
+  if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
   if (is_moving_) {
     BaseFrame base;
     double entered_s = 0.0;

@@ -40,7 +40,7 @@ double RiseAt(double swing, double rise_m) {
 
 // How far a standing foot's heading is held: wholly with the sole down, not at all with the heel up,
 // where the foot is too short from above to have one.
-double HoldOf(double flatness) {
+double HeadingLockShare(double flatness) {
   return 1.0 - EaseOut((flatness - kHeelUp) / (kSoleDown - kHeelUp));
 }
 
@@ -124,7 +124,7 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
   correction.free_turn_rad = free_rad;
   if (is_planted) {
     const double held_rad = WrapAngle(print.heading_rad - blended.heading_rad - free_rad);
-    correction.turn_rad = free_rad + HoldOf(blended.flatness) * held_rad;
+    correction.turn_rad = free_rad + HeadingLockShare(blended.flatness) * held_rad;
   } else {
     correction.turn_rad = free_rad + (1.0 - turned) * track.release_turn_rad;
   }
@@ -241,16 +241,16 @@ std::array<std::size_t, 3> JointsOf(const LegRig::Side& side) {
 
 }  // namespace
 
-void Unsettle(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
+void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
   const FootPlan& plan = movement.feet;
-  if (!(time_s < movement.entered_s + plan.settle_s)) return;
-  const auto part = static_cast<float>(EaseOut((time_s - movement.entered_s) / plan.settle_s));
-  pose.root_position_m += part * plan.settle_root_m;
+  if (!(time_s < movement.entered_s + plan.plant_fade_s)) return;
+  const auto part = static_cast<float>(EaseOut((time_s - movement.entered_s) / plan.plant_fade_s));
+  pose.root_position_m += part * plan.plant_fade_root_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
     for (std::size_t i = 0; i < joints.size(); ++i) {
       Quat& rotation = pose.rotations[joints[i]];
-      rotation = rotation * SlerpFromIdentity(plan.settle_rotations[f][i], part);
+      rotation = rotation * SlerpFromIdentity(plan.plant_fade_rotations[f][i], part);
     }
   }
 }
@@ -268,7 +268,7 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   std::array<Side, 2> sides;
   const DVec3 root = DVec3(pose.root_position_m);
   const double settled =
-      plan.settle_s > 0.0 ? 1.0 - EaseOut((time_s - movement.entered_s) / plan.settle_s) : 1.0;
+      plan.plant_fade_s > 0.0 ? 1.0 - EaseOut((time_s - movement.entered_s) / plan.plant_fade_s) : 1.0;
   DVec3 shift(0.0);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Side& side = sides[static_cast<std::size_t>(foot)];
@@ -318,22 +318,22 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
     const auto target = Vec3(side.ankle_m - moved);
     SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
   }
-  Unsettle(rig, movement, time_s, pose);
+  ApplyPlantFade(rig, movement, time_s, pose);
 }
 
-void SettleFrom(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose) {
+void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose) {
   FootPlan& plan = movement.feet;
   pose.root_position_m = displayed.root_position_m;
   std::ranges::copy(displayed.rotations, pose.rotations.begin());
-  plan.settle_s = movement.ease_out_s;
-  plan.settle_root_m = Vec3(0.0f);
-  for (auto& leg : plan.settle_rotations) leg.fill(kIdentityQuat);
+  plan.plant_fade_s = movement.ease_out_s;
+  plan.plant_fade_root_m = Vec3(0.0f);
+  for (auto& leg : plan.plant_fade_rotations) leg.fill(kIdentityQuat);
   PlantFeet(rig, movement, movement.entered_s, pose);
-  plan.settle_root_m = displayed.root_position_m - pose.root_position_m;
+  plan.plant_fade_root_m = displayed.root_position_m - pose.root_position_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
     for (std::size_t i = 0; i < joints.size(); ++i) {
-      plan.settle_rotations[f][i] =
+      plan.plant_fade_rotations[f][i] =
           glm::conjugate(pose.rotations[joints[i]]) * displayed.rotations[joints[i]];
     }
   }
@@ -368,7 +368,7 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
   add(plan.root_rest_m, movement.steer_rad);
   add(plan.root_rest_m_s, movement.duration_s());
   add({movement.entered_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
-      plan.settle_s);
+      plan.plant_fade_s);
   return packed;
 }
 
@@ -381,7 +381,7 @@ void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseS
                           .base_m = {base.x, base.y, base.z},
                           .root_m = &pose.root_position_m.x,
                           .rotations = &pose.rotations[0].x});
-  Unsettle(rig, movement, time_s, pose);
+  ApplyPlantFade(rig, movement, time_s, pose);
 }
 
 }  // namespace stridewire

@@ -104,7 +104,7 @@ class Planner {
   }
 
   // The base below which the feet that stay stand where they do.
-  void HangBase(const FootHolds& holds, std::span<const Foot> staying, double stance_end_s) {
+  void HangBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
     for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
@@ -114,7 +114,7 @@ class Planner {
     DVec3 position(0.0);
     for (const Foot foot : staying) {
       const auto f = static_cast<std::size_t>(foot);
-      const DVec3 stands = holds[f].print.position_m;
+      const DVec3 stands = locks[f].print.position_m;
       const DVec3 start = sampler_.Ball(0, foot);
       double lowest_m = start.y;
       for (std::size_t i = 1; i < times_s.size(); ++i) {
@@ -122,14 +122,14 @@ class Planner {
       }
       position += DVec3(stands.x - start.x,
                         stands.y + rig_.sides[f].ball_height_m +
-                            SlopeRise(rig_.sides[f], holds[f].normal) - lowest_m,
+                            SlopeRise(rig_.sides[f], locks[f].normal) - lowest_m,
                         stands.z - start.z);
     }
     movement_.base.position_m = position / static_cast<double>(staying.size());
   }
 
   // Where and how the moving foot of a step lands; where the eased pose has it then.
-  BlendedFoot ChooseLanding(const FootHolds& holds, const LandingWish& wish, Foot moving) {
+  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingWish& wish, Foot moving) {
     const RequestPlan& request = wish.request;
     FootPlan& plan = movement_.feet;
     const auto m = static_cast<std::size_t>(moving);
@@ -150,7 +150,7 @@ class Planner {
     }
     FootTrack& track = plan.feet[m];
     const double rise_m = vector.y;
-    track.to.position_m = holds[x].print.position_m + RotateYaw(end_heading_rad, vector);
+    track.to.position_m = locks[x].print.position_m + RotateYaw(end_heading_rad, vector);
     double turn_rad = 0.0;
     const BlendedFoot landing = sampler_.FootAt(kLanding, moving);
     const double landing_rad = landing.heading_rad;
@@ -179,16 +179,16 @@ class Planner {
     track.to.heading_rad = landing_rad + turn_rad;
     track.turn_rad[2] = turn_rad;
     if (wish.terrain != nullptr) StandOnGround(moving, *wish.terrain, track);
-    track.height_m[2] = track.to.position_m.y - holds[x].print.position_m.y - rise_m +
+    track.height_m[2] = track.to.position_m.y - locks[x].print.position_m.y - rise_m +
                         SlopeRise(rig_.sides[m], track.normals[1]) -
-                        SlopeRise(rig_.sides[x], holds[x].normal);
+                        SlopeRise(rig_.sides[x], locks[x].normal);
     return landing;
   }
 
   // Where the feet of a jump land.
-  std::array<DVec3, 2> ChooseJumpLanding(const FootHolds& holds, const RequestPlan& request) {
+  std::array<DVec3, 2> ChooseJumpLanding(const FootLocks& locks, const RequestPlan& request) {
     const DVec3 centre =
-        0.5 * (holds[0].print.position_m + holds[1].print.position_m) +
+        0.5 * (locks[0].print.position_m + locks[1].print.position_m) +
         RotateYaw(movement_.base.heading_rad,
                   DVec3(0.0, ValueOr(group_, request.applied, ParameterName::kHeight, 0.0),
                         ValueOr(group_, request.applied, ParameterName::kLength, 0.0)));
@@ -329,14 +329,14 @@ FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Fo
                    {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
 }
 
-FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, double ground_m,
+FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, double ground_m,
                   const Terrain* terrain) {
-  FootHolds holds;
+  FootLocks locks;
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     EvaluateLeg(skeleton, rig, pose, foot, leg);
     const BlendedFoot blended = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
-    FootHold& hold = holds[static_cast<std::size_t>(foot)];
+    FootLock& hold = locks[static_cast<std::size_t>(foot)];
     hold.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
     if (terrain == nullptr) continue;
     const FootSupport support = SupportOf(*terrain, rig.side(foot), hold.print);
@@ -344,10 +344,10 @@ FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pos
     hold.normal = support.normal;
     hold.height_m = hold.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
   }
-  return holds;
+  return locks;
 }
 
-void StandOn(const FootHolds& holds, Movement& movement) {
+void StandOn(const FootLocks& locks, Movement& movement) {
   movement.warp = TimeWarp(std::array{0.0, kEaseOutS}, std::array{1});
   movement.entered_s = movement.steer_rad = 0.0;
   movement.ease_out_s = kEaseOutS;
@@ -355,7 +355,7 @@ void StandOn(const FootHolds& holds, Movement& movement) {
   plan = {};
   plan.is_active = true;
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootHold& hold = holds[f];
+    const FootLock& hold = locks[f];
     FootTrack& track = plan.feet[f];
     track.from = track.to = hold.print;
     track.normals.fill(hold.normal);
@@ -369,7 +369,7 @@ namespace {
 
 // A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
 // so that whoever is told what was chosen has the same plan.
-std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
+std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
                            const LandingWish* wish, const LandingChoice& chosen,
                            const BlendSource& source, GridCache& cache, PoseSpan pose,
                            Movement& movement) {
@@ -391,9 +391,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
   const std::array<Foot, 1> stays{fixed};
   if (is_step) {
-    planner.HangBase(holds, stays, movement.duration_s());
+    planner.HangBase(locks, stays, movement.duration_s());
   } else {
-    planner.HangBase(holds, kBoth, times.release_s);
+    planner.HangBase(locks, kBoth, times.release_s);
   }
 
   // D = P - M, with P what was before.
@@ -413,7 +413,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
   plan.keeps_above_ground = wish == nullptr ? chosen.is_on_terrain : wish->terrain != nullptr;
   for (std::size_t f = 0; f < 2; ++f) {
     FootTrack& track = plan.feet[f];
-    const FootHold& hold = holds[f];
+    const FootLock& hold = locks[f];
     track.from = track.to = hold.print;
     track.normals.fill(hold.normal);
     // What the difference pose takes away in height and turning while it fades is put back, so that
@@ -443,7 +443,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
       if (chosen.is_on_terrain) track.normals[1] = chosen.normal;
       track.height_m[2] = chosen.height_m;
     } else {
-      landing = planner.ChooseLanding(holds, *wish, moving);
+      landing = planner.ChooseLanding(locks, *wish, moving);
     }
     planner.BlendSwing(moving, landing, track);
     if (wish == nullptr) {
@@ -463,7 +463,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
   }
 
   std::array<DVec3, 2> to_m = chosen.to_m;
-  if (wish != nullptr) to_m = planner.ChooseJumpLanding(holds, wish->request);
+  if (wish != nullptr) to_m = planner.ChooseJumpLanding(locks, wish->request);
   const FeetAt landing = planner.Landing();
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
@@ -479,16 +479,16 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootHolds& holds,
 
 }  // namespace
 
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingWish& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
-  return Plan(library, holds, &wish, {}, source, cache, pose, movement);
+  return Plan(library, locks, &wish, {}, source, cache, pose, movement);
 }
 
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingChoice& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
-  return Plan(library, holds, nullptr, choice, source, cache, pose, movement);
+  return Plan(library, locks, nullptr, choice, source, cache, pose, movement);
 }
 
 LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {
@@ -507,15 +507,15 @@ LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {
   return choice;
 }
 
-FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement, double time_s,
+FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, double time_s,
                   ConstPoseSpan pose) {
-  FootHolds holds;
+  FootLocks locks;
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
     const FootCorrection correction = CorrectFoot(
         movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
-    FootHold& hold = holds[static_cast<std::size_t>(foot)];
+    FootLock& hold = locks[static_cast<std::size_t>(foot)];
     const FootTrack& track = movement.feet.foot(foot);
     hold.print = time_s > track.release_s ? track.to : track.from;
     hold.height_m = correction.offset_m.y;
@@ -523,7 +523,7 @@ FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement, double
     hold.normal = correction.normal;
     hold.root_weight = correction.root_weight;
   }
-  return holds;
+  return locks;
 }
 
 }  // namespace stridewire

@@ -1,5 +1,5 @@
 // The planting of several avatars' feet at once. The same as PlantFeetByReference of foot_plan.cpp, which says why what
-// is done is done; a test holds the two together. Positions are relative to each movement's base, so that floats do.
+// is done is done; a test locks the two together. Positions are relative to each movement's base, so that floats do.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
 #undef STRIDEWIRE_FOOT_PLANT_INL_H
@@ -78,7 +78,7 @@ HWY_INLINE Track LoadTrack(const float* plan) {
 // What all of a movement's plan shares.
 struct Common {
   SoaVec3 root_rest, root_rest_velocity;
-  Float steer, duration_s, entered_s, ease_out_s, keeps_above_ground, settle_s;
+  Float steer, duration_s, entered_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
   Float per_duration, per_ease_out;  // 1 / s
 };
@@ -338,7 +338,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
     q = LoadQuat(at + 8 * kBlock);
     common.entered_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
-    common.settle_s = q.w;
+    common.plant_fade_s = q.w;
     common.per_duration = Float(1.0f) / common.duration_s;
     common.per_ease_out = Float(1.0f) / common.ease_out_s;
   }
@@ -386,10 +386,10 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
                              DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
                          second * DepthBelow(track.to, track.normals[1], bones, leg, at, c.turn);
       // The root goes with what it goes with on level ground too, and with this.
-      const Mask is_settling = common.settle_s > Float(0.0f);
+      const Mask is_settling = common.plant_fade_s > Float(0.0f);
       const Float settled =
           Float(1.0f) - EaseOut((common.time_s - common.entered_s) /
-                                Select(is_settling, common.settle_s, Float(1.0f)));
+                                Select(is_settling, common.plant_fade_s, Float(1.0f)));
       const Float lifted =
           Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
       c.offset.y = c.offset.y + lifted;

@@ -118,7 +118,7 @@ void AppendState(const Avatar& avatar, std::vector<std::byte>& out) {
   if (!is_moving && body.begins_planting) flags |= record::kBeginsPlanting;
   RecordWriter writer(out);
   writer.Flags(flags);
-  if (body.plants_feet) record::HoldFields(writer, body.holds);
+  if (body.plants_feet) record::FootLockFields(writer, body.locks);
   if (is_moving) {
     const Movement& movement = body.movement;
     writer.F64(avatar.movement_time_s());
@@ -144,7 +144,7 @@ void AppendState(const Avatar& avatar, std::vector<std::byte>& out) {
 }
 
 std::size_t MaxRecordBytes(const MotionLibrary& library) {
-  // Plan, holds, corrections and four layers take some 1,700; of poses there are three at most, or one and its
+  // Plan, locks, corrections and four layers take some 1,700; of poses there are three at most, or one and its
   // velocity.
   return 2000 + 48 * static_cast<std::size_t>(library.skeleton().joint_count()) +
          4 * static_cast<std::size_t>(library.max_example_count());

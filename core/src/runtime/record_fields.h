@@ -97,8 +97,8 @@ void CorrectionFields(Stream& stream, C& feet) {
 }
 
 template <typename Stream, typename H>
-void HoldFields(Stream& stream, H& holds) {
-  for (auto& hold : holds) {
+void FootLockFields(Stream& stream, H& locks) {
+  for (auto& hold : locks) {
     PrintFields(stream, hold.print);
     stream.F64(hold.height_m);
     stream.F64(hold.turn_rad);
@@ -139,12 +139,12 @@ void PlanFields(Stream& stream, P& plan) {
   }
   Vector(stream, plan.root_rest_m);
   Vector(stream, plan.root_rest_m_s);
-  bool settles = plan.settle_s > 0.0;
+  bool settles = plan.plant_fade_s > 0.0;
   stream.Bool(settles);
   if (!settles) return;
-  stream.F64(plan.settle_s);
-  Vector(stream, plan.settle_root_m);
-  for (auto& leg : plan.settle_rotations) {
+  stream.F64(plan.plant_fade_s);
+  Vector(stream, plan.plant_fade_root_m);
+  for (auto& leg : plan.plant_fade_rotations) {
     for (auto& rotation : leg) Rotation(stream, rotation);
   }
 }

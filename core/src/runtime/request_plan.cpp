@@ -291,7 +291,7 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
                   "walk_to");
     }
     if (walk->waypoints_m.size() > kMaxWaypoints) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m holds more than 64 places", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m locks more than 64 places", "walk_to");
     }
     if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
       return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",

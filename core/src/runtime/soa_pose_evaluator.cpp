@@ -68,7 +68,7 @@ struct SoaPoseEvaluator::Work {
   void TakePlans();
   void TakeEasing();
   void Finish(std::size_t pose);
-  void Unsettle(std::size_t pose);
+  void ApplyPlantFade(std::size_t pose);
   [[nodiscard]] float* RowOf(std::size_t pose, std::size_t lane) {
     return FloatsOf(rows) + (pose * kBlock + lane) * row_floats;
   }
@@ -174,7 +174,7 @@ void SoaPoseEvaluator::Work::TakePlans() {
   for (std::size_t i = 0; i < kBlock; ++i) {
     const FootPlan& feet = movement(i < lanes ? i : 0).feet;
     plans[i] = feet.packed.data();
-    settles |= feet.settle_s > 0.0;
+    settles |= feet.plant_fade_s > 0.0;
   }
   kernels::Transpose(plans.data(), kPackedPlanFloats, lanes, FloatsOf(plan));
 }
@@ -240,11 +240,11 @@ void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
   (void)kernels::FinishLanes(blend, poses.roots_m(), poses.rotations());
 }
 
-void SoaPoseEvaluator::Work::Unsettle(std::size_t pose) {
+void SoaPoseEvaluator::Work::ApplyPlantFade(std::size_t pose) {
   for (std::size_t i = 0; i < lanes; ++i) {
-    if (movement(i).feet.settle_s == 0.0) continue;
+    if (movement(i).feet.plant_fade_s == 0.0) continue;
     poses.Get(i, one);
-    stridewire::Unsettle(library.leg_rig(), movement(i), times[pose].of[i], one);
+    stridewire::ApplyPlantFade(library.leg_rig(), movement(i), times[pose].of[i], one);
     poses.Set(i, one);
   }
 }
@@ -297,7 +297,7 @@ const SoaPose& SoaPoseEvaluator::Next() {
                          .root_m = work.poses.roots_m(),
                          .rotations = work.poses.rotations()},
                         work.lanes);
-    if (work.settles) work.Unsettle(pose);
+    if (work.settles) work.ApplyPlantFade(pose);
   }
   return work.poses;
 }

@@ -45,7 +45,7 @@ struct RejectedTime {
   std::string reason;
 };
 
-/// What a capture holds.
+/// What a capture locks.
 struct Extraction {
   std::string path;
   int frames = 0;

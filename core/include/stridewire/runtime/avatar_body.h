@@ -29,7 +29,7 @@ struct AvatarBody {
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
   Movement movement;  ///< Under way, or the last one
-  FootHolds holds;    ///< Where the feet stood when the movement began
+  FootLocks locks;    ///< Where the feet stood when the movement began
 
   [[nodiscard]] ConstPoseSpan Shown() const { return has_layers ? layered_pose : pose; }
   [[nodiscard]] const MotionGroup& group() const { return library->group(movement.group); }
@@ -45,7 +45,7 @@ struct AvatarBody {
   void TakeForBlended(double time_s, bool keeps_speed);
 
   /// Where feet that are planted stand when the movement ends at `time_s`; CaptureBlendSource came before.
-  void KeepHolds(double time_s);
+  void CaptureFootLocks(double time_s);
 
   /// Goes on with a movement that has its weights, from `base`.
   void StartWeighted(const BaseFrame& base);

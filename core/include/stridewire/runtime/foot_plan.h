@@ -68,7 +68,7 @@ struct FootPlan {
   bool is_active = false;
   /// What was displayed before had no feet planted: soles come out of the ground, and what else planting changes at
   /// once (a root lower so that legs bend) sets in, over this long.
-  double settle_s = 0.0;
+  double plant_fade_s = 0.0;
   PackedFootPlan packed{};  ///< All of it but what was missed, once the plan is made
 
   std::array<FootTrack, 2> feet;   ///< Indexed by Foot.
@@ -78,9 +78,9 @@ struct FootPlan {
   /// On terrain: soles are lifted out of the ground they leave and land on. Level ground the blend
   /// itself keeps to within what the examples do, and knees move less.
   bool keeps_above_ground = false;
-  Vec3 settle_root_m = Vec3(0.0f);  ///< What was displayed less what planting makes of it
+  Vec3 plant_fade_root_m = Vec3(0.0f);  ///< What was displayed less what planting makes of it
   std::array<std::array<Quat, 3>, 2>
-      settle_rotations{};       ///< The same of hip, knee and ankle, by Foot
+      plant_fade_rotations{};       ///< The same of hip, knee and ankle, by Foot
   DVec3 missed_m = DVec3(0.0);  ///< From where a step lands to where it was asked to, horizontally
   double missed_rad = 0.0;      ///< The same for the foot's heading
 
@@ -142,10 +142,10 @@ void GoOnFrom(const std::array<FeetCorrection, 2>& before,
 
 /// Makes a movement whose feet are planned set in from a pose that was displayed when it was entered and had no feet
 /// planted, the blended and eased one of that time. `pose` is scratch of its size.
-void SettleFrom(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
+void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
-/// The last of planting: gives a pose whose feet are planted back what has not set in yet (FootPlan::settle_s).
-void Unsettle(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
+/// The last of planting: gives a pose whose feet are planted back what has not set in yet (FootPlan::plant_fade_s).
+void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 /// A foot of a pose with its root at `root_m`.
 [[nodiscard]] BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m,

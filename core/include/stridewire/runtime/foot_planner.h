@@ -10,17 +10,17 @@
 namespace stridewire {
 
 /// Where a foot is between two movements, and what planting adds to the blend there.
-struct FootHold {
+struct FootLock {
   Footprint print;
   double height_m = 0.0;
   double turn_rad = 0.0;
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
   double root_weight = 0.5;
 };
-using FootHolds = std::array<FootHold, 2>;  ///< Indexed by Foot.
+using FootLocks = std::array<FootLock, 2>;  ///< Indexed by Foot.
 
 /// Feet as the unplanted pose has them, on the ground below them or, without terrain, at height `ground_m`.
-[[nodiscard]] FootHolds HoldsOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
+[[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
                                 double ground_m, const Terrain* terrain);
 
 /// How a foot would stand at a place.
@@ -28,7 +28,7 @@ using FootHolds = std::array<FootHold, 2>;  ///< Indexed by Foot.
                                     const Footprint& print);
 
 /// Makes a movement of one in which both feet stay where they are held.
-void StandOn(const FootHolds& holds, Movement& movement);
+void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Where a movement is to bring the feet.
 struct LandingWish {
@@ -55,9 +55,9 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// foot that stays (for a jump: the middle of both) is where it stands and nothing drifts; its
 /// difference pose; and `movement.feet`.
 ///
-/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
+/// `pose` is scratch with one rotation a joint; `cache` locks rows of this movement or none. Never allocates. Returns
 /// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingWish& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
@@ -81,12 +81,12 @@ struct LandingChoice {
 
 /// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
 /// change is not needed.
-std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootHolds& holds,
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingChoice& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
-/// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
-[[nodiscard]] FootHolds HoldsAt(const MotionLibrary& library, const Movement& movement,
+/// The locks at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
+[[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                 double time_s, ConstPoseSpan pose);
 
 /// When the feet that a movement moves leave the ground and stand again, planted or not.

@@ -21,11 +21,11 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   const double step_s = level_s + kRiseTime_s_m * 0.5 * (start_rise_m + end_rise_m);
   // From standing the weight first moves over the foot that stays; to standing the body settles.
   const double weight_shift_s = aside ? 0.24 : 0.30;
-  const double settle_s = 0.12 * step_s + (aside ? 0.10 : 0.15);
+  const double plant_fade_s = 0.12 * step_s + (aside ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
   timing.heel_strike_s = timing.toe_off_s + ToWholeFrames(0.76 * step_s);
   timing.end_s = timing.heel_strike_s +
-                 (timing.end.standing() ? ToWholeFrames(settle_s) : timing.end.half_support_s);
+                 (timing.end.standing() ? ToWholeFrames(plant_fade_s) : timing.end.half_support_s);
   timing.toe_off_s = ToWholeFrames(timing.toe_off_s);
   timing.heel_strike_s = ToWholeFrames(timing.heel_strike_s);
   timing.end_s = ToWholeFrames(timing.end_s);
