@@ -515,7 +515,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
           ++seen;
           const FootPlan& feet = stretch.movement->feet;
           ++planted[feet.is_active ? 1 : 0];
-          settling += feet.is_active && now_s < stretch.movement->entered_s + feet.settle_s;
+          settling += feet.is_active && now_s < stretch.movement->entered_s + feet.plant_fade_s;
         }
       });
       if (HasFatalFailure()) return;
