@@ -52,7 +52,7 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
     const ConstPoseSpan pose = clip.frame(f);
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const Leg& leg = skeleton.leg(foot);
-      BodyTracks::FootTrack& track = tracks.feet[static_cast<int>(foot)];
+      BodyTracks::FootTrajectory& track = tracks.feet[static_cast<int>(foot)];
       track.ankle_m.emplace_back(PointPosition(skeleton, pose, leg.ankle, Vec3(0.0f)));
       track.ball_m.emplace_back(BallPosition(skeleton, pose, foot));
       track.toe_tip_m.emplace_back(PointPosition(skeleton, pose, leg.ball, leg.toe_tip_offset_m));

@@ -32,7 +32,7 @@ std::vector<double> Heights(const std::vector<DVec3>& path) {
 }
 
 // Slow, and low if asked for, at any of the three points; short gaps and contacts cleaned up.
-std::vector<FrameRange> StandingRuns(const BodyTracks::FootTrack& track, double fps,
+std::vector<FrameRange> StandingRuns(const BodyTracks::FootTrajectory& track, double fps,
                                      bool use_height, const ContactOptions& options) {
   Flags standing(track.ball_m.size(), 0);
   const int window = static_cast<int>(std::lround(options.smooth_s * fps));
@@ -74,7 +74,7 @@ double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
 }
 
 // The lower quartile of the ball's height while it hardly moves; of all frames if it always does.
-double RestingBallHeight(const BodyTracks::FootTrack& track, const std::vector<double>& ball_speed,
+double RestingBallHeight(const BodyTracks::FootTrajectory& track, const std::vector<double>& ball_speed,
                          const FrameRange& frames) {
   std::vector<double> still;
   std::vector<double> all;
@@ -86,7 +86,7 @@ double RestingBallHeight(const BodyTracks::FootTrack& track, const std::vector<d
   return Percentile(still.empty() ? std::move(all) : std::move(still), 25.0);
 }
 
-std::vector<double> BallSpeed(const BodyTracks::FootTrack& track, double fps,
+std::vector<double> BallSpeed(const BodyTracks::FootTrajectory& track, double fps,
                               const ContactOptions& options) {
   const int window = static_cast<int>(std::lround(options.smooth_s * fps));
   return PathSpeed(SmoothPath(track.ball_m, window), fps);
@@ -108,7 +108,7 @@ FootContacts FindContacts(const BodyTracks& tracks, const ContactOptions& option
   FootContacts contacts;
   std::vector<FrameRange> by_speed[2];
   for (int f = 0; f < 2; ++f) {
-    const BodyTracks::FootTrack& track = tracks.feet[f];
+    const BodyTracks::FootTrajectory& track = tracks.feet[f];
     const std::vector<double> ball_speed = BallSpeed(track, tracks.fps, options);
     by_speed[f] = StandingRuns(track, tracks.fps, false, options);
     double lowest = 1e9;
@@ -122,7 +122,7 @@ FootContacts FindContacts(const BodyTracks& tracks, const ContactOptions& option
     if (highest - lowest > options.raised_floor_m) contacts.single_floor = false;
   }
   for (int f = 0; f < 2; ++f) {
-    const BodyTracks::FootTrack& track = tracks.feet[f];
+    const BodyTracks::FootTrajectory& track = tracks.feet[f];
     std::vector<FrameRange> runs = contacts.single_floor
                                        ? StandingRuns(track, tracks.fps, true, options)
                                        : std::move(by_speed[f]);

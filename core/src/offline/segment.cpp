@@ -68,7 +68,7 @@ double UsualHalfSupport(const std::vector<Swing>& swings, int frame_count, doubl
   return halves.empty() ? kHalfSupportDefaultS * fps : Median(std::move(halves));
 }
 
-double FootYaw(const BodyTracks::FootTrack& track, int frame) {
+double FootYaw(const BodyTracks::FootTrajectory& track, int frame) {
   const DVec3 d = track.toe_tip_m[static_cast<std::size_t>(frame)] -
                   track.ankle_m[static_cast<std::size_t>(frame)];
   return std::atan2(d.x, d.z);
@@ -85,8 +85,8 @@ class StepFinder {
     const double seconds = swing.frames.size() / tracks_.fps;
     if (seconds < options_.swing_min_s) return Text("the foot is lifted for %.2f s only", seconds);
     if (seconds > options_.swing_max_s) return Text("the foot is in the air for %.1f s", seconds);
-    const BodyTracks::FootTrack& moving = tracks_.foot(swing.moving);
-    const BodyTracks::FootTrack& fixed = tracks_.foot(OtherFoot(swing.moving));
+    const BodyTracks::FootTrajectory& moving = tracks_.foot(swing.moving);
+    const BodyTracks::FootTrajectory& fixed = tracks_.foot(OtherFoot(swing.moving));
     step.moving = swing.moving;
     step.toe_off = swing.frames.begin;
     step.heel_strike = swing.frames.end;

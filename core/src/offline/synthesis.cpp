@@ -30,7 +30,7 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& 
   std::vector<PlantRecord> plants;
   const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
   for (const Foot foot : {OtherFoot(last), last}) {
-    const FootTrack& track = movement.feet.foot(foot);
+    const FootTrajectory& track = movement.feet.foot(foot);
     const double end_s = record.start_s + movement.duration_s();
     const double release_s = std::min(record.start_s + track.release_s, end_s);
     plants.push_back({foot, record.start_s, release_s, track.from.position_m, 0.0});

@@ -110,7 +110,7 @@ void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& bl
     planned[1] = planned[0];
     earlier_feet[1] = earlier_feet[0];
   }
-  GoOnFrom(earlier_feet, planned, movement);
+  ContinueFrom(earlier_feet, planned, movement);
 }
 
 void AvatarBody::ShowLayers() {

@@ -132,10 +132,10 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
 void SetTimes(MovementKind kind, Movement& movement) {
   const SwingTimes times = SwingTimesOf(kind, movement);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    FootTrack& track = movement.feet.foot(foot);
+    FootTrajectory& track = movement.feet.foot(foot);
     const bool moves = !IsStep(kind) || foot == MovingFoot(kind);
-    track.release_s = moves ? times.release_s : FootTrack::kNever;
-    track.land_s = moves ? times.land_s : FootTrack::kNever;
+    track.release_s = moves ? times.release_s : FootTrajectory::kNever;
+    track.land_s = moves ? times.land_s : FootTrajectory::kNever;
     track.root_weight = !IsStep(kind) ? 0.5 : moves ? 0.0 : 1.0;
   }
 }
@@ -265,7 +265,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
       movement.feet.is_active = true;
       SetTimes(body_.group().kind, movement);
       record::PlanFields(reader, movement.feet);
-      for (const FootRest& rest : movement.feet.rests) {
+      for (const FootResidual& rest : movement.feet.residuals) {
         if (!(rest.over_s > 0.0)) reader.Refuse("what feet keep ends before it begins");
       }
       movement.feet.packed = PackFootPlan(movement);

@@ -25,7 +25,7 @@ double SmoothMax(double a, double b, double soft_m) {
 }
 
 // Part of the swing that is over, 0 to 1.
-double SwingAt(const FootTrack& track, double time_s) {
+double SwingAt(const FootTrajectory& track, double time_s) {
   if (time_s <= track.release_s) return 0.0;
   if (time_s >= track.land_s) return 1.0;
   return (time_s - track.release_s) / (track.land_s - track.release_s);
@@ -58,14 +58,14 @@ DVec3 RootShare(const FootCorrection& correction) {
   return correction.root_weight * correction.offset_m + correction.root_shift_m;
 }
 
-DVec3 RootRest(const Movement& movement, double time_s) {
+DVec3 RootResidual(const Movement& movement, double time_s) {
   const FootPlan& plan = movement.feet;
   const double since_s = time_s - movement.entered_s;
   const double flat = EaseOut(since_s / kRootShiftS);
   const double rise =
       EaseOut(since_s / std::max(kRootShiftS, kRootRisePart * movement.duration_s()));
-  return DVec3(flat, rise, flat) * plan.root_rest_m +
-         movement.ease_out_s * EaseOutSlope(since_s / movement.ease_out_s) * plan.root_rest_m_s;
+  return DVec3(flat, rise, flat) * plan.root_residual_m +
+         movement.ease_out_s * EaseOutSlope(since_s / movement.ease_out_s) * plan.root_residual_m_s;
 }
 
 }  // namespace
@@ -85,7 +85,7 @@ BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m, const LegP
 
 FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                            const BlendedFoot& blended) {
-  const FootTrack& track = movement.feet.foot(foot);
+  const FootTrajectory& track = movement.feet.foot(foot);
   const double duration_s = movement.duration_s();
   const double swing = SwingAt(track, time_s);
   const bool has_landed = time_s >= track.land_s;
@@ -116,7 +116,7 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
     return movement.steer_rad * (1.0 - EaseOut(at_s / duration_s));
   };
   free_rad += steered(std::min(track.land_s, duration_s)) * turned - steered(time_s);
-  const FootRest& rest = movement.feet.rests[static_cast<std::size_t>(foot)];
+  const FootResidual& rest = movement.feet.residuals[static_cast<std::size_t>(foot)];
   const double value = EaseOut(since_s / rest.over_s);
   const double slope = rest.over_s * EaseOutSlope(since_s / rest.over_s);
   correction.offset_m += value * rest.offset_m + slope * rest.offset_m_s;
@@ -144,7 +144,7 @@ FeetCorrection CorrectFeet(const Movement& movement, double time_s, const FeetAt
     corrections.feet[f] = CorrectFoot(movement, foot, time_s, blended[f]);
     corrections.root_m += RootShare(corrections.feet[f]);
   }
-  corrections.root_m += RootRest(movement, time_s);
+  corrections.root_m += RootResidual(movement, time_s);
   return corrections;
 }
 
@@ -159,17 +159,17 @@ FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Mo
   return CorrectFeet(movement, time_s, blended);
 }
 
-void GoOnFrom(const std::array<FeetCorrection, 2>& before,
+void ContinueFrom(const std::array<FeetCorrection, 2>& before,
               const std::array<FeetCorrection, 2>& planned, Movement& movement) {
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootTrack& track = plan.feet[f];
+    const FootTrajectory& track = plan.feet[f];
     const bool is_planted = track.IsPlanted(movement.entered_s);
     const auto turn_of = [&](const FeetCorrection& correction) {
       return is_planted ? correction.feet[f].free_turn_rad : correction.feet[f].turn_rad;
     };
-    FootRest& rest = plan.rests[f];
+    FootResidual& rest = plan.residuals[f];
     rest.offset_m = before[0].feet[f].offset_m - planned[0].feet[f].offset_m;
     rest.offset_m_s = per_s * ((before[0].feet[f].offset_m - before[1].feet[f].offset_m) -
                                (planned[1].feet[f].offset_m - planned[0].feet[f].offset_m));
@@ -188,13 +188,13 @@ void GoOnFrom(const std::array<FeetCorrection, 2>& before,
   std::array<DVec3, 2> root{planned[0].root_m, planned[1].root_m};
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t f = 0; f < 2; ++f) {
-      const FootRest& rest = plan.rests[f];
+      const FootResidual& rest = plan.residuals[f];
       root[i] += planned[i].feet[f].root_weight *
                  (rest.offset_m + static_cast<double>(i) * kBlendStepS * rest.offset_m_s);
     }
   }
-  plan.root_rest_m = before[0].root_m - root[0];
-  plan.root_rest_m_s = per_s * ((before[0].root_m - before[1].root_m) - (root[1] - root[0]));
+  plan.root_residual_m = before[0].root_m - root[0];
+  plan.root_residual_m_s = per_s * ((before[0].root_m - before[1].root_m) - (root[1] - root[0]));
 }
 
 namespace {
@@ -220,7 +220,7 @@ double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Sid
 }
 
 // How much higher a foot must be so that its sole is not below the ground it leaves or lands on.
-double LiftOutOfGround(const FootTrack& track, double time_s, const LegRig::Side& side,
+double LiftOutOfGround(const FootTrajectory& track, double time_s, const LegRig::Side& side,
                        const LegPose& leg, const DVec3& ball, const Quat& turn) {
   const double second = 1.0 - EaseOut((SwingAt(track, time_s) - kGroundFrom) / kGroundOver);
   double lift_m = 0.0;
@@ -286,7 +286,7 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
         blended.ball_m + side.correction.offset_m + DVec3(side.turn * (ankle - side.leg.ball_m));
     shift += RootShare(side.correction);
   }
-  shift += RootRest(movement, time_s);
+  shift += RootResidual(movement, time_s);
 
   // Down until both ankles are in reach.
   double lower_m = 0.0;
@@ -348,8 +348,8 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     for (const double value : {v.x, v.y, v.z, w}) packed[at++] = static_cast<float>(value);
   };
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootTrack& track = plan.feet[f];
-    const FootRest& rest = plan.rests[f];
+    const FootTrajectory& track = plan.feet[f];
+    const FootResidual& rest = plan.residuals[f];
     add(track.from.position_m - base, WrapAngle(track.from.heading_rad));
     add(track.to.position_m - base, WrapAngle(track.to.heading_rad));
     add(track.release_offset_m, track.release_turn_rad);
@@ -365,8 +365,8 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(rest.offset_m_s, 0.0);
     add(track.root_shift_m, 0.0);
   }
-  add(plan.root_rest_m, movement.steer_rad);
-  add(plan.root_rest_m_s, movement.duration_s());
+  add(plan.root_residual_m, movement.steer_rad);
+  add(plan.root_residual_m_s, movement.duration_s());
   add({movement.entered_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
       plan.plant_fade_s);
   return packed;

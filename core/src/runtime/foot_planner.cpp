@@ -44,7 +44,7 @@ double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
   return side.ball_height_m * (1.0 / normal.y - 1.0);
 }
 
-// A sole rests on what sticks out of the plane it fits, but for walls that it should not stand at.
+// A sole residuals on what sticks out of the plane it fits, but for walls that it should not stand at.
 double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }
@@ -77,7 +77,7 @@ class Planner {
     return feet;
   }
   // Looks at all times of a movement that has its difference that matter for its plan.
-  void Look(const SwingTimes& swing) {
+  void SampleKeyPoses(const SwingTimes& swing) {
     const auto around = [&](double time_s, std::size_t before) {
       times_s_[before] = std::max(0.0, time_s - kVelocityStepS);
       times_s_[before + 1] = time_s;
@@ -93,18 +93,18 @@ class Planner {
     times_s_[kBlendedEnd] = movement_.duration_s();
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
   }
-  FeetAt LookedAt(std::size_t time) const {
+  FeetAt KeyPoseAt(std::size_t time) const {
     return {sampler_.FootAt(time, Foot::kLeft), sampler_.FootAt(time, Foot::kRight)};
   }
-  FeetAt Landing() const { return LookedAt(kLanding); }
-  std::array<FeetAt, 2> Entry() const { return {LookedAt(kEntry), LookedAt(kEntry + 1)}; }
+  FeetAt Landing() const { return KeyPoseAt(kLanding); }
+  std::array<FeetAt, 2> Entry() const { return {KeyPoseAt(kEntry), KeyPoseAt(kEntry + 1)}; }
   // From one ball to the other where the blend ends.
   DVec3 EndVector(Foot from, Foot to) const {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
   // The base below which the feet that stay stand where they do.
-  void HangBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
+  void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
     for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
@@ -148,7 +148,7 @@ class Planner {
       const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
       vector.x = outward * std::max(outward * vector.x, kLandApartM);
     }
-    FootTrack& track = plan.feet[m];
+    FootTrajectory& track = plan.feet[m];
     const double rise_m = vector.y;
     track.to.position_m = locks[x].print.position_m + RotateYaw(end_heading_rad, vector);
     double turn_rad = 0.0;
@@ -198,7 +198,7 @@ class Planner {
   }
 
   // Offsets and their velocities at release and landing, so that the way between is smooth.
-  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrack& track) {
+  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& track) {
     const auto velocity_around = [&](std::size_t time) {
       const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
       return way_m / (times_s_[time + 1] - times_s_[time - 1]);
@@ -214,7 +214,7 @@ class Planner {
 
   // How far the swinging foot must be pushed outward, at most of its swing, to pass the standing leg.
   double PushAside(Foot moving) {
-    const FootTrack& track = movement_.feet.foot(moving);
+    const FootTrajectory& track = movement_.feet.foot(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
     const DVec3 stands = movement_.feet.foot(OtherFoot(moving)).from.position_m;
     const auto vector = [&](const DVec3& ball, double part) {
@@ -257,7 +257,7 @@ class Planner {
     return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
   }
 
-  void StandOnGround(Foot foot, const Terrain& terrain, FootTrack& track) const {
+  void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& track) const {
     const FootSupport support = SupportOf(terrain, rig_.side(foot), track.to);
     track.to.position_m.y = StandingHeight(support);
     track.normals[1] = support.normal;
@@ -265,7 +265,7 @@ class Planner {
 
   // How much higher the swinging foot must go, at most of its swing, to clear the ground below its sole.
   double LiftOver(Foot moving, const Terrain& terrain) {
-    const FootTrack& track = movement_.feet.foot(moving);
+    const FootTrajectory& track = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
     LegPose leg;
     double lift_m = 0.0;
@@ -356,7 +356,7 @@ void StandOn(const FootLocks& locks, Movement& movement) {
   plan.is_active = true;
   for (std::size_t f = 0; f < 2; ++f) {
     const FootLock& hold = locks[f];
-    FootTrack& track = plan.feet[f];
+    FootTrajectory& track = plan.feet[f];
     track.from = track.to = hold.print;
     track.normals.fill(hold.normal);
     track.height_m.fill(hold.height_m);
@@ -391,9 +391,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
   const std::array<Foot, 1> stays{fixed};
   if (is_step) {
-    planner.HangBase(locks, stays, movement.duration_s());
+    planner.SolveBase(locks, stays, movement.duration_s());
   } else {
-    planner.HangBase(locks, kBoth, times.release_s);
+    planner.SolveBase(locks, kBoth, times.release_s);
   }
 
   // D = P - M, with P what was before.
@@ -405,14 +405,14 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, cache, pose,
                           movement);
   }
-  planner.Look(times);
+  planner.SampleKeyPoses(times);
 
   FootPlan& plan = movement.feet;
   plan = {};
   plan.is_active = true;
   plan.keeps_above_ground = wish == nullptr ? chosen.is_on_terrain : wish->terrain != nullptr;
   for (std::size_t f = 0; f < 2; ++f) {
-    FootTrack& track = plan.feet[f];
+    FootTrajectory& track = plan.feet[f];
     const FootLock& hold = locks[f];
     track.from = track.to = hold.print;
     track.normals.fill(hold.normal);
@@ -433,7 +433,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   }
 
   if (is_step) {
-    FootTrack& track = plan.feet[m];
+    FootTrajectory& track = plan.feet[m];
     BlendedFoot landing;
     if (wish == nullptr) {
       landing = planner.Landing()[m];
@@ -467,7 +467,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   const FeetAt landing = planner.Landing();
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
-    FootTrack& track = plan.feet[f];
+    FootTrajectory& track = plan.feet[f];
     track.to.position_m = to_m[f];
     track.to.heading_rad = landing[f].heading_rad;
     track.turn_rad[2] = 0.0;
@@ -497,7 +497,7 @@ LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {
                        .is_on_terrain = plan.keeps_above_ground,
                        .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
   if (!IsStep(kind)) return choice;
-  const FootTrack& track = plan.foot(MovingFoot(kind));
+  const FootTrajectory& track = plan.foot(MovingFoot(kind));
   choice.turn_rad = track.turn_rad[2];
   choice.height_m = track.height_m[2];
   choice.normal = track.normals[1];
@@ -516,7 +516,7 @@ FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, do
     const FootCorrection correction = CorrectFoot(
         movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
     FootLock& hold = locks[static_cast<std::size_t>(foot)];
-    const FootTrack& track = movement.feet.foot(foot);
+    const FootTrajectory& track = movement.feet.foot(foot);
     hold.print = time_s > track.release_s ? track.to : track.from;
     hold.height_m = correction.offset_m.y;
     hold.turn_rad = correction.free_turn_rad;

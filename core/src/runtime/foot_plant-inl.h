@@ -32,7 +32,7 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// A FootTrack and its FootRest, as PackFootPlan lays them out.
+// A FootTrajectory and its FootResidual, as PackFootPlan lays them out.
 struct Track {
   SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
   SoaVec3 normals[2];
@@ -331,7 +331,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   float* rotations = block.rotations + lane;
   Common common;
   {
-    const float* at = plan + 2 * kPackedTrackFloats * kBlock;
+    const float* at = plan + 2 * kPackedTrajectoryFloats * kBlock;
     SoaQuat q = LoadQuat(at);
     common.root_rest = XyzOf(q), common.steer = q.w;
     q = LoadQuat(at + 4 * kBlock);
@@ -372,7 +372,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   });
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const LegLanes& leg = legs[f];
-    const Track track = LoadTrack(plan + f * kPackedTrackFloats * kBlock);
+    const Track track = LoadTrack(plan + f * kPackedTrajectoryFloats * kBlock);
     const SoaVec3 ball = root + leg.ball;
     Correction& c = corrections[f];
     c = CorrectFoot(common, track, ball, headings[f], flatnesses[f]);

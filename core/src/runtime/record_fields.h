@@ -130,15 +130,15 @@ void PlanFields(Stream& stream, P& plan) {
     stream.F64(track.lift_m);
     Vector(stream, track.aside_m);
     Vector(stream, track.root_shift_m);
-    auto& rest = plan.rests[f];
+    auto& rest = plan.residuals[f];
     Vector(stream, rest.offset_m);
     Vector(stream, rest.offset_m_s);
     stream.F64(rest.turn_rad);
     stream.F64(rest.turn_rad_s);
     stream.F64(rest.over_s);
   }
-  Vector(stream, plan.root_rest_m);
-  Vector(stream, plan.root_rest_m_s);
+  Vector(stream, plan.root_residual_m);
+  Vector(stream, plan.root_residual_m_s);
   bool settles = plan.plant_fade_s > 0.0;
   stream.Bool(settles);
   if (!settles) return;

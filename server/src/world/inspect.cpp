@@ -28,8 +28,8 @@ protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEv
   current.weights.assign(movement->weights.begin(),
                          movement->weights.begin() + static_cast<std::ptrdiff_t>(weight_count));
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const FootTrack& track = movement->feet.foot(foot);
-    if (!movement->feet.is_active || track.land_s == FootTrack::kNever ||
+    const FootTrajectory& track = movement->feet.foot(foot);
+    if (!movement->feet.is_active || track.land_s == FootTrajectory::kNever ||
         avatar.movement_time_s() >= track.land_s) {
       continue;
     }

@@ -19,7 +19,7 @@ struct Movement;
 ///   heading: held like the ball while the sole is down; with the heel up it turns as the blend
 ///   height: values to add, eased from one to the next; the ball's height follows the blend
 ///   (holding it still bends knees by 25 degrees on captures)
-struct FootTrack {
+struct FootTrajectory {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
 
   Footprint from;             ///< Where it stands at the start
@@ -48,7 +48,7 @@ struct FootTrack {
 
 /// What a correction differs by from the one that was when the movement was entered, and how fast that
 /// changes: eased out.
-struct FootRest {
+struct FootResidual {
   DVec3 offset_m = DVec3(0.0);
   DVec3 offset_m_s = DVec3(0.0);
   double turn_rad = 0.0;
@@ -58,8 +58,8 @@ struct FootRest {
 
 /// A movement's plan as the vectors that plant a crowd read it: four floats at a time, positions from the movement's
 /// base. Two tracks and what they share (PackFootPlan).
-inline constexpr std::size_t kPackedTrackFloats = 56;
-inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrackFloats + 12;
+inline constexpr std::size_t kPackedTrajectoryFloats = 56;
+inline constexpr std::size_t kPackedPlanFloats = 2 * kPackedTrajectoryFloats + 12;
 using PackedFootPlan = std::array<float, kPackedPlanFloats>;
 
 /// Both feet through a movement: a value of the movement, from which with the blended pose and the
@@ -71,10 +71,10 @@ struct FootPlan {
   double plant_fade_s = 0.0;
   PackedFootPlan packed{};  ///< All of it but what was missed, once the plan is made
 
-  std::array<FootTrack, 2> feet;   ///< Indexed by Foot.
-  std::array<FootRest, 2> rests;   ///< Indexed by Foot.
-  DVec3 root_rest_m = DVec3(0.0);  ///< The same of the root, which may change the foot it follows
-  DVec3 root_rest_m_s = DVec3(0.0);
+  std::array<FootTrajectory, 2> feet;   ///< Indexed by Foot.
+  std::array<FootResidual, 2> residuals;   ///< Indexed by Foot.
+  DVec3 root_residual_m = DVec3(0.0);  ///< The same of the root, which may change the foot it follows
+  DVec3 root_residual_m_s = DVec3(0.0);
   /// On terrain: soles are lifted out of the ground they leave and land on. Level ground the blend
   /// itself keeps to within what the examples do, and knees move less.
   bool keeps_above_ground = false;
@@ -84,8 +84,8 @@ struct FootPlan {
   DVec3 missed_m = DVec3(0.0);  ///< From where a step lands to where it was asked to, horizontally
   double missed_rad = 0.0;      ///< The same for the foot's heading
 
-  [[nodiscard]] const FootTrack& foot(Foot f) const { return feet[static_cast<std::size_t>(f)]; }
-  [[nodiscard]] FootTrack& foot(Foot f) { return feet[static_cast<std::size_t>(f)]; }
+  [[nodiscard]] const FootTrajectory& foot(Foot f) const { return feet[static_cast<std::size_t>(f)]; }
+  [[nodiscard]] FootTrajectory& foot(Foot f) { return feet[static_cast<std::size_t>(f)]; }
 };
 
 /// The root takes this long to come to where the feet of a movement have it.
@@ -137,7 +137,7 @@ struct FeetCorrection {
 /// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kBlendStepS
 /// earlier. `planned` is what the plan itself corrects when the movement is entered, and kBlendStepS later. The
 /// same twice: from rest.
-void GoOnFrom(const std::array<FeetCorrection, 2>& before,
+void ContinueFrom(const std::array<FeetCorrection, 2>& before,
               const std::array<FeetCorrection, 2>& planned, Movement& movement);
 
 /// Makes a movement whose feet are planned set in from a pose that was displayed when it was entered and had no feet

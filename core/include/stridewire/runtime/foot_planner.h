@@ -71,9 +71,9 @@ struct LandingChoice {
   double turn_rad = 0.0;  ///< Of the foot where it lands, further than the step has it
   double height_m = 0.0;  ///< What is added to the blend's height there
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Of the ground there, if it is terrain
-  double lift_m = 0.0;                   ///< FootTrack::lift_m, 0 if it is none
-  DVec3 aside_m = DVec3(0.0);            ///< FootTrack::aside_m
-  DVec3 root_shift_m = DVec3(0.0);       ///< FootTrack::root_shift_m
+  double lift_m = 0.0;                   ///< FootTrajectory::lift_m, 0 if it is none
+  DVec3 aside_m = DVec3(0.0);            ///< FootTrajectory::aside_m
+  DVec3 root_shift_m = DVec3(0.0);       ///< FootTrajectory::root_shift_m
 };
 
 /// What was chosen for a movement whose feet are planned.

@@ -30,7 +30,7 @@ BodyTracks StandingTracks(int frames) {
 
 // Adds `offset(i)` to all points of a foot.
 template <typename Offset>
-void Move(BodyTracks::FootTrack& foot, Offset offset) {
+void Move(BodyTracks::FootTrajectory& foot, Offset offset) {
   for (auto* points : {&foot.ankle_m, &foot.ball_m, &foot.toe_tip_m}) {
     for (std::size_t i = 0; i < points->size(); ++i) (*points)[i] += offset(static_cast<int>(i));
   }
@@ -100,7 +100,7 @@ TEST(FindContacts, DropsTheHeightTestOnBlocks) {
 }
 
 TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {
-  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot rests for five
+  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot residuals for five
   // frames (42 ms) in a long swing: no contact.
   BodyTracks tracks = StandingTracks(400);
   Move(tracks.feet[0], [](int i) { return DVec3(0.0, 0.0, i >= 50 && i < 53 ? 0.05 : 0.0); });
