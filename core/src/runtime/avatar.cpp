@@ -445,7 +445,7 @@ void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
     body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // Who stood has no speed to keep.
-  body_.BlendIn(LandingWish{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
+  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
 }
 
 // What was planned is under way.

@@ -94,9 +94,9 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   }
 }
 
-void AvatarBody::BlendIn(const LandingWish& wish, bool keeps_speed) { BlendInAt(wish, keeps_speed); }
+void AvatarBody::BlendIn(const LandingTarget& wish, bool keeps_speed) { BlendInAt(wish, keeps_speed); }
 
-void AvatarBody::BlendIn(const LandingChoice& choice, bool keeps_speed) {
+void AvatarBody::BlendIn(const LandingDecision& choice, bool keeps_speed) {
   BlendInAt(choice, keeps_speed);
 }
 

@@ -199,7 +199,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     double time_s = 0.0;
     double entered_s = 0.0;
     BaseFrame base;
-    LandingChoice choice{.is_on_terrain = (flags & record::kOnTerrain) != 0};
+    LandingDecision choice{.is_on_terrain = (flags & record::kOnTerrain) != 0};
     reader.F64(time_s);
     ReadWeights(*body_.library, movement, reader);
     reader.F64(base.heading_rad);

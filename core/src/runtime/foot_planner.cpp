@@ -129,7 +129,7 @@ class Planner {
   }
 
   // Where and how the moving foot of a step lands; where the eased pose has it then.
-  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingWish& wish, Foot moving) {
+  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& wish, Foot moving) {
     const RequestPlan& request = wish.request;
     FootPlan& plan = movement_.feet;
     const auto m = static_cast<std::size_t>(moving);
@@ -370,7 +370,7 @@ namespace {
 // A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
 // so that whoever is told what was chosen has the same plan.
 std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
-                           const LandingWish* wish, const LandingChoice& chosen,
+                           const LandingTarget* wish, const LandingDecision& chosen,
                            const BlendSource& source, GridCache& cache, PoseSpan pose,
                            Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
@@ -480,20 +480,20 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
 }  // namespace
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingWish& wish, const BlendSource& source, GridCache& cache,
+                               const LandingTarget& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
   return Plan(library, locks, &wish, {}, source, cache, pose, movement);
 }
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingChoice& choice, const BlendSource& source, GridCache& cache,
+                               const LandingDecision& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement) {
   return Plan(library, locks, nullptr, choice, source, cache, pose, movement);
 }
 
-LandingChoice ChoiceOf(MovementKind kind, const Movement& movement) {
+LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
   const FootPlan& plan = movement.feet;
-  LandingChoice choice{.steer_rad = movement.steer_rad,
+  LandingDecision choice{.steer_rad = movement.steer_rad,
                        .is_on_terrain = plan.keeps_above_ground,
                        .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
   if (!IsStep(kind)) return choice;

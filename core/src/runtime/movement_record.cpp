@@ -51,7 +51,7 @@ void WriteWeights(const Movement& movement, RecordWriter& writer) {
   for (const float weight : movement.weights) writer.F32(weight);
 }
 
-void WriteBegun(const Avatar& avatar, unsigned flags, const LandingChoice& choice,
+void WriteBegun(const Avatar& avatar, unsigned flags, const LandingDecision& choice,
                 RecordWriter& writer) {
   const AvatarBody& body = avatar.body();
   const Movement& movement = body.movement;
@@ -81,7 +81,7 @@ bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out) {
   const AvatarBody& body = avatar.body();
   unsigned flags = CommonFlags(avatar);
   if (change.has_layers) flags |= record::kLayers;
-  LandingChoice choice;
+  LandingDecision choice;
   if (change.has_left) {
     flags |= record::kLeft;
     if (change.is_left_at_end) flags |= record::kLeftAtEnd;
@@ -93,7 +93,7 @@ bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out) {
     if (change.begun_keeps_speed) flags |= record::kKeepsSpeed;
     if (body.movement.entered_s != 0.0) flags |= record::kIsEntered;
     if (body.plants_feet) {
-      choice = ChoiceOf(body.group().kind, body.movement);
+      choice = DecisionOf(body.group().kind, body.movement);
       if (choice.steer_rad != 0.0) flags |= record::kIsSteered;
       if (choice.is_on_terrain) flags |= record::kOnTerrain;
       if (choice.aside_m != DVec3(0.0)) flags |= record::kAside;

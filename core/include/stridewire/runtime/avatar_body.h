@@ -54,8 +54,8 @@ struct AvatarBody {
   void EnterAt(double time_s);
 
   /// Plans the feet of the movement just started, if they are planted, and what of the pose before is eased out.
-  void BlendIn(const LandingWish& wish, bool keeps_speed);
-  void BlendIn(const LandingChoice& choice, bool keeps_speed);
+  void BlendIn(const LandingTarget& wish, bool keeps_speed);
+  void BlendIn(const LandingDecision& choice, bool keeps_speed);
 
   /// Lays the layers over the pose.
   void ShowLayers();

@@ -31,7 +31,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< Indexed by Foot.
 void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Where a movement is to bring the feet.
-struct LandingWish {
+struct LandingTarget {
   const RequestPlan& request;  ///< Its applied ends are kept exactly, the footprint if there is one
   const Terrain* terrain;      ///< Null: level where the library and the request say
   /// A point of the line the body goes along, which groups that say nothing of where feet stand aside keep to.
@@ -58,12 +58,12 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// `pose` is scratch with one rotation a joint; `cache` locks rows of this movement or none. Never allocates. Returns
 /// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingWish& wish, const BlendSource& source, GridCache& cache,
+                               const LandingTarget& wish, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
 /// needed to make it again.
-struct LandingChoice {
+struct LandingDecision {
   double steer_rad = 0.0;  ///< Movement::steer_rad
   bool is_on_terrain = false;
   std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};  ///< Where feet that move land, by Foot
@@ -77,12 +77,12 @@ struct LandingChoice {
 };
 
 /// What was chosen for a movement whose feet are planned.
-[[nodiscard]] LandingChoice ChoiceOf(MovementKind kind, const Movement& movement);
+[[nodiscard]] LandingDecision DecisionOf(MovementKind kind, const Movement& movement);
 
 /// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
 /// change is not needed.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingChoice& choice, const BlendSource& source, GridCache& cache,
+                               const LandingDecision& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
 /// The locks at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
