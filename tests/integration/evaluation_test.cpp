@@ -216,7 +216,7 @@ struct Sixteen {
                                  .heading_rad = zeros[0].data(),
                                  .sine = zeros[0].data(),
                                  .cosine = ones.data(),
-                                 .steer_rad = zeros[0].data(),
+                                 .extra_turn_rad = zeros[0].data(),
                                  .steered = zeros[0].data(),
                                  .ease = ease[0].data(),
                                  .velocity = velocities[0].data(),
@@ -515,7 +515,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
           ++seen;
           const FootPlan& feet = stretch.movement->feet;
           ++planted[feet.is_active ? 1 : 0];
-          settling += feet.is_active && now_s < stretch.movement->entered_s + feet.plant_fade_s;
+          settling += feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
         }
       });
       if (HasFatalFailure()) return;

@@ -217,7 +217,7 @@ TEST_F(TakeOverOfBuiltin, ASwingingFootLandsOnItsNewFootprint) {
   EXPECT_TRUE(avatar_.events()[0].is_cut_short);
   EXPECT_EQ(avatar_.events()[1].type, Type::kStarted);
   EXPECT_EQ(avatar_.events()[1].request_id, 2u);
-  EXPECT_GT(avatar_.movement()->entered_s, 0.0);
+  EXPECT_GT(avatar_.movement()->start_offset_s, 0.0);
   AdvanceUntil([&] {
     return avatar_.movement()->feet.foot(Foot::kLeft).land_s <= avatar_.movement_time_s();
   });

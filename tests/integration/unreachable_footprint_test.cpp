@@ -126,7 +126,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
     double heading_rad = avatar.base().heading_rad;
     if (before != nullptr) {
       foot = OtherFoot(MovingFoot(library->group(before->group).kind));
-      heading_rad = before->base.heading_rad + before->heading_change_rad + before->steer_rad;
+      heading_rad = before->base.heading_rad + before->heading_change_rad + before->extra_turn_rad;
     }
     DVec3 stays_m = SeenFoot(avatar, OtherFoot(foot)).ball_m;
     stays_m.y -= library->leg_rig().side(OtherFoot(foot)).ball_height_m;

@@ -464,7 +464,7 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   is_exact_ = plan.exact.has_value();
   closing_steps_ = 0;
   is_idle_reported_ = false;
-  movement_time_s_ = body_.movement.entered_s;
+  movement_time_s_ = body_.movement.start_offset_s;
   request_id_ = request_id;
   const int rise =
       next.FindParameter(IsStep(next.kind) ? ParameterName::kEndY : ParameterName::kHeight);

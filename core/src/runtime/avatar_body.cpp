@@ -42,7 +42,7 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   Evaluate(time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
   // Planting that has not set in yet sets in anew.
-  begins_planting = movement.feet.is_active && time_s < movement.entered_s + movement.feet.plant_fade_s;
+  begins_planting = movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
   if (begins_planting) TakeForBlended(time_s, keeps_speed);
 }
 
@@ -67,7 +67,7 @@ void AvatarBody::StartWeighted(const BaseFrame& base) {
 }
 
 void AvatarBody::EnterAt(double time_s) {
-  movement.entered_s = time_s;
+  movement.start_offset_s = time_s;
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s() - time_s);
 }
 
@@ -85,7 +85,7 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   }
   // D = P - M, with P what is displayed.
   movement.feet.is_active = false;
-  EvaluateBlend(group(), library->layout(), movement, movement.entered_s, cache,
+  EvaluateBlend(group(), library->layout(), movement, movement.start_offset_s, cache,
                 movement.difference);
   Subtract(pose, movement.difference, movement.difference);
   if (earlier) {
@@ -102,10 +102,10 @@ void AvatarBody::BlendIn(const LandingDecision& choice, bool keeps_speed) {
 
 // The corrections of the movement just planned go on from those before it.
 void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
-  const double entered_s = movement.entered_s;
-  std::array<FeetCorrection, 2> planned{CorrectFeet(movement, entered_s, blended[0])};
+  const double start_offset_s = movement.start_offset_s;
+  std::array<FeetCorrection, 2> planned{CorrectFeet(movement, start_offset_s, blended[0])};
   if (keeps_speed) {
-    planned[1] = CorrectFeet(movement, entered_s + kBlendStepS, blended[1]);
+    planned[1] = CorrectFeet(movement, start_offset_s + kBlendStepS, blended[1]);
   } else {
     planned[1] = planned[0];
     earlier_feet[1] = earlier_feet[0];

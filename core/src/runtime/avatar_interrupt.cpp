@@ -39,7 +39,7 @@ bool Avatar::RedirectsSwing() const {
 // What a movement that begins at `time_s` of this one goes on from.
 void Avatar::CaptureBlendSource(double time_s) {
   const bool keeps_speed =
-      options_.blend == BlendKind::kInertialization && time_s - body_.movement.entered_s >= kBlendStepS;
+      options_.blend == BlendKind::kInertialization && time_s - body_.movement.start_offset_s >= kBlendStepS;
   moved_until_s_ = keeps_speed ? time_s_ : -1.0;
   body_.CaptureBlendSource(time_s, keeps_speed);
 }

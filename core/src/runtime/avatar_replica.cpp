@@ -197,13 +197,13 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
   }
   if (has_begun) {
     double time_s = 0.0;
-    double entered_s = 0.0;
+    double start_offset_s = 0.0;
     BaseFrame base;
     LandingDecision choice{.is_on_terrain = (flags & record::kOnTerrain) != 0};
     reader.F64(time_s);
     ReadWeights(*body_.library, movement, reader);
     reader.F64(base.heading_rad);
-    if ((flags & record::kIsEntered) != 0) reader.F64(entered_s);
+    if ((flags & record::kIsEntered) != 0) reader.F64(start_offset_s);
     if (!reader.ok()) return;
     if (body_.plants_feet) {
       record::ChoiceFields(reader, flags, body_.group().kind, choice);
@@ -212,11 +212,11 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     }
     if (!reader.ok()) return;
     body_.StartWeighted(base);
-    if (!(entered_s >= 0.0 && entered_s < movement.duration_s() && time_s >= entered_s)) {
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && time_s >= start_offset_s)) {
       reader.Refuse("a movement record begins a movement outside of it");
       return;
     }
-    body_.EnterAt(entered_s);
+    body_.EnterAt(start_offset_s);
     body_.BlendIn(choice, (flags & record::kKeepsSpeed) != 0);
     body_.begins_planting = false;
     movement_time_s_ = time_s;
@@ -242,22 +242,22 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
   if (is_moving_) {
     BaseFrame base;
-    double entered_s = 0.0;
-    double steer_rad = 0.0;
+    double start_offset_s = 0.0;
+    double extra_turn_rad = 0.0;
     reader.F64(movement_time_s_);
     ReadWeights(*body_.library, movement, reader);
     record::Vector(reader, base.position_m);
     reader.F64(base.heading_rad);
-    reader.F64(entered_s);
-    reader.F64(steer_rad);
+    reader.F64(start_offset_s);
+    reader.F64(extra_turn_rad);
     if (!reader.ok()) return;
     body_.StartWeighted(base);
-    movement.steer_rad = steer_rad;
-    if (!(entered_s >= 0.0 && entered_s < movement.duration_s() && movement_time_s_ >= entered_s)) {
+    movement.extra_turn_rad = extra_turn_rad;
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && movement_time_s_ >= start_offset_s)) {
       reader.Refuse("a movement record begins a movement outside of it");
       return;
     }
-    body_.EnterAt(entered_s);
+    body_.EnterAt(start_offset_s);
     if (record::NeedsDifference(movement, movement_time_s_)) {
       record::DifferenceFields(reader, movement);
     }

@@ -63,7 +63,7 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   }
   const GridLayout::Root root = layout.RootOf(row.data());
   const BaseFrame& base = movement.base;
-  const double yaw_rad = root.yaw_rad + movement.steer_rad * (1.0 - place.steered);
+  const double yaw_rad = root.yaw_rad + movement.extra_turn_rad * (1.0 - place.steered);
   const std::array<double, 2> angles_rad = {base.heading_rad, 0.5 * (base.heading_rad + yaw_rad)};
   std::array<double, 2> sines;
   std::array<double, 2> cosines;
@@ -85,7 +85,7 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
 Place PlaceAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
-  const double eased = (time_s - movement.entered_s) / movement.ease_out_s;
+  const double eased = (time_s - movement.start_offset_s) / movement.ease_out_s;
   return {.grid = {cell.first, cell.weights},
           .fraction = static_cast<float>(EaseOut(eased)),
           .slope_s = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased)),

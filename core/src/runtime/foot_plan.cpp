@@ -60,7 +60,7 @@ DVec3 RootShare(const FootCorrection& correction) {
 
 DVec3 RootResidual(const Movement& movement, double time_s) {
   const FootPlan& plan = movement.feet;
-  const double since_s = time_s - movement.entered_s;
+  const double since_s = time_s - movement.start_offset_s;
   const double flat = EaseOut(since_s / kRootShiftS);
   const double rise =
       EaseOut(since_s / std::max(kRootShiftS, kRootRisePart * movement.duration_s()));
@@ -101,7 +101,7 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                 track.land_velocity_m_s, track.land_s - track.release_s, time_s - track.release_s) +
         AsideAt(swing) * track.aside_m;
   }
-  const double since_s = time_s - movement.entered_s;
+  const double since_s = time_s - movement.start_offset_s;
   const double settled = 1.0 - EaseOut(since_s / movement.ease_out_s);
   const auto& height = track.height_m;
   const double rise = height[2] - height[1];
@@ -113,7 +113,7 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
   double free_rad = turn[0] + settled * (turn[1] - turn[0]) + turned * (turn[2] - turn[1]);
   // A standing foot does not turn with the body; one in the air catches up, and stands again.
   const auto steered = [&](double at_s) {
-    return movement.steer_rad * (1.0 - EaseOut(at_s / duration_s));
+    return movement.extra_turn_rad * (1.0 - EaseOut(at_s / duration_s));
   };
   free_rad += steered(std::min(track.land_s, duration_s)) * turned - steered(time_s);
   const FootResidual& rest = movement.feet.residuals[static_cast<std::size_t>(foot)];
@@ -165,7 +165,7 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
   const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
     const FootTrajectory& track = plan.feet[f];
-    const bool is_planted = track.IsPlanted(movement.entered_s);
+    const bool is_planted = track.IsPlanted(movement.start_offset_s);
     const auto turn_of = [&](const FeetCorrection& correction) {
       return is_planted ? correction.feet[f].free_turn_rad : correction.feet[f].turn_rad;
     };
@@ -181,7 +181,7 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
       // It stands: only its height and what turns with the heel up goes on.
       rest.offset_m.x = rest.offset_m.z = rest.offset_m_s.x = rest.offset_m_s.z = 0.0;
     } else {
-      rest.over_s = track.land_s - movement.entered_s;
+      rest.over_s = track.land_s - movement.start_offset_s;
     }
   }
   // The root goes along with what the feet keep; only what is missing then is its own.
@@ -243,8 +243,8 @@ std::array<std::size_t, 3> JointsOf(const LegRig::Side& side) {
 
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
   const FootPlan& plan = movement.feet;
-  if (!(time_s < movement.entered_s + plan.plant_fade_s)) return;
-  const auto part = static_cast<float>(EaseOut((time_s - movement.entered_s) / plan.plant_fade_s));
+  if (!(time_s < movement.start_offset_s + plan.plant_fade_s)) return;
+  const auto part = static_cast<float>(EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s));
   pose.root_position_m += part * plan.plant_fade_root_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
@@ -268,7 +268,7 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   std::array<Side, 2> sides;
   const DVec3 root = DVec3(pose.root_position_m);
   const double settled =
-      plan.plant_fade_s > 0.0 ? 1.0 - EaseOut((time_s - movement.entered_s) / plan.plant_fade_s) : 1.0;
+      plan.plant_fade_s > 0.0 ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s) : 1.0;
   DVec3 shift(0.0);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Side& side = sides[static_cast<std::size_t>(foot)];
@@ -328,7 +328,7 @@ void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& moveme
   plan.plant_fade_s = movement.ease_out_s;
   plan.plant_fade_root_m = Vec3(0.0f);
   for (auto& leg : plan.plant_fade_rotations) leg.fill(kIdentityQuat);
-  PlantFeet(rig, movement, movement.entered_s, pose);
+  PlantFeet(rig, movement, movement.start_offset_s, pose);
   plan.plant_fade_root_m = displayed.root_position_m - pose.root_position_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
@@ -365,9 +365,9 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     add(rest.offset_m_s, 0.0);
     add(track.root_shift_m, 0.0);
   }
-  add(plan.root_residual_m, movement.steer_rad);
+  add(plan.root_residual_m, movement.extra_turn_rad);
   add(plan.root_residual_m_s, movement.duration_s());
-  add({movement.entered_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
+  add({movement.start_offset_s, movement.ease_out_s, plan.keeps_above_ground ? 1.0 : 0.0},
       plan.plant_fade_s);
   return packed;
 }

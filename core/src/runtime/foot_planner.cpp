@@ -88,8 +88,8 @@ class Planner {
     for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
       times_s_[kSwing + i] = swing.release_s + kSwingSamples[i] * (swing.land_s - swing.release_s);
     }
-    times_s_[kEntry] = movement_.entered_s;
-    times_s_[kEntry + 1] = movement_.entered_s + kBlendStepS;
+    times_s_[kEntry] = movement_.start_offset_s;
+    times_s_[kEntry + 1] = movement_.start_offset_s + kBlendStepS;
     times_s_[kBlendedEnd] = movement_.duration_s();
     sampler_.Sample(movement_, times_s_, kBlendedEnd);
   }
@@ -135,7 +135,7 @@ class Planner {
     const auto m = static_cast<std::size_t>(moving);
     const std::size_t x = 1 - m;
     const double end_heading_rad =
-        movement_.base.heading_rad + movement_.heading_change_rad + movement_.steer_rad;
+        movement_.base.heading_rad + movement_.heading_change_rad + movement_.extra_turn_rad;
     const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
     // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
     const double aside_m =
@@ -173,7 +173,7 @@ class Planner {
       };
       plan.missed_m = RotateYaw(
           end_heading_rad, DVec3(missed(ParameterName::kEndX), 0.0, missed(ParameterName::kEndZ)));
-      const double turned_rad = movement_.heading_change_rad + movement_.steer_rad;
+      const double turned_rad = movement_.heading_change_rad + movement_.extra_turn_rad;
       plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
     }
     track.to.heading_rad = landing_rad + turn_rad;
@@ -349,7 +349,7 @@ FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan
 
 void StandOn(const FootLocks& locks, Movement& movement) {
   movement.warp = TimeWarp(std::array{0.0, kEaseOutS}, std::array{1});
-  movement.entered_s = movement.steer_rad = 0.0;
+  movement.start_offset_s = movement.extra_turn_rad = 0.0;
   movement.ease_out_s = kEaseOutS;
   FootPlan& plan = movement.feet;
   plan = {};
@@ -382,10 +382,10 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   const auto x = static_cast<std::size_t>(fixed);
   const SwingTimes times = SwingTimesOf(group.kind, movement);
   if (wish == nullptr) {
-    movement.steer_rad = chosen.steer_rad;
+    movement.extra_turn_rad = chosen.extra_turn_rad;
   } else if (wish->request.turn_rad) {
-    movement.steer_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
-                                    -kMaxSteerRad, kMaxSteerRad);
+    movement.extra_turn_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
+                                    -kMaxExtraTurnRad, kMaxExtraTurnRad);
   }
 
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
@@ -397,7 +397,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   }
 
   // D = P - M, with P what was before.
-  EvaluateBlend(group, library.layout(), movement, movement.entered_s, cache, movement.difference);
+  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache, movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
   const FeetAt was = planner.FeetOf(source.before);
   Subtract(source.before, movement.difference, movement.difference);
@@ -493,7 +493,7 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
 
 LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
   const FootPlan& plan = movement.feet;
-  LandingDecision choice{.steer_rad = movement.steer_rad,
+  LandingDecision choice{.extra_turn_rad = movement.extra_turn_rad,
                        .is_on_terrain = plan.keeps_above_ground,
                        .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
   if (!IsStep(kind)) return choice;

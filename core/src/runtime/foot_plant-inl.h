@@ -78,7 +78,7 @@ HWY_INLINE Track LoadTrack(const float* plan) {
 // What all of a movement's plan shares.
 struct Common {
   SoaVec3 root_rest, root_rest_velocity;
-  Float steer, duration_s, entered_s, ease_out_s, keeps_above_ground, plant_fade_s;
+  Float steer, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
   Float per_duration, per_ease_out;  // 1 / s
 };
@@ -175,7 +175,7 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaV
                        (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
                        track.aside * (across * across);
   c.offset = Select(is_planted, print - ball, flying);
-  const Float since_s = t - common.entered_s;
+  const Float since_s = t - common.start_offset_s;
   const Float settled = one - EaseOut(since_s * common.per_ease_out);
   const Float rise = track.height.z - track.height.y;
   const Float rise_from = Select(rise > zero, zero, Float(static_cast<float>(kSinkFrom)));
@@ -337,7 +337,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     q = LoadQuat(at + 4 * kBlock);
     common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
     q = LoadQuat(at + 8 * kBlock);
-    common.entered_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
+    common.start_offset_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.plant_fade_s = q.w;
     common.per_duration = Float(1.0f) / common.duration_s;
     common.per_ease_out = Float(1.0f) / common.ease_out_s;
@@ -388,7 +388,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
       // The root goes with what it goes with on level ground too, and with this.
       const Mask is_settling = common.plant_fade_s > Float(0.0f);
       const Float settled =
-          Float(1.0f) - EaseOut((common.time_s - common.entered_s) /
+          Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
                                 Select(is_settling, common.plant_fade_s, Float(1.0f)));
       const Float lifted =
           Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
@@ -398,7 +398,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
   });
-  const Float since_s = common.time_s - common.entered_s;
+  const Float since_s = common.time_s - common.start_offset_s;
   const Float flat = EaseOut(Over(since_s, kRootShiftS));
   const Float rise =
       EaseOut(since_s / Max(Float(static_cast<float>(kRootShiftS)),

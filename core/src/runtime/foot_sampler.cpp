@@ -24,7 +24,7 @@ struct Lanes {
   kernels::GridTimes times{};
   kernels::GridPlaces places;
   alignas(64) double base_m[3 * kBlock],
-      heading_rad[kBlock], sine[kBlock], cosine[kBlock], steer_rad[kBlock];
+      heading_rad[kBlock], sine[kBlock], cosine[kBlock], extra_turn_rad[kBlock];
   alignas(64) float rows[kBlock][4 * (kJoints + 1)];
   alignas(64) float differences[kJoints * 4 * kBlock];
   alignas(64) float ease[kJoints * kernels::kEaseFloats * kBlock];
@@ -43,7 +43,7 @@ void FindPlaces(const MotionGroup& group, const Movement& movement, std::span<co
   }
   Fill<double>(t.last_cell, group.grid_point_count - 2);
   Fill(t.duration_s, movement.warp.duration_s());
-  Fill(t.entered_s, movement.entered_s);
+  Fill(t.start_offset_s, movement.start_offset_s);
   Fill(t.ease_out_s, movement.ease_out_s);
   kernels::FindInGrids(times_s.size(), t, lanes.places);
 }
@@ -124,7 +124,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   }
   Fill(lanes.heading_rad, movement.base.heading_rad);
   kernels::SinCos(lanes.heading_rad, times_s.size(), lanes.sine, lanes.cosine);
-  Fill(lanes.steer_rad, movement.steer_rad);
+  Fill(lanes.extra_turn_rad, movement.extra_turn_rad);
   const kernels::LaneBlend blend = {
       .rows = rows.data(),
       .joint_count = joints.size(),
@@ -133,7 +133,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
       .heading_rad = lanes.heading_rad,
       .sine = lanes.sine,
       .cosine = lanes.cosine,
-      .steer_rad = lanes.steer_rad,
+      .extra_turn_rad = lanes.extra_turn_rad,
       .steered = lanes.places.steered,
       .ease = is_eased ? lanes.ease : nullptr,
       .velocity = is_eased && movement.is_inertial ? lanes.velocity : nullptr,

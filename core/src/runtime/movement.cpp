@@ -54,9 +54,9 @@ void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, C
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
   // Before its beginning a movement is taken to go on as it begins.
-  const bool is_reflected = movement.entered_s < kBlendStepS;
+  const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
-                movement.entered_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);
+                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);
   const auto per_s = static_cast<float>(1.0 / kBlendStepS);
   const Pose& difference = movement.difference;
   const Vec3 entered_m = before.root_position_m - difference.root_position_m;
@@ -117,8 +117,8 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement) {
   movement.base = base;
-  movement.steer_rad = 0.0;
-  movement.entered_s = 0.0;
+  movement.extra_turn_rad = 0.0;
+  movement.start_offset_s = 0.0;
   movement.is_inertial = false;
   std::array<double, kMaxIntervals + 1> scratch;
   const auto keytimes = std::span(scratch).first(group.cells.size() + 1);
@@ -131,7 +131,7 @@ BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose) {
   BaseFrame base = movement.base;
   base.position_m.x = end_pose.root_position_m.x;
   base.position_m.z = end_pose.root_position_m.z;
-  base.heading_rad += movement.heading_change_rad + movement.steer_rad;
+  base.heading_rad += movement.heading_change_rad + movement.extra_turn_rad;
   return base;
 }
 

@@ -58,7 +58,7 @@ void WriteBegun(const Avatar& avatar, unsigned flags, const LandingDecision& cho
   writer.F64(avatar.movement_time_s());
   WriteWeights(movement, writer);
   writer.F64(movement.base.heading_rad);
-  if ((flags & record::kIsEntered) != 0) writer.F64(movement.entered_s);
+  if ((flags & record::kIsEntered) != 0) writer.F64(movement.start_offset_s);
   if (body.plants_feet) {
     record::ChoiceFields(writer, flags, body.group().kind, choice);
   } else {
@@ -91,10 +91,10 @@ bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out) {
   if (change.has_begun) {
     flags |= record::kMoves;
     if (change.begun_keeps_speed) flags |= record::kKeepsSpeed;
-    if (body.movement.entered_s != 0.0) flags |= record::kIsEntered;
+    if (body.movement.start_offset_s != 0.0) flags |= record::kIsEntered;
     if (body.plants_feet) {
       choice = DecisionOf(body.group().kind, body.movement);
-      if (choice.steer_rad != 0.0) flags |= record::kIsSteered;
+      if (choice.extra_turn_rad != 0.0) flags |= record::kIsSteered;
       if (choice.is_on_terrain) flags |= record::kOnTerrain;
       if (choice.aside_m != DVec3(0.0)) flags |= record::kAside;
       if (choice.root_shift_m != DVec3(0.0)) flags |= record::kRootShift;
@@ -125,8 +125,8 @@ void AppendState(const Avatar& avatar, std::vector<std::byte>& out) {
     WriteWeights(movement, writer);
     record::Vector(writer, movement.base.position_m);
     writer.F64(movement.base.heading_rad);
-    writer.F64(movement.entered_s);
-    writer.F64(movement.steer_rad);
+    writer.F64(movement.start_offset_s);
+    writer.F64(movement.extra_turn_rad);
     if (record::NeedsDifference(movement, avatar.movement_time_s())) {
       record::DifferenceFields(writer, movement);
     }

@@ -232,7 +232,7 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
 
     hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, places.steered + i);
     const auto over = hn::Load(d, times.ease_out_s + i);
-    const auto eased = hn::Div(hn::Sub(time, hn::Load(d, times.entered_s + i)), over);
+    const auto eased = hn::Div(hn::Sub(time, hn::Load(d, times.start_offset_s + i)), over);
     const auto part = hn::Min(hn::Max(eased, zero), one);
     const auto rest = hn::Sub(one, part);
     hn::Store(hn::DemoteTo(floats, hn::IfThenElseZero(hn::Lt(eased, one), one)), floats,

@@ -28,7 +28,7 @@ struct GridTimes {
   alignas(64) double begin[kBlock], end[kBlock];
   alignas(64) double begin_slope[kBlock], end_slope[kBlock];
   alignas(64) double last_cell[kBlock];  ///< Points of the grid less two
-  alignas(64) double duration_s[kBlock], entered_s[kBlock],
+  alignas(64) double duration_s[kBlock], start_offset_s[kBlock],
       ease_out_s[kBlock];  ///< Of the movement
 };
 /// Where its poses lie in their grids, and how much of the poses before is left.
@@ -105,7 +105,7 @@ struct LaneBlend {
   const double* heading_rad;  ///< [kBlock], of the base
   const double* sine;         ///< Of it
   const double* cosine;
-  const double* steer_rad;
+  const double* extra_turn_rad;
   const double* steered;  ///< GridPlaces
   // What is left of the poses before, while any lane has something left:
   const float* ease;           ///< PrepareEase, or null

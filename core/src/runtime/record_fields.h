@@ -64,7 +64,7 @@ void PrintFields(Stream& stream, P& print) {
 
 template <typename Stream, typename L>
 void ChoiceFields(Stream& stream, unsigned flags, MovementKind kind, L& choice) {
-  if ((flags & kIsSteered) != 0) stream.F64(choice.steer_rad);
+  if ((flags & kIsSteered) != 0) stream.F64(choice.extra_turn_rad);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     if (IsStep(kind) && foot != MovingFoot(kind)) continue;
     Vector(stream, choice.to_m[static_cast<std::size_t>(foot)]);
@@ -152,7 +152,7 @@ void PlanFields(Stream& stream, P& plan) {
 // Whether something of the difference pose may still be asked for.
 inline bool NeedsDifference(const Movement& movement, double movement_time_s) {
   // Twice the step that a join looks back by: no rounding decides.
-  return movement_time_s - 2.0 * kBlendStepS < movement.entered_s + movement.ease_out_s;
+  return movement_time_s - 2.0 * kBlendStepS < movement.start_offset_s + movement.ease_out_s;
 }
 
 template <typename Stream, typename M>

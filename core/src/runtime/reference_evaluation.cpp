@@ -89,7 +89,7 @@ LocalPose Interpolate(const CellWeights& cell, At&& at) {
 
 void ToWorld(const LocalPose& local, const Movement& movement, double time_s, PoseSpan out) {
   const double yaw_rad =
-      local.yaw_rad + movement.steer_rad * (1.0 - EaseOut(time_s / movement.duration_s()));
+      local.yaw_rad + movement.extra_turn_rad * (1.0 - EaseOut(time_s / movement.duration_s()));
   out.root_position_m =
       Vec3(movement.base.position_m + RotateYaw(movement.base.heading_rad, local.position));
   std::ranges::copy(local.rotations, out.rotations.begin());
@@ -98,7 +98,7 @@ void ToWorld(const LocalPose& local, const Movement& movement, double time_s, Po
 
 // M' = f D + M, i.e. r = r_M slerp(1, r_D, f), and along the velocity of D.
 void AddDifference(const Movement& movement, double time_s, PoseSpan out) {
-  const double s = (time_s - movement.entered_s) / movement.ease_out_s;
+  const double s = (time_s - movement.start_offset_s) / movement.ease_out_s;
   if (s >= 1.0) return;
   const auto f = static_cast<float>(EaseOut(s));
   out.root_position_m += f * movement.difference.root_position_m;

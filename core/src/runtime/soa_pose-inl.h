@@ -107,7 +107,7 @@ void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, fl
     put(1, part(1));
     put(2, hn::Sub(hn::Mul(c, part(2)), hn::Mul(s, part(0))));
     const auto yaw =
-        hn::Add(part(3), hn::Mul(of(blend.steer_rad), hn::Sub(hn::Set(d, 1.0), of(blend.steered))));
+        hn::Add(part(3), hn::Mul(of(blend.extra_turn_rad), hn::Sub(hn::Set(d, 1.0), of(blend.steered))));
     hn::Store(hn::Mul(hn::Set(d, 0.5), hn::Add(of(blend.heading_rad), yaw)), d, half_rad + i);
     SinCosOf(d, half_rad + i, sine + i, cosine + i);
     hn::StoreU(hn::DemoteTo(floats, hn::Load(d, sine + i)), floats, sines + i);

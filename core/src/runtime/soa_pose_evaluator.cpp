@@ -105,7 +105,7 @@ struct SoaPoseEvaluator::Work {
   std::vector<LaneFloats> rows;             // [pose][lane][row_floats]
   kernels::GridTimes grid_times = {};       // lanes of nobody are worked out, too
   std::array<LaneDoubles, 3> base_m;
-  LaneDoubles heading_rad, sine, cosine, steer_rad;
+  LaneDoubles heading_rad, sine, cosine, extra_turn_rad;
   std::vector<LaneFloats> plan;        // [number]
   std::vector<LaneFloats> transposed;  // [joint][x y z w]: of differences
   std::vector<LaneFloats> ease;        // [joint][number]
@@ -130,7 +130,7 @@ void SoaPoseEvaluator::Work::FindPlaces() {
     take_piece(i);
     t.last_cell[i] = group(i).grid_point_count - 2;
     t.duration_s[i] = of.warp.duration_s();
-    t.entered_s[i] = of.entered_s;
+    t.start_offset_s[i] = of.start_offset_s;
     t.ease_out_s[i] = of.ease_out_s;
   }
   for (std::size_t pose = 0; pose < count; ++pose) {
@@ -222,7 +222,7 @@ void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
       .heading_rad = heading_rad.of,
       .sine = sine.of,
       .cosine = cosine.of,
-      .steer_rad = steer_rad.of,
+      .extra_turn_rad = extra_turn_rad.of,
       .steered = at.steered,
       .ease = is_eased ? FloatsOf(ease) : nullptr,
       .velocity = is_eased && is_inertial ? FloatsOf(velocity) : nullptr,
@@ -275,7 +275,7 @@ void SoaPoseEvaluator::Begin(std::span<const SampleRun> stretches, int count) {
       work.base_m[c].of[i] = movement.base.position_m[static_cast<int>(c)];
     }
     work.heading_rad.of[i] = movement.base.heading_rad;
-    work.steer_rad.of[i] = movement.steer_rad;
+    work.extra_turn_rad.of[i] = movement.extra_turn_rad;
   }
   kernels::SinCos(work.heading_rad.of, work.lanes, work.sine.of, work.cosine.of);
   work.FindPlaces();
@@ -318,7 +318,7 @@ void SoaPoseEvaluator::PrefetchPlaces(const Movement& movement) {
 void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
   const Movement& movement = *stretch.movement;
   PrefetchBytes(movement.weights.data(), movement.weights.size() * sizeof(float));
-  if (stretch.time_s < movement.entered_s + movement.ease_out_s) {
+  if (stretch.time_s < movement.start_offset_s + movement.ease_out_s) {
     PrefetchBytes(movement.difference.rotations.data(),
                   movement.difference.rotations.size() * sizeof(Quat));
     PrefetchBytes(movement.difference_velocity.joints_rad_s.data(),

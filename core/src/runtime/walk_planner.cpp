@@ -181,7 +181,7 @@ class StepPlanner {
                                       (print.heading_rad - stance_.heading_rad));
     if (std::sqrt(miss_x * miss_x + miss_z * miss_z) >
             (strides && is_strict_ ? kMaxMissM : kMostMissM) ||
-        miss_rad > kMaxSteerRad) {
+        miss_rad > kMaxExtraTurnRad) {
       return std::nullopt;
     }
     plan->most_residual_m = kMostMissM;

@@ -64,7 +64,7 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
 /// needed to make it again.
 struct LandingDecision {
-  double steer_rad = 0.0;  ///< Movement::steer_rad
+  double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
   bool is_on_terrain = false;
   std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};  ///< Where feet that move land, by Foot
   // The rest is a step's.

@@ -24,7 +24,7 @@ struct BaseFrame {
 };
 
 /// A movement may be turned this much further, or less, than its examples turn.
-inline constexpr double kMaxSteerRad = 0.3;
+inline constexpr double kMaxExtraTurnRad = 0.3;
 
 /// The longest an old pose is eased out over (paper, Section 5: T).
 inline constexpr double kEaseOutS = 0.2;
@@ -48,11 +48,11 @@ struct Movement {
   int group = -1;
   bool is_inertial = false;  ///< There is a difference_velocity
   BaseFrame base;
-  double steer_rad = 0.0;  ///< Turned further than its examples turn, evenly over the movement
-  double entered_s = 0.0;  ///< Where it began: later than 0 if it took over in mid-swing
+  double extra_turn_rad = 0.0;  ///< Turned further than its examples turn, evenly over the movement
+  double start_offset_s = 0.0;  ///< Where it began: later than 0 if it took over in mid-swing
   double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration)
   std::vector<float> weights;        ///< [example], sum 1
-  Pose difference;                   ///< D = P - M(entered_s), world frame
+  Pose difference;                   ///< D = P - M(start_offset_s), world frame
   PoseVelocity difference_velocity;  ///< Of D when the movement was entered
   TimeWarp warp;                     ///< Of the blended keytimes
   FootPlan feet;                     ///< Not active: feet are where the blend has them
@@ -115,7 +115,7 @@ void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out);
 
-/// What is displayed: M'(t) = f(s) D + M(t) with s = (t - entered_s)/T (Eq. (5)). M'(entered_s) = P and
+/// What is displayed: M'(t) = f(s) D + M(t) with s = (t - start_offset_s)/T (Eq. (5)). M'(start_offset_s) = P and
 /// M'(t) = M(t) from T on. If it is inertial, f(s) D is followed by T h(s) V with V the difference's velocity.
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
