@@ -51,12 +51,12 @@ class BitReader {
 
 bool TakeFree(BitReader& reader, const CompactJoint& joint, Quat& q) {
   const std::uint32_t largest = reader.Take(2);
-  const int zero = 1 << (joint.free_bits - 1);
+  const int zero = 1 << (joint.smallest_three_bits - 1);
   float c[4] = {};
   float squared = 0.0f;
   bool is_good = true;
   for (std::size_t k = 0; k < 3; ++k) {
-    const auto bits = static_cast<int>(reader.Take(joint.free_bits));
+    const auto bits = static_cast<int>(reader.Take(joint.smallest_three_bits));
     is_good &= bits != 0;
     const float value = static_cast<float>(bits - zero) * joint.step[0];
     c[kStaying[largest][k]] = value;
@@ -126,7 +126,7 @@ std::vector<std::uint16_t> ByDepth(std::span<const std::int16_t> parents) {
 
 }  // namespace
 
-Status CheckRotationCodes(std::span<const RotationCode> codes) {
+Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
   const auto wrong = [](ErrorCode code, const char* text, std::size_t joint) {
     return Fail(code, text, static_cast<std::int64_t>(joint));
   };
@@ -134,10 +134,10 @@ Status CheckRotationCodes(std::span<const RotationCode> codes) {
     return wrong(ErrorCode::kLimitExceeded, "too many rotation codes", codes.size());
   }
   for (std::size_t j = 0; j < codes.size(); ++j) {
-    const RotationCode& code = codes[j];
-    if (code.free_bits != 0) {
-      if (code.free_bits < RotationCode::kMinFreeBits ||
-          code.free_bits > RotationCode::kMaxFreeBits) {
+    const RotationQuantization& code = codes[j];
+    if (code.smallest_three_bits != 0) {
+      if (code.smallest_three_bits < RotationQuantization::kMinFreeBits ||
+          code.smallest_three_bits > RotationQuantization::kMaxFreeBits) {
         return wrong(ErrorCode::kOutOfRange, "not 8 to 15 free bits, or 0", j);
       }
     } else if (j == 0) {
@@ -147,17 +147,17 @@ Status CheckRotationCodes(std::span<const RotationCode> codes) {
     if (!(std::abs(squared - 1.0f) <= 1e-5f)) {
       return wrong(ErrorCode::kOutOfRange, "reference is not a unit quaternion", j);
     }
-    if (!(code.least_w >= RotationCode::kMinLeastW && code.least_w <= 1.0f)) {
+    if (!(code.least_w >= RotationQuantization::kMinLeastW && code.least_w <= 1.0f)) {
       return wrong(ErrorCode::kOutOfRange, "least w is not 0.3 to 1", j);
     }
     for (int c = 0; c < 3; ++c) {
       if (!(std::abs(code.low[c]) <= 1.0f)) {
         return wrong(ErrorCode::kOutOfRange, "component begins outside -1 to 1", j);
       }
-      if (!(code.step[c] >= RotationCode::kMinStep && code.step[c] <= 2.0f)) {
+      if (!(code.step[c] >= RotationQuantization::kMinStep && code.step[c] <= 2.0f)) {
         return wrong(ErrorCode::kOutOfRange, "step is not 2^-20 to 2", j);
       }
-      if (code.bits[static_cast<std::size_t>(c)] > RotationCode::kMaxBits) {
+      if (code.bits[static_cast<std::size_t>(c)] > RotationQuantization::kMaxBits) {
         return wrong(ErrorCode::kOutOfRange, "more than 16 bits", j);
       }
     }
@@ -188,7 +188,7 @@ Status CheckFewerJoints(std::span<const std::uint16_t> joints,
   return {};
 }
 
-Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
+Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> codes,
                                           std::span<const std::int16_t> parents,
                                           std::span<const std::uint16_t> told) {
   if (const Status status = CheckRotationCodes(codes); !status) {
@@ -209,7 +209,7 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
   for (std::size_t c = 0; c < 3; ++c) words.Put(c, 32);
   for (std::size_t j = 0; j < codes.size(); ++j) {
     const std::size_t row = kJointRows + 4 * j;
-    const RotationCode& code = codes[j];
+    const RotationQuantization& code = codes[j];
     CompactJoint& joint = codec.joints_[j];
     joint.parent = parents[j];
     if (j == 0 ? joint.parent != -1
@@ -228,12 +228,12 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationCode> codes,
         !told.empty() && !std::ranges::binary_search(told, static_cast<std::uint16_t>(j));
     if (joint.is_left_out) continue;
     joint.least_w = code.least_w;
-    joint.free_bits = code.free_bits;
-    if (code.free_bits > 0) {
-      joint.steps[0] = kSqrt2 * static_cast<float>((1 << (code.free_bits - 1)) - 1);
+    joint.smallest_three_bits = code.smallest_three_bits;
+    if (code.smallest_three_bits > 0) {
+      joint.steps[0] = kSqrt2 * static_cast<float>((1 << (code.smallest_three_bits - 1)) - 1);
       joint.step[0] = 1.0f / joint.steps[0];
       words.Put(row + 3, 2);
-      for (std::size_t c = 0; c < 3; ++c) words.Put(row + c, code.free_bits);
+      for (std::size_t c = 0; c < 3; ++c) words.Put(row + c, code.smallest_three_bits);
       continue;
     }
     for (std::size_t c = 0; c < 3; ++c) {
@@ -327,7 +327,7 @@ Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m
           Quat(joint.reference[3], joint.reference[0], joint.reference[1], joint.reference[2]);
       continue;
     }
-    const bool is_good = joint.free_bits > 0 ? TakeFree(reader, joint, rotations[j])
+    const bool is_good = joint.smallest_three_bits > 0 ? TakeFree(reader, joint, rotations[j])
                                              : TakeRanged(reader, joint, rotations[j]);
     if (!is_good) {
       return Fail(ErrorCode::kMalformed, "rotation has bits that no encoder writes",

@@ -4,7 +4,7 @@
 
 namespace stridewire::protocol {
 
-Expected<CompactCodecs> CompactCodecs::Make(std::span<const RotationCode> codes,
+Expected<CompactCodecs> CompactCodecs::Make(std::span<const RotationQuantization> codes,
                                             std::span<const std::int16_t> parents,
                                             std::span<const std::uint16_t> fewer_joints) {
   constexpr std::array<std::uint16_t, 1> kRootAlone{0};

@@ -1,6 +1,6 @@
 #include "compact_kernel.h"
 
-#include "stridewire/base/rotation_code.h"
+#include "stridewire/base/rotation_quantization.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 
@@ -127,7 +127,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
                     hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
       // Of a ranged joint no numbers are seen by its w as well.
-      if (!work.are_unit || joint.free_bits > 0) {
+      if (!work.are_unit || joint.smallest_three_bits > 0) {
         const V squared = hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)),
                                   hn::Mul(q.w, q.w));
         fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
@@ -145,7 +145,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
         q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
         // Of others w is not told, and what it is used for needs no more than two digits of it.
-        if (joint.free_bits > 0 || joint.is_turned) {
+        if (joint.smallest_three_bits > 0 || joint.is_turned) {
           q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
         }
       }
@@ -156,7 +156,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         hn::StoreU(e.y, d, error + kBlock);
         hn::StoreU(e.z, d, error + 2 * kBlock);
       };
-      if (joint.free_bits > 0) {
+      if (joint.smallest_three_bits > 0) {
         // The smallest three, as quantise_kernel.cpp has them with 15 bits.
         V largest = q.x;
         VI index = hn::Zero(di);
@@ -178,7 +178,7 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         const auto is_2 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 2)));
         const auto is_3 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 3)));
         const auto is_0_or_1 = hn::RebindMask(d, hn::Lt(index, hn::Set(di, 2)));
-        const int most = (1 << (joint.free_bits - 1)) - 1;
+        const int most = (1 << (joint.smallest_three_bits - 1)) - 1;
         const V to_steps = hn::Set(d, joint.steps[0]);
         const V to_number = hn::Set(d, joint.step[0]);
         keep(3, index);

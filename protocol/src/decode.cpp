@@ -316,7 +316,7 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
         .low = FromWire(&from.low()),
         .step = FromWire(&from.step()),
         .bits = {from.bits_x(), from.bits_y(), from.bits_z()},
-        .free_bits = from.free_bits(),
+        .smallest_three_bits = from.free_bits(),
         .least_w = from.least_w()};
   }
   m.fewer_joints.resize(u.Count(w.fewer_joints(), kMaxJoints, "WorldInfo.fewer_joints"));

@@ -206,10 +206,10 @@ Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
                                          : b.CreateVector(layer_list);
   std::vector<wire::RotationCode> code_list;
   code_list.reserve(m.rotation_codes.size());
-  for (const RotationCode& code : m.rotation_codes) {
+  for (const RotationQuantization& code : m.rotation_codes) {
     const Quat& q = code.reference;
     code_list.emplace_back(wire::Rotation(q.x, q.y, q.z, q.w), ToWire(code.low), ToWire(code.step),
-                           code.least_w, code.bits[0], code.bits[1], code.bits[2], code.free_bits);
+                           code.least_w, code.bits[0], code.bits[1], code.bits[2], code.smallest_three_bits);
   }
   const auto codes = code_list.empty() ? Offset<flatbuffers::Vector<const wire::RotationCode*>>()
                                        : b.CreateVectorOfStructs(code_list);

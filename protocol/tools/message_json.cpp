@@ -177,13 +177,13 @@ Json Leg(const LegInfo& leg) {
           {"toe_tip_offset_m", Vector(leg.toe_tip_offset_m)}};
 }
 
-Json Fields(const RotationCode& code) {
+Json Fields(const RotationQuantization& code) {
   const Quat& q = code.reference;
   return {{"reference", Json::array({q.x, q.y, q.z, q.w})},
           {"low", Vector(code.low)},
           {"step", Vector(code.step)},
           {"bits", code.bits},
-          {"free_bits", code.free_bits},
+          {"free_bits", code.smallest_three_bits},
           {"least_w", code.least_w}};
 }
 
@@ -198,7 +198,7 @@ Json Fields(const WorldInfo& m) {
     end_sites.push_back({{"joint", site.joint}, {"offset_m", Vector(site.offset_m)}});
   }
   Json codes = Json::array();
-  for (const RotationCode& code : m.rotation_codes) codes.push_back(Fields(code));
+  for (const RotationQuantization& code : m.rotation_codes) codes.push_back(Fields(code));
   Json json = {{"seq", Wide(m.seq)},
                {"world", m.world},
                {"name", m.name},

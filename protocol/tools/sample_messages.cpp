@@ -35,11 +35,11 @@ SkeletonInfo Skeleton() {
 }
 
 // Root and hips turn every way, knees and the left ankle about one axis, the head never.
-std::vector<RotationCode> RotationCodes() {
-  std::vector<RotationCode> codes(8);
-  codes[0].free_bits = 11;
-  codes[1].free_bits = 13;
-  codes[4].free_bits = 15;
+std::vector<RotationQuantization> RotationCodes() {
+  std::vector<RotationQuantization> codes(8);
+  codes[0].smallest_three_bits = 11;
+  codes[1].smallest_three_bits = 13;
+  codes[4].smallest_three_bits = 15;
   for (const std::size_t knee : {2u, 5u}) {
     codes[knee].reference = Quat(0.9375f, 0.34798527f, 0.0f, 0.0f);
     codes[knee].low = Vec3(-0.4375f, 0.0f, 0.0f);
@@ -73,14 +73,14 @@ struct CompactArrays {
     info.mode = mode;
     if (mode == PoseMode::kCompactRoot) flags[1] = 0;  // The root turns every way.
     const CompactCodec& codec = *SampleCodecs().Find(mode);
-    const std::vector<RotationCode> codes = RotationCodes();
+    const std::vector<RotationQuantization> codes = RotationCodes();
     CompactCodec::Block block;
     for (int a = 0; a < 3; ++a) {
       std::vector<Quat> rotations;
       for (std::size_t j = 0; j < codes.size(); ++j) {
         const double angle = 0.7 * a + 0.45 * static_cast<double>(j);
         Vec3 v(Sin(angle), Cos(1.3 * angle), Sin(0.4 + 2.1 * angle));
-        if (codes[j].free_bits == 0) {
+        if (codes[j].smallest_three_bits == 0) {
           v *= 0.25f;
           for (int c = 0; c < 3; ++c) {
             if (codes[j].bits[static_cast<std::size_t>(c)] < 8) v[c] = 0.0f;

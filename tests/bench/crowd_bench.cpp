@@ -14,7 +14,7 @@
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
-#include "stridewire/runtime/pose_code.h"
+#include "stridewire/runtime/pose_quantization.h"
 #include "stridewire/runtime/reference_evaluation.h"
 #include "stridewire/runtime/evaluation_batcher.h"
 #include "world/poses_ahead.h"
@@ -137,7 +137,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));
   }
   const auto codecs =
-      protocol::CompactCodecs::Make(ChoosePoseCode(*library).joints, parents, {}).value();
+      protocol::CompactCodecs::Make(ChoosePoseQuantization(*library).joints, parents, {}).value();
   server::PosesAhead ahead(std::make_shared<server::PoseScratch>(library), &codecs);
   constexpr auto kMode = protocol::PoseMode::kCompact;
   ahead.SetModes(std::array{kMode}, 1);

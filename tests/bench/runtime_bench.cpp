@@ -28,7 +28,7 @@
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/pose_code.h"
+#include "stridewire/runtime/pose_quantization.h"
 
 namespace stridewire {
 namespace {
@@ -294,7 +294,7 @@ protocol::CompactCodec CompactCodecOf(const Library& library) {
   for (const Joint& joint : library->skeleton().joints) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));
   }
-  return protocol::CompactCodec::Make(ChoosePoseCode(*library).joints, parents).value();
+  return protocol::CompactCodec::Make(ChoosePoseQuantization(*library).joints, parents).value();
 }
 
 /// Poses as a batch encodes them: so many at once, copied in and their bytes out.

@@ -19,7 +19,7 @@
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/pose_code.h"
+#include "stridewire/runtime/pose_quantization.h"
 
 namespace stridewire {
 namespace {
@@ -39,7 +39,7 @@ std::vector<std::int16_t> ParentsOf(const Skeleton& skeleton) {
   return parents;
 }
 
-CompactCodec CodecOf(const Skeleton& skeleton, const PoseCode& code) {
+CompactCodec CodecOf(const Skeleton& skeleton, const PoseQuantization& code) {
   return CompactCodec::Make(code.joints, ParentsOf(skeleton)).value();
 }
 
@@ -167,12 +167,12 @@ class CompactPosesOf : public testing::TestWithParam<Source> {
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
     library_ = LibraryOf(GetParam().subjects);
-    code_ = ChoosePoseCode(*library_);
+    code_ = ChoosePoseQuantization(*library_);
   }
   [[nodiscard]] const Skeleton& skeleton() const { return library_->skeleton(); }
 
   Library library_;
-  PoseCode code_;
+  PoseQuantization code_;
 };
 constexpr auto kNameOf = [](const auto& source) { return source.param.name; };
 // Subject 01 is Debian's.
@@ -293,11 +293,11 @@ TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
 }
 
 TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
-  const PoseCode code = ChoosePoseCode(*LibraryOf({}));
+  const PoseQuantization code = ChoosePoseQuantization(*LibraryOf({}));
   int as_they_are = 0;
   for (std::size_t j = 1; j < code.joints.size(); ++j) {
-    const RotationCode& joint = code.joints[j];
-    if (joint.free_bits > 0) continue;
+    const RotationQuantization& joint = code.joints[j];
+    if (joint.smallest_three_bits > 0) continue;
     as_they_are += joint.reference == kIdentityQuat;
     if (joint.reference != kIdentityQuat) {
       EXPECT_LE(std::abs(joint.reference.w), 0.997f) << j;
@@ -341,7 +341,7 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
       ranges.push_back(range);
     }
     skeleton.end_sites.push_back({joints - 1, offset()});
-    const PoseCode code = ChoosePoseCode(skeleton, ranges, kLargestErrorM);
+    const PoseQuantization code = ChoosePoseQuantization(skeleton, ranges, kLargestErrorM);
     const CompactCodec codec = CodecOf(skeleton, code);
     Passage passage(skeleton, codec);
     Pose pose(joints);
@@ -349,7 +349,7 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
       for (int j = 0; j < joints; ++j) {
         Quat& q = pose.rotations[static_cast<std::size_t>(j)];
         const RotationRange& range = ranges[static_cast<std::size_t>(j)];
-        if (range.least_w < static_cast<double>(RotationCode::kMinLeastW)) {
+        if (range.least_w < static_cast<double>(RotationQuantization::kMinLeastW)) {
           const auto normal = [&] { return static_cast<float>(random.Draw(-1.0, 1.0)); };
           q = Normalise(Quat(normal() + 0.1f, normal(), normal(), normal()));
           continue;
@@ -381,8 +381,8 @@ TEST(CompactPoses, BonesOfManyMetresGetAllBitsAndSaySo) {
   Skeleton skeleton;
   skeleton.joints = {{"root", -1, Vec3(0.0f)}, {"far", 0, Vec3(0.0f, 100.0f, 0.0f)}};
   const std::vector<RotationRange> ranges(2);
-  const PoseCode code = ChoosePoseCode(skeleton, ranges, kLargestErrorM);
-  EXPECT_EQ(code.joints[0].free_bits, RotationCode::kMaxFreeBits);
+  const PoseQuantization code = ChoosePoseQuantization(skeleton, ranges, kLargestErrorM);
+  EXPECT_EQ(code.joints[0].smallest_three_bits, RotationQuantization::kMaxFreeBits);
   EXPECT_GT(code.largest_error_m, kLargestErrorM);
   EXPECT_TRUE(protocol::CheckRotationCodes(code.joints));
 }

@@ -40,11 +40,11 @@ inline protocol::Welcome Welcome(bool resumed = false) {
 }
 
 /// Hips and head turn every way, the spine never.
-inline std::vector<RotationCode> RotationCodes() {
-  std::vector<RotationCode> codes(kJoints);
-  codes[0].free_bits = 12;
+inline std::vector<RotationQuantization> RotationCodes() {
+  std::vector<RotationQuantization> codes(kJoints);
+  codes[0].smallest_three_bits = 12;
   codes[1].step = Vec3(0.02f);
-  codes[2].free_bits = 14;
+  codes[2].smallest_three_bits = 14;
   return codes;
 }
 /// From afar the head's turn is not told.

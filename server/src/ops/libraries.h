@@ -7,7 +7,7 @@
 #include "ops/config.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
-#include "world/pose_codes.h"
+#include "world/pose_quantizations.h"
 
 namespace stridewire::server {
 

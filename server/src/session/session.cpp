@@ -493,7 +493,7 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
   if ((features_ & protocol::kFeatureLayers) != 0) {
     for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
   }
-  std::vector<RotationCode> codes;
+  std::vector<RotationQuantization> codes;
   std::vector<std::uint16_t> fewer_joints;
   if ((features_ & protocol::kFeatureCompact) != 0) {
     codes = world.codes->joints;

@@ -9,7 +9,7 @@
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/ground.h"
-#include "world/pose_codes.h"
+#include "world/pose_quantizations.h"
 
 namespace stridewire::server {
 

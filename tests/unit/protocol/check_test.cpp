@@ -380,7 +380,7 @@ TEST(Check, WorldInfo) {
       "WorldInfo.leg.toe_tip_offset_m");
   W with_codes = good;
   with_codes.rotation_codes.resize(good.skeleton.joints.size());
-  with_codes.rotation_codes[0].free_bits = 12;
+  with_codes.rotation_codes[0].smallest_three_bits = 12;
   ASSERT_TRUE(Check(with_codes));
   Refused<W>(
       with_codes, [](W& m) { m.rotation_codes.pop_back(); }, ErrorCode::kShapeMismatch,
@@ -389,7 +389,7 @@ TEST(Check, WorldInfo) {
       with_codes, [&](W& m) { m.rotation_codes[1].step.y = nan; }, ErrorCode::kOutOfRange,
       "WorldInfo.rotation_codes", 1);
   Refused<W>(
-      with_codes, [](W& m) { m.rotation_codes[0].free_bits = 0; }, ErrorCode::kMalformed,
+      with_codes, [](W& m) { m.rotation_codes[0].smallest_three_bits = 0; }, ErrorCode::kMalformed,
       "WorldInfo.rotation_codes", 0);
   Refused<W>(
       with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,

@@ -20,9 +20,9 @@ namespace {
 constexpr std::array<std::int16_t, 3> kParents = {-1, 0, 1};
 
 // A root, a joint that turns about three axes and one that turns about one: 2 + 36 + 30 + 13 bits.
-std::vector<RotationCode> Codes() {
-  std::vector<RotationCode> codes(3);
-  codes[0].free_bits = 12;
+std::vector<RotationQuantization> Codes() {
+  std::vector<RotationQuantization> codes(3);
+  codes[0].smallest_three_bits = 12;
   codes[1].reference = YawRotation(0.5);
   codes[1].low = Vec3(-0.5f);
   codes[1].step = Vec3(1.0f / 1024.0f);
@@ -90,8 +90,8 @@ TEST(CompactCodec, GivesBackWhatItWasGiven) {
 }
 
 TEST(CompactCodec, AJointMakesUpForTheErrorsOfThoseAbove) {
-  std::vector<RotationCode> codes = Codes();
-  codes[0].free_bits = RotationCode::kMinFreeBits;  // 19 thousandths of a radian
+  std::vector<RotationQuantization> codes = Codes();
+  codes[0].smallest_three_bits = RotationQuantization::kMinFreeBits;  // 19 thousandths of a radian
   codes[1].bits = {16, 16, 16};
   codes[1].step = Vec3(1.0f / 65536.0f);
   const CompactCodec codec = CompactCodec::Make(codes, kParents).value();
@@ -119,15 +119,15 @@ TEST(CompactCodec, AJointMakesUpForTheErrorsOfThoseAbove) {
 // told badly is turned far.
 TEST(CompactCodec, AJointMakesUpForThoseTurnedFar) {
   for (const Quat& reference : {kIdentityQuat, YawRotation(1.0)}) {
-    std::vector<RotationCode> codes(4);
-    codes[0].free_bits = 8;
+    std::vector<RotationQuantization> codes(4);
+    codes[0].smallest_three_bits = 8;
     for (std::size_t j = 1; j < 4; ++j) {
       const auto bits = static_cast<std::uint8_t>(j < 3 ? 8 : 16);  // 4 thousandths of v
       codes[j].reference = reference;
       codes[j].low = Vec3(-0.8f);
       codes[j].step = Vec3(1.6f / static_cast<float>(1 << bits));
       codes[j].bits = {bits, bits, bits};
-      codes[j].least_w = RotationCode::kMinLeastW;
+      codes[j].least_w = RotationQuantization::kMinLeastW;
     }
     const CompactCodec codec =
         CompactCodec::Make(codes, std::array<std::int16_t, 4>{-1, 0, 1, 2}).value();
@@ -297,31 +297,31 @@ TEST(CompactCodec, DecodeRefusesBitsNoEncoderWrites) {
 }
 
 TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
-  const auto code = [](const std::vector<RotationCode>& codes) {
+  const auto code = [](const std::vector<RotationQuantization>& codes) {
     const auto codec = CompactCodec::Make(codes, kParents);
     return codec ? ErrorCode::kIo : codec.error().code;
   };
   ASSERT_EQ(code(Codes()), ErrorCode::kIo);
   const auto with = [&](const auto& change, std::size_t joint = 1) {
-    std::vector<RotationCode> codes = Codes();
+    std::vector<RotationQuantization> codes = Codes();
     change(codes[joint]);
     return code(codes);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(with([](RotationCode& c) { c.free_bits = 0; }, 0), ErrorCode::kMalformed);
+  EXPECT_EQ(with([](RotationQuantization& c) { c.smallest_three_bits = 0; }, 0), ErrorCode::kMalformed);
   for (const std::uint8_t bits : {1, 7, 16, 255}) {
-    EXPECT_EQ(with([&](RotationCode& c) { c.free_bits = bits; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.smallest_three_bits = bits; }), ErrorCode::kOutOfRange);
   }
-  EXPECT_EQ(with([](RotationCode& c) { c.bits[2] = 17; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([](RotationQuantization& c) { c.bits[2] = 17; }), ErrorCode::kOutOfRange);
   for (const float bad : {nan, -2.0f, 0.0f}) {
-    EXPECT_EQ(with([&](RotationCode& c) { c.step.y = bad; }), ErrorCode::kOutOfRange);
-    EXPECT_EQ(with([&](RotationCode& c) { c.reference.x = bad == 0.0f ? 1.0f : bad; }),
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.step.y = bad; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.reference.x = bad == 0.0f ? 1.0f : bad; }),
               ErrorCode::kOutOfRange);
-    EXPECT_EQ(with([&](RotationCode& c) { c.least_w = bad; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.least_w = bad; }), ErrorCode::kOutOfRange);
   }
-  EXPECT_EQ(with([&](RotationCode& c) { c.low.z = nan; }), ErrorCode::kOutOfRange);
-  EXPECT_EQ(with([&](RotationCode& c) { c.low.z = 1.5f; }), ErrorCode::kOutOfRange);
-  EXPECT_EQ(with([&](RotationCode& c) { c.least_w = 1.5f; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([&](RotationQuantization& c) { c.low.z = nan; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([&](RotationQuantization& c) { c.low.z = 1.5f; }), ErrorCode::kOutOfRange);
+  EXPECT_EQ(with([&](RotationQuantization& c) { c.least_w = 1.5f; }), ErrorCode::kOutOfRange);
   EXPECT_EQ(CompactCodec::Make({}, {}).error().code, ErrorCode::kShapeMismatch);
   EXPECT_EQ(CompactCodec::Make(Codes(), std::array<std::int16_t, 2>{-1, 0}).error().code,
             ErrorCode::kShapeMismatch);

@@ -105,8 +105,8 @@ TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
 
 // A root and a joint that turns about y by up to half a radian.
 CompactCodec SmallCodec() {
-  std::vector<RotationCode> codes(2);
-  codes[0].free_bits = 12;
+  std::vector<RotationQuantization> codes(2);
+  codes[0].smallest_three_bits = 12;
   codes[1].low = Vec3(0.0f, -0.25f, 0.0f);
   codes[1].step = Vec3(0.01f, 0x1p-10f, 0.01f);
   codes[1].bits = {0, 9, 0};

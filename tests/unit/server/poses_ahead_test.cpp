@@ -12,7 +12,7 @@
 #include "captured_library.h"
 #include "drawn_requests.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "world/pose_codes.h"
+#include "world/pose_quantizations.h"
 
 namespace stridewire::server {
 namespace {

@@ -7,27 +7,27 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/base/math.h"
-#include "stridewire/base/rotation_code.h"
+#include "stridewire/base/rotation_quantization.h"
 
 namespace stridewire::protocol {
 
-/// Whether codes can be told and decoded: references unit, numbers finite, bits within RotationCode's limits, a root
+/// Whether codes can be told and decoded: references unit, numbers finite, bits within RotationQuantization's limits, a root
 /// that turns every way. kOutOfRange, kMalformed; `index` is the joint. None at all is allowed: a world without.
-[[nodiscard]] Status CheckRotationCodes(std::span<const RotationCode> codes);
+[[nodiscard]] Status CheckRotationCodes(std::span<const RotationQuantization> codes);
 
 /// Whether some joints can be told without the others: numbers growing, the root among them and of each its parent.
 /// kShapeMismatch: more than there are joints; kMalformed with `index` in `joints`.
 [[nodiscard]] Status CheckFewerJoints(std::span<const std::uint16_t> joints,
                                       std::span<const std::int16_t> parents);
 
-/// A RotationCode as the codec takes it.
+/// A RotationQuantization as the codec takes it.
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
   float low[3] = {};
   float step[3] = {};   ///< Of a free joint the first: of each of the three
   float steps[3] = {};  ///< 1 / step
   std::int32_t bits[3] = {};
-  std::int32_t free_bits = 0;  ///< 0: not free
+  std::int32_t smallest_three_bits = 0;  ///< 0: not free
   float least_w = 0.0f;
   std::int32_t parent = -1;  ///< -1: none
   bool is_turned = false;    ///< `reference` is not 1
@@ -58,7 +58,7 @@ class CompactCodec {
   /// `parents` has one entry a joint, -1 for the first, then below its own index. `told`: the joints that are told;
   /// none: all. Errors as CheckRotationCodes and CheckFewerJoints, kShapeMismatch: not as many parents; kOutOfRange:
   /// a parent.
-  [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationCode> codes,
+  [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationQuantization> codes,
                                                    std::span<const std::int16_t> parents,
                                                    std::span<const std::uint16_t> told = {});
 

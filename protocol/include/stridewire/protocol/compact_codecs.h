@@ -20,7 +20,7 @@ class CompactCodecs {
 
   /// `fewer_joints` as CheckFewerJoints takes them, or none: then there is no PoseDetail::kFewer. Errors as
   /// CompactCodec::Make.
-  [[nodiscard]] static Expected<CompactCodecs> Make(std::span<const RotationCode> codes,
+  [[nodiscard]] static Expected<CompactCodecs> Make(std::span<const RotationQuantization> codes,
                                                     std::span<const std::int16_t> parents,
                                                     std::span<const std::uint16_t> fewer_joints);
 

@@ -11,7 +11,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/base/math.h"
-#include "stridewire/base/rotation_code.h"
+#include "stridewire/base/rotation_quantization.h"
 #include "stridewire/protocol/frame.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/protocol/pose_codec.h"
@@ -396,7 +396,7 @@ struct WorldInfo {
   SkeletonInfo skeleton;
   std::vector<std::string> layers;  ///< Names for SetLayers; only with kFeatureLayers.
   /// One a joint, for compact poses; only with kFeatureCompact, else none.
-  std::vector<RotationCode> rotation_codes;
+  std::vector<RotationQuantization> rotation_codes;
   /// Those that PoseDetail::kFewer tells, growing, the root among them and of each its parent (CheckFewerJoints);
   /// only with kFeatureDetail and codes, else none.
   std::vector<std::uint16_t> fewer_joints;

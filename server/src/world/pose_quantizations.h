@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "stridewire/base/rotation_code.h"
+#include "stridewire/base/rotation_quantization.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/runtime/motion_library.h"
 
@@ -12,7 +12,7 @@ namespace stridewire::server {
 
 /// How the compact poses of a library's worlds are told.
 struct PoseCodes {
-  std::vector<RotationCode> joints;
+  std::vector<RotationQuantization> joints;
   std::vector<std::uint16_t> fewer_joints;  ///< Told at protocol::PoseDetail::kFewer.
   protocol::CompactCodecs codecs;
 };

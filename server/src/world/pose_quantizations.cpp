@@ -1,14 +1,14 @@
-#include "world/pose_codes.h"
+#include "world/pose_quantizations.h"
 
 #include <utility>
 
 #include "stridewire/base/check.h"
-#include "stridewire/runtime/pose_code.h"
+#include "stridewire/runtime/pose_quantization.h"
 
 namespace stridewire::server {
 
 std::shared_ptr<const PoseCodes> MakePoseCodes(const MotionLibrary& library) {
-  std::vector<RotationCode> joints = ChoosePoseCode(library).joints;
+  std::vector<RotationQuantization> joints = ChoosePoseQuantization(library).joints;
   std::vector<std::int16_t> parents;
   for (const Joint& joint : library.skeleton().joints) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));

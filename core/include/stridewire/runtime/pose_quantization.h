@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "stridewire/base/rotation_code.h"
+#include "stridewire/base/rotation_quantization.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/skeleton.h"
 
@@ -16,7 +16,7 @@ struct RotationRange {
   Quat reference = kIdentityQuat;
   Vec3 low = Vec3(-1.0f);
   Vec3 high = Vec3(1.0f);
-  double least_w = 0.0;  ///< Below RotationCode::kMinLeastW: it turns every way
+  double least_w = 0.0;  ///< Below RotationQuantization::kMinLeastW: it turns every way
 };
 
 /// The range of each joint in a library: its examples, layers and stand pose, and a good deal more, since movements are
@@ -24,8 +24,8 @@ struct RotationRange {
 [[nodiscard]] std::vector<RotationRange> FindRotationRanges(const MotionLibrary& library);
 
 /// Codes for all joints of a skeleton, and the bound they keep.
-struct PoseCode {
-  std::vector<RotationCode> joints;
+struct PoseQuantization {
+  std::vector<RotationQuantization> joints;
   double largest_error_m =
       0.0;  ///< Of any joint or end site against the root, in a pose within the ranges
 };
@@ -35,7 +35,7 @@ struct PoseCode {
 /// (an angle) moves only what its bones reach, and the bound is the sum over a chain of bone times angle. No angle is
 /// off by more than 0.23 degrees. `largest_error_m` of the result is larger than asked for only if no bits were left to
 /// give: bones of many metres. `ranges` has one entry a joint. Same bytes on every machine.
-[[nodiscard]] PoseCode ChoosePoseCode(const Skeleton& skeleton,
+[[nodiscard]] PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
                                       std::span<const RotationRange> ranges,
                                       double largest_error_m);
 
@@ -51,6 +51,6 @@ inline constexpr double kFewerJointsShiftM = 0.12;
 [[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library);
 
 /// Both, so that with the root in steps of 2^-14 m everything is within 1 mm of where it is in the world.
-[[nodiscard]] PoseCode ChoosePoseCode(const MotionLibrary& library);
+[[nodiscard]] PoseQuantization ChoosePoseQuantization(const MotionLibrary& library);
 
 }  // namespace stridewire

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/pose_code.h"
+#include "stridewire/runtime/pose_quantization.h"
 
 #include <algorithm>
 #include <cmath>
@@ -105,7 +105,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   const bool is_rigid = widest < kStillWidth && !is_planted;
   const double sine = std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
                       (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + beside);
-  constexpr auto kLeast = static_cast<double>(RotationCode::kMinLeastW);
+  constexpr auto kLeast = static_cast<double>(RotationQuantization::kMinLeastW);
   range.least_w = std::sqrt(std::max(kLeast * kLeast, 1.0 - sine * sine));
   return range;
 }
@@ -117,8 +117,8 @@ class BitChoice {
       : ranges_(ranges), most_m_(most_m), joints_(ranges.size()) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& joint = joints_[j];
-      joint.is_free = ranges[j].least_w < static_cast<double>(RotationCode::kMinLeastW);
-      if (joint.is_free) joint.bits = {RotationCode::kMinFreeBits, 0, 0};
+      joint.is_free = ranges[j].least_w < static_cast<double>(RotationQuantization::kMinLeastW);
+      if (joint.is_free) joint.bits = {RotationQuantization::kMinFreeBits, 0, 0};
       joint.angle_rad = AngleOf(j, joint.bits);
       joint.most_rad = kMostOuterRad;
     }
@@ -149,13 +149,13 @@ class BitChoice {
     }
   }
 
-  [[nodiscard]] PoseCode Result() const {
-    PoseCode code;
+  [[nodiscard]] PoseQuantization Result() const {
+    PoseQuantization code;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
-      RotationCode& rotation = code.joints.emplace_back();
+      RotationQuantization& rotation = code.joints.emplace_back();
       if (joints_[j].is_free) {
-        rotation.free_bits = joints_[j].bits[0];
-        rotation.least_w = RotationCode::kMinLeastW;
+        rotation.smallest_three_bits = joints_[j].bits[0];
+        rotation.least_w = RotationQuantization::kMinLeastW;
         continue;
       }
       const RotationRange& range = ranges_[j];
@@ -230,9 +230,9 @@ class BitChoice {
   [[nodiscard]] bool CanTakeMore(std::size_t j, std::size_t component) const {
     const Joint& joint = joints_[j];
     const int bits = joint.bits[component];
-    if (joint.is_free) return component == 0 && bits < RotationCode::kMaxFreeBits;
-    return bits < RotationCode::kMaxBits && StepOf(j, static_cast<int>(component), bits + 1) >=
-                                                static_cast<double>(RotationCode::kMinStep);
+    if (joint.is_free) return component == 0 && bits < RotationQuantization::kMaxFreeBits;
+    return bits < RotationQuantization::kMaxBits && StepOf(j, static_cast<int>(component), bits + 1) >=
+                                                static_cast<double>(RotationQuantization::kMinStep);
   }
 
   // The component that one more bit helps most, radians a bit; -1 if there is none.
@@ -287,7 +287,7 @@ class BitChoice {
 
   bool TakeOne(std::size_t j, std::size_t component) {
     Joint& joint = joints_[j];
-    const int least = joint.is_free ? int{RotationCode::kMinFreeBits} : 0;
+    const int least = joint.is_free ? int{RotationQuantization::kMinFreeBits} : 0;
     if ((joint.is_free && component > 0) || joint.bits[component] <= least) return false;
     const double before_rad = joint.angle_rad;
     --joint.bits[component];
@@ -317,7 +317,7 @@ std::vector<RotationRange> FindRotationRanges(const MotionLibrary& library) {
   return ranges;
 }
 
-PoseCode ChoosePoseCode(const Skeleton& skeleton, std::span<const RotationRange> ranges,
+PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton, std::span<const RotationRange> ranges,
                         double largest_error_m) {
   STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
   BitChoice choice(skeleton, ranges, largest_error_m);
@@ -363,8 +363,8 @@ std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library) {
   return ChooseFewerJoints(library.skeleton(), FindRotationRanges(library), kFewerJointsShiftM);
 }
 
-PoseCode ChoosePoseCode(const MotionLibrary& library) {
-  return ChoosePoseCode(library.skeleton(), FindRotationRanges(library), kLargestAgainstRootM);
+PoseQuantization ChoosePoseQuantization(const MotionLibrary& library) {
+  return ChoosePoseQuantization(library.skeleton(), FindRotationRanges(library), kLargestAgainstRootM);
 }
 
 }  // namespace stridewire
