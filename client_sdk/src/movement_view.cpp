@@ -19,7 +19,7 @@ std::size_t MovementView::avatar_count() const {
 
 Status MovementView::Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
                            PoseScreen& screen) {
-  const protocol::AvatarNumber avatar = message.avatars[i];
+  const protocol::AvatarId avatar = message.avatars[i];
   if ((message.flags[i] & protocol::kMovementGone) != 0) {
     if (shard.avatars.erase(avatar) > 0) screen.Gone(avatar);
     return {};
@@ -37,7 +37,7 @@ Status MovementView::Apply(const protocol::Movements& message, std::size_t i, Sh
   return told->second.replica->Apply(message.record(i));
 }
 
-void MovementView::Show(const protocol::Movements& message, protocol::AvatarNumber avatar,
+void MovementView::Show(const protocol::Movements& message, protocol::AvatarId avatar,
                         Told& told, PoseScreen& screen) {
   const PoseStamp stamp{.tick = message.tick,
                         .time_s = message.server_time_s,
@@ -62,7 +62,7 @@ Status MovementView::Take(const protocol::Movements& message, PoseScreen& screen
     if (Status status = Apply(message, i, shard, screen); !status) return status;
   }
   if (message.states) {
-    for (const protocol::AvatarNumber avatar : message.avatars) {
+    for (const protocol::AvatarId avatar : message.avatars) {
       const auto told = shard.avatars.find(avatar);
       if (told == shard.avatars.end()) continue;
       AvatarReplica* replica = told->second.replica.get();

@@ -16,11 +16,11 @@ namespace stridewire::client {
 class PoseScreen {
  public:
   virtual ~PoseScreen() = default;
-  virtual void Show(protocol::AvatarNumber avatar, std::uint16_t shard, const PoseStamp& stamp,
+  virtual void Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                     ConstPoseSpan pose) = 0;
-  virtual void Gone(protocol::AvatarNumber avatar) = 0;
+  virtual void Gone(protocol::AvatarId avatar) = 0;
   /// Others are not evaluated. Who is wanted only later is shown from the next state on.
-  [[nodiscard]] virtual bool Wants(protocol::AvatarNumber) const { return true; }
+  [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
 };
 
 /// The avatars of a world, evaluated here from what they are told to begin (protocol/STANDARD.md, "Movement records"): bit by
@@ -51,12 +51,12 @@ class MovementView {
     bool is_known = false;
     std::uint64_t step = 0;         // the last that is complete
     std::uint16_t parts_taken = 0;  // of the next one
-    std::map<protocol::AvatarNumber, Told> avatars;
+    std::map<protocol::AvatarId, Told> avatars;
   };
 
   [[nodiscard]] Status Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
                              PoseScreen& screen);
-  void Show(const protocol::Movements& message, protocol::AvatarNumber avatar, Told& told,
+  void Show(const protocol::Movements& message, protocol::AvatarId avatar, Told& told,
             PoseScreen& screen);
 
   std::shared_ptr<const MotionLibrary> library_;

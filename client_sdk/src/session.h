@@ -173,7 +173,7 @@ class Session {
     bool join_answered = false;  ///< The caller has had its REPLY.
     std::deque<Command> unsent;
     std::map<protocol::SubscriptionId, Subscription> subscriptions;
-    std::map<protocol::AvatarNumber, protocol::Placement> spawned;  ///< Ours, and where they are.
+    std::map<protocol::AvatarId, protocol::Placement> spawned;  ///< Ours, and where they are.
     std::uint64_t told_dropped_batches = 0;                         ///< By the last Lagging.
     std::unique_ptr<WorldView> view;
     std::unique_ptr<MovementView> evaluated;  ///< While movements are observed.

@@ -177,7 +177,7 @@ stridewire_status Session::Spawn(stridewire_world world, protocol::Spawn message
 
 stridewire_status Session::Remove(stridewire_world world, protocol::Remove message,
                                   std::uint64_t& command) {
-  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
+  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
@@ -189,7 +189,7 @@ stridewire_status Session::Request(stridewire_world world, protocol::Request mes
 
 stridewire_status Session::Cancel(stridewire_world world, protocol::CancelQueue message,
                                   std::uint64_t& command) {
-  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
+  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
@@ -208,7 +208,7 @@ stridewire_status Session::SetLayers(stridewire_world world, protocol::SetLayers
 
 stridewire_status Session::SetPlanting(stridewire_world world, protocol::SetPlanting message,
                                        std::uint64_t& command) {
-  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
+  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
@@ -219,7 +219,7 @@ stridewire_status Session::Observe(stridewire_world world, protocol::Observe mes
     return Refuse(STRIDEWIRE_LIMIT_REACHED, "too many subscriptions of one world");
   }
   message.subscription = next_subscription_;
-  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarNumber);
+  const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   if (stridewire_status status = Enqueue(world, message, bytes, command); status != STRIDEWIRE_OK) {
     return status;
   }
@@ -284,7 +284,7 @@ const WorldView* Session::FindWorld(stridewire_world world) const {
 }
 
 void Session::UpdateFilter(World& world) {
-  std::set<protocol::AvatarNumber> wanted;
+  std::set<protocol::AvatarId> wanted;
   for (const auto& [id, subscription] : world.subscriptions) {
     const auto& avatars = subscription.message.avatars;
     if (avatars.empty()) return world.view->SetFilter(std::nullopt);

@@ -41,7 +41,7 @@ void WorldView::Clear() {
   codecs_ = {};
 }
 
-void WorldView::SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter) {
+void WorldView::SetFilter(std::optional<std::set<protocol::AvatarId>> filter) {
   filter_ = std::move(filter);
   if (!filter_) return;
   for (auto track = tracks_.begin(); track != tracks_.end();) {
@@ -85,7 +85,7 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
 
   protocol::PoseBatchReader reader(batch, codecs_.Find(info.mode));
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
-    const protocol::AvatarNumber avatar = batch.avatars[i];
+    const protocol::AvatarId avatar = batch.avatars[i];
     reader.Next();
     if (filter_ && !filter_->contains(avatar)) continue;
     if (const auto left = left_.find(avatar); left != left_.end() && info.tick < left->second) {
@@ -109,7 +109,7 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   return {};
 }
 
-WorldView::Track* WorldView::TrackOf(protocol::AvatarNumber avatar) {
+WorldView::Track* WorldView::TrackOf(protocol::AvatarId avatar) {
   auto track = tracks_.find(avatar);
   if (track == tracks_.end()) {
     const std::size_t joints = skeleton_.joints.size();
@@ -137,7 +137,7 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3
   track.seen_tick = stamp.tick;
 }
 
-void WorldView::Show(protocol::AvatarNumber avatar, std::uint16_t shard, const PoseStamp& stamp,
+void WorldView::Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                      ConstPoseSpan pose) {
   if (stamp.tick % shown_every_ != 0 || !Wants(avatar)) return;
   if (Track* track = TrackOf(avatar); track != nullptr) {
@@ -182,27 +182,27 @@ void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
   Forget(info.server_time_s);
 }
 
-void WorldView::Leave(protocol::AvatarNumber avatar, std::uint64_t tick) {
+void WorldView::Leave(protocol::AvatarId avatar, std::uint64_t tick) {
   Remove(avatar);
   if (left_.contains(avatar) || left_.size() < protocol::kMaxItems) left_[avatar] = tick;
 }
 
-void WorldView::Remove(protocol::AvatarNumber avatar) {
+void WorldView::Remove(protocol::AvatarId avatar) {
   if (auto track = tracks_.find(avatar); track != tracks_.end()) track->second.gone = true;
 }
 
-const PoseHistory* WorldView::Find(protocol::AvatarNumber avatar) const {
+const PoseHistory* WorldView::Find(protocol::AvatarId avatar) const {
   const auto track = tracks_.find(avatar);
   return track == tracks_.end() ? nullptr : track->second.history.get();
 }
 
-bool WorldView::IsGone(protocol::AvatarNumber avatar) const {
+bool WorldView::IsGone(protocol::AvatarId avatar) const {
   const auto track = tracks_.find(avatar);
   return track == tracks_.end() || track->second.gone;
 }
 
-std::vector<protocol::AvatarNumber> WorldView::Avatars() const {
-  std::vector<protocol::AvatarNumber> avatars;
+std::vector<protocol::AvatarId> WorldView::Avatars() const {
+  std::vector<protocol::AvatarId> avatars;
   for (const auto& [avatar, track] : tracks_) {
     if (!track.gone) avatars.push_back(avatar);
   }

@@ -61,7 +61,7 @@ class WorldView : public PoseScreen {
   void Break() { ++epoch_; }
 
   /// Which avatars' poses to keep; empty: all.
-  void SetFilter(std::optional<std::set<protocol::AvatarNumber>> filter);
+  void SetFilter(std::optional<std::set<protocol::AvatarId>> filter);
 
   /// Takes in one batch. `every_n_ticks` is the rate asked for, to count gaps. kMalformed and others:
   /// a pose that is none, or another figure than announced; what came before it is kept.
@@ -72,17 +72,17 @@ class WorldView : public PoseScreen {
               std::uint64_t every_n_ticks, Counts& counts);
 
   /// The server said that the avatar is gone.
-  void Remove(protocol::AvatarNumber avatar);
+  void Remove(protocol::AvatarId avatar);
   /// It has left the region observed at that tick; poses from before it that are still on their way do not
   /// bring it back.
-  void Leave(protocol::AvatarNumber avatar, std::uint64_t tick);
+  void Leave(protocol::AvatarId avatar, std::uint64_t tick);
 
   /// Nullptr if nothing is known of it.
-  [[nodiscard]] const PoseHistory* Find(protocol::AvatarNumber avatar) const;
-  [[nodiscard]] bool IsGone(protocol::AvatarNumber avatar) const;
+  [[nodiscard]] const PoseHistory* Find(protocol::AvatarId avatar) const;
+  [[nodiscard]] bool IsGone(protocol::AvatarId avatar) const;
 
   /// Avatars that are there, in growing order.
-  [[nodiscard]] std::vector<protocol::AvatarNumber> Avatars() const;
+  [[nodiscard]] std::vector<protocol::AvatarId> Avatars() const;
 
  private:
   struct Track {
@@ -100,16 +100,16 @@ class WorldView : public PoseScreen {
     protocol::PoseMode mode = protocol::PoseMode::kFull;
   };
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
-  using Tracks = std::map<protocol::AvatarNumber, Track>;
+  using Tracks = std::map<protocol::AvatarId, Track>;
 
-  void Show(protocol::AvatarNumber avatar, std::uint16_t shard, const PoseStamp& stamp,
+  void Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
             ConstPoseSpan pose) override;
-  void Gone(protocol::AvatarNumber avatar) override { Remove(avatar); }
-  [[nodiscard]] bool Wants(protocol::AvatarNumber avatar) const override {
+  void Gone(protocol::AvatarId avatar) override { Remove(avatar); }
+  [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override {
     return !filter_ || filter_->contains(avatar);
   }
   /// The track to add a pose to; null: there is no memory for it.
-  Track* TrackOf(protocol::AvatarNumber avatar);
+  Track* TrackOf(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
             std::span<const Quat> rotations, Counts& counts);
 
@@ -126,10 +126,10 @@ class WorldView : public PoseScreen {
   std::string library_hash_;
   std::vector<std::string> layers_;
   protocol::CompactCodecs codecs_;  ///< Of compact poses, if the server tells them
-  std::optional<std::set<protocol::AvatarNumber>> filter_;
+  std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
-  std::map<protocol::AvatarNumber, std::uint64_t>
+  std::map<protocol::AvatarId, std::uint64_t>
       left_;  // since which tick; forgotten after a while
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;

@@ -76,9 +76,9 @@ class Findings {
          field, index);
   }
 
-  void Avatars(std::span<const AvatarNumber> avatars, std::size_t min, const char* field) {
+  void Avatars(std::span<const AvatarId> avatars, std::size_t min, const char* field) {
     Count(avatars.size(), min, kMaxItems, field);
-    const auto zero = std::find(avatars.begin(), avatars.end(), AvatarNumber{0});
+    const auto zero = std::find(avatars.begin(), avatars.end(), AvatarId{0});
     if (zero != avatars.end()) {
       Wrong(ErrorCode::kOutOfRange, "id is zero", field, zero - avatars.begin());
     }

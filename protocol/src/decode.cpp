@@ -62,7 +62,7 @@ class Unpacker {
   }
 
   void Avatars(const flatbuffers::Vector<std::uint32_t>* avatars, const char* field,
-               std::vector<AvatarNumber>& out) {
+               std::vector<AvatarId>& out) {
     if (const std::size_t count = Count(avatars, kMaxItems, field); count > 0) {
       out.assign(avatars->data(), avatars->data() + count);
     }

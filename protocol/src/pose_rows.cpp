@@ -128,7 +128,7 @@ std::size_t PoseBatchComposer::Fitting(const PoseRows& rows,
   std::size_t poses = 0;
   for (std::size_t i = 0; i < picked.size(); ++i) {
     if (!rows.has_pose(picked[i])) continue;
-    used += rows.poses(picked[i], picked[i]).size() + sizeof(AvatarNumber) + 1;
+    used += rows.poses(picked[i], picked[i]).size() + sizeof(AvatarId) + 1;
     if (used > room || ++poses > kMaxItems) return i;
   }
   return picked.size();
@@ -158,8 +158,8 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
   for (const std::uint32_t row : picked) {
     if (rows.has_pose(row)) *flags++ = rows.flags(row);
   }
-  AvatarNumber* avatars = nullptr;
-  const auto avatars_offset = builder.CreateUninitializedVector<AvatarNumber>(count, &avatars);
+  AvatarId* avatars = nullptr;
+  const auto avatars_offset = builder.CreateUninitializedVector<AvatarId>(count, &avatars);
   for (const std::uint32_t row : picked) {
     if (rows.has_pose(row)) {
       *avatars++ = flatbuffers::EndianScalar((*rows.avatars())[row]);

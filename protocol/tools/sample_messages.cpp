@@ -65,7 +65,7 @@ const std::vector<std::uint16_t> kFewerJoints = {0, 1, 2, 4, 5};
 // What those can tell, but for the second avatar, whose left knee turns about another axis.
 struct CompactArrays {
   PoseBatchInfo info{3, 1, 2, 4, 123'456, 2057.6, PoseMode::kCompact, 8};
-  std::vector<AvatarNumber> avatars = {1, 1001, 2001};
+  std::vector<AvatarId> avatars = {1, 1001, 2001};
   std::vector<std::uint8_t> flags = {kPoseStanding, kPoseWide, kPoseDiscontinuity};
   std::vector<std::byte> poses;
 
@@ -117,7 +117,7 @@ struct CompactArrays {
 /// Arrays of a batch. Rotations go through every index left out and both signs.
 struct BatchArrays {
   PoseBatchInfo info;
-  std::vector<AvatarNumber> avatars;
+  std::vector<AvatarId> avatars;
   std::vector<std::uint8_t> flags;
   std::vector<std::byte> poses;
 
@@ -126,7 +126,7 @@ struct BatchArrays {
     const std::size_t bytes = PoseBytes(mode, joint_count);
     poses.resize(bytes * static_cast<std::size_t>(avatar_count));
     for (int a = 0; a < avatar_count; ++a) {
-      avatars.push_back(static_cast<AvatarNumber>(a * 1000 + 1));
+      avatars.push_back(static_cast<AvatarId>(a * 1000 + 1));
       flags.push_back(static_cast<std::uint8_t>(a % 4));
       std::vector<Quat> rotations;
       for (int j = 0; j < joint_count; ++j) {
@@ -239,7 +239,7 @@ std::vector<SampleMessage> SampleMessages() {
     request.items.push_back({43, 18'446'744'073'709'551'615u, StandMovement{1.5}});
     add("request", request);
     Request crowd{4, 3, {}};
-    for (AvatarNumber a = 1; a <= 100; ++a) {
+    for (AvatarId a = 1; a <= 100; ++a) {
       crowd.items.push_back(
           {a, 5000 + a, StepMovement{FootChoice::kAuto, 0.5 + a / 512.0, {}, 0, 0}});
     }

@@ -142,9 +142,9 @@ void WholePose(benchmark::State& state, const Library& library) {
   constexpr auto kMode = protocol::PoseMode::kCompact;
   ahead.SetModes(std::array{kMode}, 1);
   std::vector<server::PosesAhead::Place> kept(steps.walkers().size());
-  std::vector<protocol::AvatarNumber> numbers(steps.walkers().size());
+  std::vector<protocol::AvatarId> numbers(steps.walkers().size());
   std::iota(numbers.begin(), numbers.end(), 1u);
-  const auto avatars = std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers);
+  const auto avatars = std::make_shared<const std::vector<protocol::AvatarId>>(numbers);
   std::vector<std::uint32_t> all(numbers.size());
   std::iota(all.begin(), all.end(), 0u);
   protocol::PoseRows rows;

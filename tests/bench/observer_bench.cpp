@@ -56,7 +56,7 @@ struct Crowd {
     world->name = "crowd";
     world->library = library;
     world->codes = server::MakePoseCodes(*library);
-    std::vector<protocol::AvatarNumber> numbers(kAvatars);
+    std::vector<protocol::AvatarId> numbers(kAvatars);
     std::iota(numbers.begin(), numbers.end(), 1u);
     auto rows = std::make_shared<protocol::PoseRows>();
     auto places = std::make_shared<server::Places>();
@@ -66,7 +66,7 @@ struct Crowd {
                      .tick = 1,
                      .mode = protocol::PoseMode::kCompact,
                      .joint_count = static_cast<std::uint16_t>(pose.rotations.size())},
-                    std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
+                    std::make_shared<const std::vector<protocol::AvatarId>>(numbers),
                     world->codes->codecs.Find(protocol::PoseMode::kCompact));
     places->Begin(world->interest_cell_m, kAvatars);
     std::mt19937 random(1);

@@ -52,12 +52,12 @@ int Run(int argc, char** argv) {
   std::vector<protocol::SpawnItem> crowd(static_cast<std::size_t>(avatars));
   for (int i = 0; i < avatars; ++i) {
     auto& item = crowd[static_cast<std::size_t>(i)];
-    item.avatar = static_cast<protocol::AvatarNumber>(i + 1);
+    item.avatar = static_cast<protocol::AvatarId>(i + 1);
     item.start.position_m = {2.0 * (i % 40), 0.0, 2.0 * (i / 40)};
   }
   controller.Spawn(world->world, crowd);
   for (int i = 1; i <= avatars; ++i) {
-    controller.Request(world->world, Steps(static_cast<protocol::AvatarNumber>(i), 250, 0.5));
+    controller.Request(world->world, Steps(static_cast<protocol::AvatarId>(i), 250, 0.5));
   }
   const auto tick_now = [&] {
     controller.Send(protocol::Ping{.nonce = 1});

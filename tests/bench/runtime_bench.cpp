@@ -353,9 +353,9 @@ void DecodeCompactPose(benchmark::State& state, const Library& library) {
 /// What a tick encodes for a crowd: one frame, to be shared by all observers.
 void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   const Crowd crowd(library, kCrowd);
-  std::vector<protocol::AvatarNumber> numbers(kCrowd);
+  std::vector<protocol::AvatarId> numbers(kCrowd);
   std::iota(numbers.begin(), numbers.end(), 1u);
-  const auto avatars = std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers);
+  const auto avatars = std::make_shared<const std::vector<protocol::AvatarId>>(numbers);
   std::vector<std::uint32_t> all(kCrowd);
   std::iota(all.begin(), all.end(), 0u);
   const auto joints = static_cast<std::uint16_t>(library->skeleton().joint_count());
@@ -383,12 +383,12 @@ void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode
   constexpr std::size_t kRows = 10'000;
   constexpr std::size_t kPicked = 100;
   const Crowd crowd(library, kCrowd);
-  std::vector<protocol::AvatarNumber> numbers(kRows);
-  for (std::size_t i = 0; i < kRows; ++i) numbers[i] = static_cast<protocol::AvatarNumber>(i + 1);
+  std::vector<protocol::AvatarId> numbers(kRows);
+  for (std::size_t i = 0; i < kRows; ++i) numbers[i] = static_cast<protocol::AvatarId>(i + 1);
   protocol::PoseRows rows;
   const auto joints = static_cast<std::uint16_t>(library->skeleton().joint_count());
   Status status = rows.Begin({1, 0, 0, 1, 1, 0.0, mode, joints},
-                             std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers));
+                             std::make_shared<const std::vector<protocol::AvatarId>>(numbers));
   for (std::size_t i = 0; i < kRows && status; ++i) {
     const ConstPoseSpan pose = crowd.avatars()[i % kCrowd].pose();
     status = rows.Add(0, pose.root_position_m, pose.rotations);

@@ -102,13 +102,13 @@ void Controller::OnReply(const protocol::Reply& reply) {
                      std::string(protocol::StatusCodeName(reply.code)) + " " + reply.text);
         return;
       }
-      std::vector<protocol::AvatarNumber> all(walkers_.size());
+      std::vector<protocol::AvatarId> all(walkers_.size());
       for (std::size_t i = 0; i < all.size(); ++i) all[i] = run_.layout.Number(world_, i);
       return Spawn(all, Command::kSpawn);
   }
 }
 
-protocol::Placement Controller::Place(protocol::AvatarNumber number) const {
+protocol::Placement Controller::Place(protocol::AvatarId number) const {
   // A square of avatars around the origin, or around the choreography's start.
   const std::size_t index = run_.layout.IndexIn(number);
   const auto side = static_cast<std::size_t>(
@@ -125,7 +125,7 @@ protocol::Placement Controller::Place(protocol::AvatarNumber number) const {
   return place;
 }
 
-void Controller::Spawn(const std::vector<protocol::AvatarNumber>& avatars, Command command) {
+void Controller::Spawn(const std::vector<protocol::AvatarId>& avatars, Command command) {
   for (std::size_t from = 0; from < avatars.size(); from += kMaxItemsPerMessage) {
     const std::size_t to = std::min(avatars.size(), from + kMaxItemsPerMessage);
     protocol::Spawn spawn{.seq = NextSeq(), .world = world_id_, .items = {}};
@@ -139,7 +139,7 @@ void Controller::Spawn(const std::vector<protocol::AvatarNumber>& avatars, Comma
   }
 }
 
-void Controller::Remove(const std::vector<protocol::AvatarNumber>& avatars, Command last) {
+void Controller::Remove(const std::vector<protocol::AvatarId>& avatars, Command last) {
   for (std::size_t from = 0; from < avatars.size(); from += kMaxItemsPerMessage) {
     const std::size_t to = std::min(avatars.size(), from + kMaxItemsPerMessage);
     protocol::Remove remove{.seq = NextSeq(), .world = world_id_, .avatars = {}};
@@ -151,7 +151,7 @@ void Controller::Remove(const std::vector<protocol::AvatarNumber>& avatars, Comm
 
 void Controller::OnSpawnReply(const protocol::Reply& reply, const Pending& pending) {
   // An earlier run that was broken off, or our own lost connection, may have left some there.
-  std::vector<protocol::AvatarNumber> left_over;
+  std::vector<protocol::AvatarId> left_over;
   std::size_t refused = 0;
   std::string why;
   if (reply.code != protocol::StatusCode::kOk) {
@@ -236,7 +236,7 @@ void Controller::AddOuting(const Due& due, std::int64_t now_ns, protocol::Reques
   Outing outing = walkers_[due.walker].wanderer.Next(may_jump_);
   const std::uint32_t limit = welcome().limits.max_queue;
   if (limit > 0 && outing.movements.size() > limit) outing.movements.resize(limit);
-  const protocol::AvatarNumber number = run_.layout.Number(world_, due.walker);
+  const protocol::AvatarId number = run_.layout.Number(world_, due.walker);
   if (probes_ != nullptr) {
     probes_->Schedule(number - 1, last_request_ + 1, due.at_ns, now_ns);
   }
@@ -255,7 +255,7 @@ std::size_t Controller::Ahead() const {
 void Controller::AddChoreography(std::size_t walker, std::int64_t due_ns, std::int64_t now_ns,
                                  protocol::Request& request) {
   const std::vector<MovementRequest>& movements = run_.choreography->movements;
-  const protocol::AvatarNumber number = run_.layout.Number(world_, walker);
+  const protocol::AvatarId number = run_.layout.Number(world_, walker);
   Walker& who = walkers_[walker];
   if (who.next == 0 && probes_ != nullptr &&
       !std::holds_alternative<StandRequest>(movements.front().movement)) {
@@ -346,7 +346,7 @@ void Controller::CleanUp() {
     has_cleaned_up_ = true;
     return Finish();
   }
-  std::vector<protocol::AvatarNumber> all(walkers_.size());
+  std::vector<protocol::AvatarId> all(walkers_.size());
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = run_.layout.Number(world_, i);
   Remove(all, Command::kRemoveLast);
 }

@@ -52,7 +52,7 @@ class Controller final : public Session {
   enum class Command { kJoin, kSpawn, kSpawnAgain, kRemove, kRemoveLast, kRequest };
   struct Pending {
     Command command = Command::kJoin;
-    std::vector<protocol::AvatarNumber> avatars;  ///< kSpawn
+    std::vector<protocol::AvatarId> avatars;  ///< kSpawn
     std::uint64_t items = 0;                      ///< kRequest
   };
   struct Walker {
@@ -75,9 +75,9 @@ class Controller final : public Session {
   void OnSpawnReply(const protocol::Reply& reply, const Pending& pending);
   void OnEvent(const protocol::Event& event);
 
-  void Spawn(const std::vector<protocol::AvatarNumber>& avatars, Command command);
-  void Remove(const std::vector<protocol::AvatarNumber>& avatars, Command last);
-  [[nodiscard]] protocol::Placement Place(protocol::AvatarNumber number) const;
+  void Spawn(const std::vector<protocol::AvatarId>& avatars, Command command);
+  void Remove(const std::vector<protocol::AvatarId>& avatars, Command last);
+  [[nodiscard]] protocol::Placement Place(protocol::AvatarId number) const;
 
   void StartMoving();
   void Schedule(std::size_t walker, std::int64_t at_ns);

@@ -46,7 +46,7 @@ void Observer::WatchSome(std::size_t which) {
 }
 
 std::optional<std::size_t> Observer::IndexIn(const World& world,
-                                             protocol::AvatarNumber number) const {
+                                             protocol::AvatarId number) const {
   if (!run_.layout.IsOurs(world.index, number))
     return std::nullopt;  // Somebody else's, in our world.
   if (world.watched.empty()) return run_.layout.IndexIn(number);
@@ -172,11 +172,11 @@ namespace {
 // The poses of one message of movements, as a batch would have them.
 class BatchScreen final : public client::PoseScreen {
  public:
-  BatchScreen(std::size_t joint_count, std::function<bool(protocol::AvatarNumber)> wants)
+  BatchScreen(std::size_t joint_count, std::function<bool(protocol::AvatarId)> wants)
       : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),
         wants_(std::move(wants)) {}
 
-  void Show(protocol::AvatarNumber avatar, std::uint16_t, const client::PoseStamp& stamp,
+  void Show(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
             ConstPoseSpan pose) override {
     const std::size_t begin = poses.size();
     poses.resize(begin + bytes_);
@@ -189,16 +189,16 @@ class BatchScreen final : public client::PoseScreen {
         static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
                                   (stamp.standing ? protocol::kPoseStanding : 0)));
   }
-  void Gone(protocol::AvatarNumber) override {}
-  [[nodiscard]] bool Wants(protocol::AvatarNumber avatar) const override { return wants_(avatar); }
+  void Gone(protocol::AvatarId) override {}
+  [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return wants_(avatar); }
 
-  std::vector<protocol::AvatarNumber> avatars;
+  std::vector<protocol::AvatarId> avatars;
   std::vector<std::uint8_t> flags;
   std::vector<std::byte> poses;
 
  private:
   std::size_t bytes_;
-  std::function<bool(protocol::AvatarNumber)> wants_;
+  std::function<bool(protocol::AvatarId)> wants_;
 };
 
 }  // namespace
@@ -210,7 +210,7 @@ void Observer::OnMovements(const protocol::Movements& movements, std::size_t fra
     return Lose("movements of a world that is not observed");
   }
   World& world = worlds_[found->second];
-  BatchScreen screen(world.joint_count, [&](protocol::AvatarNumber avatar) {
+  BatchScreen screen(world.joint_count, [&](protocol::AvatarId avatar) {
     return IndexIn(world, avatar).has_value();
   });
   if (const Status taken = world.evaluated->Take(movements, screen); !taken) {
@@ -255,7 +255,7 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
   protocol::PoseBatchReader reader(batch, world.codecs.Find(batch.info.mode));
   for (std::size_t i = 0; i < batch.avatars.size(); ++i) {
-    const protocol::AvatarNumber number = batch.avatars[i];
+    const protocol::AvatarId number = batch.avatars[i];
     const std::span<const std::byte> pose = reader.Next();
     const std::optional<std::size_t> index = IndexIn(world, number);
     if (!index) continue;
@@ -301,7 +301,7 @@ bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
   }
   stream->tick = tick;
   stream->avatar_count = 0;
-  for (const protocol::AvatarNumber number : batch.avatars) {
+  for (const protocol::AvatarId number : batch.avatars) {
     if (IndexIn(world, number)) ++stream->avatar_count;
   }
   return true;
@@ -332,7 +332,7 @@ bool Observer::CheckPose(World& world, Seen& seen, const protocol::PoseBatch& ba
 
 void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size_t i,
                        std::span<const std::byte> pose, std::int64_t now_ns) {
-  const protocol::AvatarNumber number = batch.avatars[i];
+  const protocol::AvatarId number = batch.avatars[i];
   const std::size_t index = run_.layout.IndexIn(number);
   if (pose.size() > world.most_pose_bytes) return;  // None that will decode.
   std::byte* const last = world.last_poses.data() + index * world.most_pose_bytes;

@@ -75,7 +75,7 @@ class Observer final : public Session {
   struct World {
     int index = 0;
     std::size_t joint_count = 0;
-    std::vector<protocol::AvatarNumber> watched;  ///< Growing; empty: all
+    std::vector<protocol::AvatarId> watched;  ///< Growing; empty: all
     std::vector<Seen> seen;                       ///< Of each of them
     std::uint64_t back_tick = 0;                  ///< First seen on this connection; 0: none yet
     protocol::CompactCodecs codecs;               ///< Of compact poses, if the server tells them
@@ -95,7 +95,7 @@ class Observer final : public Session {
   void WatchSome(std::size_t which);
   /// Where a pose of that avatar is counted; empty: it is not ours, or not watched.
   [[nodiscard]] std::optional<std::size_t> IndexIn(const World& world,
-                                                   protocol::AvatarNumber number) const;
+                                                   protocol::AvatarId number) const;
   void OnWorldInfo(const protocol::WorldInfo& info);
   /// What poses come in.
   [[nodiscard]] protocol::PoseMode SentMode() const;

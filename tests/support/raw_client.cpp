@@ -171,7 +171,7 @@ std::optional<protocol::Reply> RawClient::Observe(protocol::WorldId world,
   return Await<protocol::Reply>();
 }
 
-std::vector<protocol::RequestItem> Steps(protocol::AvatarNumber avatar, int count,
+std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count,
                                          double length_m) {
   std::vector<protocol::RequestItem> items;
   for (int i = 1; i <= count; ++i) {

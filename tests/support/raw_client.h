@@ -92,7 +92,7 @@ class RawClient {
 };
 
 /// A walk of `count` steps of one avatar, request ids from 1 on.
-[[nodiscard]] std::vector<protocol::RequestItem> Steps(protocol::AvatarNumber avatar, int count,
+[[nodiscard]] std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count,
                                                        double length_m);
 
 }  // namespace stridewire

@@ -109,7 +109,7 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   info.joint_count = static_cast<std::uint16_t>(joints);
   auto rotations = RotationsAt(info.server_time_s);
   rotations.resize(static_cast<std::size_t>(joints), kIdentityQuat);
-  std::vector<protocol::AvatarNumber> numbers;
+  std::vector<protocol::AvatarId> numbers;
   std::vector<std::uint32_t> all;
   for (const AvatarAt& a : avatars) {
     all.push_back(static_cast<std::uint32_t>(numbers.size()));
@@ -117,7 +117,7 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   }
   const protocol::CompactCodecs codecs = Codecs();
   protocol::PoseRows rows;
-  (void)rows.Begin(info, std::make_shared<const std::vector<protocol::AvatarNumber>>(numbers),
+  (void)rows.Begin(info, std::make_shared<const std::vector<protocol::AvatarId>>(numbers),
                    codecs.Find(mode));
   for (const AvatarAt& a : avatars) {
     (void)rows.Add(a.flags, a.root_position_m.value_or(RootAt(info.server_time_s, a.avatar)),

@@ -6,7 +6,7 @@
 
 namespace stridewire::server {
 
-void MovementFeed::Watch(std::optional<std::vector<AvatarNumber>> named) {
+void MovementFeed::Watch(std::optional<std::vector<AvatarId>> named) {
   asked_ = 0;
   if (!named || is_whole_) {
     is_whole_ = true;
@@ -16,23 +16,23 @@ void MovementFeed::Watch(std::optional<std::vector<AvatarNumber>> named) {
     next_ = 1;
     return;
   }
-  std::vector<AvatarNumber> added;
+  std::vector<AvatarId> added;
   std::ranges::set_difference(*named, named_, std::back_inserter(added));
   // Who came back before the client has heard of it was told of all the time.
-  std::vector<AvatarNumber> removed;
+  std::vector<AvatarId> removed;
   std::ranges::set_difference(named_, *named, std::back_inserter(removed));
-  std::vector<AvatarNumber> either;
+  std::vector<AvatarId> either;
   std::ranges::set_union(forgotten_, removed, std::back_inserter(either));
   forgotten_.clear();
   std::ranges::set_difference(either, *named, std::back_inserter(forgotten_));
   // Those whose states are still to come and are wanted, and the new ones.
-  std::vector<AvatarNumber> waiting;
+  std::vector<AvatarId> waiting;
   if (next_ != 0 && states_of_ != nullptr) {
-    std::ranges::copy_if(*states_of_, std::back_inserter(waiting), [&](AvatarNumber number) {
+    std::ranges::copy_if(*states_of_, std::back_inserter(waiting), [&](AvatarId number) {
       return number >= next_ && std::ranges::binary_search(*named, number);
     });
   }
-  auto states_of = std::make_shared<std::vector<AvatarNumber>>();
+  auto states_of = std::make_shared<std::vector<AvatarId>>();
   std::ranges::set_union(waiting, added, std::back_inserter(*states_of));
   next_ = states_of->empty() ? 0 : 1;
   states_of_ = std::move(states_of);
@@ -48,7 +48,7 @@ protocol::Movements MovementFeed::Pick(const protocol::Movements& step, std::siz
                            .step = step.step,
                            .tick = step.tick,
                            .server_time_s = step.server_time_s};
-  const auto add = [&](AvatarNumber number, std::uint8_t flags, std::span<const std::byte> record) {
+  const auto add = [&](AvatarId number, std::uint8_t flags, std::span<const std::byte> record) {
     some.avatars.push_back(number);
     some.flags.push_back(flags);
     some.records.insert(some.records.end(), record.begin(), record.end());
@@ -64,7 +64,7 @@ protocol::Movements MovementFeed::Pick(const protocol::Movements& step, std::siz
   const auto told =
       forgotten_.begin() + static_cast<std::ptrdiff_t>(std::min(room, forgotten_.size()));
   std::for_each(forgotten_.begin(), told,
-                [&](AvatarNumber number) { add(number, protocol::kMovementGone, {}); });
+                [&](AvatarId number) { add(number, protocol::kMovementGone, {}); });
   forgotten_.erase(forgotten_.begin(), told);
   for (std::size_t i = 0; i < step.avatars.size(); ++i) {
     if (!std::ranges::binary_search(named_, step.avatars[i])) continue;
@@ -81,7 +81,7 @@ void MovementFeed::Lose() {
 void MovementFeed::Recover() {
   is_lost_ = false;
   asked_ = 0;
-  states_of_ = is_whole_ ? nullptr : std::make_shared<const std::vector<AvatarNumber>>(named_);
+  states_of_ = is_whole_ ? nullptr : std::make_shared<const std::vector<AvatarId>>(named_);
   next_ = is_whole_ || !named_.empty() ? 1 : 0;
 }
 

@@ -17,7 +17,7 @@ class MovementFeed {
 
   /// Who it is about from now on: avatars of the shard, growing, or all. Whom it was not about before the client is
   /// to have the state of. What was once about all stays so: the client tells whom it does not want.
-  void Watch(std::optional<std::vector<AvatarNumber>> named);
+  void Watch(std::optional<std::vector<AvatarId>> named);
 
   /// Every step is told as it is.
   [[nodiscard]] bool is_whole() const { return is_whole_; }
@@ -41,11 +41,11 @@ class MovementFeed {
  private:
   std::shared_ptr<World> world_;
   bool is_whole_ = false;
-  std::vector<AvatarNumber> named_;  // growing
-  std::vector<AvatarNumber>
+  std::vector<AvatarId> named_;  // growing
+  std::vector<AvatarId>
       forgotten_;  // growing; the client does not know yet that they are not told of any more
-  std::shared_ptr<const std::vector<AvatarNumber>> states_of_;  // growing; null: all
-  AvatarNumber next_ = 0;    // of those, from here on they are still to be told; 0: none
+  std::shared_ptr<const std::vector<AvatarId>> states_of_;  // growing; null: all
+  AvatarId next_ = 0;    // of those, from here on they are still to be told; 0: none
   std::uint32_t asked_ = 0;  // nonce of the question under way, 0: none
   bool is_lost_ = false;
 };

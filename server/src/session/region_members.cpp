@@ -73,7 +73,7 @@ RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
   if (lane.avatars != avatars) {
     lane.avatars = avatars;
     lane.is_inside.assign(lane.avatars->size(), false);
-    for (const AvatarNumber number : lane.inside) {
+    for (const AvatarId number : lane.inside) {
       const auto at = std::ranges::lower_bound(*lane.avatars, number);
       if (at == lane.avatars->end() || *at != number) continue;
       lane.is_inside[static_cast<std::size_t>(at - lane.avatars->begin())] = true;
@@ -97,7 +97,7 @@ RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
   std::size_t kept = 0;
   const bool is_uniform = ring_count_ == 1;  // most are: nothing is to be looked up
   for (const auto& [row, distance_m2] : near_) {
-    const AvatarNumber number = (*lane.avatars)[row];
+    const AvatarId number = (*lane.avatars)[row];
     const Ring& ring = is_uniform ? rings_[0] : RingAt(distance_m2);
     const bool is_of_mode = is_uniform || ring.mode == mode;
     if (!lane.is_inside[row]) {

@@ -47,8 +47,8 @@ class RegionMembers {
 
   /// What came of a delivery, which has places and is of one of the modes. Holds until the next call.
   struct Change {
-    std::span<const AvatarNumber> entered;  ///< Growing.
-    std::span<const AvatarNumber> left;     ///< The same. Also who is not in the world any more.
+    std::span<const AvatarId> entered;  ///< Growing.
+    std::span<const AvatarId> left;     ///< The same. Also who is not in the world any more.
     std::span<const std::uint32_t> due;     ///< Rows whose poses are to be sent.
   };
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
@@ -58,7 +58,7 @@ class RegionMembers {
     return Update(from_shard, tick, avatars, places, nullptr, protocol::PoseMode::kMovement);
   }
   /// Who of a shard is in it, growing.
-  [[nodiscard]] const std::vector<AvatarNumber>& inside(int shard) { return lanes_[shard].inside; }
+  [[nodiscard]] const std::vector<AvatarId>& inside(int shard) { return lanes_[shard].inside; }
 
  private:
   // `rows` null: all have poses.
@@ -82,16 +82,16 @@ class RegionMembers {
   std::size_t ring_count_ = 0;
   std::array<std::uint16_t, kSentModes.size() + 1> every_{};  // by mode, movement among them
   struct Lane {
-    std::vector<AvatarNumber> inside;  // growing
+    std::vector<AvatarId> inside;  // growing
     protocol::PoseRows::Avatars avatars;
     std::vector<bool> is_inside;  // by row of those
   };
   std::map<int, Lane> lanes_;  // by shard
   // What the last Change is about.
   std::vector<std::pair<std::uint32_t, double>> near_;  // row, distance squared
-  std::vector<AvatarNumber> now_;
-  std::vector<AvatarNumber> entered_;
-  std::vector<AvatarNumber> left_;
+  std::vector<AvatarId> now_;
+  std::vector<AvatarId> entered_;
+  std::vector<AvatarId> left_;
   std::vector<std::uint32_t> due_;
 };
 

@@ -152,7 +152,7 @@ class Session : private ConnectionHandler {
     return WantsMovements(world) && subscriptions_.HasRegion(world);
   }
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
-  [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::span<const AvatarId> Named(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::size_t region_count() const { return subscriptions_.region_count(); }
 
@@ -210,7 +210,7 @@ class Session : private ConnectionHandler {
                    std::vector<Part>&& parts, Pending&& pending);
   /// `empty`: a part without avatars.
   template <typename Part>
-  void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars,
+  void SubmitAvatars(protocol::Seq seq, WorldId world, const std::vector<AvatarId>& avatars,
                      const Part& empty = {});
   void Leave(WorldId id);
 

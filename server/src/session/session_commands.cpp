@@ -243,13 +243,13 @@ void Session::OnInspected(const protocol::AvatarState& state) {
 }
 
 template <typename Part>
-void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarNumber>& avatars,
+void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarId>& avatars,
                             const Part& empty) {
   const Membership* membership = Commanding(seq, world);
   if (membership == nullptr || !Affords(seq, avatars.size())) return;
   std::vector<Part> parts(static_cast<std::size_t>(host_.shard_count()), empty);
   std::uint32_t index = 0;
-  for (const AvatarNumber avatar : avatars) {
+  for (const AvatarId avatar : avatars) {
     parts[static_cast<std::size_t>(ShardOf(avatar, host_.shard_count()))].avatars.push_back(
         {index++, avatar});
   }

@@ -34,7 +34,7 @@ const SharedFrame& SharedMovements::Empty(std::size_t i, const protocol::Movemen
 
 // Others are to be told of, or the client knows of nobody yet.
 void Session::WatchMovements(const std::shared_ptr<World>& world) {
-  const std::span<const AvatarNumber> named =
+  const std::span<const AvatarId> named =
       subscriptions_.Named(world->id, protocol::PoseMode::kMovement);
   RegionMembers* region = subscriptions_.RegionOf(world->id, protocol::PoseMode::kMovement);
   for (int shard = 0; shard < host_.shard_count(); ++shard) {
@@ -47,8 +47,8 @@ void Session::WatchMovements(const std::shared_ptr<World>& world) {
       feed.Watch(std::nullopt);
       continue;
     }
-    std::vector<AvatarNumber> there;
-    std::ranges::copy_if(named, std::back_inserter(there), [&](AvatarNumber number) {
+    std::vector<AvatarId> there;
+    std::ranges::copy_if(named, std::back_inserter(there), [&](AvatarId number) {
       return ShardOf(number, host_.shard_count()) == shard;
     });
     feed.Watch(std::move(there));

@@ -54,8 +54,8 @@ PoseInterest::Every Session::EveryOf(WorldId world, PoseMode mode) const {
   return connection_ == nullptr ? PoseInterest::Every{} : subscriptions_.EveryOf(world, mode);
 }
 
-std::span<const AvatarNumber> Session::Named(WorldId world, PoseMode mode) const {
-  return connection_ == nullptr ? std::span<const AvatarNumber>()
+std::span<const AvatarId> Session::Named(WorldId world, PoseMode mode) const {
+  return connection_ == nullptr ? std::span<const AvatarId>()
                                 : subscriptions_.Named(world, mode);
 }
 
@@ -111,8 +111,8 @@ void Session::TellRegion(WorldId world, std::uint64_t tick, const RegionMembers:
   if (count == 0) return;
   std::vector<protocol::Event> events;
   events.reserve(count);
-  const auto add = [&](protocol::EventType type, std::span<const AvatarNumber> avatars) {
-    for (const AvatarNumber avatar : avatars) {
+  const auto add = [&](protocol::EventType type, std::span<const AvatarId> avatars) {
+    for (const AvatarId avatar : avatars) {
       events.push_back(
           {.type = type, .avatar = avatar, .tick = tick, .time_s = host_.clock().TickTime(tick)});
     }

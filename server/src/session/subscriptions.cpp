@@ -100,7 +100,7 @@ void Subscriptions::SumUp(const Key& key) {
     if (wanted == 0) continue;
     every = std::gcd(every, wanted);
     is_whole |= subscription.avatars.empty() && !subscription.region;
-    std::vector<AvatarNumber> named;
+    std::vector<AvatarId> named;
     named.reserve(watch.named.size() + subscription.avatars.size());
     std::ranges::set_union(watch.named, subscription.avatars, std::back_inserter(named));
     watch.named = std::move(named);
@@ -125,9 +125,9 @@ PoseInterest::Every Subscriptions::EveryOf(WorldId world, PoseMode mode) const {
   return it == watches_.end() ? PoseInterest::Every{} : it->second.every;
 }
 
-std::span<const AvatarNumber> Subscriptions::Named(WorldId world, PoseMode mode) const {
+std::span<const AvatarId> Subscriptions::Named(WorldId world, PoseMode mode) const {
   const auto it = watches_.find({world, mode});
-  return it == watches_.end() ? std::span<const AvatarNumber>() : it->second.named;
+  return it == watches_.end() ? std::span<const AvatarId>() : it->second.named;
 }
 
 bool Subscriptions::WatchesWorld(WorldId world) const {
@@ -199,9 +199,9 @@ std::optional<std::span<const std::uint32_t>> Subscriptions::Pick(const PoseDeli
   if (lane.avatars != rows.avatars()) {
     lane.avatars = rows.avatars();
     lane.rows.clear();
-    const std::vector<AvatarNumber>& avatars = *lane.avatars;
+    const std::vector<AvatarId>& avatars = *lane.avatars;
     auto from = avatars.begin();
-    for (const AvatarNumber number : watch.named) {
+    for (const AvatarId number : watch.named) {
       from = std::lower_bound(from, avatars.end(), number);
       if (from == avatars.end()) break;
       if (*from == number) lane.rows.push_back(static_cast<std::uint32_t>(from - avatars.begin()));

@@ -25,7 +25,7 @@ class Subscriptions {
     protocol::PoseMode mode = protocol::PoseMode::kFull;  ///< Of a region: beyond its rings.
     std::uint16_t every_n_ticks = 1;
     bool with_events = false;
-    std::vector<AvatarNumber> avatars;  ///< Empty: all, or those of the region.
+    std::vector<AvatarId> avatars;  ///< Empty: all, or those of the region.
     std::optional<RegionMembers> region;
   };
   enum class Share : std::uint8_t { kNone, kWhole, kSome, kRegion };
@@ -69,7 +69,7 @@ class Subscriptions {
   /// How often, as whole batches or as others.
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
   /// Avatars whose poses suffice, growing. Empty: whole batches are wanted, or nothing is.
-  [[nodiscard]] std::span<const AvatarNumber> Named(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::span<const AvatarId> Named(WorldId world, protocol::PoseMode mode) const;
 
   /// What the region of that world reaches in that mode; empty: there is none.
   [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
@@ -94,7 +94,7 @@ class Subscriptions {
   /// The subscriptions of one world and mode together.
   struct Watch {
     PoseInterest::Every every;
-    std::vector<AvatarNumber> named;  // growing; empty: all
+    std::vector<AvatarId> named;  // growing; empty: all
     std::map<int, Lane> lanes;
   };
 

@@ -41,7 +41,7 @@ struct LayerPart {
 };
 struct AvatarRef {
   std::uint32_t index = 0;
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
 };
 struct RemovePart {
   std::vector<AvatarRef> avatars;
@@ -96,7 +96,7 @@ struct Inspection {
   int from_shard = 0;  ///< The session's shard.
   SessionId session = 0;
   std::uint64_t nonce = 0;
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
 };
 struct InspectionResult {
   SessionId session = 0;
@@ -110,16 +110,16 @@ struct StatesQuestion {
   int from_shard = 0;  ///< The session's shard.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarNumber first = 0;
+  AvatarId first = 0;
   std::size_t enough_bytes = 0;                            ///< Of states; the last may go beyond.
-  std::shared_ptr<const std::vector<AvatarNumber>> named;  ///< Whose, growing; null: all.
+  std::shared_ptr<const std::vector<AvatarId>> named;  ///< Whose, growing; null: all.
 };
 struct StatesAnswer {
   WorldId world = 0;
   int from_shard = 0;  ///< The avatars'.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarNumber next = 0;  ///< Where to go on; 0: these were all.
+  AvatarId next = 0;  ///< Where to go on; 0: these were all.
   SharedFrame frame;      ///< Null: none.
 };
 
@@ -154,7 +154,7 @@ struct PoseInterest {
   };
   Every every;
   /// Avatars named by any session, growing; null: none. Of who wants all there are none in it.
-  std::shared_ptr<const std::vector<AvatarNumber>> named;
+  std::shared_ptr<const std::vector<AvatarId>> named;
   /// Regions that any session observes; null: none.
   std::shared_ptr<const std::vector<RegionReach>> regions;
 };

@@ -13,8 +13,8 @@ namespace stridewire::server {
 /// Collects avatar numbers of many lists, each once. Most are small and lie close together.
 class NumberUnion {
  public:
-  void Add(std::span<const AvatarNumber> numbers) {
-    for (const AvatarNumber number : numbers) {
+  void Add(std::span<const AvatarId> numbers) {
+    for (const AvatarId number : numbers) {
       if (number >= kSmall) {
         large_.push_back(number);
         continue;
@@ -26,12 +26,12 @@ class NumberUnion {
   }
 
   /// All of them, growing; then there are none.
-  [[nodiscard]] std::vector<AvatarNumber> Take() {
-    std::vector<AvatarNumber> all;
+  [[nodiscard]] std::vector<AvatarId> Take() {
+    std::vector<AvatarId> all;
     for (std::size_t word = 0; word < bits_.size(); ++word) {
       for (std::uint64_t bits = bits_[word]; bits != 0; bits &= bits - 1) {
-        all.push_back(static_cast<AvatarNumber>(64 * word) +
-                      static_cast<AvatarNumber>(std::countr_zero(bits)));
+        all.push_back(static_cast<AvatarId>(64 * word) +
+                      static_cast<AvatarId>(std::countr_zero(bits)));
       }
     }
     std::ranges::sort(large_);
@@ -42,9 +42,9 @@ class NumberUnion {
   }
 
  private:
-  static constexpr AvatarNumber kSmall = 1u << 20;  // 128 KB of bits
+  static constexpr AvatarId kSmall = 1u << 20;  // 128 KB of bits
   std::vector<std::uint64_t> bits_;
-  std::vector<AvatarNumber> large_;
+  std::vector<AvatarId> large_;
 };
 
 }  // namespace stridewire::server

@@ -13,7 +13,7 @@
 
 namespace stridewire::server {
 
-using protocol::AvatarNumber;
+using protocol::AvatarId;
 using protocol::WorldId;
 using SessionId = std::uint64_t;
 
@@ -28,18 +28,18 @@ struct World {
   double interest_cell_m = 8.0;  ///< Of the grid that regions are looked up in.
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
-  std::atomic<AvatarNumber> last_number{0};   ///< Largest avatar number ever asked for.
+  std::atomic<AvatarId> last_number{0};   ///< Largest avatar number ever asked for.
   GroundSlot ground;  ///< As last set; a shard's avatars have it from a tick on.
 };
 
 /// The shard an avatar lives on.
-[[nodiscard]] constexpr int ShardOf(AvatarNumber avatar, int shard_count) {
-  return static_cast<int>(avatar % static_cast<AvatarNumber>(shard_count));
+[[nodiscard]] constexpr int ShardOf(AvatarId avatar, int shard_count) {
+  return static_cast<int>(avatar % static_cast<AvatarId>(shard_count));
 }
 
 /// In which of so many ticks an avatar begins what a large command asks of all: of no account who else was asked,
 /// in what order, and on which shard they live.
-[[nodiscard]] constexpr std::uint32_t StartTickOf(AvatarNumber avatar, std::uint32_t over_ticks) {
+[[nodiscard]] constexpr std::uint32_t StartTickOf(AvatarId avatar, std::uint32_t over_ticks) {
   // The finaliser of MurmurHash3: numbers in a row are spread whatever `over_ticks` has in common with the shards.
   std::uint32_t hash = avatar;
   hash = (hash ^ (hash >> 16)) * 0x85eb'ca6bu;
@@ -49,17 +49,17 @@ struct World {
 }
 
 /// An avatar number nobody has used in this world; 0 when there is none left.
-[[nodiscard]] inline AvatarNumber NextNumber(World& world) {
-  AvatarNumber last = world.last_number.load(std::memory_order_relaxed);
+[[nodiscard]] inline AvatarId NextNumber(World& world) {
+  AvatarId last = world.last_number.load(std::memory_order_relaxed);
   do {
-    if (last == ~AvatarNumber{0}) return 0;
+    if (last == ~AvatarId{0}) return 0;
   } while (!world.last_number.compare_exchange_weak(last, last + 1, std::memory_order_relaxed));
   return last + 1;
 }
 
 /// Numbers the server chooses are larger than any a client chose.
-inline void NoteNumber(World& world, AvatarNumber number) {
-  AvatarNumber last = world.last_number.load(std::memory_order_relaxed);
+inline void NoteNumber(World& world, AvatarId number) {
+  AvatarId last = world.last_number.load(std::memory_order_relaxed);
   while (last < number &&
          !world.last_number.compare_exchange_weak(last, number, std::memory_order_relaxed)) {
   }

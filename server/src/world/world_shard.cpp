@@ -26,7 +26,7 @@ bool IsSpawnable(const protocol::Placement& start) {
          std::abs(start.heading_rad) <= kMaxSpawnHeadingRad;
 }
 
-ReplyItem NoSuchAvatar(std::uint32_t index, AvatarNumber avatar, protocol::RequestId request = 0) {
+ReplyItem NoSuchAvatar(std::uint32_t index, AvatarId avatar, protocol::RequestId request = 0) {
   return {index, avatar, request, StatusCode::kNoSuchAvatar, "no avatar of that number"};
 }
 
@@ -50,7 +50,7 @@ WorldShard::WorldShard(std::shared_ptr<World> world, int shard, int shard_count,
 
 WorldShard::~WorldShard() { budget_.Release(*world_, static_cast<std::int64_t>(avatars_.size())); }
 
-protocol::Event& WorldShard::AddEvent(EventType type, AvatarNumber avatar, std::uint64_t tick) {
+protocol::Event& WorldShard::AddEvent(EventType type, AvatarId avatar, std::uint64_t tick) {
   protocol::Event& event = events_.emplace_back();
   event.type = type;
   event.avatar = avatar;
@@ -92,7 +92,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
   AvatarOptions options = world_->avatar_options;
   options.terrain = terrain();
   for (const SpawnPart::Item& item : part.items) {
-    const AvatarNumber number = item.spawn.avatar;
+    const AvatarId number = item.spawn.avatar;
     ReplyItem reply{.index = item.index, .avatar = number};
     if (!IsSpawnable(item.spawn.start)) {
       reply.code = StatusCode::kOutOfRange;
@@ -274,14 +274,14 @@ std::span<const WorldShard::InOrder> WorldShard::AvatarsInOrder() {
   if (!is_order_known_) {
     in_order_.clear();
     advancing_.clear();
-    std::vector<AvatarNumber> numbers;
+    std::vector<AvatarId> numbers;
     numbers.reserve(avatars_.size());
     for (auto& [number, entry] : avatars_) {
       in_order_.push_back({number, &entry});
       advancing_.push_back(&entry.avatar);
       numbers.push_back(number);
     }
-    numbers_ = std::make_shared<const std::vector<AvatarNumber>>(std::move(numbers));
+    numbers_ = std::make_shared<const std::vector<AvatarId>>(std::move(numbers));
     all_rows_.resize(avatars_.size());
     std::iota(all_rows_.begin(), all_rows_.end(), 0u);
     is_order_known_ = true;
@@ -380,7 +380,7 @@ std::shared_ptr<const std::vector<protocol::Event>> WorldShard::TakeEvents() {
   return events;
 }
 
-void WorldShard::Gone(AvatarNumber avatar) {
+void WorldShard::Gone(AvatarId avatar) {
   if (movements_wanted_) gone_.push_back(avatar);
 }
 
@@ -410,14 +410,14 @@ void WorldShard::TellMovements() {
   last_step_had_avatars_ = !in_order.empty();
   const std::size_t first = movements_.size();
   movements_.push_back(EmptyMovements());
-  const auto add = [&](AvatarNumber number, std::uint8_t flags) {
+  const auto add = [&](AvatarId number, std::uint8_t flags) {
     protocol::Movements& message = movements_.back();
     message.avatars.push_back(number);
     message.flags.push_back(flags);
     message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
     if (IsFull(message)) movements_.push_back(EmptyMovements());
   };
-  for (const AvatarNumber number : gone_) add(number, protocol::kMovementGone);
+  for (const AvatarId number : gone_) add(number, protocol::kMovementGone);
   gone_.clear();
   for (const std::uint32_t row : eventful_) {
     const auto& [number, entry] = in_order[row];
@@ -461,7 +461,7 @@ StatesAnswer WorldShard::States(const StatesQuestion& question, protocol::Encode
   StatesAnswer answer{.world = world_->id, .from_shard = shard_};
   protocol::Movements message = EmptyMovements();
   message.states = true;
-  const auto tell = [&](AvatarNumber number, const Entry& entry) {
+  const auto tell = [&](AvatarId number, const Entry& entry) {
     if (message.records.size() > question.enough_bytes || IsFull(message)) {
       answer.next = number;
       return;
@@ -478,7 +478,7 @@ StatesAnswer WorldShard::States(const StatesQuestion& question, protocol::Encode
       tell(it->first, it->second);
     }
   } else {
-    const std::vector<AvatarNumber>& named = *question.named;
+    const std::vector<AvatarId>& named = *question.named;
     for (auto number = std::ranges::lower_bound(named, question.first);
          number != named.end() && answer.next == 0; ++number) {
       if (const auto it = avatars_.find(*number); it != avatars_.end()) tell(*number, it->second);
@@ -492,7 +492,7 @@ StatesAnswer WorldShard::States(const StatesQuestion& question, protocol::Encode
   return answer;
 }
 
-protocol::AvatarState WorldShard::Inspect(AvatarNumber avatar, std::uint64_t tick,
+protocol::AvatarState WorldShard::Inspect(AvatarId avatar, std::uint64_t tick,
                                           std::size_t max_site_bytes) const {
   protocol::AvatarState state;
   const auto it = avatars_.find(avatar);
@@ -524,7 +524,7 @@ std::span<const std::uint32_t> WorldShard::NamedRows(PoseMode mode) {
       }
       named_rows_[m].clear();
       auto from = numbers_->begin();
-      for (const AvatarNumber number : named.Take()) {
+      for (const AvatarId number : named.Take()) {
         from = std::lower_bound(from, numbers_->end(), number);
         if (from == numbers_->end()) break;
         if (*from == number) {

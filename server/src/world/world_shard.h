@@ -71,7 +71,7 @@ class WorldShard {
                                     protocol::Encoder& encoder) const;
 
   /// What an avatar is doing after `tick`, the answer to InspectAvatar.
-  [[nodiscard]] protocol::AvatarState Inspect(AvatarNumber avatar, std::uint64_t tick,
+  [[nodiscard]] protocol::AvatarState Inspect(AvatarId avatar, std::uint64_t tick,
                                               std::size_t max_site_bytes) const;
 
   [[nodiscard]] std::size_t avatar_count() const { return avatars_.size(); }
@@ -95,7 +95,7 @@ class WorldShard {
     PrefetchBytes(&entry.spawn_tick, sizeof(entry.spawn_tick) + sizeof(entry.ahead));
   }
   struct InOrder {
-    AvatarNumber number;
+    AvatarId number;
     Entry* entry;
   };
   void Spawn(const WorldCommand& command, const SpawnPart& part, std::uint64_t tick,
@@ -119,8 +119,8 @@ class WorldShard {
   void TellMovements();
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
-  void Gone(AvatarNumber avatar);
-  protocol::Event& AddEvent(protocol::EventType type, AvatarNumber avatar, std::uint64_t tick);
+  void Gone(AvatarId avatar);
+  protocol::Event& AddEvent(protocol::EventType type, AvatarId avatar, std::uint64_t tick);
 
   std::shared_ptr<World> world_;
   int shard_;
@@ -129,7 +129,7 @@ class WorldShard {
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
   PosesAhead ahead_;                       // before the avatars, whose places are in it
-  std::map<AvatarNumber, Entry> avatars_;  // in order, so that batches and events are
+  std::map<AvatarId, Entry> avatars_;  // in order, so that batches and events are
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
   std::vector<Avatar*> advancing_;
@@ -156,7 +156,7 @@ class WorldShard {
   std::uint64_t tick_ = 0;  // to which they go on
   std::uint16_t more_steps_ = 0;
   std::size_t max_bulk_bytes_;
-  std::vector<AvatarNumber> gone_;              // since the last step
+  std::vector<AvatarId> gone_;              // since the last step
   std::vector<protocol::Movements> movements_;  // of steps not taken yet
   std::shared_ptr<const Ground> ground_;        // null: flat
   std::deque<GroundPart> grounds_;              // from later ticks on

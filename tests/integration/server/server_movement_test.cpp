@@ -18,27 +18,27 @@
 namespace stridewire {
 namespace {
 
-using protocol::AvatarNumber;
+using protocol::AvatarId;
 using protocol::PoseMode;
 using server::Limit;
 using server::ThreadMetrics;
 
 using PoseBytes = std::vector<std::byte>;
-using Shown = std::map<std::pair<std::uint64_t, AvatarNumber>, PoseBytes>;  // by tick and avatar
+using Shown = std::map<std::pair<std::uint64_t, AvatarId>, PoseBytes>;  // by tick and avatar
 
 class Keeper : public client::PoseScreen {
  public:
-  void Show(AvatarNumber avatar, std::uint16_t, const client::PoseStamp& stamp,
+  void Show(AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
             ConstPoseSpan pose) override {
     PoseBytes bytes(protocol::PoseBytes(PoseMode::kFull, pose.rotations.size()));
     ASSERT_TRUE(protocol::EncodePose(PoseMode::kFull, pose.root_position_m, pose.rotations, bytes));
     shown[{stamp.tick, avatar}] = std::move(bytes);
     gone.erase(avatar);
   }
-  void Gone(AvatarNumber avatar) override { gone[avatar] = true; }
+  void Gone(AvatarId avatar) override { gone[avatar] = true; }
 
   Shown shown;
-  std::map<AvatarNumber, bool> gone;
+  std::map<AvatarId, bool> gone;
 };
 
 // Who evaluates a crowd has to be as fast as the server, which sends its poses as well.
@@ -70,7 +70,7 @@ class BothWays {
   }
 
   void Observe(PoseMode mode, protocol::SubscriptionId id,
-               const std::vector<AvatarNumber>& avatars = {}) {
+               const std::vector<AvatarId>& avatars = {}) {
     client_.Send(protocol::Observe{.seq = client_.NextSeq(),
                                    .world = world_,
                                    .subscription = id,
@@ -100,7 +100,7 @@ class BothWays {
         const Status taken = view_.Take(*movements, told_);
         ASSERT_TRUE(taken) << Describe(taken.error());
         states_ += movements->states;
-        for (const AvatarNumber avatar : movements->avatars) ++told_of_[avatar];
+        for (const AvatarId avatar : movements->avatars) ++told_of_[avatar];
       } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
         for (std::size_t i = 0; i < batch->avatars.size(); ++i) {
           const auto pose = batch->pose(i);
@@ -134,10 +134,10 @@ class BothWays {
   const client::MovementView& view() const { return view_; }
   const Shown& full() const { return full_; }
   int states() const { return states_; }
-  const std::map<AvatarNumber, int>& told_of() const { return told_of_; }
+  const std::map<AvatarId, int>& told_of() const { return told_of_; }
   std::uint64_t last_tick() const { return last_tick_; }
   /// The region it observes has them, as it was told.
-  const std::set<AvatarNumber>& inside() const { return inside_; }
+  const std::set<AvatarId>& inside() const { return inside_; }
 
  private:
   RawClient client_;
@@ -146,8 +146,8 @@ class BothWays {
   Keeper told_;
   Shown full_;
   int states_ = 0;
-  std::map<AvatarNumber, int> told_of_;
-  std::set<AvatarNumber> inside_;
+  std::map<AvatarId, int> told_of_;
+  std::set<AvatarId> inside_;
   std::uint64_t last_tick_ = 0;
 };
 
@@ -158,20 +158,20 @@ class Crowd {
     EXPECT_TRUE(client_.SayHello());
     world_ = client_.Join(world)->world;
     std::vector<protocol::SpawnItem> spawns;
-    for (AvatarNumber i = 1; i <= size; ++i) spawns.push_back({i, {DVec3(2.0 * i, 0.0, 0.0), 0.1}});
+    for (AvatarId i = 1; i <= size; ++i) spawns.push_back({i, {DVec3(2.0 * i, 0.0, 0.0), 0.1}});
     EXPECT_EQ(client_.Spawn(world_, spawns)->accepted, size);
     Walk();
   }
 
   void Walk() {
     std::vector<protocol::RequestItem> walk;
-    for (AvatarNumber avatar = 1; avatar <= size_; ++avatar) {
+    for (AvatarId avatar = 1; avatar <= size_; ++avatar) {
       std::ranges::copy(Steps(avatar, 60, 0.3 + 0.004 * avatar), std::back_inserter(walk));
     }
     EXPECT_TRUE(client_.Request(world_, walk));
   }
   // Sends some elsewhere in mid-step, and lets some wave.
-  void Stir(AvatarNumber avatar) {
+  void Stir(AvatarId avatar) {
     EXPECT_TRUE(client_.Request(world_, {{.avatar = avatar,
                                           .request_id = 7,
                                           .movement = protocol::StepMovement{.length_m = 0.6},
@@ -183,11 +183,11 @@ class Crowd {
     ASSERT_TRUE(client_.Await<protocol::Reply>());
     ASSERT_TRUE(client_.Await<protocol::Reply>());
   }
-  void Spawn(AvatarNumber avatar) {
+  void Spawn(AvatarId avatar) {
     EXPECT_EQ(client_.Spawn(world_, {{avatar, {DVec3(0.0), 0.0}}})->accepted, 1u);
     EXPECT_TRUE(client_.Request(world_, Steps(avatar, 20, 0.5)));
   }
-  void Remove(AvatarNumber avatar) {
+  void Remove(AvatarId avatar) {
     client_.Send(protocol::Remove{.seq = client_.NextSeq(), .world = world_, .avatars = {avatar}});
     ASSERT_TRUE(client_.Await<protocol::Reply>());
   }
@@ -205,7 +205,7 @@ TEST(ServerMovement, ShowsTheBytesOfFullPoses) {
   both.Observe(PoseMode::kFull, 1);
   both.Observe(PoseMode::kMovement, 2);
   both.TakeUntil([&] { return both.told().shown.size() > 40 * 60; });
-  for (const AvatarNumber avatar : {3u, 4u, 9u, 12u}) crowd.Stir(avatar);
+  for (const AvatarId avatar : {3u, 4u, 9u, 12u}) crowd.Stir(avatar);
   crowd.Remove(7);
   both.TakeUntil([&] { return both.told().shown.size() > 40 * 200; });
   const int compared = both.Compare();
@@ -228,7 +228,7 @@ TEST(ServerMovement, TellsOfThoseNamedAlone) {
   BothWays both(server, "w");
   both.Observe(PoseMode::kFull, 1);
   both.Observe(PoseMode::kMovement, 2, {3, 4, 9, 100});
-  const auto shown_of = [&](AvatarNumber avatar) {
+  const auto shown_of = [&](AvatarId avatar) {
     return std::ranges::count_if(both.told().shown,
                                  [&](const auto& item) { return item.first.second == avatar; });
   };
@@ -240,7 +240,7 @@ TEST(ServerMovement, TellsOfThoseNamedAlone) {
   EXPECT_EQ(both.view().avatar_count(), 4u);
   crowd.Spawn(41);
   both.TakeUntil([&] { return shown_of(41) > 30; });
-  for (const AvatarNumber avatar : {3u, 9u, 13u}) crowd.Stir(avatar);
+  for (const AvatarId avatar : {3u, 9u, 13u}) crowd.Stir(avatar);
   EXPECT_TRUE(both.told().gone.empty());
   both.StopObserving(2);
   both.TakeUntil([&] { return both.told().gone.size() == 2; });
@@ -269,13 +269,13 @@ TEST(ServerMovement, TellsOfThoseInARegionThatMoves) {
   watcher.Observe(PoseMode::kFull, 1);
   BothWays player(server, "w");
   player.ObserveRegion(20.0, 6.0);
-  const auto shown_of = [&](AvatarNumber avatar) {
+  const auto shown_of = [&](AvatarId avatar) {
     return std::ranges::count_if(player.told().shown,
                                  [&](const auto& item) { return item.first.second == avatar; });
   };
   const auto is_told_of_those_inside = [&] {
     return player.view().avatar_count() == player.inside().size() &&
-           std::ranges::none_of(player.inside(), [&](AvatarNumber avatar) {
+           std::ranges::none_of(player.inside(), [&](AvatarId avatar) {
              return !shown_of(avatar) || player.told().gone.contains(avatar);
            });
   };
@@ -330,15 +330,15 @@ TEST_P(ServerMovementOf, WhoReadsTooSlowlyIsToldAnew) {
   Crowd crowd(server, "w", kLargeCrowd);
   BothWays both(server, "w", 16 << 10);
   both.Observe(PoseMode::kFull, 1);
-  std::vector<AvatarNumber> all_but_one(kLargeCrowd);
+  std::vector<AvatarId> all_but_one(kLargeCrowd);
   std::iota(all_but_one.begin(), all_but_one.end(), 1u);
   all_but_one.pop_back();
-  both.Observe(PoseMode::kMovement, 2, GetParam() ? all_but_one : std::vector<AvatarNumber>());
+  both.Observe(PoseMode::kMovement, 2, GetParam() ? all_but_one : std::vector<AvatarId>());
   const std::size_t watched = GetParam() ? all_but_one.size() : kLargeCrowd;
   both.TakeUntil([&] { return both.view().avatar_count() == watched; });
   const int states = both.states();
   // Reads nothing until movements were dropped.
-  for (AvatarNumber avatar = 1; server.metrics().Sum(Limit::kObserverBacklog) == 0; ++avatar) {
+  for (AvatarId avatar = 1; server.metrics().Sum(Limit::kObserverBacklog) == 0; ++avatar) {
     crowd.Stir(1 + avatar % kLargeCrowd);
   }
   const std::size_t before = both.told().shown.size();

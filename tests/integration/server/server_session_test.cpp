@@ -13,7 +13,7 @@ namespace stridewire {
 namespace {
 
 using namespace std::chrono_literals;
-using protocol::AvatarNumber;
+using protocol::AvatarId;
 using protocol::ErrorNotice;
 using protocol::EventType;
 using protocol::PoseMode;
@@ -163,7 +163,7 @@ TEST(ServerSession, AnswersWhatAnAvatarIsDoing) {
   ASSERT_TRUE(world);
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
   ASSERT_TRUE(client.Request(world->world, Steps(2, 30, 0.4)));
-  const auto ask = [&](protocol::WorldId in, protocol::AvatarNumber avatar, std::uint64_t nonce) {
+  const auto ask = [&](protocol::WorldId in, protocol::AvatarId avatar, std::uint64_t nonce) {
     client.Send(protocol::InspectAvatar{nonce, in, avatar});
     return client.Await<protocol::AvatarState>();
   };
@@ -839,7 +839,7 @@ TEST(ServerSession, LayersForWhoKnowsOfThem) {
   // Who walks tells where its foot is about to stand, and what it plays.
   const protocol::WalkMovement walk{DVec3(0.0, 0.0, 3.0), 0.0, {}, std::nullopt};
   EXPECT_EQ(client.Request(world->world, {{3, 7, walk}})->accepted, 1u);
-  const auto inspect = [&](protocol::AvatarNumber avatar) {
+  const auto inspect = [&](protocol::AvatarId avatar) {
     client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
     return client.Await<protocol::AvatarState>();
   };
@@ -884,12 +884,12 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
   const auto world = client.Join("hall");
   ASSERT_TRUE(world);
   ASSERT_TRUE(client.Spawn(world->world, {{1, {}}, {2, {}}, {3, {}}}));
-  const auto set = [&](RawClient& who, std::vector<protocol::AvatarNumber> avatars, bool is_off) {
+  const auto set = [&](RawClient& who, std::vector<protocol::AvatarId> avatars, bool is_off) {
     who.Send(protocol::SetPlanting{
         .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .is_off = is_off});
     return who.Await<Reply>();
   };
-  const auto is_off = [&](protocol::AvatarNumber avatar) {
+  const auto is_off = [&](protocol::AvatarId avatar) {
     client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
     const auto state = client.Await<protocol::AvatarState>();
     EXPECT_TRUE(state && state->code == StatusCode::kOk);

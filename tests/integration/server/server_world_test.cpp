@@ -21,7 +21,7 @@ namespace stridewire {
 namespace {
 
 using namespace std::chrono_literals;
-using protocol::AvatarNumber;
+using protocol::AvatarId;
 using protocol::EventType;
 using protocol::PoseMode;
 using protocol::Reply;
@@ -40,7 +40,7 @@ double ResidentMiB() {
 
 // ---- the same bytes everywhere
 
-std::vector<protocol::RequestItem> Choreography(AvatarNumber avatar) {
+std::vector<protocol::RequestItem> Choreography(AvatarId avatar) {
   using namespace protocol;
   const double length_m = 0.3 + 0.02 * avatar;
   return {
@@ -54,21 +54,21 @@ std::vector<protocol::RequestItem> Choreography(AvatarNumber avatar) {
   };
 }
 
-protocol::Placement Start(AvatarNumber avatar) {
+protocol::Placement Start(AvatarId avatar) {
   return {{3.0 * avatar, 0.0, -1.0 * avatar}, 0.3 * avatar};
 }
 
 // One avatar a metre.
-std::vector<protocol::SpawnItem> OnALine(AvatarNumber count) {
+std::vector<protocol::SpawnItem> OnALine(AvatarId count) {
   std::vector<protocol::SpawnItem> items;
-  for (AvatarNumber avatar = 1; avatar <= count; ++avatar) {
+  for (AvatarId avatar = 1; avatar <= count; ++avatar) {
     items.push_back({.avatar = avatar, .start = {{static_cast<double>(avatar), 0.0, 0.0}, 0.0}});
   }
   return items;
 }
 
 // Pose bytes by avatar and number of ticks since its first movement began.
-using PoseStreams = std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>>;
+using PoseStreams = std::map<AvatarId, std::map<std::uint64_t, std::vector<std::byte>>>;
 
 // Of before compact poses.
 constexpr std::uint64_t kWithoutCompact = ~protocol::kFeatureCompact;
@@ -86,7 +86,7 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
   std::vector<protocol::SpawnItem> spawns;
   std::vector<protocol::RequestItem> requests;
   for (int i = 1; i <= avatars; ++i) {
-    const auto avatar = static_cast<AvatarNumber>(i);
+    const auto avatar = static_cast<AvatarId>(i);
     spawns.push_back({avatar, Start(avatar)});
     std::ranges::copy(Choreography(avatar), std::back_inserter(requests));
   }
@@ -94,8 +94,8 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
   client.Observe(world->world, 1, mode);
   client.Send(protocol::Request{.seq = client.NextSeq(), .world = world->world, .items = requests});
 
-  std::map<AvatarNumber, std::uint64_t> started;
-  std::map<AvatarNumber, std::map<std::uint64_t, std::vector<std::byte>>> by_tick;
+  std::map<AvatarId, std::uint64_t> started;
+  std::map<AvatarId, std::map<std::uint64_t, std::vector<std::byte>>> by_tick;
   std::size_t idle = 0;
   while (idle < static_cast<std::size_t>(avatars)) {
     const auto message = client.Receive();
@@ -129,7 +129,7 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
 PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
   PoseStreams streams;
   for (int i = 1; i <= avatars; ++i) {
-    const auto number = static_cast<AvatarNumber>(i);
+    const auto number = static_cast<AvatarId>(i);
     const protocol::Placement start = Start(number);
     Avatar avatar(MakeToyLibrary(), {start.position_m, start.heading_rad});
     const auto step = [&](double length_m) {
@@ -173,12 +173,12 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
   TestServer server(config);
   auto [client, world] = server.Enter("crowd");
   std::vector<protocol::SpawnItem> spawns;
-  for (AvatarNumber avatar = 1; avatar <= 48; ++avatar) spawns.push_back({avatar, Start(avatar)});
+  for (AvatarId avatar = 1; avatar <= 48; ++avatar) spawns.push_back({avatar, Start(avatar)});
   ASSERT_TRUE(client.Spawn(world->world, spawns));
   const auto held = [&] { return server.metrics().Sum(Limit::kStartsPerTick); };
-  const auto ask = [&](AvatarNumber count, int steps) {
+  const auto ask = [&](AvatarId count, int steps) {
     std::vector<protocol::RequestItem> items;
-    for (AvatarNumber avatar = 1; avatar <= count; ++avatar) {
+    for (AvatarId avatar = 1; avatar <= count; ++avatar) {
       for (int i = 0; i < steps; ++i) {
         items.push_back({.avatar = avatar,
                          .request_id = 1,
@@ -192,20 +192,20 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
   EXPECT_EQ(held(), 0u);
   EXPECT_EQ(ask(48, 1), 48u);
   std::uint64_t expected = 0;
-  for (AvatarNumber avatar = 1; avatar <= 48; ++avatar)
+  for (AvatarId avatar = 1; avatar <= 48; ++avatar)
     expected += server::StartTickOf(avatar, 3) > 0;
   EXPECT_EQ(held(), expected);
 }
 
 TEST(ServerWorld, MakesACrowdOverSomeTicks) {
-  constexpr AvatarNumber kCrowd = 60;
+  constexpr AvatarId kCrowd = 60;
   server::Config config = TestConfig(2);
   config.limits.spawns_per_tick = 4;
   TestServer server(config);
   auto [crowd, world] = server.Enter("crowd");
   auto [other, same_world] = server.Enter("other");
   std::vector<protocol::SpawnItem> spawns;
-  for (AvatarNumber avatar = 1; avatar <= kCrowd; ++avatar)
+  for (AvatarId avatar = 1; avatar <= kCrowd; ++avatar)
     spawns.push_back({avatar, Start(avatar)});
   spawns.push_back({7, Start(7)});  // lives already
   const protocol::Seq spawn_seq = crowd.NextSeq();
@@ -417,7 +417,7 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
     EXPECT_EQ(batch->info.joint_count, 7);
     EXPECT_TRUE(batch->info.tick % 4 == 0 || batch->info.tick % 6 == 0);
     EXPECT_EQ((++seen[{batch->info.tick, batch->info.shard}]), 1);
-    for (const AvatarNumber avatar : batch->avatars) {
+    for (const AvatarId avatar : batch->avatars) {
       EXPECT_EQ(avatar % 2, batch->info.shard);
     }
   }
@@ -461,12 +461,12 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
   std::vector<protocol::SpawnItem> items;
-  for (AvatarNumber avatar = 1; avatar <= 20; ++avatar)
+  for (AvatarId avatar = 1; avatar <= 20; ++avatar)
     items.push_back({.avatar = avatar, .start = {}});
   ASSERT_EQ(controller.Spawn(world->world, items)->accepted, 20u);
   RawClient client = server.Enter("w", protocol::Role::kObserver).first;
-  std::map<std::uint16_t, std::vector<AvatarNumber>> last;  // by shard
-  const auto observe = [&](protocol::SubscriptionId id, std::vector<AvatarNumber> avatars) {
+  std::map<std::uint16_t, std::vector<AvatarId>> last;  // by shard
+  const auto observe = [&](protocol::SubscriptionId id, std::vector<AvatarId> avatars) {
     client.Send(protocol::Observe{.seq = client.NextSeq(),
                                   .world = world->world,
                                   .subscription = id,
@@ -476,7 +476,7 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
     return reply ? reply->code : StatusCode::kInternal;
   };
   // Batches come until each shard's says this.
-  const auto shows = [&](std::vector<AvatarNumber> even, std::vector<AvatarNumber> odd) {
+  const auto shows = [&](std::vector<AvatarId> even, std::vector<AvatarId> odd) {
     for (int i = 0; i < 200; ++i) {
       const auto batch = client.Await<protocol::PoseBatch>();
       if (!batch) return false;
@@ -514,8 +514,8 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
   ASSERT_EQ(controller.Spawn(world->world, OnALine(60))->accepted, 60u);
 
   RawClient player = server.Enter("w", protocol::Role::kObserver).first;
-  std::set<AvatarNumber> inside;
-  std::map<AvatarNumber, std::uint64_t> seen;  // tick of the last pose
+  std::set<AvatarId> inside;
+  std::map<AvatarId, std::uint64_t> seen;  // tick of the last pose
   std::uint64_t last_number = 0;
   const auto take = [&](const protocol::Message& message) {
     if (const auto* events = std::get_if<protocol::Events>(&message)) {
@@ -532,7 +532,7 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
       EXPECT_TRUE(batch->info.is_partial);
       EXPECT_FALSE(batch->avatars.empty());
-      for (const AvatarNumber avatar : batch->avatars) seen[avatar] = batch->info.tick;
+      for (const AvatarId avatar : batch->avatars) seen[avatar] = batch->info.tick;
     }
   };
   const auto observe = [&](double x, bool replace, double radius_m = 5.4) {
@@ -546,9 +546,9 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
     const auto reply = player.Await<Reply>(take);
     return reply ? reply->code : StatusCode::kInternal;
   };
-  const auto shows = [&](AvatarNumber first, AvatarNumber last) {
-    std::set<AvatarNumber> expected;
-    for (AvatarNumber avatar = first; avatar <= last; ++avatar) expected.insert(avatar);
+  const auto shows = [&](AvatarId first, AvatarId last) {
+    std::set<AvatarId> expected;
+    for (AvatarId avatar = first; avatar <= last; ++avatar) expected.insert(avatar);
     for (int i = 0; i < 300 && inside != expected; ++i) {
       const auto message = player.Receive();
       if (!message) break;
@@ -594,10 +594,10 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
 
 /// What an observer of a region hears.
 struct Heard {
-  std::map<AvatarNumber, PoseMode> mode;  // of the last pose
-  std::map<AvatarNumber, std::set<std::uint64_t>> ticks;
-  std::map<AvatarNumber, int> entered;
-  std::map<AvatarNumber, int> left;
+  std::map<AvatarId, PoseMode> mode;  // of the last pose
+  std::map<AvatarId, std::set<std::uint64_t>> ticks;
+  std::map<AvatarId, int> entered;
+  std::map<AvatarId, int> left;
 
   void Take(const protocol::Message& message) {
     if (const auto* events = std::get_if<protocol::Events>(&message)) {
@@ -606,7 +606,7 @@ struct Heard {
       }
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&message)) {
       EXPECT_TRUE(batch->info.is_partial);
-      for (const AvatarNumber avatar : batch->avatars) {
+      for (const AvatarId avatar : batch->avatars) {
         mode[avatar] = batch->info.mode;
         // One pose a tick, whatever the number of details.
         EXPECT_TRUE(ticks[avatar].insert(batch->info.tick).second) << avatar;
@@ -643,8 +643,8 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
       heard.Take(*message);
     }
   };
-  const auto shows = [&](AvatarNumber first, AvatarNumber last, PoseMode mode) {
-    for (AvatarNumber avatar = first; avatar <= last; ++avatar) {
+  const auto shows = [&](AvatarId first, AvatarId last, PoseMode mode) {
+    for (AvatarId avatar = first; avatar <= last; ++avatar) {
       EXPECT_EQ(heard.mode[avatar], mode) << avatar;
     }
   };
@@ -984,7 +984,7 @@ TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
   std::vector<protocol::SpawnItem> crowd(200);
   ASSERT_EQ(controller.Spawn(world->world, crowd)->accepted, 200u);
   std::vector<protocol::RequestItem> walk;
-  for (AvatarNumber avatar = 1; avatar <= 200; ++avatar) {
+  for (AvatarId avatar = 1; avatar <= 200; ++avatar) {
     std::ranges::copy(Steps(avatar, 40, 0.4), std::back_inserter(walk));
   }
   ASSERT_EQ(controller.Request(world->world, walk)->accepted, walk.size());

@@ -39,7 +39,7 @@ std::vector<MovementRequest> Choreography() {
       {7, StepRequest{.length_m = 0.55}}};
 }
 
-std::vector<protocol::RequestItem> OnTheWire(protocol::AvatarNumber avatar) {
+std::vector<protocol::RequestItem> OnTheWire(protocol::AvatarId avatar) {
   std::vector<protocol::RequestItem> items;
   for (const MovementRequest& request : Choreography()) {
     protocol::RequestItem item;
@@ -96,7 +96,7 @@ std::optional<int> ShiftOf(const Seen& seen, const Clip& truth) {
 // poses nobody receives. Empty where the walk began first, or less than nine frames in ten are left to
 // compare.
 std::optional<Seen> RecordOnce(RawClient& game, std::uint16_t port, protocol::WorldId world,
-                               protocol::AvatarNumber avatar, const Clip& truth, double lead_s) {
+                               protocol::AvatarId avatar, const Clip& truth, double lead_s) {
   EXPECT_TRUE(game.Spawn(world, {{.avatar = avatar}}));
   const test::ScratchFolder folder;
   const std::string out = folder.File("seen.bvh");
@@ -150,7 +150,7 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
 
   std::optional<Seen> seen;
   std::optional<int> shift;
-  for (protocol::AvatarNumber avatar = 1; avatar <= 5 && !shift; ++avatar) {
+  for (protocol::AvatarId avatar = 1; avatar <= 5 && !shift; ++avatar) {
     seen = RecordOnce(game, port, world->world, avatar, truth->clip, 1.0 + 0.5 * avatar);
     if (seen) shift = ShiftOf(*seen, truth->clip);
   }

@@ -13,13 +13,13 @@
 namespace stridewire::client {
 namespace {
 
-using protocol::AvatarNumber;
+using protocol::AvatarId;
 using protocol::Movements;
 
 constexpr double kTickS = 1.0 / 60.0;
 
 struct Screen : PoseScreen {
-  void Show(AvatarNumber avatar, std::uint16_t, const PoseStamp& stamp,
+  void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
             ConstPoseSpan pose) override {
     Pose& kept = shown[avatar];
     kept.root_position_m = pose.root_position_m;
@@ -27,20 +27,20 @@ struct Screen : PoseScreen {
     stamps[avatar] = stamp;
     gone.erase(avatar);
   }
-  void Gone(AvatarNumber avatar) override { gone.insert(avatar); }
-  [[nodiscard]] bool Wants(AvatarNumber avatar) const override { return avatar != unwanted; }
+  void Gone(AvatarId avatar) override { gone.insert(avatar); }
+  [[nodiscard]] bool Wants(AvatarId avatar) const override { return avatar != unwanted; }
 
-  std::map<AvatarNumber, Pose> shown;
-  std::map<AvatarNumber, PoseStamp> stamps;
-  std::set<AvatarNumber> gone;
-  AvatarNumber unwanted = 0;
+  std::map<AvatarId, Pose> shown;
+  std::map<AvatarId, PoseStamp> stamps;
+  std::set<AvatarId> gone;
+  AvatarId unwanted = 0;
 };
 
 // A shard of avatars that always walk, and what it would send.
 class Server {
  public:
-  explicit Server(AvatarNumber count) {
-    for (AvatarNumber i = 1; i <= count; ++i) {
+  explicit Server(AvatarId count) {
+    for (AvatarId i = 1; i <= count; ++i) {
       avatars_.emplace(i, Avatar(library_, {DVec3(i, 0.0, 0.0), 0.1 * i}));
     }
   }
@@ -74,7 +74,7 @@ class Server {
             .tick = 1000 + step_,
             .server_time_s = static_cast<double>(step_)};
   }
-  static void Add(Movements& message, AvatarNumber number, std::uint8_t flags) {
+  static void Add(Movements& message, AvatarId number, std::uint8_t flags) {
     message.avatars.push_back(number);
     message.flags.push_back(flags);
     message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
@@ -101,7 +101,7 @@ class Server {
 
  private:
   std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
-  std::map<AvatarNumber, Avatar> avatars_;
+  std::map<AvatarId, Avatar> avatars_;
   std::uint64_t step_ = 0;
 };
 
@@ -178,7 +178,7 @@ TEST(MovementView, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
   Server::Add(message, 5, protocol::kMovementGone);
   ASSERT_TRUE(view.Take(message, screen));
   EXPECT_EQ(view.avatar_count(), 2u);
-  EXPECT_EQ(screen.gone, std::set<AvatarNumber>{3});
+  EXPECT_EQ(screen.gone, std::set<AvatarId>{3});
 }
 
 TEST(MovementView, ARecordThatIsNoneIsRefused) {

@@ -523,7 +523,7 @@ TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
   const auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(std::get<protocol::SetPlanting>(sent[0]).avatars,
-            (std::vector<protocol::AvatarNumber>{4, 5}));
+            (std::vector<protocol::AvatarId>{4, 5}));
   EXPECT_TRUE(std::get<protocol::SetPlanting>(sent[0]).is_off);
 
   const stridewire_world old = JoinedWithout(protocol::kFeaturePlanting);

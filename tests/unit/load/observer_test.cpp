@@ -167,7 +167,7 @@ TEST(PartialObserver, WatchesAsManyAsItIsTold) {
     FakeConnection connection = server.Accept();
     EXPECT_TRUE(connection.Expect<protocol::Hello>().has_value());
     connection.Send(toy::Welcome());
-    std::vector<std::vector<protocol::AvatarNumber>> named;
+    std::vector<std::vector<protocol::AvatarId>> named;
     for (protocol::WorldId world = 1; world <= 2; ++world) {
       const auto join = connection.Expect<protocol::JoinWorld>();
       ASSERT_TRUE(join.has_value());

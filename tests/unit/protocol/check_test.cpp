@@ -430,9 +430,9 @@ TEST(Check, Reply) {
 
 TEST(Check, PoseBatch) {
   using B = PoseBatch;
-  static const std::vector<AvatarNumber> avatars = {1, 2};
-  static const std::vector<AvatarNumber> with_zero = {1, 0};
-  static const std::vector<AvatarNumber> too_many(kMaxItems + 1, 1);
+  static const std::vector<AvatarId> avatars = {1, 2};
+  static const std::vector<AvatarId> with_zero = {1, 0};
+  static const std::vector<AvatarId> too_many(kMaxItems + 1, 1);
   static const std::vector<std::uint8_t> flags = {0, 0};
   static const std::vector<std::byte> poses(2 * PoseBytes(PoseMode::kQuantised, 3));
   const B good{{1, 0, 0, 1, 0, 0.0, PoseMode::kQuantised, 3}, avatars, flags, poses};
@@ -836,7 +836,7 @@ TEST(Encoder, ACrowdOfTheLargestSizeFits) {
   Request request{1, 1, {}};
   Spawn spawn{2, 1, {}};
   Reply reply{2, StatusCode::kOk, "", 65'536, {}};
-  for (AvatarNumber a = 1; a <= kMaxItems; ++a) {
+  for (AvatarId a = 1; a <= kMaxItems; ++a) {
     request.items.push_back(
         {a, 1'000'000 + a, StepMovement{FootChoice::kLeft, 0.1, 0.2, 0.3, 0.4}});
     spawn.items.push_back({a, {DVec3(1.0, 2.0, 3.0), 4.0}});

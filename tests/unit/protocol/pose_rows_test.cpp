@@ -19,13 +19,13 @@ constexpr std::size_t kJoints = 5;
 
 PoseBatchInfo Info(PoseMode mode) { return {5, 1, 0, 1, 99, 1.5, mode, kJoints}; }
 
-Vec3 RootOf(AvatarNumber avatar) { return {0.25f * static_cast<float>(avatar), 1.0f, 0.0f}; }
+Vec3 RootOf(AvatarId avatar) { return {0.25f * static_cast<float>(avatar), 1.0f, 0.0f}; }
 
 /// Avatars 10, 20, 30, ..., flagged by their row.
 void Fill(PoseRows& rows, PoseMode mode, std::size_t count) {
-  std::vector<AvatarNumber> avatars(count);
-  for (std::size_t i = 0; i < count; ++i) avatars[i] = static_cast<AvatarNumber>(10 * (i + 1));
-  ASSERT_TRUE(rows.Begin(Info(mode), std::make_shared<const std::vector<AvatarNumber>>(avatars)));
+  std::vector<AvatarId> avatars(count);
+  for (std::size_t i = 0; i < count; ++i) avatars[i] = static_cast<AvatarId>(10 * (i + 1));
+  ASSERT_TRUE(rows.Begin(Info(mode), std::make_shared<const std::vector<AvatarId>>(avatars)));
   const std::vector<Quat> rotations(kJoints, YawRotation(0.25));
   for (std::size_t i = 0; i < count; ++i) {
     ASSERT_TRUE(rows.Add(static_cast<std::uint8_t>(i), RootOf(avatars[i]), rotations));
@@ -85,7 +85,7 @@ TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
   PoseRows rows;
   ASSERT_TRUE(rows.Begin(
       Info(PoseMode::kQuantised),
-      std::make_shared<const std::vector<AvatarNumber>>(std::vector<AvatarNumber>{1, 2, 3, 4, 5})));
+      std::make_shared<const std::vector<AvatarId>>(std::vector<AvatarId>{1, 2, 3, 4, 5})));
   const std::vector<Quat> rotations(kJoints, kIdentityQuat);
   rows.SkipTo(1);
   ASSERT_TRUE(rows.Add(7, RootOf(2), rotations));
@@ -117,18 +117,18 @@ CompactCodec SmallCodec() {
 TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
   const CompactCodec codec = SmallCodec();
   const PoseBatchInfo info{5, 1, 0, 1, 99, 1.5, PoseMode::kCompact, 2};
-  std::vector<AvatarNumber> avatars(100);
+  std::vector<AvatarId> avatars(100);
   std::iota(avatars.begin(), avatars.end(), 1u);
-  const auto numbers = std::make_shared<const std::vector<AvatarNumber>>(avatars);
-  const auto is_skipped = [](AvatarNumber a) { return a % 11 == 3 || a > 97; };
-  const auto is_bad = [](AvatarNumber a) { return a % 7 == 0; };
-  const auto turn = [](AvatarNumber a) { return a % 5 == 0 ? 2.0 : 0.02 * (a % 20); };
+  const auto numbers = std::make_shared<const std::vector<AvatarId>>(avatars);
+  const auto is_skipped = [](AvatarId a) { return a % 11 == 3 || a > 97; };
+  const auto is_bad = [](AvatarId a) { return a % 7 == 0; };
+  const auto turn = [](AvatarId a) { return a % 5 == 0 ? 2.0 : 0.02 * (a % 20); };
   PoseRows rows;
   PoseBatchComposer composer;
   for (int round = 0; round < 2; ++round) {  // the second with the first one's memory
     ASSERT_TRUE(rows.Begin(info, numbers, &codec));
     std::vector<std::uint32_t> picked;
-    for (const AvatarNumber a : avatars) {
+    for (const AvatarId a : avatars) {
       if (a % 3 > 0) picked.push_back(a - 1);
       if (is_skipped(a)) {
         rows.SkipTo(a);
@@ -140,7 +140,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
       ASSERT_EQ(status.has_value(), !is_bad(a)) << a;
     }
     rows.SkipTo(100);
-    const auto has_pose = [&](AvatarNumber a) { return !is_skipped(a) && !is_bad(a); };
+    const auto has_pose = [&](AvatarId a) { return !is_skipped(a) && !is_bad(a); };
     EXPECT_EQ(rows.pose_count(),
               static_cast<std::size_t>(std::ranges::count_if(avatars, has_pose)));
     const Decoded decoded(composer, rows, picked);
@@ -148,7 +148,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
     PoseBatchReader reader(decoded.batch, &codec);
     std::size_t i = 0;
     for (const std::uint32_t row : picked) {
-      const AvatarNumber a = row + 1;
+      const AvatarId a = row + 1;
       ASSERT_EQ(rows.has_pose(row), has_pose(a)) << a;
       if (!has_pose(a)) continue;
       const int wide = a % 5 == 0 ? kPoseWide : 0;
@@ -182,7 +182,7 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
   std::iota(picked.begin(), picked.end(), 0u);
   const std::size_t fitting = composer.Fitting(rows, picked);
   // All but what the batch says of itself and less than one more avatar takes.
-  const std::size_t avatar_bytes = PoseBytes(PoseMode::kFull, kJoints) + sizeof(AvatarNumber) + 1;
+  const std::size_t avatar_bytes = PoseBytes(PoseMode::kFull, kJoints) + sizeof(AvatarId) + 1;
   EXPECT_GT((fitting + 1) * avatar_bytes + 128, 4096u);
   std::vector<std::byte> frame;
   ASSERT_TRUE(composer.Compose(rows, std::span(picked).first(fitting),
@@ -201,9 +201,9 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
 TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
   // 4 KiB frames, filled to the last avatar.
   PoseBatchComposer composer({4096, 4096});
-  std::vector<AvatarNumber> avatars(500);
+  std::vector<AvatarId> avatars(500);
   std::iota(avatars.begin(), avatars.end(), 1u);
-  const auto numbers = std::make_shared<const std::vector<AvatarNumber>>(avatars);
+  const auto numbers = std::make_shared<const std::vector<AvatarId>>(avatars);
   std::vector<std::uint32_t> all(avatars.size());
   std::iota(all.begin(), all.end(), 0u);
   for (std::uint16_t joints = 1; joints <= 64; ++joints) {
@@ -222,7 +222,7 @@ TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
 }
 
 TEST(PoseRows, AreOfABatchThatCanBe) {
-  const auto none = std::make_shared<const std::vector<AvatarNumber>>();
+  const auto none = std::make_shared<const std::vector<AvatarId>>();
   const auto begin = [&](PoseMode mode, std::uint16_t joints) {
     return PoseRows().Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, none).error().code;
   };

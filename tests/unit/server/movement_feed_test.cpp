@@ -11,9 +11,9 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 
 /// A step in which some avatars have a record of as many bytes as their number.
-protocol::Movements StepOf(const std::vector<AvatarNumber>& avatars) {
+protocol::Movements StepOf(const std::vector<AvatarId>& avatars) {
   protocol::Movements step{.world = 4, .shard = 1, .part = 2, .parts = 3, .step = 5, .tick = 6};
-  for (const AvatarNumber number : avatars) {
+  for (const AvatarId number : avatars) {
     step.avatars.push_back(number);
     step.flags.push_back(protocol::kPoseDiscontinuity);
     step.records.resize(step.records.size() + number, static_cast<std::byte>(number));
@@ -23,7 +23,7 @@ protocol::Movements StepOf(const std::vector<AvatarNumber>& avatars) {
 }
 
 /// Whose states it asks for; empty: it asks for none, or for all (`is_all`).
-std::vector<AvatarNumber> Asked(MovementFeed& feed, AvatarNumber next = 0, bool* is_all = nullptr) {
+std::vector<AvatarId> Asked(MovementFeed& feed, AvatarId next = 0, bool* is_all = nullptr) {
   static std::uint32_t nonce = 0;
   if (!feed.asks()) return {};
   StatesQuestion question;
@@ -74,11 +74,11 @@ TEST(MovementFeed, WhoIsNotToldOfAnyMoreIsGone) {
 
 TEST(MovementFeed, TellsOfNoMoreThanFits) {
   MovementFeed feed(nullptr);
-  std::vector<AvatarNumber> many(2000);
+  std::vector<AvatarId> many(2000);
   std::iota(many.begin(), many.end(), 1u);
   feed.Watch(many);
   feed.Watch({{}});
-  std::vector<AvatarNumber> gone;
+  std::vector<AvatarId> gone;
   int steps = 0;
   for (; gone.size() < many.size() && steps < 100; ++steps) {
     const protocol::Movements some = feed.Pick(StepOf({5, 6}), 4096);

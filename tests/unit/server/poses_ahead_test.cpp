@@ -25,9 +25,9 @@ constexpr std::size_t kCrowd = 30;
 class Encoder {
  public:
   explicit Encoder(const PoseCodes& codes) : codes_(codes) {
-    std::vector<protocol::AvatarNumber> numbers(kCrowd);
+    std::vector<protocol::AvatarId> numbers(kCrowd);
     std::iota(numbers.begin(), numbers.end(), 1u);
-    numbers_ = std::make_shared<const std::vector<protocol::AvatarNumber>>(std::move(numbers));
+    numbers_ = std::make_shared<const std::vector<protocol::AvatarId>>(std::move(numbers));
   }
 
   const protocol::PoseRows& Encode(PoseMode mode, std::span<const Avatar> avatars) {

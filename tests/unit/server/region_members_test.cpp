@@ -18,15 +18,15 @@ using protocol::PoseMode;
 using testing::ElementsAre;
 
 /// Avatars at places; of those in `without` the shard made no pose.
-PoseDelivery DeliveryAt(const std::map<AvatarNumber, std::pair<float, float>>& at,
+PoseDelivery DeliveryAt(const std::map<AvatarId, std::pair<float, float>>& at,
                         std::uint64_t tick, int shard = 0,
-                        const std::set<AvatarNumber>& without = {}, double cell_m = 8.0) {
+                        const std::set<AvatarId>& without = {}, double cell_m = 8.0) {
   auto rows = std::make_shared<protocol::PoseRows>();
   auto places = std::make_shared<Places>();
-  std::vector<AvatarNumber> numbers;
+  std::vector<AvatarId> numbers;
   for (const auto& [number, place] : at) numbers.push_back(number);
   EXPECT_TRUE(rows->Begin({1, 0, 0, 1, tick, 0.0, protocol::PoseMode::kFull, 1},
-                          std::make_shared<const std::vector<AvatarNumber>>(numbers)));
+                          std::make_shared<const std::vector<AvatarId>>(numbers)));
   places->Begin(cell_m, numbers.size());
   for (std::size_t row = 0; row < numbers.size(); ++row) {
     const auto& [x, z] = at.at(numbers[row]);
@@ -45,9 +45,9 @@ PoseDelivery DeliveryAt(const std::map<AvatarNumber, std::pair<float, float>>& a
           .places = std::move(places)};
 }
 
-std::vector<AvatarNumber> NumbersOfRows(const PoseDelivery& delivery,
+std::vector<AvatarId> NumbersOfRows(const PoseDelivery& delivery,
                                         std::span<const std::uint32_t> rows) {
-  std::vector<AvatarNumber> numbers;
+  std::vector<AvatarId> numbers;
   for (const std::uint32_t row : rows) numbers.push_back((*delivery.rows->avatars())[row]);
   return numbers;
 }
@@ -99,8 +99,8 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
   constexpr std::uint16_t kEvery = 4;
   members.Move(region, 8.0, kEvery, PoseMode::kFull);
   EXPECT_EQ(members.every(PoseMode::kFull), 1);
-  std::map<AvatarNumber, std::pair<float, float>> at[2];
-  std::set<AvatarNumber> inside;
+  std::map<AvatarId, std::pair<float, float>> at[2];
+  std::set<AvatarId> inside;
   std::size_t entered_count = 0;
   std::size_t left_count = 0;
   for (std::uint64_t tick = 1; tick <= 600; ++tick) {
@@ -113,7 +113,7 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
     }
     const double leave_at_m = region.radius_m + region.leave_m.value_or(8.0);
     for (int shard = 0; shard < 2; ++shard) {
-      for (AvatarNumber number = 1 + static_cast<AvatarNumber>(shard); number <= 60; number += 2) {
+      for (AvatarId number = 1 + static_cast<AvatarId>(shard); number <= 60; number += 2) {
         const auto found = at[shard].find(number);
         if (found == at[shard].end()) {
           if (random.Draw(0.0, 1.0) < 0.2) {
@@ -129,10 +129,10 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
       }
       const PoseDelivery delivery = DeliveryAt(at[shard], tick, shard);
       const RegionMembers::Change change = members.Update(delivery);
-      std::vector<AvatarNumber> entered;
-      std::vector<AvatarNumber> left;
-      std::vector<AvatarNumber> due;
-      for (AvatarNumber number = 1 + static_cast<AvatarNumber>(shard); number <= 60; number += 2) {
+      std::vector<AvatarId> entered;
+      std::vector<AvatarId> left;
+      std::vector<AvatarId> due;
+      for (AvatarId number = 1 + static_cast<AvatarId>(shard); number <= 60; number += 2) {
         const auto found = at[shard].find(number);
         const bool was = inside.contains(number);
         bool is = false;
@@ -184,13 +184,13 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
   EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionReach{0.0, 0.0, 12.0, 6.0, true}));
   EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionReach{0.0, 0.0, 29.0, 18.0, true}));
 
-  std::map<AvatarNumber, std::pair<float, float>> at;
-  std::set<AvatarNumber> inside;
-  std::map<AvatarNumber, PoseMode> last_mode;
+  std::map<AvatarId, std::pair<float, float>> at;
+  std::set<AvatarId> inside;
+  std::map<AvatarId, PoseMode> last_mode;
   int crossed = 0;
   int left_count = 0;
   for (std::uint64_t tick = 1; tick <= 900; ++tick) {
-    for (AvatarNumber number = 1; number <= 60; ++number) {
+    for (AvatarId number = 1; number <= 60; ++number) {
       const auto found = at.find(number);
       if (found == at.end()) {
         at[number] = {static_cast<float>(random.Draw(-40.0, 40.0)),
@@ -206,7 +206,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
       region.centre_m.x += random.Draw(-4.0, 4.0);
       members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
     }
-    const auto distance_of = [&](AvatarNumber number) {
+    const auto distance_of = [&](AvatarId number) {
       return std::hypot(at.at(number).first - region.centre_m.x,
                         at.at(number).second - region.centre_m.z);
     };
@@ -214,7 +214,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
          {PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot}) {
       if (tick % members.every(mode) != 0) continue;
       const RegionReach reach = members.reach(mode);
-      std::set<AvatarNumber> without;
+      std::set<AvatarId> without;
       for (const auto& [number, place] : at) {
         const double distance_m = distance_of(number);
         if (distance_m > reach.reach_m || (reach.beyond_m > 0.0 && distance_m <= reach.beyond_m)) {
@@ -224,10 +224,10 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
       PoseDelivery delivery = DeliveryAt(at, tick, 0, without);
       delivery.mode = mode;
       const RegionMembers::Change change = members.Update(delivery);
-      std::vector<AvatarNumber> entered;
-      std::vector<AvatarNumber> left;
-      std::vector<AvatarNumber> due;
-      for (AvatarNumber number = 1; number <= 60; ++number) {
+      std::vector<AvatarId> entered;
+      std::vector<AvatarId> left;
+      std::vector<AvatarId> due;
+      for (AvatarId number = 1; number <= 60; ++number) {
         const bool was = inside.contains(number);
         const double distance_m = at.contains(number) ? distance_of(number) : 1e9;
         const auto [every, of] = distance_m <= 6.0    ? std::pair(2u, PoseMode::kCompact)
@@ -244,7 +244,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
           last_mode[number] = mode;
         }
       }
-      for (const AvatarNumber number : left) {
+      for (const AvatarId number : left) {
         inside.erase(number);
         last_mode.erase(number);
       }
@@ -278,7 +278,7 @@ TEST(RegionMembers, OfOneModeHaveTheWholeReach) {
 TEST(RegionMembers, EnterWithTheirFirstPose) {
   RegionMembers members;
   members.Move({{0.0, 0.0}, 10.0, 0.0, {}, {}}, 8.0, 1, PoseMode::kFull);
-  const std::map<AvatarNumber, std::pair<float, float>> at{{4, {1.0f, 1.0f}}, {5, {2.0f, 0.0f}}};
+  const std::map<AvatarId, std::pair<float, float>> at{{4, {1.0f, 1.0f}}, {5, {2.0f, 0.0f}}};
   PoseDelivery delivery = DeliveryAt(at, 1, 0, {5});
   RegionMembers::Change change = members.Update(delivery);
   EXPECT_THAT(std::vector(change.entered.begin(), change.entered.end()), ElementsAre(4));

@@ -17,11 +17,11 @@ using Every = PoseInterest::Every;
 constexpr WorldId kWorld = 3;
 
 /// A delivery whose rows are of these avatars; of those below 100 there is a pose.
-PoseDelivery DeliveryOf(const std::vector<AvatarNumber>& avatars, std::uint64_t tick = 1,
+PoseDelivery DeliveryOf(const std::vector<AvatarId>& avatars, std::uint64_t tick = 1,
                         int shard = 0) {
   auto rows = std::make_shared<protocol::PoseRows>();
   EXPECT_TRUE(rows->Begin({kWorld, 0, 0, 1, tick, 0.0, PoseMode::kFull, 1},
-                          std::make_shared<const std::vector<AvatarNumber>>(avatars)));
+                          std::make_shared<const std::vector<AvatarId>>(avatars)));
   for (std::size_t i = 0; i < avatars.size(); ++i) {
     if (avatars[i] >= 100) continue;
     rows->SkipTo(i);
@@ -141,10 +141,10 @@ TEST(Subscriptions, TellOnceThatNoneIsThere) {
 TEST(NumberUnion, HasEachNumberOnceInOrder) {
   NumberUnion numbers;
   EXPECT_TRUE(numbers.Take().empty());
-  numbers.Add(std::vector<AvatarNumber>{64, 3, ~AvatarNumber{0}});
-  numbers.Add(std::vector<AvatarNumber>{1u << 20, 63, 3, (1u << 20) - 1, 0, ~AvatarNumber{0}});
+  numbers.Add(std::vector<AvatarId>{64, 3, ~AvatarId{0}});
+  numbers.Add(std::vector<AvatarId>{1u << 20, 63, 3, (1u << 20) - 1, 0, ~AvatarId{0}});
   EXPECT_THAT(numbers.Take(),
-              ElementsAre(0, 3, 63, 64, (1u << 20) - 1, 1u << 20, ~AvatarNumber{0}));
+              ElementsAre(0, 3, 63, 64, (1u << 20) - 1, 1u << 20, ~AvatarId{0}));
   EXPECT_TRUE(numbers.Take().empty());
 }
 

@@ -45,14 +45,14 @@ struct Bench {
     return shard.Execute({.world = world, .session = session, .seq = 1, .part = std::move(part)},
                          ++tick);
   }
-  CommandResult Spawn(const std::vector<AvatarNumber>& numbers, SessionId session = 1) {
+  CommandResult Spawn(const std::vector<AvatarId>& numbers, SessionId session = 1) {
     SpawnPart part;
-    for (const AvatarNumber number : numbers) {
+    for (const AvatarId number : numbers) {
       part.items.push_back({static_cast<std::uint32_t>(part.items.size()), {.avatar = number}});
     }
     return Do(std::move(part), session);
   }
-  CommandResult Walk(AvatarNumber avatar, int steps) {
+  CommandResult Walk(AvatarId avatar, int steps) {
     RequestPart part;
     for (int i = 0; i < steps; ++i) {
       part.items.push_back({static_cast<std::uint32_t>(i),
@@ -162,14 +162,14 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
       shards.push_back(
           std::make_unique<WorldShard>(world, s, shard_count, 8, kClock, budget, metrics));
     }
-    const auto execute = [&]<typename Part>(AvatarNumber avatar, std::uint64_t tick, Part part) {
+    const auto execute = [&]<typename Part>(AvatarId avatar, std::uint64_t tick, Part part) {
       const int s = ShardOf(avatar, shard_count);
       return shards[static_cast<std::size_t>(s)]
           ->Execute({.world = world, .session = 1, .seq = 1, .part = std::move(part)}, tick)
           .accepted;
     };
     std::vector<Avatar> alone;
-    for (const AvatarNumber avatar : {1u, 2u}) {
+    for (const AvatarId avatar : {1u, 2u}) {
       ASSERT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
       ASSERT_EQ(execute(avatar, 1, SpawnPart{{{0, {.avatar = avatar}}}}), 1u);
       alone.emplace_back(library, BaseFrame{});
@@ -282,15 +282,15 @@ TEST(WorldShard, KeepsTheFlagUntilTheRarestObserverHasSeenIt) {
 TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
   Bench bench;
   bench.Watch(1);
-  std::vector<AvatarNumber> numbers(90);
-  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<AvatarNumber>(i + 1);
+  std::vector<AvatarId> numbers(90);
+  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<AvatarId>(i + 1);
   bench.Spawn(numbers);
   bench.shard.Advance(bench.tick, 1);
   protocol::PoseBatchComposer composer({1 << 20, 4096});  // 31 of these avatars a frame
   PoseDelivery delivery;
   ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, true, composer, delivery));
   ASSERT_GT(delivery.parts.size(), 2u);
-  std::vector<AvatarNumber> seen;
+  std::vector<AvatarId> seen;
   for (std::size_t part = 0; part < delivery.parts.size(); ++part) {
     EXPECT_LE(delivery.parts[part]->size(), 4096 + protocol::kFrameHeaderBytes);
     const Decoded decoded(delivery.parts[part]);
@@ -327,7 +327,7 @@ TEST(WorldShard, EncodesOfARingThoseInItAndTellsPlacesWhenNobodyIs) {
     bench.shard.SetInterest(interest);
   };
   SpawnPart part;
-  for (AvatarNumber number = 1; number <= 9; ++number) {
+  for (AvatarId number = 1; number <= 9; ++number) {
     part.items.push_back({number, {.avatar = number, .start = {{1.0 * number, 0.0, 0.0}, 0.0}}});
   }
   bench.Do(std::move(part));
@@ -335,7 +335,7 @@ TEST(WorldShard, EncodesOfARingThoseInItAndTellsPlacesWhenNobodyIs) {
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
   const auto encoded = [&] {
-    std::vector<AvatarNumber> numbers;
+    std::vector<AvatarId> numbers;
     for (std::size_t row = 0; row < delivery.rows->size(); ++row) {
       if (delivery.rows->has_pose(row)) numbers.push_back((*delivery.rows->avatars())[row]);
     }
@@ -405,19 +405,19 @@ TEST(WorldShard, BoundsAnAvatarsQueue) {
 }
 
 // Bytes of all poses by avatar and tick of a crowd that begins over some ticks.
-std::map<AvatarNumber, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_count,
+std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_count,
                                                                           bool is_reversed) {
-  constexpr AvatarNumber kAvatars = 40;
+  constexpr AvatarId kAvatars = 40;
   constexpr std::uint32_t kOverTicks = 3;
   AvatarBudget budget(100, 100);
   ThreadMetrics metrics;
   const auto world = Bench::MakeWorld();
-  std::map<AvatarNumber, std::vector<std::vector<std::byte>>> poses;
+  std::map<AvatarId, std::vector<std::vector<std::byte>>> poses;
   for (int s = 0; s < shard_count; ++s) {
     WorldShard shard(world, s, shard_count, 8, kClock, budget, metrics);
     SpawnPart spawn;
     RequestPart request{.items = {}, .over_ticks = kOverTicks};
-    for (AvatarNumber avatar = 1; avatar <= kAvatars; ++avatar) {
+    for (AvatarId avatar = 1; avatar <= kAvatars; ++avatar) {
       if (ShardOf(avatar, shard_count) != s) continue;
       EXPECT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
       spawn.items.push_back({avatar, {.avatar = avatar}});
@@ -467,7 +467,7 @@ TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
   constexpr std::uint32_t kOverTicks = 40;
   for (const int shard_count : {1, 2, 4, 8}) {
     std::map<std::pair<int, std::uint32_t>, int> starts;
-    for (AvatarNumber avatar = 1; avatar <= 10'000; ++avatar) {
+    for (AvatarId avatar = 1; avatar <= 10'000; ++avatar) {
       const std::uint32_t tick = StartTickOf(avatar, kOverTicks);
       ASSERT_LT(tick, kOverTicks);
       ++starts[{ShardOf(avatar, shard_count), tick}];
@@ -477,7 +477,7 @@ TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
       EXPECT_LE(count, mean + 5.0 * std::sqrt(mean)) << where.first << " of " << shard_count;
     }
   }
-  for (AvatarNumber avatar = 1; avatar <= 1000; ++avatar) EXPECT_EQ(StartTickOf(avatar, 1), 0u);
+  for (AvatarId avatar = 1; avatar <= 1000; ++avatar) EXPECT_EQ(StartTickOf(avatar, 1), 0u);
 }
 
 TEST(WorldShard, AnswersOnlyTicksItsObserversWant) {
@@ -501,18 +501,18 @@ TEST(WorldShard, EncodesNobodyThatIsNotWanted) {
   Bench bench(2);
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
-  const auto name = [&](int shard, std::vector<AvatarNumber> named) {
+  const auto name = [&](int shard, std::vector<AvatarId> named) {
     bench.shard.SetInterest(
         {.world = bench.world,
          .shard = shard,
          .poses = {{{.every = {.some = 1},
-                     .named = std::make_shared<const std::vector<AvatarNumber>>(named)},
+                     .named = std::make_shared<const std::vector<AvatarId>>(named)},
                     {}}}});
   };
   const auto encoded = [&] {
     EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, false, composer, delivery));
     EXPECT_TRUE(delivery.parts.empty());
-    std::vector<AvatarNumber> avatars;
+    std::vector<AvatarId> avatars;
     for (std::size_t row = 0; row < delivery.rows->size(); ++row) {
       if (delivery.rows->has_pose(row)) avatars.push_back((*delivery.rows->avatars())[row]);
     }
@@ -542,7 +542,7 @@ TEST(World, NumbersNeverMeet) {
   NoteNumber(world, 10);
   NoteNumber(world, 4);
   EXPECT_EQ(NextNumber(world), 11u);
-  NoteNumber(world, ~AvatarNumber{0});
+  NoteNumber(world, ~AvatarId{0});
   EXPECT_EQ(NextNumber(world), 0u);
 }
 

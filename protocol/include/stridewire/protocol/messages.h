@@ -23,7 +23,7 @@
 namespace stridewire::protocol {
 
 using WorldId = std::uint32_t;         ///< Given by the server, never 0.
-using AvatarNumber = std::uint32_t;    ///< Number within its world, never 0.
+using AvatarId = std::uint32_t;    ///< Number within its world, never 0.
 using SubscriptionId = std::uint32_t;  ///< Chosen by the client, unique in its session, never 0.
 using RequestId = std::uint64_t;       ///< Chosen by the client; 0 is the avatar's own doing.
 
@@ -79,7 +79,7 @@ struct LeaveWorld {
 };
 
 struct SpawnItem {
-  AvatarNumber avatar = 0;  ///< 0: the server chooses and tells in the reply.
+  AvatarId avatar = 0;  ///< 0: the server chooses and tells in the reply.
   Placement start;
   bool operator==(const SpawnItem&) const = default;
 };
@@ -96,7 +96,7 @@ struct Remove {
   static constexpr MessageType kType = MessageType::kRemove;
   Seq seq = 0;
   WorldId world = 0;
-  std::vector<AvatarNumber> avatars;  ///< 1 to kMaxItems
+  std::vector<AvatarId> avatars;  ///< 1 to kMaxItems
   bool operator==(const Remove&) const = default;
 };
 
@@ -143,7 +143,7 @@ struct WalkMovement {
 };
 
 struct RequestItem {
-  AvatarNumber avatar = 0;   ///< Not 0.
+  AvatarId avatar = 0;   ///< Not 0.
   RequestId request_id = 0;  ///< Not 0; comes back in events.
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
   Interrupt interrupt = Interrupt::kNone;  ///< Another one only with kFeatureTakeovers.
@@ -164,7 +164,7 @@ struct CancelQueue {
   static constexpr MessageType kType = MessageType::kCancelQueue;
   Seq seq = 0;
   WorldId world = 0;
-  std::vector<AvatarNumber> avatars;  ///< 1 to kMaxItems
+  std::vector<AvatarId> avatars;  ///< 1 to kMaxItems
   bool operator==(const CancelQueue&) const = default;
 };
 
@@ -212,7 +212,7 @@ struct SetTerrain {
 /// Starts a clip of the library over what an avatar does, or ends it. Ranges are the server's to check,
 /// item by item.
 struct LayerItem {
-  AvatarNumber avatar = 0;  ///< Not 0.
+  AvatarId avatar = 0;  ///< Not 0.
   std::string layer;        ///< One of WorldInfo::layers, 1 to kMaxNameBytes.
   bool is_off = false;      ///< Ends it; weight and speed then mean nothing.
   double weight = 1.0;      ///< Above 0, up to 1.
@@ -236,7 +236,7 @@ struct SetPlanting {
   static constexpr MessageType kType = MessageType::kSetPlanting;
   Seq seq = 0;
   WorldId world = 0;
-  std::vector<AvatarNumber> avatars;  ///< At least one.
+  std::vector<AvatarId> avatars;  ///< At least one.
   bool is_off = false;
   bool operator==(const SetPlanting&) const = default;
 };
@@ -267,7 +267,7 @@ struct Observe {
   WorldId world = 0;
   SubscriptionId subscription = 0;  ///< Not 0.
   PoseMode mode = PoseMode::kFull;
-  std::vector<AvatarNumber> avatars;  ///< Empty: all. Numbers nobody has yet may be among them.
+  std::vector<AvatarId> avatars;  ///< Empty: all. Numbers nobody has yet may be among them.
   std::uint16_t every_n_ticks = 1;    ///< 1 to kMaxEveryNTicks
   bool with_events = false;           ///< Events of the world, too.
   /// Who is in it, instead of `avatars`, which is empty then. Only with kFeatureRegions.
@@ -309,7 +309,7 @@ struct InspectAvatar {
   static constexpr MessageType kType = MessageType::kInspectAvatar;
   std::uint64_t nonce = 0;  ///< Comes back in AvatarState.
   WorldId world = 0;
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
   bool operator==(const InspectAvatar&) const = default;
 };
 
@@ -405,7 +405,7 @@ struct WorldInfo {
 
 struct ReplyItem {
   std::uint32_t index = 0;  ///< Position in the command's items or avatars.
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
   RequestId request_id = 0;  ///< Only for Request.
   StatusCode code = StatusCode::kOk;
   std::string text;
@@ -450,7 +450,7 @@ struct PoseBatchInfo {
 struct PoseBatch {
   static constexpr MessageType kType = MessageType::kPoseBatch;
   PoseBatchInfo info;
-  std::span<const AvatarNumber> avatars;  ///< 0 to kMaxItems, none 0
+  std::span<const AvatarId> avatars;  ///< 0 to kMaxItems, none 0
   std::span<const std::uint8_t> flags;    ///< One an avatar.
   std::span<const std::byte> poses;       ///< One after the other (PoseBatchReader).
 
@@ -489,7 +489,7 @@ struct ParameterSet {
 
 struct Event {
   EventType type = EventType::kAccepted;
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
   RequestId request_id = 0;  ///< 0: the avatar's own doing.
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
@@ -589,7 +589,7 @@ struct AvatarState {
   static constexpr MessageType kType = MessageType::kAvatarState;
   std::uint64_t nonce = 0;
   WorldId world = 0;
-  AvatarNumber avatar = 0;
+  AvatarId avatar = 0;
   StatusCode code = StatusCode::kOk;  ///< If not kOk, nothing below `text` is set.
   std::string text;
   std::uint64_t tick = 0;
@@ -630,7 +630,7 @@ struct Movements {
   std::uint64_t tick = 0;
   double server_time_s = 0.0;         ///< The server's clock at that tick.
   bool states = false;                ///< After `step`, which came before; else the changes in it.
-  std::vector<AvatarNumber> avatars;  ///< 0 to kMaxItems, none 0
+  std::vector<AvatarId> avatars;  ///< 0 to kMaxItems, none 0
   std::vector<std::uint8_t> flags;    ///< One an avatar.
   std::vector<std::uint32_t>
       ends;  ///< Where in `records` each one's ends; it begins where the one before ends.

@@ -24,7 +24,7 @@ namespace stridewire::protocol {
 /// is filled; afterwards any number of threads may read.
 class PoseRows {
  public:
-  using Avatars = std::shared_ptr<const std::vector<AvatarNumber>>;
+  using Avatars = std::shared_ptr<const std::vector<AvatarId>>;
 
   /// Starts anew; drops what was there. `info` with part 0 of 1; `avatars` not null, growing, none of them
   /// 0. Compact rows need the world's codec, which has to live as long as poses are added. Errors as Check(PoseBatch), or
