@@ -176,7 +176,7 @@ class Session {
     std::map<protocol::AvatarId, protocol::Placement> spawned;  ///< Ours, and where they are.
     std::uint64_t told_dropped_batches = 0;                         ///< By the last Lagging.
     std::unique_ptr<WorldView> view;
-    std::unique_ptr<MovementView> evaluated;  ///< While movements are observed.
+    std::unique_ptr<ReplicaSet> evaluated;  ///< While movements are observed.
     std::optional<protocol::TerrainInfo> terrain;
   };
 

@@ -16,7 +16,7 @@ constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 
 bool Session::MaySend() const {
   const std::size_t memory =
-      std::clamp<std::size_t>(limits_.reply_memory, 1, protocol::kReplyMemory);
+      std::clamp<std::size_t>(limits_.reply_memory, 1, protocol::kReplyCache);
   return output_.size() < kMaxOutputBytes && unanswered_.size() < memory;
 }
 
@@ -84,7 +84,7 @@ Session::Readiness Session::PrepareMovements(World& world, const Command& comman
   }
   if (*library == nullptr) return Readiness::kWaits;
   if (world.evaluated == nullptr) {
-    world.evaluated = std::make_unique<MovementView>(*library, 1.0 / tick_hz_,
+    world.evaluated = std::make_unique<ReplicaSet>(*library, 1.0 / tick_hz_,
                                                      options_.max_pose_bytes / kReplicaBytes);
   }
   return Readiness::kReady;

@@ -148,7 +148,7 @@ void WorldView::Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseS
   }
 }
 
-Status WorldView::Take(const protocol::Movements& movements, MovementView& evaluated,
+Status WorldView::Take(const protocol::Movements& movements, ReplicaSet& evaluated,
                        std::uint64_t every_n_ticks, Counts& counts) {
   if (evaluated.library().skeleton().joints.size() != skeleton_.joints.size()) {
     return Fail(ErrorCode::kShapeMismatch, "the library has another number of joints than told");

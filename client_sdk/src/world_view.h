@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "movement_view.h"
+#include "replica_set.h"
 #include "pose_history.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
@@ -23,7 +23,7 @@ struct PoseBudget {
 };
 
 /// What is seen of a world: its figure, and the poses of its avatars.
-class WorldView : public PoseScreen {
+class WorldView : public PoseSink {
  public:
   /// Poses of an avatar that is gone can still be sampled for this long.
   static constexpr double kKeepGone_s = 2.0;
@@ -68,7 +68,7 @@ class WorldView : public PoseScreen {
   Status Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
   /// Poses that are evaluated here, of every `every_n_ticks`th tick: Show and Gone until `tick` is over.
-  Status Take(const protocol::Movements& movements, MovementView& evaluated,
+  Status Take(const protocol::Movements& movements, ReplicaSet& evaluated,
               std::uint64_t every_n_ticks, Counts& counts);
 
   /// The server said that the avatar is gone.

@@ -13,7 +13,7 @@ namespace {
 constexpr int kExitFailure = 1;
 constexpr int kExitBadInput = 2;
 
-int Complain(const stridewire::Error& error, int exit_code) {
+int PrintError(const stridewire::Error& error, int exit_code) {
   std::fprintf(stderr, "stridewired: %s\n", stridewire::Describe(error).c_str());
   return exit_code;
 }
@@ -22,7 +22,7 @@ int Main(int argc, char** argv) {
   using namespace stridewire::server;
   using Action = CommandLine::Action;
   const auto command = ReadCommandLine(argc, argv, SystemEnvironment);
-  if (!command) return Complain(command.error(), kExitBadInput);
+  if (!command) return PrintError(command.error(), kExitBadInput);
   if (command->action == Action::kPrintText || command->action == Action::kPrintConfig) {
     const std::string text =
         command->action == Action::kPrintText ? command->text : PrintConfig(command->config);
@@ -31,11 +31,11 @@ int Main(int argc, char** argv) {
   }
 
   auto libraries = Libraries::Load(command->config);
-  if (!libraries) return Complain(libraries.error(), kExitBadInput);
+  if (!libraries) return PrintError(libraries.error(), kExitBadInput);
   auto terrains = Terrains::Load(command->config);
-  if (!terrains) return Complain(terrains.error(), kExitBadInput);
+  if (!terrains) return PrintError(terrains.error(), kExitBadInput);
   auto viewer = ViewerFiles::Find(command->config.viewer_dir);
-  if (!viewer) return Complain(viewer.error(), kExitBadInput);
+  if (!viewer) return PrintError(viewer.error(), kExitBadInput);
   if (command->action == Action::kCheckConfig) {
     std::puts("the configuration is good");
     return 0;
@@ -45,7 +45,7 @@ int Main(int argc, char** argv) {
   const Log log(command->config.log_level);
   Server server(command->config, *std::move(libraries), *std::move(viewer), *std::move(terrains));
   server.WatchSignals();
-  if (const auto status = server.Start(); !status) return Complain(status.error(), kExitFailure);
+  if (const auto status = server.Start(); !status) return PrintError(status.error(), kExitFailure);
   std::printf("%s\n", server.ReadyLine().c_str());
   std::fflush(stdout);
   return server.Run() ? 0 : kExitFailure;

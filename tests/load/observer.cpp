@@ -100,7 +100,7 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
       return run_.Problem(name() + ": --library is not that of world " + info.name);
     }
     world.evaluated =
-        std::make_unique<client::MovementView>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
+        std::make_unique<client::ReplicaSet>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
   }
   world.codecs = {};
   if (protocol::IsCompact(SentMode())) {
@@ -170,7 +170,7 @@ void Observer::OnLost(const std::string& why, bool by_us) {
 namespace {
 
 // The poses of one message of movements, as a batch would have them.
-class BatchScreen final : public client::PoseScreen {
+class BatchScreen final : public client::PoseSink {
  public:
   BatchScreen(std::size_t joint_count, std::function<bool(protocol::AvatarId)> wants)
       : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "latency_probes.h"
-#include "movement_view.h"
+#include "replica_set.h"
 #include "run_state.h"
 #include "session.h"
 #include "stridewire/protocol/compact_codecs.h"
@@ -84,7 +84,7 @@ class Observer final : public Session {
     std::vector<std::size_t> last_sizes;
     std::size_t most_pose_bytes = 0;
     std::vector<Stream> streams;
-    std::unique_ptr<client::MovementView> evaluated;  ///< In mode movement.
+    std::unique_ptr<client::ReplicaSet> evaluated;  ///< In mode movement.
     std::uint64_t batches_dropped = 0;                ///< As the server told on this connection
   };
 

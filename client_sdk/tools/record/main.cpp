@@ -22,7 +22,7 @@ namespace {
 constexpr int kExitFailure = 1;
 constexpr int kExitBadUsage = 2;
 
-int Complain(const std::string& sentence, int exit_code) {
+int PrintError(const std::string& sentence, int exit_code) {
   std::fprintf(stderr, "stridewire-record: %s\n", sentence.c_str());
   return exit_code;
 }
@@ -101,21 +101,21 @@ int Run(int argc, char** argv) {
   } catch (const CLI::CallForVersion& version) {
     return app.exit(version);
   } catch (const CLI::ParseError& error) {
-    return Complain(std::string(error.what()) + " (see --help)", kExitBadUsage);
+    return PrintError(std::string(error.what()) + " (see --help)", kExitBadUsage);
   }
 
   if (!ParseAddress(address, options)) {
-    return Complain("--connect: \"" + address + "\" is not HOST:PORT", kExitBadUsage);
+    return PrintError("--connect: \"" + address + "\" is not HOST:PORT", kExitBadUsage);
   }
   if (options.world.empty() || options.world.size() > STRIDEWIRE_MAX_NAME_BYTES) {
-    return Complain("--world: a name has 1 to 64 bytes", kExitBadUsage);
+    return PrintError("--world: a name has 1 to 64 bytes", kExitBadUsage);
   }
-  if (options.avatar == 0) return Complain("--avatar: numbers begin at 1", kExitBadUsage);
+  if (options.avatar == 0) return PrintError("--avatar: numbers begin at 1", kExitBadUsage);
   if (!(options.seconds > 0.0 && options.seconds <= 3600.0)) {
-    return Complain("--seconds: is not a number above 0 and up to 3600", kExitBadUsage);
+    return PrintError("--seconds: is not a number above 0 and up to 3600", kExitBadUsage);
   }
   if (!(options.timeout_s >= 0.1 && options.timeout_s <= 600.0)) {
-    return Complain("--timeout-s: is not a number from 0.1 to 600", kExitBadUsage);
+    return PrintError("--timeout-s: is not a number from 0.1 to 600", kExitBadUsage);
   }
   if (mode == "full") {
     options.mode = STRIDEWIRE_FULL;
@@ -124,10 +124,10 @@ int Run(int argc, char** argv) {
   } else if (mode == "movement") {
     options.mode = STRIDEWIRE_MOVEMENT;
   } else {
-    return Complain("--mode: \"" + mode + "\" is not full, quantised or movement", kExitBadUsage);
+    return PrintError("--mode: \"" + mode + "\" is not full, quantised or movement", kExitBadUsage);
   }
   if (const std::string wrong = out.empty() ? "is empty" : OutputError(out); !wrong.empty()) {
-    return Complain("--out: " + out + ": " + wrong, kExitBadUsage);
+    return PrintError("--out: " + out + ": " + wrong, kExitBadUsage);
   }
 
   const bool terminal = ::isatty(STDERR_FILENO) != 0;
@@ -136,12 +136,12 @@ int Run(int argc, char** argv) {
   });
   if (terminal) std::fputs("\r\033[K", stderr);
   if (!recording) {
-    return Complain(Describe(recording.error()),
+    return PrintError(Describe(recording.error()),
                     recording.error().code == ErrorCode::kIo ? kExitFailure : kExitBadUsage);
   }
   if (Status written = WriteBvh(recording->skeleton, recording->clip, std::filesystem::path(out));
       !written) {
-    return Complain(Describe(written.error()), kExitFailure);
+    return PrintError(Describe(written.error()), kExitFailure);
   }
 
   const int frames = recording->clip.frame_count();
@@ -177,7 +177,7 @@ int Run(int argc, char** argv) {
     }
   }
   if (!recording->cut_short.empty()) {
-    return Complain("cut short: " + recording->cut_short, kExitFailure);
+    return PrintError("cut short: " + recording->cut_short, kExitFailure);
   }
   return 0;
 }
@@ -189,6 +189,6 @@ int main(int argc, char** argv) {
   try {
     return stridewire::record::Run(argc, argv);
   } catch (const std::exception& error) {
-    return stridewire::record::Complain(error.what(), stridewire::record::kExitFailure);
+    return stridewire::record::PrintError(error.what(), stridewire::record::kExitFailure);
   }
 }

@@ -56,30 +56,30 @@ std::optional<LayerSource> ParseSource(std::string_view text) {
 
 int RunAddLayers(const AddLayersCommand& command) {
   if (command.loops.empty() && command.once.empty()) {
-    return Complain("add-layers: names no layer; give --layer or --layer-once");
+    return PrintError("add-layers: names no layer; give --layer or --layer-once");
   }
   std::vector<LayerSource> sources;
   for (const auto* texts : {&command.loops, &command.once}) {
     for (const std::string& text : *texts) {
       auto source = ParseSource(text);
       if (!source) {
-        return Complain("\"" + text + "\" is not NAME=FILE or NAME=FILE:FROM_S:TO_S");
+        return PrintError("\"" + text + "\" is not NAME=FILE or NAME=FILE:FROM_S:TO_S");
       }
       if (IsSameFile(command.out, source->path)) {
-        return Complain("--out: " + command.out + " is a file to read from");
+        return PrintError("--out: " + command.out + " is a file to read from");
       }
       source->cut.is_looping = texts == &command.loops;
       sources.push_back(*std::move(source));
     }
   }
   if (IsSameFile(command.out, command.library)) {
-    return Complain("--out: " + command.out + " is the library to add to");
+    return PrintError("--out: " + command.out + " is the library to add to");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
   const Skeleton& skeleton = (*library)->skeleton();
   std::optional<std::vector<float>> mask;
   if (!command.joints.empty()) {
@@ -87,23 +87,23 @@ int RunAddLayers(const AddLayersCommand& command) {
     if (!named) {
       Error error = named.error();
       error.where = "--layer-joints: " + error.where;
-      return ComplainOfInput(error);
+      return PrintInputError(error);
     }
     mask = *std::move(named);
   }
   std::vector<RawLayer> layers;
   for (const LayerSource& source : sources) {
     const auto capture = ReadBvh(source.path);
-    if (!capture) return ComplainOfInput(capture.error());
+    if (!capture) return PrintInputError(capture.error());
     auto layer = CutLayer(*capture, skeleton, source.cut);
-    if (!layer) return ComplainOfInput(layer.error());
+    if (!layer) return PrintInputError(layer.error());
     if (mask) layer->weights = *mask;
     layers.push_back(*std::move(layer));
   }
   const auto made = AddLayers(**library, layers);
-  if (!made) return ComplainOfInput(made.error());
+  if (!made) return PrintInputError(made.error());
   if (Status status = WriteFile(command.out, (*made)->bytes()); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   if (command.json) {
     std::printf("%s\n", Dump({{"layers", LayersToJson(**made)},

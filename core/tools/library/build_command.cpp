@@ -9,7 +9,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
-#include "patience.h"
+#include "progress.h"
 #include "stridewire/offline/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
@@ -131,15 +131,15 @@ int RunBuild(const BuildCommand& command) {
   options.mirror = command.mirror;
   options.unsettled_jumps = command.all;
   if (const std::string wrong = ParseKinds(command.kinds, options); !wrong.empty()) {
-    return Complain(wrong);
+    return PrintError(wrong);
   }
   for (const std::string& path : command.files) {
     if (IsSameFile(command.out, path)) {
-      return Complain("--out: " + command.out + " is a file to read from");
+      return PrintError("--out: " + command.out + " is a file to read from");
     }
   }
   if (Status status = CheckOutputFile(command.out); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   BvhReadOptions read;
   read.unit_m = command.unit_m;
@@ -147,7 +147,7 @@ int RunBuild(const BuildCommand& command) {
   if (!command.up.empty()) {
     read.up = ParseAxis(command.up);
     if (!read.up)
-      return Complain("--up: \"" + command.up +
+      return PrintError("--up: \"" + command.up +
                       "\" is not an axis; there are x, y, z, -x, -y and -z");
   }
   read.left_ankle = command.left_ankle;
@@ -156,7 +156,7 @@ int RunBuild(const BuildCommand& command) {
   read.right_ball = command.right_ball;
 
   if (command.left_ankle.empty() != command.right_ankle.empty()) {
-    return Complain("--left-ankle and --right-ankle belong together: give both or none");
+    return PrintError("--left-ankle and --right-ankle belong together: give both or none");
   }
 
   const InterruptSignal interrupt_signal;
@@ -178,7 +178,7 @@ int RunBuild(const BuildCommand& command) {
     progress.Show(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
     const auto capture = reading.get();
     reading = start_reading(i + 1);
-    if (InterruptSignal::IsAsked()) return Complain(stopped, kExitFailure);
+    if (InterruptSignal::IsAsked()) return PrintError(stopped, kExitFailure);
     Extraction unreadable;
     if (!capture) {
       unreadable.path = path;
@@ -189,22 +189,22 @@ int RunBuild(const BuildCommand& command) {
     progress.Hide();
     if (!command.json) PrintFile(extraction);
     if (!extraction.error.empty()) {
-      Complain(WithPath(extraction));
+      PrintError(WithPath(extraction));
     }
   }
 
   progress.Show(static_cast<double>(command.files.size()) /
                 static_cast<double>(command.files.size() + 1));
   const auto raw = assembler.Assemble();
-  if (!raw) return ComplainOfInput(raw.error());
+  if (!raw) return PrintInputError(raw.error());
   LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
   if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;
   const auto library = builder.Build(*raw);
   progress.Hide();
-  if (!library) return ComplainOfInput(library.error());
-  if (InterruptSignal::IsAsked()) return Complain(stopped, kExitFailure);
+  if (!library) return PrintInputError(library.error());
+  if (InterruptSignal::IsAsked()) return PrintError(stopped, kExitFailure);
   if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   if (command.json) {
     Json json;

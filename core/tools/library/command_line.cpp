@@ -8,14 +8,14 @@
 
 namespace stridewire {
 
-int Complain(const std::string& sentence, int exit_code) {
+int PrintError(const std::string& sentence, int exit_code) {
   std::fprintf(stderr, "stridewire-library: %s\n", sentence.c_str());
   return exit_code;
 }
 
-int ComplainOfInput(const Error& error) { return Complain(Describe(error), kExitBadInput); }
+int PrintInputError(const Error& error) { return PrintError(Describe(error), kExitBadInput); }
 
-int ComplainOfOutput(const Error& error) { return Complain(Describe(error), kExitFailure); }
+int PrintOutputError(const Error& error) { return PrintError(Describe(error), kExitFailure); }
 
 Status CheckOutputFile(const std::filesystem::path& path) {
   std::error_code ignored;

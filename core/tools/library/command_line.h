@@ -14,13 +14,13 @@ inline constexpr int kExitFailure = 1;
 inline constexpr int kExitBadInput = 2;
 
 // Prints one sentence on stderr. Returns the exit code.
-int Complain(const std::string& sentence, int exit_code = kExitBadInput);
+int PrintError(const std::string& sentence, int exit_code = kExitBadInput);
 
 // What was given (files, options, fields) is wrong: kExitBadInput, unreadable files included.
-int ComplainOfInput(const Error& error);
+int PrintInputError(const Error& error);
 
 // What was to be made cannot be: kExitFailure.
-int ComplainOfOutput(const Error& error);
+int PrintOutputError(const Error& error);
 
 // Whether a file could be put at `path`: found out before the work, not after it. Only plain files
 // are replaced: a rename would turn /dev/null into one.

@@ -35,10 +35,10 @@ Clip ExampleClip(const MotionLibrary& library, int group_index, int example) {
 
 int RunExport(const ExportCommand& command) {
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
   std::error_code failed;
   std::filesystem::create_directories(command.out, failed);
-  if (failed) return Complain(command.out + ": the folder cannot be made", kExitFailure);
+  if (failed) return PrintError(command.out + ": the folder cannot be made", kExitFailure);
   int count = 0;
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
     const MotionGroup& group = (*library)->groups()[g];
@@ -49,7 +49,7 @@ int RunExport(const ExportCommand& command) {
       const std::filesystem::path path = std::filesystem::path(command.out) / name;
       const Clip clip = ExampleClip(**library, static_cast<int>(g), e);
       if (Status status = WriteBvh((*library)->skeleton(), clip, path); !status) {
-        return ComplainOfOutput(status.error());
+        return PrintOutputError(status.error());
       }
       ++count;
     }

@@ -9,7 +9,7 @@ namespace stridewire {
 
 int RunInspect(const InspectCommand& command) {
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
   const nlohmann::ordered_json json = LibraryToJson(**library, command.examples);
   if (command.json) {
     std::printf("%s\n", Dump(json).c_str());

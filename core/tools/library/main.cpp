@@ -215,7 +215,7 @@ int Run(int argc, char** argv) {
 
   const std::string wrong = argc < 2 ? "a command is needed" : FirstWordError(app, argv[1]);
   if (!wrong.empty()) {
-    return Complain(wrong +
+    return PrintError(wrong +
                     "; there are build, inspect, refine, add-layers, report, synthesize and "
                     "export-capture");
   }
@@ -231,7 +231,7 @@ int Run(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const auto commands = app.get_subcommands();
     const std::string command = commands.empty() ? "" : commands.front()->get_name() + ": ";
-    return Complain(command + error.what());
+    return PrintError(command + error.what());
   }
   if (*build_app) return RunBuild(build);
   if (*inspect_app) return RunInspect(inspect);
@@ -249,10 +249,10 @@ int main(int argc, char** argv) {
   try {
     const int exit_code = stridewire::Run(argc, argv);
     if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
-      return stridewire::Complain("the report cannot be written", stridewire::kExitFailure);
+      return stridewire::PrintError("the report cannot be written", stridewire::kExitFailure);
     }
     return exit_code;
   } catch (const std::exception& error) {
-    return stridewire::Complain(std::string("failed: ") + error.what(), stridewire::kExitFailure);
+    return stridewire::PrintError(std::string("failed: ") + error.what(), stridewire::kExitFailure);
   }
 }

@@ -3,7 +3,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
-#include "patience.h"
+#include "progress.h"
 #include "refinement_json.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/offline/refine.h"
@@ -37,13 +37,13 @@ void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefineme
 int RunRefine(const RefineCommand& command) {
   const InterruptSignal interrupt_signal;
   if (IsSameFile(command.out, command.library)) {
-    return Complain("--out: " + command.out + " is the library to refine");
+    return PrintError("--out: " + command.out + " is the library to refine");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
 
   Progress progress("refining");
   RefineOptions options;
@@ -56,10 +56,10 @@ int RunRefine(const RefineCommand& command) {
   };
   const auto refined = Refine(*library, options);
   progress.Hide();
-  if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
-  if (!refined) return ComplainOfInput(refined.error());
+  if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
+  if (!refined) return PrintInputError(refined.error());
   if (Status status = WriteFile(command.out, refined->library->bytes()); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
 
   if (command.json) {

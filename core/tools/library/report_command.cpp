@@ -6,7 +6,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
-#include "patience.h"
+#include "progress.h"
 #include "refinement_json.h"
 #include "report/report.h"
 #include "stridewire/offline/assemble.h"
@@ -70,23 +70,23 @@ std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>
     if (InterruptSignal::IsAsked()) return nullptr;
     const auto capture = ReadBvh(path);
     if (!capture) {
-      ComplainOfInput(capture.error());
+      PrintInputError(capture.error());
       return nullptr;
     }
     const Extraction& extraction = assembler.Add(*capture);
     if (!extraction.error.empty()) {
-      Complain(path + ": " + extraction.error);
+      PrintError(path + ": " + extraction.error);
       return nullptr;
     }
   }
   const auto raw = assembler.Assemble();
   if (!raw) {
-    ComplainOfInput(raw.error());
+    PrintInputError(raw.error());
     return nullptr;
   }
   const auto library = LibraryBuilder().Build(*raw);
   if (!library) {
-    ComplainOfInput(library.error());
+    PrintInputError(library.error());
     return nullptr;
   }
   return *library;
@@ -108,15 +108,15 @@ int RunReport(const ReportCommand& command) {
   std::error_code failed;
   const std::filesystem::path folder = command.out;
   if (std::filesystem::exists(folder, failed) && !std::filesystem::is_directory(folder, failed)) {
-    return Complain(command.out + ": is there already and no folder", kExitFailure);
+    return PrintError(command.out + ": is there already and no folder", kExitFailure);
   }
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
 
   std::shared_ptr<const MotionLibrary> captured;
   if (!command.captures.empty()) {
     captured = ReadCaptures(command.captures);
-    if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+    if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
     if (captured == nullptr) return kExitBadInput;
   }
 
@@ -132,15 +132,15 @@ int RunReport(const ReportCommand& command) {
                               return !InterruptSignal::IsAsked();
                             }});
   progress.Hide();
-  if (InterruptSignal::IsAsked()) return Complain("stopped; nothing was written", kExitFailure);
+  if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
   if (!report) {
-    return report.error().code == ErrorCode::kOutOfRange ? ComplainOfInput(report.error())
-                                                         : ComplainOfOutput(report.error());
+    return report.error().code == ErrorCode::kOutOfRange ? PrintInputError(report.error())
+                                                         : PrintOutputError(report.error());
   }
   std::filesystem::create_directories(folder, failed);
-  if (failed) return Complain(command.out + ": the folder cannot be made", kExitFailure);
+  if (failed) return PrintError(command.out + ": the folder cannot be made", kExitFailure);
   if (Status status = WriteReport(*report, folder); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   if (command.json) {
     Json json = ReportToJson(*report, command);

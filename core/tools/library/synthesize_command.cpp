@@ -52,15 +52,15 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
 
 int RunSynthesize(const SynthesizeCommand& command) {
   if (IsSameFile(command.out, command.choreography) || IsSameFile(command.out, command.library)) {
-    return Complain("--out: " + command.out + " is a file to read from");
+    return PrintError("--out: " + command.out + " is a file to read from");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   const auto choreography = ReadChoreography(command.choreography);
-  if (!choreography) return ComplainOfInput(choreography.error());
+  if (!choreography) return PrintInputError(choreography.error());
   const auto library = OpenLibrary(command.library);
-  if (!library) return ComplainOfInput(library.error());
+  if (!library) return PrintInputError(library.error());
   auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps,
                               {.run_time_correction = !command.no_correction,
                                .foot_planting = !command.no_planting,
@@ -73,12 +73,12 @@ int RunSynthesize(const SynthesizeCommand& command) {
     if (!error.where.empty()) where += (error.index >= 0 ? "." : ": ") + error.where;
     error.where = std::move(where);
     error.index = -1;
-    return ComplainOfInput(error);
+    return PrintInputError(error);
   }
   if (Status status =
           WriteBvh((*library)->skeleton(), synthesis->clip, std::filesystem::path(command.out));
       !status) {
-    return ComplainOfOutput(status.error());
+    return PrintOutputError(status.error());
   }
   if (command.json) {
     Json json;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "net/shared_frame.h"
-#include "world/mail.h"
+#include "world/shard_messages.h"
 
 namespace stridewire::server {
 

@@ -237,7 +237,7 @@ std::vector<ConfigKey> MakeKeys() {
   limit("messages_per_s", "Messages of one session a second; beyond, reading pauses",
         &Limits::messages_per_s, 1, 100'000'000);
   limit("max_pending_commands", "Commands of one session not answered yet; beyond, reading pauses",
-        &Limits::max_pending_commands, 1, static_cast<int>(protocol::kReplyMemory));
+        &Limits::max_pending_commands, 1, static_cast<int>(protocol::kReplyCache));
   limit("control_buffer_bytes", "Waiting for one session, poses apart",
         &Limits::control_buffer_bytes, std::size_t{64 * 1024}, 1024 * kMiB);
   limit("observer_backlog_ticks", "Batches kept for a slow observer, per world, mode and shard",

@@ -77,7 +77,7 @@ enum class Limit : std::uint8_t {
   kPendingCommands,
   kControlBuffer,
   kObserverBacklog,
-  kReplyMemory,
+  kReplyCache,
   kEventReplay,
   kHttpConnections,
   kHttpWork,

@@ -15,7 +15,7 @@
 #include "ops/library_pages.h"
 #include "ops/metrics.h"
 #include "ops/viewer_files.h"
-#include "session/gate.h"
+#include "session/handshake.h"
 #include "session/session_directory.h"
 #include "world/shard.h"
 #include "world/world_directory.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "world/mail.h"
+#include "world/shard_messages.h"
 
 namespace stridewire::server {
 

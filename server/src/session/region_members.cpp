@@ -47,7 +47,7 @@ std::vector<PoseMode> RegionMembers::modes() const {
   return modes;
 }
 
-RegionReach RegionMembers::reach(PoseMode mode) const {
+RegionFilter RegionMembers::reach(PoseMode mode) const {
   const auto is_of_mode = [&](const Ring& ring) { return ring.mode == mode; };
   const std::span<const Ring> all = rings();
   const auto first = std::ranges::find_if(all, is_of_mode);

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "world/mail.h"
+#include "world/shard_messages.h"
 
 namespace stridewire::server {
 
@@ -43,7 +43,7 @@ class RegionMembers {
     return every_[static_cast<std::size_t>(mode)];
   }
   /// What holds all rings of that mode, of which there is one.
-  [[nodiscard]] RegionReach reach(protocol::PoseMode mode) const;
+  [[nodiscard]] RegionFilter reach(protocol::PoseMode mode) const;
 
   /// What came of a delivery, which has places and is of one of the modes. Holds until the next call.
   struct Change {

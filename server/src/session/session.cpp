@@ -22,7 +22,7 @@ using protocol::StatusCode;
 Session::Session(SessionIdentity identity, SessionHost& host)
     : identity_(std::move(identity)),
       host_(host),
-      replies_(protocol::kReplyMemory, host.config().limits.reply_memory_bytes),
+      replies_(protocol::kReplyCache, host.config().limits.reply_memory_bytes),
       event_replay_(host.config().limits.event_replay_bytes),
       request_tokens_(host.config().limits.requests_per_s, host.config().limits.request_burst),
       message_tokens_(host.config().limits.messages_per_s, host.config().limits.messages_per_s) {}
@@ -246,11 +246,11 @@ void Session::OnMessage(protocol::Message&& message) {
 template <typename Command>
 void Session::Handle(Command command) {
   const Seq seq = command.seq;
-  switch (replies_.Judge(seq)) {
-    case ReplyMemory::Verdict::kNew: break;
-    case ReplyMemory::Verdict::kPending: return;
-    case ReplyMemory::Verdict::kAnswered: {
-      const ReplyMemory::Answer& answer = replies_.Find(seq);
+  switch (replies_.Classify(seq)) {
+    case ReplyCache::Verdict::kNew: break;
+    case ReplyCache::Verdict::kPending: return;
+    case ReplyCache::Verdict::kAnswered: {
+      const ReplyCache::Answer& answer = replies_.Find(seq);
       if (const auto it = worlds_.find(answer.joined); it != worlds_.end()) {
         SendWorldInfo(seq, it->second);
         SendGround(*it->second.world, false);
@@ -258,12 +258,12 @@ void Session::Handle(Command command) {
       connection_->SendControl(answer.reply);
       return;
     }
-    case ReplyMemory::Verdict::kForgotten:
+    case ReplyCache::Verdict::kForgotten:
       Send(Reply{.seq = seq,
                  .code = StatusCode::kForgotten,
                  .text = "it was done so long ago that the answer is not kept"});
       return;
-    case ReplyMemory::Verdict::kGap:
+    case ReplyCache::Verdict::kGap:
       host_.metrics().protocol_errors.Add();
       Fail(StatusCode::kBadSequence, "a command before this one is missing", seq);
       return;
@@ -482,7 +482,7 @@ void Session::Answer(Reply&& reply, WorldId joined) {
   STRIDEWIRE_CHECK(frame != nullptr);  // MaxItems sees to it that a Reply fits
   const std::size_t forgotten = replies_.Remember(reply.seq, frame, joined);
   if (forgotten > 0 && replies_.bytes() > host_.config().limits.reply_memory_bytes / 2) {
-    host_.metrics().Reached(Limit::kReplyMemory, forgotten);
+    host_.metrics().Reached(Limit::kReplyCache, forgotten);
   }
   if (connection_ != nullptr) connection_->SendControl(frame);
 }

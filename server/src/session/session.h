@@ -16,7 +16,7 @@
 #include "session/event_replay.h"
 #include "session/movement_feed.h"
 #include "session/refusal.h"
-#include "session/reply_memory.h"
+#include "session/reply_cache.h"
 #include "session/session_host.h"
 #include "session/subscriptions.h"
 #include "session/token_bucket.h"
@@ -153,7 +153,7 @@ class Session : private ConnectionHandler {
   }
   [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::span<const AvatarId> Named(WorldId world, protocol::PoseMode mode) const;
-  [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::optional<RegionFilter> ReachOf(WorldId world, protocol::PoseMode mode) const;
   [[nodiscard]] std::size_t region_count() const { return subscriptions_.region_count(); }
 
  private:
@@ -253,7 +253,7 @@ class Session : private ConnectionHandler {
   std::map<protocol::Seq, Pending> pending_;
   std::size_t pending_items_ = 0;
   int pending_questions_ = 0;
-  ReplyMemory replies_;
+  ReplyCache replies_;
   EventReplay event_replay_;
   std::uint64_t events_number_ = 0;
   TokenBucket request_tokens_;

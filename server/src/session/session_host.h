@@ -7,7 +7,7 @@
 #include "ops/metrics.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "world/mail.h"
+#include "world/shard_messages.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
 

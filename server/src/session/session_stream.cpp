@@ -59,7 +59,7 @@ std::span<const AvatarId> Session::Named(WorldId world, PoseMode mode) const {
                                 : subscriptions_.Named(world, mode);
 }
 
-std::optional<RegionReach> Session::ReachOf(WorldId world, PoseMode mode) const {
+std::optional<RegionFilter> Session::ReachOf(WorldId world, PoseMode mode) const {
   return connection_ == nullptr ? std::nullopt : subscriptions_.ReachOf(world, mode);
 }
 

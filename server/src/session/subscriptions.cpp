@@ -164,7 +164,7 @@ bool Subscriptions::MoveRegion(SubscriptionId id, const protocol::Observe& moved
 
 const RegionMembers* Subscriptions::FindRegion(const Key& key) const { return RegionIn(all_, key); }
 
-std::optional<RegionReach> Subscriptions::ReachOf(WorldId world, PoseMode mode) const {
+std::optional<RegionFilter> Subscriptions::ReachOf(WorldId world, PoseMode mode) const {
   const RegionMembers* region = FindRegion({world, mode});
   return region == nullptr ? std::nullopt : std::optional(region->reach(mode));
 }

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "session/region_members.h"
-#include "world/mail.h"
+#include "world/shard_messages.h"
 
 namespace stridewire::server {
 
@@ -72,7 +72,7 @@ class Subscriptions {
   [[nodiscard]] std::span<const AvatarId> Named(WorldId world, protocol::PoseMode mode) const;
 
   /// What the region of that world reaches in that mode; empty: there is none.
-  [[nodiscard]] std::optional<RegionReach> ReachOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::optional<RegionFilter> ReachOf(WorldId world, protocol::PoseMode mode) const;
 
   [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;
   /// The rows of a delivery that Share::kSome is about; without value: none has a pose and the client knows

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "stridewire/base/check.h"
-#include "world/number_union.h"
+#include "world/id_set.h"
 
 namespace stridewire::server {
 namespace {
@@ -234,7 +234,7 @@ void Shard::Publish() {
   }
 }
 
-void Shard::Receive(TickMail&& mail) {
+void Shard::Receive(ShardOutbox&& mail) {
   for (CommandResult& result : mail.results) {
     const auto it = sessions_.find(result.session);
     if (it != sessions_.end()) it->second->OnResult(std::move(result));
@@ -366,8 +366,8 @@ void Shard::TellNamed() {
     if (told == told_interest_.end()) continue;
     bool is_same = true;
     for (const PoseMode mode : kSentModes) {
-      NumberUnion numbers;
-      std::vector<RegionReach> regions;
+      IdSet numbers;
+      std::vector<RegionFilter> regions;
       for (const Session* session : WatchersOf(world)) {
         numbers.Add(session->Named(world, mode));
         if (const auto reach = session->ReachOf(world, mode)) regions.push_back(*reach);

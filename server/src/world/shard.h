@@ -101,7 +101,7 @@ class Shard : public SessionHost {
   void RunCommands();
   void AnswerQuestions();
   void Publish();
-  void Receive(TickMail&& mail);
+  void Receive(ShardOutbox&& mail);
   void OnInterest(const Interest& interest);
   void Tell(const Interest& interest);
   void TellNamed();
@@ -139,7 +139,7 @@ class Shard : public SessionHost {
   std::set<WorldId> named_anew_;  // whose avatars named and regions are told at the next tick
   protocol::Encoder encoder_;
   protocol::PoseBatchComposer composer_;
-  std::vector<TickMail> outgoing_;  // by shard
+  std::vector<ShardOutbox> outgoing_;  // by shard
   std::vector<std::weak_ptr<Connection>> connections_;
   bool is_draining_ = false;
 };

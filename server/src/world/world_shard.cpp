@@ -9,7 +9,7 @@
 #include "stridewire/runtime/movement_record.h"
 #include "world/convert.h"
 #include "world/inspect.h"
-#include "world/number_union.h"
+#include "world/id_set.h"
 
 namespace stridewire::server {
 
@@ -518,7 +518,7 @@ std::span<const std::uint32_t> WorldShard::NamedRows(PoseMode mode) {
   if (!are_named_rows_known_) {
     are_named_rows_known_ = true;
     for (std::size_t m = 0; m < named_rows_.size(); ++m) {
-      NumberUnion named;
+      IdSet named;
       for (const Interest& shard : interests_) {
         if (shard.poses[m].named != nullptr) named.Add(*shard.poses[m].named);
       }
@@ -546,7 +546,7 @@ bool WorldShard::HasRegions(PoseMode mode) const {
 bool WorldShard::HasRegionsOfSeveral(PoseMode mode) const {
   return std::ranges::any_of(interests_, [&](const Interest& shard) {
     const auto& regions = shard.poses[ModeIndex(mode)].regions;
-    return regions != nullptr && std::ranges::any_of(*regions, &RegionReach::is_one_of_several);
+    return regions != nullptr && std::ranges::any_of(*regions, &RegionFilter::is_one_of_several);
   });
 }
 
@@ -599,7 +599,7 @@ std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const
   for (const Interest& shard : interests_) {
     const auto& regions = shard.poses[ModeIndex(mode)].regions;
     if (regions == nullptr) continue;
-    for (const RegionReach& region : *regions) {
+    for (const RegionFilter& region : *regions) {
       const double beyond_m2 = region.beyond_m * region.beyond_m;
       const auto take_beyond = [&](std::uint32_t row, double x, double z) {
         // Told as RegionMembers tells in which ring one is.

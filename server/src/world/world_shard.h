@@ -11,7 +11,7 @@
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
-#include "world/mail.h"
+#include "world/shard_messages.h"
 #include "world/pose_frames.h"
 #include "world/poses_ahead.h"
 #include "world/tick_clock.h"

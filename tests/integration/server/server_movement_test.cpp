@@ -10,7 +10,7 @@
 #include <set>
 #include <string>
 
-#include "movement_view.h"
+#include "replica_set.h"
 #include "random.h"
 #include "stridewire/offline/open_library.h"
 #include "test_server.h"
@@ -26,7 +26,7 @@ using server::ThreadMetrics;
 using PoseBytes = std::vector<std::byte>;
 using Shown = std::map<std::pair<std::uint64_t, AvatarId>, PoseBytes>;  // by tick and avatar
 
-class Keeper : public client::PoseScreen {
+class Keeper : public client::PoseSink {
  public:
   void Show(AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
             ConstPoseSpan pose) override {
@@ -131,7 +131,7 @@ class BothWays {
 
   RawClient& client() { return client_; }
   const Keeper& told() const { return told_; }
-  const client::MovementView& view() const { return view_; }
+  const client::ReplicaSet& view() const { return view_; }
   const Shown& full() const { return full_; }
   int states() const { return states_; }
   const std::map<AvatarId, int>& told_of() const { return told_of_; }
@@ -142,7 +142,7 @@ class BothWays {
  private:
   RawClient client_;
   protocol::WorldId world_ = 0;
-  client::MovementView view_;
+  client::ReplicaSet view_;
   Keeper told_;
   Shown full_;
   int states_ = 0;

@@ -180,9 +180,9 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
   EXPECT_EQ(members.every(PoseMode::kCompactFewer), 3);
   EXPECT_EQ(members.every(PoseMode::kCompactRoot), 4);
   EXPECT_EQ(members.every(PoseMode::kQuantised), 0);
-  EXPECT_EQ(members.reach(PoseMode::kCompact), (RegionReach{0.0, 0.0, 18.0, 0.0, true}));
-  EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionReach{0.0, 0.0, 12.0, 6.0, true}));
-  EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionReach{0.0, 0.0, 29.0, 18.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompact), (RegionFilter{0.0, 0.0, 18.0, 0.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionFilter{0.0, 0.0, 12.0, 6.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionFilter{0.0, 0.0, 29.0, 18.0, true}));
 
   std::map<AvatarId, std::pair<float, float>> at;
   std::set<AvatarId> inside;
@@ -213,7 +213,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
     for (const PoseMode mode :
          {PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot}) {
       if (tick % members.every(mode) != 0) continue;
-      const RegionReach reach = members.reach(mode);
+      const RegionFilter reach = members.reach(mode);
       std::set<AvatarId> without;
       for (const auto& [number, place] : at) {
         const double distance_m = distance_of(number);
@@ -264,7 +264,7 @@ TEST(RegionMembers, OfOneModeHaveTheWholeReach) {
   RegionMembers members;
   protocol::Region region{{1.0, 2.0}, 20.0, 5.0, {{6.0, 2}}, {}};
   members.Move(region, 8.0, 4, PoseMode::kCompact);
-  const RegionReach whole{1.0, 2.0, 25.0, 0.0, false};
+  const RegionFilter whole{1.0, 2.0, 25.0, 0.0, false};
   EXPECT_EQ(members.reach(PoseMode::kCompact), whole);
   region.ring_details = {protocol::PoseDetail::kAll};
   members.Move(region, 8.0, 4, PoseMode::kCompactRoot);

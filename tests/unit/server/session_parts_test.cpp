@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "session/event_replay.h"
-#include "session/reply_memory.h"
+#include "session/reply_cache.h"
 #include "session/session_directory.h"
 #include "session/token_bucket.h"
 
@@ -11,44 +11,44 @@ namespace stridewire::server {
 namespace {
 
 using testing::ElementsAre;
-using Known = ReplyMemory::Verdict;
+using Known = ReplyCache::Verdict;
 
 SharedFrame FrameOf(std::size_t bytes) {
   return std::make_shared<const std::vector<std::byte>>(bytes);
 }
 
-TEST(ReplyMemory, TakesCommandsInOrderAndOnce) {
-  ReplyMemory memory(10, 1000);
+TEST(ReplyCache, TakesCommandsInOrderAndOnce) {
+  ReplyCache memory(10, 1000);
   EXPECT_EQ(memory.last_seq(), 0u);
-  EXPECT_EQ(memory.Judge(1), Known::kNew);
-  EXPECT_EQ(memory.Judge(2), Known::kGap);
+  EXPECT_EQ(memory.Classify(1), Known::kNew);
+  EXPECT_EQ(memory.Classify(2), Known::kGap);
   memory.Take(1);
   EXPECT_EQ(memory.last_seq(), 1u);
-  EXPECT_EQ(memory.Judge(1), Known::kPending);
-  EXPECT_EQ(memory.Judge(2), Known::kNew);
+  EXPECT_EQ(memory.Classify(1), Known::kPending);
+  EXPECT_EQ(memory.Classify(2), Known::kNew);
   memory.Take(2);
   const SharedFrame second = FrameOf(10);
   EXPECT_EQ(memory.Remember(2, second, 5), 0u);  // answers may come in any order
-  EXPECT_EQ(memory.Judge(1), Known::kPending);
-  EXPECT_EQ(memory.Judge(2), Known::kAnswered);
+  EXPECT_EQ(memory.Classify(1), Known::kPending);
+  EXPECT_EQ(memory.Classify(2), Known::kAnswered);
   EXPECT_EQ(memory.Find(2).reply, second);
   EXPECT_EQ(memory.Find(2).joined, 5u);
 }
 
-TEST(ReplyMemory, ForgetsTheOldestBeyondItsCount) {
-  ReplyMemory memory(3, 1000);
+TEST(ReplyCache, ForgetsTheOldestBeyondItsCount) {
+  ReplyCache memory(3, 1000);
   for (protocol::Seq seq = 1; seq <= 5; ++seq) {
     memory.Take(seq);
     memory.Remember(seq, FrameOf(1), 0);
   }
-  EXPECT_EQ(memory.Judge(1), Known::kForgotten);
-  EXPECT_EQ(memory.Judge(2), Known::kForgotten);
-  EXPECT_EQ(memory.Judge(3), Known::kAnswered);
-  EXPECT_EQ(memory.Judge(6), Known::kNew);
+  EXPECT_EQ(memory.Classify(1), Known::kForgotten);
+  EXPECT_EQ(memory.Classify(2), Known::kForgotten);
+  EXPECT_EQ(memory.Classify(3), Known::kAnswered);
+  EXPECT_EQ(memory.Classify(6), Known::kNew);
 }
 
-TEST(ReplyMemory, ForgetsTheOldestBeyondItsBytesButKeepsTheLast) {
-  ReplyMemory memory(100, 1000);
+TEST(ReplyCache, ForgetsTheOldestBeyondItsBytesButKeepsTheLast) {
+  ReplyCache memory(100, 1000);
   for (protocol::Seq seq = 1; seq <= 50; ++seq) {
     memory.Take(seq);
     memory.Remember(seq, FrameOf(300), 0);
@@ -56,20 +56,20 @@ TEST(ReplyMemory, ForgetsTheOldestBeyondItsBytesButKeepsTheLast) {
   }
   memory.Take(51);
   memory.Remember(51, FrameOf(5000), 0);
-  EXPECT_EQ(memory.Judge(51), Known::kAnswered);
-  EXPECT_EQ(memory.Judge(50), Known::kForgotten);
+  EXPECT_EQ(memory.Classify(51), Known::kAnswered);
+  EXPECT_EQ(memory.Classify(50), Known::kForgotten);
 }
 
-TEST(ReplyMemory, NeverForgetsWhatIsNotAnswered) {
-  ReplyMemory memory(2, 10);
+TEST(ReplyCache, NeverForgetsWhatIsNotAnswered) {
+  ReplyCache memory(2, 10);
   memory.Take(1);
   for (protocol::Seq seq = 2; seq <= 9; ++seq) {
     memory.Take(seq);
     EXPECT_EQ(memory.Remember(seq, FrameOf(100), 0), 0u);
   }
-  EXPECT_EQ(memory.Judge(1), Known::kPending);
+  EXPECT_EQ(memory.Classify(1), Known::kPending);
   EXPECT_EQ(memory.Remember(1, FrameOf(100), 0), 8u);
-  EXPECT_EQ(memory.Judge(9), Known::kAnswered);
+  EXPECT_EQ(memory.Classify(9), Known::kAnswered);
 }
 
 TEST(EventReplay, GivesBackWhatCameAfterANumber) {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "world/number_union.h"
+#include "world/id_set.h"
 #include "world/pose_frames.h"
 
 namespace stridewire::server {
@@ -138,8 +138,8 @@ TEST(Subscriptions, TellOnceThatNoneIsThere) {
   EXPECT_FALSE(all.Pick(DeliveryOf({1})).has_value());
 }
 
-TEST(NumberUnion, HasEachNumberOnceInOrder) {
-  NumberUnion numbers;
+TEST(IdSet, HasEachNumberOnceInOrder) {
+  IdSet numbers;
   EXPECT_TRUE(numbers.Take().empty());
   numbers.Add(std::vector<AvatarId>{64, 3, ~AvatarId{0}});
   numbers.Add(std::vector<AvatarId>{1u << 20, 63, 3, (1u << 20) - 1, 0, ~AvatarId{0}});

@@ -322,8 +322,8 @@ TEST(WorldShard, EncodesOfARingThoseInItAndTellsPlacesWhenNobodyIs) {
   PoseInterest& full = interest.poses[ModeIndex(PoseMode::kFull)];
   full.every.some = 1;
   const auto ring = [&](double reach_m, double beyond_m, bool is_one_of_several) {
-    full.regions = std::make_shared<const std::vector<RegionReach>>(
-        1, RegionReach{0.0, 0.0, reach_m, beyond_m, is_one_of_several});
+    full.regions = std::make_shared<const std::vector<RegionFilter>>(
+        1, RegionFilter{0.0, 0.0, reach_m, beyond_m, is_one_of_several});
     bench.shard.SetInterest(interest);
   };
   SpawnPart part;

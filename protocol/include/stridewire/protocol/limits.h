@@ -59,7 +59,7 @@ inline constexpr std::size_t kMaxPieceBytes = std::size_t{1} << 20;  ///< Of a l
 inline constexpr std::size_t kMaxLibraryBytes = std::size_t{1} << 30;
 inline constexpr std::uint16_t kMaxEveryNTicks = 3600;
 inline constexpr std::uint16_t kMaxBatchParts = 1024;
-inline constexpr std::uint32_t kReplyMemory = 1024;  ///< Answers a server remembers a session.
+inline constexpr std::uint32_t kReplyCache = 1024;  ///< Answers a server remembers a session.
 inline constexpr int kMaxDepth = 4;                  ///< Nesting of tables.
 
 }  // namespace stridewire::protocol

@@ -332,7 +332,7 @@ struct ServerLimits {
   std::uint32_t max_items = static_cast<std::uint32_t>(kMaxItems);
   std::uint32_t max_avatars_per_world = 0;
   std::uint32_t max_queue = 0;  ///< Requests waiting, per avatar.
-  std::uint32_t reply_memory = kReplyMemory;
+  std::uint32_t reply_memory = kReplyCache;
   double idle_timeout_s = 0.0;   ///< A connection silent for longer is closed; 0: never.
   double resume_window_s = 0.0;  ///< How long a session waits for its client; 0: not at all.
   bool operator==(const ServerLimits&) const = default;

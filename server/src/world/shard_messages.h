@@ -133,7 +133,7 @@ inline constexpr std::array kSentModes{
 }
 
 /// A circle or ring on the ground whose avatars are of interest.
-struct RegionReach {
+struct RegionFilter {
   double x = 0.0;
   double z = 0.0;
   double reach_m = 0.0;
@@ -141,7 +141,7 @@ struct RegionReach {
   /// Others of its session's are of other modes. Its deliveries come even with nobody's pose: who was in one of those may
   /// have left, which only places tell.
   bool is_one_of_several = false;
-  bool operator==(const RegionReach&) const = default;
+  bool operator==(const RegionFilter&) const = default;
 };
 
 /// What the sessions of a shard want of the poses of a world in one mode.
@@ -156,7 +156,7 @@ struct PoseInterest {
   /// Avatars named by any session, growing; null: none. Of who wants all there are none in it.
   std::shared_ptr<const std::vector<AvatarId>> named;
   /// Regions that any session observes; null: none.
-  std::shared_ptr<const std::vector<RegionReach>> regions;
+  std::shared_ptr<const std::vector<RegionFilter>> regions;
 };
 
 /// What the sessions of a shard want of a world; replaces what that shard said before.
@@ -202,7 +202,7 @@ struct EventDelivery {
 };
 
 /// All that one shard has for another after a tick; one post.
-struct TickMail {
+struct ShardOutbox {
   std::vector<CommandResult> results;
   std::vector<EventDelivery> events;
   std::vector<PoseDelivery> poses;

@@ -15,7 +15,7 @@ namespace stridewire::server {
 ///
 /// Bounded: at most `max_count` commands back, and at most `max_bytes` of answers, the last answer
 /// apart; older ones are forgotten, unanswered ones never.
-class ReplyMemory {
+class ReplyCache {
  public:
   enum class Verdict : std::uint8_t {
     kNew,        ///< The next one: take it.
@@ -29,10 +29,10 @@ class ReplyMemory {
     WorldId joined = 0;  ///< The world of a JoinWorld, else 0.
   };
 
-  ReplyMemory(std::size_t max_count, std::size_t max_bytes)
+  ReplyCache(std::size_t max_count, std::size_t max_bytes)
       : max_count_(max_count), max_bytes_(max_bytes) {}
 
-  [[nodiscard]] Verdict Judge(protocol::Seq seq) const;
+  [[nodiscard]] Verdict Classify(protocol::Seq seq) const;
 
   /// A command judged kNew is taken.
   void Take(protocol::Seq seq);

@@ -1,24 +1,24 @@
-#include "movement_view.h"
+#include "replica_set.h"
 
 #include <utility>
 
 namespace stridewire::client {
 
-MovementView::MovementView(std::shared_ptr<const MotionLibrary> library, double tick_s,
+ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s,
                            std::size_t max_avatars)
     : library_(std::move(library)),
       tick_s_(tick_s),
       max_avatars_(max_avatars),
       evaluator_(*library_, 1) {}
 
-std::size_t MovementView::avatar_count() const {
+std::size_t ReplicaSet::avatar_count() const {
   std::size_t count = 0;
   for (const auto& [number, shard] : shards_) count += shard.avatars.size();
   return count;
 }
 
-Status MovementView::Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
-                           PoseScreen& screen) {
+Status ReplicaSet::Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
+                           PoseSink& screen) {
   const protocol::AvatarId avatar = message.avatars[i];
   if ((message.flags[i] & protocol::kMovementGone) != 0) {
     if (shard.avatars.erase(avatar) > 0) screen.Gone(avatar);
@@ -37,8 +37,8 @@ Status MovementView::Apply(const protocol::Movements& message, std::size_t i, Sh
   return told->second.replica->Apply(message.record(i));
 }
 
-void MovementView::Show(const protocol::Movements& message, protocol::AvatarId avatar,
-                        Told& told, PoseScreen& screen) {
+void ReplicaSet::Show(const protocol::Movements& message, protocol::AvatarId avatar,
+                        Told& told, PoseSink& screen) {
   const PoseStamp stamp{.tick = message.tick,
                         .time_s = message.server_time_s,
                         .discontinuity = std::exchange(told.is_new, false),
@@ -46,7 +46,7 @@ void MovementView::Show(const protocol::Movements& message, protocol::AvatarId a
   screen.Show(avatar, message.shard, stamp, told.replica->pose());
 }
 
-Status MovementView::Take(const protocol::Movements& message, PoseScreen& screen) {
+Status ReplicaSet::Take(const protocol::Movements& message, PoseSink& screen) {
   if (!shards_.contains(message.shard) && shards_.size() == kMaxShards) {
     return Fail(ErrorCode::kLimitExceeded, "movements come from too many shards", message.shard);
   }

@@ -12,10 +12,10 @@
 
 namespace stridewire::client {
 
-/// Who takes the poses that a MovementView makes.
-class PoseScreen {
+/// Who takes the poses that a ReplicaSet makes.
+class PoseSink {
  public:
-  virtual ~PoseScreen() = default;
+  virtual ~PoseSink() = default;
   virtual void Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                     ConstPoseSpan pose) = 0;
   virtual void Gone(protocol::AvatarId avatar) = 0;
@@ -26,18 +26,18 @@ class PoseScreen {
 /// The avatars of a world, evaluated here from what they are told to begin (protocol/STANDARD.md, "Movement records"): bit by
 /// bit the server's poses of its ticks. Where a message is missing nothing is known of a shard's avatars until their
 /// states come.
-class MovementView {
+class ReplicaSet {
  public:
   /// More shards than this in one world are refused.
   static constexpr std::size_t kMaxShards = 1024;
 
   /// At most `max_avatars`, others are left out; each takes some 10 KB.
-  MovementView(std::shared_ptr<const MotionLibrary> library, double tick_s,
+  ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s,
                std::size_t max_avatars);
 
   /// Takes in one message and shows what it makes known. kMalformed and others: a record that is none, or of
   /// another library.
-  [[nodiscard]] Status Take(const protocol::Movements& message, PoseScreen& screen);
+  [[nodiscard]] Status Take(const protocol::Movements& message, PoseSink& screen);
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
   [[nodiscard]] std::size_t avatar_count() const;
@@ -55,9 +55,9 @@ class MovementView {
   };
 
   [[nodiscard]] Status Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
-                             PoseScreen& screen);
+                             PoseSink& screen);
   void Show(const protocol::Movements& message, protocol::AvatarId avatar, Told& told,
-            PoseScreen& screen);
+            PoseSink& screen);
 
   std::shared_ptr<const MotionLibrary> library_;
   double tick_s_;

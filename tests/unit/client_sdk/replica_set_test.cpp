@@ -1,4 +1,4 @@
-#include "movement_view.h"
+#include "replica_set.h"
 
 #include <gtest/gtest.h>
 
@@ -18,7 +18,7 @@ using protocol::Movements;
 
 constexpr double kTickS = 1.0 / 60.0;
 
-struct Screen : PoseScreen {
+struct Screen : PoseSink {
   void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
             ConstPoseSpan pose) override {
     Pose& kept = shown[avatar];
@@ -105,10 +105,10 @@ class Server {
   std::uint64_t step_ = 0;
 };
 
-TEST(MovementView, ShowsFromTheStatesOn) {
+TEST(ReplicaSet, ShowsFromTheStatesOn) {
   Server server(5);
   Screen screen;
-  MovementView view(server.library(), kTickS, 100);
+  ReplicaSet view(server.library(), kTickS, 100);
   for (int i = 0; i < 30; ++i) (void)server.Step();
   ASSERT_TRUE(view.Take(server.Step(), screen));
   EXPECT_EQ(view.avatar_count(), 0u);
@@ -122,10 +122,10 @@ TEST(MovementView, ShowsFromTheStatesOn) {
   EXPECT_FALSE(screen.stamps[1].discontinuity);
 }
 
-TEST(MovementView, StepsOfOneTickAreShownOnceAndPartsWaitForEachOther) {
+TEST(ReplicaSet, StepsOfOneTickAreShownOnceAndPartsWaitForEachOther) {
   Server server(5);
   Screen screen;
-  MovementView view(server.library(), kTickS, 100);
+  ReplicaSet view(server.library(), kTickS, 100);
   ASSERT_TRUE(view.Take(server.Step(), screen));  // all are new: states
   ASSERT_EQ(server.Same(screen), 5);
   const std::uint64_t before = screen.stamps[1].tick;
@@ -141,10 +141,10 @@ TEST(MovementView, StepsOfOneTickAreShownOnceAndPartsWaitForEachOther) {
   EXPECT_EQ(server.Same(screen), 5);
 }
 
-TEST(MovementView, KnowsNobodyBehindAGapUntilStatesCome) {
+TEST(ReplicaSet, KnowsNobodyBehindAGapUntilStatesCome) {
   Server server(5);
   Screen screen;
-  MovementView view(server.library(), kTickS, 100);
+  ReplicaSet view(server.library(), kTickS, 100);
   ASSERT_TRUE(view.Take(server.Step(), screen));
   for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Take(server.Step(), screen));
   (void)server.Step();
@@ -166,11 +166,11 @@ TEST(MovementView, KnowsNobodyBehindAGapUntilStatesCome) {
   EXPECT_EQ(view.avatar_count(), 0u);
 }
 
-TEST(MovementView, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
+TEST(ReplicaSet, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
   Server server(5);
   Screen screen;
   screen.unwanted = 2;
-  MovementView view(server.library(), kTickS, 3);
+  ReplicaSet view(server.library(), kTickS, 3);
   ASSERT_TRUE(view.Take(server.Step(), screen));
   EXPECT_EQ(view.avatar_count(), 3u);  // 1, 3, 4
   Movements message = server.Step();
@@ -181,10 +181,10 @@ TEST(MovementView, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
   EXPECT_EQ(screen.gone, std::set<AvatarId>{3});
 }
 
-TEST(MovementView, ARecordThatIsNoneIsRefused) {
+TEST(ReplicaSet, ARecordThatIsNoneIsRefused) {
   Server server(2);
   Screen screen;
-  MovementView view(server.library(), kTickS, 100);
+  ReplicaSet view(server.library(), kTickS, 100);
   Movements message = server.Step();
   message.records.pop_back();
   --message.ends.back();

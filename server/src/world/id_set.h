@@ -11,7 +11,7 @@
 namespace stridewire::server {
 
 /// Collects avatar numbers of many lists, each once. Most are small and lie close together.
-class NumberUnion {
+class IdSet {
  public:
   void Add(std::span<const AvatarId> numbers) {
     for (const AvatarId number : numbers) {

@@ -1,4 +1,4 @@
-#include "session/reply_memory.h"
+#include "session/reply_cache.h"
 
 #include <utility>
 
@@ -6,19 +6,19 @@
 
 namespace stridewire::server {
 
-ReplyMemory::Verdict ReplyMemory::Judge(protocol::Seq seq) const {
+ReplyCache::Verdict ReplyCache::Classify(protocol::Seq seq) const {
   if (seq > last_seq()) return seq == last_seq() + 1 ? Verdict::kNew : Verdict::kGap;
   if (seq < first_) return Verdict::kForgotten;
   return answers_[seq - first_].reply == nullptr ? Verdict::kPending : Verdict::kAnswered;
 }
 
-void ReplyMemory::Take(protocol::Seq seq) {
+void ReplyCache::Take(protocol::Seq seq) {
   STRIDEWIRE_CHECK(seq == last_seq() + 1);
   answers_.emplace_back();
 }
 
-std::size_t ReplyMemory::Remember(protocol::Seq seq, SharedFrame reply, WorldId joined) {
-  STRIDEWIRE_CHECK(Judge(seq) == Verdict::kPending);
+std::size_t ReplyCache::Remember(protocol::Seq seq, SharedFrame reply, WorldId joined) {
+  STRIDEWIRE_CHECK(Classify(seq) == Verdict::kPending);
   bytes_ += reply->size();
   answers_[seq - first_] = {std::move(reply), joined};
   std::size_t forgotten = 0;
@@ -32,8 +32,8 @@ std::size_t ReplyMemory::Remember(protocol::Seq seq, SharedFrame reply, WorldId 
   return forgotten;
 }
 
-const ReplyMemory::Answer& ReplyMemory::Find(protocol::Seq seq) const {
-  STRIDEWIRE_CHECK(Judge(seq) == Verdict::kAnswered);
+const ReplyCache::Answer& ReplyCache::Find(protocol::Seq seq) const {
+  STRIDEWIRE_CHECK(Classify(seq) == Verdict::kAnswered);
   return answers_[seq - first_];
 }
 

@@ -1,4 +1,4 @@
-#include "session/gate.h"
+#include "session/handshake.h"
 
 #include <spdlog/spdlog.h>
 

@@ -1,4 +1,4 @@
-#include "patience.h"
+#include "progress.h"
 
 #include <unistd.h>
 
