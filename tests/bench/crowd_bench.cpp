@@ -17,7 +17,7 @@
 #include "stridewire/runtime/pose_quantization.h"
 #include "stridewire/runtime/reference_evaluation.h"
 #include "stridewire/runtime/evaluation_batcher.h"
-#include "world/poses_ahead.h"
+#include "world/encoded_pose_cache.h"
 
 namespace stridewire {
 namespace {
@@ -89,12 +89,12 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
-// Poses of each tick, evaluated some ticks ahead as the server does (server::PosesAhead), and not kept.
+// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and not kept.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
   // Spread over shards: threads that share nothing but the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
   Steps steps(library, count, plants_feet);
-  const auto turns = static_cast<int>(server::PosesAhead::TurnsOf(steps.walkers().size()));
+  const auto turns = static_cast<int>(server::EncodedPoseCache::TurnsOf(steps.walkers().size()));
   struct Ahead {
     std::uint32_t revision = 0;
     int left = 0;
@@ -138,10 +138,10 @@ void WholePose(benchmark::State& state, const Library& library) {
   }
   const auto codecs =
       protocol::CompactCodecs::Make(ChoosePoseQuantization(*library).joints, parents, {}).value();
-  server::PosesAhead ahead(std::make_shared<server::PoseScratch>(library), &codecs);
+  server::EncodedPoseCache ahead(std::make_shared<server::PoseScratch>(library), &codecs);
   constexpr auto kMode = protocol::PoseMode::kCompact;
   ahead.SetModes(std::array{kMode}, 1);
-  std::vector<server::PosesAhead::Place> kept(steps.walkers().size());
+  std::vector<server::EncodedPoseCache::Place> kept(steps.walkers().size());
   std::vector<protocol::AvatarId> numbers(steps.walkers().size());
   std::iota(numbers.begin(), numbers.end(), 1u);
   const auto avatars = std::make_shared<const std::vector<protocol::AvatarId>>(numbers);
@@ -165,7 +165,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     ahead.Finish();
     Status status = rows.Begin(info, avatars, codecs.Find(kMode));
     for (std::size_t i = 0; i < kept.size(); ++i) {
-      const server::PosesAhead::Encoded encoded = ahead.Of(kept[i], kMode);
+      const server::EncodedPoseCache::Encoded encoded = ahead.Of(kept[i], kMode);
       rows.AddEncoded(0, encoded.is_wide, encoded.bytes);
     }
     std::span<const std::uint32_t> left = all;
@@ -179,7 +179,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     return status;
   };
   // Until each has had its turn.
-  for (std::size_t i = 0; i < 2 * server::PosesAhead::kMost; ++i) (void)tick();
+  for (std::size_t i = 0; i < 2 * server::EncodedPoseCache::kMost; ++i) (void)tick();
   for (auto _ : state) {
     if (const Status status = tick(); !status) return state.SkipWithError(status.error().text);
     if (rows.pose_count() != kept.size()) return state.SkipWithError("poses are missing");
@@ -255,7 +255,7 @@ class LineAligned {
 // row of all examples; each pose is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
 void Floor(benchmark::State& state, const Library& library) {
   const auto count = static_cast<std::size_t>(state.range(0));
-  const std::size_t poses = server::PosesAhead::TurnsOf(count);
+  const std::size_t poses = server::EncodedPoseCache::TurnsOf(count);
   const std::size_t passed = poses / 2 + 3;
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);

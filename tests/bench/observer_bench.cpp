@@ -59,7 +59,7 @@ struct Crowd {
     std::vector<protocol::AvatarId> numbers(kAvatars);
     std::iota(numbers.begin(), numbers.end(), 1u);
     auto rows = std::make_shared<protocol::PoseRows>();
-    auto places = std::make_shared<server::Places>();
+    auto places = std::make_shared<server::SpatialGrid>();
     const Pose& pose = library->stand_pose();
     Status status =
         rows->Begin({.world = world->id,

@@ -66,7 +66,7 @@ RegionMembers::Change RegionMembers::Update(const PoseDelivery& delivery) {
 
 RegionMembers::Change RegionMembers::Update(int from_shard, std::uint64_t tick,
                                             const protocol::PoseRows::Avatars& avatars,
-                                            const Places& places, const protocol::PoseRows* rows,
+                                            const SpatialGrid& places, const protocol::PoseRows* rows,
                                             PoseMode mode) {
   const auto has_pose = [&](std::uint32_t row) { return rows == nullptr || rows->has_pose(row); };
   Lane& lane = lanes_[from_shard];

@@ -54,7 +54,7 @@ class RegionMembers {
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
   /// The same of all avatars of a shard, whose poses nobody asks for.
   [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
-                              const protocol::PoseRows::Avatars& avatars, const Places& places) {
+                              const protocol::PoseRows::Avatars& avatars, const SpatialGrid& places) {
     return Update(from_shard, tick, avatars, places, nullptr, protocol::PoseMode::kMovement);
   }
   /// Who of a shard is in it, growing.
@@ -63,7 +63,7 @@ class RegionMembers {
  private:
   // `rows` null: all have poses.
   [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
-                              const protocol::PoseRows::Avatars& avatars, const Places& places,
+                              const protocol::PoseRows::Avatars& avatars, const SpatialGrid& places,
                               const protocol::PoseRows* rows, protocol::PoseMode mode);
   struct Ring {
     double to_m = 0.0;

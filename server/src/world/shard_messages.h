@@ -10,7 +10,7 @@
 #include "net/shared_frame.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "world/places.h"
+#include "world/spatial_grid.h"
 #include "world/world.h"
 
 /// What shards send each other. Values only; the receiver owns what it gets.
@@ -180,7 +180,7 @@ struct PoseDelivery {
   /// What batches with some of them are made of: at least those that are named or in a region.
   std::shared_ptr<const protocol::PoseRows> rows;
   /// Where all of them are; null: nobody has a region.
-  std::shared_ptr<const Places> places;
+  std::shared_ptr<const SpatialGrid> places;
 };
 
 /// What the avatars of one world and shard began in a tick, step by step.
@@ -191,7 +191,7 @@ struct MovementDelivery {
   std::shared_ptr<const std::vector<protocol::Movements>> steps;
   /// Whose, and where they are after it; null: nobody has a region.
   protocol::PoseRows::Avatars avatars;
-  std::shared_ptr<const Places> places;
+  std::shared_ptr<const SpatialGrid> places;
 };
 
 /// Events of one world, shard and tick.

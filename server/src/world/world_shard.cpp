@@ -573,10 +573,10 @@ void WorldShard::ShowPoses(std::span<const std::uint32_t> rows) {
   Avatar::ShowPoses(shown_, ahead_.evaluator());
 }
 
-std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
+std::shared_ptr<const SpatialGrid> WorldShard::PlacesAt(std::uint64_t tick) {
   if (places_ != nullptr && places_tick_ == tick) return places_;
   const std::span<const InOrder> in_order = AvatarsInOrder();
-  auto places = std::make_shared<Places>();
+  auto places = std::make_shared<SpatialGrid>();
   places->Begin(world_->interest_cell_m, in_order.size());
   KeepPoses(all_rows_);
   for (std::size_t i = 0; i < in_order.size(); ++i) {
@@ -589,7 +589,7 @@ std::shared_ptr<const Places> WorldShard::PlacesAt(std::uint64_t tick) {
   return places_;
 }
 
-std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const Places& places) {
+std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const SpatialGrid& places) {
   is_near_.resize(numbers_->size());
   near_rows_.clear();
   const auto take = [&](std::uint32_t row) {
@@ -653,7 +653,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
     if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
     rows.SkipTo(wanted[i]);
     if (is_compact) {
-      const PosesAhead::Encoded encoded = ahead_.Of(entry.ahead, mode);
+      const EncodedPoseCache::Encoded encoded = ahead_.Of(entry.ahead, mode);
       rows.AddEncoded(flags, encoded.is_wide, encoded.bytes);
     } else {
       const ConstPoseSpan pose = entry.avatar.pose();

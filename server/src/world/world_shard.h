@@ -13,7 +13,7 @@
 #include "stridewire/runtime/avatar.h"
 #include "world/shard_messages.h"
 #include "world/pose_frames.h"
-#include "world/poses_ahead.h"
+#include "world/encoded_pose_cache.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
 
@@ -87,7 +87,7 @@ class WorldShard {
     Avatar avatar;
     SessionId owner = 0;
     std::uint64_t spawn_tick = 0;
-    PosesAhead::Place ahead;
+    EncodedPoseCache::Place ahead;
   };
   // What Encode reads of who is quiet.
   static void Prefetch(const Entry& entry) {
@@ -114,8 +114,8 @@ class WorldShard {
   bool HasRegionsOfSeveral(protocol::PoseMode mode) const;
   void KeepPoses(std::span<const std::uint32_t> rows);
   void ShowPoses(std::span<const std::uint32_t> rows);
-  std::shared_ptr<const Places> PlacesAt(std::uint64_t tick);
-  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const Places& places);
+  std::shared_ptr<const SpatialGrid> PlacesAt(std::uint64_t tick);
+  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const SpatialGrid& places);
   void TellMovements();
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
@@ -128,7 +128,7 @@ class WorldShard {
   TickClock clock_;
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
-  PosesAhead ahead_;                       // before the avatars, whose places are in it
+  EncodedPoseCache ahead_;                       // before the avatars, whose places are in it
   std::map<AvatarId, Entry> avatars_;  // in order, so that batches and events are
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
@@ -144,7 +144,7 @@ class WorldShard {
   bool are_named_rows_known_ = false;
   std::vector<std::uint32_t> near_rows_;  // those last asked for, by any mode
   std::vector<std::uint8_t> is_near_;     // by row, all 0 between
-  std::shared_ptr<const Places> places_;  // of places_tick_
+  std::shared_ptr<const SpatialGrid> places_;  // of places_tick_
   std::uint64_t places_tick_ = 0;
   std::uint16_t max_every_ = 1;
   bool events_wanted_ = false;

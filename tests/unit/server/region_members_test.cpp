@@ -22,7 +22,7 @@ PoseDelivery DeliveryAt(const std::map<AvatarId, std::pair<float, float>>& at,
                         std::uint64_t tick, int shard = 0,
                         const std::set<AvatarId>& without = {}, double cell_m = 8.0) {
   auto rows = std::make_shared<protocol::PoseRows>();
-  auto places = std::make_shared<Places>();
+  auto places = std::make_shared<SpatialGrid>();
   std::vector<AvatarId> numbers;
   for (const auto& [number, place] : at) numbers.push_back(number);
   EXPECT_TRUE(rows->Begin({1, 0, 0, 1, tick, 0.0, protocol::PoseMode::kFull, 1},
@@ -52,12 +52,12 @@ std::vector<AvatarId> NumbersOfRows(const PoseDelivery& delivery,
   return numbers;
 }
 
-TEST(Places, FindsAllNearAPlaceHoweverLargeTheCells) {
+TEST(SpatialGrid, FindsAllNearAPlaceHoweverLargeTheCells) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << "\n";
   Random random(seed);
   for (const double cell_m : {1.0, 8.0, 1000.0}) {
-    Places places;
+    SpatialGrid places;
     places.Begin(cell_m, 300);
     std::vector<std::pair<float, float>> at;
     for (std::uint32_t row = 0; row < 300; ++row) {

@@ -1,4 +1,4 @@
-#include "world/places.h"
+#include "world/spatial_grid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,30 +6,30 @@
 
 namespace stridewire::server {
 
-void Places::Begin(double cell_m, std::size_t count) {
+void SpatialGrid::Begin(double cell_m, std::size_t count) {
   cells_per_m_ = 1.0 / cell_m;
   entries_.clear();
   entries_.reserve(count);
 }
 
-void Places::Add(std::uint32_t row, float x, float z) {
+void SpatialGrid::Add(std::uint32_t row, float x, float z) {
   entries_.push_back({CellOf(x), CellOf(z), row, x, z});
 }
 
-void Places::Sort() {
+void SpatialGrid::Sort() {
   std::ranges::sort(entries_, {}, [](const Entry& entry) {
     return std::tuple(entry.column, entry.cell, entry.row);
   });
 }
 
-std::int64_t Places::CellOf(double metres) const {
+std::int64_t SpatialGrid::CellOf(double metres) const {
   // Regions may lie anywhere, avatars within some hundred kilometres.
   constexpr double kFarthest = 1e9;
   return static_cast<std::int64_t>(
       std::floor(std::clamp(metres * cells_per_m_, -kFarthest, kFarthest)));
 }
 
-std::size_t Places::LowerBound(std::int64_t column, std::int64_t cell) const {
+std::size_t SpatialGrid::LowerBound(std::int64_t column, std::int64_t cell) const {
   const auto found = std::ranges::lower_bound(
       entries_, std::pair(column, cell), {},
       [](const Entry& entry) { return std::pair(entry.column, entry.cell); });

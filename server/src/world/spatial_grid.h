@@ -8,7 +8,7 @@ namespace stridewire::server {
 
 /// Where the avatars of a tick are on the ground, sorted into the cells of a grid, so that those near a place are
 /// found without looking at all. Filled by one thread, then read by any.
-class Places {
+class SpatialGrid {
  public:
   /// Starts anew; `cell_m` above 0.
   void Begin(double cell_m, std::size_t count);

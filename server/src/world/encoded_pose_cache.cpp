@@ -1,4 +1,4 @@
-#include "world/poses_ahead.h"
+#include "world/encoded_pose_cache.h"
 
 #include <algorithm>
 #include <bit>
@@ -24,17 +24,17 @@ static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMostBehi
 
 PoseScratch::PoseScratch(std::shared_ptr<const MotionLibrary> of_library)
     : library(std::move(of_library)),
-      evaluator(*library, static_cast<int>(PosesAhead::kMost)),
+      evaluator(*library, static_cast<int>(EncodedPoseCache::kMost)),
       taken(library->skeleton().joint_count()),
       pose(library->skeleton().joint_count()) {}
 
-PosesAhead::PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs)
+EncodedPoseCache::EncodedPoseCache(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs)
     : scratch_(std::move(scratch)),
       codecs_(codecs),
       pose_bytes_(kRootBytes),
       wide_bytes_(protocol::PoseBytes(PoseMode::kQuantised, scratch_->taken.joint_count())) {}
 
-void PosesAhead::SetModes(std::span<const PoseMode> compact_modes, int ticks_apart) {
+void EncodedPoseCache::SetModes(std::span<const PoseMode> compact_modes, int ticks_apart) {
   STRIDEWIRE_CHECK(compact_modes.size() <= kModes && ticks_apart >= 1);
   std::vector<Mode> modes;
   std::size_t at = 0;
@@ -55,7 +55,7 @@ void PosesAhead::SetModes(std::span<const PoseMode> compact_modes, int ticks_apa
   Forget();
 }
 
-void PosesAhead::Forget() {
+void EncodedPoseCache::Forget() {
   if (++layout_ == 0) layout_ = 1;
   for (Kept& kept : kept_) kept.layout = 0;
   others_.clear();
@@ -66,7 +66,7 @@ void PosesAhead::Forget() {
   SizePlanes();
 }
 
-void PosesAhead::SizePlanes() {
+void EncodedPoseCache::SizePlanes() {
   const std::size_t bytes = kept_.size() * pose_bytes_;
   const std::size_t lines = (bytes + kCacheLineBytes - 1) / kCacheLineBytes;
   for (std::size_t i = 0; i < planes_.size(); ++i) {
@@ -76,7 +76,7 @@ void PosesAhead::SizePlanes() {
   }
 }
 
-void PosesAhead::Begin(std::uint64_t step, double step_s, std::size_t shown) {
+void EncodedPoseCache::Begin(std::uint64_t step, double step_s, std::size_t shown) {
   STRIDEWIRE_CHECK(wanted_.empty() && taken_count_ == 0);
   if (ring_ == kMost && std::max(kept_.size(), shown) > kMany) {
     ring_ = kMost / 2;
@@ -88,7 +88,7 @@ void PosesAhead::Begin(std::uint64_t step, double step_s, std::size_t shown) {
   shown_ = shown;
 }
 
-void PosesAhead::MakePlace(Place& place) {
+void EncodedPoseCache::MakePlace(Place& place) {
   if (place.of_ != nullptr) return;
   if (free_.empty()) {
     // For all that are shown, or by an eighth: planes are large.
@@ -105,7 +105,7 @@ void PosesAhead::MakePlace(Place& place) {
   free_.pop_back();
 }
 
-void PosesAhead::Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays) {
+void EncodedPoseCache::Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays) {
   Kept& kept = kept_[place];
   if (kept.is_any_other) others_.erase(place);
   kept = {.first_step = step_,
@@ -118,7 +118,7 @@ void PosesAhead::Start(std::uint32_t place, std::uint64_t revision, std::size_t 
 }
 
 // Who is sent elsewhere again and again makes few poses in vain.
-std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t revision) const {
+std::uint8_t EncodedPoseCache::CutsAfter(const Kept& kept, std::uint64_t revision) const {
   constexpr std::uint8_t kMostCuts = 3;
   if (kept.layout != layout_ || kept.stays || kept.count == 0) return kept.cuts;
   if (kept.revision != static_cast<std::uint32_t>(revision) && PoseOf(kept) < kept.count) {
@@ -127,7 +127,7 @@ std::uint8_t PosesAhead::CutsAfter(const Kept& kept, std::uint64_t revision) con
   return kept.cuts > 0 ? kept.cuts - 1 : 0;
 }
 
-void PosesAhead::Ask(Place& place, Avatar& avatar) {
+void EncodedPoseCache::Ask(Place& place, Avatar& avatar) {
   // Layers go on by themselves, whatever the avatar does.
   const bool has_layers = !avatar.is_event_free() && !avatar.layers().empty();
   if (!has_layers && Has(place, avatar.revision())) return;
@@ -139,7 +139,7 @@ void PosesAhead::Ask(Place& place, Avatar& avatar) {
   Take(place, avatar.revision(), avatar.pose(), !has_layers);
 }
 
-void PosesAhead::Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s) {
+void EncodedPoseCache::Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s) {
   MakePlace(place);
   Kept& kept = kept_[place.index_];
   kept.cuts = CutsAfter(kept, revision);
@@ -149,7 +149,7 @@ void PosesAhead::Want(Place& place, std::uint64_t revision, const Movement& move
   wanted_.push_back({place.index_, 0, {&movement, time_s, step_s_, ticks_apart_}, false});
 }
 
-void PosesAhead::Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays) {
+void EncodedPoseCache::Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays) {
   MakePlace(place);
   Start(place.index_, revision, 1, stays);
   scratch_->taken.Set(taken_count_, pose);
@@ -157,12 +157,12 @@ void PosesAhead::Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, 
   if (taken_count_ == kLanes) KeepTaken();
 }
 
-void PosesAhead::KeepTaken() {
+void EncodedPoseCache::KeepTaken() {
   Keep(scratch_->taken, std::span(taken_for_).first(taken_count_), 0);
   taken_count_ = 0;
 }
 
-void PosesAhead::Finish() {
+void EncodedPoseCache::Finish() {
   if (taken_count_ > 0) KeepTaken();
   std::size_t poses = 0;
   const std::size_t turns = std::min(TurnsOf(shown_), ring_);
@@ -194,7 +194,7 @@ void PosesAhead::Finish() {
   });
 }
 
-void PosesAhead::Keep(const SoaPose& lanes, std::span<const std::uint32_t> places,
+void EncodedPoseCache::Keep(const SoaPose& lanes, std::span<const std::uint32_t> places,
                       std::size_t pose) {
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     modes_[m].codec->Encode({.roots_m = lanes.roots_m(),
@@ -220,7 +220,7 @@ void PosesAhead::Keep(const SoaPose& lanes, std::span<const std::uint32_t> place
   }
 }
 
-void PosesAhead::KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place,
+void EncodedPoseCache::KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place,
                           std::size_t pose, std::size_t mode) {
   lanes.Get(lane, scratch_->pose);
   kept_[place].is_any_other = 1;
@@ -235,7 +235,7 @@ void PosesAhead::KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t 
   others.flags[pose] |= static_cast<std::uint8_t>(1u << (is_told ? mode : mode + kModes));
 }
 
-PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
+EncodedPoseCache::Encoded EncodedPoseCache::Of(const Place& place, PoseMode mode) const {
   STRIDEWIRE_CHECK(place.of_ == this);
   const Kept& kept = kept_[place.index_];
   const std::size_t pose = PoseOf(kept);
@@ -251,7 +251,7 @@ PosesAhead::Encoded PosesAhead::Of(const Place& place, PoseMode mode) const {
   return {{BytesOf(place.index_, pose) + modes_[m].at, modes_[m].codec->pose_bytes()}};
 }
 
-PosesAhead::Encoded PosesAhead::OtherOf(std::uint32_t place, std::size_t pose,
+EncodedPoseCache::Encoded EncodedPoseCache::OtherOf(std::uint32_t place, std::size_t pose,
                                         std::size_t mode) const {
   const Others& others = others_.at(place);
   const unsigned flags = others.flags[pose];
@@ -268,7 +268,7 @@ PosesAhead::Encoded PosesAhead::OtherOf(std::uint32_t place, std::size_t pose,
   return {std::span(others.wide).subspan(before * wide_bytes_, wide_bytes_), true};
 }
 
-Vec3 PosesAhead::RootOf(const Place& place) const {
+Vec3 EncodedPoseCache::RootOf(const Place& place) const {
   const Kept& kept = kept_[place.index_];
   const std::byte* bytes = BytesOf(place.index_, PoseOf(kept));
   Vec3 root_m;

@@ -20,7 +20,7 @@ struct PoseScratch {
   explicit PoseScratch(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  SoaPoseEvaluator evaluator;  ///< Of PosesAhead::kMost
+  SoaPoseEvaluator evaluator;  ///< Of EncodedPoseCache::kMost
   EvaluationBatcher queue;
   SoaPose taken;
   Pose pose;
@@ -47,7 +47,7 @@ struct PoseScratch {
 ///
 /// It is more than caches hold: each avatar has cache lines of its own, which are written whole and past the caches, and
 /// are asked for before they are read.
-class PosesAhead {
+class EncodedPoseCache {
  public:
   static constexpr std::size_t kMost = 16;
   /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would not fill the lanes.
@@ -57,7 +57,7 @@ class PosesAhead {
   /// Of more avatars there are planes of kMost / 2 ticks only, for their memory.
   static constexpr std::size_t kMany = 32'768;
 
-  /// Where an avatar's poses are kept. Given back when the avatar goes, before PosesAhead does.
+  /// Where an avatar's poses are kept. Given back when the avatar goes, before EncodedPoseCache does.
   class Place {
    public:
     Place() = default;
@@ -72,15 +72,15 @@ class PosesAhead {
     }
 
    private:
-    friend class PosesAhead;
-    PosesAhead* of_ = nullptr;
+    friend class EncodedPoseCache;
+    EncodedPoseCache* of_ = nullptr;
     std::uint32_t index_ = 0;
   };
 
   /// `codecs` may be null: of a world without compact poses only roots are kept, as without modes. They outlive it.
-  PosesAhead(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
-  PosesAhead(const PosesAhead&) = delete;
-  PosesAhead& operator=(const PosesAhead&) = delete;
+  EncodedPoseCache(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
+  EncodedPoseCache(const EncodedPoseCache&) = delete;
+  EncodedPoseCache& operator=(const EncodedPoseCache&) = delete;
 
   /// In which modes poses are told, and every how many ticks. What was kept for others is nothing any more.
   void SetModes(std::span<const protocol::PoseMode> compact_modes, int ticks_apart);
@@ -122,7 +122,7 @@ class PosesAhead {
  private:
   static constexpr std::size_t kLanes = SoaPose::kLanes;
   static constexpr std::size_t kStanding = kMost;  // plane
-  // Places that lie together have their turns together.
+  // SpatialGrid that lie together have their turns together.
   static constexpr std::uint32_t kPlacesOfATurn = 8;
   struct alignas(kCacheLineBytes) Line {
     std::byte of[kCacheLineBytes];

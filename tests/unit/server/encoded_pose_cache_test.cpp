@@ -1,4 +1,4 @@
-#include "world/poses_ahead.h"
+#include "world/encoded_pose_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -61,8 +61,8 @@ class Ahead {
         shown_(shown),
         encoder_(*codes_) {}
 
-  PosesAhead& poses() { return poses_; }
-  std::vector<PosesAhead::Place>& places() { return places_; }
+  EncodedPoseCache& poses() { return poses_; }
+  std::vector<EncodedPoseCache::Place>& places() { return places_; }
 
   void Advance() {
     eager_.Advance();
@@ -90,7 +90,7 @@ class Ahead {
     for (const PoseMode mode : modes) {
       const protocol::PoseRows& rows = encoder_.Encode(mode, eager_.avatars());
       for (std::size_t i = 0; i < kCrowd; ++i) {
-        const PosesAhead::Encoded told = poses_.Of(places_[i], mode);
+        const EncodedPoseCache::Encoded told = poses_.Of(places_[i], mode);
         ASSERT_TRUE(std::ranges::equal(told.bytes, rows.poses(i, i)))
             << "step " << step_ << ", avatar " << i << ", mode " << static_cast<int>(mode);
         ASSERT_EQ(told.is_wide, (rows.flags(i) & protocol::kPoseWide) != 0);
@@ -133,9 +133,9 @@ class Ahead {
   std::shared_ptr<const PoseCodes> codes_;
   DrawnCrowd eager_;
   DrawnCrowd told_;
-  PosesAhead poses_;
-  std::vector<PosesAhead::Place> places_;
-  std::vector<PosesAhead::Place> standing_;
+  EncodedPoseCache poses_;
+  std::vector<EncodedPoseCache::Place> places_;
+  std::vector<EncodedPoseCache::Place> standing_;
   std::size_t shown_;  // as if there were so many
   Encoder encoder_;
   std::uint64_t step_ = 100;
@@ -161,7 +161,7 @@ std::shared_ptr<const PoseCodes> CodesForStraightKnees(const MotionLibrary& libr
   return codes;
 }
 
-TEST(PosesAhead, AreTheBytesOfEachTicksOwn) {
+TEST(EncodedPoseCache, AreTheBytesOfEachTicksOwn) {
   constexpr unsigned kSeed = 20261124;
   SCOPED_TRACE(testing::Message() << "seed " << kSeed);
   const auto library = LibraryOf({});
@@ -183,7 +183,7 @@ TEST(PosesAhead, AreTheBytesOfEachTicksOwn) {
   }
 }
 
-TEST(PosesAhead, AreThoseOfTheTicksThatAreWanted) {
+TEST(EncodedPoseCache, AreThoseOfTheTicksThatAreWanted) {
   Ahead ahead(LibraryOf({}), 5);
   int apart = 1;
   std::span<const PoseMode> modes;
@@ -202,7 +202,7 @@ TEST(PosesAhead, AreThoseOfTheTicksThatAreWanted) {
   EXPECT_GT(ahead.found(), 500);
 }
 
-TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
+TEST(EncodedPoseCache, PlacesOfWhoIsGoneAreOthers) {
   Ahead ahead(LibraryOf({}), 6);
   ahead.poses().SetModes(kAll, 1);
   for (std::size_t tick = 0; tick < 200; ++tick) {
@@ -218,7 +218,7 @@ TEST(PosesAhead, PlacesOfWhoIsGoneAreOthers) {
   }
 }
 
-TEST(PosesAhead, OfVeryManyFewerTicksAreKept) {
+TEST(EncodedPoseCache, OfVeryManyFewerTicksAreKept) {
   Ahead ahead(LibraryOf({}), 7, nullptr, 10'000);
   ahead.poses().SetModes(kAll, 1);
   std::uint64_t most = 0;
@@ -232,21 +232,21 @@ TEST(PosesAhead, OfVeryManyFewerTicksAreKept) {
     }
   };
   walk();
-  EXPECT_EQ(most, PosesAhead::kMost);
-  ahead.AddStanding(PosesAhead::kMany + 1);
+  EXPECT_EQ(most, EncodedPoseCache::kMost);
+  ahead.AddStanding(EncodedPoseCache::kMany + 1);
   const int before = ahead.found();
   walk();
-  EXPECT_EQ(most, PosesAhead::kMost / 2);
+  EXPECT_EQ(most, EncodedPoseCache::kMost / 2);
   EXPECT_GT(ahead.found() - before, 500);
 }
 
-TEST(PosesAhead, WhoseRootCanNotBeToldIsNowhereNear) {
+TEST(EncodedPoseCache, WhoseRootCanNotBeToldIsNowhereNear) {
   const auto library = LibraryOf({});
   const auto codes = MakePoseCodes(*library);
-  PosesAhead poses(std::make_shared<PoseScratch>(library), &codes->codecs);
+  EncodedPoseCache poses(std::make_shared<PoseScratch>(library), &codes->codecs);
   poses.SetModes(kAll, 1);
   Pose pose = library->stand_pose();
-  std::vector<PosesAhead::Place> places(3);
+  std::vector<EncodedPoseCache::Place> places(3);
   poses.Begin(1, 1.0 / 60.0, places.size());
   std::size_t i = 0;
   for (const float x :
@@ -267,9 +267,9 @@ std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
                           const Avatar& avatar, const std::shared_ptr<PoseScratch>& scratch) {
   constexpr std::size_t kShown = 10'000;
   constexpr double kTickS = 1e-4;
-  PosesAhead poses(scratch, nullptr);
+  EncodedPoseCache poses(scratch, nullptr);
   poses.SetModes({}, 1);
-  PosesAhead::Place place;
+  EncodedPoseCache::Place place;
   std::uint64_t evaluated = 0;
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
     const std::uint64_t revision = 1 + tick / ticks_of_a_course;
@@ -284,7 +284,7 @@ std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
   return evaluated;
 }
 
-TEST(PosesAhead, OfWhoIsSentElsewhereAgainAndAgainFewAreInVain) {
+TEST(EncodedPoseCache, OfWhoIsSentElsewhereAgainAndAgainFewAreInVain) {
   const auto library = LibraryOf({});
   Avatar avatar(library, {}, {});
   ASSERT_TRUE(avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = 0.6}}));
