@@ -155,9 +155,9 @@ bool Connection::SendEvents(SharedFrame frame) {
   return true;
 }
 
-void Connection::SendGround(WorldId world, SharedFrame frame) {
+void Connection::SendTerrain(WorldId world, SharedFrame frame) {
   if (is_closed_ || is_closing_) return;
-  queue_.PushGround(world, std::move(frame));
+  queue_.PushTerrain(world, std::move(frame));
   ScheduleFlush();
 }
 

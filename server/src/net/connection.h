@@ -55,8 +55,8 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   /// As SendQueue::PushMovements.
   [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame);
   void DropMovements(WorldId world) { queue_.DropMovements(world); }
-  void SendGround(WorldId world, SharedFrame frame);
-  void DropGround(WorldId world) { queue_.DropGround(world); }
+  void SendTerrain(WorldId world, SharedFrame frame);
+  void DropTerrain(WorldId world) { queue_.DropTerrain(world); }
   void DropPoses(WorldId world, protocol::PoseMode mode) { queue_.DropPoses(world, mode); }
 
   [[nodiscard]] const SendQueue& queue() const { return queue_; }

@@ -32,7 +32,7 @@ bool SendQueue::PushEvents(SharedFrame frame) {
   return true;
 }
 
-void SendQueue::PushGround(WorldId world, SharedFrame frame) {
+void SendQueue::PushTerrain(WorldId world, SharedFrame frame) {
   grounds_.insert_or_assign(world, std::move(frame));
 }
 

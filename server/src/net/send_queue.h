@@ -39,8 +39,8 @@ class SendQueue {
   [[nodiscard]] std::size_t PushPoses(const PoseDelivery& delivery);
 
   /// Takes a world's ground in place of one that still waits: the last is what holds.
-  void PushGround(WorldId world, SharedFrame frame);
-  void DropGround(WorldId world) { grounds_.erase(world); }
+  void PushTerrain(WorldId world, SharedFrame frame);
+  void DropTerrain(WorldId world) { grounds_.erase(world); }
 
   /// Takes what avatars began. Beyond the budget it is not taken, and what waits of the world and shard is forgotten:
   /// returns how many frames went, 0: taken.

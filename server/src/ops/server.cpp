@@ -205,11 +205,11 @@ void Server::SetTerrain(TerrainChange change) {
     // Far enough ahead that every shard has it in time.
     const std::uint64_t tick = clock_.TickAt(TickClock::Clock::now()) + kGroundTicksAhead;
     for (const auto& shard : shards_) {
-      shard->ChangeGround({.world = change.world,
+      shard->ChangeTerrain({.world = change.world,
                            .from_shard = change.from_shard,
                            .session = change.session,
                            .seq = change.seq,
-                           .part = GroundPart{*ground, tick}});
+                           .part = TerrainPart{*ground, tick}});
     }
   });
 }

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "stridewire/offline/terrain_file.h"
-#include "world/ground.h"
+#include "world/world_terrain.h"
 
 namespace stridewire::server {
 
@@ -14,7 +14,7 @@ Expected<Terrains> Terrains::Load(const Config& config) {
     if (world.terrain.empty() || terrains.terrains_.contains(world.terrain)) continue;
     auto terrain = ReadTerrain(world.terrain);
     if (!terrain) return std::unexpected(std::move(terrain.error()));
-    if (!MakeGround(1, *terrain, encoder)) {
+    if (!MakeWorldTerrain(1, *terrain, encoder)) {
       return Fail(ErrorCode::kLimitExceeded, "is larger than a message may be (max_bulk_bytes)",
                   world.terrain);
     }

@@ -68,7 +68,7 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   Send(welcome);
   for (auto& [id, membership] : worlds_) {
     SendWorldInfo(0, membership);
-    SendGround(*membership.world, true);
+    SendTerrain(*membership.world, true);
   }
 
   subscriptions_.TellAnew();
@@ -253,7 +253,7 @@ void Session::Handle(Command command) {
       const ReplyCache::Answer& answer = replies_.Find(seq);
       if (const auto it = worlds_.find(answer.joined); it != worlds_.end()) {
         SendWorldInfo(seq, it->second);
-        SendGround(*it->second.world, false);
+        SendTerrain(*it->second.world, false);
       }
       connection_->SendControl(answer.reply);
       return;
@@ -317,7 +317,7 @@ void Session::OnJoined(Seq seq, Outcome<std::shared_ptr<World>>&& outcome) {
       worlds_.emplace(world->id, Membership{.world = world, .role = role}).first->second;
   host_.InterestChanged(world);
   SendWorldInfo(seq, membership);
-  SendGround(*world, false);
+  SendTerrain(*world, false);
   Answer(Reply{.seq = seq}, world->id);
 }
 
@@ -339,7 +339,7 @@ void Session::Leave(WorldId id) {
   EndMovements(id);
   if (connection_ != nullptr) {
     for (const PoseMode mode : kSentModes) connection_->DropPoses(id, mode);
-    connection_->DropGround(id);
+    connection_->DropTerrain(id);
   }
   if (is_controller) {
     for (int shard = 0; shard < host_.shard_count(); ++shard) {
@@ -511,10 +511,10 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
                            .fewer_joints = std::move(fewer_joints)});
 }
 
-void Session::SendGround(const World& world, bool also_flat) {
+void Session::SendTerrain(const World& world, bool also_flat) {
   if (connection_ == nullptr || (features_ & protocol::kFeatureTerrain) == 0) return;
   if (const auto ground = world.ground.Get()) {
-    connection_->SendGround(world.id, ground->frame);
+    connection_->SendTerrain(world.id, ground->frame);
   } else if (also_flat) {
     Send(protocol::WorldTerrain{.world = world.id, .terrain = {}});
   }

@@ -218,7 +218,7 @@ class Session : private ConnectionHandler {
   void Answer(protocol::Reply&& reply, WorldId joined = 0);
   void SendWorldInfo(protocol::Seq seq, const Membership& membership);
   /// The world's ground, if it has one or if it is wanted all the same.
-  void SendGround(const World& world, bool also_flat);
+  void SendTerrain(const World& world, bool also_flat);
   void SendLagging(Membership& membership);
   void SendPoses(const PoseDelivery& delivery);
   void MoveRegion(const protocol::Observe& command, const std::shared_ptr<World>& world);

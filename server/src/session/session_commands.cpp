@@ -313,7 +313,7 @@ void Session::OnTerrainRefused(Seq seq, Refusal refusal) {
 
 void Session::OnGround(WorldId world, const SharedFrame& frame) {
   if (connection_ == nullptr || (features_ & protocol::kFeatureTerrain) == 0) return;
-  if (worlds_.contains(world)) connection_->SendGround(world, frame);
+  if (worlds_.contains(world)) connection_->SendTerrain(world, frame);
 }
 
 void Session::OnResult(CommandResult&& result) {

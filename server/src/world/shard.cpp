@@ -136,7 +136,7 @@ void Shard::RunCommands() {
   std::set<SessionId> waits;
   for (WorldCommand& command : inbox_) {
     // A ground has a tick of its own.
-    if (waits.contains(command.session) && !std::holds_alternative<GroundPart>(command.part)) {
+    if (waits.contains(command.session) && !std::holds_alternative<TerrainPart>(command.part)) {
       waiting.push_back(std::move(command));
       continue;
     }
@@ -407,9 +407,9 @@ void Shard::LeaveWorld(WorldId world) { peers_.LeaveWorld(world); }
 
 void Shard::SetTerrain(TerrainChange&& change) { peers_.SetTerrain(std::move(change)); }
 
-void Shard::ChangeGround(WorldCommand command) {
+void Shard::ChangeTerrain(WorldCommand command) {
   asio::post(context_, [this, command = std::move(command)]() mutable {
-    const SharedFrame frame = std::get<GroundPart>(command.part).ground->frame;
+    const SharedFrame frame = std::get<TerrainPart>(command.part).ground->frame;
     for (const auto& [id, session] : sessions_) session->OnGround(command.world->id, frame);
     inbox_.push_back(std::move(command));
   });

@@ -69,7 +69,7 @@ class Shard : public SessionHost {
   void Adopt(Arrival arrival);
   void Deliver(SessionId session, protocol::Seq seq, Outcome<std::shared_ptr<World>> joined);
   /// A world has another ground: this shard's avatars from a tick on, its sessions are told.
-  void ChangeGround(WorldCommand command);
+  void ChangeTerrain(WorldCommand command);
   void RefuseTerrain(SessionId session, protocol::Seq seq, Refusal refusal);
   void Drain();
   /// Calls `done` on this shard when its connections have sent what they had.

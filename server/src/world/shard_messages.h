@@ -57,8 +57,8 @@ struct PlantingPart {
 struct ReleasePart {};
 
 /// Another ground for all avatars, on all shards from the same tick on.
-struct GroundPart {
-  std::shared_ptr<const Ground> ground;
+struct TerrainPart {
+  std::shared_ptr<const WorldTerrain> ground;
   std::uint64_t tick = 0;
 };
 
@@ -68,7 +68,7 @@ struct WorldCommand {
   int from_shard = 0;  ///< The session's shard.
   SessionId session = 0;
   protocol::Seq seq = 0;  ///< 0: no answer is wanted.
-  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, GroundPart, LayerPart,
+  std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, TerrainPart, LayerPart,
                PlantingPart>
       part;
 };

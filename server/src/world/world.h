@@ -8,7 +8,7 @@
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
-#include "world/ground.h"
+#include "world/world_terrain.h"
 #include "world/pose_quantizations.h"
 
 namespace stridewire::server {
@@ -29,7 +29,7 @@ struct World {
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
   std::atomic<AvatarId> last_number{0};   ///< Largest avatar number ever asked for.
-  GroundSlot ground;  ///< As last set; a shard's avatars have it from a tick on.
+  TerrainSlot ground;  ///< As last set; a shard's avatars have it from a tick on.
 };
 
 /// The shard an avatar lives on.

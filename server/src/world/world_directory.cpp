@@ -37,7 +37,7 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   world->codes = libraries_.FindCodes(library);
   STRIDEWIRE_CHECK(world->library != nullptr);  // all that are configured were loaded at the start
   if (is_configured && !configured->second.terrain.empty()) {
-    auto ground = MakeGround(world->id, terrains_.Find(configured->second.terrain), encoder_);
+    auto ground = MakeWorldTerrain(world->id, terrains_.Find(configured->second.terrain), encoder_);
     STRIDEWIRE_CHECK(ground.has_value());  // the same
     world->ground.Set(*std::move(ground));
   }
@@ -45,7 +45,7 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   return world;
 }
 
-Outcome<std::shared_ptr<const Ground>> WorldDirectory::SetTerrain(
+Outcome<std::shared_ptr<const WorldTerrain>> WorldDirectory::SetTerrain(
     World& world, std::optional<protocol::TerrainInfo>&& terrain) {
   const auto refuse = [](const Error& error) {
     const bool is_limit = error.code == ErrorCode::kLimitExceeded;
@@ -57,7 +57,7 @@ Outcome<std::shared_ptr<const Ground>> WorldDirectory::SetTerrain(
     if (!checked) return refuse(checked.error());
     made = *std::move(checked);
   }
-  auto ground = MakeGround(world.id, std::move(made), encoder_);
+  auto ground = MakeWorldTerrain(world.id, std::move(made), encoder_);
   if (!ground) return refuse(ground.error());
   world.ground.Set(*ground);
   return *std::move(ground);

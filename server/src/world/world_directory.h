@@ -36,7 +36,7 @@ class WorldDirectory {
 
   /// Gives a world the ground that was sent, null: flat; what its shards and sessions are to share.
   /// kOutOfRange, kLimitReached: it is no terrain.
-  [[nodiscard]] Outcome<std::shared_ptr<const Ground>> SetTerrain(
+  [[nodiscard]] Outcome<std::shared_ptr<const WorldTerrain>> SetTerrain(
       World& world, std::optional<protocol::TerrainInfo>&& terrain);
 
   /// Forgets empty worlds and says which.

@@ -77,7 +77,7 @@ CommandResult WorldShard::Execute(const WorldCommand& command, std::uint64_t tic
           SetLayers(part, result);
         } else if constexpr (std::is_same_v<T, PlantingPart>) {
           SetPlanting(part, result);
-        } else if constexpr (std::is_same_v<T, GroundPart>) {
+        } else if constexpr (std::is_same_v<T, TerrainPart>) {
           grounds_.push_back(part);
         } else {
           Release(command.session, tick);
@@ -244,7 +244,7 @@ void WorldShard::Release(SessionId session, std::uint64_t tick) {
   budget_.Release(*world_, static_cast<std::int64_t>(removed));
 }
 
-void WorldShard::ChangeGround(std::uint64_t tick) {
+void WorldShard::ChangeTerrain(std::uint64_t tick) {
   while (!grounds_.empty() && grounds_.front().tick <= tick) {
     ground_ = std::move(grounds_.front().ground);
     grounds_.pop_front();
@@ -260,13 +260,13 @@ void WorldShard::Advance(std::uint64_t tick, int steps) {
     const std::uint64_t first = tick - static_cast<std::uint64_t>(steps) + 1;
     const std::uint64_t change = grounds_.front().tick;
     if (change <= first) {
-      ChangeGround(first);
+      ChangeTerrain(first);
       continue;
     }
     AdvanceAvatars(change - 1, static_cast<int>(change - first));
     steps = static_cast<int>(tick - change) + 1;
   }
-  ChangeGround(tick);
+  ChangeTerrain(tick);
   AdvanceAvatars(tick, steps);
 }
 

@@ -106,7 +106,7 @@ class WorldShard {
   void SetPlanting(const PlantingPart& part, CommandResult& result);
   void Cancel(const CancelPart& part, CommandResult& result);
   void Release(SessionId session, std::uint64_t tick);
-  void ChangeGround(std::uint64_t tick);
+  void ChangeTerrain(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
   std::span<const InOrder> AvatarsInOrder();
   std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
@@ -158,8 +158,8 @@ class WorldShard {
   std::size_t max_bulk_bytes_;
   std::vector<AvatarId> gone_;              // since the last step
   std::vector<protocol::Movements> movements_;  // of steps not taken yet
-  std::shared_ptr<const Ground> ground_;        // null: flat
-  std::deque<GroundPart> grounds_;              // from later ticks on
+  std::shared_ptr<const WorldTerrain> ground_;        // null: flat
+  std::deque<TerrainPart> grounds_;              // from later ticks on
   std::vector<Avatar*> shown_;                  // scratch
   // By mode.
   std::array<bool, kSentModes.size()> last_had_poses_{};

@@ -48,11 +48,11 @@ TEST(SendQueue, SendsControlInOrderAndBeforePoses) {
 
 TEST(SendQueue, OfAGroundTheLastIsSentAndBehindControl) {
   SendQueue queue(1000, 4);
-  queue.PushGround(1, Frame(5000, 10));
-  queue.PushGround(2, Frame(10, 20));
-  queue.PushGround(1, Frame(5000, 11));
-  queue.PushGround(3, Frame(10, 30));
-  queue.DropGround(3);
+  queue.PushTerrain(1, Frame(5000, 10));
+  queue.PushTerrain(2, Frame(10, 20));
+  queue.PushTerrain(1, Frame(5000, 11));
+  queue.PushTerrain(3, Frame(10, 30));
+  queue.DropTerrain(3);
   EXPECT_EQ(queue.control_bytes(), 0u) << "events have their budget to themselves";
   EXPECT_EQ(queue.PushPoses(Batch(50)), 0u);
   for (int i = 1; i <= 3; ++i) queue.PushControl(Frame(10, i));

@@ -561,11 +561,11 @@ TEST(TickClock, TicksAreDueWhenTheClockSaysSo) {
   }
 }
 
-std::shared_ptr<const Ground> MakeGround(double height_m) {
+std::shared_ptr<const WorldTerrain> MakeWorldTerrain(double height_m) {
   const auto terrain = Terrain::Make({{}, {{{0, 0}, {1, 1}, height_m}}});
   EXPECT_TRUE(terrain);
   protocol::Encoder encoder;
-  const auto ground = server::MakeGround(3, *terrain, encoder);
+  const auto ground = server::MakeWorldTerrain(3, *terrain, encoder);
   EXPECT_TRUE(ground);
   return *ground;
 }
@@ -575,8 +575,8 @@ TEST(WorldShard, ChangesTheGroundAtItsTick) {
   bench.Spawn({1});
   EXPECT_EQ(bench.shard.terrain(), nullptr);
   bench.tick = 100;
-  bench.Do(GroundPart{MakeGround(0.25), 103});
-  bench.Do(GroundPart{MakeGround(0.5), 105});
+  bench.Do(TerrainPart{MakeWorldTerrain(0.25), 103});
+  bench.Do(TerrainPart{MakeWorldTerrain(0.5), 105});
   const auto height = [&] {
     const auto terrain = bench.shard.terrain();
     return terrain == nullptr ? 0.0 : terrain->HeightAt(0.5, 0.5);
@@ -591,7 +591,7 @@ TEST(WorldShard, ChangesTheGroundAtItsTick) {
 
 TEST(WorldShard, MadeLateItHasTheGroundOfItsWorld) {
   Bench bench;
-  bench.world->ground.Set(MakeGround(0.125));
+  bench.world->ground.Set(MakeWorldTerrain(0.125));
   const WorldShard late(bench.world, 0, 1, 8, kClock, bench.budget, bench.metrics);
   ASSERT_NE(late.terrain(), nullptr);
   EXPECT_EQ(late.terrain()->HeightAt(0.5, 0.5), 0.125);
@@ -604,7 +604,7 @@ TEST(WorldDirectory, GivesAWorldItsGround) {
   Libraries libraries;
   libraries.Add("toy", MakeToyLibrary());
   Terrains terrains;
-  terrains.Add("hall.json", MakeGround(0.5)->terrain);
+  terrains.Add("hall.json", MakeWorldTerrain(0.5)->terrain);
   WorldDirectory directory(config, libraries, terrains);
   const auto hall = directory.Join("hall");
   ASSERT_TRUE(hall);

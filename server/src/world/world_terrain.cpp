@@ -1,4 +1,4 @@
-#include "world/ground.h"
+#include "world/world_terrain.h"
 
 #include <vector>
 
@@ -6,7 +6,7 @@
 
 namespace stridewire::server {
 
-Expected<std::shared_ptr<const Ground>> MakeGround(protocol::WorldId world,
+Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(protocol::WorldId world,
                                                    std::shared_ptr<const Terrain> terrain,
                                                    protocol::Encoder& encoder) {
   protocol::WorldTerrain message{.world = world, .terrain = {}};
@@ -15,7 +15,7 @@ Expected<std::shared_ptr<const Ground>> MakeGround(protocol::WorldId world,
   if (Status status = encoder.Encode(message, *frame); !status) {
     return std::unexpected(std::move(status.error()));
   }
-  return std::make_shared<const Ground>(Ground{std::move(terrain), std::move(frame)});
+  return std::make_shared<const WorldTerrain>(WorldTerrain{std::move(terrain), std::move(frame)});
 }
 
 }  // namespace stridewire::server
