@@ -23,7 +23,7 @@
 #include "stridewire/offline/refine.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/movement.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "drawn_requests.h"
+#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
 #include "rough_ground.h"

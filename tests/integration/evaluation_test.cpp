@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "drawn_requests.h"
+#include "random_requests.h"
 #include "foot_sampler.h"
 #include "instruction_sets.h"
 #include "pose_kernels.h"

@@ -12,7 +12,7 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "drawn_requests.h"
+#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
 #include "rough_ground.h"

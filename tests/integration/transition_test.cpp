@@ -20,7 +20,7 @@
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/foot_vector.h"
-#include "toy_library.h"
+#include "test_library.h"
 #include "velocity_steps.h"
 
 namespace stridewire {

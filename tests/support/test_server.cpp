@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "stridewire/offline/open_library.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 

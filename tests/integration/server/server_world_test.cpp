@@ -15,7 +15,7 @@
 #include "stridewire/protocol/pose_batch_reader.h"
 #include "stridewire/runtime/avatar.h"
 #include "test_server.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

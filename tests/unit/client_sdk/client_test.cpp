@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "fake_server.h"
-#include "toy_world.h"
+#include "test_world.h"
 
 namespace stridewire {
 namespace {

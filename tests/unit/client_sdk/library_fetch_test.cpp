@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "scratch_folder.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire::client {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/movement_record.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire::client {
 namespace {

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "stridewire/protocol/decode.h"
-#include "toy_world.h"
+#include "test_world.h"
 
 namespace stridewire::client {
 namespace {

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "stridewire/protocol/decode.h"
-#include "toy_world.h"
+#include "test_world.h"
 
 namespace stridewire::client {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "drawn_requests.h"
+#include "random_requests.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "world/pose_quantizations.h"
 

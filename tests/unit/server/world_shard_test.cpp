@@ -10,7 +10,7 @@
 
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/decode.h"
-#include "toy_library.h"
+#include "test_library.h"
 #include "world/world_directory.h"
 
 namespace stridewire::server {

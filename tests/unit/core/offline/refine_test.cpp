@@ -12,7 +12,7 @@
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/correction.h"
 #include "stridewire/runtime/measure.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

@@ -9,7 +9,7 @@
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/runtime/foot_vector.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

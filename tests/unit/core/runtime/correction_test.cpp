@@ -16,7 +16,7 @@
 #include "stridewire/runtime/foot_support.h"
 #include "stridewire/runtime/measure.h"
 #include "stridewire/runtime/terrain.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

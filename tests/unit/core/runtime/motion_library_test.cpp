@@ -11,7 +11,7 @@
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/cardinal_basis.h"
 #include "stridewire/runtime/movement.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "stridewire/runtime/foot_vector.h"
-#include "toy_library.h"
+#include "test_library.h"
 
 namespace stridewire {
 namespace {

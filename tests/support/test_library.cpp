@@ -1,4 +1,4 @@
-#include "toy_library.h"
+#include "test_library.h"
 
 #include <algorithm>
 #include <array>
