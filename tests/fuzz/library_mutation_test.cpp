@@ -283,10 +283,10 @@ TEST(LibraryMutation, EveryFileEndsAsAnErrorOrALibraryThatCanBePlayed) {
   const auto builtin = builder.Build(GenerateBuiltinLibrary());
   ASSERT_TRUE(builtin.has_value());
   const auto refined =
-      Refine(MakeToyLibrary(), {.max_error_m = 0.0, .max_pseudoexamples = 3, .samples = 100});
+      Refine(MakeTestLibrary(), {.max_error_m = 0.0, .max_pseudoexamples = 3, .samples = 100});
   ASSERT_TRUE(refined.has_value());
   ASSERT_GT(refined->library->group(0).site_count, refined->library->group(0).example_count);
-  const std::vector<Seed> seeds = {Seed(*MakeToyLibrary()), Seed(*refined->library),
+  const std::vector<Seed> seeds = {Seed(*MakeTestLibrary()), Seed(*refined->library),
                                    Seed(**builtin)};
   for (const Seed& good : seeds) ASSERT_TRUE(MotionLibrary::FromBytes(good.bytes).has_value());
 

@@ -21,7 +21,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RestlessWalker& walker, const Avatar& avatar, std::uint64_t id,
+MovementRequest RandomRequest(const RandomWalker& walker, const Avatar& avatar, std::uint64_t id,
                               Random& random) {
   MovementRequest request{
       id, {}, random.Draw(0, 1) < 0.8 ? Interrupt::kNow : Interrupt::kAfterMovement};
@@ -114,7 +114,7 @@ class Observer {
   bool stood_[2] = {false, false};
 };
 
-Figures InterruptAll(const RestlessWalker& walker, const Library& library, BlendKind blend,
+Figures InterruptAll(const RandomWalker& walker, const Library& library, BlendKind blend,
                      int avatars, double seconds, unsigned seed) {
   Figures figures;
   for (int i = 0; i < avatars; ++i) {
@@ -137,20 +137,20 @@ Figures InterruptAll(const RestlessWalker& walker, const Library& library, Blend
   return figures;
 }
 
-class TakeOver : public testing::TestWithParam<RestlessWalker> {};
+class TakeOver : public testing::TestWithParam<RandomWalker> {};
 INSTANTIATE_TEST_SUITE_P(Libraries, TakeOver,
-                         testing::Values(RestlessWalker{"Builtin", {}, 0.75},
-                                         RestlessWalker{"Subject16", {"16"}, 0.75},
-                                         RestlessWalker{"Subject01", {"01"}, 0.58}),
+                         testing::Values(RandomWalker{"Builtin", {}, 0.75},
+                                         RandomWalker{"Subject16", {"16"}, 0.75},
+                                         RandomWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
 TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
-  const RestlessWalker& walker = GetParam();
+  const RandomWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
   const unsigned seed = 20261122;
   const char* asked = std::getenv("STRIDEWIRE_AVATARS");
-  const int avatars = asked == nullptr ? kRestlessWalkers : std::atoi(asked);
+  const int avatars = asked == nullptr ? kRandomWalkers : std::atoi(asked);
   const double examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps).joint_rad_s;
   for (const BlendKind blend : {BlendKind::kCubic, BlendKind::kInertialization}) {
     const Figures figures = InterruptAll(walker, library, blend, avatars, 60.0, seed);

@@ -49,9 +49,9 @@ struct Manner {
 void PrintTo(const Manner& manner, std::ostream* out) { *out << manner.name; }
 
 // An avatar to which all that can happen to one happens, as `random` has it.
-class Restless {
+class RandomlyDriven {
  public:
-  Restless(Library library, Random& random)
+  RandomlyDriven(Library library, Random& random)
       : random_(random),
         avatar_(std::move(library), DrawBase(random),
                 {.run_time_correction = Draws(0.7),
@@ -122,13 +122,13 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   Figures figures;
   constexpr int kTicks = 3000;
   for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
-    Restless restless(library_, random);
-    Avatar& avatar = restless.avatar();
+    RandomlyDriven driven(library_, random);
+    Avatar& avatar = driven.avatar();
     AvatarReplica first(library_);
     std::optional<AvatarReplica> late;
     int joins_at = 0;
     for (int tick = 0; tick < kTicks; ++tick) {
-      restless.Stir();
+      driven.Stir();
       avatar.Advance(manner.tick_s);
       figures.movements += Begun(avatar);
       Bytes record;
@@ -227,16 +227,16 @@ TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
     {
       const OnlyInstructionSet only(told_on);
       Random random(kSeed);
-      std::vector<std::unique_ptr<Restless>> crowd;
+      std::vector<std::unique_ptr<RandomlyDriven>> crowd;
       for (std::size_t i = 0; i < kAvatars; ++i) {
-        crowd.push_back(std::make_unique<Restless>(library_, random));
+        crowd.push_back(std::make_unique<RandomlyDriven>(library_, random));
       }
       for (Tick& tick : ticks) {
-        for (const auto& restless : crowd) {
-          restless->Stir();
-          restless->avatar().Advance(manner.tick_s);
-          (void)AppendChange(restless->avatar(), tick.records.emplace_back());
-          tick.poses.push_back(BytesOf(restless->avatar().pose()));
+        for (const auto& driven : crowd) {
+          driven->Stir();
+          driven->avatar().Advance(manner.tick_s);
+          (void)AppendChange(driven->avatar(), tick.records.emplace_back());
+          tick.poses.push_back(BytesOf(driven->avatar().pose()));
         }
       }
     }
@@ -275,15 +275,15 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
   constexpr unsigned kSeed = 20261127;
   Random random(kSeed);
   const Library library = LibraryOf({});
-  Restless restless(library, random);
+  RandomlyDriven driven(library, random);
   AvatarReplica replica(library);
   SoaPoseEvaluator evaluator(*library, 1);
   Bytes record;
   for (int tick = 0; tick < 3000; ++tick) {
-    restless.Stir();
-    restless.avatar().Advance(1.0 / 60.0);
+    driven.Stir();
+    driven.avatar().Advance(1.0 / 60.0);
     record.clear();
-    const bool is_changed = AppendChange(restless.avatar(), record);
+    const bool is_changed = AppendChange(driven.avatar(), record);
     const std::size_t before = counted_memory::LiveBytes();
     counted_memory::ResetPeak();
     const bool is_taken = !is_changed || replica.Apply(record).has_value();
@@ -305,16 +305,16 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
   int refused = 0;
   int shown = 0;
   for (int round = 0; round < 20; ++round) {
-    Restless restless(library, random);
+    RandomlyDriven driven(library, random);
     AvatarReplica replica(library);
     for (int tick = 0; tick < 600; ++tick) {
-      restless.Stir();
-      restless.avatar().Advance(1.0 / 60.0);
+      driven.Stir();
+      driven.avatar().Advance(1.0 / 60.0);
       Bytes record;
-      const bool is_changed = AppendChange(restless.avatar(), record);
+      const bool is_changed = AppendChange(driven.avatar(), record);
       if (!is_changed) {
         if (tick % 10 != 0) continue;
-        AppendState(restless.avatar(), record);
+        AppendState(driven.avatar(), record);
       }
       Bytes damaged = record;
       const std::size_t count = 1 + below(4);

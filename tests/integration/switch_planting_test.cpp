@@ -20,7 +20,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RestlessWalker& walker, const Avatar& avatar, Random& random) {
+MovementRequest RandomRequest(const RandomWalker& walker, const Avatar& avatar, Random& random) {
   MovementRequest request{
       1, {}, random.Draw(0, 1) < 0.6 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
@@ -103,10 +103,10 @@ class Observer {
   bool stood_[2] = {false, false};
 };
 
-Figures SwitchAll(const RestlessWalker& walker, const Library& library, double seconds,
+Figures SwitchAll(const RandomWalker& walker, const Library& library, double seconds,
                   unsigned seed) {
   Figures figures;
-  for (int i = 0; i < kRestlessWalkers; ++i) {
+  for (int i = 0; i < kRandomWalkers; ++i) {
     Random random(seed + static_cast<unsigned>(i));
     Avatar avatar(library, BaseFrame{});
     Observer observer(avatar, figures);
@@ -133,7 +133,7 @@ Figures SwitchAll(const RestlessWalker& walker, const Library& library, double s
 // adds.
 void ExpectNoJumps(const Figures& figures, const VelocityStep& examples, double climb_m_s = 0.0) {
   for (const Join join : {kGoesOff, kGoesOn}) {
-    ASSERT_GT(figures.joins[join], 4 * kRestlessWalkers);
+    ASSERT_GT(figures.joins[join], 4 * kRandomWalkers);
     EXPECT_LE(figures.largest[join].joint_rad_s,
               std::max(1.5 * examples.joint_rad_s, 1.25 * figures.largest[kStays].joint_rad_s));
     EXPECT_LE(figures.largest[join].root_m_s,
@@ -142,15 +142,15 @@ void ExpectNoJumps(const Figures& figures, const VelocityStep& examples, double 
   }
 }
 
-class SwitchPlanting : public testing::TestWithParam<RestlessWalker> {};
+class SwitchPlanting : public testing::TestWithParam<RandomWalker> {};
 INSTANTIATE_TEST_SUITE_P(Libraries, SwitchPlanting,
-                         testing::Values(RestlessWalker{"Builtin", {}, 0.75},
-                                         RestlessWalker{"Subject16", {"16"}, 0.75},
-                                         RestlessWalker{"Subject01", {"01"}, 0.58}),
+                         testing::Values(RandomWalker{"Builtin", {}, 0.75},
+                                         RandomWalker{"Subject16", {"16"}, 0.75},
+                                         RandomWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
 TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
-  const RestlessWalker& walker = GetParam();
+  const RandomWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
   const unsigned seed = 20261122;
@@ -187,7 +187,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
   double deepest_m = 0.0;
   double worst_m = 0.0;
   int landings = 0;
-  for (int i = 0; i < kRestlessWalkers; ++i) {
+  for (int i = 0; i < kRandomWalkers; ++i) {
     Random random(seed + static_cast<unsigned>(i));
     Avatar avatar(library, BaseFrame{}, {.terrain = ground});
     Observer observer(avatar, figures);
@@ -226,7 +226,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
       figures.largest[kGoesOff].root_m_s, figures.largest[kGoesOn].joint_rad_s,
       figures.largest[kGoesOn].root_m_s, deepest_m, worst_m);
   EXPECT_GT(deepest_m, 0.3);
-  ASSERT_GT(landings, 20 * kRestlessWalkers);
+  ASSERT_GT(landings, 20 * kRandomWalkers);
   EXPECT_LE(worst_m, 0.05);  // soles rest on the highest of the ground below them
   // The cubic that eases a height out over T sets out with 6 / T^2 of it.
   ExpectNoJumps(figures, LargestStepOfExamples(*library, kFps),

@@ -50,7 +50,7 @@ std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
 }
 
 TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   ASSERT_EQ(library->transitions().size(), 16u);
   for (const std::size_t step : {kLeft, kRight}) {
     EXPECT_LT(DistanceM(*library, step, kJump), 0.01f);
@@ -117,7 +117,7 @@ Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& librar
 }
 
 TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
-  const auto older = Older(*MakeToyLibrary());
+  const auto older = Older(*MakeTestLibrary());
   ASSERT_TRUE(older.has_value()) << Describe(older.error());
   EXPECT_TRUE((*older)->transitions().empty());
   EXPECT_EQ((*older)->FindTransition(kLeft, kJump), nullptr);
@@ -126,7 +126,7 @@ TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
 
 TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
   const auto with = [](std::size_t place, fb::Transition transition) {
-    const auto library = Changed(*MakeToyLibrary(), [&](std::uint8_t* payload) {
+    const auto library = Changed(*MakeTestLibrary(), [&](std::uint8_t* payload) {
       const auto* all = fb::GetMotionLibrary(payload)->transitions()->Data();
       std::memcpy(payload + (all - payload) + place * sizeof transition, &transition,
                   sizeof transition);
@@ -258,7 +258,7 @@ TEST(Ways, AnOlderLibraryGoesByItsFeet) {
   const StepRequest left = Step(Foot::kLeft, 0.5);
   EXPECT_EQ(Does(*older, {left, JumpRequest{.length_m = 0.6}}),
             "step_left -(no way leads from step_left to jump in this library) +step_right");
-  EXPECT_EQ(Does(Older(*MakeToyLibrary()).value(), {left, left, JumpRequest{.length_m = 0.6}}),
+  EXPECT_EQ(Does(Older(*MakeTestLibrary()).value(), {left, left, JumpRequest{.length_m = 0.6}}),
             "step_left +step_right step_left +step_right jump");
 }
 

@@ -7,18 +7,18 @@
 namespace stridewire {
 
 /// Who is asked for something else all the time, for tests that look at every frame.
-struct RestlessWalker {
+struct RandomWalker {
   const char* name;
   std::vector<std::string> subjects;  ///< Captured; none: the generated library
   double longest_m;                   ///< Step asked for
 };
-inline void PrintTo(const RestlessWalker& walker, std::ostream* out) { *out << walker.name; }
+inline void PrintTo(const RandomWalker& walker, std::ostream* out) { *out << walker.name; }
 
 /// How many a test has.
 #ifdef __SANITIZE_ADDRESS__
-inline constexpr int kRestlessWalkers = 3;  // one thread, twenty times as slow
+inline constexpr int kRandomWalkers = 3;  // one thread, twenty times as slow
 #else
-inline constexpr int kRestlessWalkers = 15;
+inline constexpr int kRandomWalkers = 15;
 #endif
 
 }  // namespace stridewire

@@ -114,7 +114,7 @@ RawLibrary MakeToyRawLibrary() {
   return raw;
 }
 
-std::shared_ptr<const MotionLibrary> MakeToyLibrary() {
+std::shared_ptr<const MotionLibrary> MakeTestLibrary() {
   LibraryBuilder builder;
   auto library = builder.Build(MakeToyRawLibrary());
   if (!library) {

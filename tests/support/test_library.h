@@ -13,6 +13,6 @@ namespace stridewire {
 [[nodiscard]] RawLibrary MakeToyRawLibrary();
 
 /// The same, built. Aborts if the builder refuses.
-[[nodiscard]] std::shared_ptr<const MotionLibrary> MakeToyLibrary();
+[[nodiscard]] std::shared_ptr<const MotionLibrary> MakeTestLibrary();
 
 }  // namespace stridewire

@@ -43,7 +43,7 @@ int Bring(LibraryFetch& fetch, const MotionLibrary& server) {
 }
 
 TEST(LibraryFetch, BringsItOnceAndThenTakesItFromItsFolder) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   const test::ScratchFolder scratch;
   const std::string folder = scratch.File("new/folder");
   const auto whole = static_cast<int>((library->bytes().size() + LibraryFetch::kPieceBytes - 1) /
@@ -72,7 +72,7 @@ TEST(LibraryFetch, BringsItOnceAndThenTakesItFromItsFolder) {
 }
 
 TEST(LibraryFetch, NoFolderIsNoError) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   for (const char* folder : {"", "/dev/null/not a folder"}) {
     LibraryFetch fetch(folder);
     (void)fetch.Want(library->hash());
@@ -82,7 +82,7 @@ TEST(LibraryFetch, NoFolderIsNoError) {
 }
 
 TEST(LibraryFetch, GoesOnWhereAConnectionBroke) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   LibraryFetch fetch("");
   (void)fetch.Want(library->hash());
   fetch.OnTask(library->hash(), Do(*fetch.TakeTask()));
@@ -100,7 +100,7 @@ TEST(LibraryFetch, GoesOnWhereAConnectionBroke) {
 }
 
 TEST(LibraryFetch, RefusesWhatIsNotTheLibraryAndTriesAgainWhenAsked) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   const test::ScratchFolder scratch;
   LibraryFetch fetch(scratch.File("."));
   for (const char* hash : {"", "../../../../../../etc/passwd.....",

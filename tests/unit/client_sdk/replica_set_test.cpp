@@ -100,7 +100,7 @@ class Server {
   [[nodiscard]] std::shared_ptr<const MotionLibrary> library() const { return library_; }
 
  private:
-  std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
+  std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
   std::map<AvatarId, Avatar> avatars_;
   std::uint64_t step_ = 0;
 };

@@ -31,7 +31,7 @@ struct Bench {
     auto world = std::make_shared<World>();
     world->id = 3;
     world->name = "bench";
-    world->library = MakeToyLibrary();
+    world->library = MakeTestLibrary();
     return world;
   }
 
@@ -602,7 +602,7 @@ TEST(WorldDirectory, GivesAWorldItsGround) {
   config.library = "toy";
   config.worlds["hall"] = {.library = "", .terrain = "hall.json", .persistent = false};
   Libraries libraries;
-  libraries.Add("toy", MakeToyLibrary());
+  libraries.Add("toy", MakeTestLibrary());
   Terrains terrains;
   terrains.Add("hall.json", MakeWorldTerrain(0.5)->terrain);
   WorldDirectory directory(config, libraries, terrains);
@@ -636,7 +636,7 @@ TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
   config.limits.max_worlds = 2;
   config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true};
   Libraries libraries;
-  libraries.Add("toy", MakeToyLibrary());
+  libraries.Add("toy", MakeTestLibrary());
   const Terrains terrains;
   WorldDirectory directory(config, libraries, terrains);
   const auto hall = directory.Join("hall");

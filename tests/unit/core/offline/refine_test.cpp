@@ -205,7 +205,7 @@ TEST(Refine, StopsWhenTold) {
 }
 
 TEST(Refine, RefusesOptionsThatMakeNoSense) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   for (const RefineOptions& options :
        {RefineOptions{.max_error_m = -1.0}, RefineOptions{.max_error_m = NAN},
         RefineOptions{.max_pseudoexamples = -1}, RefineOptions{.max_pseudoexamples = 1025},

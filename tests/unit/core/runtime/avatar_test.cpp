@@ -41,7 +41,7 @@ class AvatarTest : public testing::Test {
     return found;
   }
 
-  const std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
+  const std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
   Avatar avatar_{library_, {}};
   std::uint64_t last_id_ = 0;
 };

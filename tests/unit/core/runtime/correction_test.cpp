@@ -272,7 +272,7 @@ TEST(Terrain, NeverAllocatesWhenAsked) {
 
 // Where a movement starts has no part in its weights: a client that evaluates it far away gets the same.
 TEST(Correction, IsTheSameWhereverAnAvatarStands) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   const auto weights = [&](const BaseFrame& start) {
     Avatar avatar(library, start);
     EXPECT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.47}}));
@@ -284,7 +284,7 @@ TEST(Correction, IsTheSameWhereverAnAvatarStands) {
 }
 
 TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   for (const bool corrected : {true, false}) {
     Avatar avatar(library, {}, {.run_time_correction = corrected});
     for (const double length_m : {0.33, 0.51, 0.13, 0.47}) {

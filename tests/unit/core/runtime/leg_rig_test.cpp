@@ -25,7 +25,7 @@ class SolveLegTest : public testing::Test {
 
   static constexpr unsigned kSeed = 7;
   std::mt19937 random_{kSeed};
-  const std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
+  const std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
   const Skeleton& skeleton_ = library_->skeleton();
   const LegRig& rig_ = library_->leg_rig();
 };

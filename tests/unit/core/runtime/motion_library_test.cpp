@@ -26,7 +26,7 @@ std::string CodeOf(std::span<const std::byte> bytes) {
 }
 
 TEST(MotionLibrary, HoldsWhatWasBuilt) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   ASSERT_EQ(library->groups().size(), 3u);
   EXPECT_EQ(library->skeleton().joints[2].name, "LeftLeg");
   EXPECT_EQ(library->group(0).kind, MovementKind::kStepLeft);
@@ -38,11 +38,11 @@ TEST(MotionLibrary, HoldsWhatWasBuilt) {
 }
 
 TEST(MotionLibrary, SameInputGivesTheSameBytes) {
-  EXPECT_EQ(Copy(MakeToyLibrary()->bytes()), Copy(MakeToyLibrary()->bytes()));
+  EXPECT_EQ(Copy(MakeTestLibrary()->bytes()), Copy(MakeTestLibrary()->bytes()));
 }
 
 TEST(MotionLibrary, OpensItsFile) {
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   const auto path = std::filesystem::temp_directory_path() /
                     ("motion_library_test_" + std::to_string(::getpid()) + ".swl");
   {
@@ -63,7 +63,7 @@ TEST(MotionLibrary, OpensItsFile) {
 }
 
 TEST(MotionLibrary, DamageTruncationAndForeignFilesAreNamed) {
-  const std::vector<std::byte> good = Copy(MakeToyLibrary()->bytes());
+  const std::vector<std::byte> good = Copy(MakeTestLibrary()->bytes());
   EXPECT_EQ(CodeOf({}), "malformed");
   EXPECT_EQ(CodeOf(std::span(good).first(40)), "malformed");
   EXPECT_EQ(CodeOf(std::span(good).first(good.size() - 1)), "malformed");
@@ -118,7 +118,7 @@ TEST(LibraryBuilder, AveragesNearDuplicates) {
 
 TEST(LibraryBuilder, StoredExamplesAreTheClips) {
   const RawLibrary raw = MakeToyRawLibrary();
-  const auto library = MakeToyLibrary();
+  const auto library = MakeTestLibrary();
   double largest_rad = 0.0;
   for (int g = 0; g < 3; ++g) {
     const MotionGroup& group = library->group(g);

@@ -36,7 +36,7 @@ class MovementTest : public testing::Test {
     return pose;
   }
 
-  const std::shared_ptr<const MotionLibrary> library_ = MakeToyLibrary();
+  const std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
   GridCache cache_{library_->layout()};
   std::vector<double> scratch_ = std::vector<double>(15);
 };
