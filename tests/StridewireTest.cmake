@@ -10,7 +10,7 @@ function(stridewire_test name)
   cmake_parse_arguments(ARG "ALONE;THREADS" "LABEL" "SOURCES;APART;LIBRARIES" ${ARGN})
   add_executable(${name} ${ARG_SOURCES} ${ARG_APART})
   set_source_files_properties(${ARG_APART} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
-  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} GTest::gtest GTest::gmock GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} stridewire_core_internal GTest::gtest GTest::gmock GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE
     STRIDEWIRE_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
     STRIDEWIRE_MOCAP_DIR="${PROJECT_SOURCE_DIR}/../shared/mocap")

@@ -8,7 +8,7 @@
 
 #include "pose_history.h"
 #include "stridewire/protocol/messages.h"
-#include "stridewire/runtime/avatar_replica.h"
+#include "runtime/avatar/avatar_replica.h"
 
 namespace stridewire::client {
 

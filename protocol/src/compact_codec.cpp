@@ -7,7 +7,7 @@
 
 #include "compact_kernel.h"
 #include "smallest_three.h"
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/protocol/pose_codec.h"
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "frame_builder.h"
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/check.h"
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "sample_messages.h"
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
-#include "stridewire/base/check.h"
-#include "stridewire/base/trig.h"
+#include "base/check.h"
+#include "base/trig.h"
 
 namespace stridewire::protocol {
 namespace {

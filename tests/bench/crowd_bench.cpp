@@ -13,10 +13,10 @@
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/correction.h"
-#include "stridewire/runtime/pose_quantization.h"
-#include "stridewire/runtime/reference_evaluation.h"
-#include "stridewire/runtime/evaluation_batcher.h"
+#include "runtime/weights/correction.h"
+#include "runtime/library/pose_quantization.h"
+#include "runtime/pose/reference_evaluation.h"
+#include "runtime/pose/evaluation_batcher.h"
 #include "world/encoded_pose_cache.h"
 
 namespace stridewire {

@@ -28,7 +28,7 @@
 #include "bench_libraries.h"
 #include "net/tcp_transport.h"
 #include "session/session.h"
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "world/pose_frames.h"
 
 namespace stridewire {

@@ -26,9 +26,9 @@
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/correction.h"
+#include "runtime/weights/correction.h"
 #include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/pose_quantization.h"
+#include "runtime/library/pose_quantization.h"
 
 namespace stridewire {
 namespace {

@@ -5,8 +5,8 @@
 #include <random>
 #include <string>
 
-#include "stridewire/base/check.h"
-#include "stridewire/offline/builtin_library.h"
+#include "base/check.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/movement.h"
 

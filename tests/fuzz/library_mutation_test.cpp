@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "../../core/src/runtime/library_file.h"
-#include "stridewire/offline/builtin_library.h"
-#include "stridewire/offline/interpolation_error.h"
+#include "runtime/library/library_file.h"
+#include "offline/builtin/builtin_library.h"
+#include "offline/build/interpolation_error.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/refine.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/movement.h"
 #include "test_library.h"

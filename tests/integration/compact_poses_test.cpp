@@ -19,7 +19,7 @@
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/pose_quantization.h"
+#include "runtime/library/pose_quantization.h"
 
 namespace stridewire {
 namespace {

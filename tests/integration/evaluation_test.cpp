@@ -11,17 +11,17 @@
 
 #include "captured_library.h"
 #include "random_requests.h"
-#include "foot_sampler.h"
+#include "runtime/plan/foot_sampler.h"
 #include "instruction_sets.h"
-#include "pose_kernels.h"
+#include "runtime/pose/pose_kernels.h"
 #include "random.h"
 #include "rough_ground.h"
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/reference_evaluation.h"
-#include "stridewire/runtime/evaluation_batcher.h"
+#include "runtime/pose/reference_evaluation.h"
+#include "runtime/pose/evaluation_batcher.h"
 
 namespace stridewire {
 namespace {

@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "stridewire/offline/builtin_library.h"
-#include "stridewire/runtime/cardinal_basis.h"
+#include "offline/builtin/builtin_library.h"
+#include "runtime/library/cardinal_basis.h"
 #include "stridewire/runtime/movement.h"
 
 namespace stridewire {

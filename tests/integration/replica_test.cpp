@@ -17,8 +17,8 @@
 #include "random.h"
 #include "rough_ground.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/avatar_replica.h"
-#include "stridewire/runtime/movement_record.h"
+#include "runtime/avatar/avatar_replica.h"
+#include "runtime/avatar/movement_record.h"
 
 namespace stridewire {
 namespace {

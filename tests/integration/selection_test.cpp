@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "example_clusters.h"
-#include "grid_cells.h"
-#include "left_out_error.h"
-#include "select_examples.h"
-#include "statistics.h"
-#include "stridewire/runtime/measure.h"
+#include "offline/build/example_clusters.h"
+#include "offline/build/grid_cells.h"
+#include "offline/build/left_out_error.h"
+#include "offline/build/select_examples.h"
+#include "offline/base/statistics.h"
+#include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {

@@ -13,13 +13,13 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "library_file.h"
+#include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
 #include "random.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 #include "velocity_steps.h"
 

@@ -12,7 +12,7 @@
 #include "counted_memory.h"
 #include "random.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "capture_files.h"
-#include "stridewire/offline/assemble.h"
+#include "offline/extract/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"

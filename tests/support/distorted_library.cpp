@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
 namespace {

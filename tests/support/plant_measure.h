@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "leg_geometry.h"
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 #include "stridewire/offline/synthesis.h"
 #include "velocity_steps.h"
 

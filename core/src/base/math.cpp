@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 
 namespace stridewire {
 

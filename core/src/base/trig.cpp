@@ -1,4 +1,4 @@
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 
 #include <cmath>
 #include <numbers>

@@ -9,7 +9,7 @@
 #include "commands.h"
 #include "library_json.h"
 #include "stridewire/offline/bvh_reader.h"
-#include "stridewire/offline/layers.h"
+#include "offline/build/layers.h"
 #include "stridewire/offline/open_library.h"
 
 namespace stridewire {

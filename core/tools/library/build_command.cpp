@@ -10,7 +10,7 @@
 #include "commands.h"
 #include "library_json.h"
 #include "progress.h"
-#include "stridewire/offline/assemble.h"
+#include "offline/extract/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <limits>
 
-#include "stridewire/offline/interpolation_error.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/interpolation_error.h"
+#include "offline/build/refine.h"
 
 namespace stridewire {
 namespace {

@@ -12,7 +12,7 @@
 #include "command_line.h"
 #include "commands.h"
 #include "stridewire/base/version.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/refine.h"
 
 namespace stridewire {
 namespace {

@@ -6,7 +6,7 @@
 #include "progress.h"
 #include "refinement_json.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/refine.h"
 
 namespace stridewire {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "stridewire/offline/refine.h"
+#include "offline/build/refine.h"
 
 namespace stridewire {
 

@@ -9,7 +9,7 @@
 #include "progress.h"
 #include "refinement_json.h"
 #include "report/report.h"
-#include "stridewire/offline/assemble.h"
+#include "offline/extract/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"

@@ -4,7 +4,7 @@
 #include <boost/asio/post.hpp>
 #include <utility>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/protocol/decode.h"
 
 namespace stridewire::server {

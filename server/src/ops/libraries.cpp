@@ -2,7 +2,7 @@
 
 #include <set>
 
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 
 namespace stridewire::server {

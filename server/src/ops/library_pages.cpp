@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/convex_hull.h"
-#include "stridewire/runtime/correction.h"
-#include "stridewire/runtime/measure.h"
+#include "runtime/library/convex_hull.h"
+#include "runtime/weights/correction.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/request_plan.h"
 

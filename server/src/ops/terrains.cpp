@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "stridewire/offline/terrain_file.h"
+#include "offline/choreography/terrain_file.h"
 #include "world/world_terrain.h"
 
 namespace stridewire::server {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 
 namespace stridewire::server {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "session/encode_frame.h"
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 
 namespace stridewire::server {
 namespace {

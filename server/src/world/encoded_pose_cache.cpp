@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/pose_codec.h"
 

@@ -11,7 +11,7 @@
 #include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/evaluation_batcher.h"
+#include "runtime/pose/evaluation_batcher.h"
 
 namespace stridewire::server {
 

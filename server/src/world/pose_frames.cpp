@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 
 namespace stridewire::server {
 

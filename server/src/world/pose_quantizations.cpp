@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "stridewire/base/check.h"
-#include "stridewire/runtime/pose_quantization.h"
+#include "base/check.h"
+#include "runtime/library/pose_quantization.h"
 
 namespace stridewire::server {
 

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "world/id_set.h"
 
 namespace stridewire::server {

@@ -1,6 +1,6 @@
 #include "world/world_directory.h"
 
-#include "stridewire/base/check.h"
+#include "base/check.h"
 #include "world/convert.h"
 
 namespace stridewire::server {

@@ -5,8 +5,8 @@
 #include <numeric>
 #include <utility>
 
-#include "stridewire/base/check.h"
-#include "stridewire/runtime/movement_record.h"
+#include "base/check.h"
+#include "runtime/avatar/movement_record.h"
 #include "world/convert.h"
 #include "world/inspect.h"
 #include "world/id_set.h"

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/movement_record.h"
+#include "runtime/avatar/movement_record.h"
 #include "test_library.h"
 
 namespace stridewire::client {

@@ -1,4 +1,4 @@
-#include "curve.h"
+#include "offline/builtin/curve.h"
 
 #include <cstddef>
 

@@ -1,4 +1,4 @@
-#include "elementary.h"
+#include "offline/builtin/elementary.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,6 +1,6 @@
-#include "figure.h"
+#include "offline/builtin/figure.h"
 
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,9 +1,9 @@
-#include "foot_path.h"
+#include "offline/builtin/foot_path.h"
 
 #include <algorithm>
 
-#include "elementary.h"
-#include "stridewire/base/trig.h"
+#include "offline/builtin/elementary.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,8 +1,8 @@
 #pragma once
 
-#include "curve.h"
-#include "figure.h"
-#include "step_timing.h"
+#include "offline/builtin/curve.h"
+#include "offline/builtin/figure.h"
+#include "offline/builtin/step_timing.h"
 
 namespace stridewire::builtin {
 

@@ -1,12 +1,12 @@
-#include "gait_state.h"
+#include "offline/builtin/gait_state.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "curve.h"
-#include "elementary.h"
-#include "figure.h"
-#include "stridewire/base/trig.h"
+#include "offline/builtin/curve.h"
+#include "offline/builtin/elementary.h"
+#include "offline/builtin/figure.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,4 +1,4 @@
-#include "general_steps.h"
+#include "offline/builtin/general_steps.h"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "mirror.h"
-#include "step.h"
+#include "offline/builtin/mirror.h"
+#include "offline/builtin/step.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "figure.h"
+#include "offline/builtin/figure.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire::builtin {

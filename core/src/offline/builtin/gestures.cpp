@@ -1,11 +1,11 @@
-#include "gestures.h"
+#include "offline/builtin/gestures.h"
 
 #include <cmath>
 #include <string>
 #include <utility>
 
-#include "figure.h"
-#include "stridewire/base/trig.h"
+#include "offline/builtin/figure.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

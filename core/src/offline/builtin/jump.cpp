@@ -1,19 +1,19 @@
-#include "jump.h"
+#include "offline/builtin/jump.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <string>
 
-#include "curve.h"
-#include "elementary.h"
-#include "figure.h"
-#include "foot_path.h"
-#include "gait_state.h"
-#include "leg_ik.h"
-#include "step.h"
-#include "stridewire/base/trig.h"
-#include "upper_body.h"
+#include "offline/builtin/curve.h"
+#include "offline/builtin/elementary.h"
+#include "offline/builtin/figure.h"
+#include "offline/builtin/foot_path.h"
+#include "offline/builtin/gait_state.h"
+#include "offline/builtin/leg_ik.h"
+#include "offline/builtin/step.h"
+#include "base/trig.h"
+#include "offline/builtin/upper_body.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,9 +1,9 @@
-#include "leg_ik.h"
+#include "offline/builtin/leg_ik.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "figure.h"
-#include "foot_path.h"
+#include "offline/builtin/figure.h"
+#include "offline/builtin/foot_path.h"
 
 namespace stridewire::builtin {
 

@@ -1,8 +1,8 @@
-#include "mirror.h"
+#include "offline/builtin/mirror.h"
 
 #include <algorithm>
 
-#include "figure.h"
+#include "offline/builtin/figure.h"
 
 namespace stridewire::builtin {
 namespace {

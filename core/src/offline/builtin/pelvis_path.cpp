@@ -1,12 +1,12 @@
-#include "pelvis_path.h"
+#include "offline/builtin/pelvis_path.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "elementary.h"
-#include "leg_ik.h"
-#include "stridewire/base/trig.h"
+#include "offline/builtin/elementary.h"
+#include "offline/builtin/leg_ik.h"
+#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -2,10 +2,10 @@
 
 #include <vector>
 
-#include "curve.h"
-#include "figure.h"
-#include "foot_path.h"
-#include "step_timing.h"
+#include "offline/builtin/curve.h"
+#include "offline/builtin/figure.h"
+#include "offline/builtin/foot_path.h"
+#include "offline/builtin/step_timing.h"
 
 namespace stridewire::builtin {
 

@@ -1,16 +1,16 @@
-#include "step.h"
+#include "offline/builtin/step.h"
 
 #include <cmath>
 #include <string>
 #include <utility>
 
-#include "curve.h"
-#include "elementary.h"
-#include "foot_path.h"
-#include "leg_ik.h"
-#include "pelvis_path.h"
-#include "step_timing.h"
-#include "upper_body.h"
+#include "offline/builtin/curve.h"
+#include "offline/builtin/elementary.h"
+#include "offline/builtin/foot_path.h"
+#include "offline/builtin/leg_ik.h"
+#include "offline/builtin/pelvis_path.h"
+#include "offline/builtin/step_timing.h"
+#include "offline/builtin/upper_body.h"
 
 namespace stridewire::builtin {
 namespace {

@@ -3,10 +3,10 @@
 #include <span>
 #include <string>
 
-#include "figure.h"
-#include "step_shape.h"
+#include "offline/builtin/figure.h"
+#include "offline/builtin/step_shape.h"
 #include "stridewire/offline/raw_library.h"
-#include "upper_body.h"
+#include "offline/builtin/upper_body.h"
 
 namespace stridewire::builtin {
 

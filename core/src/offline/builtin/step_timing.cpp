@@ -1,4 +1,4 @@
-#include "step_timing.h"
+#include "offline/builtin/step_timing.h"
 
 #include <algorithm>
 #include <cmath>

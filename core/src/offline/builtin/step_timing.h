@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "gait_state.h"
-#include "step_shape.h"
+#include "offline/builtin/gait_state.h"
+#include "offline/builtin/step_shape.h"
 
 namespace stridewire::builtin {
 

@@ -1,4 +1,4 @@
-#include "upper_body.h"
+#include "offline/builtin/upper_body.h"
 
 namespace stridewire::builtin {
 namespace {

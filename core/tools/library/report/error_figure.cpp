@@ -4,7 +4,7 @@
 
 #include "figures.h"
 #include "gnuplot.h"
-#include "stridewire/offline/error_map.h"
+#include "offline/build/error_map.h"
 
 namespace stridewire {
 namespace {

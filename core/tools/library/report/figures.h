@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/offline/error_map.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/error_map.h"
+#include "offline/build/refine.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 

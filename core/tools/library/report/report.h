@@ -7,9 +7,9 @@
 
 #include "figures.h"
 #include "stridewire/base/error.h"
-#include "stridewire/offline/interpolation_error.h"
-#include "stridewire/offline/leave_one_out.h"
-#include "stridewire/offline/refine.h"
+#include "offline/build/interpolation_error.h"
+#include "offline/build/leave_one_out.h"
+#include "offline/build/refine.h"
 
 namespace stridewire {
 

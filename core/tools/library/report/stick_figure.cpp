@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "gnuplot.h"
-#include "stridewire/runtime/correction.h"
+#include "runtime/weights/correction.h"
 
 namespace stridewire {
 namespace {

@@ -1,4 +1,4 @@
-#include "stridewire/base/trig.h"
+#include "base/trig.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stridewire/offline/assemble.h"
+#include "offline/extract/assemble.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,11 @@
 #include <cstdio>
 
 #include "capture_files.h"
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/offline/mirror.h"
+#include "offline/extract/mirror.h"
 #include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/keytimes.h"
 #include "synthetic_walker.h"
 

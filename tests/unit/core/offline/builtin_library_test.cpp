@@ -1,4 +1,4 @@
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 
 #include <gtest/gtest.h>
 #include <xxhash.h>

@@ -1,4 +1,4 @@
-#include "stridewire/offline/contacts.h"
+#include "offline/extract/contacts.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "capture_files.h"
-#include "stridewire/offline/extract.h"
+#include "offline/extract/extract.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {

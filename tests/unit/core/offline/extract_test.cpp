@@ -1,5 +1,5 @@
 // Extraction from a synthetic figure whose contacts, lengths and headings are known.
-#include "stridewire/offline/extract.h"
+#include "offline/extract/extract.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/runtime/keytimes.h"
 #include "synthetic_walker.h"
 

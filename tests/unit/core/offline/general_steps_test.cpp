@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "leg_geometry.h"
-#include "stridewire/offline/builtin_library.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "offline/builtin/builtin_library.h"
+#include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
 namespace {

@@ -1,4 +1,4 @@
-#include "stridewire/offline/glitch_repair.h"
+#include "offline/capture/glitch_repair.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

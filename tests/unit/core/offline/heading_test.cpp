@@ -1,4 +1,4 @@
-#include "stridewire/offline/heading.h"
+#include "offline/extract/heading.h"
 
 #include <gtest/gtest.h>
 

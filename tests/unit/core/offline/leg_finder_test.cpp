@@ -1,4 +1,4 @@
-#include "leg_finder.h"
+#include "offline/capture/leg_finder.h"
 
 #include <gtest/gtest.h>
 

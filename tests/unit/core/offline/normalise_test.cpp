@@ -1,4 +1,4 @@
-#include "stridewire/offline/normalise.h"
+#include "offline/extract/normalise.h"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "stridewire/offline/pose_error.h"
+#include "offline/build/pose_error.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 
 namespace stridewire {

@@ -1,4 +1,4 @@
-#include "stridewire/offline/refine.h"
+#include "offline/build/refine.h"
 
 #include <gtest/gtest.h>
 
@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "distorted_library.h"
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/correction.h"
-#include "stridewire/runtime/measure.h"
+#include "runtime/weights/correction.h"
+#include "runtime/weights/measure.h"
 #include "test_library.h"
 
 namespace stridewire {

@@ -1,4 +1,4 @@
-#include "smooth_examples.h"
+#include "offline/build/smooth_examples.h"
 
 #include <gtest/gtest.h>
 
@@ -7,12 +7,12 @@
 #include <random>
 #include <vector>
 
-#include "grid_example.h"
-#include "stridewire/offline/builtin_library.h"
+#include "offline/build/grid_example.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/offline/library_writer.h"
-#include "stridewire/runtime/convex_hull.h"
-#include "stridewire/runtime/measure.h"
+#include "offline/build/library_writer.h"
+#include "runtime/library/convex_hull.h"
+#include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {

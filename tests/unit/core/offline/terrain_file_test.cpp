@@ -1,4 +1,4 @@
-#include "stridewire/offline/terrain_file.h"
+#include "offline/choreography/terrain_file.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

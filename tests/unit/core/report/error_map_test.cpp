@@ -1,13 +1,13 @@
-#include "stridewire/offline/error_map.h"
+#include "offline/build/error_map.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "stridewire/offline/builtin_library.h"
+#include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/measure.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/runtime/movement.h"
 
 namespace stridewire {

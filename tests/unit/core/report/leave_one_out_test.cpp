@@ -1,4 +1,4 @@
-#include "stridewire/offline/leave_one_out.h"
+#include "offline/build/leave_one_out.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 
 namespace stridewire {

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/cardinal_basis.h"
+#include "runtime/library/cardinal_basis.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/convex_hull.h"
+#include "runtime/library/convex_hull.h"
 
 #include <gtest/gtest.h>
 

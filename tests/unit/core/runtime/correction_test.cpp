@@ -1,4 +1,4 @@
-#include "stridewire/runtime/correction.h"
+#include "runtime/weights/correction.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,10 @@
 
 #include "counted_memory.h"
 #include "distorted_library.h"
-#include "end_poses.h"
+#include "runtime/weights/end_poses.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/foot_support.h"
-#include "stridewire/runtime/measure.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
 

@@ -9,7 +9,7 @@
 #include <fstream>
 
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/cardinal_basis.h"
+#include "runtime/library/cardinal_basis.h"
 #include "stridewire/runtime/movement.h"
 #include "test_library.h"
 

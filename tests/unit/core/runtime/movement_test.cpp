@@ -8,7 +8,7 @@
 #include <numeric>
 #include <random>
 
-#include "stridewire/runtime/foot_vector.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 
 namespace stridewire {

@@ -1,0 +1,111 @@
+#include "offline/build/grid_cells.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "offline/build/grid_example.h"
+#include "stridewire/runtime/movement.h"
+
+namespace stridewire {
+namespace {
+
+constexpr int kMinCells = 2;
+constexpr int kMaxCells = 400;  // an interval; kMaxIntervals of them fit into the grid's limit
+constexpr double kGrowth = 1.15;
+constexpr int kMaxRounds = 20;
+constexpr int kSamples = 24;  // an interval and example
+static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
+
+struct IntervalLength {
+  double mean_s = 0.0;
+  double max_s = 0.0;
+};
+
+IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
+  IntervalLength length;
+  for (const RawExample& example : group.examples) {
+    const double length_s = example.keytimes_s[interval + 1] - example.keytimes_s[interval];
+    length.mean_s += length_s / static_cast<double>(group.examples.size());
+    length.max_s = std::max(length.max_s, length_s);
+  }
+  return length;
+}
+
+// For each interval how far the stored example is from its clip: mean over joints and time.
+std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
+                                 const GridLayout& layout) {
+  const GridExample stored = ResampleOnGrid(example, cells, layout);
+  // A group of one, for the very code that plays it.
+  MotionGroup alone;
+  alone.example_count = 1;
+  alone.cells = cells;
+  alone.grid = stored.rows;
+  alone.grid_point_count =
+      static_cast<int>(stored.rows.size() / static_cast<std::size_t>(layout.row_floats));
+  Movement movement;
+  movement.weights = {1.0f};
+  movement.warp = TimeWarp(example.keytimes_s, cells);
+  GridCache cache(layout);
+  Pose played(example.clip.joint_count);
+  Pose captured(example.clip.joint_count);
+  std::vector<double> errors(cells.size(), 0.0);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const double from_s = example.keytimes_s[i];
+    const double length_s = example.keytimes_s[i + 1] - from_s;
+    for (int s = 0; s < kSamples; ++s) {
+      const double t = from_s + length_s * (s + 0.5) / kSamples;
+      EvaluateBlend(alone, layout, movement, t, cache, played);
+      SampleClip(example.clip, t, captured);
+      for (std::size_t j = 0; j < played.rotations.size(); ++j) {
+        errors[i] += AngleBetween(played.rotations[j], captured.rotations[j]);
+      }
+    }
+    errors[i] /= kSamples * example.clip.joint_count;
+  }
+  return errors;
+}
+
+}  // namespace
+
+std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout& layout) {
+  const std::size_t intervals = group.examples.front().keytimes_s.size() - 1;
+  double clip_fps = 0.0;
+  for (const RawExample& example : group.examples) clip_fps = std::max(clip_fps, example.clip.fps);
+  std::vector<int> cells(intervals);
+  std::vector<int> most(intervals);
+  for (std::size_t i = 0; i < intervals; ++i) {
+    const IntervalLength length = LengthOf(group, i);
+    const auto cells_at = [](double length_s, double rate) {
+      return static_cast<int>(
+          std::lround(std::clamp(length_s * rate, double{kMinCells}, double{kMaxCells})));
+    };
+    cells[i] = cells_at(length.mean_s, fps);
+    most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
+  }
+  for (int round = 0; round < kMaxRounds; ++round) {
+    // In an example that is off in the mean, the intervals that are more off than that grow.
+    std::vector<bool> grows(intervals, false);
+    for (const RawExample& example : group.examples) {
+      const std::vector<double> errors = StoredErrors(example, cells, layout);
+      const std::vector<double>& keys = example.keytimes_s;
+      double mean = 0.0;
+      for (std::size_t i = 0; i < intervals; ++i) {
+        mean += errors[i] * (keys[i + 1] - keys[i]) / keys.back();
+      }
+      if (mean <= kStoredErrorRad) continue;
+      for (std::size_t i = 0; i < intervals; ++i) {
+        if (errors[i] >= mean) grows[i] = true;
+      }
+    }
+    bool changed = false;
+    for (std::size_t i = 0; i < intervals; ++i) {
+      if (!grows[i] || cells[i] == most[i]) continue;
+      cells[i] = std::min(most[i], static_cast<int>(std::ceil(kGrowth * cells[i])));
+      changed = true;
+    }
+    if (!changed) break;
+  }
+  return cells;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,121 @@
+#include "offline/build/grid_example.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/keytimes.h"
+
+namespace stridewire {
+namespace {
+
+std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
+  const std::size_t d = examples.front().parameters.size();
+  std::vector<double> mean(d, 0.0);
+  for (const GridExample& example : examples) {
+    for (std::size_t l = 0; l < d; ++l) {
+      mean[l] += example.parameters[l] / static_cast<double>(examples.size());
+    }
+  }
+  std::size_t best = 0;
+  double best_distance = HUGE_VAL;
+  for (std::size_t e = 0; e < examples.size(); ++e) {
+    double distance = 0.0;
+    for (std::size_t l = 0; l < d; ++l) {
+      const double difference = examples[e].parameters[l] - mean[l];
+      distance += difference * difference;
+    }
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = e;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
+                           const GridLayout& layout) {
+  Clip clip = example.clip;
+  MakeSignContinuous(clip);
+  const TimeWarp warp(example.keytimes_s, cells);
+  int point_count = 1;
+  for (const int count : cells) point_count += count;
+
+  GridExample result;
+  result.keytimes_s = example.keytimes_s;
+  result.parameters = example.parameters;
+  result.heading_change_rad = example.heading_change_rad;
+  result.source = example.source;
+  result.mirrored = example.mirrored;
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  result.rows.assign(static_cast<std::size_t>(point_count) * row_floats, 0.0f);
+
+  Pose pose(clip.joint_count);
+  double yaw_rad = 0.0;
+  for (int p = 0; p < point_count; ++p) {
+    SampleClip(clip, warp.TimeAt(p), pose);
+    float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
+    double wrapped_rad = yaw_rad;
+    HeadingOf(pose.rotations[0], wrapped_rad);  // near the vertical the last yaw is kept
+    yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
+    pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
+    for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+      GridLayout::SetRotation(row, j, Normalise(pose.rotations[j]));
+    }
+    layout.SetRoot(row, {DVec3(pose.root_position_m), yaw_rad});
+  }
+  return result;
+}
+
+void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
+                      int joint_count) {
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  GridExample& reference = examples[MedoidIndex(examples)];
+  const std::size_t points = reference.rows.size() / row_floats;
+  const auto flip = [&](float* row, std::size_t j) {
+    GridLayout::SetRotation(row, j, -GridLayout::RotationOf(row, j));
+  };
+  const auto dot = [&](const float* row, const float* to, std::size_t j) {
+    return Dot(GridLayout::RotationOf(row, j), GridLayout::RotationOf(to, j));
+  };
+  for (std::size_t j = 0; j < static_cast<std::size_t>(joint_count); ++j) {
+    for (GridExample& example : examples) {
+      for (std::size_t p = 1; p < points; ++p) {
+        float* row = &example.rows[p * row_floats];
+        if (dot(row, row - row_floats, j) < 0.0f) flip(row, j);
+      }
+    }
+    for (GridExample& example : examples) {
+      float along = 0.0f;
+      for (std::size_t p = 0; p < points; ++p) {
+        along += dot(&example.rows[p * row_floats], &reference.rows[p * row_floats], j);
+      }
+      if (along >= 0.0f) continue;
+      for (std::size_t p = 0; p < points; ++p) flip(&example.rows[p * row_floats], j);
+    }
+  }
+}
+
+void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row) {
+  constexpr float kSmallestNorm = 0.1f;
+  for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
+    const Quat q = GridLayout::RotationOf(sum.data(), j);
+    const float norm = std::sqrt(Dot(q, q));
+    if (norm >= kSmallestNorm) GridLayout::SetRotation(row, j, q * (1.0f / norm));
+  }
+  layout.SetRoot(row, layout.RootOf(sum.data()));
+}
+
+Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count) {
+  Pose pose(joint_count);
+  for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+    pose.rotations[j] = GridLayout::RotationOf(row.data(), j);
+  }
+  const auto [position, yaw_rad] = layout.RootOf(row.data());
+  pose.root_position_m = Vec3(position);
+  pose.rotations[0] = YawRotation(yaw_rad) * pose.rotations[0];
+  return pose;
+}
+
+}  // namespace stridewire

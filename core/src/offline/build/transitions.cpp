@@ -1,0 +1,150 @@
+#include "offline/build/transitions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/library/contact_keytimes.h"
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+namespace {
+
+// Where joints are and how fast they go, seen from the ground below the root, along the heading.
+struct Moment {
+  int example = -1;
+  std::vector<DVec3> joints_m;
+  std::vector<DVec3> velocities_m_s;
+};
+
+double RootMeanSquareM(const std::vector<DVec3>& a, const std::vector<DVec3>& b) {
+  double sum = 0.0;
+  for (std::size_t j = 0; j < a.size(); ++j) sum += glm::dot(a[j] - b[j], a[j] - b[j]);
+  return std::sqrt(sum / static_cast<double>(a.size()));
+}
+
+class MomentReader {
+ public:
+  explicit MomentReader(const Skeleton& skeleton)
+      : skeleton_(skeleton),
+        layout_(skeleton.joint_count()),
+        pose_(skeleton.joint_count()),
+        points_(skeleton.joints.size()),
+        rotations_(skeleton.joints.size()) {}
+
+  Moment Stand(const Pose& pose) {
+    const std::vector<DVec3> joints_m = PointsOf(pose);
+    return {-1, Seen(joints_m, joints_m[0], 0.0, 0.0), std::vector<DVec3>(joints_m.size())};
+  }
+
+  Moment Start(const MotionGroup& group, int example) {
+    const auto keytimes_s = KeytimesOf(group, example);
+    return MomentOf(group, example, 0, 1, (keytimes_s[1] - keytimes_s[0]) / group.cells.front(),
+                    0.0, 0.0);
+  }
+
+  Moment End(const MotionGroup& group, int example) {
+    const auto keytimes_s = KeytimesOf(group, example);
+    const auto last = static_cast<std::size_t>(group.interval_count());
+    const int rise =
+        group.FindParameter(IsStep(group.kind) ? ParameterName::kEndY : ParameterName::kHeight);
+    return MomentOf(
+        group, example, group.grid_point_count - 1, group.grid_point_count - 2,
+        -(keytimes_s[last] - keytimes_s[last - 1]) / group.cells.back(),
+        group.heading_change_rad[static_cast<std::size_t>(example)],
+        rise < 0 ? 0.0 : GroundRise(group.site(example)[static_cast<std::size_t>(rise)]));
+  }
+
+ private:
+  static std::span<const double> KeytimesOf(const MotionGroup& group, int example) {
+    const auto keys = static_cast<std::size_t>(group.interval_count()) + 1;
+    return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
+  }
+
+  // The velocity is that to the grid point `beside`, `away_s` later.
+  Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
+                  double heading_rad, double ground_m) {
+    const std::vector<DVec3> at = PointsOf(group, example, point);
+    const DVec3 root_m = at[0];
+    Moment moment{example, Seen(at, root_m, heading_rad, ground_m),
+                  Seen(PointsOf(group, example, beside), root_m, heading_rad, ground_m)};
+    for (std::size_t j = 0; j < at.size(); ++j) {
+      moment.velocities_m_s[j] = (moment.velocities_m_s[j] - moment.joints_m[j]) / away_s;
+    }
+    return moment;
+  }
+
+  static std::vector<DVec3> Seen(std::vector<DVec3> points, const DVec3& root_m, double heading_rad,
+                                 double ground_m) {
+    for (DVec3& point : points) {
+      point = RotateYaw(-heading_rad, point - DVec3(root_m.x, ground_m, root_m.z));
+    }
+    return points;
+  }
+
+  std::vector<DVec3> PointsOf(const MotionGroup& group, int example, int point) {
+    const auto n = static_cast<std::size_t>(group.example_count);
+    const std::size_t row = static_cast<std::size_t>(point) * n + static_cast<std::size_t>(example);
+    const float* x = &group.grid[row * static_cast<std::size_t>(layout_.row_floats)];
+    for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
+      pose_.rotations[j] = GridLayout::RotationOf(x, j);
+    }
+    const auto [position, yaw_rad] = layout_.RootOf(x);
+    pose_.root_position_m = Vec3(position);
+    pose_.rotations[0] = YawRotation(yaw_rad) * pose_.rotations[0];
+    return PointsOf(pose_);
+  }
+
+  std::vector<DVec3> PointsOf(ConstPoseSpan pose) {
+    ForwardKinematics(skeleton_, pose, points_, rotations_);
+    return {points_.begin(), points_.end()};
+  }
+
+  const Skeleton& skeleton_;
+  GridLayout layout_;
+  Pose pose_;
+  std::vector<Vec3> points_;
+  std::vector<Quat> rotations_;
+};
+
+Transition Nearest(const std::vector<Moment>& ends, const std::vector<Moment>& starts) {
+  Transition nearest;
+  double least_m = HUGE_VAL;
+  for (const Moment& end : ends) {
+    for (const Moment& start : starts) {
+      const double distance_m =
+          RootMeanSquareM(end.joints_m, start.joints_m) +
+          kTransitionVelocityS * RootMeanSquareM(end.velocities_m_s, start.velocities_m_s);
+      if (distance_m >= least_m) continue;
+      least_m = distance_m;
+      nearest = {static_cast<float>(distance_m), end.example, start.example};
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+std::vector<Transition> FindTransitions(const LibraryContent& content) {
+  MomentReader reader(content.skeleton);
+  std::vector<std::vector<Moment>> ends;
+  std::vector<std::vector<Moment>> starts;
+  for (const MotionGroup& group : content.groups) {
+    ends.emplace_back();
+    starts.emplace_back();
+    const int compared = std::min(group.example_count, kMaxComparedExamples);
+    for (int i = 0; i < compared; ++i) {
+      const int example = i * group.example_count / compared;
+      ends.back().push_back(reader.End(group, example));
+      starts.back().push_back(reader.Start(group, example));
+    }
+  }
+  ends.push_back({reader.Stand(content.stand_pose)});
+  starts.push_back(ends.back());
+  std::vector<Transition> transitions;
+  for (const auto& end : ends) {
+    for (const auto& start : starts) transitions.push_back(Nearest(end, start));
+  }
+  return transitions;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,430 @@
+#include "offline/capture/bvh_file.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <unordered_set>
+
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/runtime/skeleton.h"
+
+namespace stridewire {
+namespace {
+
+bool IsSpace(char c) { return c == ' ' || c == '\t' || c == '\v' || c == '\f'; }
+char Lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+bool EqualsWord(std::string_view a, std::string_view lower_word) {
+  return a.size() == lower_word.size() && std::equal(a.begin(), a.end(), lower_word.begin(),
+                                                     [](char x, char y) { return Lower(x) == y; });
+}
+
+bool StartsWithWord(std::string_view a, std::string_view lower_word) {
+  return a.size() >= lower_word.size() && EqualsWord(a.substr(0, lower_word.size()), lower_word);
+}
+
+enum class NumberFault { kNone, kNoNumber, kTooLarge };
+
+// A finite number within our limit. What is too small to be told from zero is zero.
+NumberFault ReadNumber(std::string_view token, double& value) {
+  std::string_view digits = token;
+  if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
+  const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+  if (digits.empty() || end != digits.data() + digits.size()) return NumberFault::kNoNumber;
+  if (code == std::errc::result_out_of_range) {
+    value = std::strtod(std::string(digits).c_str(), nullptr);
+    if (std::fabs(value) < 1.0) value = 0.0;
+  } else if (code != std::errc()) {
+    return NumberFault::kNoNumber;
+  }
+  return std::fabs(value) <= kMaxBvhNumber ? NumberFault::kNone : NumberFault::kTooLarge;
+}
+
+// Names go on into reports and other files, which are UTF-8.
+bool IsUtf8(std::string_view text) {
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned char lead = static_cast<unsigned char>(text[i]);
+    const int extra = lead < 0x80   ? 0
+                      : lead < 0xC2 ? -1
+                      : lead < 0xE0 ? 1
+                      : lead < 0xF0 ? 2
+                      : lead < 0xF5 ? 3
+                                    : -1;
+    if (extra < 0 || text.size() - i <= static_cast<std::size_t>(extra)) return false;
+    for (int k = 1; k <= extra; ++k) {
+      const unsigned char c = static_cast<unsigned char>(text[i + static_cast<std::size_t>(k)]);
+      const unsigned char low = k > 1 ? 0x80 : lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
+      const unsigned char high = k > 1 ? 0xBF : lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
+      if (c < low || c > high) return false;
+    }
+    i += static_cast<std::size_t>(extra) + 1;
+  }
+  return true;
+}
+
+// One unit of the last digit written: 1e-7 for ".0083333", 1e-8 for "8.33333e-03".
+double LastDigit(std::string_view token) {
+  const std::size_t e = token.find_first_of("eE");
+  const std::string_view mantissa = token.substr(0, e);
+  const std::size_t point = mantissa.find('.');
+  int exponent =
+      point == std::string_view::npos ? 0 : -static_cast<int>(mantissa.size() - point - 1);
+  if (e != std::string_view::npos) {
+    int power = 0;
+    std::string_view text = token.substr(e + 1);
+    if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+    if (std::from_chars(text.data(), text.data() + text.size(), power).ec == std::errc()) {
+      exponent += std::clamp(power, -400, 400);
+    }
+  }
+  return std::pow(10.0, std::max(exponent, -400));
+}
+
+class Parser {
+ public:
+  Parser(std::string_view text, std::string_view name) : text_(text), name_(name) {
+    if (text_.starts_with("\xEF\xBB\xBF")) text_.remove_prefix(3);  // UTF-8 byte order mark
+  }
+
+  Expected<BvhFile> Run() {
+    for (const auto step :
+         {&Parser::ParseHierarchy, &Parser::ParseMotionHead, &Parser::ParseRows}) {
+      if (Status status = (this->*step)(); !status)
+        return std::unexpected(std::move(status.error()));
+    }
+    return std::move(file_);
+  }
+
+ private:
+  std::unexpected<Error> FailAt(int line, ErrorCode code, const char* sentence,
+                                std::int64_t index = -1) const {
+    return Fail(code, sentence, name_ + ':' + std::to_string(line), index);
+  }
+  std::unexpected<Error> Malformed(const char* sentence) const {
+    return FailAt(token_line_, ErrorCode::kMalformed, sentence);
+  }
+
+  // Steps over one line end (LF, CRLF or CR) at `at_`.
+  void SkipLineEnd() {
+    if (text_[at_] == '\r' && at_ + 1 < text_.size() && text_[at_ + 1] == '\n') ++at_;
+    ++at_;
+    ++line_;
+  }
+  static bool IsLineEnd(char c) { return c == '\n' || c == '\r'; }
+
+  void SkipSpace() {
+    while (at_ < text_.size()) {
+      if (IsLineEnd(text_[at_])) {
+        SkipLineEnd();
+      } else if (IsSpace(text_[at_])) {
+        ++at_;
+      } else {
+        return;
+      }
+    }
+  }
+
+  // Next word; a brace is a word of its own. Empty at the end of the text.
+  std::string_view Next() {
+    SkipSpace();
+    token_line_ = line_;
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && !IsSpace(text_[at_]) && !IsLineEnd(text_[at_])) {
+      const char c = text_[at_];
+      if (c == '{' || c == '}') {
+        if (at_ == begin) ++at_;
+        break;
+      }
+      ++at_;
+    }
+    return text_.substr(begin, at_ - begin);
+  }
+
+  // Rest of the line without surrounding space, up to an opening brace.
+  std::string_view RestOfLine() {
+    while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
+    token_line_ = line_;
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && !IsLineEnd(text_[at_]) && text_[at_] != '{') ++at_;
+    std::string_view rest = text_.substr(begin, at_ - begin);
+    while (!rest.empty() && IsSpace(rest.back())) rest.remove_suffix(1);
+    return rest;
+  }
+
+  Status NextNumber(double& value, const char* sentence) {
+    switch (ReadNumber(Next(), value)) {
+      case NumberFault::kNone: return {};
+      case NumberFault::kNoNumber: return Malformed(sentence);
+      case NumberFault::kTooLarge: break;
+    }
+    return FailAt(token_line_, ErrorCode::kOutOfRange, "a number is not finite or too large");
+  }
+
+  Status ParseOffset(DVec3& offset) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (Status status = NextNumber(offset[axis], "OFFSET needs three numbers"); !status) {
+        return status;
+      }
+    }
+    return {};
+  }
+
+  Status ParseChannels(BvhJoint& joint) {
+    double count = 0.0;
+    if (Status status = NextNumber(count, "CHANNELS needs a number of channels"); !status) {
+      return status;
+    }
+    if (!(count >= 0.0 && count <= 6.0) || count != std::floor(count)) {
+      return FailAt(token_line_, ErrorCode::kOutOfRange, "a joint has 0 to 6 channels");
+    }
+    joint.first_channel = file_.channel_count;
+    for (int i = 0; i < static_cast<int>(count); ++i) {
+      const std::string_view word = Next();
+      BvhChannel channel;
+      if (word.empty() || (channel.axis = Lower(word[0]) - 'x') < 0 || channel.axis > 2) {
+        return Malformed("expected a channel name such as Xposition or Zrotation");
+      }
+      channel.is_rotation = EqualsWord(word.substr(1), "rotation");
+      if (!channel.is_rotation && !EqualsWord(word.substr(1), "position")) {
+        return Malformed("expected a channel name such as Xposition or Zrotation");
+      }
+      for (const BvhChannel& other : joint.channels) {
+        if (other.axis == channel.axis && other.is_rotation == channel.is_rotation) {
+          return Malformed("a joint has the same channel twice");
+        }
+      }
+      joint.channels.push_back(channel);
+    }
+    file_.channel_count += static_cast<int>(count);
+    return {};
+  }
+
+  Status OpenJoint(int parent) {
+    const int line = line_;
+    std::string name(RestOfLine());
+    if (name.empty()) return FailAt(line, ErrorCode::kMalformed, "expected a joint name");
+    if (name.size() > kMaxBvhNameBytes) {
+      return FailAt(line, ErrorCode::kLimitExceeded, "a joint's name is too long");
+    }
+    for (const char c : name) {
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
+        return FailAt(line, ErrorCode::kMalformed, "a joint's name has a control character");
+      }
+    }
+    if (!IsUtf8(name)) {
+      for (char& c : name) {
+        if (static_cast<unsigned char>(c) >= 0x80) c = '_';
+      }
+    }
+    if (static_cast<int>(file_.joints.size()) >= kMaxJoints) {
+      return FailAt(line, ErrorCode::kLimitExceeded, "the skeleton has too many joints",
+                    kMaxJoints);
+    }
+    if (static_cast<int>(stack_.size()) >= kMaxBvhDepth) {
+      return FailAt(line, ErrorCode::kLimitExceeded, "joints are nested too deeply", kMaxBvhDepth);
+    }
+    if (!names_.insert(name).second) {
+      for (int number = 2;; ++number) {
+        std::string numbered = name + '_' + std::to_string(number);
+        if (!names_.insert(numbered).second) continue;
+        file_.notes.push_back("a second joint " + name + " is called " + numbered);
+        name = std::move(numbered);
+        break;
+      }
+    }
+    if (Next() != "{") return Malformed("expected { after a joint's name");
+    BvhJoint joint;
+    joint.name = std::move(name);
+    joint.parent = parent;
+    joint.line = line;
+    stack_.push_back({static_cast<int>(file_.joints.size()), false, false});
+    file_.joints.push_back(std::move(joint));
+    return {};
+  }
+
+  Status ParseEndSite(int joint) {
+    RestOfLine();  // "Site", or whatever the program wrote.
+    if (Next() != "{") return Malformed("expected { after End Site");
+    if (!EqualsWord(Next(), "offset")) return Malformed("expected OFFSET in an End Site");
+    BvhEndSite site;
+    site.joint = joint;
+    site.line = token_line_;
+    if (Status status = ParseOffset(site.offset); !status) return status;
+    if (Next() != "}") return Malformed("expected } after an End Site");
+    if (file_.end_sites.size() >= static_cast<std::size_t>(kMaxJoints)) {
+      return FailAt(token_line_, ErrorCode::kLimitExceeded, "the skeleton has too many End Sites",
+                    kMaxJoints);
+    }
+    file_.end_sites.push_back(site);
+    return {};
+  }
+
+  // A loop with its own stack: no file makes the program's stack grow.
+  Status ParseHierarchy() {
+    if (!EqualsWord(Next(), "hierarchy")) return Malformed("a BVH file begins with HIERARCHY");
+    if (!EqualsWord(Next(), "root")) return Malformed("expected ROOT after HIERARCHY");
+    if (Status status = OpenJoint(-1); !status) return status;
+    while (!stack_.empty()) {
+      Open& open = stack_.back();
+      BvhJoint& joint = file_.joints[static_cast<std::size_t>(open.joint)];
+      const std::string_view word = Next();
+      Status status;
+      if (word.empty()) {
+        return Malformed("the file ends inside HIERARCHY");
+      } else if (word == "}") {
+        if (!open.has_offset) return Malformed("a joint has no OFFSET");
+        stack_.pop_back();
+      } else if (EqualsWord(word, "offset")) {
+        if (open.has_offset) return Malformed("a joint has two OFFSETs");
+        open.has_offset = true;
+        joint.line = token_line_;
+        status = ParseOffset(joint.offset);
+      } else if (EqualsWord(word, "channels")) {
+        if (open.has_channels) return Malformed("a joint has CHANNELS twice");
+        open.has_channels = true;
+        status = ParseChannels(joint);
+      } else if (EqualsWord(word, "joint")) {
+        status = OpenJoint(open.joint);
+      } else if (EqualsWord(word, "end")) {
+        status = ParseEndSite(open.joint);
+      } else {
+        return Malformed("expected OFFSET, CHANNELS, JOINT, End Site or }");
+      }
+      if (!status) return status;
+    }
+    if (file_.channel_count == 0) return Malformed("no joint has a channel");
+    return {};
+  }
+
+  // "Frames: 10", "Frames:10", "Frames : 10", "Frames 10"; likewise "Frame Time:". Leaves the value
+  // as the next word.
+  bool SkipLabel(std::string_view lower_first, std::string_view lower_second) {
+    const auto skip = [&](std::string_view lower_word) {
+      SkipSpace();
+      token_line_ = line_;
+      if (!StartsWithWord(text_.substr(at_), lower_word)) return false;
+      at_ += lower_word.size();
+      return true;
+    };
+    if (!skip(lower_first)) return false;
+    if (!lower_second.empty() && !skip(lower_second)) return false;
+    while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
+    if (at_ < text_.size() && text_[at_] == ':') ++at_;
+    return true;
+  }
+
+  Status ParseMotionHead() {
+    const std::string_view word = Next();
+    if (EqualsWord(word, "root")) {
+      return FailAt(token_line_, ErrorCode::kUnsupported, "a file with a second ROOT");
+    }
+    if (!EqualsWord(word, "motion")) return Malformed("expected MOTION after HIERARCHY");
+    if (!SkipLabel("frames", "")) return Malformed("expected Frames: after MOTION");
+    const std::string_view count = Next();
+    const auto [end, code] =
+        std::from_chars(count.data(), count.data() + count.size(), announced_frames_);
+    if (code == std::errc::result_out_of_range && end == count.data() + count.size() &&
+        count.front() != '-') {
+      announced_frames_ = INT64_MAX;  // As good as any number that the rows will not reach.
+    } else if (code != std::errc() || end != count.data() + count.size() || announced_frames_ < 1) {
+      return Malformed("Frames: must be a whole number, 1 or more");
+    }
+    frames_line_ = token_line_;
+    if (!SkipLabel("frame", "time")) return Malformed("expected Frame Time: after Frames:");
+    SkipSpace();
+    const std::size_t begin = at_;
+    if (Status status = NextNumber(file_.frame_time_s, "Frame Time: must be a number of seconds");
+        !status) {
+      return status;
+    }
+    file_.frame_time_line = token_line_;
+    file_.frame_time_digit_s = LastDigit(text_.substr(begin, at_ - begin));
+    if (!RestOfLine().empty()) return Malformed("something stands after Frame Time");
+    return {};
+  }
+
+  Status ParseRows() {
+    const std::size_t channels = static_cast<std::size_t>(file_.channel_count);
+    const std::int64_t joints = static_cast<std::int64_t>(file_.joints.size());
+    // A number takes two characters at least, its separator included.
+    const std::size_t most_rows = (text_.size() - at_) / (2 * channels) + 1;
+    file_.values.reserve(channels *
+                         std::min(most_rows, static_cast<std::size_t>(announced_frames_)));
+    std::int64_t frames = 0;
+    for (;;) {
+      SkipSpace();
+      if (at_ >= text_.size()) break;
+      if (frames == announced_frames_) {
+        file_.notes.push_back("line " + std::to_string(line_) +
+                              ": more than the frames that Frames: announces; left out");
+        break;
+      }
+      if ((frames + 1) * joints > kMaxBvhRotations) {
+        return FailAt(line_, ErrorCode::kLimitExceeded, "the motion has too many frames", frames);
+      }
+      if (Status status = ParseRow(channels); !status) return status;
+      ++frames;
+    }
+    if (frames == 0) return FailAt(line_, ErrorCode::kMalformed, "the motion has no frame");
+    if (frames < announced_frames_) {
+      file_.notes.push_back("line " + std::to_string(frames_line_) + ": Frames: announces " +
+                            std::to_string(announced_frames_) + " frames, the file locks " +
+                            std::to_string(frames));
+    }
+    file_.frame_count = static_cast<int>(frames);
+    return {};
+  }
+
+  Status ParseRow(std::size_t channels) {
+    for (std::size_t i = 0;; ++i) {
+      while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
+      const std::size_t begin = at_;
+      while (at_ < text_.size() && !IsSpace(text_[at_]) && !IsLineEnd(text_[at_])) ++at_;
+      if (at_ == begin) {
+        if (i == channels) return {};
+        return FailAt(line_, ErrorCode::kMalformed, "a frame has fewer numbers than the channels",
+                      static_cast<std::int64_t>(i));
+      }
+      if (i == channels) {
+        return FailAt(line_, ErrorCode::kMalformed, "a frame has more numbers than the channels");
+      }
+      double value = 0.0;
+      switch (ReadNumber(text_.substr(begin, at_ - begin), value)) {
+        case NumberFault::kNone: break;
+        case NumberFault::kNoNumber:
+          return FailAt(line_, ErrorCode::kMalformed, "expected a number",
+                        static_cast<std::int64_t>(i));
+        case NumberFault::kTooLarge:
+          return FailAt(line_, ErrorCode::kOutOfRange, "a number is not finite or too large",
+                        static_cast<std::int64_t>(i));
+      }
+      file_.values.push_back(static_cast<float>(value));
+    }
+  }
+
+  struct Open {
+    int joint;
+    bool has_offset;
+    bool has_channels;
+  };
+
+  std::string_view text_;
+  std::string name_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+  int token_line_ = 1;
+  std::int64_t announced_frames_ = 0;
+  int frames_line_ = 0;
+  std::vector<Open> stack_;
+  std::unordered_set<std::string> names_;
+  BvhFile file_;
+};
+
+}  // namespace
+
+Expected<BvhFile> ParseBvhFile(std::string_view text, std::string_view name) {
+  return Parser(text, name).Run();
+}
+
+}  // namespace stridewire

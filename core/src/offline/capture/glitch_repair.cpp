@@ -1,0 +1,204 @@
+#include "offline/capture/glitch_repair.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace stridewire {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+constexpr double kJumpRad_s = 1800.0 * kDegree;  // Arms of a jumping person reach about 1000.
+constexpr double kJumpMinRad = 12.0 * kDegree;   // At 240 Hz and above speeds are mostly noise.
+constexpr double kJumpMaxRad = 60.0 * kDegree;   // At 30 Hz 1800 degrees/s would excuse anything.
+constexpr double kSpikeS = 0.04;
+constexpr double kSpreadS = 0.08;
+constexpr double kLimbEndM = 0.15;
+constexpr double kRootOffPathM = 0.01;
+constexpr double kRootAcceleration_m_s2 = 40.0;
+constexpr int kMedianReach = 2;
+constexpr double kSmallJumpRad = 45.0 * kDegree;
+
+class Track {
+ public:
+  Track(Clip& clip, int joint) : clip_(clip), joint_(joint) {}
+  Quat& operator[](int frame) {
+    return clip_
+        .rotations[static_cast<std::size_t>(frame) * static_cast<std::size_t>(clip_.joint_count) +
+                   static_cast<std::size_t>(joint_)];
+  }
+
+ private:
+  Clip& clip_;
+  int joint_;
+};
+
+// Frames strictly between `before` and `after` on the short arc between those two.
+void Interpolate(Track& track, int before, int after) {
+  const Quat from = track[before];
+  const Quat turn = glm::conjugate(from) * track[after];
+  for (int f = before + 1; f < after; ++f) {
+    const float fraction = static_cast<float>(f - before) / static_cast<float>(after - before);
+    track[f] = Normalise(from * SlerpFromIdentity(turn, fraction));
+  }
+}
+
+// How far the body reaches beyond a joint.
+double ReachBeyond(const Skeleton& skeleton, int joint) {
+  std::vector<double> distance(skeleton.joints.size(), -1.0);
+  distance[static_cast<std::size_t>(joint)] = 0.0;
+  double reach = 0.0;
+  for (std::size_t j = static_cast<std::size_t>(joint) + 1; j < distance.size(); ++j) {
+    const double before = distance[static_cast<std::size_t>(skeleton.joints[j].parent)];
+    if (before < 0.0) continue;
+    distance[j] = before + glm::length(skeleton.joints[j].offset_m);
+    reach = std::max(reach, distance[j]);
+  }
+  for (const EndSite& site : skeleton.end_sites) {
+    const double before = distance[static_cast<std::size_t>(site.joint)];
+    if (before >= 0.0) reach = std::max<double>(reach, before + glm::length(site.offset_m));
+  }
+  return reach;
+}
+
+bool IsLimbEnd(const Skeleton& skeleton, int joint) {
+  return ReachBeyond(skeleton, joint) < kLimbEndM;
+}
+
+void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& clip,
+                 GlitchReport& report) {
+  Track track(clip, joint);
+  const int end = clip.frame_count();
+  const double limit = std::clamp(kJumpRad_s / clip.fps, kJumpMinRad, kJumpMaxRad);
+  const int spike = std::max(2, static_cast<int>(std::lround(kSpikeS * clip.fps)));
+  const int spread = std::max(1, static_cast<int>(std::lround(0.5 * kSpreadS * clip.fps)));
+  // jump at f: between f and f + 1
+  const auto jump = [&](int f) { return AngleBetween(track[f], track[f + 1]); };
+  for (int f = first_frame; f + 1 < end; ++f) {
+    const double angle = jump(f);
+    if (angle <= limit) continue;
+    // Back again soon? Then everything in between is bad.
+    int back = -1;
+    double largest = angle;
+    for (int g = f + 1; g < std::min(f + 1 + spike, end - 1); ++g) {
+      const double there = jump(g);
+      if (there > limit && AngleBetween(track[f], track[g + 1]) < 0.5 * std::max(angle, there)) {
+        back = g + 1;
+        largest = std::max(angle, there);
+      }
+    }
+    if (back > 0) {
+      Interpolate(track, f, back);
+      report.repaired.push_back({joint, {f + 1, back}, largest});
+      f = back - 1;
+    } else if (f - first_frame < spike) {
+      for (int g = first_frame; g <= f; ++g) track[g] = track[f + 1];
+      report.repaired.push_back({joint, {first_frame, f + 1}, angle});
+    } else if (end - 1 - f <= spike) {
+      for (int g = f + 1; g < end; ++g) track[g] = track[f];
+      report.repaired.push_back({joint, {f + 1, end}, angle});
+    } else {
+      const int before = std::max(first_frame, f - spread);
+      const int after = std::min(end - 1, f + 1 + spread);
+      const JointFlip flip{joint, {before, after + 1}, angle};
+      if (angle <= kSmallJumpRad || IsLimbEnd(skeleton, joint)) {
+        Interpolate(track, before, after);
+        report.repaired.push_back(flip);
+      } else {
+        report.left.push_back(flip);
+      }
+      f = after - 1;
+    }
+  }
+}
+
+// One or two frames at which the root is beside its path: the solver that made the recording
+// gave them to another joint (16_17: pelvis 4 cm aside and 30 degrees turned for a frame).
+void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
+  std::vector<Vec3>& path = clip.root_positions_m;
+  const int end = clip.frame_count();
+  const double limit = std::max(kRootOffPathM, kRootAcceleration_m_s2 / (clip.fps * clip.fps));
+  std::vector<double> off(path.size(), 0.0);
+  for (int f = first_frame + kMedianReach; f + kMedianReach < end; ++f) {
+    Vec3 median;
+    for (int axis = 0; axis < 3; ++axis) {
+      std::array<float, 2 * kMedianReach + 1> values;
+      for (int k = -kMedianReach; k <= kMedianReach; ++k) {
+        values[static_cast<std::size_t>(k + kMedianReach)] =
+            path[static_cast<std::size_t>(f + k)][axis];
+      }
+      std::ranges::nth_element(values, values.begin() + kMedianReach);
+      median[axis] = values[kMedianReach];
+    }
+    off[static_cast<std::size_t>(f)] = glm::length(path[static_cast<std::size_t>(f)] - median);
+  }
+  // A fast walk moves 2 cm a frame at 120 Hz, but its median moves along.
+  for (int f = first_frame + 1; f + 1 < end; ++f) {
+    if (off[static_cast<std::size_t>(f)] <= limit) continue;
+    int last = f;
+    double largest = 0.0;
+    while (last + 1 < end && off[static_cast<std::size_t>(last)] > limit) {
+      largest = std::max(largest, off[static_cast<std::size_t>(last)]);
+      ++last;
+    }
+    const Vec3 from = path[static_cast<std::size_t>(f - 1)];
+    const Vec3 to = path[static_cast<std::size_t>(last)];
+    for (int g = f; g < last; ++g) {
+      const float fraction = static_cast<float>(g - f + 1) / static_cast<float>(last - f + 1);
+      path[static_cast<std::size_t>(g)] = from + fraction * (to - from);
+    }
+    report.repaired.push_back({0, {f, last}, 0.0, largest});
+    f = last;
+  }
+}
+
+}  // namespace
+
+GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip) {
+  GlitchReport report;
+  for (int joint = 0; joint < clip.joint_count; ++joint) {
+    RepairJoint(skeleton, joint, std::max(0, first_frame), clip, report);
+  }
+  RepairRootPath(std::max(0, first_frame), clip, report);
+  if (!report.repaired.empty()) MakeSignContinuous(clip);
+  return report;
+}
+
+std::string DescribeFlip(const Skeleton& skeleton, const JointFlip& flip, double fps) {
+  char text[64];
+  const double middle_s = 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps;
+  if (flip.distance_m > 0.0) {
+    std::snprintf(text, sizeof text, " moves %.1f cm at once at %.2f s", 100.0 * flip.distance_m,
+                  middle_s);
+  } else {
+    std::snprintf(text, sizeof text, " turns %.0f degrees at once at %.2f s",
+                  flip.angle_rad / kDegree, middle_s);
+  }
+  return skeleton.joints[static_cast<std::size_t>(flip.joint)].name + text;
+}
+
+std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchReport& report,
+                                         double fps) {
+  std::vector<std::string> sentences;
+  for (int joint = 0; joint < skeleton.joint_count(); ++joint) {
+    int count = 0;
+    const JointFlip* worst = nullptr;
+    for (const JointFlip& flip : report.repaired) {
+      if (flip.joint != joint || flip.distance_m > 0.0) continue;
+      ++count;
+      if (worst == nullptr || flip.angle_rad > worst->angle_rad) worst = &flip;
+    }
+    if (count == 0) continue;
+    std::string sentence = DescribeFlip(skeleton, *worst, fps) + ": mended";
+    if (count > 1) sentence += ", as " + std::to_string(count - 1) + " smaller flips of it";
+    sentences.push_back(std::move(sentence));
+  }
+  for (const JointFlip& flip : report.repaired) {
+    if (flip.distance_m > 0.0) sentences.push_back(DescribeFlip(skeleton, flip, fps) + ": mended");
+  }
+  return sentences;
+}
+
+}  // namespace stridewire

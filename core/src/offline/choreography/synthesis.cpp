@@ -1,0 +1,293 @@
+#include "stridewire/offline/synthesis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+
+#include "runtime/library/contact_keytimes.h"
+#include "runtime/weights/measure.h"
+
+namespace stridewire {
+namespace {
+
+// The frames from `from_s` to `to_s`, both within a millionth of one; empty: first > last.
+struct Frames {
+  Frames(const Clip& clip, double from_s, double to_s)
+      : first(static_cast<int>(std::ceil(from_s * clip.fps - 1e-6))),
+        last(std::min(static_cast<int>(std::floor(to_s * clip.fps + 1e-6)),
+                      clip.frame_count() - 1)) {}
+  int first;
+  int last;
+};
+
+DVec3 Ball(const MotionLibrary& library, const Clip& clip, int frame, Foot foot) {
+  return DVec3(BallPosition(library.skeleton(), clip.frame(frame), foot));
+}
+
+// Where feet were planted, from the movement's own plan; a step's landing last.
+std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& movement) {
+  std::vector<PlantRecord> plants;
+  const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
+  for (const Foot foot : {OtherFoot(last), last}) {
+    const FootTrajectory& track = movement.feet.foot(foot);
+    const double end_s = record.start_s + movement.duration_s();
+    const double release_s = std::min(record.start_s + track.release_s, end_s);
+    plants.push_back({foot, record.start_s, release_s, track.from.position_m, 0.0});
+    if (record.start_s + track.land_s <= end_s) {
+      plants.push_back({foot, record.start_s + track.land_s, end_s, track.to.position_m, 0.0});
+    }
+  }
+  return plants;
+}
+
+// The fixed foot of a step stands all along, the moving one before toe-off and after heel-strike;
+// a jump has both feet down before toe-off and after landing.
+std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
+  std::vector<PlantRecord> plants;
+  const std::size_t n = record.keytimes_s.size() - 1;
+  const auto add = [&](Foot foot, std::size_t from, std::size_t to) {
+    plants.push_back({foot, record.keytimes_s[from], record.keytimes_s[to], {}, 0.0});
+  };
+  const ContactKeytimes contact = ContactKeytimesOf(record.kind, static_cast<int>(n));
+  if (IsStep(record.kind)) {
+    const Foot moving = MovingFoot(record.kind);
+    add(OtherFoot(moving), 0, n);
+    if (n >= 2) add(moving, contact.landing, n);
+  } else if (record.kind == MovementKind::kJump) {
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      add(foot, 0, contact.toe_off);
+      add(foot, contact.landing, n);
+    }
+  }
+  return plants;
+}
+
+// Where a planted step was asked to bring its foot.
+Footprint AskedOf(MovementKind kind, const FootPlan& feet) {
+  Footprint asked = feet.foot(MovingFoot(kind)).to;
+  asked.position_m += feet.missed_m;
+  asked.heading_rad += feet.missed_rad;
+  return asked;
+}
+
+void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecord& record) {
+  const bool is_planted = !record.plants.empty();
+  if (!is_planted) record.plants = PlantsOf(record);
+  for (PlantRecord& plant : record.plants) {
+    const Frames frames(clip, plant.from_s, plant.to_s);
+    if (!is_planted && frames.first <= frames.last) {
+      plant.anchor_m = Ball(library, clip, frames.first, plant.foot);
+    }
+    for (int frame = frames.first; frame <= frames.last; ++frame) {
+      const DVec3 away = Ball(library, clip, frame, plant.foot) - plant.anchor_m;
+      plant.drift_m = std::max(plant.drift_m, std::hypot(away.x, away.z));
+    }
+  }
+}
+
+// Ids are the caller's own; walks are told by how they end: with a stand that no movement was for.
+bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
+  return walks.contains(event.request_id) &&
+         (event.type == AvatarEventType::kRejected ||
+          (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand));
+}
+
+// Where a movement stands in a choreography, among layers.
+std::string PlaceOf(std::size_t request, std::span<const LayerCue> layers) {
+  const auto before =
+      std::ranges::count_if(layers, [&](const LayerCue& cue) { return cue.before <= request; });
+  return "movements[" + std::to_string(request + static_cast<std::size_t>(before)) + "]";
+}
+
+// A step or jump that no way leads to when its turn comes.
+Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests,
+               std::span<const LayerCue> layers) {
+  const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);
+  return {event.code, event.reason, -1,
+          PlaceOf(static_cast<std::size_t>(request - requests.begin()), layers)};
+}
+
+// Sets the layers that go before a movement, and those left of earlier ones.
+Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
+                 Avatar& avatar) {
+  for (; next < layers.size() && layers[next].before <= before; ++next) {
+    const LayerCue& cue = layers[next];
+    const Status status = avatar.SetLayer({.layer = avatar.library().FindLayer(cue.layer),
+                                           .is_on = !cue.is_off,
+                                           .weight = cue.weight,
+                                           .blend_s = cue.blend_s,
+                                           .speed = cue.speed});
+    if (status) continue;
+    Error error = status.error();
+    error.where = "movements[" + std::to_string(cue.before + next) + "].layer";
+    error.index = -1;
+    return std::unexpected(std::move(error));
+  }
+  return {};
+}
+
+// How far a step's foot, when it first stands, is from where it was asked to.
+void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& asked,
+                    MovementRecord& record) {
+  const Foot foot = MovingFoot(record.kind);
+  const double end_s = clip.frame_count() / clip.fps;
+  const int frame = Frames(clip, record.plants.back().from_s, end_s).first;
+  if (frame >= clip.frame_count()) return;
+  const ConstPoseSpan pose = clip.frame(frame);
+  LegPose leg;
+  EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
+  const BlendedFoot lands = FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg);
+  record.landing_error_m =
+      std::hypot(lands.ball_m.x - asked.position_m.x, lands.ball_m.z - asked.position_m.z);
+  record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - asked.heading_rad));
+}
+
+// The examples' own, by their weights: what cardinal weights that are the same were asked for.
+ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> weights) {
+  ParameterValues mean;
+  mean.count = group.parameter_count();
+  for (std::size_t e = 0; e < weights.size(); ++e) {
+    for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+      mean.values[l] += static_cast<double>(weights[e]) * group.site(static_cast<int>(e))[l];
+    }
+  }
+  return mean;
+}
+
+// Without planting: how far the measured end is from what was requested, in the parameters the group has.
+void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
+  double squared = 0.0;
+  for (std::size_t l = 0; l < group.parameters.size(); ++l) {
+    const double miss = record.measured.values[l] - record.requested.values[l];
+    switch (group.parameters[l].name) {
+      case ParameterName::kEndX:
+      case ParameterName::kEndY:
+      case ParameterName::kEndZ: squared += miss * miss; break;
+      case ParameterName::kTurn: record.landing_error_rad = std::fabs(miss); break;
+      default: break;
+    }
+  }
+  record.landing_error_m = std::sqrt(squared);
+}
+
+}  // namespace
+
+Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+                               std::span<const MovementRequest> requests, double fps,
+                               const AvatarOptions& options, std::span<const LayerCue> layers) {
+  if (!(fps >= 10.0 && fps <= 1000.0)) {
+    return Fail(ErrorCode::kOutOfRange, "frames a second must be from 10 to 1000");
+  }
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    if (Status status = ValidateRequest(*library, requests[i]); !status) {
+      Error error = status.error();
+      error.where = PlaceOf(i, layers) + "." + error.where;
+      error.index = -1;
+      return std::unexpected(error);
+    }
+  }
+
+  const int joint_count = library->skeleton().joint_count();
+  Avatar avatar(library, start, options);
+  Synthesis result;
+  result.clip.fps = fps;
+  result.clip.joint_count = joint_count;
+  const auto record_pose = [&] {
+    const ConstPoseSpan pose = avatar.pose();
+    result.clip.root_positions_m.push_back(pose.root_position_m);
+    result.clip.rotations.insert(result.clip.rotations.end(), pose.rotations.begin(),
+                                 pose.rotations.end());
+  };
+  record_pose();
+
+  Pose scratch(joint_count);
+  GridCache cache(library->layout());
+  std::vector<std::optional<Footprint>> asked;  // of steps that were planted
+  std::set<std::uint64_t> walks;
+  for (const MovementRequest& request : requests) {
+    if (std::holds_alternative<WalkRequest>(request.movement)) walks.insert(request.id);
+  }
+  std::size_t next_cue = 0;
+  if (Status status = SetLayers(layers, 0, next_cue, avatar); !status) {
+    return std::unexpected(status.error());
+  }
+  std::size_t next = 0;
+  while (next < requests.size() || !avatar.idle()) {
+    while (next < requests.size() && avatar.queue_size() < Avatar::kMaxQueue) {
+      if (Status status = avatar.Enqueue(requests[next]); !status) {
+        Error error = status.error();
+        error.where = PlaceOf(next, layers) + (error.where.empty() ? "" : "." + error.where);
+        error.index = -1;
+        return std::unexpected(std::move(error));
+      }
+      ++next;
+    }
+    if (result.clip.frame_count() >= kMaxSynthesisFrames) {
+      return Fail(ErrorCode::kLimitExceeded, "the choreography takes more than 2^20 frames");
+    }
+    avatar.Advance(1.0 / fps);
+    record_pose();
+    for (const AvatarEvent& event : avatar.events()) {
+      const auto about = std::ranges::find(requests, event.request_id, &MovementRequest::id);
+      if (next_cue < layers.size() && about != requests.end()) {
+        const auto before = static_cast<std::size_t>(about - requests.begin());
+        if (Status status = SetLayers(layers, before, next_cue, avatar); !status) {
+          return std::unexpected(status.error());
+        }
+      }
+      if (event.type == AvatarEventType::kStarted) {
+        asked.emplace_back();
+        MovementRecord record;
+        record.kind = event.kind;
+        record.request_id = event.request_id;
+        record.group = event.group;
+        record.start_s = event.time_s;
+        record.requested = event.requested;
+        record.applied = event.applied;
+        record.extrapolated = event.extrapolated;
+        record.clamped = event.clamped;
+        if (const Movement* movement = avatar.movement(); movement != nullptr && event.group >= 0) {
+          record.corrected = options.run_time_correction
+                                 ? MeanParameters(library->group(event.group), movement->weights)
+                                 : movement->parameters;
+          record.weights = movement->weights;
+          for (int i = 0; i <= movement->warp.interval_count(); ++i) {
+            record.keytimes_s.push_back(event.time_s + movement->warp.keytime_s(i));
+          }
+          cache.Clear();
+          if (movement->feet.is_active) {
+            record.plants = PlantsOf(record, *movement);
+            if (IsStep(record.kind)) asked.back() = AskedOf(record.kind, movement->feet);
+          }
+          record.measured = MeasureMovement(*library, *movement, cache, scratch);
+        }
+        result.movements.push_back(std::move(record));
+      } else if (EndsWalk(event, walks)) {
+        result.walks.push_back({event.request_id, event.type == AvatarEventType::kFinished,
+                                event.reason, event.time_s, event.base});
+      } else if (event.missed) {
+        result.unreachable_footprints.push_back(
+            {event.request_id, DescribeRejection(event), event.time_s, *event.missed});
+      } else if (event.type == AvatarEventType::kRejected) {
+        return std::unexpected(Rejected(event, requests, layers));
+      } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
+        result.movements.back().end_s = event.time_s;
+        result.movements.back().base = event.base;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < result.movements.size(); ++i) {
+    MovementRecord& record = result.movements[i];
+    if (record.keytimes_s.empty()) continue;
+    MeasurePlants(*library, result.clip, record);
+    if (asked[i]) {
+      MeasureLanding(*library, result.clip, *asked[i], record);
+    } else if (IsStep(record.kind)) {
+      MeasureUnplantedLanding(library->group(record.group), record);
+    }
+  }
+  return result;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,293 @@
+#include "offline/extract/assemble.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "offline/base/statistics.h"
+#include "offline/extract/mirror.h"
+
+namespace stridewire {
+namespace {
+
+constexpr std::size_t kExamplesPerParameter = 3;
+constexpr std::size_t kLeastForAnArea = std::size(kStraightStepParameters) + 1;
+constexpr std::size_t kOutlierFreeMin = 4;  // examples from which on extremes are not counted
+
+// Examples of one kind with all their parameters, on their way into a group.
+struct Pool {
+  MovementKind kind = MovementKind::kStepLeft;
+  std::span<const ParameterName> names;
+  std::vector<RawExample> examples;
+};
+
+double Spread(const Pool& pool, std::size_t parameter) {
+  std::vector<double> values;
+  for (const RawExample& example : pool.examples) values.push_back(example.parameters[parameter]);
+  if (values.empty()) return 0.0;
+  std::ranges::sort(values);
+  const std::size_t skip = values.size() >= kOutlierFreeMin ? 1 : 0;
+  return values[values.size() - 1 - skip] - values[skip];
+}
+
+// The parameters a pool spans, `always` among them, at most one fewer than it has examples (but
+// `always`).
+std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const ParameterName> always,
+                                           bool with_height, const AssembleOptions& options) {
+  struct Candidate {
+    std::size_t index;
+    double spread;  // in units of the least that counts
+    bool fixed;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < pool.names.size(); ++i) {
+    const ParameterName name = pool.names[i];
+    const bool fixed = std::ranges::find(always, name) != always.end();
+    const bool height = name == ParameterName::kStartY || name == ParameterName::kEndY;
+    if (height && !with_height) continue;
+    const double least =
+        name == ParameterName::kTurn ? options.spread_min_rad : options.spread_min_m;
+    const double spread = Spread(pool, i) / least;
+    if (fixed || spread >= 1.0) candidates.push_back({i, spread, fixed});
+  }
+  std::ranges::stable_sort(candidates, [](const Candidate& a, const Candidate& b) {
+    return std::pair(a.fixed, a.spread) > std::pair(b.fixed, b.spread);
+  });
+  const std::size_t most = std::max(always.size(), pool.examples.size() / kExamplesPerParameter);
+  if (candidates.size() > most) candidates.resize(most);
+  std::vector<std::size_t> indices;
+  for (const Candidate& candidate : candidates) indices.push_back(candidate.index);
+  std::ranges::sort(indices);
+  return indices;
+}
+
+RawGroup MakeGroup(Pool pool, const std::vector<std::size_t>& parameters) {
+  RawGroup group;
+  group.kind = pool.kind;
+  for (const std::size_t i : parameters) group.parameters.push_back(pool.names[i]);
+  for (RawExample& example : pool.examples) {
+    std::vector<double> kept;
+    for (const std::size_t i : parameters) kept.push_back(example.parameters[i]);
+    example.parameters = std::move(kept);
+    group.examples.push_back(std::move(example));
+  }
+  return group;
+}
+
+void Raise(Pose& pose, double by_m) { pose.root_position_m.y += static_cast<float>(by_m); }
+
+void Raise(Clip& clip, double by_m) {
+  for (Vec3& position : clip.root_positions_m) position.y += static_cast<float>(by_m);
+}
+
+// Brings the examples of several captures together.
+class Assembler {
+ public:
+  Assembler(const AssembleOptions& options, const Skeleton& skeleton,
+            std::span<const Extraction> files)
+      : options_(options), skeleton_(skeleton), files_(files) {
+    if (options.mirror) partners_ = FindMirrorJoints(skeleton);
+    for (int f = 0; f < 2; ++f) {
+      std::vector<double> heights;
+      for (const Extraction& file : files) {
+        if (file.error.empty() && file.has_contacts) heights.push_back(file.ball_height_m[f]);
+      }
+      ball_height_m_[f] = Median(std::move(heights));
+    }
+  }
+
+  Expected<RawLibrary> Run() {
+    if (options_.mirror && !partners_) {
+      return Fail(ErrorCode::kUnsupported,
+                  "cannot mirror: neither the joints' names nor their places pair left with right",
+                  "--mirror");
+    }
+    RawLibrary library;
+    library.skeleton = skeleton_;
+    if (options_.steps) {
+      AddStepGroups(library);
+    }
+    if (options_.jumps) AddJumpGroup(library);
+    if (library.groups.empty()) {
+      return Fail(ErrorCode::kNotFound, "no usable step or jump in the captures");
+    }
+    library.stand_pose = StandPose(library);
+    return library;
+  }
+
+ private:
+  // What brings a capture's resting balls to the library's height. A foot may be off by its markers
+  // (2 cm seen), so the foot that agrees better decides.
+  [[nodiscard]] double Shift(const Extraction& file) const {
+    if (!file.has_contacts) return 0.0;
+    const double left = ball_height_m_[0] - file.ball_height_m[0];
+    const double right = ball_height_m_[1] - file.ball_height_m[1];
+    return std::fabs(left) < std::fabs(right) ? left : right;
+  }
+
+  void Collect(const ExtractedExample& from, const Extraction& file, Pool& pool) const {
+    if (from.kind != pool.kind) return;
+    pool.examples.push_back(from.example);
+    Raise(pool.examples.back().clip, Shift(file));
+  }
+
+  template <typename Member, typename Keep>
+  [[nodiscard]] Pool Gather(MovementKind kind, std::span<const ParameterName> names, Member member,
+                            Keep keep) const {
+    Pool pool{kind, names, {}};
+    for (const Extraction& file : files_) {
+      if (!file.error.empty()) continue;
+      for (const ExtractedExample& example : file.*member) {
+        if (!keep(example)) continue;
+        Collect(example, file, pool);
+        if (partners_ && IsStep(kind)) {
+          Collect(MirrorExample(skeleton_, *partners_, names, example), file, pool);
+        }
+      }
+    }
+    return pool;
+  }
+
+  void AddStepGroups(RawLibrary& library) const {
+    constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};
+    const auto all = [](const ExtractedExample&) { return true; };
+    const auto level = [](const ExtractedExample& e) { return e.level; };
+    std::array<Pool, 2> straight_steps;  // by foot
+    std::array<Pool, 2> level_steps;
+    std::array<Pool, 2> all_steps;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const MovementKind kind = StepKind(kFeet[f]);
+      straight_steps[f] = Gather(kind, kStraightStepParameters, &Extraction::straight_steps, all);
+      level_steps[f] = Gather(kind, kGeneralStepParameters, &Extraction::general_steps, level);
+      all_steps[f] = Gather(kind, kGeneralStepParameters, &Extraction::general_steps, all);
+      const std::size_t straight_count = straight_steps[f].examples.size();
+      const std::size_t level_count = level_steps[f].examples.size();
+      if (all_steps[f].examples.size() <= level_count) all_steps[f].examples.clear();
+      if (level_count <= straight_count) level_steps[f].examples.clear();
+      // Fewer span no area: what is asked beside their line would be met by no weights.
+      const bool all_hold_them = !all_steps[f].examples.empty();
+      if (all_hold_them && level_count < kLeastForAnArea) level_steps[f].examples.clear();
+      if ((all_hold_them || !level_steps[f].examples.empty()) && straight_count < kLeastForAnArea) {
+        straight_steps[f].examples.clear();
+      }
+    }
+    for (Pool& pool : straight_steps) {
+      if (!pool.examples.empty()) library.groups.push_back(MakeGroup(std::move(pool), {0, 1}));
+    }
+    for (Pool& pool : level_steps) AddGeneral(std::move(pool), false, library);
+    for (Pool& pool : all_steps) AddGeneral(std::move(pool), true, library);
+  }
+
+  void AddGeneral(Pool pool, bool with_height, RawLibrary& library) const {
+    if (pool.examples.empty()) return;
+    const std::vector<std::size_t> spanned =
+        SpannedParameters(pool, kStraightStepParameters, with_height, options_);
+    library.groups.push_back(MakeGroup(std::move(pool), spanned));
+  }
+
+  void AddJumpGroup(RawLibrary& library) const {
+    Pool pool =
+        Gather(MovementKind::kJump, kJumpParameters, &Extraction::jump_examples,
+               [&](const ExtractedExample& e) { return e.settled || options_.unsettled_jumps; });
+    if (pool.examples.empty()) return;
+    constexpr ParameterName kAlways[] = {ParameterName::kLength};
+    const std::vector<std::size_t> spanned = SpannedParameters(pool, kAlways, true, options_);
+    library.groups.push_back(MakeGroup(std::move(pool), spanned));
+  }
+
+  // The quietest stand of all captures; without any, how the first example starts.
+  [[nodiscard]] Pose StandPose(const RawLibrary& library) const {
+    const Extraction* best = nullptr;
+    for (const Extraction& file : files_) {
+      if (!file.error.empty() || !file.stand) continue;
+      if (best == nullptr || file.stand->unrest < best->stand->unrest) best = &file;
+    }
+    if (best != nullptr) {
+      Pose pose = best->stand->pose;
+      Raise(pose, Shift(*best));
+      return pose;
+    }
+    const ConstPoseSpan first = library.groups.front().examples.front().clip.frame(0);
+    Pose pose;
+    pose.root_position_m = first.root_position_m;
+    pose.rotations.assign(first.rotations.begin(), first.rotations.end());
+    return pose;
+  }
+
+  const AssembleOptions& options_;
+  const Skeleton& skeleton_;
+  std::span<const Extraction> files_;
+  std::optional<std::vector<int>> partners_;
+  double ball_height_m_[2] = {0.0, 0.0};
+};
+
+bool SameOffsets(const Skeleton& a, const Skeleton& b) {
+  for (std::size_t j = 1; j < a.joints.size(); ++j) {
+    if (glm::length(a.joints[j].offset_m - b.joints[j].offset_m) > 1e-5f) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+LibraryAssembler::LibraryAssembler(AssembleOptions options) : options_(std::move(options)) {}
+
+const Extraction& LibraryAssembler::Add(const Capture& capture) {
+  const bool first = skeleton_.joints.empty();
+  if (!first && !SameJointTree(skeleton_, capture.skeleton)) {
+    Extraction& file = files_.emplace_back();
+    file.path = capture.path;
+    file.frames = capture.clip.frame_count();
+    file.fps = capture.clip.fps;
+    file.unit_m = capture.unit_m;
+    file.notes = capture.notes;
+    file.skeleton = capture.skeleton;
+    file.error = TreeDifference(skeleton_, skeleton_path_, capture.skeleton);
+    return file;
+  }
+  ExtractOptions extract = options_.extract;
+  extract.target = first || SameOffsets(skeleton_, capture.skeleton) ? nullptr : &skeleton_;
+  Extraction& file = files_.emplace_back(Extract(capture, extract));
+  if (first && file.error.empty()) {
+    skeleton_ = capture.skeleton;
+    skeleton_path_ = capture.path;
+  }
+  return file;
+}
+
+Expected<RawLibrary> LibraryAssembler::Assemble() const {
+  return Assembler(options_, skeleton_, files_).Run();
+}
+
+std::string TreeDifference(const Skeleton& first, const std::string& first_name,
+                           const Skeleton& other) {
+  const auto parent = [](const Skeleton& skeleton, std::size_t j) {
+    const int index = skeleton.joints[j].parent;
+    return index < 0 ? std::string("no joint")
+                     : skeleton.joints[static_cast<std::size_t>(index)].name;
+  };
+  for (std::size_t j = 0; j < std::min(first.joints.size(), other.joints.size()); ++j) {
+    const Joint& a = first.joints[j];
+    const Joint& b = other.joints[j];
+    if (a.name != b.name) {
+      return "its joint " + std::to_string(j) + " is " + b.name + " where " + first_name + " has " +
+             a.name;
+    }
+    if (a.parent != b.parent) {
+      return "its joint " + b.name + " hangs on " + parent(other, j) + " where in " + first_name +
+             " it hangs on " + parent(first, j);
+    }
+  }
+  return "it has " + std::to_string(other.joints.size()) + " joints, " + first_name + " has " +
+         std::to_string(first.joints.size());
+}
+
+bool SameJointTree(const Skeleton& a, const Skeleton& b) {
+  return std::ranges::equal(a.joints, b.joints, [](const Joint& x, const Joint& y) {
+    return x.name == y.name && x.parent == y.parent;
+  });
+}
+
+}  // namespace stridewire

@@ -1,0 +1,71 @@
+#include "offline/extract/body_tracks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kPelvisSmoothS = 0.06;
+
+}  // namespace
+
+std::vector<DVec3> SmoothPath(const std::vector<DVec3>& path, int window) {
+  const int reach = window / 2;
+  const int count = static_cast<int>(path.size());
+  if (reach < 1 || count == 0) return path;
+  std::vector<DVec3> smooth(path.size());
+  DVec3 sum(0.0);
+  const auto at = [&](int i) -> const DVec3& {
+    return path[static_cast<std::size_t>(std::clamp(i, 0, count - 1))];
+  };
+  for (int i = -reach; i <= reach; ++i) sum += at(i);
+  for (int i = 0; i < count; ++i) {
+    smooth[static_cast<std::size_t>(i)] = sum / static_cast<double>(2 * reach + 1);
+    sum += at(i + reach + 1) - at(i - reach);
+  }
+  return smooth;
+}
+
+std::vector<double> PathSpeed(const std::vector<DVec3>& path, double fps) {
+  const std::size_t count = path.size();
+  std::vector<double> speed(count, 0.0);
+  for (std::size_t i = 0; i < count && count > 1; ++i) {
+    const std::size_t before = i == 0 ? 0 : i - 1;
+    const std::size_t after = std::min(i + 1, count - 1);
+    speed[i] = glm::length(path[after] - path[before]) * fps / static_cast<double>(after - before);
+  }
+  return speed;
+}
+
+BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame) {
+  BodyTracks tracks;
+  tracks.fps = clip.fps;
+  tracks.frames = {std::min(first_frame, clip.frame_count()), clip.frame_count()};
+  const auto count = static_cast<std::size_t>(tracks.frames.size());
+  tracks.pelvis_m.reserve(count);
+  tracks.pelvis_yaw_rad.reserve(count);
+  double yaw_rad = 0.0;
+  for (int f = tracks.frames.begin; f < tracks.frames.end; ++f) {
+    const ConstPoseSpan pose = clip.frame(f);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const Leg& leg = skeleton.leg(foot);
+      BodyTracks::FootTrajectory& track = tracks.feet[static_cast<int>(foot)];
+      track.ankle_m.emplace_back(PointPosition(skeleton, pose, leg.ankle, Vec3(0.0f)));
+      track.ball_m.emplace_back(BallPosition(skeleton, pose, foot));
+      track.toe_tip_m.emplace_back(PointPosition(skeleton, pose, leg.ball, leg.toe_tip_offset_m));
+    }
+    tracks.pelvis_m.emplace_back(pose.root_position_m);
+    double frame_yaw_rad = yaw_rad;
+    HeadingOf(pose.rotations[0], frame_yaw_rad);
+    yaw_rad = f == tracks.frames.begin ? frame_yaw_rad : UnwrapAngle(frame_yaw_rad, yaw_rad);
+    tracks.pelvis_yaw_rad.push_back(yaw_rad);
+  }
+  const int window = static_cast<int>(std::lround(kPelvisSmoothS * clip.fps));
+  tracks.pelvis_speed_m_s = PathSpeed(SmoothPath(tracks.pelvis_m, window), clip.fps);
+  return tracks;
+}
+
+}  // namespace stridewire

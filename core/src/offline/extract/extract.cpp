@@ -1,0 +1,290 @@
+#include "offline/extract/extract.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "offline/extract/ground.h"
+#include "offline/base/horizontal_distance.h"
+#include "offline/extract/stand_pose.h"
+#include "offline/extract/body_tracks.h"
+#include "offline/capture/glitch_repair.h"
+#include "offline/extract/heading.h"
+#include "offline/extract/normalise.h"
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kStandingYawS = 0.2;
+constexpr double kJumpStraightMaxRad = 0.35;  // Jumps that turn by less count as straight ahead.
+
+double HeadingBetween(const DVec3& from, const DVec3& to) {
+  return std::atan2(to.x - from.x, to.z - from.z);
+}
+
+double LegLength(const Skeleton& skeleton) {
+  double length = 0.0;
+  for (const Leg& leg : skeleton.legs) {
+    for (const int joint : {leg.knee, leg.ankle}) {
+      length += 0.5 * glm::length(skeleton.joints[static_cast<std::size_t>(joint)].offset_m);
+    }
+  }
+  return length;
+}
+
+// One capture on its way to examples.
+class Extractor {
+ public:
+  Extractor(const Capture& capture, const ExtractOptions& options)
+      : capture_(capture), options_(options), clip_(capture.clip) {}
+
+  Extraction Run() {
+    out_.path = capture_.path;
+    out_.frames = clip_.frame_count();
+    out_.fps = clip_.fps;
+    out_.unit_m = capture_.unit_m;
+    out_.notes = capture_.notes;
+    out_.skeleton = options_.target != nullptr ? *options_.target : capture_.skeleton;
+    if (const Status valid = Check(); !valid) {
+      out_.error = Describe(valid.error());
+      return std::move(out_);
+    }
+    const GlitchReport glitches = RepairGlitches(capture_.skeleton, capture_.first_frame, clip_);
+    flips_left_ = glitches.left;
+    for (std::string& sentence : DescribeRepairs(capture_.skeleton, glitches, clip_.fps)) {
+      out_.notes.push_back(std::move(sentence));
+    }
+    tracks_ = TrackBody(capture_.skeleton, clip_, capture_.first_frame);
+    contacts_ = FindContacts(tracks_, options_.contacts);
+    Segmentation segments = Segment(tracks_, contacts_, options_.segments);
+    heading_rad_ = StrideHeading(tracks_, contacts_);
+    if (options_.target != nullptr) Retarget();
+    ground_ = FindGround(contacts_);
+    out_.has_contacts = ground_.has_contacts;
+    for (int f = 0; f < 2; ++f) out_.ball_height_m[f] = ground_.ball_height_m[f];
+    for (RejectedSpan& span : segments.rejected) Reject(span.frames, std::move(span.reason));
+    for (const StepSegment& step : segments.steps) AddStep(step);
+    for (const JumpSegment& jump : segments.jumps) AddJump(jump);
+    std::ranges::sort(out_.rejected, {}, &RejectedTime::from_s);
+    out_.stand = FindStand(out_.skeleton, clip_, tracks_, contacts_, ground_, heading_rad_);
+    return std::move(out_);
+  }
+
+ private:
+  [[nodiscard]] Status Check() const {
+    if (clip_.frame_count() <= capture_.first_frame) {
+      return Fail(ErrorCode::kInvalidArgument, "the capture has no frame to use", capture_.path);
+    }
+    if (capture_.skeleton.joint_count() != clip_.joint_count ||
+        out_.skeleton.joint_count() != clip_.joint_count) {
+      return Fail(ErrorCode::kShapeMismatch, "skeleton and motion differ in their joints",
+                  capture_.path);
+    }
+    if (Status valid = capture_.skeleton.Validate(); !valid) return valid;
+    return clip_.Validate();
+  }
+
+  // Measures everything again on a figure with other bone lengths.
+  void Retarget() {
+    const double own = LegLength(capture_.skeleton);
+    const double scale = own > 0.0 ? LegLength(out_.skeleton) / own : 1.0;
+    for (Vec3& position : clip_.root_positions_m) position *= static_cast<float>(scale);
+    tracks_ = TrackBody(out_.skeleton, clip_, capture_.first_frame);
+    MeasureBallHeights(tracks_, options_.contacts, contacts_);
+  }
+
+  [[nodiscard]] double GroundBelow(Foot foot, int contact) const {
+    return ground_.Below(foot,
+                         contacts_.foot(foot)[static_cast<std::size_t>(contact)].ball_height_m);
+  }
+
+  void Reject(const FrameRange& frames, std::string reason) {
+    out_.rejected.push_back({Seconds(frames.begin), Seconds(frames.end), std::move(reason)});
+  }
+
+  // Of a frame of the tracks, from the capture's first frame.
+  [[nodiscard]] double Seconds(int frame) const {
+    return (tracks_.frames.begin + frame) / clip_.fps;
+  }
+
+  [[nodiscard]] const DVec3& Pelvis(int frame) const {
+    return tracks_.pelvis_m[static_cast<std::size_t>(frame)];
+  }
+
+  [[nodiscard]] double Heading(int frame) const {
+    return heading_rad_[static_cast<std::size_t>(frame)];
+  }
+
+  [[nodiscard]] DVec3 FeetCentre(int frame) const {
+    const auto i = static_cast<std::size_t>(frame);
+    return 0.5 * (tracks_.feet[0].ball_m[i] + tracks_.feet[1].ball_m[i]);
+  }
+
+  // Moving minus fixed foot in a heading frame.
+  [[nodiscard]] DVec3 FootVectorAt(Foot moving, int frame, double heading_rad) const {
+    const auto i = static_cast<std::size_t>(frame);
+    return RotateYaw(-heading_rad,
+                     tracks_.foot(moving).ball_m[i] - tracks_.foot(OtherFoot(moving)).ball_m[i]);
+  }
+
+  // A flip between these frames that could not be mended, as a sentence; empty if there is none.
+  [[nodiscard]] std::string FlipWithin(const FrameRange& frames) const {
+    const FrameRange in_clip{frames.begin + tracks_.frames.begin,
+                             frames.end + tracks_.frames.begin};
+    for (const JointFlip& flip : flips_left_) {
+      if (flip.frames.Overlaps(in_clip)) {
+        return DescribeFlip(capture_.skeleton, flip, clip_.fps);
+      }
+    }
+    return {};
+  }
+
+  [[nodiscard]] RawExample Cut(const FrameRange& frames, double heading_rad, double ground_m,
+                               std::initializer_list<int> keyframes) const {
+    RawExample example;
+    const int shift = tracks_.frames.begin;
+    example.clip =
+        NormaliseClip(clip_, {frames.begin + shift, frames.end + shift}, heading_rad, ground_m);
+    for (const int k : keyframes) {
+      example.keytimes_s.push_back((k - frames.begin) / clip_.fps);
+    }
+    char times[64];
+    std::snprintf(times, sizeof times, " %.2f-%.2f s", Seconds(frames.begin),
+                  Seconds(frames.end - 1));
+    example.source = std::filesystem::path(capture_.path).filename().string() + times;
+    return example;
+  }
+
+  void AddStep(const StepSegment& step) {
+    const FrameRange frames{step.start, step.end + 1};
+    if (std::string flip = FlipWithin(frames); !flip.empty()) {
+      Reject(frames, std::move(flip));
+      return;
+    }
+    const MovementKind kind = StepKind(step.moving);
+    (step.moving == Foot::kLeft ? out_.steps_left : out_.steps_right) += 1;
+    const Foot fixed = OtherFoot(step.moving);
+    const double ground = GroundBelow(fixed, step.fixed_contact);
+    const double from = Heading(step.start);
+    const double to = Heading(step.end);
+
+    ExtractedExample general{
+        kind, Cut(frames, from, ground, {step.start, step.toe_off, step.heel_strike, step.end})};
+    const DVec3 d0 = FootVectorAt(step.moving, step.start, from);
+    const DVec3 d1 = FootVectorAt(step.moving, step.end, to);
+    general.example.parameters = {d0.x, d0.y, d0.z, d1.x, d1.y, d1.z, to - from};
+    general.example.heading_change_rad = to - from;
+    general.level = IsLevel(step);
+    out_.general_steps.push_back(std::move(general));
+
+    double heading = 0.5 * (from + to);
+    if (!IsStraight(step, heading)) return;
+    ExtractedExample straight{
+        kind, Cut(frames, heading, ground, {step.start, step.toe_off, step.heel_strike, step.end})};
+    straight.example.parameters = {FootVectorAt(step.moving, step.start, heading).z,
+                                   FootVectorAt(step.moving, step.end, heading).z};
+    out_.straight_steps.push_back(std::move(straight));
+  }
+
+  [[nodiscard]] bool IsLevel(const StepSegment& step) const {
+    const double ground = GroundBelow(OtherFoot(step.moving), step.fixed_contact);
+    for (const int contact : {step.before_contact, step.after_contact}) {
+      if (std::fabs(GroundBelow(step.moving, contact) - ground) > options_.level_rise_max_m) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // Whether a step is a plain one ahead on level ground; `heading` becomes the step's direction.
+  [[nodiscard]] bool IsStraight(const StepSegment& step, double& heading) const {
+    const double turn = Heading(step.end) - Heading(step.start);
+    if (!IsLevel(step) || std::fabs(turn) > options_.straight_turn_max_rad) return false;
+    const DVec3& start = Pelvis(step.start);
+    const DVec3& end = Pelvis(step.end);
+    if (HorizontalDistance(start, end) > options_.displacement_heading_min_m) {
+      const double direction = UnwrapAngle(HeadingBetween(start, end), heading);
+      if (std::fabs(direction - heading) > options_.straight_drift_max_rad) return false;
+      heading = direction;
+    }
+    const double own_side = step.moving == Foot::kLeft ? 1.0 : -1.0;
+    for (const int frame : {step.start, step.end}) {
+      const double side = own_side * FootVectorAt(step.moving, frame, heading).x;
+      if (side < -0.05 || side > options_.straight_side_max_m) return false;
+    }
+    return FootVectorAt(step.moving, step.end, heading).z >
+           FootVectorAt(step.moving, step.start, heading).z;
+  }
+
+  // Pelvis yaw around a moment of standing. The stride heading looks too far around for a jump.
+  [[nodiscard]] double StandingYaw(int frame) const {
+    const int reach = static_cast<int>(std::lround(kStandingYawS * 0.5 * clip_.fps));
+    const int begin = std::max(0, frame - reach);
+    const int end = std::min(tracks_.size(), frame + reach + 1);
+    double sum = 0.0;
+    for (int i = begin; i < end; ++i) sum += tracks_.pelvis_yaw_rad[static_cast<std::size_t>(i)];
+    return sum / (end - begin);
+  }
+
+  void AddJump(const JumpSegment& jump) {
+    const FrameRange frames{jump.start, jump.end + 1};
+    if (std::string flip = FlipWithin(frames); !flip.empty()) {
+      Reject(frames, std::move(flip));
+      return;
+    }
+    out_.jumps += 1;
+    double from = StandingYaw(jump.start);
+    double to = StandingYaw(jump.end);
+    const DVec3 centre_from = FeetCentre(jump.start);
+    const DVec3 centre_to = FeetCentre(jump.end);
+    if (std::fabs(to - from) <= kJumpStraightMaxRad) {
+      double heading = 0.5 * (from + to);
+      if (HorizontalDistance(centre_from, centre_to) > options_.displacement_heading_min_m) {
+        const double direction = UnwrapAngle(HeadingBetween(centre_from, centre_to), heading);
+        if (std::fabs(direction - heading) <= options_.straight_drift_max_rad) heading = direction;
+      }
+      from = to = heading;
+    }
+    double ground = 0.0;
+    double rise = 0.0;
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const double before = GroundBelow(foot, jump.before_contact[static_cast<int>(foot)]);
+      const double after = GroundBelow(foot, jump.after_contact[static_cast<int>(foot)]);
+      ground += 0.5 * before;
+      rise += 0.5 * (after - before);
+    }
+    ExtractedExample out{
+        MovementKind::kJump,
+        Cut(frames, from, ground,
+            {jump.start, jump.crouch, jump.toe_off, jump.landing, jump.absorb, jump.end}),
+        jump.settled};
+    const double length = RotateYaw(-from, centre_to - centre_from).z;
+    out.example.parameters = {length, rise, to - from};
+    out.example.heading_change_rad = to - from;
+    if (!jump.settled) {
+      out_.notes.push_back("the jump of " + out.example.source +
+                           " does not come to rest: its end is in motion");
+    }
+    out_.jump_examples.push_back(std::move(out));
+  }
+
+  const Capture& capture_;
+  const ExtractOptions& options_;
+  Clip clip_;
+  Extraction out_;
+  std::vector<JointFlip> flips_left_;
+  BodyTracks tracks_;
+  FootContacts contacts_;
+  Ground ground_;
+  std::vector<double> heading_rad_;
+};
+
+}  // namespace
+
+Extraction Extract(const Capture& capture, const ExtractOptions& options) {
+  return Extractor(capture, options).Run();
+}
+
+}  // namespace stridewire

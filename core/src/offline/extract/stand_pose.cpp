@@ -1,0 +1,104 @@
+#include "offline/extract/stand_pose.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "offline/base/horizontal_distance.h"
+#include "offline/base/statistics.h"
+#include "offline/extract/normalise.h"
+#include "stridewire/runtime/pose.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kWindowS = 0.1;  // Speeds over this time: single frames are noise.
+constexpr double kSameGroundM = 0.03;
+// What counts how much, beside the mean joint speed in m/s.
+constexpr double kStridePerM = 2.0;  // One foot ahead of the other
+constexpr double kCrouchPerM = 4.0;  // Pelvis lower than it stands otherwise
+constexpr double kLeanPerM = 2.0;    // Pelvis off the feet, or the top of the body off the pelvis
+
+double StandHeight(const BodyTracks& tracks) {
+  std::vector<double> heights;
+  heights.reserve(tracks.pelvis_m.size());
+  for (const DVec3& p : tracks.pelvis_m) heights.push_back(p.y);
+  return Percentile(std::move(heights), 75.0);
+}
+
+// The still moments of a capture may be a crouch before a jump or a reach for a bar: how far the body
+// is from upright, pelvis above the ankles and the highest joint above the pelvis.
+double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
+  const DVec3 pelvis(positions[0]);
+  const auto at = [&](int joint) { return DVec3(positions[static_cast<std::size_t>(joint)]); };
+  const DVec3 ankles =
+      0.5 * (at(skeleton.leg(Foot::kLeft).ankle) + at(skeleton.leg(Foot::kRight).ankle));
+  const auto top = std::max_element(positions.begin(), positions.end(),
+                                    [](const Vec3& a, const Vec3& b) { return a.y < b.y; });
+  return HorizontalDistance(pelvis, ankles) + HorizontalDistance(DVec3(*top), pelvis);
+}
+
+}  // namespace
+
+std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip& clip,
+                                           const BodyTracks& tracks, const FootContacts& contacts,
+                                           const Ground& ground,
+                                           const std::vector<double>& heading_rad) {
+  const int count = tracks.size();
+  std::vector<char> standing[2];
+  for (int f = 0; f < 2; ++f) {
+    standing[f].assign(static_cast<std::size_t>(count), 0);
+    for (const Contact& contact : contacts.feet[f]) {
+      std::fill(standing[f].begin() + contact.frames.begin,
+                standing[f].begin() + contact.frames.end, 1);
+    }
+  }
+  const int reach = std::max(1, static_cast<int>(std::lround(0.5 * kWindowS * clip.fps)));
+  const double stand_height = StandHeight(tracks);
+  const auto joints = static_cast<std::size_t>(skeleton.joint_count());
+  std::vector<Vec3> before(joints);
+  std::vector<Vec3> after(joints);
+  std::vector<Quat> rotations(joints);
+  std::optional<double> best;
+  int best_frame = 0;
+  for (int i = reach; i + reach < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (!standing[0][k] || !standing[1][k]) continue;
+    const DVec3 apart =
+        RotateYaw(-heading_rad[k], tracks.feet[0].ball_m[k] - tracks.feet[1].ball_m[k]);
+    if (std::fabs(apart.y - ground.ball_height_m[0] + ground.ball_height_m[1]) > kSameGroundM) {
+      continue;
+    }
+    const int frame = tracks.frames.begin + i;
+    ForwardKinematics(skeleton, clip.frame(frame - reach), before, rotations);
+    ForwardKinematics(skeleton, clip.frame(frame + reach), after, rotations);
+    double moved = 0.0;
+    for (std::size_t j = 0; j < joints; ++j) moved += glm::length(after[j] - before[j]);
+    const double speed = moved / static_cast<double>(joints) * clip.fps / (2.0 * reach);
+    const double unrest = speed + kStridePerM * std::fabs(apart.z) +
+                          kCrouchPerM * std::max(0.0, stand_height - tracks.pelvis_m[k].y) +
+                          kLeanPerM * Lean(skeleton, after);
+    if (!best || unrest < *best) {
+      best = unrest;
+      best_frame = i;
+    }
+  }
+  if (!best) return std::nullopt;
+  const int frame = tracks.frames.begin + best_frame;
+  double below = 0.0;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    for (const Contact& contact : contacts.foot(foot)) {
+      if (contact.frames.begin <= best_frame && best_frame < contact.frames.end) {
+        below += 0.5 * ground.Below(foot, contact.ball_height_m);
+      }
+    }
+  }
+  const Clip cut = NormaliseClip(clip, {frame, frame + 1},
+                                 heading_rad[static_cast<std::size_t>(best_frame)], below);
+  Extraction::Stand stand;
+  stand.pose.root_position_m = cut.root_positions_m[0];
+  stand.pose.rotations = cut.rotations;
+  stand.unrest = *best;
+  return stand;
+}
+
+}  // namespace stridewire

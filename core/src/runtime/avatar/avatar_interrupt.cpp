@@ -1,0 +1,108 @@
+// The part of an avatar that goes from one movement to the next, at its end or in the middle of it.
+
+#include <algorithm>
+
+#include "base/check.h"
+#include "stridewire/runtime/avatar.h"
+#include "runtime/library/contact_keytimes.h"
+
+namespace stridewire {
+
+// When both feet stand again, or if they do the time that it is. Who has begun to jump jumps.
+double Avatar::Landed() const {
+  const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
+  return IsStep(group().kind) && movement_time_s_ <= swing.release_s
+             ? movement_time_s_
+             : std::max(movement_time_s_, swing.land_s);
+}
+
+double Avatar::EndOfMovement() const {
+  return interrupts_ && !IsStartDelayed() ? std::min(Landed(), body_.movement.duration_s())
+                                  : body_.movement.duration_s();
+}
+
+// The foot in the air is the one that the request at the queue's head moves, and far from landing.
+bool Avatar::RedirectsSwing() const {
+  if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) || body_.plants_feet != foot_planting()) {
+    return false;
+  }
+  const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);
+  if (step == nullptr ||
+      step->foot.value_or(MovingFoot(group().kind)) != MovingFoot(group().kind)) {
+    return false;
+  }
+  const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
+  return movement_time_s_ > swing.release_s &&
+         swing.land_s - movement_time_s_ > kLeastSwingLeft * (swing.land_s - swing.release_s);
+}
+
+// What a movement that begins at `time_s` of this one goes on from.
+void Avatar::CaptureBlendSource(double time_s) {
+  const bool keeps_speed =
+      options_.blend == BlendKind::kInertialization && time_s - body_.movement.start_offset_s >= kBlendStepS;
+  moved_until_s_ = keeps_speed ? time_s_ : -1.0;
+  body_.CaptureBlendSource(time_s, keeps_speed);
+}
+
+// Tells who shows the avatar elsewhere that the movement under way is left at `time_s`. One that began in the same
+// Advance they know nothing of.
+void Avatar::Leave(double time_s, bool is_redirected) {
+  if (change_.has_left || change_.has_begun) {
+    change_.is_any = true;
+    return;
+  }
+  change_.has_left = true;
+  change_.left_s = time_s;
+  change_.is_left_at_end = time_s == body_.movement.duration_s();
+  change_.left_keeps_speed = keeps_speed();
+  change_.is_redirected = is_redirected;
+}
+
+// A step of the foot in the air takes over from the step under way, at the same part of the swing. One that may
+// be refused and is leaves the step under way to go on.
+void Avatar::RedirectSwing() {
+  const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
+  const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
+  MovementRequest request = queue_[queue_head_];
+  CancelQueue();
+  auto& step = std::get<StepRequest>(request.movement);
+  step.foot = MovingFoot(group().kind);
+  CaptureBlendSource(movement_time_s_);
+  const auto plan = PlanRequest(request);
+  STRIDEWIRE_CHECK(plan.has_value());
+  const AvatarEvent left{.type = AvatarEventType::kFinished,
+                         .request_id = request_id_,
+                         .kind = group().kind,
+                         .group = body_.movement.group,
+                         .is_cut_short = true,
+                         .base = base_};
+  if (!PlanRequested(request, *plan, part)) return;
+  AddEvent(left);
+  Leave(movement_time_s_, true);
+  BeginMovement(*plan, request.id);
+}
+
+// Before a movement is planned that feet are planted in as they were not before, or the other way round.
+void Avatar::SwitchPlanting() {
+  if (body_.plants_feet == foot_planting()) return;
+  body_.plants_feet = body_.begins_planting = foot_planting();
+  change_.is_any = true;
+  body_.TakeForBlended(movement_time_s_, keeps_speed());
+  if (!body_.plants_feet) return;
+  const Skeleton& skeleton = body_.library->skeleton();
+  const LegRig& rig = body_.library->leg_rig();
+  const Terrain* terrain = options_.terrain.get();
+  body_.locks = FootLocksOf(skeleton, rig, body_.pose, base_.position_m.y, terrain);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    FootLock& hold = body_.locks[static_cast<std::size_t>(foot)];
+    hold.height_m = 0.0;
+    hold.normal = Vec3(0.0f, 1.0f, 0.0f);
+    if (terrain != nullptr) continue;
+    // Level, but for feet on different steps of stairs.
+    const double stands_m =
+        BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
+    hold.print.position_m.y += GroundRise(stands_m - base_.position_m.y);
+  }
+}
+
+}  // namespace stridewire

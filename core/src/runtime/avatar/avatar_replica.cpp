@@ -1,0 +1,316 @@
+#include "runtime/avatar/avatar_replica.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+#include "runtime/avatar/record_fields.h"
+#include "base/check.h"
+
+namespace stridewire {
+namespace {
+
+// No number of a record is larger: metres, seconds, radians.
+constexpr double kMostOfANumber = 1e9;
+constexpr float kMostOfAWeight = 1e3f;
+// Products of rotations are not of unit length exactly.
+constexpr float kNearlyUnit = 0.02f;
+
+}  // namespace
+
+// Reads the fields of a record. The first thing that is wrong is kept; all that is read after it is 0.
+class AvatarReplica::Reader {
+ public:
+  explicit Reader(std::span<const std::byte> record) : record_(record) {}
+
+  [[nodiscard]] const Status& status() const { return status_; }
+  [[nodiscard]] bool ok() const { return status_.has_value(); }
+  void Refuse(const char* text) {
+    if (ok()) status_ = Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(at_));
+  }
+  void Finish() {
+    if (at_ != record_.size()) Refuse("a movement record is longer than what it tells");
+  }
+
+  void F64(double& value) { Number(value); }
+  void F32(float& value) { Number(value); }
+  [[nodiscard]] unsigned Flags() {
+    std::uint16_t flags = 0;
+    Take(&flags, sizeof flags);
+    return flags;
+  }
+  void Index(int& value) {
+    std::uint8_t index = 0;
+    Take(&index, sizeof index);
+    value = index;
+  }
+  void Bool(bool& value) {
+    std::uint8_t byte = 0;
+    Take(&byte, sizeof byte);
+    value = byte == 1;
+    if (byte > 1) Refuse("a flag of a movement record is neither 0 nor 1");
+  }
+  void CheckUnit(Quat& q) {
+    if (std::fabs(Dot(q, q) - 1.0f) <= kNearlyUnit) return;
+    Refuse("a rotation of a movement record is not of unit length");
+    q = kIdentityQuat;
+  }
+  void CheckUnit(Vec3& v) {
+    if (std::fabs(glm::dot(v, v) - 1.0f) <= kNearlyUnit && v.y > 0.0f) return;
+    Refuse("a normal of a movement record is not of unit length and up");
+    v = Vec3(0.0f, 1.0f, 0.0f);
+  }
+
+ private:
+  template <typename T>
+  void Number(T& value) {
+    value = 0;
+    Take(&value, sizeof value);
+    if (std::fabs(value) <= static_cast<T>(kMostOfANumber)) return;
+    Refuse("a number of a movement record is none or too large");
+    value = 0;
+  }
+  void Take(void* value, std::size_t bytes) {
+    if (!ok()) return;
+    if (record_.size() - at_ < bytes) {
+      Refuse("a movement record is cut short");
+      return;
+    }
+    std::memcpy(value, record_.data() + at_, bytes);
+    at_ += bytes;
+  }
+
+  std::span<const std::byte> record_;
+  std::size_t at_ = 0;
+  Status status_;
+};
+
+namespace {
+
+template <typename Reader>
+void ReadLayers(const MotionLibrary& library, LayerStack& layers, Reader& reader) {
+  int count = 0;
+  reader.Index(count);
+  std::array<LayerStack::Playing, LayerStack::kMaxLayers> playing{};
+  if (count > static_cast<int>(playing.size())) {
+    reader.Refuse("a movement record tells of too many layers");
+    return;
+  }
+  const auto told = std::span(playing).first(static_cast<std::size_t>(count));
+  for (LayerStack::Playing& p : told) record::LayerFields(reader, p);
+  if (reader.ok() && !layers.Restore(library, told)) {
+    reader.Refuse("a movement record tells of a layer that cannot be");
+  }
+}
+
+template <typename Reader>
+void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reader) {
+  int group = 0;
+  reader.Index(group);
+  if (!reader.ok()) return;
+  if (static_cast<std::size_t>(group) >= library.groups().size()) {
+    reader.Refuse("a movement record tells of a group that the library has not");
+    return;
+  }
+  movement.group = group;
+  movement.weights.resize(static_cast<std::size_t>(library.group(group).example_count));
+  double sum = 0.0;
+  double magnitude = 0.0;
+  for (float& weight : movement.weights) {
+    reader.F32(weight);
+    sum += static_cast<double>(weight);
+    magnitude = std::max(magnitude, std::fabs(static_cast<double>(weight)));
+  }
+  if (!(std::fabs(sum - 1.0) <= 1e-3) || magnitude > kMostOfAWeight) {
+    reader.Refuse("weights of a movement record do not sum to 1");
+  }
+}
+
+// Feet of the movement's kind leave the ground and land when it says.
+void SetTimes(MovementKind kind, Movement& movement) {
+  const SwingTimes times = SwingTimesOf(kind, movement);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    FootTrajectory& track = movement.feet.foot(foot);
+    const bool moves = !IsStep(kind) || foot == MovingFoot(kind);
+    track.release_s = moves ? times.release_s : FootTrajectory::kNever;
+    track.land_s = moves ? times.land_s : FootTrajectory::kNever;
+    track.root_weight = !IsStep(kind) ? 0.5 : moves ? 0.0 : 1.0;
+  }
+}
+
+}  // namespace
+
+AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
+    : body_(std::move(library)) {
+  body_.layered_pose = body_.pose;
+  body_.layers.MakeRoom();
+}
+
+bool AvatarReplica::IsState(std::span<const std::byte> record) {
+  return !record.empty() && (std::to_integer<unsigned>(record[0]) & record::kIsState) != 0;
+}
+
+Status AvatarReplica::Apply(std::span<const std::byte> record) {
+  Reader reader(record);
+  const unsigned flags = reader.Flags();
+  if ((flags & record::kIsState) != 0) {
+    ReadState(flags, reader);
+  } else if (!is_known_) {
+    return Fail(ErrorCode::kNotFound, "a change of an avatar of which no state is known");
+  } else {
+    ReadChange(flags, reader);
+  }
+  is_known_ = reader.ok();
+  is_idle_ = (flags & record::kIsIdle) != 0;
+  return reader.status();
+}
+
+void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
+  // All is read before anything of it is done: what is done allows no going back.
+  Movement& movement = body_.movement;
+  const bool has_left = (flags & record::kLeft) != 0;
+  const bool has_begun = (flags & record::kMoves) != 0;
+  if (has_left && !is_moving_) {
+    reader.Refuse("a movement record ends a movement that is not under way");
+    return;
+  }
+  if (has_begun && is_moving_ && !has_left) {
+    reader.Refuse("a movement record begins a movement and ends none");
+    return;
+  }
+  if (has_begun && ((flags & record::kPlants) != 0) != body_.plants_feet) {
+    reader.Refuse("a movement record plants feet that are not, or the other way round");
+    return;
+  }
+  if (has_left) {
+    double left_s = movement.duration_s();
+    if ((flags & record::kLeftAtEnd) == 0) reader.F64(left_s);
+    if (!(left_s >= 0.0 && left_s <= movement.duration_s())) {
+      reader.Refuse("a movement record ends a movement outside of it");
+    }
+    if (!reader.ok()) return;
+    body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
+    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.CaptureFootLocks(left_s);
+    is_moving_ = false;
+  }
+  if (has_begun) {
+    double time_s = 0.0;
+    double start_offset_s = 0.0;
+    BaseFrame base;
+    LandingDecision choice{.is_on_terrain = (flags & record::kOnTerrain) != 0};
+    reader.F64(time_s);
+    ReadWeights(*body_.library, movement, reader);
+    reader.F64(base.heading_rad);
+    if ((flags & record::kIsEntered) != 0) reader.F64(start_offset_s);
+    if (!reader.ok()) return;
+    if (body_.plants_feet) {
+      record::ChoiceFields(reader, flags, body_.group().kind, choice);
+    } else {
+      record::Vector(reader, base.position_m);
+    }
+    if (!reader.ok()) return;
+    body_.StartWeighted(base);
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && time_s >= start_offset_s)) {
+      reader.Refuse("a movement record begins a movement outside of it");
+      return;
+    }
+    body_.EnterAt(start_offset_s);
+    body_.BlendIn(choice, (flags & record::kKeepsSpeed) != 0);
+    body_.begins_planting = false;
+    movement_time_s_ = time_s;
+    is_moving_ = is_told_ = true;
+  }
+  if ((flags & record::kLayers) != 0) {
+    ReadLayers(*body_.library, body_.layers, reader);
+    are_layers_told_ = true;
+  }
+  reader.Finish();
+}
+
+void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
+  Movement& movement = body_.movement;
+  movement.feet = {};
+  body_.plants_feet = (flags & record::kPlants) != 0;
+  body_.begins_planting = (flags & record::kBeginsPlanting) != 0;
+  is_moving_ = (flags & record::kMoves) != 0;
+  if (body_.plants_feet && !body_.library->leg_rig().is_usable) {
+    reader.Refuse("a movement record plants feet that the library has not");
+    return;
+  }
+  if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
+  if (is_moving_) {
+    BaseFrame base;
+    double start_offset_s = 0.0;
+    double extra_turn_rad = 0.0;
+    reader.F64(movement_time_s_);
+    ReadWeights(*body_.library, movement, reader);
+    record::Vector(reader, base.position_m);
+    reader.F64(base.heading_rad);
+    reader.F64(start_offset_s);
+    reader.F64(extra_turn_rad);
+    if (!reader.ok()) return;
+    body_.StartWeighted(base);
+    movement.extra_turn_rad = extra_turn_rad;
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && movement_time_s_ >= start_offset_s)) {
+      reader.Refuse("a movement record begins a movement outside of it");
+      return;
+    }
+    body_.EnterAt(start_offset_s);
+    if (record::NeedsDifference(movement, movement_time_s_)) {
+      record::DifferenceFields(reader, movement);
+    }
+    if (body_.plants_feet) {
+      movement.feet.is_active = true;
+      SetTimes(body_.group().kind, movement);
+      record::PlanFields(reader, movement.feet);
+      for (const FootResidual& rest : movement.feet.residuals) {
+        if (!(rest.over_s > 0.0)) reader.Refuse("what feet keep ends before it begins");
+      }
+      movement.feet.packed = PackFootPlan(movement);
+    }
+  } else {
+    record::PoseFields(reader, body_.pose);
+    record::PoseFields(reader, body_.blended_pose);
+    record::CorrectionFields(reader, body_.earlier_feet[0]);
+    if ((flags & record::kKeepsSpeed) != 0) {
+      record::PoseFields(reader, body_.earlier_pose);
+      record::CorrectionFields(reader, body_.earlier_feet[1]);
+    }
+  }
+  if ((flags & record::kLayers) != 0) {
+    ReadLayers(*body_.library, body_.layers, reader);
+  } else {
+    body_.layers.Clear();
+  }
+  is_told_ = are_layers_told_ = true;
+  reader.Finish();
+}
+
+void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
+                               SoaPoseEvaluator& evaluator) {
+  constexpr std::size_t kAtOnce = 16;  // as Avatar::AdvanceAll
+  std::array<PoseJob, kAtOnce> jobs;
+  while (!replicas.empty()) {
+    const auto block = replicas.first(std::min(replicas.size(), kAtOnce));
+    const MotionLibrary& library = block.front()->library();
+    std::size_t moving = 0;
+    for (AvatarReplica* replica : block) {
+      STRIDEWIRE_CHECK(&replica->library() == &library);
+      if (!replica->is_known_ || !replica->is_moving_) continue;
+      if (!replica->is_told_) replica->movement_time_s_ += dt_s;
+      jobs[moving++] = {&replica->body_.movement, replica->movement_time_s_, &replica->body_.pose};
+    }
+    EvaluatePoses(evaluator, std::span(jobs).first(moving));
+    for (AvatarReplica* replica : block) {
+      if (!replica->is_known_) continue;
+      if (!replica->are_layers_told_) replica->body_.layers.Advance(library, dt_s);
+      replica->body_.ShowLayers();
+      replica->is_told_ = replica->are_layers_told_ = false;
+    }
+    replicas = replicas.subspan(block.size());
+  }
+}
+
+}  // namespace stridewire

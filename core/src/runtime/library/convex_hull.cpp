@@ -1,0 +1,187 @@
+#include "runtime/library/convex_hull.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "base/check.h"
+#include "stridewire/runtime/motion_library.h"
+
+// Wolfe's algorithm finds the point of smallest norm in a polytope. The corral is a set of affinely
+// independent vertices; each round adds the vertex furthest towards the origin and then drops
+// vertices until the affine minimum of the corral lies inside it:
+//
+//            o  origin (= the target)
+//            |
+//    v1 -----x---------- v2      x: nearest point, a convex combination of the corral {v1, v2}
+
+namespace stridewire {
+namespace {
+
+constexpr std::size_t kMaxCorral = kMaxParameters + 1;
+constexpr int kMaxRounds = 200;
+constexpr double kInside = 1e-9;
+
+using Point = std::array<double, kMaxParameters>;
+
+double DotProduct(const Point& a, const Point& b, std::size_t d) {
+  double sum = 0.0;
+  for (std::size_t l = 0; l < d; ++l) sum += a[l] * b[l];
+  return sum;
+}
+
+struct Corral {
+  std::size_t size = 0;
+  std::array<Point, kMaxCorral> points{};
+  std::array<double, kMaxCorral> lambda{};  // convex weights
+
+  void Remove(std::size_t i) {
+    --size;
+    for (; i < size; ++i) {
+      points[i] = points[i + 1];
+      lambda[i] = lambda[i + 1];
+    }
+  }
+};
+
+// Weights (sum 1, any sign) of the smallest-norm point in the corral's affine hull:
+// solve (1 1^T + P P^T) v = 1 by elimination with pivoting, weights = v / sum v.
+bool AffineMinimum(const Corral& corral, std::size_t d, std::array<double, kMaxCorral>& weights) {
+  const std::size_t n = corral.size;
+  std::array<std::array<double, kMaxCorral + 1>, kMaxCorral> m{};
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      m[i][j] = 1.0 + DotProduct(corral.points[i], corral.points[j], d);
+    }
+    m[i][n] = 1.0;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    std::size_t pivot = i;
+    for (std::size_t r = i + 1; r < n; ++r) {
+      if (std::fabs(m[r][i]) > std::fabs(m[pivot][i])) pivot = r;
+    }
+    if (std::fabs(m[pivot][i]) < 1e-13) return false;
+    std::swap(m[i], m[pivot]);
+    for (std::size_t r = i + 1; r < n; ++r) {
+      const double f = m[r][i] / m[i][i];
+      for (std::size_t c = i; c <= n; ++c) m[r][c] -= f * m[i][c];
+    }
+  }
+  double sum = 0.0;
+  for (std::size_t i = n; i-- > 0;) {
+    double value = m[i][n];
+    for (std::size_t c = i + 1; c < n; ++c) value -= m[i][c] * weights[c];
+    weights[i] = value / m[i][i];
+    sum += weights[i];
+  }
+  if (std::fabs(sum) < 1e-13) return false;
+  for (std::size_t i = 0; i < n; ++i) weights[i] /= sum;
+  return true;
+}
+
+}  // namespace
+
+double ProjectOntoHull(std::span<const double> points, std::span<const double> metric,
+                       double growth, std::span<const double> target, std::span<double> nearest) {
+  const std::size_t d = metric.size();
+  STRIDEWIRE_CHECK(d >= 1 && d <= kMaxParameters && points.size() >= d && points.size() % d == 0);
+  const std::size_t count = points.size() / d;
+  STRIDEWIRE_CHECK(count <= MotionLibrary::kMaxExamples);
+
+  Point sum{};
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t l = 0; l < d; ++l) sum[l] += points[i * d + l];
+  }
+  // Vertices relative to the target, in the metric.
+  std::array<Point, MotionLibrary::kMaxExamples> vertices;  // of which the first ones are touched
+  for (std::size_t l = 0; l < d; ++l) {
+    const double mean = sum[l] / static_cast<double>(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double grown = mean + (1.0 + growth) * (points[i * d + l] - mean);
+      vertices[i][l] = (grown - target[l]) * metric[l];
+    }
+  }
+
+  std::size_t start = 0;
+  double start_norm = HUGE_VAL;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double norm = DotProduct(vertices[i], vertices[i], d);
+    if (norm < start_norm) {
+      start_norm = norm;
+      start = i;
+    }
+  }
+  Corral corral;
+  corral.size = 1;
+  corral.points[0] = vertices[start];
+  corral.lambda[0] = 1.0;
+  Point x = corral.points[0];
+
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const double norm = DotProduct(x, x, d);
+    if (norm < kInside * kInside) break;
+    double least = HUGE_VAL;
+    std::size_t candidate = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double along = DotProduct(x, vertices[i], d);
+      if (along < least) {
+        least = along;
+        candidate = i;
+      }
+    }
+    if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // no vertex is nearer to the origin
+    if (corral.size == d + 1) {  // full: the least useful vertex makes room
+      const auto smallest = std::min_element(
+          corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
+      corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));
+    }
+    corral.points[corral.size] = vertices[candidate];
+    corral.lambda[corral.size] = 0.0;
+    ++corral.size;
+
+    std::array<double, kMaxCorral> weights{};
+    bool solved = false;
+    while (corral.size > 0) {
+      if (!AffineMinimum(corral, d, weights)) {
+        corral.Remove(corral.size - 1);  // affinely dependent: the newcomer adds nothing
+        break;
+      }
+      const auto end = weights.begin() + static_cast<long>(corral.size);
+      if (std::all_of(weights.begin(), end, [](double w) { return w > 1e-12; })) {
+        solved = true;
+        break;
+      }
+      // Go from lambda towards the affine minimum until a weight reaches 0, and drop that vertex.
+      double theta = 1.0;
+      for (std::size_t i = 0; i < corral.size; ++i) {
+        if (weights[i] <= 1e-12 && corral.lambda[i] > weights[i]) {
+          theta = std::min(theta, corral.lambda[i] / (corral.lambda[i] - weights[i]));
+        }
+      }
+      for (std::size_t i = 0; i < corral.size; ++i) {
+        corral.lambda[i] += theta * (weights[i] - corral.lambda[i]);
+      }
+      const std::size_t before = corral.size;
+      for (std::size_t i = corral.size; i-- > 0;) {
+        if (corral.lambda[i] <= 1e-12) corral.Remove(i);
+      }
+      if (corral.size == before) break;
+    }
+    if (!solved) break;
+    for (std::size_t i = 0; i < corral.size; ++i) corral.lambda[i] = weights[i];
+    Point next{};
+    for (std::size_t i = 0; i < corral.size; ++i) {
+      for (std::size_t l = 0; l < d; ++l) next[l] += corral.lambda[i] * corral.points[i][l];
+    }
+    if (DotProduct(next, next, d) >= norm) break;  // rounding: no more progress
+    x = next;
+  }
+
+  const double distance = std::sqrt(DotProduct(x, x, d));
+  for (std::size_t l = 0; l < d; ++l) {
+    nearest[l] = distance < kInside ? target[l] : target[l] + x[l] / metric[l];
+  }
+  return distance < kInside ? 0.0 : distance;
+}
+
+}  // namespace stridewire

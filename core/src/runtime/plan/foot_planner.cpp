@@ -1,0 +1,529 @@
+#include "stridewire/runtime/foot_planner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/plan/foot_sampler.h"
+#include "runtime/library/contact_keytimes.h"
+
+namespace stridewire {
+namespace {
+
+// On captures the ball leaves the ground this long before toe-off and comes to rest this long after
+// heel-strike.
+constexpr double kBallLeavesS = 0.06;
+constexpr double kBallRestsS = 0.08;
+constexpr double kShortestSwingS = 0.05;
+constexpr double kVelocityStepS = 0.004;
+
+constexpr double kHalfFootWidthM = 0.04;
+constexpr double kBumpM = 0.05;
+constexpr double kClearanceM = 0.037;
+constexpr double kMaxLiftM = 0.4;
+constexpr double kPassingRadiusM = 0.02;
+// Nearer its prints a foot is kept out of their ground instead (LiftOutOfGround).
+constexpr std::array<double, 15> kClearanceSamples{0.13,   0.1825, 0.235,  0.2875, 0.34,
+                                                   0.3925, 0.445,  0.4975, 0.55,   0.6025,
+                                                   0.655,  0.7075, 0.76,   0.8125, 0.865};
+
+constexpr double kMaxAsideM = 0.05;
+
+// A foot that passes the other closer than this is pushed aside for it.
+constexpr double kPassApartM = 0.11;
+constexpr double kLandApartM = 0.05;  // no nearer unless asked to
+constexpr double kPassingM = 0.2;
+constexpr double kCrossingM = 0.04;
+constexpr double kMaxPushM = 0.08;
+constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
+
+constexpr std::array<double, 5> kStanceSamples{0.1, 0.3, 0.5, 0.7, 0.9};
+
+// The ball's centre is this much higher over a slope than over level ground, straight above the same
+// point of the sole.
+double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
+  return side.ball_height_m * (1.0 / normal.y - 1.0);
+}
+
+// A sole residuals on what sticks out of the plane it fits, but for walls that it should not stand at.
+double StandingHeight(const FootSupport& support) {
+  return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
+}
+
+double ValueOr(const MotionGroup& group, const ParameterValues& values, ParameterName name,
+               double otherwise) {
+  const int l = group.FindParameter(name);
+  return l < 0 ? otherwise : values.values[static_cast<std::size_t>(l)];
+}
+
+class Planner {
+ public:
+  Planner(const MotionLibrary& library, GridCache& cache, PoseSpan pose, Movement& movement)
+      : library_(library),
+        skeleton_(library.skeleton()),
+        rig_(library.leg_rig()),
+        group_(library.group(movement.group)),
+        cache_(cache),
+        pose_(pose),
+        movement_(movement),
+        sampler_(library, cache, pose) {}
+
+  FeetAt FeetOf(ConstPoseSpan pose) const {
+    FeetAt feet;
+    LegPose leg;
+    for (std::size_t f = 0; f < 2; ++f) {
+      EvaluateLeg(skeleton_, rig_, pose, static_cast<Foot>(f), leg);
+      feet[f] = FootOf(rig_, static_cast<Foot>(f), DVec3(pose.root_position_m), leg);
+    }
+    return feet;
+  }
+  // Looks at all times of a movement that has its difference that matter for its plan.
+  void SampleKeyPoses(const SwingTimes& swing) {
+    const auto around = [&](double time_s, std::size_t before) {
+      times_s_[before] = std::max(0.0, time_s - kVelocityStepS);
+      times_s_[before + 1] = time_s;
+      times_s_[before + 2] = std::min(movement_.duration_s(), time_s + kVelocityStepS);
+    };
+    around(swing.release_s, kRelease - 1);
+    around(swing.land_s, kLanding - 1);
+    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
+      times_s_[kSwing + i] = swing.release_s + kSwingSamples[i] * (swing.land_s - swing.release_s);
+    }
+    times_s_[kEntry] = movement_.start_offset_s;
+    times_s_[kEntry + 1] = movement_.start_offset_s + kBlendStepS;
+    times_s_[kBlendedEnd] = movement_.duration_s();
+    sampler_.Sample(movement_, times_s_, kBlendedEnd);
+  }
+  FeetAt KeyPoseAt(std::size_t time) const {
+    return {sampler_.FootAt(time, Foot::kLeft), sampler_.FootAt(time, Foot::kRight)};
+  }
+  FeetAt Landing() const { return KeyPoseAt(kLanding); }
+  std::array<FeetAt, 2> Entry() const { return {KeyPoseAt(kEntry), KeyPoseAt(kEntry + 1)}; }
+  // From one ball to the other where the blend ends.
+  DVec3 EndVector(Foot from, Foot to) const {
+    return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
+  }
+
+  // The base below which the feet that stay stand where they do.
+  void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
+    movement_.base.position_m = DVec3(0.0);
+    std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
+    for (std::size_t i = 0; i < kStanceSamples.size(); ++i) {
+      times_s[i + 1] = kStanceSamples[i] * stance_end_s;
+    }
+    sampler_.Sample(movement_, times_s, 0);
+    DVec3 position(0.0);
+    for (const Foot foot : staying) {
+      const auto f = static_cast<std::size_t>(foot);
+      const DVec3 stands = locks[f].print.position_m;
+      const DVec3 start = sampler_.Ball(0, foot);
+      double lowest_m = start.y;
+      for (std::size_t i = 1; i < times_s.size(); ++i) {
+        lowest_m = std::min(lowest_m, sampler_.Ball(i, foot).y);
+      }
+      position += DVec3(stands.x - start.x,
+                        stands.y + rig_.sides[f].ball_height_m +
+                            SlopeRise(rig_.sides[f], locks[f].normal) - lowest_m,
+                        stands.z - start.z);
+    }
+    movement_.base.position_m = position / static_cast<double>(staying.size());
+  }
+
+  // Where and how the moving foot of a step lands; where the eased pose has it then.
+  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& wish, Foot moving) {
+    const RequestPlan& request = wish.request;
+    FootPlan& plan = movement_.feet;
+    const auto m = static_cast<std::size_t>(moving);
+    const std::size_t x = 1 - m;
+    const double end_heading_rad =
+        movement_.base.heading_rad + movement_.heading_change_rad + movement_.extra_turn_rad;
+    const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
+    // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
+    const double aside_m =
+        std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement_.base.position_m).x,
+                   -kMaxAsideM, kMaxAsideM);
+    DVec3 vector{ValueOr(group_, request.applied, ParameterName::kEndX, blended.x + aside_m),
+                 GroundRise(ValueOr(group_, request.applied, ParameterName::kEndY, 0.0)),
+                 ValueOr(group_, request.applied, ParameterName::kEndZ, blended.z)};
+    if (!request.is_side_given) {
+      const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+      vector.x = outward * std::max(outward * vector.x, kLandApartM);
+    }
+    FootTrajectory& track = plan.feet[m];
+    const double rise_m = vector.y;
+    track.to.position_m = locks[x].print.position_m + RotateYaw(end_heading_rad, vector);
+    double turn_rad = 0.0;
+    const BlendedFoot landing = sampler_.FootAt(kLanding, moving);
+    const double landing_rad = landing.heading_rad;
+    if (request.exact) {
+      DVec3 residual = request.exact->position_m - track.to.position_m;
+      const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
+      const double part =
+          std::min(1.0, request.most_residual_m / std::max(length_m, request.most_residual_m));
+      plan.missed_m = (1.0 - part) * DVec3(residual.x, 0.0, residual.z);
+      residual.x *= part;
+      residual.z *= part;
+      track.to.position_m += residual;
+      const double wanted_rad = WrapAngle(request.exact->heading_rad - landing_rad);
+      turn_rad = std::clamp(wanted_rad, -kMaxFootTurnRad, kMaxFootTurnRad);
+      plan.missed_rad = wanted_rad - turn_rad;
+    } else {
+      const auto missed = [&](ParameterName name) {
+        return ValueOr(group_, request.requested, name, 0.0) -
+               ValueOr(group_, request.applied, name, 0.0);
+      };
+      plan.missed_m = RotateYaw(
+          end_heading_rad, DVec3(missed(ParameterName::kEndX), 0.0, missed(ParameterName::kEndZ)));
+      const double turned_rad = movement_.heading_change_rad + movement_.extra_turn_rad;
+      plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
+    }
+    track.to.heading_rad = landing_rad + turn_rad;
+    track.turn_rad[2] = turn_rad;
+    if (wish.terrain != nullptr) StandOnGround(moving, *wish.terrain, track);
+    track.height_m[2] = track.to.position_m.y - locks[x].print.position_m.y - rise_m +
+                        SlopeRise(rig_.sides[m], track.normals[1]) -
+                        SlopeRise(rig_.sides[x], locks[x].normal);
+    return landing;
+  }
+
+  // Where the feet of a jump land.
+  std::array<DVec3, 2> ChooseJumpLanding(const FootLocks& locks, const RequestPlan& request) {
+    const DVec3 centre =
+        0.5 * (locks[0].print.position_m + locks[1].print.position_m) +
+        RotateYaw(movement_.base.heading_rad,
+                  DVec3(0.0, ValueOr(group_, request.applied, ParameterName::kHeight, 0.0),
+                        ValueOr(group_, request.applied, ParameterName::kLength, 0.0)));
+    const DVec3 apart = 0.5 * EndVector(Foot::kRight, Foot::kLeft);
+    const DVec3 flat(apart.x, 0.0, apart.z);
+    return {centre + 1.0 * flat, centre + -1.0 * flat};
+  }
+
+  // Offsets and their velocities at release and landing, so that the way between is smooth.
+  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& track) {
+    const auto velocity_around = [&](std::size_t time) {
+      const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
+      return way_m / (times_s_[time + 1] - times_s_[time - 1]);
+    };
+    track.release_velocity_m_s = -velocity_around(kRelease);
+    const BlendedFoot released = sampler_.FootAt(kRelease, foot);
+    track.release_offset_m = track.from.position_m - released.ball_m;
+    const FootCorrection at_release = CorrectFoot(movement_, foot, track.release_s, released);
+    track.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
+    track.land_velocity_m_s = -velocity_around(kLanding);
+    track.land_offset_m = track.to.position_m - landing.ball_m;
+  }
+
+  // How far the swinging foot must be pushed outward, at most of its swing, to pass the standing leg.
+  double PushAside(Foot moving) {
+    const FootTrajectory& track = movement_.feet.foot(moving);
+    const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
+    const DVec3 stands = movement_.feet.foot(OtherFoot(moving)).from.position_m;
+    const auto vector = [&](const DVec3& ball, double part) {
+      const double heading = movement_.base.heading_rad + part * movement_.heading_change_rad;
+      return RotateYaw(-heading, ball - stands);
+    };
+    // Who starts or lands across the other foot means to.
+    if (outward * vector(track.from.position_m, 0.0).x < kCrossingM ||
+        outward * vector(track.to.position_m, 1.0).x < kCrossingM) {
+      return 0.0;
+    }
+    double push_m = 0.0;
+    for (std::size_t i = 0; i < kSwingSamples.size(); ++i) {
+      const double part = kSwingSamples[i];
+      const double time_s = times_s_[kSwing + i];
+      const BlendedFoot blended{
+          .ball_m = sampler_.Ball(kSwing + i, moving)};  // its heading moves no ball
+      const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
+      const DVec3 apart = vector(ball, part);
+      if (std::fabs(apart.z) > kPassingM) continue;
+      const double lift = 4.0 * part * (1.0 - part);
+      push_m = std::max(push_m, (kPassApartM - outward * apart.x) / (lift * lift));
+    }
+    return std::min(push_m, kMaxPushM);
+  }
+
+  // What brings the root above a place by the end of the movement.
+  DVec3 RootShift(const DVec3& place_m) {
+    const double end_s = movement_.duration_s();
+    EvaluateMovement(group_, library_.layout(), movement_, end_s, cache_, pose_);
+    const FeetAt feet = FeetOf(pose_);
+    DVec3 shift = place_m - DVec3(pose_.root_position_m);
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const FootCorrection correction =
+          CorrectFoot(movement_, foot, end_s, feet[static_cast<std::size_t>(foot)]);
+      shift -= correction.root_weight * correction.offset_m + correction.root_shift_m;
+    }
+    shift.y = 0.0;
+    const double length_m = std::sqrt(shift.x * shift.x + shift.z * shift.z);
+    return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
+  }
+
+  void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& track) const {
+    const FootSupport support = SupportOf(terrain, rig_.side(foot), track.to);
+    track.to.position_m.y = StandingHeight(support);
+    track.normals[1] = support.normal;
+  }
+
+  // How much higher the swinging foot must go, at most of its swing, to clear the ground below its sole.
+  double LiftOver(Foot moving, const Terrain& terrain) {
+    const FootTrajectory& track = movement_.feet.foot(moving);
+    const LegRig::Side& side = rig_.side(moving);
+    LegPose leg;
+    double lift_m = 0.0;
+    for (const double part : kClearanceSamples) {
+      const double time_s = track.release_s + part * (track.land_s - track.release_s);
+      EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
+      EvaluateLeg(skeleton_, rig_, pose_, moving, leg);
+      const BlendedFoot blended = FootOf(rig_, moving, DVec3(pose_.root_position_m), leg);
+      const FootCorrection correction = CorrectFoot(movement_, moving, time_s, blended);
+      const DVec3 ball = blended.ball_m + correction.offset_m;
+      const Quat turn = TurnOf(correction);
+      const double lift = LiftShare(part);
+      const auto clear = [&](const Vec3& point, double rest_m) {
+        const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
+        const double ground_m = terrain.HighestWithin(at.x, at.z, kPassingRadiusM);
+        lift_m = std::max(lift_m, (ground_m + kClearanceM * lift - (at.y - rest_m)) / lift);
+      };
+      clear(leg.ball_m, side.ball_height_m);
+      clear(leg.heel_m, side.ball_height_m);
+      clear(leg.toe_tip_m, side.toe_height_m);
+    }
+    return std::min(lift_m, kMaxLiftM);
+  }
+
+ private:
+  const MotionLibrary& library_;
+  const Skeleton& skeleton_;
+  const LegRig& rig_;
+  const MotionGroup& group_;
+  GridCache& cache_;
+  PoseSpan pose_;
+  Movement& movement_;
+  FootSampler sampler_;
+
+  // Times that Look looks at; kRelease and kLanding are between one before and one after them.
+  static constexpr std::size_t kRelease = 1;
+  static constexpr std::size_t kLanding = 4;
+  static constexpr std::size_t kSwing = 6;
+  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();  // and kBlendStepS later
+  static constexpr std::size_t kBlendedEnd = kEntry + 2;  // without what is left of the pose before
+  static_assert(kBlendedEnd < FootSampler::kMost);
+  std::array<double, kBlendedEnd + 1> times_s_;
+};
+
+}  // namespace
+
+SwingTimes SwingTimesOf(MovementKind kind, const Movement& movement) {
+  const double duration_s = movement.duration_s();
+  if (movement.warp.interval_count() < 3) return {0.25 * duration_s, 0.9 * duration_s};
+  const ContactKeytimes contact = ContactKeytimesOf(kind, movement.warp.interval_count());
+  const double off_s = movement.warp.keytime_s(contact.toe_off);
+  SwingTimes times;
+  times.release_s = std::max(off_s - kBallLeavesS, 0.5 * off_s);
+  times.land_s = std::min(movement.warp.keytime_s(contact.landing) + kBallRestsS, duration_s);
+  times.release_s = std::min(times.release_s, times.land_s - kShortestSwingS);
+  return times;
+}
+
+FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Footprint& print) {
+  return SupportOf(terrain, print.position_m.x, print.position_m.z, print.heading_rad,
+                   {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
+}
+
+FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, double ground_m,
+                  const Terrain* terrain) {
+  FootLocks locks;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(skeleton, rig, pose, foot, leg);
+    const BlendedFoot blended = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
+    FootLock& hold = locks[static_cast<std::size_t>(foot)];
+    hold.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
+    if (terrain == nullptr) continue;
+    const FootSupport support = SupportOf(*terrain, rig.side(foot), hold.print);
+    hold.print.position_m.y = StandingHeight(support);
+    hold.normal = support.normal;
+    hold.height_m = hold.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
+  }
+  return locks;
+}
+
+void StandOn(const FootLocks& locks, Movement& movement) {
+  movement.warp = TimeWarp(std::array{0.0, kEaseOutS}, std::array{1});
+  movement.start_offset_s = movement.extra_turn_rad = 0.0;
+  movement.ease_out_s = kEaseOutS;
+  FootPlan& plan = movement.feet;
+  plan = {};
+  plan.is_active = true;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const FootLock& hold = locks[f];
+    FootTrajectory& track = plan.feet[f];
+    track.from = track.to = hold.print;
+    track.normals.fill(hold.normal);
+    track.height_m.fill(hold.height_m);
+    track.turn_rad.fill(hold.turn_rad);
+    track.root_weight = hold.root_weight;
+  }
+}
+
+namespace {
+
+// A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
+// so that whoever is told what was chosen has the same plan.
+std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
+                           const LandingTarget* wish, const LandingDecision& chosen,
+                           const BlendSource& source, GridCache& cache, PoseSpan pose,
+                           Movement& movement) {
+  const MotionGroup& group = library.group(movement.group);
+  Planner planner(library, cache, pose, movement);
+  const bool is_step = IsStep(group.kind);
+  const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
+  const Foot fixed = OtherFoot(moving);
+  const auto m = static_cast<std::size_t>(moving);
+  const auto x = static_cast<std::size_t>(fixed);
+  const SwingTimes times = SwingTimesOf(group.kind, movement);
+  if (wish == nullptr) {
+    movement.extra_turn_rad = chosen.extra_turn_rad;
+  } else if (wish->request.turn_rad) {
+    movement.extra_turn_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
+                                    -kMaxExtraTurnRad, kMaxExtraTurnRad);
+  }
+
+  constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
+  const std::array<Foot, 1> stays{fixed};
+  if (is_step) {
+    planner.SolveBase(locks, stays, movement.duration_s());
+  } else {
+    planner.SolveBase(locks, kBoth, times.release_s);
+  }
+
+  // D = P - M, with P what was before.
+  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache, movement.difference);
+  const FeetAt start = planner.FeetOf(movement.difference);
+  const FeetAt was = planner.FeetOf(source.before);
+  Subtract(source.before, movement.difference, movement.difference);
+  if (source.earlier) {
+    SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, cache, pose,
+                          movement);
+  }
+  planner.SampleKeyPoses(times);
+
+  FootPlan& plan = movement.feet;
+  plan = {};
+  plan.is_active = true;
+  plan.keeps_above_ground = wish == nullptr ? chosen.is_on_terrain : wish->terrain != nullptr;
+  for (std::size_t f = 0; f < 2; ++f) {
+    FootTrajectory& track = plan.feet[f];
+    const FootLock& hold = locks[f];
+    track.from = track.to = hold.print;
+    track.normals.fill(hold.normal);
+    // What the difference pose takes away in height and turning while it fades is put back, so that
+    // a foot on the ground does neither; only the foot that carries comes to rest.
+    const double sinks_m = was[f].ball_m.y - start[f].ball_m.y;
+    const double turns_rad = WrapAngle(was[f].heading_rad - start[f].heading_rad);
+    const bool stays_down = is_step && f == x;
+    track.height_m = {hold.height_m, stays_down ? 0.0 : hold.height_m + sinks_m, 0.0};
+    track.turn_rad = {hold.turn_rad, hold.turn_rad + turns_rad, hold.turn_rad + turns_rad};
+    track.height_m[2] = track.height_m[1];
+    track.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
+  }
+  for (const Foot foot : kBoth) {
+    if (is_step && foot != moving) continue;
+    plan.foot(foot).release_s = times.release_s;
+    plan.foot(foot).land_s = times.land_s;
+  }
+
+  if (is_step) {
+    FootTrajectory& track = plan.feet[m];
+    BlendedFoot landing;
+    if (wish == nullptr) {
+      landing = planner.Landing()[m];
+      track.to.position_m = chosen.to_m[m];
+      track.to.heading_rad = landing.heading_rad + chosen.turn_rad;
+      track.turn_rad[2] = chosen.turn_rad;
+      if (chosen.is_on_terrain) track.normals[1] = chosen.normal;
+      track.height_m[2] = chosen.height_m;
+    } else {
+      landing = planner.ChooseLanding(locks, *wish, moving);
+    }
+    planner.BlendSwing(moving, landing, track);
+    if (wish == nullptr) {
+      track.lift_m = chosen.lift_m;
+      track.aside_m = chosen.aside_m;
+      track.root_shift_m = chosen.root_shift_m;
+      return planner.Entry();
+    }
+    const double push_m = planner.PushAside(moving);
+    if (wish->terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish->terrain);
+    if (push_m > 0.0) {
+      track.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                                DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+    }
+    if (wish->request.root_m) track.root_shift_m = planner.RootShift(*wish->request.root_m);
+    return planner.Entry();
+  }
+
+  std::array<DVec3, 2> to_m = chosen.to_m;
+  if (wish != nullptr) to_m = planner.ChooseJumpLanding(locks, wish->request);
+  const FeetAt landing = planner.Landing();
+  for (const Foot foot : kBoth) {
+    const auto f = static_cast<std::size_t>(foot);
+    FootTrajectory& track = plan.feet[f];
+    track.to.position_m = to_m[f];
+    track.to.heading_rad = landing[f].heading_rad;
+    track.turn_rad[2] = 0.0;
+    track.height_m[2] = 0.0;
+    planner.BlendSwing(foot, landing[f], track);
+  }
+  return planner.Entry();
+}
+
+}  // namespace
+
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
+                               const LandingTarget& wish, const BlendSource& source, GridCache& cache,
+                               PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, &wish, {}, source, cache, pose, movement);
+}
+
+std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
+                               const LandingDecision& choice, const BlendSource& source, GridCache& cache,
+                               PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, nullptr, choice, source, cache, pose, movement);
+}
+
+LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
+  const FootPlan& plan = movement.feet;
+  LandingDecision choice{.extra_turn_rad = movement.extra_turn_rad,
+                       .is_on_terrain = plan.keeps_above_ground,
+                       .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
+  if (!IsStep(kind)) return choice;
+  const FootTrajectory& track = plan.foot(MovingFoot(kind));
+  choice.turn_rad = track.turn_rad[2];
+  choice.height_m = track.height_m[2];
+  choice.normal = track.normals[1];
+  choice.lift_m = track.lift_m;
+  choice.aside_m = track.aside_m;
+  choice.root_shift_m = track.root_shift_m;
+  return choice;
+}
+
+FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, double time_s,
+                  ConstPoseSpan pose) {
+  FootLocks locks;
+  LegPose leg;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
+    const FootCorrection correction = CorrectFoot(
+        movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
+    FootLock& hold = locks[static_cast<std::size_t>(foot)];
+    const FootTrajectory& track = movement.feet.foot(foot);
+    hold.print = time_s > track.release_s ? track.to : track.from;
+    hold.height_m = correction.offset_m.y;
+    hold.turn_rad = correction.free_turn_rad;
+    hold.normal = correction.normal;
+    hold.root_weight = correction.root_weight;
+  }
+  return locks;
+}
+
+}  // namespace stridewire

@@ -1,0 +1,315 @@
+#include "stridewire/runtime/request_plan.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/library/contact_keytimes.h"
+#include "runtime/library/convex_hull.h"
+#include "runtime/skeleton/foot_vector.h"
+#include "runtime/weights/measure.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kStartWeight = 4.0;     // the start is a fact, the end a wish
+constexpr double kFreeWeight = 0.02;     // a parameter nobody asked for follows the others
+constexpr double kPerParameterM = 1e-3;  // of groups that span a request alike, the plainer
+constexpr double kFootPreferenceM = 0.01;
+
+// A step asked for without turn, side or height stays in a straight group unless that misses it by
+// this much more: parameters nobody asked for would bend the walk.
+constexpr double kPlainPreferenceM = 0.15;
+// Inside the hull beats its edge grown by 10 %: a metre outside counts for this much more.
+constexpr double kOutsideWeight = 0.25;
+// A group without a parameter for where feet stand aside or in height takes them to be about as the
+// stand pose has them (people stand wider than they walk); beyond this, they are missed.
+constexpr double kStartSlackM = 0.12;
+constexpr double kLevelSlackM = 0.05;  // balls roll up and down on level ground
+// Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
+constexpr double kStraightMetresPerRadian = 2.0;
+// Of a footprint, what a group misses sidewise is eased into the swing, and little of a turn is missed.
+constexpr double kExactSideWeight = 0.4;
+constexpr double kExactMetresPerRadian = 1.0;
+// Landing higher or lower than asked puts a foot into the air or the ground: worse than falling short.
+constexpr double kHeightWeight = 4.0;
+constexpr double kChangeM = 1e-6;
+
+// What is wanted of one parameter; not `given`: anything the examples have.
+struct Wish {
+  double value = 0.0;
+  bool given = false;
+  double weight = 1.0;
+  bool natural = false;  // not given, but as the stand pose has it
+};
+using Wishes = std::array<Wish, kParameterNameCount>;
+
+Wish& At(Wishes& wishes, ParameterName name) { return wishes[static_cast<std::size_t>(name)]; }
+
+// Whether a group is for more than steps straight ahead.
+bool IsGeneral(const MotionGroup& group) {
+  for (const ParameterName name :
+       {ParameterName::kTurn, ParameterName::kStartX, ParameterName::kEndX, ParameterName::kStartY,
+        ParameterName::kEndY, ParameterName::kHeight}) {
+    if (group.FindParameter(name) >= 0) return true;
+  }
+  return false;
+}
+
+// How far outside the range of a group's examples, grown by `growth`, a target is: no more than outside their hull.
+double OutsideRange(const MotionGroup& group, std::span<const double> metric,
+                    std::span<const double> target, double growth) {
+  constexpr double kSlack = 1e-6;  // ranges are told in other digits than examples
+  double sum = 0.0;
+  for (std::size_t l = 0; l < target.size(); ++l) {
+    const Parameter& parameter = group.parameters[l];
+    const double more = growth * (parameter.max - parameter.min) + kSlack;
+    const double outside = metric[l] * std::max({0.0, parameter.min - more - target[l],
+                                                 target[l] - parameter.max - more});
+    sum += outside * outside;
+  }
+  return std::sqrt(sum);
+}
+
+// Null if it costs, with `for_itself_m`, as much as `best_cost_m` or more.
+std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
+                                       const Wishes& wishes, double natural_side_m,
+                                       double for_itself_m, double best_cost_m) {
+  const MotionGroup& group = library.group(group_index);
+  const std::size_t d = group.parameters.size();
+  RequestPlan plan;
+  plan.group = group_index;
+  plan.requested.count = plan.applied.count = static_cast<int>(d);
+  std::array<double, kMaxParameters> metric_room{};
+  std::array<bool, kParameterNameCount> is_spanned{};
+  for (std::size_t l = 0; l < d; ++l) {
+    const auto name = static_cast<std::size_t>(group.parameters[l].name);
+    const Wish& wish = wishes[name];
+    is_spanned[name] = true;
+    metric_room[l] = wish.given ? wish.weight : kFreeWeight;
+    plan.requested.values[l] = wish.given ? wish.value : group.parameters[l].centre;
+    if (wish.natural) {
+      plan.requested.values[l] =
+          std::clamp(natural_side_m, group.parameters[l].min, group.parameters[l].max);
+    }
+  }
+
+  // What the group has no parameter for is missed by as much as was asked.
+  double missed_m = 0.0;
+  for (const ParameterName name :
+       {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kEndX ? natural_side_m : 0.0;
+    const double missed = wishes[i].weight * std::fabs(wishes[i].value - natural);
+    if (missed > kChangeM) plan.clamped = true;
+    missed_m += missed;
+  }
+  double beside_m = 0.0;
+  for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
+    const auto i = static_cast<std::size_t>(name);
+    if (!wishes[i].given || is_spanned[i]) continue;
+    const double natural = name == ParameterName::kStartX ? natural_side_m : 0.0;
+    beside_m += wishes[i].weight *
+                std::max(0.0, std::fabs(wishes[i].value - natural) -
+                                  (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
+  }
+
+  const std::span<const double> target = std::span(plan.requested.values).first(d);
+  const std::span<const double> metric = std::span(metric_room).first(d);
+  // Most groups are out of the question before hulls, which take their time, are looked at.
+  const double least_m = OutsideRange(group, metric, target, kHullGrowth) +
+                         kOutsideWeight * OutsideRange(group, metric, target, 0.0);
+  if (least_m + missed_m + beside_m + for_itself_m >= best_cost_m) return std::nullopt;
+
+  const std::span<const double> examples =
+      group.sites.first(static_cast<std::size_t>(group.example_count) * d);
+  std::array<double, kMaxParameters> inside{};
+  const double outside_m =
+      ProjectOntoHull(examples, metric, 0.0, target, std::span(inside).first(d));
+  plan.extrapolated = outside_m > kChangeM;
+  if (outside_m == 0.0) {
+    std::ranges::copy(target, plan.applied.values.begin());
+  } else {
+    plan.distance_m = ProjectOntoHull(examples, metric, kHullGrowth, target,
+                                      std::span(plan.applied.values).first(d));
+  }
+  for (std::size_t l = 0; l < d; ++l) {
+    const auto name = static_cast<std::size_t>(group.parameters[l].name);
+    if (!wishes[name].given) plan.requested.values[l] = plan.applied.values[l];
+    if (std::fabs(plan.requested.values[l] - plan.applied.values[l]) > kChangeM) {
+      plan.clamped = true;
+    }
+  }
+  plan.distance_m += missed_m;
+  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + beside_m;
+  if (plan.cost_m + for_itself_m >= best_cost_m) return std::nullopt;
+  return plan;
+}
+
+std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
+                                    const Wishes& wishes, double natural_side_m, bool is_plain) {
+  std::optional<RequestPlan> best;
+  double best_cost_m = HUGE_VAL;
+  for (std::size_t g = 0; g < library.groups().size(); ++g) {
+    const MotionGroup& group = library.groups()[g];
+    if (group.kind != kind) continue;
+    double for_itself_m = kPerParameterM * group.parameter_count();
+    if (is_plain && IsGeneral(group)) for_itself_m += kPlainPreferenceM;
+    const auto plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m,
+                                  for_itself_m, best_cost_m);
+    if (!plan) continue;
+    best_cost_m = plan->cost_m + for_itself_m;
+    best = plan;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequest& request,
+                                    const FootState& feet, Foot last_moved, bool standing) {
+  const FootState stand{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)};
+  const auto plan_foot = [&](Foot foot) {
+    const DVec3 start = feet.Vector(foot);
+    const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+    const bool is_wide = std::fabs(start.x - stand.Vector(foot).x) > kStartSlackM;
+    Wishes wishes;
+    At(wishes, ParameterName::kStartX) = {start.x, true, kStartWeight};
+    At(wishes, ParameterName::kStartY) = {start.y, true, kStartWeight};
+    At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
+    At(wishes, ParameterName::kEndX) = {
+        outward * request.side_m.value_or(0.0), request.side_m.has_value(),
+        request.at ? kExactSideWeight : 1.0, !request.side_m && is_wide};
+    At(wishes, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
+    At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
+    At(wishes, ParameterName::kTurn) = {request.turn_rad, true,
+                                        request.at                ? kExactMetresPerRadian
+                                        : request.turn_rad == 0.0 ? kStraightMetresPerRadian
+                                                                  : kMetresPerRadian};
+    const bool is_plain = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
+    auto plan = BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x, is_plain);
+    if (plan) {
+      plan->is_side_given = request.side_m.has_value();
+      plan->turn_rad = request.turn_rad;
+    }
+    return plan;
+  };
+
+  if (request.foot) return plan_foot(*request.foot);
+  const std::optional<RequestPlan> expected = plan_foot(OtherFoot(last_moved));
+  if (expected && !standing) return expected;
+  const std::optional<RequestPlan> other = plan_foot(last_moved);
+  if (!expected) return other;
+  if (!other || other->cost_m > expected->cost_m - kFootPreferenceM) return expected;
+  return other;
+}
+
+std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot,
+                                         const Footprint& print, const DVec3& fixed_m,
+                                         double heading_rad, const FootState& feet) {
+  const DVec3 vector = RotateYaw(-print.heading_rad, print.position_m - fixed_m);
+  StepRequest step;
+  step.foot = foot;
+  step.at = FootprintRequest{print.position_m, print.heading_rad};
+  step.length_m = vector.z;
+  step.side_m = foot == Foot::kLeft ? vector.x : -vector.x;
+  step.height_m = GroundRise(vector.y);
+  step.turn_rad = print.heading_rad - heading_rad;
+  std::optional<RequestPlan> plan = PlanStep(library, step, feet, OtherFoot(foot), false);
+  if (plan) plan->exact = print;
+  return plan;
+}
+
+std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequest& request) {
+  Wishes wishes;
+  At(wishes, ParameterName::kLength) = {request.length_m, true, 1.0};
+  At(wishes, ParameterName::kHeight) = {request.height_m, true, 1.0};
+  At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
+  return BestPlan(library, MovementKind::kJump, wishes, 0.0,
+                  request.turn_rad == 0.0 && request.height_m == 0.0);
+}
+
+Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request) {
+  const auto within = [](double value, double limit) {
+    return std::isfinite(value) && std::fabs(value) <= limit;
+  };
+  const auto is_place = [&](const DVec3& place) {
+    return within(place.x, kMaxWalkPositionM) && within(place.y, kMaxWalkPositionM) &&
+           within(place.z, kMaxWalkPositionM);
+  };
+  const auto has_kind = [&](MovementKind kind) {
+    return std::any_of(library.groups().begin(), library.groups().end(),
+                       [&](const MotionGroup& group) { return group.kind == kind; });
+  };
+  if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
+    if (!within(step->length_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "step");
+    }
+    if (step->side_m && !within(*step->side_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "side_m is not a number within 10 m", "step");
+    }
+    if (!within(step->height_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "step");
+    }
+    if (!within(step->turn_rad, kMaxRequestTurnRad)) {
+      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "step");
+    }
+    if (step->at && !is_place(step->at->position_m)) {
+      return Fail(ErrorCode::kOutOfRange, "at_m is not within 1000000 m", "step");
+    }
+    if (step->at && !within(step->at->heading_rad.value_or(0.0), kMaxWalkHeadingRad)) {
+      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
+    }
+    if (step->exact_only && !step->at) {
+      return Fail(ErrorCode::kInvalidArgument, "must_be_met has a meaning only beside at_m",
+                  "step");
+    }
+    const bool found =
+        step->foot ? has_kind(StepKind(*step->foot))
+                   : has_kind(MovementKind::kStepLeft) || has_kind(MovementKind::kStepRight);
+    if (!found) return Fail(ErrorCode::kUnsupported, "the library has no such step", "step");
+  } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+    if (!within(jump->length_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "jump");
+    }
+    if (!within(jump->height_m, kMaxRequestLengthM)) {
+      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "jump");
+    }
+    if (!within(jump->turn_rad, kMaxRequestTurnRad)) {
+      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "jump");
+    }
+    if (!has_kind(MovementKind::kJump)) {
+      return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
+    }
+  } else if (const auto* walk = std::get_if<WalkRequest>(&request.movement)) {
+    if (!is_place(walk->position_m)) {
+      return Fail(ErrorCode::kOutOfRange, "position_m is not within 1000000 m", "walk_to");
+    }
+    if (!within(walk->heading_rad, kMaxWalkHeadingRad)) {
+      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad",
+                  "walk_to");
+    }
+    if (walk->waypoints_m.size() > kMaxWaypoints) {
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m locks more than 64 places", "walk_to");
+    }
+    if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",
+                  "walk_to");
+    }
+    if (walk->speed_m_s &&
+        !(*walk->speed_m_s >= kMinWalkSpeedMPerS && *walk->speed_m_s <= kMaxWalkSpeedMPerS)) {
+      return Fail(ErrorCode::kOutOfRange, "speed_m_s is not a number from 0.05 to 5", "walk_to");
+    }
+    if (!has_kind(MovementKind::kStepLeft) || !has_kind(MovementKind::kStepRight)) {
+      return Fail(ErrorCode::kUnsupported, "the library has no steps of both feet", "walk_to");
+    }
+  } else if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
+    if (!(stand->seconds >= 0.0 && stand->seconds <= kMaxStandS)) {
+      return Fail(ErrorCode::kOutOfRange, "seconds is not a number from 0 to 3600", "stand");
+    }
+  }
+  return {};
+}
+
+}  // namespace stridewire

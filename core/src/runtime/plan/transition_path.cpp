@@ -1,0 +1,157 @@
+#include "stridewire/runtime/transition_path.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/skeleton/foot_vector.h"
+
+namespace stridewire {
+namespace {
+
+constexpr double kFeetApartForwardM = 0.12;
+constexpr double kFeetApartAsideM = 0.3;
+
+// Captured movements that do meet are up to 0.125 m apart, strides and what begins with feet together more than
+// 0.2 m. Some captures have nothing that begins near their stand: what they begin with anyhow is no bound then.
+constexpr float kMaxTransitionM = 0.15f;
+constexpr float kMaxTransitionOfStand = 1.5f;
+// As much as planting eases into a swing (RequestPlan::most_residual_m).
+constexpr double kMaxStartMissM = 0.25;
+// What steps that go before must be worth.
+constexpr double kWorthAStepM = 0.25;
+constexpr double kWorthClosingM = 0.03;
+
+class TransitionPathFinder {
+ public:
+  TransitionPathFinder(const MotionLibrary& library, const MovementRequest& request)
+      : library_(library),
+        stand_{FootVector(library.skeleton(), library.stand_pose(), Foot::kLeft, 0.0)},
+        step_(std::get_if<StepRequest>(&request.movement)),
+        jump_(std::get_if<JumpRequest>(&request.movement)) {}
+
+  [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct, const Stance& stance) const {
+    if (step_ != nullptr && step_->at) return {direct};
+    const bool can_begin = direct && CanBegin(*direct, stance);
+    const TransitionPath as_it_is{can_begin ? direct : std::nullopt};
+    if (can_begin && !BeginsWithFeetApart(*direct, stance)) return as_it_is;
+    // What can begin may be made better by one step; what cannot takes as many as it needs.
+    const double most_cost_m = can_begin ? WorthAStepM(CostM(*direct, stance)) : HUGE_VAL;
+    const int most =
+        std::min(can_begin ? 1 : kMaxInsertedSteps, kMaxInsertedSteps - stance.inserted_steps);
+    for (int steps = 1; steps <= most; ++steps) {
+      if (auto first = FirstOf(steps, stance, most_cost_m)) return {first, true};
+    }
+    return as_it_is;
+  }
+
+ private:
+  // The first of so many steps after which the request costs no more than that.
+  std::optional<RequestPlan> FirstOf(int steps, const Stance& stance, double most_cost_m) const {
+    for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
+      auto step =
+          PlanStep(library_, StepRequest{.foot = foot}, stance.feet, stance.last_moved, false);
+      if (!step || !CanBegin(*step, stance)) continue;
+      const Stance after = After(*step, foot);
+      if (steps > 1 ? FirstOf(steps - 1, after, most_cost_m).has_value()
+                    : IsMet(after, most_cost_m)) {
+        return step;
+      }
+    }
+    return std::nullopt;
+  }
+
+  bool IsMet(const Stance& stance, double most_cost_m) const {
+    const auto plan = jump_ != nullptr
+                          ? PlanJump(library_, *jump_)
+                          : PlanStep(library_, *step_, stance.feet, stance.last_moved, false);
+    return plan && CanBegin(*plan, stance) && CostM(*plan, stance) <= most_cost_m;
+  }
+
+  Stance After(const RequestPlan& step, Foot foot) const {
+    const MotionGroup& group = library_.group(step.group);
+    const auto end_or = [&](ParameterName name, double otherwise) {
+      const int l = group.FindParameter(name);
+      return l < 0 ? otherwise : step.applied.values[static_cast<std::size_t>(l)];
+    };
+    const DVec3 vector(end_or(ParameterName::kEndX, stand_.Vector(foot).x),
+                       end_or(ParameterName::kEndY, 0.0), end_or(ParameterName::kEndZ, 0.0));
+    return {{foot == Foot::kLeft ? vector : -vector}, foot, static_cast<std::size_t>(step.group)};
+  }
+
+  bool CanBegin(const RequestPlan& plan, const Stance& stance) const {
+    return Meets(stance.group, static_cast<std::size_t>(plan.group)) &&
+           (!BeginsWithFeetApart(plan, stance) || StartMissM(plan, stance) <= kMaxStartMissM);
+  }
+
+  // A jump, or a step of the foot that moved last: the other one has to come first.
+  bool BeginsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
+    const MovementKind kind = library_.group(plan.group).kind;
+    return AreFeetApart(stance.feet, stand_) &&
+           (!IsStep(kind) || MovingFoot(kind) == stance.last_moved);
+  }
+
+  bool Meets(std::size_t from, std::size_t to) const {
+    const std::size_t stand = library_.groups().size();
+    const Transition* transition = library_.FindTransition(from, to);
+    if (transition == nullptr || from == stand) return true;
+    return transition->distance_m <=
+           std::max(kMaxTransitionM,
+                    kMaxTransitionOfStand * library_.FindTransition(stand, to)->distance_m);
+  }
+
+  // How far the feet are, forward, from where the movement's examples have them at the start.
+  double StartMissM(const RequestPlan& plan, const Stance& stance) const {
+    const MotionGroup& group = library_.group(plan.group);
+    const int l = group.FindParameter(ParameterName::kStartZ);
+    if (l < 0) return std::fabs(stance.feet.left_from_right_m.z - stand_.left_from_right_m.z);
+    return std::fabs(stance.feet.Vector(MovingFoot(group.kind)).z -
+                     plan.applied.values[static_cast<std::size_t>(l)]);
+  }
+
+  // Steps: as planned. Jumps: how much further than in a stand feet are apart.
+  double CostM(const RequestPlan& plan, const Stance& stance) const {
+    if (jump_ == nullptr) return plan.cost_m;
+    const DVec3 apart = stance.feet.left_from_right_m - stand_.left_from_right_m;
+    return std::max(
+        {0.0, std::fabs(apart.z) - kFeetApartForwardM, std::fabs(apart.x) - kFeetApartAsideM});
+  }
+
+  // What it may cost at most after a step that goes before it.
+  double WorthAStepM(double cost_m) const {
+    return jump_ != nullptr ? std::max(0.0, cost_m - kWorthClosingM) : cost_m - kWorthAStepM;
+  }
+
+  const MotionLibrary& library_;
+  FootState stand_;
+  const StepRequest* step_;
+  const JumpRequest* jump_;
+};
+
+}  // namespace
+
+bool AreFeetApart(const FootState& feet, const FootState& stand) {
+  const DVec3 apart = feet.left_from_right_m - stand.left_from_right_m;
+  return std::fabs(apart.z) > kFeetApartForwardM || std::fabs(apart.x) > kFeetApartAsideM;
+}
+
+TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
+            const std::optional<RequestPlan>& direct, const Stance& stance) {
+  return TransitionPathFinder(library, request).Find(direct, stance);
+}
+
+const char* NoPathReason(MovementKind from, MovementKind to) {
+  static constexpr std::array<std::array<const char*, 3>, 3> kReasons{
+      {{"no way leads from step_left to step_left in this library",
+        "no way leads from step_left to step_right in this library",
+        "no way leads from step_left to jump in this library"},
+       {"no way leads from step_right to step_left in this library",
+        "no way leads from step_right to step_right in this library",
+        "no way leads from step_right to jump in this library"},
+       {"no way leads from jump to step_left in this library",
+        "no way leads from jump to step_right in this library",
+        "no way leads from jump to jump in this library"}}};
+  return kReasons.at(static_cast<std::size_t>(from)).at(static_cast<std::size_t>(to));
+}
+
+}  // namespace stridewire

@@ -1,0 +1,265 @@
+#include "stridewire/runtime/walk_planner.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/trig.h"
+#include "stridewire/runtime/foot_planner.h"
+#include "runtime/plan/walk_steering.h"
+
+namespace stridewire {
+namespace {
+
+// A foot this near its place at the goal is there.
+constexpr double kThereM = 0.002;
+constexpr double kThereRad = 0.004;
+// Without planting feet land where the blend has them: that is as near as it gets.
+constexpr double kRoughlyThereM = 0.15;
+constexpr double kRoughlyThereRad = 0.25;
+
+// How far off the library's own step may be, which is eased into the swing. Libraries without steps in
+// place turn and close with what they have.
+constexpr double kMaxMissM = 0.16;
+constexpr double kMostMissM = 0.6;
+// Who steps no further than this stands above their feet at the end.
+constexpr double kForwardM = 0.2;
+
+// A sole that hangs over an edge or lies on bumps stands badly; in front of a wall it does not stand.
+constexpr double kLeastCarried = 0.999;
+constexpr double kDeepestGapM = 0.04;
+constexpr double kHighestRiseM = 0.04;
+// Nothing in the way of a swing may be higher than this above both its ends.
+constexpr double kMaxHurdleM = 0.25;
+constexpr double kHurdleRadiusM = 0.06;
+
+// Where else a foot may land, nearest first: rings of eight around where it should.
+constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
+
+constexpr int kMaxOutOfReach = 3;  // of these, until a step is given up
+
+// What is tried when a step does not work out: shorter ones, then to either side.
+struct Attempt {
+  double part;      // of the step
+  double bend_rad;  // of the course
+};
+constexpr std::array<Attempt, 11> kAttempts{{{1.0, 0.0},
+                                             {0.75, 0.0},
+                                             {0.5, 0.0},
+                                             {1.0, 0.5},
+                                             {1.0, -0.5},
+                                             {0.7, 0.9},
+                                             {0.7, -0.9},
+                                             {0.3, 0.0},
+                                             {0.6, 1.4},
+                                             {0.6, -1.4},
+                                             {0.15, 0.0}}};
+
+// Nearer than this the goal's ground is looked at again: it may have changed.
+constexpr double kGoalInSightM = 1.5;
+
+constexpr double kProgressM = 0.02;
+constexpr double kMetresPerRadianLeft = 0.3;
+
+class StepPlanner {
+ public:
+  StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance)
+      : library_(library), gait_(library.locomotion_profile()), terrain_(terrain), stance_(stance) {}
+
+  void Begin(bool is_strict) {
+    is_strict_ = is_strict;
+    candidates_ = 0;
+  }
+
+  // Null: no step of this foot that far and onto good ground.
+  std::optional<RequestPlan> Plan(Foot moving, const WalkStep& step) {
+    moving_ = moving;
+    outward_ = moving == Foot::kLeft ? 1.0 : -1.0;
+    fixed_m_ = stance_.feet[static_cast<std::size_t>(OtherFoot(moving))].position_m;
+    const Footprint wanted{step.print.position_m,
+                           UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
+    if (terrain_ == nullptr) return Reach(Level(wanted), step.root_m);
+    if (IsGood(wanted)) return Reach(OnGround(wanted), step.root_m);
+    if (step.is_last) return std::nullopt;
+    int out_of_reach = 0;
+    for (const double ring_m : kRingsM) {
+      for (int i = 0; i < 8; ++i) {
+        // First ahead and behind, then aside.
+        constexpr std::array<double, 8> kAround{0.0,        kPi,         0.25 * kPi, -0.25 * kPi,
+                                                0.75 * kPi, -0.75 * kPi, 0.5 * kPi,  -0.5 * kPi};
+        const double way = wanted.heading_rad + kAround[static_cast<std::size_t>(i)];
+        Footprint print = wanted;
+        print.position_m += RotateYaw(way, DVec3(0.0, 0.0, ring_m));
+        if (!KeepsApart(print) || !IsGood(print)) continue;
+        if (auto plan = Reach(OnGround(print), step.root_m)) return plan;
+        if (++out_of_reach >= kMaxOutOfReach) return std::nullopt;
+      }
+    }
+    return std::nullopt;
+  }
+
+  // Whether both feet can stand as the goal has them.
+  bool GoalIsGood(const WalkSteering& course) {
+    double heights_m[2];
+    for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+      const Footprint print = OnGround(course.GoalPrint(foot));
+      if (!Carries(foot, print)) return false;
+      heights_m[static_cast<std::size_t>(foot)] = print.position_m.y;
+    }
+    return std::fabs(heights_m[0] - heights_m[1]) <= kMaxWalkClimbM;
+  }
+
+  [[nodiscard]] bool has_seen_bad_ground() const { return has_seen_bad_ground_; }
+  [[nodiscard]] bool has_seen_heights() const { return has_seen_heights_; }
+  [[nodiscard]] bool is_spent() const { return candidates_ >= kMaxWalkCandidates; }
+
+ private:
+  static constexpr double kPi = 3.14159265358979323846;
+
+  Footprint Level(Footprint print) const {
+    print.position_m.y = fixed_m_.y;
+    return print;
+  }
+  Footprint OnGround(Footprint print) const {
+    print.position_m.y = terrain_->HeightAt(print.position_m.x, print.position_m.z);
+    return print;
+  }
+
+  // A foot that was moved aside lands beside the other still, not across or behind it.
+  bool KeepsApart(const Footprint& print) const {
+    const DVec3 v = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
+    return outward_ * v.x >= 0.08 && outward_ * v.x <= gait_.stand_m + 0.3 &&
+           v.z <= gait_.longest_m && v.z >= -std::max(gait_.back_m, 0.15);
+  }
+
+  bool Carries(Foot foot, const Footprint& print) const {
+    const FootSupport support = SupportOf(*terrain_, library_.leg_rig().side(foot), print);
+    return support.normal.y >= kLeastWalkNormalY && support.carried >= kLeastCarried &&
+           support.gap_m <= kDeepestGapM && support.rise_m <= kHighestRiseM;
+  }
+
+  bool IsGood(const Footprint& print) {
+    if (is_spent()) return false;
+    ++candidates_;
+    const double height_m = terrain_->HeightAt(print.position_m.x, print.position_m.z);
+    if (std::fabs(height_m - fixed_m_.y) > kMaxWalkClimbM) {
+      has_seen_heights_ = true;
+      return false;
+    }
+    if (!Carries(moving_, print)) {
+      has_seen_bad_ground_ = true;
+      return false;
+    }
+    const DVec3 from = stance_.feet[static_cast<std::size_t>(moving_)].position_m;
+    const double ends_m = std::max(std::max(from.y, height_m), fixed_m_.y);
+    for (const double part : {0.2, 0.4, 0.6, 0.8}) {
+      const DVec3 at = from + part * (print.position_m - from);
+      if (terrain_->HighestWithin(at.x, at.z, kHurdleRadiusM) > ends_m + kMaxHurdleM) {
+        has_seen_heights_ = true;
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // The library's step there, null where it misses by more than can be eased into the swing.
+  std::optional<RequestPlan> Reach(const Footprint& print, const DVec3& root_m) const {
+    auto plan =
+        PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector);
+    if (!plan) return plan;
+    const MotionGroup& group = library_.group(plan->group);
+    const DVec3 wanted = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
+    const auto applied_or = [&](ParameterName name, double otherwise) {
+      const int l = group.FindParameter(name);
+      return l < 0 ? otherwise : plan->applied.values[static_cast<std::size_t>(l)];
+    };
+    const bool strides = wanted.z > kForwardM;
+    const double natural_x =
+        outward_ * std::clamp(outward_ * wanted.x, gait_.width_m, gait_.stand_m);
+    const double miss_x = applied_or(ParameterName::kEndX, natural_x) - wanted.x;
+    const double miss_z = applied_or(ParameterName::kEndZ, 0.0) - wanted.z;
+    const double miss_rad = std::fabs(applied_or(ParameterName::kTurn, 0.0) -
+                                      (print.heading_rad - stance_.heading_rad));
+    if (std::sqrt(miss_x * miss_x + miss_z * miss_z) >
+            (strides && is_strict_ ? kMaxMissM : kMostMissM) ||
+        miss_rad > kMaxExtraTurnRad) {
+      return std::nullopt;
+    }
+    plan->most_residual_m = kMostMissM;
+    if (!strides) plan->root_m = root_m;
+    return plan;
+  }
+
+  const MotionLibrary& library_;
+  const LocomotionProfile& gait_;
+  const Terrain* terrain_;
+  const WalkStance& stance_;
+  Foot moving_ = Foot::kLeft;
+  double outward_ = 1.0;
+  DVec3 fixed_m_ = DVec3(0.0);
+  bool is_strict_ = true;
+  int candidates_ = 0;
+  bool has_seen_bad_ground_ = false;
+  bool has_seen_heights_ = false;
+};
+
+WalkDecision Refuse(const char* reason) {
+  WalkDecision decision;
+  decision.outcome = WalkOutcome::kRefused;
+  decision.reason = reason;
+  return decision;
+}
+
+}  // namespace
+
+WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
+                          const WalkRequest& walk, const WalkStance& stance,
+                          WalkProgress& progress) {
+  WalkSteering course(library.locomotion_profile(), walk, stance);
+  course.PassWaypoints(progress.next_waypoint);
+  const double there_m = stance.is_exact ? kThereM : kRoughlyThereM;
+  const double there_rad = stance.is_exact ? kThereRad : kRoughlyThereRad;
+  const bool is_last_leg = progress.next_waypoint >= walk.waypoints_m.size();
+  if (is_last_leg && course.IsThere(there_m, there_rad)) return {};
+
+  const double left =
+      course.LeftM(progress.next_waypoint) + kMetresPerRadianLeft * course.LeftRad();
+  if (left < progress.least_left - kProgressM) {
+    progress.least_left = left;
+    progress.steps_without = 0;
+  } else if (++progress.steps_without > kMaxStepsWithout) {
+    return Refuse("the walk comes no nearer to its goal");
+  }
+  if (++progress.steps > kMaxWalkSteps) {
+    return Refuse("the walk takes more than 10000 steps");
+  }
+
+  StepPlanner planner(library, terrain, stance);
+  const bool looks_at_goal =
+      terrain != nullptr && (progress.steps == 1 || (is_last_leg && left < kGoalInSightM));
+  if (looks_at_goal && !planner.GoalIsGood(course)) {
+    return Refuse("the goal lies on an edge or a slope too steep to stand");
+  }
+  // First what the library has of its own, then what can be eased into its steps.
+  for (const bool is_strict : {true, false}) {
+    planner.Begin(is_strict);
+    for (const Attempt& attempt : kAttempts) {
+      for (const Foot moving : course.Feet(progress.next_waypoint)) {
+        const WalkStep step =
+            course.Next(moving, progress.next_waypoint, attempt.part, attempt.bend_rad);
+        if (auto plan = planner.Plan(moving, step)) {
+          return {.outcome = WalkOutcome::kStep, .plan = *plan};
+        }
+      }
+      if (planner.is_spent()) break;
+    }
+  }
+  if (planner.has_seen_heights()) {
+    return Refuse("the way is too high or too low to step on");
+  }
+  if (planner.has_seen_bad_ground()) {
+    return Refuse("there is no ground for a foot, but edges and slopes");
+  }
+  return Refuse("the library has no steps that lead there");
+}
+
+}  // namespace stridewire

@@ -1,0 +1,322 @@
+#include "runtime/plan/walk_steering.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/trig.h"
+
+namespace stridewire {
+namespace {
+
+// How far a foot turns in one step, away from the other one and towards it, walking and on the spot.
+struct TurnLimits {
+  double out_rad;
+  double in_rad;
+};
+constexpr TurnLimits kWalkTurn{0.6, 0.35};
+constexpr TurnLimits kSpotTurn{0.85, 0.3};
+
+constexpr double kPassWaypointM = 0.35;
+constexpr double kTogetherM = 0.05;
+constexpr double kTogetherRad = 0.15;
+constexpr double kAtGoalM = 1e-3;
+constexpr double kAtGoalRad = 2e-3;
+
+// Further than this nobody goes aside or backward.
+constexpr double kMaxShiftM = 1.3;
+constexpr double kSideStepM = 0.28;
+constexpr double kLeastBackM = 0.12;
+constexpr double kLeastApartM = 0.12;
+
+// Somebody who faces away from the way by more than this turns before they set out.
+constexpr double kSlowTurnRad = 0.7;
+// The goal's heading is walked into in a curve, as far as that is not a loop.
+constexpr double kCurvePart = 0.2;
+constexpr double kCurveM = 0.6;
+constexpr double kMaxCurveRad = 1.9;
+constexpr double kCurveFadeRad = 0.6;
+
+// A step that would be this much longer than a comfortable one is not divided.
+constexpr double kStretch = 0.15;
+constexpr double kFirstStepS = 0.6;
+constexpr double kShortestStepM = 0.2;
+
+double Length(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
+double HeadingTo(const DVec3& v) { return Atan2(v.x, v.z); }
+double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
+
+// Parts that a length is divided into, so that none is longer than one.
+double Parts(double length, double one) {
+  return std::max(1.0, std::ceil(length / one - kStretch));
+}
+
+double TurnWithin(double turn_rad, Foot moving, const TurnLimits& limits) {
+  const double outward = Outward(moving);
+  const double out_rad = std::clamp(outward * turn_rad, -limits.in_rad, limits.out_rad);
+  return outward * out_rad;
+}
+
+}  // namespace
+
+WalkSteering::WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance)
+    : gait_(gait), walk_(walk), stance_(stance) {
+  goal_.position_m = walk.position_m;
+  goal_.heading_rad = UnwrapAngle(walk.heading_rad, stance.heading_rad);
+}
+
+DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
+  const DVec3 left = gait_.stand_feet_m[0];
+  const DVec3 right = gait_.stand_feet_m[1];
+  return {0.5 * (left.x + right.x) + 0.5 * Outward(foot) * width_m, 0.0,
+          foot == Foot::kLeft ? left.z : right.z};
+}
+
+WalkSteering::Body WalkSteering::BodyOver(Foot fixed) const {
+  const DVec3 apart =
+      RotateYaw(-stance_.heading_rad, At(fixed).position_m - At(OtherFoot(fixed)).position_m);
+  const double width_m =
+      std::clamp(Outward(fixed) * apart.x, std::min(gait_.width_m, gait_.stand_m), gait_.stand_m);
+  Body body;
+  body.heading_rad = stance_.heading_rad;
+  body.position_m =
+      At(fixed).position_m - RotateYaw(stance_.heading_rad, FootOffset(fixed, width_m));
+  return body;
+}
+
+WalkSteering::Body WalkSteering::BodyNow() const {
+  const Body left = BodyOver(Foot::kLeft);
+  const Body right = BodyOver(Foot::kRight);
+  return {0.5 * (left.position_m + right.position_m), stance_.heading_rad};
+}
+
+Footprint WalkSteering::GoalPrint(Foot foot) const {
+  return {goal_.position_m + RotateYaw(goal_.heading_rad, FootOffset(foot, gait_.stand_m)),
+          goal_.heading_rad};
+}
+
+bool WalkSteering::IsAtGoal(Foot foot, double within_m, double within_rad) const {
+  const Footprint goal = GoalPrint(foot);
+  return Length(At(foot).position_m - goal.position_m) <= within_m &&
+         std::fabs(WrapAngle(At(foot).heading_rad - goal.heading_rad)) <= within_rad;
+}
+
+bool WalkSteering::IsThere(double within_m, double within_rad) const {
+  return IsAtGoal(Foot::kLeft, within_m, within_rad) &&
+         IsAtGoal(Foot::kRight, within_m, within_rad);
+}
+
+void WalkSteering::PassWaypoints(std::size_t& next) const {
+  const Body body = BodyNow();
+  while (next < walk_.waypoints_m.size() &&
+         Length(walk_.waypoints_m[next] - body.position_m) <= kPassWaypointM) {
+    ++next;
+  }
+}
+
+double WalkSteering::LeftM(std::size_t next_waypoint) const {
+  double left_m = 0.0;
+  DVec3 from = BodyNow().position_m;
+  for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
+    left_m += Length(walk_.waypoints_m[i] - from);
+    from = walk_.waypoints_m[i];
+  }
+  return left_m + Length(goal_.position_m - from);
+}
+
+double WalkSteering::LeftRad() const {
+  return std::fabs(WrapAngle(goal_.heading_rad - stance_.heading_rad));
+}
+
+double WalkSteering::StepM() const {
+  if (!walk_.speed_m_s) return gait_.step_m;
+  const double step_s = stance_.last_step_s > 0.0 ? stance_.last_step_s : kFirstStepS;
+  return std::clamp(*walk_.speed_m_s * step_s, kShortestStepM, gait_.longest_m);
+}
+
+double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const {
+  if (next_waypoint < walk_.waypoints_m.size()) {
+    return HeadingTo(walk_.waypoints_m[next_waypoint] - body.position_m);
+  }
+  const DVec3 way = goal_.position_m - body.position_m;
+  const double straight_rad = HeadingTo(way);
+  const double left_m = Length(way);
+  if (left_m <= (1.0 + kStretch) * StepM()) return straight_rad;
+  const double bend_rad = std::fabs(WrapAngle(goal_.heading_rad - straight_rad));
+  const double curve_m = std::min(kCurvePart * left_m, kCurveM) *
+                         std::clamp((kMaxCurveRad - bend_rad) / kCurveFadeRad, 0.0, 1.0);
+  return HeadingTo(way - RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, curve_m)));
+}
+
+// Whether stepping aside or backward, or turning on the spot, takes fewer steps than walking there.
+bool WalkSteering::Shifts(const Body& body, bool is_last_leg) const {
+  if (!is_last_leg) return false;
+  const DVec3 way = goal_.position_m - body.position_m;
+  const double left_m = Length(way);
+  if (left_m > kMaxShiftM) return false;
+  if (left_m < kAtGoalM) return true;
+  const auto turning_steps = [](double turn_rad, double free_rad) {
+    return 2.0 * std::max(0.0, std::fabs(turn_rad) - free_rad) /
+           (kSpotTurn.out_rad + kSpotTurn.in_rad);
+  };
+  const double way_rad = HeadingTo(way);
+  const double walking = turning_steps(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
+                         left_m / StepM() + 1.0 +
+                         turning_steps(WrapAngle(goal_.heading_rad - way_rad), kSpotTurn.out_rad);
+  const DVec3 local = RotateYaw(-body.heading_rad, way);
+  const double ahead_m = local.z >= 0.0 ? StepM() : std::max(gait_.back_m, kLeastBackM);
+  const double shifting =
+      1.0 + std::max({std::fabs(local.z) / ahead_m, 2.0 * std::fabs(local.x) / kSideStepM,
+                      turning_steps(WrapAngle(goal_.heading_rad - body.heading_rad), 0.0)});
+  return shifting <= walking;
+}
+
+std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
+  const Foot expected = OtherFoot(stance_.last_moved);
+  feet_ = {expected, stance_.last_moved};
+  const Body left = BodyOver(Foot::kLeft);
+  const Body right = BodyOver(Foot::kRight);
+  const bool is_together =
+      Length(left.position_m - right.position_m) <= kTogetherM &&
+      std::fabs(WrapAngle(At(Foot::kLeft).heading_rad - At(Foot::kRight).heading_rad)) <=
+          kTogetherRad;
+  if (!is_together) return std::span(feet_).first(1);
+
+  // From a stand either foot may go: the one on the side that it turns or goes to.
+  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
+  Foot first = expected;
+  const Body body = BodyNow();
+  const auto towards = [&](double value, double least) {
+    if (std::fabs(value) > least) first = value > 0.0 ? Foot::kLeft : Foot::kRight;
+    return std::fabs(value) > least;
+  };
+  if (is_last_leg && IsAtGoal(Foot::kLeft, kAtGoalM, kAtGoalRad)) {
+    first = Foot::kRight;
+  } else if (is_last_leg && IsAtGoal(Foot::kRight, kAtGoalM, kAtGoalRad)) {
+    first = Foot::kLeft;
+  } else if (Shifts(body, is_last_leg)) {
+    const DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
+    if (!towards(local.x, 0.06)) towards(WrapAngle(goal_.heading_rad - body.heading_rad), 0.1);
+  } else {
+    towards(WrapAngle(Bearing(body, next_waypoint) - body.heading_rad), 0.25);
+  }
+  feet_ = {first, OtherFoot(first)};
+  return feet_;
+}
+
+WalkStep WalkSteering::Next(Foot moving, std::size_t next_waypoint, double part,
+                          double bend_rad) const {
+  const Body body = BodyOver(OtherFoot(moving));
+  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
+  if (is_last_leg && IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad)) {
+    return part == 1.0 ? LandAtGoal(moving) : LandNearer(moving, part);
+  }
+  if (Shifts(body, is_last_leg)) return Shift(body, moving, part, bend_rad);
+  return Walk(body, moving, next_waypoint, part, bend_rad);
+}
+
+WalkStep WalkSteering::LandAtGoal(Foot moving) const {
+  const DVec3 fixed_m = BodyOver(OtherFoot(moving)).position_m;
+  const bool is_there = IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad);
+  return {GoalPrint(moving), is_there ? goal_.position_m : 0.5 * (fixed_m + goal_.position_m),
+          true};
+}
+
+// Part of the way to the goal, for a foot that does not get there at once.
+WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
+  WalkStep step = LandAtGoal(moving);
+  const Footprint& from = At(moving);
+  step.print.position_m = from.position_m + part * (step.print.position_m - from.position_m);
+  step.print.heading_rad =
+      stance_.heading_rad + part * WrapAngle(goal_.heading_rad - stance_.heading_rad);
+  step.is_last = false;
+  return step;
+}
+
+WalkStep WalkSteering::Land(const Body& body, Foot moving) const {
+  const DVec3 fixed = At(OtherFoot(moving)).position_m;
+  const DVec3 local = RotateYaw(-body.heading_rad, body.position_m - fixed);
+  // Who strides walks narrow, who stands stands wide.
+  const double stride = std::clamp(std::fabs(local.z) / 0.35, 0.0, 1.0);
+  const double width_m = gait_.stand_m + (gait_.width_m - gait_.stand_m) * stride;
+  DVec3 vector = local + FootOffset(moving, width_m);
+  const double outward = Outward(moving);
+  const double least_m = std::min(kLeastApartM, width_m);
+  vector.x = outward * std::clamp(outward * vector.x, least_m, gait_.stand_m + 1.2 * kSideStepM);
+  vector.z = std::clamp(vector.z, -std::max(gait_.back_m, kLeastBackM) - 0.05, gait_.longest_m);
+  WalkStep step;
+  step.print.position_m = fixed + RotateYaw(body.heading_rad, vector);
+  step.print.heading_rad = body.heading_rad;
+  step.root_m = 0.5 * (body.position_m + BodyOver(OtherFoot(moving)).position_m);
+  return step;
+}
+
+WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
+                          double bend_rad) const {
+  const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
+  const double away_rad = WrapAngle(Bearing(body, next_waypoint) + bend_rad - body.heading_rad);
+  const double turn_rad =
+      part *
+      TurnWithin(away_rad, moving, std::fabs(away_rad) > kSlowTurnRad ? kSpotTurn : kWalkTurn);
+  const double rest_rad = std::fabs(away_rad - turn_rad);
+  const double left_m = LeftM(next_waypoint);
+  const double steps = Parts(left_m, StepM());
+  if (is_last_leg && steps <= 1.0 && part == 1.0 && bend_rad == 0.0 && rest_rad < 0.1) {
+    const double last_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
+    const double turned_rad = TurnWithin(last_rad, moving, kWalkTurn);
+    if (turned_rad == last_rad) return LandAtGoal(moving);
+    return Land({goal_.position_m, body.heading_rad + turned_rad}, moving);
+  }
+  const double step_m = part * left_m / steps * std::clamp(1.0 - rest_rad / kSlowTurnRad, 0.0, 1.0);
+  Body next;
+  next.heading_rad = body.heading_rad + turn_rad;
+  next.position_m = body.position_m + RotateYaw(next.heading_rad, DVec3(0.0, 0.0, step_m));
+  return Land(next, moving);
+}
+
+WalkStep WalkSteering::Shift(const Body& body, Foot moving, double part, double bend_rad) const {
+  DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
+  local = RotateYaw(bend_rad, local);
+  const double turn_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
+  const double outward = Outward(moving);
+  const double aside_m = outward * local.x;
+  const double turn_out_rad = outward * turn_rad;
+  const double inner_m = std::max(0.02, gait_.stand_m - kLeastApartM);
+
+  // In pairs of steps: the outer foot goes, the other follows.
+  const double side_pairs =
+      std::fabs(local.x) <= inner_m && aside_m < 0.0 ? 0.0 : Parts(std::fabs(local.x), kSideStepM);
+  const double turn_pairs = std::fabs(turn_rad) <= kSpotTurn.in_rad && turn_out_rad < 0.0
+                                ? 0.0
+                                : Parts(std::fabs(turn_rad), kSpotTurn.out_rad + kSpotTurn.in_rad);
+  const auto steps_of = [](double pairs, bool is_outer) {
+    return pairs == 0.0 ? 1.0 : 2.0 * pairs - (is_outer ? 1.0 : 0.0);
+  };
+  const double ahead_m = local.z >= 0.0 ? 0.8 * StepM() : std::max(gait_.back_m, kLeastBackM);
+  const double steps =
+      std::max({Parts(std::fabs(local.z), ahead_m), steps_of(side_pairs, aside_m >= 0.0),
+                steps_of(turn_pairs, turn_out_rad >= 0.0)});
+
+  Body next = body;
+  DVec3 move(0.0, 0.0, local.z / steps);
+  if (aside_m >= 0.0) {
+    move.x = outward * std::min(aside_m / std::max(side_pairs, 1.0), 1.15 * kSideStepM);
+  } else {
+    move.x = -outward * std::min(-aside_m, side_pairs == 0.0 ? inner_m : 0.0);
+  }
+  double turned_rad = 0.0;
+  if (turn_out_rad >= 0.0) {
+    const double pairs = std::max(turn_pairs, 1.0);
+    turned_rad = pairs == 1.0 ? std::min(turn_out_rad, kSpotTurn.out_rad)
+                              : std::min(turn_out_rad / pairs, kSpotTurn.out_rad);
+  } else {
+    turned_rad = -std::min(-turn_out_rad, kSpotTurn.in_rad);
+  }
+  if (steps == 1.0 && part == 1.0 && bend_rad == 0.0 && turned_rad == turn_out_rad) {
+    return LandAtGoal(moving);
+  }
+  next.position_m += RotateYaw(body.heading_rad, part * move);
+  next.heading_rad += part * outward * turned_rad;
+  return Land(next, moving);
+}
+
+}  // namespace stridewire

@@ -1,0 +1,129 @@
+// Single poses of a movement. Of many at once see pose_stretch.cpp.
+
+#include <algorithm>
+#include <array>
+
+#include "runtime/pose/cell_weights.h"
+#include "runtime/pose/grid_blend.h"
+#include "runtime/pose/pose_kernels.h"
+#include "stridewire/runtime/movement.h"
+
+namespace stridewire {
+
+void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                 const GridPlace& place, float* row) {
+  const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  const std::vector<float>& weights = movement.weights;
+  const auto largest =
+      static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  for (std::size_t j = 0; j < static_cast<std::size_t>(layout.joint_count); ++j) {
+    float square = 0.0f;
+    for (std::size_t i = 4 * j; i < 4 * j + 4; ++i) square += row[i] * row[i];
+    if (square >= kernels::kSmallestNorm * kernels::kSmallestNorm) continue;
+    for (std::size_t i = 4 * j; i < 4 * j + 4; ++i) {
+      float& sum = row[i];
+      sum = 0.0f;
+      for (int k = 0; k < 4; ++k) {
+        const auto examples = static_cast<std::size_t>(PointOf(group, place, k)) *
+                              static_cast<std::size_t>(group.example_count);
+        sum += place.weights[static_cast<std::size_t>(k)] *
+               group.grid[(examples + largest) * row_floats + i];
+      }
+    }
+  }
+}
+
+namespace {
+
+// Where a pose lies in its movement, and how much is left of the poses before.
+struct Place {
+  GridPlace grid;
+  float fraction;  // of the difference that is left
+  float slope_s;   // of its velocity
+  double steered;  // EaseOut of the part of the movement behind
+  bool is_eased;   // there is something left of the difference
+};
+
+using RowScratch = std::array<float, kMaxRowFloats>;
+
+// Makes rotations unit, adds what is left of the poses before and takes the pose into the world.
+void FinishPose(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                const Place& place, RowScratch& row, PoseSpan out) {
+  const bool is_inertial = place.is_eased && movement.is_inertial;
+  const kernels::RotationBlend rotations = {
+      .row = row.data(),
+      .joint_count = static_cast<std::size_t>(layout.joint_count),
+      .difference = place.is_eased ? &movement.difference.rotations[0].x : nullptr,
+      .fraction = place.fraction,
+      .velocity = is_inertial ? &movement.difference_velocity.joints_rad_s[0].x : nullptr,
+      .seconds = place.slope_s};
+  if (!kernels::BlendRotations(rotations, &out.rotations[0].x)) {
+    TakeLargest(group, layout, movement, place.grid, row.data());
+    (void)kernels::BlendRotations(rotations, &out.rotations[0].x);
+  }
+  const GridLayout::Root root = layout.RootOf(row.data());
+  const BaseFrame& base = movement.base;
+  const double yaw_rad = root.yaw_rad + movement.extra_turn_rad * (1.0 - place.steered);
+  const std::array<double, 2> angles_rad = {base.heading_rad, 0.5 * (base.heading_rad + yaw_rad)};
+  std::array<double, 2> sines;
+  std::array<double, 2> cosines;
+  kernels::SinCos(angles_rad.data(), 2, sines.data(), cosines.data());
+  const DVec3& local = root.position_m;
+  out.root_position_m =
+      Vec3(base.position_m + DVec3(cosines[0] * local.x + sines[0] * local.z, local.y,
+                                   cosines[0] * local.z - sines[0] * local.x));
+  out.rotations[0] =
+      Quat(static_cast<float>(cosines[1]), 0.0f, static_cast<float>(sines[1]), 0.0f) *
+      out.rotations[0];
+  if (!place.is_eased) return;
+  out.root_position_m += place.fraction * movement.difference.root_position_m;
+  if (movement.is_inertial) {
+    out.root_position_m += place.slope_s * movement.difference_velocity.root_m_s;
+  }
+}
+
+Place PlaceAt(const MotionGroup& group, const Movement& movement, double time_s) {
+  const CellWeights cell =
+      CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
+  const double eased = (time_s - movement.start_offset_s) / movement.ease_out_s;
+  return {.grid = {cell.first, cell.weights},
+          .fraction = static_cast<float>(EaseOut(eased)),
+          .slope_s = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased)),
+          .steered = EaseOut(time_s / movement.warp.duration_s()),
+          .is_eased = eased < 1.0};
+}
+
+void EvaluateAt(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                const Place& place, GridCache& cache, PoseSpan out) {
+  RowScratch row;
+  BlendRow(group, layout, movement, place.grid, cache, row.data());
+  FinishPose(group, layout, movement, place, row, out);
+}
+
+}  // namespace
+
+void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                       int point, GridCache& cache, PoseSpan out) {
+  const Place place = {.grid = {point, {1.0f, 0.0f, 0.0f, 0.0f}},
+                       .fraction = 0.0f,
+                       .slope_s = 0.0f,
+                       .steered = 1.0,
+                       .is_eased = false};
+  RowScratch row;
+  std::ranges::copy(cache.Row(group, movement.weights, point), row.begin());
+  FinishPose(group, layout, movement, place, row, out);
+}
+
+void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                   double time_s, GridCache& cache, PoseSpan out) {
+  Place place = PlaceAt(group, movement, time_s);
+  place.is_eased = false;
+  EvaluateAt(group, layout, movement, place, cache, out);
+}
+
+void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                      double time_s, GridCache& cache, PoseSpan out) {
+  EvaluateAt(group, layout, movement, PlaceAt(group, movement, time_s), cache, out);
+}
+
+}  // namespace stridewire

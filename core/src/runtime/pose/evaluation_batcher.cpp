@@ -1,0 +1,73 @@
+#include "runtime/pose/evaluation_batcher.h"
+
+#include "base/check.h"
+
+namespace stridewire {
+
+namespace {
+
+// A key is sorted by in two halves.
+constexpr int kHalfBits = 11;
+constexpr std::uint32_t kHalfMask = (1u << kHalfBits) - 1;
+constexpr std::uint32_t kParts = 64;  // of a movement
+
+}  // namespace
+
+int SampleRunCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
+                 int most) {
+  const double apart_s = step_s * ticks_apart;
+  const double left = (movement.duration_s() - time_s) / apart_s;
+  if (!(left < most)) return most;
+  return std::max(1, static_cast<int>(left) + 1);
+}
+
+void EvaluationBatcher::Add(const SampleRun& stretch, int count, std::uint32_t tag) {
+  STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
+  const Movement& movement = *stretch.movement;
+  const double part = std::clamp(stretch.time_s / movement.duration_s(), 0.0, 1.0);
+  // Those not planted first, the longest first.
+  auto key = movement.feet.is_active ? 1u : 0u;
+  key = key << 5 | static_cast<std::uint32_t>(kMaxCount - count);
+  key = key << 8 | (static_cast<std::uint32_t>(movement.group) & 0xffu);
+  key = key << 6 | static_cast<std::uint32_t>(part * (kParts - 1));
+  items_.push_back({stretch, key, tag, count});
+}
+
+void EvaluationBatcher::Sort() {
+  places_.resize(items_.size());
+  sorted_.resize(items_.size());
+  order_.resize(items_.size());
+  for (std::uint32_t i = 0; i < items_.size(); ++i) places_[i] = {items_[i].key, i};
+  const auto pass = [](std::span<const Place> from, std::span<Place> to, int shift) {
+    std::array<std::uint32_t, kHalfMask + 2> begins{};
+    for (const Place& place : from) ++begins[(place.key >> shift & kHalfMask) + 1];
+    for (std::size_t i = 1; i < begins.size(); ++i) begins[i] += begins[i - 1];
+    for (const Place& place : from) to[begins[place.key >> shift & kHalfMask]++] = place;
+  };
+  pass(places_, sorted_, 0);
+  pass(sorted_, places_, kHalfBits);
+  for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = items_[places_[i].item];
+}
+
+std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
+  std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
+  const bool is_planted = order_[begin].stretch.movement->feet.is_active;
+  // Planted ones come last, so that the first that is otherwise is the end.
+  while (order_[end - 1].stretch.movement->feet.is_active != is_planted) --end;
+  return std::span(order_).subspan(begin, end - begin);
+}
+
+// A part of the blocks to come in the time of each pose: first where what they read lies, then that.
+void EvaluationBatcher::PrefetchBehind(std::size_t end, int pose, int count) const {
+  const std::size_t lanes = SoaPose::kLanes;
+  const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);
+  const auto last = static_cast<std::size_t>(pose + 1) * lanes / static_cast<std::size_t>(count);
+  for (std::size_t i = first; i < last; ++i) {
+    if (end + lanes + i < order_.size()) {
+      SoaPoseEvaluator::PrefetchPlaces(*order_[end + lanes + i].stretch.movement);
+    }
+    if (end + i < order_.size()) SoaPoseEvaluator::Prefetch(order_[end + i].stretch);
+  }
+}
+
+}  // namespace stridewire

@@ -1,0 +1,501 @@
+// The planting of several avatars' feet at once. The same as PlantFeetByReference of foot_plan.cpp, which says why what
+// is done is done; a test locks the two together. Positions are relative to each movement's base, so that floats do.
+#if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef STRIDEWIRE_FOOT_PLANT_INL_H
+#undef STRIDEWIRE_FOOT_PLANT_INL_H
+#else
+#define STRIDEWIRE_FOOT_PLANT_INL_H
+#endif
+
+#include "runtime/skeleton/foot_plant_constants.h"
+#include "runtime/pose/simd_math-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace stridewire::kernels::HWY_NAMESPACE {
+namespace {
+
+HWY_INLINE Float EaseOut(Float s) {
+  const Float r = Float(1.0f) - Clamp(s, Float(0.0f), Float(1.0f));
+  return r * r * (Float(3.0f) - Float(2.0f) * r);
+}
+HWY_INLINE Float EaseOutSlope(Float s) {
+  const Float in = Clamp(s, Float(0.0f), Float(1.0f));
+  const Float r = Float(1.0f) - in;
+  return in * r * r;
+}
+// By a length that is known, without dividing.
+HWY_INLINE Float Over(Float x, double length) {
+  return x * Float(static_cast<float>(1.0 / length));
+}
+HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
+  const Float d = a - b;
+  return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
+}
+
+// A FootTrajectory and its FootResidual, as PackFootPlan lays them out.
+struct Track {
+  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
+  SoaVec3 normals[2];
+  SoaVec3 rest_offset, rest_velocity, root_shift;
+  Float from_heading, to_heading, release_turn, root_weight, lift, rest_turn, rest_turn_s;
+  Float rest_over_s, release_s, land_s;
+};
+
+HWY_INLINE Track LoadTrack(const float* plan) {
+  Track t;
+  const auto next = [&]() HWY_ATTR {
+    const SoaQuat four = LoadQuat(plan);
+    plan += 4 * kBlock;
+    return four;
+  };
+  SoaQuat q = next();
+  t.from = XyzOf(q), t.from_heading = q.w;
+  q = next();
+  t.to = XyzOf(q), t.to_heading = q.w;
+  q = next();
+  t.release_offset = XyzOf(q), t.release_turn = q.w;
+  q = next();
+  t.release_velocity = XyzOf(q), t.root_weight = q.w;
+  q = next();
+  t.land_offset = XyzOf(q), t.lift = q.w;
+  q = next();
+  t.land_velocity = XyzOf(q), t.rest_turn = q.w;
+  q = next();
+  t.aside = XyzOf(q), t.rest_turn_s = q.w;
+  q = next();
+  t.height = XyzOf(q), t.rest_over_s = q.w;
+  q = next();
+  t.turn = XyzOf(q), t.release_s = q.w;
+  q = next();
+  t.normals[0] = XyzOf(q), t.land_s = q.w;
+  t.normals[1] = XyzOf(next());
+  t.rest_offset = XyzOf(next());
+  t.rest_velocity = XyzOf(next());
+  t.root_shift = XyzOf(next());
+  return t;
+}
+
+// What all of a movement's plan shares.
+struct Common {
+  SoaVec3 root_rest, root_rest_velocity;
+  Float steer, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
+  Float time_s;
+  Float per_duration, per_ease_out;  // 1 / s
+};
+
+// A leg by forward kinematics, relative to the root and in world axes.
+struct LegLanes {
+  SoaVec3 positions[kMaxLegChain];
+  SoaQuat rotations[kMaxLegChain];
+  SoaVec3 ball;
+};
+
+HWY_INLINE SoaVec3 Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
+
+// Whatever is done to a leg waits for what was done before, so both legs take each step together: a processor works on
+// one while the other waits.
+template <typename Step>
+HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
+  step(rig.bones[0], std::size_t{0});
+  step(rig.bones[1], std::size_t{1});
+}
+
+// `joints`: those that `rotations` has.
+HWY_INLINE void EvaluateLegs(
+    const LegRig& rig, const float* rotations, SoaQuat root, LegLanes* legs,
+    const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
+  std::size_t longest = 0;
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    legs[f].positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
+    legs[f].rotations[0] = root;
+    longest = longest > bones.count ? longest : bones.count;
+  });
+  for (std::size_t i = 1; i < longest; ++i) {
+    ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+      if (i >= bones.count) return;
+      LegLanes& leg = legs[f];
+      leg.positions[i] =
+          leg.positions[i - 1] + Rotate(leg.rotations[i - 1], Same(bones.offsets_m[i]));
+      leg.rotations[i] =
+          Multiply(leg.rotations[i - 1], LoadQuat(rotations + (bones.*joints)[i] * 4 * kBlock));
+    });
+  }
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const std::size_t last = bones.count - 1;
+    legs[f].ball = legs[f].positions[last] + Rotate(legs[f].rotations[last], Same(bones.ball_m));
+  });
+}
+
+void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+              float* ankles_m) {
+  for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
+    LegLanes legs[2];
+    EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs, &LegRig::Bones::among);
+    ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+      const auto put = [&](SoaVec3 v, float* to) HWY_ATTR {
+        StoreLanes(v.x, to);
+        StoreLanes(v.y, to + kBlock);
+        StoreLanes(v.z, to + 2 * kBlock);
+      };
+      put(legs[f].ball, balls_m + f * 3 * kBlock + lane);
+      put(legs[f].positions[bones.ankle], ankles_m + f * 3 * kBlock + lane);
+    });
+  }
+}
+
+struct Correction {
+  SoaVec3 offset;
+  Float swing;
+  SoaQuat turn;  // of the foot
+  SoaVec3 root;  // what the root goes along with it
+};
+
+HWY_INLINE Float Steered(const Common& common, Float at_s) {
+  return common.steer * (Float(1.0f) - EaseOut(at_s * common.per_duration));
+}
+
+HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaVec3 ball,
+                                  Float heading, Float flatness) {
+  const Float one = 1.0f;
+  const Float zero = 0.0f;
+  const Float t = common.time_s;
+  const Mask has_landed = t >= track.land_s;
+  const Mask is_planted = (t <= track.release_s) || has_landed;
+  const Float length = Select(is_planted, one, track.land_s - track.release_s);
+  const Float s = Select(has_landed, one, Select(is_planted, zero, (t - track.release_s) / length));
+  const Float r = one - s;
+
+  Correction c;
+  c.swing = s;
+  const SoaVec3 print = Select(has_landed, track.to, track.from);
+  const Float print_heading = Select(has_landed, track.to_heading, track.from_heading);
+  const Float across = Float(4.0f) * s * r;
+  const SoaVec3 flying = track.release_offset * ((one + s + s) * r * r) +
+                       track.land_offset * (s * s * (one + r + r)) +
+                       (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
+                       track.aside * (across * across);
+  c.offset = Select(is_planted, print - ball, flying);
+  const Float since_s = t - common.start_offset_s;
+  const Float settled = one - EaseOut(since_s * common.per_ease_out);
+  const Float rise = track.height.z - track.height.y;
+  const Float rise_from = Select(rise > zero, zero, Float(static_cast<float>(kSinkFrom)));
+  const Float risen = one - EaseOut(Over(s - rise_from, 1.0 - kSinkFrom));
+  const Float ends = static_cast<float>(kLiftEnds);
+  const Float lifted =
+      (one - EaseOut(Over(s, kLiftEnds))) * EaseOut(Over(s - (one - ends), kLiftEnds));
+  c.offset.y = track.height.x + settled * (track.height.y - track.height.x) + rise * risen +
+               track.lift * lifted;
+
+  const Float turned = one - EaseOut(s);
+  Float free = track.turn.x + settled * (track.turn.y - track.turn.x) +
+               turned * (track.turn.z - track.turn.y);
+  free =
+      free + (Steered(common, Min(track.land_s, common.duration_s)) * turned - Steered(common, t));
+  const Float rested = since_s / track.rest_over_s;
+  const Float value = EaseOut(rested);
+  const Float slope = track.rest_over_s * EaseOutSlope(rested);
+  c.offset = c.offset + track.rest_offset * value + track.rest_velocity * slope;
+  free = free + value * track.rest_turn + slope * track.rest_turn_s;
+  const Float held = WrapAngle(print_heading - heading - free);
+  const Float hold =
+      one - EaseOut(Over(flatness - Float(static_cast<float>(kHeelUp)), kSoleDown - kHeelUp));
+  const Float turn =
+      Select(is_planted, free + hold * held, free + (one - turned) * track.release_turn);
+
+  const SoaVec3 tilt = track.normals[0] * (one - turned) + track.normals[1] * turned;
+  const SoaVec3 normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
+  c.turn = Multiply(Normalise({normal.z, zero, -normal.x, one + normal.y}),
+                    YawRotation(WrapAngle(turn)));
+  c.root =
+      c.offset * track.root_weight + track.root_shift * (one - EaseOut(t * common.per_duration));
+  return c;
+}
+
+// How deep a sole is below the ground a print lies on, taken for a plane; less the further it is away.
+HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
+                            const LegLanes& leg, SoaVec3 ball, SoaQuat turn) {
+  const Float dx = ball.x - print.x;
+  const Float dz = ball.z - print.z;
+  const Float away = Sqrt(dx * dx + dz * dz);
+  const Float near =
+      EaseOut(Over(away - Float(static_cast<float>(kNearPrintM)), kFarFromPrintM - kNearPrintM));
+  const Float per_rise = Float(1.0f) / normal.y;
+  const auto depth_of = [&](SoaVec3 point, float rest_m) HWY_ATTR {
+    const SoaVec3 at = ball + Rotate(turn, point - leg.ball);
+    const Float ground =
+        print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) * per_rise;
+    return ground + Float(rest_m) * per_rise - at.y;
+  };
+  const std::size_t last = bones.count - 1;
+  const SoaVec3 toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
+  const SoaVec3 heel =
+      leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Same(bones.heel_m));
+  const Float depth =
+      Max(Max(depth_of(leg.ball, bones.ball_height_m), depth_of(heel, bones.ball_height_m)),
+          depth_of(toe_tip, bones.toe_height_m));
+  return near * SmoothMax(Float(0.0f), depth, static_cast<float>(kSoftGroundM));
+}
+
+HWY_INLINE SoaQuat ShortestArc(SoaVec3 from, SoaVec3 to) {
+  const Float scale = Sqrt(Dot(from, from) * Dot(to, to));
+  const SoaVec3 axis = Cross(from, to);
+  return Normalise({axis.x, axis.y, axis.z, scale + Dot(from, to)});
+}
+
+HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) {
+  const Float scale = Sqrt(Dot(thigh, thigh) * Dot(shank, shank));
+  const SoaVec3 plane = Cross(thigh, shank) * (Float(1.0f) / scale);
+  const Float sine = Sqrt(Dot(plane, plane));
+  const Float s =
+      Clamp(Over(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
+  const SoaVec3 reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
+  const Mask is_backward = Dot(plane, reference) < Float(0.0f);
+  const Float forward = Select(is_backward, Float(0.0f), Float(1.0f));
+  const Float weight = Select(is_backward, Float(1.0f), s * s * (Float(3.0f) - Float(2.0f) * s));
+  return plane * forward + reference * (Float(kReferenceWeight) * weight);
+}
+
+// What is unit but for rounding made so: a step of Newton's is as good as a root and a division.
+HWY_INLINE SoaQuat NearlyUnit(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
+
+// Where an ankle is to be, from the root, and how it is turned there.
+struct AnkleGoal {
+  SoaVec3 at_m;
+  SoaQuat rotation;
+};
+
+// Bends both legs so that their ankles are where they are to be, and stores what of the rotations changes.
+HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGoal* goals,
+                          float* rotations) {
+  struct Work {
+    SoaVec3 thigh, shank, towards, new_thigh, new_shank;
+    Float distance;
+    SoaQuat turn_thigh, turn_shank;
+  } work[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
+    Work& w = work[f];
+    w.thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
+    w.shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
+    const SoaVec3 reach = goals[f].at_m - leg.positions[bones.hip];
+    w.distance = Sqrt(Dot(reach, reach));
+    const Mask is_away = w.distance > Float(1e-6f);
+    const Float per_distance = Float(1.0f) / Max(w.distance, Float(1e-6f));
+    w.towards = Select(is_away, reach * per_distance, {Float(0.0f), Float(-1.0f), Float(0.0f)});
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    Work& w = work[f];
+    const float l1 = bones.thigh_m;
+    const float l2 = bones.shank_m;
+    const float shortest = (l1 > l2 ? l1 - l2 : l2 - l1) + 1e-3f * (l1 + l2);
+    const Float d = Clamp(w.distance, Float(shortest), Float(kMaxLegExtension * (l1 + l2)));
+    const Float a = (Float(l1 * l1 - l2 * l2) + d * d) / (d + d);
+    const Float h = Sqrt(Max(Float(0.0f), Float(l1 * l1) - a * a));
+    SoaVec3 pole = Cross(w.towards, KneeAxis(w.thigh, w.shank, legs[f].rotations[bones.hip]));
+    const Float pole_length = Sqrt(Dot(pole, pole));
+    const Mask has_pole = pole_length > Float(1e-6f);
+    pole = Select(has_pole, pole * (Float(1.0f) / Max(pole_length, Float(1e-6f))),
+                  {Float(0.0f), Float(0.0f), Float(1.0f)});
+    w.new_thigh = w.towards * a + pole * h;
+    w.new_shank = w.towards * d - w.new_thigh;
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
+    work[f].turn_thigh = ShortestArc(work[f].thigh, work[f].new_thigh);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones&, std::size_t f) HWY_ATTR {
+    Work& w = work[f];
+    w.turn_shank = Multiply(ShortestArc(Rotate(w.turn_thigh, w.shank), w.new_shank), w.turn_thigh);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
+    const Work& w = work[f];
+    const auto store = [&](std::size_t place, SoaQuat before, SoaQuat rotation) HWY_ATTR {
+      StoreQuat(NearlyUnit(Multiply(Conjugate(before), rotation)),
+                rotations + bones.joints[place] * 4 * kBlock);
+    };
+    store(bones.hip, leg.rotations[bones.hip - 1],
+          Multiply(w.turn_thigh, leg.rotations[bones.hip]));
+    store(bones.knee, Multiply(w.turn_thigh, leg.rotations[bones.knee - 1]),
+          Multiply(w.turn_shank, leg.rotations[bones.knee]));
+    store(bones.ankle, Multiply(w.turn_shank, leg.rotations[bones.ankle - 1]), goals[f].rotation);
+  });
+}
+
+// As many as a vector has lanes, from `lane` on.
+void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
+  const DoubleTag d;
+  const hn::Rebind<float, DoubleTag> floats;
+  const std::size_t doubles = hn::Lanes(d);
+  const std::size_t width = hn::Lanes(FloatTag());
+  const float* plan = block.plan + lane;
+  float* rotations = block.rotations + lane;
+  Common common;
+  {
+    const float* at = plan + 2 * kPackedTrajectoryFloats * kBlock;
+    SoaQuat q = LoadQuat(at);
+    common.root_rest = XyzOf(q), common.steer = q.w;
+    q = LoadQuat(at + 4 * kBlock);
+    common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
+    q = LoadQuat(at + 8 * kBlock);
+    common.start_offset_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
+    common.plant_fade_s = q.w;
+    common.per_duration = Float(1.0f) / common.duration_s;
+    common.per_ease_out = Float(1.0f) / common.ease_out_s;
+  }
+  HWY_ALIGN float local_m[3 * kBlock];
+  HWY_ALIGN float times_s[kBlock];
+  for (std::size_t i = 0; i < width; i += doubles) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto world = hn::PromoteTo(d, hn::LoadU(floats, block.root_m + c * kBlock + lane + i));
+      const auto base = hn::LoadU(d, block.base_m + c * kBlock + lane + i);
+      hn::StoreU(hn::DemoteTo(floats, hn::Sub(world, base)), floats, local_m + c * kBlock + i);
+    }
+    hn::StoreU(hn::DemoteTo(floats, hn::LoadU(d, block.time_s + lane + i)), floats, times_s + i);
+  }
+  const SoaVec3 root = LoadVec3(local_m);
+  common.time_s = LoadLanes(times_s);
+
+  const SoaQuat root_rotation = LoadQuat(rotations);
+  LegLanes legs[2];
+  Correction corrections[2];
+  SoaVec3 ankles[2];
+  SoaVec3 shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
+  Float headings[2];
+  Float flatnesses[2];
+  EvaluateLegs(rig, rotations, root_rotation, legs);
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const SoaVec3 sole = legs[f].ball - legs[f].positions[bones.ankle];
+    headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
+    flatnesses[f] = bones.foot_m < kSmallestBoneM
+                        ? Float(0.0f)
+                        : Over(Sqrt(sole.x * sole.x + sole.z * sole.z), bones.foot_m);
+  });
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    const LegLanes& leg = legs[f];
+    const Track track = LoadTrack(plan + f * kPackedTrajectoryFloats * kBlock);
+    const SoaVec3 ball = root + leg.ball;
+    Correction& c = corrections[f];
+    c = CorrectFoot(common, track, ball, headings[f], flatnesses[f]);
+    const Mask keeps_above = common.keeps_above_ground > Float(0.0f);
+    if (Any(keeps_above)) {
+      const Float second =
+          Float(1.0f) -
+          EaseOut(Over(c.swing - Float(static_cast<float>(kGroundFrom)), kGroundOver));
+      const SoaVec3 at = ball + c.offset;
+      const Float lift = (Float(1.0f) - second) *
+                             DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
+                         second * DepthBelow(track.to, track.normals[1], bones, leg, at, c.turn);
+      // The root goes with what it goes with on level ground too, and with this.
+      const Mask is_settling = common.plant_fade_s > Float(0.0f);
+      const Float settled =
+          Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
+                                Select(is_settling, common.plant_fade_s, Float(1.0f)));
+      const Float lifted =
+          Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
+      c.offset.y = c.offset.y + lifted;
+      c.root.y = c.root.y + lifted * track.root_weight;
+    }
+    ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
+    shift = shift + c.root;
+  });
+  const Float since_s = common.time_s - common.start_offset_s;
+  const Float flat = EaseOut(Over(since_s, kRootShiftS));
+  const Float rise =
+      EaseOut(since_s / Max(Float(static_cast<float>(kRootShiftS)),
+                            Float(static_cast<float>(kRootRisePart)) * common.duration_s));
+  const Float speed = common.ease_out_s * EaseOutSlope(since_s * common.per_ease_out);
+  shift = shift +
+          SoaVec3{flat * common.root_rest.x, rise * common.root_rest.y, flat * common.root_rest.z} +
+          common.root_rest_velocity * speed;
+
+  Float lower = 0.0f;
+  for (std::size_t f = 0; f < 2; ++f) {
+    const LegRig::Bones& bones = rig.bones[f];
+    const SoaVec3 hip = legs[f].positions[bones.hip];
+    const SoaVec3 blended = legs[f].positions[bones.ankle] - hip;
+    const float length = bones.thigh_m + bones.shank_m;
+    const Float allowed = Min(
+        SmoothMax(Sqrt(Dot(blended, blended)), Float(static_cast<float>(kEasyExtension) * length),
+                  static_cast<float>(kSoftM)),
+        Float(static_cast<float>(kLongestExtension) * length));
+    const SoaVec3 reach = ankles[f] - (root + shift + hip);
+    const Float drop_squared = allowed * allowed - (reach.x * reach.x + reach.z * reach.z);
+    const float deepest = 0.5f * length;
+    const Float drop = Sqrt(Max(drop_squared, Float(deepest * deepest)));
+    lower = SmoothMax(lower, -reach.y - drop, static_cast<float>(kSoftLowerM));
+  }
+  shift.y = shift.y - lower;
+
+  // The root is shown in floats of the world: the legs reach from where that is.
+  HWY_ALIGN float shifts_m[3 * kBlock];
+  StoreLanes(shift.x, shifts_m);
+  StoreLanes(shift.y, shifts_m + kBlock);
+  StoreLanes(shift.z, shifts_m + 2 * kBlock);
+  for (std::size_t i = 0; i < width; i += doubles) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      float* root_m = block.root_m + c * kBlock + lane + i;
+      const auto by = hn::PromoteTo(d, hn::LoadU(floats, shifts_m + c * kBlock + i));
+      const auto shown =
+          hn::DemoteTo(floats, hn::Add(hn::PromoteTo(d, hn::LoadU(floats, root_m)), by));
+      hn::StoreU(shown, floats, root_m);
+      const auto base = hn::LoadU(d, block.base_m + c * kBlock + lane + i);
+      hn::StoreU(hn::DemoteTo(floats, hn::Sub(hn::PromoteTo(d, shown), base)), floats,
+                 local_m + c * kBlock + i);
+    }
+  }
+  const SoaVec3 moved = LoadVec3(local_m);
+  AnkleGoal goals[2];
+  ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
+    goals[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
+  });
+  SolveLegs(rig, legs, goals, rotations);
+}
+
+void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
+  for (std::size_t lane = 0; lane < count; lane += hn::Lanes(FloatTag())) {
+    PlantSome(rig, block, lane);
+  }
+}
+
+// The same number in the lanes of one vector.
+HWY_INLINE void Spread(const float* from, std::size_t count, float* to) {
+  const FloatTag d;
+  for (std::size_t i = 0; i < count; ++i) hn::Store(hn::Set(d, from[i]), d, to + i * kBlock);
+}
+
+// One pose in all lanes of a vector, of which the first is kept.
+void PlantOne(const LegRig& rig, const PlantJob& job) {
+  HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
+  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // of which those of the legs are used
+  HWY_ALIGN double time_s[kBlock];
+  HWY_ALIGN double base_m[3 * kBlock];
+  HWY_ALIGN float root_m[3 * kBlock];
+  Spread(job.plan, kPackedPlanFloats, plan);
+  Spread(job.root_m, 3, root_m);
+  for (const LegRig::Bones& bones : rig.bones) {
+    for (std::size_t i = 0; i < bones.count; ++i) {
+      const std::size_t joint = bones.joints[i];
+      Spread(job.rotations + 4 * joint, 4, rotations + joint * 4 * kBlock);
+    }
+  }
+  for (std::size_t i = 0; i < hn::Lanes(FloatTag()); ++i) {
+    time_s[i] = job.time_s;
+    for (std::size_t c = 0; c < 3; ++c) base_m[c * kBlock + i] = job.base_m[c];
+  }
+  PlantSome(rig, {plan, time_s, base_m, root_m, rotations}, 0);
+  for (std::size_t c = 0; c < 3; ++c) job.root_m[c] = root_m[c * kBlock];
+  for (const LegRig::Bones& bones : rig.bones) {
+    for (const std::size_t place : {bones.hip, bones.knee, bones.ankle}) {
+      const std::size_t joint = bones.joints[place];
+      for (std::size_t c = 0; c < 4; ++c) {
+        job.rotations[4 * joint + c] = rotations[(joint * 4 + c) * kBlock];
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stridewire::kernels::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif  // STRIDEWIRE_FOOT_PLANT_INL_H

@@ -1,0 +1,352 @@
+#include "stridewire/runtime/soa_pose_evaluator.h"
+
+#include <algorithm>
+#include <array>
+
+#include "runtime/pose/grid_blend.h"
+#include "runtime/pose/pose_kernels.h"
+#include "base/check.h"
+#include "stridewire/base/prefetch.h"
+
+namespace stridewire {
+
+using kernels::kBlock;
+static_assert(SoaPose::kLanes == kBlock);
+
+void SoaPose::Get(std::size_t lane, PoseSpan pose) const {
+  pose.root_position_m = root_m(lane);
+  for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+    const Numbers* q = &numbers_[3 + 4 * j];
+    pose.rotations[j] = Quat(q[3].of[lane], q[0].of[lane], q[1].of[lane], q[2].of[lane]);
+  }
+}
+
+void SoaPose::Set(std::size_t lane, ConstPoseSpan pose) {
+  for (int c = 0; c < 3; ++c) {
+    numbers_[static_cast<std::size_t>(c)].of[lane] = pose.root_position_m[c];
+  }
+  for (std::size_t j = 0; j < pose.rotations.size(); ++j) {
+    const Quat& q = pose.rotations[j];
+    Numbers* to = &numbers_[3 + 4 * j];
+    to[0].of[lane] = q.x;
+    to[1].of[lane] = q.y;
+    to[2].of[lane] = q.z;
+    to[3].of[lane] = q.w;
+  }
+}
+
+struct SoaPoseEvaluator::Work {
+  struct alignas(64) LaneFloats {
+    float of[kBlock] = {};
+  };
+  struct LaneDoubles {
+    alignas(64) double of[kBlock] = {};
+  };
+  // So many movements are blended together that what is summed of them stays in the nearest cache.
+  static constexpr std::size_t kRun = 8;
+  static float* FloatsOf(std::vector<LaneFloats>& lanes) { return lanes.front().of; }
+
+  Work(const MotionLibrary& of_library, int of_max_count)
+      : library(of_library),
+        joints(static_cast<std::size_t>(of_library.skeleton().joint_count())),
+        row_floats(static_cast<std::size_t>(of_library.layout().row_floats)),
+        max_count(of_max_count),
+        places(static_cast<std::size_t>(of_max_count)),
+        times(static_cast<std::size_t>(of_max_count)),
+        ring(kRun * 4 * row_floats / kBlock),
+        rows(static_cast<std::size_t>(of_max_count) * row_floats),
+        plan(kPackedPlanFloats),
+        transposed(4 * joints),
+        ease(kernels::kEaseFloats * joints),
+        velocity(3 * joints),
+        none(4 * joints, 0.0f),
+        poses(of_library.skeleton().joint_count()),
+        one(of_library.skeleton().joint_count()) {}
+
+  void FindPlaces();
+  void BlendRows();
+  void TakePlans();
+  void TakeEasing();
+  void Finish(std::size_t pose);
+  void ApplyPlantFade(std::size_t pose);
+  [[nodiscard]] float* RowOf(std::size_t pose, std::size_t lane) {
+    return FloatsOf(rows) + (pose * kBlock + lane) * row_floats;
+  }
+  [[nodiscard]] GridPlace PlaceOf(std::size_t pose, std::size_t lane) const {
+    const kernels::GridPlaces& of = places[pose];
+    return {of.first_point[lane],
+            {of.weights[0][lane], of.weights[1][lane], of.weights[2][lane], of.weights[3][lane]}};
+  }
+  [[nodiscard]] const Movement& movement(std::size_t lane) const {
+    return *stretches[lane].movement;
+  }
+  [[nodiscard]] const MotionGroup& group(std::size_t lane) const {
+    return library.group(movement(lane).group);
+  }
+
+  const MotionLibrary& library;
+  std::size_t joints;
+  std::size_t row_floats;
+  int max_count;
+
+  // Of the block under way:
+  std::array<SampleRun, kBlock> stretches;
+  std::size_t lanes = 0;
+  std::size_t count = 0;
+  std::size_t next = 0;
+  bool is_planted = false;
+  bool is_eased = false;     // some lane, at some time
+  bool is_inertial = false;  // the same
+  bool settles = false;
+
+  std::vector<kernels::GridPlaces> places;  // [pose]
+  std::vector<LaneDoubles> times;           // [pose]
+  std::vector<LaneFloats> ring;             // [kRun][4][row_floats]
+  std::vector<LaneFloats> rows;             // [pose][lane][row_floats]
+  kernels::GridTimes grid_times = {};       // lanes of nobody are worked out, too
+  std::array<LaneDoubles, 3> base_m;
+  LaneDoubles heading_rad, sine, cosine, extra_turn_rad;
+  std::vector<LaneFloats> plan;        // [number]
+  std::vector<LaneFloats> transposed;  // [joint][x y z w]: of differences
+  std::vector<LaneFloats> ease;        // [joint][number]
+  std::vector<LaneFloats> velocity;    // [joint][x y z]
+  std::array<LaneFloats, 3> root_ease_m, root_ease_m_s;
+  LaneFloats fastest;
+  LaneFloats is_inertial_lane;
+  std::vector<float> none;  // of who has no difference
+  SoaPose poses;
+  Pose one;  // scratch
+};
+
+// Where each pose lies in its grid.
+void SoaPoseEvaluator::Work::FindPlaces() {
+  kernels::GridTimes& t = grid_times;
+  const auto take_piece = [&](std::size_t i) {
+    SetPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
+  };
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const Movement& of = movement(i);
+    t.time_s[i] = stretches[i].time_s;
+    take_piece(i);
+    t.last_cell[i] = group(i).grid_point_count - 2;
+    t.duration_s[i] = of.warp.duration_s();
+    t.start_offset_s[i] = of.start_offset_s;
+    t.ease_out_s[i] = of.ease_out_s;
+  }
+  for (std::size_t pose = 0; pose < count; ++pose) {
+    if (pose > 0) {
+      for (std::size_t i = 0; i < lanes; ++i) {
+        for (int tick = 0; tick < stretches[i].ticks_apart; ++tick) {
+          t.time_s[i] += stretches[i].step_s;
+        }
+        if (t.time_s[i] >= t.end_s[i]) take_piece(i);
+      }
+    }
+    std::ranges::copy(t.time_s, times[pose].of);
+    kernels::FindInGrids(lanes, t, places[pose]);
+  }
+}
+
+void SoaPoseEvaluator::Work::BlendRows() {
+  std::array<const float*, kBlock> weights;
+  for (std::size_t i = 0; i < lanes; ++i) weights[i] = movement(i).weights.data();
+  for (std::size_t i = 0; i < lanes;) {
+    std::size_t end = i + 1;
+    while (end < lanes && end - i < kRun && movement(end).group == movement(i).group) ++end;
+    kernels::BlendRun({.grid = group(i).grid.data(),
+                       .examples = static_cast<std::size_t>(group(i).example_count),
+                       .row_floats = row_floats,
+                       .point_count = group(i).grid_point_count,
+                       .lane = i,
+                       .lanes = end - i,
+                       .poses = count,
+                       .places = places.data(),
+                       .weights = weights.data(),
+                       .ring = FloatsOf(ring),
+                       .rows = FloatsOf(rows)});
+    i = end;
+  }
+}
+
+void SoaPoseEvaluator::Work::TakePlans() {
+  settles = false;
+  std::array<const float*, kBlock> plans;
+  for (std::size_t i = 0; i < kBlock; ++i) {
+    const FootPlan& feet = movement(i < lanes ? i : 0).feet;
+    plans[i] = feet.packed.data();
+    settles |= feet.plant_fade_s > 0.0;
+  }
+  kernels::Transpose(plans.data(), kPackedPlanFloats, lanes, FloatsOf(plan));
+}
+
+// What is left of the poses before.
+void SoaPoseEvaluator::Work::TakeEasing() {
+  is_eased = is_inertial = false;
+  std::array<const float*, kBlock> differences;
+  std::array<const float*, kBlock> velocities;
+  differences.fill(none.data());
+  velocities.fill(none.data());
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const Movement& of = movement(i);
+    is_inertial_lane.of[i] = 0.0f;
+    if (places[0].is_eased[i] == 0.0f) continue;  // and not later either
+    is_eased = true;
+    differences[i] = &of.difference.rotations[0].x;
+    for (std::size_t c = 0; c < 3; ++c) {
+      root_ease_m[c].of[i] = of.difference.root_position_m[static_cast<int>(c)];
+      root_ease_m_s[c].of[i] =
+          of.is_inertial ? of.difference_velocity.root_m_s[static_cast<int>(c)] : 0.0f;
+    }
+    if (!of.is_inertial) continue;
+    is_inertial = true;
+    is_inertial_lane.of[i] = 1.0f;
+    velocities[i] = &of.difference_velocity.joints_rad_s[0].x;
+  }
+  if (!is_eased) return;
+  kernels::Transpose(differences.data(), 4 * joints, lanes, FloatsOf(transposed));
+  kernels::PrepareEase(FloatsOf(transposed), joints, lanes, FloatsOf(ease));
+  if (!is_inertial) return;
+  kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
+  kernels::FindFastest(FloatsOf(velocity), joints, lanes, fastest.of);
+}
+
+void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
+  std::array<const float*, kBlock> of_lanes;
+  for (std::size_t i = 0; i < kBlock; ++i) of_lanes[i] = RowOf(pose, i);
+  const kernels::GridPlaces& at = places[pose];
+  const kernels::LaneBlend blend = {
+      .rows = of_lanes.data(),
+      .joint_count = joints,
+      .lanes = lanes,
+      .base_m = base_m[0].of,
+      .heading_rad = heading_rad.of,
+      .sine = sine.of,
+      .cosine = cosine.of,
+      .extra_turn_rad = extra_turn_rad.of,
+      .steered = at.steered,
+      .ease = is_eased ? FloatsOf(ease) : nullptr,
+      .velocity = is_eased && is_inertial ? FloatsOf(velocity) : nullptr,
+      .fastest = fastest.of,
+      .root_ease_m = root_ease_m[0].of,
+      .root_ease_m_s = root_ease_m_s[0].of,
+      .fraction = at.fraction,
+      .slope_s = at.slope_s,
+      .is_eased = at.is_eased,
+      .is_inertial = is_inertial_lane.of};
+  if (kernels::FinishLanes(blend, poses.roots_m(), poses.rotations())) return;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    TakeLargest(group(i), library.layout(), movement(i), PlaceOf(pose, i), RowOf(pose, i));
+  }
+  (void)kernels::FinishLanes(blend, poses.roots_m(), poses.rotations());
+}
+
+void SoaPoseEvaluator::Work::ApplyPlantFade(std::size_t pose) {
+  for (std::size_t i = 0; i < lanes; ++i) {
+    if (movement(i).feet.plant_fade_s == 0.0) continue;
+    poses.Get(i, one);
+    stridewire::ApplyPlantFade(library.leg_rig(), movement(i), times[pose].of[i], one);
+    poses.Set(i, one);
+  }
+}
+
+SoaPoseEvaluator::SoaPoseEvaluator(const MotionLibrary& library, int max_count)
+    : work_(std::make_unique<Work>(library, max_count)) {
+  STRIDEWIRE_CHECK(max_count >= 1);
+}
+SoaPoseEvaluator::~SoaPoseEvaluator() = default;
+SoaPoseEvaluator::SoaPoseEvaluator(SoaPoseEvaluator&&) noexcept = default;
+SoaPoseEvaluator& SoaPoseEvaluator::operator=(SoaPoseEvaluator&&) noexcept = default;
+
+int SoaPoseEvaluator::max_count() const { return work_->max_count; }
+
+void SoaPoseEvaluator::Begin(std::span<const SampleRun> stretches, int count) {
+  Work& work = *work_;
+  STRIDEWIRE_CHECK(!stretches.empty() && stretches.size() <= kBlock);
+  STRIDEWIRE_CHECK(count >= 1 && count <= work.max_count);
+  std::ranges::copy(stretches, work.stretches.begin());
+  work.lanes = stretches.size();
+  work.count = static_cast<std::size_t>(count);
+  work.next = 0;
+  work.is_planted = stretches.front().movement->feet.is_active;
+  for (std::size_t i = 0; i < work.lanes; ++i) {
+    const Movement& movement = work.movement(i);
+    STRIDEWIRE_CHECK(movement.feet.is_active == work.is_planted);
+    for (std::size_t c = 0; c < 3; ++c) {
+      work.base_m[c].of[i] = movement.base.position_m[static_cast<int>(c)];
+    }
+    work.heading_rad.of[i] = movement.base.heading_rad;
+    work.extra_turn_rad.of[i] = movement.extra_turn_rad;
+  }
+  kernels::SinCos(work.heading_rad.of, work.lanes, work.sine.of, work.cosine.of);
+  work.FindPlaces();
+  work.TakeEasing();
+  if (work.is_planted) work.TakePlans();
+  work.BlendRows();
+}
+
+const SoaPose& SoaPoseEvaluator::Next() {
+  Work& work = *work_;
+  STRIDEWIRE_CHECK(work.next < work.count);
+  const std::size_t pose = work.next++;
+  work.Finish(pose);
+  if (work.is_planted) {
+    kernels::PlantLanes(work.library.leg_rig(),
+                        {.plan = Work::FloatsOf(work.plan),
+                         .time_s = work.times[pose].of,
+                         .base_m = work.base_m[0].of,
+                         .root_m = work.poses.roots_m(),
+                         .rotations = work.poses.rotations()},
+                        work.lanes);
+    if (work.settles) work.ApplyPlantFade(pose);
+  }
+  return work.poses;
+}
+
+void SoaPoseEvaluator::PrefetchTimes(const Movement& movement) {
+  PrefetchBytes(&movement, kCacheLineBytes);
+  PrefetchBytes(&movement.warp, 2 * kCacheLineBytes);
+  PrefetchBytes(&movement.feet, 1);
+}
+
+void SoaPoseEvaluator::PrefetchPlaces(const Movement& movement) {
+  PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
+  if (movement.feet.is_active) {
+    PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));
+  }
+}
+
+void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
+  const Movement& movement = *stretch.movement;
+  PrefetchBytes(movement.weights.data(), movement.weights.size() * sizeof(float));
+  if (stretch.time_s < movement.start_offset_s + movement.ease_out_s) {
+    PrefetchBytes(movement.difference.rotations.data(),
+                  movement.difference.rotations.size() * sizeof(Quat));
+    PrefetchBytes(movement.difference_velocity.joints_rad_s.data(),
+                  movement.difference_velocity.joints_rad_s.size() * sizeof(Vec3));
+  }
+}
+
+void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
+  // Those whose feet are planted go together, and the others.
+  for (const bool is_planted : {false, true}) {
+    std::array<SampleRun, kBlock> stretches;
+    std::array<Pose*, kBlock> shown;
+    std::size_t lanes = 0;
+    const auto evaluate = [&] {
+      if (lanes == 0) return;
+      evaluator.Begin(std::span(stretches).first(lanes), 1);
+      const SoaPose& poses = evaluator.Next();
+      for (std::size_t i = 0; i < lanes; ++i) poses.Get(i, *shown[i]);
+      lanes = 0;
+    };
+    for (const PoseJob& job : jobs) {
+      if (job.movement->feet.is_active != is_planted) continue;
+      stretches[lanes] = {.movement = job.movement, .time_s = job.time_s};
+      shown[lanes++] = job.shown;
+      if (lanes == kBlock) evaluate();
+    }
+    evaluate();
+  }
+}
+
+}  // namespace stridewire

@@ -1,0 +1,162 @@
+#include "stridewire/runtime/foot_support.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "base/trig.h"
+
+namespace stridewire {
+namespace {
+
+// Points of a sole that are looked at: rows from heel to toe, columns from side to side.
+constexpr int kHeelRows = 6;  // Behind the ball's own.
+constexpr int kToeRows = 3;
+constexpr int kRows = kHeelRows + 1 + kToeRows;
+constexpr int kColumns = 5;
+constexpr int kBallColumn = kColumns / 2;
+constexpr double kMaxSlope = 1.0;
+constexpr double kForgivenM = 0.005;
+
+struct SolePoint {
+  double side;     // To the left of the ball.
+  double forward;  // In front of it.
+  double height;
+  bool is_reached;
+};
+
+class SolePoints {
+ public:
+  SolePoint& at(int row, int column) {
+    return points_[static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column)];
+  }
+  SolePoint& ball() { return at(kHeelRows, kBallColumn); }
+  [[nodiscard]] auto begin() const { return points_.begin(); }
+  [[nodiscard]] auto end() const { return points_.end(); }
+  [[nodiscard]] static constexpr double size() { return kRows * kColumns; }
+
+  // What is reached from the ball, found by sweeping until nothing changes: at most as often as there are
+  // points, twice on ordinary ground.
+  void Spread() {
+    ball().is_reached = true;
+    for (bool is_changed = true; is_changed;) {
+      is_changed = false;
+      for (int row = 0; row < kRows; ++row) {
+        for (int column = 0; column < kColumns; ++column) {
+          SolePoint& point = at(row, column);
+          if (row > 0) is_changed |= Reach(point, at(row - 1, column));
+          if (row + 1 < kRows) is_changed |= Reach(point, at(row + 1, column));
+          if (column > 0) is_changed |= Reach(point, at(row, column - 1));
+          if (column + 1 < kColumns) is_changed |= Reach(point, at(row, column + 1));
+        }
+      }
+    }
+  }
+
+ private:
+  static bool Reach(const SolePoint& from, SolePoint& to) {
+    if (!from.is_reached || to.is_reached) return false;
+    const double distance = std::abs(to.side - from.side) + std::abs(to.forward - from.forward);
+    to.is_reached = std::abs(to.height - from.height) <= kMaxSlope * distance + kForgivenM;
+    return to.is_reached;
+  }
+
+  std::array<SolePoint, std::size_t{kRows} * kColumns> points_{};
+};
+
+// height = ball_height + at_ball + side_slope side + forward_slope forward
+struct Plane {
+  double at_ball = 0.0;
+  double side_slope = 0.0;
+  double forward_slope = 0.0;
+  int count = 0;  // of points it fits
+};
+
+// Least squares over the points reached, about their mean so that a level ground gives exactly level.
+Plane FitPlane(const SolePoints& points, double ball_height) {
+  Plane plane;
+  double mean_side = 0.0;
+  double mean_forward = 0.0;
+  double mean_height = 0.0;
+  for (const SolePoint& point : points) {
+    if (!point.is_reached) continue;
+    ++plane.count;
+    mean_side += point.side;
+    mean_forward += point.forward;
+    mean_height += point.height - ball_height;
+  }
+  mean_side /= plane.count;
+  mean_forward /= plane.count;
+  mean_height /= plane.count;
+  double ss = 0.0;
+  double sf = 0.0;
+  double ff = 0.0;
+  double sh = 0.0;
+  double fh = 0.0;
+  for (const SolePoint& point : points) {
+    if (!point.is_reached) continue;
+    const double side = point.side - mean_side;
+    const double forward = point.forward - mean_forward;
+    const double height = point.height - ball_height - mean_height;
+    ss += side * side;
+    sf += side * forward;
+    ff += forward * forward;
+    sh += side * height;
+    fh += forward * height;
+  }
+  const double determinant = ss * ff - sf * sf;
+  if (determinant > 1e-9 * ss * ff) {
+    plane.side_slope = (sh * ff - fh * sf) / determinant;
+    plane.forward_slope = (fh * ss - sh * sf) / determinant;
+  } else if (ss + ff > 0.0) {
+    // All on one line: the slope along it, none across.
+    const bool is_along = ff >= ss;
+    (is_along ? plane.forward_slope : plane.side_slope) = is_along ? fh / ff : sh / ss;
+  }
+  plane.at_ball = mean_height - plane.side_slope * mean_side - plane.forward_slope * mean_forward;
+  return plane;
+}
+
+}  // namespace
+
+FootSupport SupportOf(const Terrain& terrain, double x, double z, double heading_rad,
+                      const Sole& sole) {
+  // Forward is (sin, cos) in x and z, left is (cos, -sin).
+  const double sine = Sin(heading_rad);
+  const double cosine = Cos(heading_rad);
+  SolePoints points;
+  for (int row = 0; row < kRows; ++row) {
+    const double forward = row <= kHeelRows ? sole.heel_m * (row - kHeelRows) / kHeelRows
+                                            : sole.toe_m * (row - kHeelRows) / kToeRows;
+    for (int column = 0; column < kColumns; ++column) {
+      const double side = sole.half_width_m * (column - kBallColumn) / kBallColumn;
+      points.at(row, column) = {
+          side, forward,
+          terrain.HeightAt(x + sine * forward + cosine * side, z + cosine * forward - sine * side),
+          false};
+    }
+  }
+  points.Spread();
+  const double ball_height = points.ball().height;
+  const Plane plane = FitPlane(points, ball_height);
+
+  FootSupport support;
+  support.ground_height_m = ball_height;
+  support.plane_height_m = ball_height + plane.at_ball;
+  for (const SolePoint& point : points) {
+    const double above =
+        point.height - ball_height -
+        (plane.at_ball + plane.side_slope * point.side + plane.forward_slope * point.forward);
+    support.rise_m = std::max(support.rise_m, above);
+    support.gap_m = std::max(support.gap_m, -above);
+  }
+  support.carried = plane.count / SolePoints::size();
+  const double slope_x = plane.side_slope * cosine + plane.forward_slope * sine;
+  const double slope_z = plane.forward_slope * cosine - plane.side_slope * sine;
+  const double length = std::sqrt(slope_x * slope_x + 1.0 + slope_z * slope_z);
+  support.normal = Vec3(-slope_x / length, 1.0 / length, -slope_z / length);
+  return support;
+}
+
+}  // namespace stridewire

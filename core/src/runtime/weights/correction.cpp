@@ -1,0 +1,218 @@
+#include "runtime/weights/correction.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "runtime/weights/end_poses.h"
+#include "runtime/weights/measure.h"
+
+namespace stridewire {
+namespace {
+
+constexpr auto kMaxExamples = static_cast<std::size_t>(MotionLibrary::kMaxExamples);
+constexpr std::size_t kMaxRows = kMaxParameters + 1;  // of [J; 1]
+using Vector = std::array<double, kMaxRows>;          // metres; a radian is kMetresPerRadian
+using Matrix = std::array<Vector, kMaxRows>;
+
+constexpr double kLeastUse = 0.5;  // of the mean |w|
+constexpr double kMargin = 0.1;    // below the largest sum of |w|
+constexpr double kShrinkErrorM =
+    1e-4;                        // at smaller errors less: the weights follow the request smoothly
+constexpr double kRidge = 1e-9;  // of the trace: directions that no example spans
+constexpr int kMaxHalvings = 3;
+
+double Sum(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return sum;
+}
+
+double SumOfSizes(std::span<const double> values) {
+  double sum = 0.0;
+  for (const double value : values) sum += std::fabs(value);
+  return sum;
+}
+
+// L L^T = matrix (Cholesky), L below the diagonal and on it; false if it is not positive definite.
+bool Factor(Matrix& matrix, std::size_t rows) {
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = matrix[i][j];
+      for (std::size_t k = 0; k < j; ++k) sum -= matrix[i][k] * matrix[j][k];
+      if (i == j) {
+        if (!(sum > 0.0)) return false;
+        matrix[i][i] = std::sqrt(sum);
+      } else {
+        matrix[i][j] = sum / matrix[j][j];
+      }
+    }
+  }
+  return true;
+}
+
+void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t k = 0; k < i; ++k) right[i] -= factor[i][k] * right[k];
+    right[i] /= factor[i][i];
+  }
+  for (std::size_t i = rows; i-- > 0;) {
+    for (std::size_t k = i + 1; k < rows; ++k) right[i] -= factor[k][i] * right[k];
+    right[i] /= factor[i][i];
+  }
+}
+
+// [J; 1], row by row, and its step.
+class WeightStep {
+ public:
+  // `slopes` [d][n]: J, metres.
+  WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
+      : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
+    least_use_ = kLeastUse * SumOfSizes(weights) / static_cast<double>(n_);
+    for (std::size_t e = 0; e < n_; ++e) uses_ += Use(e);
+    for (std::size_t a = 0; a < rows_; ++a) {
+      for (std::size_t b = 0; b <= a; ++b) {
+        double sum = 0.0;
+        for (std::size_t e = 0; e < n_; ++e) sum += Use(e) * At(a, e) * At(b, e);
+        factor_[a][b] = sum;
+      }
+    }
+    double trace = 0.0;
+    for (std::size_t a = 0; a < rows_; ++a) trace += factor_[a][a];
+    for (std::size_t a = 0; a < rows_; ++a) factor_[a][a] += kRidge * trace;
+    is_there_ = Factor(factor_, rows_);
+  }
+
+  [[nodiscard]] bool is_there() const { return is_there_; }
+
+  // Weights [n] that make up for `missing` and shrink by a share of themselves otherwise.
+  void To(const Vector& missing, double shrinking, std::span<double> out) const {
+    Vector y = missing;
+    y[rows_ - 1] = 1.0 - Sum(weights_);
+    if (shrinking > 0.0) {
+      for (std::size_t a = 0; a < rows_; ++a) {
+        for (std::size_t e = 0; e < n_; ++e) y[a] += shrinking * At(a, e) * weights_[e];
+      }
+    }
+    SolveFactored(factor_, rows_, y);
+    for (std::size_t e = 0; e < n_; ++e) {
+      double change = 0.0;
+      for (std::size_t a = 0; a < rows_; ++a) change += At(a, e) * y[a];
+      out[e] = (1.0 - shrinking) * weights_[e] + Use(e) * change;
+    }
+    const double left = (1.0 - Sum(out)) / uses_;  // by the ridge
+    for (std::size_t e = 0; e < n_; ++e) out[e] += left * Use(e);
+  }
+
+ private:
+  [[nodiscard]] double Use(std::size_t e) const { return std::fabs(weights_[e]) + least_use_; }
+  [[nodiscard]] double At(std::size_t row, std::size_t e) const {
+    return row + 1 == rows_ ? 1.0 : slopes_[row * n_ + e];
+  }
+
+  std::span<const double> weights_;
+  std::span<const double> slopes_;
+  std::size_t n_;
+  std::size_t rows_;
+  double least_use_ = 0.0;
+  double uses_ = 0.0;
+  Matrix factor_{};
+  bool is_there_ = false;
+};
+
+}  // namespace
+
+CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
+  return {.max_iterations = group.parameter_count() <= 2 ? 3 : 8};
+}
+
+Correction CorrectWeights(const MotionLibrary& library, int group_index,
+                          const ParameterValues& wanted, const CorrectionLimits& limits,
+                          std::span<double> weight_scratch, Movement& movement) {
+  const Correction correction =
+      CorrectWeights(library.skeleton(), library.layout(), library.group(group_index), wanted,
+                     limits, weight_scratch, movement);
+  movement.group = group_index;
+  return correction;
+}
+
+Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
+                          const MotionGroup& group, const ParameterValues& wanted,
+                          const CorrectionLimits& limits, std::span<double> weight_scratch,
+                          Movement& movement) {
+  const std::size_t d = group.parameters.size();
+  const auto n = static_cast<std::size_t>(group.example_count);
+  const std::span<double> weights = weight_scratch.first(n);
+  // Of which the first ones are touched.
+  std::array<double, kMaxExamples> next_room;
+  std::array<double, kMaxExamples> halved_room;
+  std::array<double, kMaxParameters * kMaxExamples> slopes_room;
+  const std::span<double> next = std::span(next_room).first(n);
+  const std::span<double> halved = std::span(halved_room).first(n);
+  const std::span<double> slopes = std::span(slopes_room).first(d * n);
+  Vector unit{};
+  for (std::size_t l = 0; l < d; ++l) {
+    unit[l] = group.parameters[l].name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
+  }
+  EndPoses ends(skeleton, layout, group);
+
+  struct Miss {
+    Vector missing{};  // p^ - a(w)
+    double largest_m = 0.0;
+  };
+  const auto measure = [&](std::span<const double> w) {
+    TakeWeights(group, w, movement);
+    ends.Blend(movement);
+    const ParameterValues measured = ends.Measure();
+    Miss error;
+    for (std::size_t l = 0; l < d; ++l) {
+      error.missing[l] = unit[l] * (wanted.values[l] - measured.values[l]);
+      error.largest_m = std::max(error.largest_m, std::fabs(error.missing[l]));
+    }
+    return error;
+  };
+
+  SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
+  Miss best = measure(weights);
+  Correction correction;
+  correction.initial_error_m = best.largest_m;
+  const double most = std::max(kMaxCorrectedWeightSum, SumOfSizes(weights));
+  while (correction.iterations < limits.max_iterations && best.largest_m > limits.tolerance_m) {
+    ++correction.iterations;
+    ends.MeasureSlopes(slopes);
+    for (std::size_t l = 0; l < d; ++l) {
+      for (std::size_t e = 0; e < n; ++e) slopes[l * n + e] *= unit[l];
+    }
+    const WeightStep step(weights, slopes, d);
+    if (!step.is_there()) break;
+    step.To(best.missing, 0.0, next);
+    const double size = SumOfSizes(next);
+    if (size > most - kMargin) {
+      step.To(best.missing, 1.0, halved);
+      const double least = SumOfSizes(halved);
+      // Steps are linear in how much weights shrink, sums of |w| no more than that.
+      const double shrinking = least < size
+                                   ? std::min((size - most + kMargin) / (size - least), 1.0) *
+                                         best.largest_m / (best.largest_m + kShrinkErrorM)
+                                   : 0.0;
+      for (std::size_t e = 0; e < n; ++e) next[e] += shrinking * (halved[e] - next[e]);
+    }
+    bool is_better = false;
+    for (int halvings = 0; halvings <= kMaxHalvings && !is_better; ++halvings) {
+      const double part = 1.0 / static_cast<double>(1 << halvings);
+      for (std::size_t e = 0; e < n; ++e) halved[e] = weights[e] + part * (next[e] - weights[e]);
+      if (SumOfSizes(halved) > most) continue;
+      const Miss error = measure(halved);
+      if (!(error.largest_m < best.largest_m)) continue;
+      best = error;
+      std::copy(halved.begin(), halved.end(), weights.begin());
+      is_better = true;
+    }
+    if (!is_better) break;
+  }
+  TakeWeights(group, weights, movement);
+  correction.error_m = best.largest_m;
+  return correction;
+}
+
+}  // namespace stridewire

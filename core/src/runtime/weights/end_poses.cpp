@@ -1,0 +1,199 @@
+#include "runtime/weights/end_poses.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/weights/end_measures.h"
+#include "runtime/pose/pose_kernels.h"
+#include "base/trig.h"
+
+namespace stridewire {
+namespace {
+
+DVec3 Turn(double sine, double cosine, const DVec3& v) {
+  return {cosine * v.x + sine * v.z, v.y, cosine * v.z - sine * v.x};
+}
+
+}  // namespace
+
+class EndPoses::Gradient {
+ public:
+  // By the four parts of a joint's quaternion, or of the root behind them.
+  void Add(int joint, const DVec3& by_xyz, double by_w) {
+    const auto j = static_cast<std::size_t>(joint);
+    // Chains share where they come from.
+    std::size_t i = 0;
+    while (i < joint_count_ && joints_[i].joint != j) ++i;
+    if (i == joint_count_) joints_[joint_count_++] = {j, {}};
+    Parts& parts = joints_[i];
+    parts.by[0] += by_xyz.x;
+    parts.by[1] += by_xyz.y;
+    parts.by[2] += by_xyz.z;
+    parts.by[3] += by_w;
+  }
+  // The change with an example's weight.
+  [[nodiscard]] double Of(const float* row) const {
+    std::array<double, 4> sums{};
+    for (std::size_t i = 0; i < joint_count_; ++i) {
+      const float* at = row + 4 * joints_[i].joint;
+      for (std::size_t c = 0; c < 4; ++c) sums[c] += joints_[i].by[c] * at[c];
+    }
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+  }
+
+ private:
+  struct Parts {
+    std::size_t joint;
+    std::array<double, 4> by;
+  };
+  std::size_t joint_count_ = 0;
+  std::array<Parts, 2 * static_cast<std::size_t>(kMaxJoints) + 1> joints_;
+};
+
+EndPoses::EndPoses(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group)
+    : skeleton_(skeleton),
+      layout_(layout),
+      group_(group),
+      sign_(group.kind == MovementKind::kStepRight ? -1.0 : 1.0) {
+  for (std::size_t f = 0; f < 2; ++f) {
+    for (int j = skeleton.legs[f].ball; j >= 0;
+         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+      chains_[f][lengths_[f]++] = j;
+    }
+  }
+}
+
+const float* EndPoses::Rows(bool is_end) const {
+  const std::size_t point = is_end ? static_cast<std::size_t>(group_.grid_point_count - 1) : 0;
+  return &group_.grid[point * static_cast<std::size_t>(group_.example_count) *
+                      static_cast<std::size_t>(layout_.row_floats)];
+}
+
+void EndPoses::Blend(const Movement& movement) {
+  heading_change_rad_ = movement.heading_change_rad;
+  sine_ = Sin(heading_change_rad_);
+  cosine_ = Cos(heading_change_rad_);
+  BlendEnd(movement, false);
+  BlendEnd(movement, true);
+}
+
+void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
+  const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
+  const float* rows = Rows(is_end);
+  std::array<float, kMaxRowFloats> sum;
+  kernels::SumRows(rows, movement.weights.data(), movement.weights.size(), row_floats, sum.data());
+
+  End& end = ends_[is_end ? 1 : 0];
+  const auto [position, yaw_rad] = layout_.RootOf(sum.data());
+  end.root_m = position;
+  end.sine = Sin(yaw_rad);
+  end.cosine = Cos(yaw_rad);
+  for (std::size_t f = 0; f < 2; ++f) {
+    DVec3 arm(skeleton_.legs[f].ball_offset_m);
+    for (std::size_t i = 0; i < lengths_[f]; ++i) {
+      const auto j = static_cast<std::size_t>(chains_[f][i]);
+      Link& link = end.links[f][i];
+      DQuat blended(GridLayout::RotationOf(sum.data(), j));
+      double norm = std::sqrt(glm::dot(blended, blended));
+      link.per_norm = 1.0 / norm;
+      if (norm < kernels::kSmallestNorm) {  // as EvaluateBlend
+        const auto largest = static_cast<std::size_t>(
+            std::max_element(movement.weights.begin(), movement.weights.end()) -
+            movement.weights.begin());
+        blended = DQuat(GridLayout::RotationOf(rows + largest * row_floats, j));
+        norm = std::sqrt(glm::dot(blended, blended));
+        link.per_norm = 0.0;  // it changes as nothing says
+      }
+      link.rotation = blended * (1.0 / norm);
+      link.arm = arm;
+      link.ball = link.rotation * arm;
+      arm = DVec3(skeleton_.joints[j].offset_m) + link.ball;
+    }
+    end.arms_m[f] = Turn(end.sine, end.cosine, end.links[f][lengths_[f] - 1].ball);
+  }
+}
+
+ParameterValues EndPoses::Measure() const {
+  return ParametersOf(group_,
+                      {.start_m = sign_ * (ends_[0].Ball(0) - ends_[0].Ball(1)),
+                       .end_m = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1)),
+                       .travel_m = 0.5 * (ends_[1].Ball(0) + ends_[1].Ball(1) - ends_[0].Ball(0) -
+                                          ends_[0].Ball(1)),
+                       .heading_change_rad = heading_change_rad_});
+}
+
+// How far a foot's ball goes `along` a direction of the world. From the root down: the direction in the axes of each
+// joint's parent, g, tells what the joint's own rotation does to it. With v the arm and R(q) v its end, q = (u, w),
+//
+//   R(q) v = (w w - u u) v + 2 (u v) u + 2 w (u x v)
+//
+// and of its change with q what only makes q longer is taken off.
+void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
+                           Gradient& gradient) const {
+  const DVec3& arm = end.arms_m[foot];
+  gradient.Add(layout_.joint_count, along, along.x * arm.z - along.z * arm.x);
+  DVec3 g = Turn(-end.sine, end.cosine, along);
+  for (std::size_t i = lengths_[foot]; i-- > 0;) {
+    const Link& link = end.links[foot][i];
+    const DVec3 u(link.rotation.x, link.rotation.y, link.rotation.z);
+    const double w = link.rotation.w;
+    const DVec3& v = link.arm;
+    const double vg = glm::dot(v, g);
+    const double ug = glm::dot(u, g);
+    const double uv = glm::dot(u, v);
+    const double longer = glm::dot(link.ball, g);
+    const double scale = 2.0 * link.per_norm;
+    gradient.Add(chains_[foot][i],
+                 scale * (v * ug - u * (vg + longer) + g * uv + w * glm::cross(v, g)),
+                 scale * (w * (vg - longer) + glm::dot(glm::cross(u, v), g)));
+    g = glm::conjugate(link.rotation) * g;
+  }
+}
+
+void EndPoses::MeasureSlopes(std::span<double> slopes) const {
+  const auto n = static_cast<std::size_t>(group_.example_count);
+  const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
+  const DVec3 apart = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1));
+  // Examples turn the frame that the end is told in.
+  const DVec3 by_heading(-apart.z, 0.0, apart.x);
+  for (std::size_t l = 0; l < group_.parameters.size(); ++l) {
+    const std::span<double> out = slopes.subspan(l * n, n);
+    std::fill(out.begin(), out.end(), 0.0);
+    const auto add = [&](bool is_end, const DVec3& left, const DVec3& right) {
+      Gradient gradient;
+      AddGradient(ends_[is_end ? 1 : 0], 0, left, gradient);
+      AddGradient(ends_[is_end ? 1 : 0], 1, right, gradient);
+      const float* rows = Rows(is_end);
+      for (std::size_t e = 0; e < n; ++e) out[e] += gradient.Of(rows + e * row_floats);
+    };
+    const auto add_start = [&](const DVec3& axis) { add(false, sign_ * axis, -sign_ * axis); };
+    const auto add_end = [&](const DVec3& axis) {
+      const DVec3 along = sign_ * Turn(sine_, cosine_, axis);
+      add(true, along, -along);
+      const double by = glm::dot(axis, by_heading);
+      for (std::size_t e = 0; e < n; ++e) out[e] += by * group_.heading_change_rad[e];
+    };
+    const auto add_travel = [&](const DVec3& axis) {
+      add(false, -0.5 * axis, -0.5 * axis);
+      add(true, 0.5 * axis, 0.5 * axis);
+    };
+    const DVec3 x(1.0, 0.0, 0.0);
+    const DVec3 y(0.0, 1.0, 0.0);
+    const DVec3 z(0.0, 0.0, 1.0);
+    switch (group_.parameters[l].name) {
+      case ParameterName::kStartX: add_start(x); break;
+      case ParameterName::kStartY: add_start(y); break;
+      case ParameterName::kStartZ: add_start(z); break;
+      case ParameterName::kEndX: add_end(x); break;
+      case ParameterName::kEndY: add_end(y); break;
+      case ParameterName::kEndZ: add_end(z); break;
+      case ParameterName::kTurn:
+        std::copy_n(group_.heading_change_rad.begin(), n, out.begin());
+        break;
+      case ParameterName::kLength: add_travel(z); break;
+      case ParameterName::kHeight: add_travel(y); break;
+    }
+  }
+}
+
+}  // namespace stridewire
