@@ -401,7 +401,7 @@ TEST_F(LibraryTool, WalksToAPlaceOrSaysWhyNot) {
 TEST_F(LibraryTool, LeavesOutAStepThatMustBeMetAndIsNot) {
   const std::string choreography =
       folder_.Write("c.json", R"({"movements":[{"step":{"length_m":0.5}},
-                                 {"step":{"at_m":[0,0,7],"heading_rad":0,"must_be_met":true}}]})");
+                                 {"step":{"at_m":[0,0,7],"heading_rad":0,"exact_only":true}}]})");
   const std::vector<std::string> arguments = {"synthesize", "builtin", "--choreography",
                                               choreography, "--out",   Out()};
   const ProgramResult told = Tool(arguments);

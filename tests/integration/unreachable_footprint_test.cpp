@@ -343,7 +343,7 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
 TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
   const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "must_be_met has a meaning only beside at_m");
+  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only has a meaning only beside at_m");
   Avatar sliding(library_, BaseFrame{}, {.foot_planting = false});
   const MovementRequest somewhere = StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0);
   EXPECT_EQ(sliding.Enqueue(somewhere).error().code, ErrorCode::kUnsupported);

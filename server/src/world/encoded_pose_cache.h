@@ -122,7 +122,7 @@ class EncodedPoseCache {
  private:
   static constexpr std::size_t kLanes = SoaPose::kLanes;
   static constexpr std::size_t kStanding = kMost;  // plane
-  // SpatialGrid that lie together have their turns together.
+  // Places that lie together have their turns together.
   static constexpr std::uint32_t kPlacesOfATurn = 8;
   struct alignas(kCacheLineBytes) Line {
     std::byte of[kCacheLineBytes];

@@ -12,7 +12,7 @@
 
 namespace stridewire::server {
 
-/// The ground of a world: what its avatars walk on, and the WorldTerrain that tells of it, encoded
+/// The ground of a world: what its avatars walk on, and the Ground that tells of it, encoded
 /// once and shared by all who hear it. Immutable.
 struct WorldTerrain {
   std::shared_ptr<const Terrain> terrain;  ///< Null: flat at 0.

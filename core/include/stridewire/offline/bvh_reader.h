@@ -13,7 +13,7 @@
 namespace stridewire {
 
 /// Limits on a BVH file; beyond one of them reading ends with kLimitExceeded. Joints are limited by
-/// kMaxJoints. Memory follows what the file really locks, never what it announces.
+/// kMaxJoints. Memory follows what the file really holds, never what it announces.
 inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
 inline constexpr int kMaxBvhDepth = 128;  ///< Joints nested in each other.
 inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;  ///< Frames times joints.

@@ -23,7 +23,7 @@ namespace stridewire {
 /// differ in joints; kIo: the stream took no more.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out);
 
-/// As above, into a file: written beside it first and then renamed, so that `path` locks either
+/// As above, into a file: written beside it first and then renamed, so that `path` holds either
 /// what it held before or everything. kIo: `where` names the path.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip,
                               const std::filesystem::path& path);

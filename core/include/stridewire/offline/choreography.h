@@ -27,7 +27,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, ei
 ///    "terrain":{…as in terrain_file.h…},
 ///    "movements":[{"step":{"length_m":0.6}},
 ///                 {"step":{"foot":"left","length_m":0.5,"side_m":0.1,"height_m":0.15,"turn_rad":0.3}},
-///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0,"must_be_met":true}},
+///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0,"exact_only":true}},
 ///                 {"walk_to":{"position_m":[3,0,5],"heading_rad":1.6,"waypoints_m":[[0,0,4]],"speed_m_s":1}},
 ///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
 ///                 {"layer":{"name":"wave","weight":0.8,"blend_s":0.5,"speed":1}},

@@ -55,7 +55,7 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// foot that stays (for a jump: the middle of both) is where it stands and nothing drifts; its
 /// difference pose; and `movement.feet`.
 ///
-/// `pose` is scratch with one rotation a joint; `cache` locks rows of this movement or none. Never allocates. Returns
+/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
 /// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingTarget& wish, const BlendSource& source, GridCache& cache,
@@ -85,7 +85,7 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
                                const LandingDecision& choice, const BlendSource& source, GridCache& cache,
                                PoseSpan pose, Movement& movement);
 
-/// The locks at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
+/// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                 double time_s, ConstPoseSpan pose);
 

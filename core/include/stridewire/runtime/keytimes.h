@@ -32,7 +32,7 @@ inline constexpr double kLongestInterval = 4.0 / 3.0;
 /// blended and each is clamped as above. Otherwise sum w K stops increasing outside the hull, and
 /// even inside it an interval may shrink much faster than the motion in it, which then rushes: on
 /// steps of 0.64 to 0.76 m of captured subject 16 by 2.7 cm from one 60 Hz frame to the next. K_0 = 0.
-/// `example_keytimes_s` is [example][interval_count + 1]; `out_s` locks interval_count + 1; the
+/// `example_keytimes_s` is [example][interval_count + 1]; `out_s` holds interval_count + 1; the
 /// weights sum to 1.
 void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const float> weights,
                    std::span<double> out_s);

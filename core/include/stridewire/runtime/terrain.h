@@ -137,7 +137,7 @@ class Terrain {
   TerrainData data_;
   GroundPoint field_max_m_;  ///< Last sample of the field.
 
-  // The grid over the boxes: cell (i, j) locks boxes_[starts_[c]] to boxes_[starts_[c + 1] - 1],
+  // The grid over the boxes: cell (i, j) holds boxes_[starts_[c]] to boxes_[starts_[c + 1] - 1],
   // c = j cells_x_ + i, highest first.
   Rectangle bounds_;
   std::int32_t cells_x_ = 0;

@@ -61,7 +61,7 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
   for (std::size_t j = 0; j < joints; ++j) {
     const float weight = layer.weights[j];
     if (!(weight >= 0.0f && weight <= 1.0f)) {
-      return fail(ErrorCode::kOutOfRange, "its mask locks a weight not from 0 to 1");
+      return fail(ErrorCode::kOutOfRange, "its mask holds a weight not from 0 to 1");
     }
     if (weight > 0.0f && of_legs[j]) {
       return Fail(ErrorCode::kInvalidArgument, "its mask touches the root or a leg",
@@ -69,7 +69,7 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
     }
     is_empty = is_empty && weight <= 0.0f;
   }
-  if (is_empty) return fail(ErrorCode::kInvalidArgument, "its mask locks no joint");
+  if (is_empty) return fail(ErrorCode::kInvalidArgument, "its mask holds no joint");
   if (layer.clip.duration_s() * kLayerKeysPerSecond > kMaxLayerFrames - 2) {
     return fail(ErrorCode::kLimitExceeded, "is longer than ten minutes");
   }
@@ -161,7 +161,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
 
 Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers, const Skeleton& skeleton) {
   if (layers.size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kLimitExceeded, "a library locks at most 64 layers",
+    return Fail(ErrorCode::kLimitExceeded, "a library holds at most 64 layers",
                 static_cast<std::int64_t>(layers.size()));
   }
   const std::vector<bool> of_legs = JointsOfLegs(skeleton);
@@ -218,7 +218,7 @@ Expected<std::shared_ptr<const MotionLibrary>> AddLayers(const MotionLibrary& li
   }
   all.insert(all.end(), added->views().begin(), added->views().end());
   if (all.size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kLimitExceeded, "a library locks at most 64 layers",
+    return Fail(ErrorCode::kLimitExceeded, "a library holds at most 64 layers",
                 static_cast<std::int64_t>(all.size()));
   }
   return WriteLibrary({library.skeleton(), library.stand_pose(), library.groups(), all});

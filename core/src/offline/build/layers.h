@@ -16,7 +16,7 @@
 namespace stridewire {
 
 inline constexpr double kLayerKeysPerSecond =
-    30.0;                                   ///< About: a loop locks a whole number of them.
+    30.0;                                   ///< About: a loop holds a whole number of them.
 inline constexpr double kLoopBlendS = 0.4;  ///< The most that goes into closing a captured loop.
 
 /// The mask of layers that name no joints, one weight a joint: everything but the root and the legs.

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-/// What a library locks: views of whatever locks it meanwhile.
+/// What a library holds: views of whatever holds it meanwhile.
 struct LibraryContent {
   const Skeleton& skeleton;
   const Pose& stand_pose;

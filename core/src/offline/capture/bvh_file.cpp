@@ -369,7 +369,7 @@ class Parser {
     if (frames == 0) return FailAt(line_, ErrorCode::kMalformed, "the motion has no frame");
     if (frames < announced_frames_) {
       file_.notes.push_back("line " + std::to_string(frames_line_) + ": Frames: announces " +
-                            std::to_string(announced_frames_) + " frames, the file locks " +
+                            std::to_string(announced_frames_) + " frames, the file holds " +
                             std::to_string(frames));
     }
     file_.frame_count = static_cast<int>(frames);

@@ -74,7 +74,7 @@ Status ReadFlag(const JsonField& field, const char* key, bool& out) {
 
 Status ReadStep(const JsonField& field, StepRequest& step) {
   if (auto ok = CheckKeys(field, {"foot", "length_m", "side_m", "height_m", "turn_rad", "at_m",
-                                  "heading_rad", "must_be_met"});
+                                  "heading_rad", "exact_only"});
       !ok) {
     return ok;
   }
@@ -89,10 +89,10 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
     }
   }
   if (field.Find("at_m") != nullptr) {
-    if (auto ok = ReadFlag(field, "must_be_met", step.exact_only); !ok) return ok;
+    if (auto ok = ReadFlag(field, "exact_only", step.exact_only); !ok) return ok;
     return ReadFootprint(field, step.at.emplace());
   }
-  for (const char* key : {"heading_rad", "must_be_met"}) {
+  for (const char* key : {"heading_rad", "exact_only"}) {
     if (field.Find(key) == nullptr) continue;
     return Fail(ErrorCode::kMalformed, "has a meaning only beside at_m", field.WhereOf(key));
   }

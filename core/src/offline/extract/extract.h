@@ -45,7 +45,7 @@ struct RejectedTime {
   std::string reason;
 };
 
-/// What a capture locks.
+/// What a capture holds.
 struct Extraction {
   std::string path;
   int frames = 0;

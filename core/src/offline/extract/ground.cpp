@@ -41,7 +41,7 @@ Ground FindGround(const FootContacts& contacts) {
   if (!found[0]) resting[0] = resting[1];
   if (!found[1]) resting[1] = resting[0];
   if (!contacts.single_floor && std::fabs(resting[0] - resting[1]) > kFeetDifferMaxM) {
-    // The feet never stood on the same level: nothing tells how high which ball residuals.
+    // The feet never stood on the same level: nothing tells how high which ball rests.
     resting[0] = resting[1] = std::min(resting[0], resting[1]);
   }
   const double mean = 0.5 * (resting[0] + resting[1]);

@@ -144,7 +144,7 @@ void AppendState(const Avatar& avatar, std::vector<std::byte>& out) {
 }
 
 std::size_t MaxRecordBytes(const MotionLibrary& library) {
-  // Plan, locks, corrections and four layers take some 1,700; of poses there are three at most, or one and its
+  // Plan, holds, corrections and four layers take some 1,700; of poses there are three at most, or one and its
   // velocity.
   return 2000 + 48 * static_cast<std::size_t>(library.skeleton().joint_count()) +
          4 * static_cast<std::size_t>(library.max_example_count());

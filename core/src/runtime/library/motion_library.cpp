@@ -267,7 +267,7 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
     return Fail(ErrorCode::kMalformed, "a group's grid is not aligned to 64 bytes");
   }
   if (!AllSane(group.grid)) {
-    return Fail(ErrorCode::kMalformed, "a group's grid locks a number out of range");
+    return Fail(ErrorCode::kMalformed, "a group's grid holds a number out of range");
   }
   for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
     const float* x = &group.grid[row];
@@ -343,7 +343,7 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
   }
   for (const float weight : layer.weights) {
     if (!(weight > 0.0f && weight <= 1.0f))
-      return fail("a layer's mask locks a weight not in (0, 1]");
+      return fail("a layer's mask holds a weight not in (0, 1]");
   }
   const std::size_t key_floats = 4 * layer.joints.size();
   if (layer.rotations.empty() || layer.rotations.size() % key_floats != 0 ||
@@ -355,7 +355,7 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
     const double norm = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] +
                                   double{q[3]} * q[3]);
     if (!(std::fabs(norm - 1.0) <= kUnitTolerance)) {
-      return Fail(ErrorCode::kMalformed, "a layer locks a rotation not of unit length",
+      return Fail(ErrorCode::kMalformed, "a layer holds a rotation not of unit length",
                   static_cast<std::int64_t>(i / 4));
     }
   }
@@ -520,7 +520,7 @@ Status MotionLibrary::Load() {
     const fb::Quat& q = *root.stand_rotations()->Get(static_cast<flatbuffers::uoffset_t>(j));
     stand_pose_.rotations[j] = Quat(q.w(), q.x(), q.y(), q.z());
     if (!(std::fabs(glm::length(stand_pose_.rotations[j]) - 1.0f) <= kUnitTolerance)) {
-      return Fail(ErrorCode::kMalformed, "the stand pose locks a rotation not of unit length",
+      return Fail(ErrorCode::kMalformed, "the stand pose holds a rotation not of unit length",
                   static_cast<std::int64_t>(j));
     }
   }

@@ -44,7 +44,7 @@ double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
   return side.ball_height_m * (1.0 / normal.y - 1.0);
 }
 
-// A sole residuals on what sticks out of the plane it fits, but for walls that it should not stand at.
+// A sole rests on what sticks out of the plane it fits, but for walls that it should not stand at.
 double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }

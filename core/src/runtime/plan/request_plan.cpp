@@ -262,7 +262,7 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
       return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
     }
     if (step->exact_only && !step->at) {
-      return Fail(ErrorCode::kInvalidArgument, "must_be_met has a meaning only beside at_m",
+      return Fail(ErrorCode::kInvalidArgument, "exact_only has a meaning only beside at_m",
                   "step");
     }
     const bool found =
@@ -291,7 +291,7 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
                   "walk_to");
     }
     if (walk->waypoints_m.size() > kMaxWaypoints) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m locks more than 64 places", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m holds more than 64 places", "walk_to");
     }
     if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
       return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",

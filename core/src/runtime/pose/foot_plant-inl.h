@@ -1,5 +1,5 @@
 // The planting of several avatars' feet at once. The same as PlantFeetByReference of foot_plan.cpp, which says why what
-// is done is done; a test locks the two together. Positions are relative to each movement's base, so that floats do.
+// is done is done; a test holds the two together. Positions are relative to each movement's base, so that floats do.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
 #undef STRIDEWIRE_FOOT_PLANT_INL_H

@@ -82,7 +82,7 @@ inline constexpr float kSmallestNorm = 0.1f;
 /// Sine and cosine of `count` angles, the same bits as Sin and Cos of base/trig.h. |x| <= 1e5.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
 
-/// Poses of up to kBlock movements side by side, a movement a lane: an array [n][kBlock] locks a number of each. What
+/// Poses of up to kBlock movements side by side, a movement a lane: an array [n][kBlock] holds a number of each. What
 /// stands in lanes of nobody is read, but means nothing.
 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.

@@ -11,7 +11,7 @@
 namespace stridewire {
 namespace {
 
-// The index: as many cells as boxes at first, and finer while a cell locks more than a few.
+// The index: as many cells as boxes at first, and finer while a cell holds more than a few.
 constexpr std::int32_t kMaxIndexCellsPerAxis = 1024;
 constexpr std::size_t kFewBoxes = 16;
 constexpr double kMinIndexedM = 1e-6;  // Narrower grids have cells as if they were so wide.

@@ -107,7 +107,7 @@ TEST(ParseChoreography, StartsAtTheOriginUnlessToldOtherwise) {
 TEST(ParseChoreography, ReadsFootprints) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"movements":[{"step":{"foot":"right","at_m":[1,0.25,-2],"heading_rad":0.5}},
-                       {"step":{"at_m":[0,0,0],"must_be_met":true}}]})",
+                       {"step":{"at_m":[0,0,0],"exact_only":true}}]})",
       "c.json");
   ASSERT_TRUE(read.has_value()) << Describe(read.error());
   const auto& first = std::get<StepRequest>(read->movements[0].movement);
@@ -231,9 +231,9 @@ const BadText kBadTexts[] = {
      "c.json: movements[0].step.length_m: has no meaning beside at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.heading_rad: has a meaning only beside at_m"},
-    {R"({"movements":[{"step":{"length_m":0.5,"must_be_met":true}}]})", ErrorCode::kMalformed,
+    {R"({"movements":[{"step":{"length_m":0.5,"exact_only":true}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.exact_only: has a meaning only beside at_m"},
-    {R"({"movements":[{"step":{"at_m":[0,0,1],"must_be_met":1}}]})", ErrorCode::kMalformed,
+    {R"({"movements":[{"step":{"at_m":[0,0,1],"exact_only":1}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.exact_only: is neither true nor false"},
     {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,
      "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},

@@ -100,7 +100,7 @@ TEST(FindContacts, DropsTheHeightTestOnBlocks) {
 }
 
 TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {
-  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot residuals for five
+  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot rests for five
   // frames (42 ms) in a long swing: no contact.
   BodyTracks tracks = StandingTracks(400);
   Move(tracks.feet[0], [](int i) { return DVec3(0.0, 0.0, i >= 50 && i < 53 ? 0.05 : 0.0); });
