@@ -41,7 +41,7 @@ class Steps {
   Steps(const Library& library, int count, bool plants_feet) {
     std::mt19937 random(1);
     std::vector<Movement> kinds;
-    Avatar avatar(library, {}, {.foot_planting = plants_feet});
+    AvatarSimulation avatar(library, {}, {.foot_planting = plants_feet});
     while (kinds.size() < kKinds) {
       if (avatar.queue_size() < 2) {
         const double length_m = 0.45 + 0.2 * static_cast<double>(random() % 1000) / 1000.0;

@@ -164,22 +164,22 @@ class Crowd {
 
   void Advance() {
     AdvanceStates();
-    Avatar::ShowPoses(all_, evaluator_);
+    AvatarSimulation::ShowPoses(all_, evaluator_);
   }
   /// Without poses.
   void AdvanceStates() {
-    for (Avatar& avatar : avatars_) {
+    for (AvatarSimulation& avatar : avatars_) {
       if (avatar.queue_size() < 2) Refill(avatar);
     }
     all_.clear();
-    for (Avatar& avatar : avatars_) all_.push_back(&avatar);
-    Avatar::AdvanceStates(all_, kTickS);
+    for (AvatarSimulation& avatar : avatars_) all_.push_back(&avatar);
+    AvatarSimulation::AdvanceStates(all_, kTickS);
   }
 
-  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
+  [[nodiscard]] const std::vector<AvatarSimulation>& avatars() const { return avatars_; }
 
  private:
-  void Refill(Avatar& avatar) {
+  void Refill(AvatarSimulation& avatar) {
     for (int i = 0; i < 64; ++i) {
       const double length_m = 0.45 + 0.2 * static_cast<double>(random_() % 1000) / 1000.0;
       (void)avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = length_m}});
@@ -187,8 +187,8 @@ class Crowd {
   }
 
   std::mt19937 random_{1};
-  std::vector<Avatar> avatars_;
-  std::vector<Avatar*> all_;
+  std::vector<AvatarSimulation> avatars_;
+  std::vector<AvatarSimulation*> all_;
   SoaPoseEvaluator evaluator_;
 };
 
@@ -328,7 +328,7 @@ void DecodeCompactPose(benchmark::State& state, const Library& library) {
   const Crowd crowd(library, kBlock);
   const protocol::CompactCodec codec = CompactCodecOf(library);
   protocol::CompactCodec::Block block;
-  for (const Avatar& avatar : crowd.avatars()) {
+  for (const AvatarSimulation& avatar : crowd.avatars()) {
     block.Add(avatar.pose().root_position_m, avatar.pose().rotations);
   }
   codec.Encode(block);
@@ -365,7 +365,7 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
   for (auto _ : state) {
     frame.clear();
     Status status = rows.Begin({1, 0, 0, 1, 1, 0.0, mode, joints}, avatars);
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       if (!status) break;
       status = rows.Add(0, avatar.pose().root_position_m, avatar.pose().rotations);
     }

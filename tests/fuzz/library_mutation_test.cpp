@@ -244,7 +244,7 @@ void Evaluate(const MotionLibrary& library, Mutator& mutator) {
 
 // An avatar given whatever the library takes.
 void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator) {
-  Avatar avatar(library, {});
+  AvatarSimulation avatar(library, {});
   for (int tick = 0; tick < 150; ++tick) {
     if (mutator.Below(8) == 0) {
       MovementRequest request;

@@ -228,7 +228,7 @@ TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
   DrawnCrowd crowd(library_, 20, 5);
   for (int tick = 0; tick < 1200; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       passage.Send(avatar.pose());
       root_passage.Send(avatar.pose());
     }
@@ -256,7 +256,7 @@ TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
   DrawnCrowd crowd(library_, 20, 5);
   for (int tick = 0; tick < 1200; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) passage.Send(avatar.pose());
+    for (const AvatarSimulation& avatar : crowd.avatars()) passage.Send(avatar.pose());
   }
   passage.Flush();
   passage.Print(std::string("avatars of ") + GetParam().name);
@@ -270,7 +270,7 @@ TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
   std::vector<CompactCodec::Block> blocks;
   for (int tick = 0; tick < 120; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       if (blocks.empty() || blocks.back().size() == CompactCodec::kBlock) blocks.emplace_back();
       blocks.back().Add(avatar.pose().root_position_m, avatar.pose().rotations);
     }

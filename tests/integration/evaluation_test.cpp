@@ -34,7 +34,7 @@ struct Source {
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
-void AppendBytes(const Avatar& avatar, std::string& bytes) {
+void AppendBytes(const AvatarSimulation& avatar, std::string& bytes) {
   const ConstPoseSpan pose = avatar.pose();
   bytes.append(reinterpret_cast<const char*>(&pose.root_position_m), sizeof(Vec3));
   bytes.append(reinterpret_cast<const char*>(pose.rotations.data()), pose.rotations.size_bytes());
@@ -88,7 +88,7 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
   Pose scratch = pose;
   int sampled = 0;
   for (int walk = 0; walk < 40; ++walk) {
-    Avatar avatar(library, {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
+    AvatarSimulation avatar(library, {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
                             random.Draw(-4.0, 4.0)});
     for (int step = 0; step < 6; ++step) {
       const bool jumps = random.Draw(0.0, 1.0) < 0.2;
@@ -277,7 +277,7 @@ TEST(Evaluation, IsWhatMovementModeStandsFor) {
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
+    for (const AvatarSimulation& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
   }
   EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0x75cf2fbe2c99a5d5u);
   EXPECT_EQ(protocol::kFeatureMovementMode, 32'768u);
@@ -305,7 +305,7 @@ TEST_P(EvaluationOf, IsTheReference) {
   int poses = 0;
   for (int tick = 0; tick < 600; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       const Movement* movement = avatar.movement();
       if (movement == nullptr) continue;
       const MotionGroup& group = library_->group(movement->group);
@@ -346,7 +346,7 @@ TEST_P(EvaluationOf, PlantsAsTheReference) {
   int on_rough_ground = 0;
   for (int tick = 0; tick < 900; ++tick) {
     crowd.Advance();
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       const Movement* movement = avatar.movement();
       if (movement == nullptr) continue;
       if (!movement->feet.is_active) continue;
@@ -388,7 +388,7 @@ TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
     for (int tick = 0; tick < 300; ++tick) {
       crowd.Advance();
       ticks.emplace_back();
-      for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, ticks.back());
+      for (const AvatarSimulation& avatar : crowd.avatars()) AppendBytes(avatar, ticks.back());
     }
   }
   std::printf("instruction sets compared:");
@@ -411,7 +411,7 @@ TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
     for (std::size_t tick = 0; tick < 300; ++tick) {
       crowd.Advance(at_once);
       std::string bytes;
-      for (const Avatar& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
+      for (const AvatarSimulation& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
       if (at_once == 1) {
         alone.push_back(std::move(bytes));
       } else {
@@ -442,7 +442,7 @@ TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
   for (int tick = 0; tick < 200; ++tick) {
     crowd.Advance();
     std::vector<PoseJob> jobs;
-    for (const Avatar& avatar : crowd.avatars()) {
+    for (const AvatarSimulation& avatar : crowd.avatars()) {
       if (avatar.movement() == nullptr) continue;
       const std::size_t i = jobs.size();
       movements[i] = *avatar.movement();
@@ -480,7 +480,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
       if (tick % 3 != 0) continue;
       std::uint32_t tag = 0;
       std::size_t wanted = 0;
-      for (const Avatar& avatar : crowd.avatars()) {
+      for (const AvatarSimulation& avatar : crowd.avatars()) {
         if (avatar.movement() == nullptr) continue;
         movements[tag] = *avatar.movement();
         const int apart = 1 + static_cast<int>(random.Draw(0.0, 3.0));

@@ -21,7 +21,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RandomWalker& walker, const Avatar& avatar, std::uint64_t id,
+MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar, std::uint64_t id,
                               Random& random) {
   MovementRequest request{
       id, {}, random.Draw(0, 1) < 0.8 ? Interrupt::kNow : Interrupt::kAfterMovement};
@@ -59,7 +59,7 @@ struct Figures {
 // Looks at one avatar after every frame.
 class Observer {
  public:
-  Observer(const Avatar& avatar, Figures& figures)
+  Observer(const AvatarSimulation& avatar, Figures& figures)
       : avatar_(avatar), figures_(figures), steps_(avatar.library().skeleton(), kFps) {}
 
   void Look() {
@@ -104,7 +104,7 @@ class Observer {
     }
   }
 
-  const Avatar& avatar_;
+  const AvatarSimulation& avatar_;
   Figures& figures_;
   VelocitySteps steps_;
   int frames_since_join_ = 0;
@@ -119,7 +119,7 @@ Figures InterruptAll(const RandomWalker& walker, const Library& library, BlendKi
   Figures figures;
   for (int i = 0; i < avatars; ++i) {
     Random random(seed + static_cast<unsigned>(i));
-    Avatar avatar(library, BaseFrame{}, {.blend = blend});
+    AvatarSimulation avatar(library, BaseFrame{}, {.blend = blend});
     Observer observer(avatar, figures);
     double next_s = 0.0;
     std::uint64_t id = 0;
@@ -202,7 +202,7 @@ class TakeOverOfBuiltin : public testing::Test {
     ASSERT_TRUE(avatar_.Enqueue({2, std::move(movement), interrupt}).has_value());
   }
 
-  Avatar avatar_{OpenLibrary("builtin").value(), BaseFrame{}};
+  AvatarSimulation avatar_{OpenLibrary("builtin").value(), BaseFrame{}};
 };
 
 using Type = AvatarEventType;

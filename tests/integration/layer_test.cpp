@@ -81,8 +81,8 @@ TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
   ASSERT_GE(carry, 0);
   AvatarOptions options;
   if (walker.on_terrain) options.terrain = Slabs();
-  Avatar plain(library, {}, options);
-  Avatar layered(library, {}, options);
+  AvatarSimulation plain(library, {}, options);
+  AvatarSimulation layered(library, {}, options);
   Random random(7);
   for (int i = 0; i < 12; ++i) {
     MovementRequest request{
@@ -229,7 +229,7 @@ TEST(LayerRequests, WhatMakesNoSenseIsRefusedAndChangesNothing) {
 
 TEST(LayerRequests, NoTickAllocates) {
   const Library library = LibraryOf({});
-  Avatar avatar(library, {});
+  AvatarSimulation avatar(library, {});
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
   // Only an avatar's first layer makes room for its pose with layers.
   ASSERT_TRUE(avatar.SetLayer({.layer = 0}).has_value());

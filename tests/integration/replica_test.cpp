@@ -72,13 +72,13 @@ class RandomlyDriven {
     if (Draws(0.01)) DrawLayer(random_, avatar_);
   }
 
-  [[nodiscard]] Avatar& avatar() { return avatar_; }
+  [[nodiscard]] AvatarSimulation& avatar() { return avatar_; }
 
  private:
   bool Draws(double likely) { return stridewire::Draws(random_, likely); }
 
   Random& random_;
-  Avatar avatar_;
+  AvatarSimulation avatar_;
 };
 
 std::string Refusal(AvatarReplica& replica, const Bytes& record) {
@@ -98,7 +98,7 @@ void Advance(AvatarReplica& replica, SoaPoseEvaluator& evaluator, double dt_s) {
   AvatarReplica::AdvanceAll(std::span(&one, 1), dt_s, evaluator);
 }
 
-int Begun(const Avatar& avatar) {
+int Begun(const AvatarSimulation& avatar) {
   return static_cast<int>(std::ranges::count_if(avatar.events(), [](const AvatarEvent& event) {
     return event.type == AvatarEventType::kStarted && event.group >= 0;
   }));
@@ -123,7 +123,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   constexpr int kTicks = 3000;
   for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
     RandomlyDriven driven(library_, random);
-    Avatar& avatar = driven.avatar();
+    AvatarSimulation& avatar = driven.avatar();
     AvatarReplica first(library_);
     std::optional<AvatarReplica> late;
     int joins_at = 0;
@@ -176,7 +176,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
   std::size_t state_bytes = 0;
   std::size_t largest_state = 0;
   for (int walker = 0; walker < 10; ++walker) {
-    Avatar avatar(library_, BaseFrame{},
+    AvatarSimulation avatar(library_, BaseFrame{},
                   {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
     for (int tick = 0; tick < 3000; ++tick) {
       if (avatar.idle()) {
@@ -346,7 +346,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
 
 TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
   const Library library = LibraryOf({});
-  Avatar avatar(library, BaseFrame{});
+  AvatarSimulation avatar(library, BaseFrame{});
   avatar.Advance(1.0 / 60.0);
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
   avatar.Advance(1.0 / 60.0);

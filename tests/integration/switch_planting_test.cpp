@@ -20,7 +20,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RandomWalker& walker, const Avatar& avatar, Random& random) {
+MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar, Random& random) {
   MovementRequest request{
       1, {}, random.Draw(0, 1) < 0.6 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
@@ -51,7 +51,7 @@ struct Figures {
 // Looks at one avatar after every frame.
 class Observer {
  public:
-  Observer(const Avatar& avatar, Figures& figures)
+  Observer(const AvatarSimulation& avatar, Figures& figures)
       : avatar_(avatar), figures_(figures), steps_(avatar.library().skeleton(), kFps) {}
 
   void Look() {
@@ -93,7 +93,7 @@ class Observer {
     }
   }
 
-  const Avatar& avatar_;
+  const AvatarSimulation& avatar_;
   Figures& figures_;
   VelocitySteps steps_;
   Join join_ = kStays;
@@ -108,7 +108,7 @@ Figures SwitchAll(const RandomWalker& walker, const Library& library, double sec
   Figures figures;
   for (int i = 0; i < kRandomWalkers; ++i) {
     Random random(seed + static_cast<unsigned>(i));
-    Avatar avatar(library, BaseFrame{});
+    AvatarSimulation avatar(library, BaseFrame{});
     Observer observer(avatar, figures);
     double next_request_s = 0.0;
     double next_switch_s = 0.0;
@@ -189,7 +189,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
   int landings = 0;
   for (int i = 0; i < kRandomWalkers; ++i) {
     Random random(seed + static_cast<unsigned>(i));
-    Avatar avatar(library, BaseFrame{}, {.terrain = ground});
+    AvatarSimulation avatar(library, BaseFrame{}, {.terrain = ground});
     Observer observer(avatar, figures);
     int planted_steps = 0;
     for (int frame = 0; frame < 3600; ++frame) {
@@ -234,7 +234,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
 }
 
 TEST(SwitchPlantingOff, WhatMustBeMetIsRefusedAtOnceOrWhenItsTurnComes) {
-  Avatar avatar(LibraryOf({}), BaseFrame{});
+  AvatarSimulation avatar(LibraryOf({}), BaseFrame{});
   const MovementRequest must{
       2, StepRequest{.foot = Foot::kRight, .at = {{{-0.1, 0.0, 0.9}, 0.0}}, .exact_only = true}};
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}}).has_value());

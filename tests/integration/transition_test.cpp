@@ -148,7 +148,7 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
 // "+" before what it inserts and "-" before what it refuses, and the reason.
 std::string Does(std::shared_ptr<const MotionLibrary> library,
                  const std::vector<decltype(MovementRequest::movement)>& movements) {
-  Avatar avatar(std::move(library), BaseFrame{});
+  AvatarSimulation avatar(std::move(library), BaseFrame{});
   std::uint64_t id = 0;
   for (const auto& movement : movements) {
     const Status status = avatar.Enqueue({++id, movement});
@@ -265,7 +265,7 @@ TEST(Ways, AnOlderLibraryGoesByItsFeet) {
 TEST(Ways, AreFoundWithoutAllocating) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   for (const auto& library : {OpenLibrary("builtin").value(), strides}) {
-    Avatar avatar(library, BaseFrame{});
+    AvatarSimulation avatar(library, BaseFrame{});
     for (int i = 0; i < 3; ++i) {
       ASSERT_TRUE(avatar.Enqueue({1, Step(Foot::kLeft, 0.5)}).has_value());
       ASSERT_TRUE(avatar.Enqueue({2, Step(Foot::kLeft, 0.5)}).has_value());
@@ -289,7 +289,7 @@ TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.groups.pop_back();
   const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
-  Avatar avatar(no_jumps, BaseFrame{});
+  AvatarSimulation avatar(no_jumps, BaseFrame{});
   const Status status = avatar.Enqueue({1, JumpRequest{.length_m = 0.6}});
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
@@ -328,7 +328,7 @@ TEST_P(Joins, AreNoRougherThanMovements) {
   int inserted = 0;
   for (unsigned i = 0; i < 12; ++i) {
     Random random(seed + i);
-    Avatar avatar(library, BaseFrame{});
+    AvatarSimulation avatar(library, BaseFrame{});
     VelocitySteps steps(library->skeleton(), kFramesPerS);
     std::size_t from = 3;
     std::size_t to = 3;

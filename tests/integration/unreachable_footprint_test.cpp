@@ -28,7 +28,7 @@ MovementRequest StepOnto(std::uint64_t id, Foot foot, const DVec3& place_m, doub
           StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
 }
 
-BlendedFoot SeenFoot(const Avatar& avatar, Foot foot) {
+BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
   const MotionLibrary& library = avatar.library();
   LegPose leg;
   EvaluateLeg(library.skeleton(), library.leg_rig(), avatar.pose(), foot, leg);
@@ -55,7 +55,7 @@ struct Seen {
 };
 
 // Advances until the request has ended; nobody but the pose is asked where feet are.
-Seen Watch(Avatar& avatar, std::uint64_t id, Foot foot, const Footprint& asked,
+Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprint& asked,
            const DVec3& stays_m) {
   const double ball_m = avatar.library().leg_rig().side(foot).ball_height_m;
   Seen seen;
@@ -104,7 +104,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261122;
   Random random(seed);
-  Avatar avatar(library, BaseFrame{});
+  AvatarSimulation avatar(library, BaseFrame{});
   int inside = 0, refused_inside = 0, outside = 0, played_outside = 0, refused = 0, nearest_met = 0;
   double worst_m = 0.0;
   double worst_rad = 0.0;
@@ -140,7 +140,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
                                          random.Draw(-1.0, 1.8));
     const Footprint print{stays_m + RotateYaw(heading_rad, vector), heading_rad};
 
-    Avatar other = avatar;
+    AvatarSimulation other = avatar;
     ASSERT_TRUE(
         other.Enqueue(StepOnto(id, foot, print.position_m, heading_rad, false)).has_value());
     const Seen near = Watch(other, id, foot, print, stays_m);
@@ -159,7 +159,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
       ++refused;
       const auto told = std::ranges::find(other.events(), Type::kRejected, &AvatarEvent::type);
       const Footprint nearest = told->missed->nearest;
-      Avatar again = avatar;
+      AvatarSimulation again = avatar;
       ASSERT_TRUE(
           again.Enqueue(StepOnto(id, foot, nearest.position_m, nearest.heading_rad)).has_value());
       nearest_met += !Watch(again, id, foot, nearest, stays_m).is_rejected;
@@ -198,7 +198,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
 class RefusalOfBuiltin : public testing::Test {
  protected:
   // Queues steps, of which those with an odd id are far out of reach and are to be met.
-  static void Queue(Avatar& avatar, std::initializer_list<std::uint64_t> ids) {
+  static void Queue(AvatarSimulation& avatar, std::initializer_list<std::uint64_t> ids) {
     for (const std::uint64_t id : ids) {
       MovementRequest request{id, StepRequest{.length_m = 0.5}};
       if (id % 2 == 1) request = StepOnto(id, Foot::kLeft, {0.0, 0.0, -9.0}, 0.0);
@@ -206,7 +206,7 @@ class RefusalOfBuiltin : public testing::Test {
     }
   }
   // Both avatars until they stand: bit by bit the same poses, and the same events but for those of refusals.
-  static int AdvanceAlike(Avatar& refusing, Avatar& other) {
+  static int AdvanceAlike(AvatarSimulation& refusing, AvatarSimulation& other) {
     int refused = 0;
     for (int tick = 0; tick < 1200 && !(other.idle() && refusing.idle()); ++tick) {
       refusing.Advance(kTickS);
@@ -230,8 +230,8 @@ class RefusalOfBuiltin : public testing::Test {
   }
 
   Library library_ = OpenLibrary("builtin").value();
-  Avatar avatar_{library_, BaseFrame{}};
-  Avatar other_{library_, BaseFrame{}};
+  AvatarSimulation avatar_{library_, BaseFrame{}};
+  AvatarSimulation other_{library_, BaseFrame{}};
 };
 
 TEST_F(RefusalOfBuiltin, TheQueueGoesOnAsIfItHadNotBeenThere) {
@@ -267,7 +267,7 @@ TEST_F(RefusalOfBuiltin, SaysWhereTheNearestFootprintWouldBe) {
 }
 
 TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
-  for (Avatar* avatar : {&avatar_, &other_}) {
+  for (AvatarSimulation* avatar : {&avatar_, &other_}) {
     Queue(*avatar, {2, 4});
     while (avatar->movement() == nullptr ||
            avatar->movement()->feet.foot(Foot::kRight).IsPlanted(avatar->movement_time_s()) ==
@@ -310,7 +310,7 @@ TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
   TerrainData data;
   data.boxes.push_back({{-5.0, 0.2}, {5.0, 5.0}, 0.2});
   data.boxes.push_back({{-5.0, -5.0}, {5.0, -0.2}, 4.0});
-  Avatar avatar(library_, BaseFrame{}, {.terrain = Terrain::Make(std::move(data)).value()});
+  AvatarSimulation avatar(library_, BaseFrame{}, {.terrain = Terrain::Make(std::move(data)).value()});
   ASSERT_TRUE(avatar.Enqueue(StepOnto(1, Foot::kLeft, {0.1, 0.0, -0.4}, 0.0)).has_value());
   ASSERT_TRUE(avatar.Enqueue(StepOnto(2, Foot::kLeft, {0.1, 9.0, 0.45}, 0.0)).has_value());
   avatar.Advance(kTickS);
@@ -322,7 +322,7 @@ TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
 }
 
 TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
-  for (int i = 0; i < Avatar::kMaxQueue; ++i) Queue(avatar_, {2ull * i + 1});
+  for (int i = 0; i < AvatarSimulation::kMaxQueue; ++i) Queue(avatar_, {2ull * i + 1});
   const std::size_t before = counted_memory::LiveBytes();
   counted_memory::ResetPeak();
   int refused = 0;
@@ -336,15 +336,15 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
   EXPECT_LE(counted_memory::PeakBytes(), before);
   std::printf("%d refusals in %d ticks, %.1f us each\n", refused, ticks,
               1e6 * took.count() / refused);
-  EXPECT_EQ(refused, Avatar::kMaxQueue);
-  EXPECT_GE(ticks, Avatar::kMaxQueue / Avatar::kMaxEventsPerAdvance);
+  EXPECT_EQ(refused, AvatarSimulation::kMaxQueue);
+  EXPECT_GE(ticks, AvatarSimulation::kMaxQueue / AvatarSimulation::kMaxEventsPerAdvance);
 }
 
 TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
   const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
   EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only has a meaning only beside at_m");
-  Avatar sliding(library_, BaseFrame{}, {.foot_planting = false});
+  AvatarSimulation sliding(library_, BaseFrame{}, {.foot_planting = false});
   const MovementRequest somewhere = StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0);
   EXPECT_EQ(sliding.Enqueue(somewhere).error().code, ErrorCode::kUnsupported);
   EXPECT_TRUE(sliding.Enqueue(StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0, false)).has_value());

@@ -66,7 +66,7 @@ struct Walk {
   double path_m = 0.0;  // of the base from step to step
 };
 
-Walk GoTo(Avatar& avatar, const WalkRequest& goal) {
+Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
   Walk walk;
   EXPECT_TRUE(avatar.Enqueue({1, goal}).has_value());
   DVec3 at = avatar.base().position_m;
@@ -119,7 +119,7 @@ double WalkAbout(const char* name, const Library& library, const Ground& ground,
     // Half of them nearby, where the ways are many.
     goal.position_m = i % 2 == 0 ? place() : start.position_m + 0.2 * place();
     goal.heading_rad = random.Draw(-M_PI, M_PI);
-    Avatar avatar(library, start, {.terrain = ground});
+    AvatarSimulation avatar(library, start, {.terrain = ground});
     const Walk walk = GoTo(avatar, goal);
     EXPECT_TRUE(walk.ended) << i;
     steps += walk.steps;
@@ -176,7 +176,7 @@ TEST_P(WalkTo, AThousandPlacesOnRoughGround) {
 }
 
 TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
-  Avatar avatar(OpenLibrary("builtin").value(), BaseFrame{});
+  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   ASSERT_TRUE(avatar.Enqueue({1, WalkRequest{.position_m = {0.0, 0.0, 5.0}}}).has_value());
   for (int i = 0; i < 60; ++i) avatar.Advance(kTickS);
   EXPECT_EQ(avatar.CancelQueue(), 1);
@@ -190,7 +190,7 @@ TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
 
 TEST(WalkTo, AllocatesNothingOnTheWay) {
   Random random(3);
-  Avatar avatar(OpenLibrary("builtin").value(), BaseFrame{}, {.terrain = RoughGround(random)});
+  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{}, {.terrain = RoughGround(random)});
   WalkRequest goal{.position_m = {2.0, 0.0, 3.0}, .heading_rad = 2.0};
   goal.waypoints_m = {{0.0, 0.0, 2.0}};
   ASSERT_TRUE(avatar.Enqueue({1, goal}).has_value());
@@ -204,7 +204,7 @@ TEST(WalkTo, AllocatesNothingOnTheWay) {
 }
 
 TEST(WalkTo, PassesItsWaypoints) {
-  Avatar avatar(OpenLibrary("builtin").value(), BaseFrame{});
+  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   WalkRequest goal{.position_m = {4.0, 0.0, 0.0}, .heading_rad = 3.0};
   goal.waypoints_m = {{0.0, 0.0, 3.0}, {4.0, 0.0, 3.0}};
   ASSERT_TRUE(avatar.Enqueue({1, goal}).has_value());
@@ -229,7 +229,7 @@ TEST(WalkTo, KeepsToASpeedItsStepsHave) {
   double seconds[2];
   const double speeds_m_s[2] = {0.5, 1.0};
   for (int i = 0; i < 2; ++i) {
-    Avatar avatar(library, BaseFrame{});
+    AvatarSimulation avatar(library, BaseFrame{});
     WalkRequest goal{.position_m = {0.0, 0.0, 10.0}};
     goal.speed_m_s = speeds_m_s[i];
     ASSERT_TRUE(avatar.Enqueue({1, goal}).has_value());
@@ -244,7 +244,7 @@ TEST(WalkTo, SaysWhyItCanNot) {
   const Library library = OpenLibrary("builtin").value();
   const Ground wall =
       Terrain::Make({.height_field = {}, .boxes = {{{-20.0, 2.0}, {20.0, 2.5}, 1.5}}}).value();
-  Avatar avatar(library, BaseFrame{}, {.terrain = wall});
+  AvatarSimulation avatar(library, BaseFrame{}, {.terrain = wall});
   const Walk behind = GoTo(avatar, {.position_m = {0.0, 0.0, 5.0}});
   EXPECT_FALSE(behind.arrived);
   EXPECT_FALSE(behind.reason.empty());

@@ -22,7 +22,7 @@ inline BaseFrame DrawBase(Random& random) {
 
 /// Whatever an avatar can be asked for: steps, also to footprints, walks, jumps, stands, some of which take over and some of
 /// which it cannot do.
-inline MovementRequest DrawRequest(Random& random, const Avatar& avatar) {
+inline MovementRequest DrawRequest(Random& random, const AvatarSimulation& avatar) {
   MovementRequest request{.id = 1};
   const double kind = random.Draw(0.0, 1.0);
   if (kind < 0.4) {
@@ -55,7 +55,7 @@ inline MovementRequest DrawRequest(Random& random, const Avatar& avatar) {
 }
 
 /// One of its library's layers comes or goes, if there are any.
-inline void DrawLayer(Random& random, Avatar& avatar) {
+inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
   const auto layers = static_cast<double>(avatar.library().layers().size());
   if (layers == 0.0) return;
   (void)avatar.SetLayer({.layer = static_cast<int>(random.Draw(0.0, layers)),
@@ -80,29 +80,29 @@ class DrawnCrowd {
   /// A sixtieth of a second, `at_once` avatars together, the last ones fewer.
   void Advance(std::size_t at_once = 1000) {
     DrawRequests();
-    std::vector<Avatar*> some;
-    for (Avatar& avatar : avatars_) {
+    std::vector<AvatarSimulation*> some;
+    for (AvatarSimulation& avatar : avatars_) {
       some.push_back(&avatar);
       if (some.size() < at_once && &avatar != &avatars_.back()) continue;
-      Avatar::AdvanceAll(some, 1.0 / 60.0, evaluator_);
+      AvatarSimulation::AdvanceAll(some, 1.0 / 60.0, evaluator_);
       some.clear();
     }
   }
 
-  /// The same without poses (Avatar::AdvanceStates).
+  /// The same without poses (AvatarSimulation::AdvanceStates).
   void AdvanceStates() {
     DrawRequests();
-    std::vector<Avatar*> all;
-    for (Avatar& avatar : avatars_) all.push_back(&avatar);
-    Avatar::AdvanceStates(all, 1.0 / 60.0);
+    std::vector<AvatarSimulation*> all;
+    for (AvatarSimulation& avatar : avatars_) all.push_back(&avatar);
+    AvatarSimulation::AdvanceStates(all, 1.0 / 60.0);
   }
 
-  [[nodiscard]] const std::vector<Avatar>& avatars() const { return avatars_; }
-  [[nodiscard]] std::vector<Avatar>& avatars() { return avatars_; }
+  [[nodiscard]] const std::vector<AvatarSimulation>& avatars() const { return avatars_; }
+  [[nodiscard]] std::vector<AvatarSimulation>& avatars() { return avatars_; }
 
  private:
   void DrawRequests() {
-    for (Avatar& avatar : avatars_) {
+    for (AvatarSimulation& avatar : avatars_) {
       if (Draws(random_, 0.01)) DrawLayer(random_, avatar);
       if (Draws(random_, 0.003)) (void)avatar.SetFootPlanting(!avatar.foot_planting());
       if (avatar.queue_size() == 0 && Draws(random_, 0.2)) {
@@ -113,7 +113,7 @@ class DrawnCrowd {
 
   Random random_;
   SoaPoseEvaluator evaluator_;
-  std::vector<Avatar> avatars_;
+  std::vector<AvatarSimulation> avatars_;
 };
 
 }  // namespace stridewire

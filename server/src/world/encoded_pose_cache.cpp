@@ -127,7 +127,7 @@ std::uint8_t EncodedPoseCache::CutsAfter(const Kept& kept, std::uint64_t revisio
   return kept.cuts > 0 ? kept.cuts - 1 : 0;
 }
 
-void EncodedPoseCache::Ask(Place& place, Avatar& avatar) {
+void EncodedPoseCache::Ask(Place& place, AvatarSimulation& avatar) {
   // Layers go on by themselves, whatever the avatar does.
   const bool has_layers = !avatar.is_event_free() && !avatar.layers().empty();
   if (!has_layers && Has(place, avatar.revision())) return;

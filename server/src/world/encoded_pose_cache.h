@@ -90,7 +90,7 @@ class EncodedPoseCache {
   void Begin(std::uint64_t step, double step_s, std::size_t shown);
 
   /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is until then.
-  void Ask(Place& place, Avatar& avatar);
+  void Ask(Place& place, AvatarSimulation& avatar);
 
   // What Ask does, for who has no avatar.
   /// Poses of this step are there already.

@@ -7,7 +7,7 @@
 namespace stridewire::server {
 namespace {
 
-protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEvent& started,
+protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar, const AvatarEvent& started,
                                             std::size_t max_site_bytes) {
   const protocol::Event event = ToWire(started, avatar.library());
   protocol::CurrentMovement current{.request_id = event.request_id,
@@ -54,7 +54,7 @@ protocol::CurrentMovement CurrentMovementOf(const Avatar& avatar, const AvatarEv
 
 }  // namespace
 
-protocol::AvatarState Inspect(const Avatar& avatar, std::size_t max_site_bytes) {
+protocol::AvatarState Inspect(const AvatarSimulation& avatar, std::size_t max_site_bytes) {
   protocol::AvatarState state;
   state.base = ToWire(avatar.base());
   if (const AvatarEvent* started = avatar.started()) {

@@ -107,7 +107,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
       continue;
     }
     const BaseFrame start = FromWire(item.spawn.start);
-    avatars_.emplace(number, Entry{.avatar = Avatar(world_->library, start, options),
+    avatars_.emplace(number, Entry{.avatar = AvatarSimulation(world_->library, start, options),
                                    .owner = command.session,
                                    .spawn_tick = tick});
     is_order_known_ = false;
@@ -131,7 +131,7 @@ void WorldShard::Request(const RequestPart& part, std::uint64_t tick, CommandRes
       result.items.push_back(NoSuchAvatar(item.index, asked.avatar, asked.request_id));
       continue;
     }
-    Avatar& avatar = it->second.avatar;
+    AvatarSimulation& avatar = it->second.avatar;
     const std::uint32_t delay_ticks = StartTickOf(asked.avatar, part.over_ticks);
     held += delay_ticks > 0;
     ReplyItem refused{.index = item.index, .avatar = asked.avatar, .request_id = asked.request_id};
@@ -294,7 +294,7 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
-    Avatar::AdvanceStates(advancing_, step_s, &eventful_);
+    AvatarSimulation::AdvanceStates(advancing_, step_s, &eventful_);
     ++step_;
     --more_steps_;
     if (movements_wanted_) TellMovements();
@@ -570,7 +570,7 @@ void WorldShard::ShowPoses(std::span<const std::uint32_t> rows) {
   const std::span<const InOrder> in_order = AvatarsInOrder();
   shown_.clear();
   for (const std::uint32_t row : rows) shown_.push_back(&in_order[row].entry->avatar);
-  Avatar::ShowPoses(shown_, ahead_.evaluator());
+  AvatarSimulation::ShowPoses(shown_, ahead_.evaluator());
 }
 
 std::shared_ptr<const SpatialGrid> WorldShard::PlacesAt(std::uint64_t tick) {

@@ -84,7 +84,7 @@ class WorldShard {
 
  private:
   struct Entry {
-    Avatar avatar;
+    AvatarSimulation avatar;
     SessionId owner = 0;
     std::uint64_t spawn_tick = 0;
     EncodedPoseCache::Place ahead;
@@ -132,7 +132,7 @@ class WorldShard {
   std::map<AvatarId, Entry> avatars_;  // in order, so that batches and events are
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
-  std::vector<Avatar*> advancing_;
+  std::vector<AvatarSimulation*> advancing_;
   std::vector<std::uint32_t>
       eventful_;  // rows to which something may have happened in the last step
   protocol::PoseRows::Avatars numbers_;
@@ -160,7 +160,7 @@ class WorldShard {
   std::vector<protocol::Movements> movements_;  // of steps not taken yet
   std::shared_ptr<const WorldTerrain> ground_;        // null: flat
   std::deque<TerrainPart> grounds_;              // from later ticks on
-  std::vector<Avatar*> shown_;                  // scratch
+  std::vector<AvatarSimulation*> shown_;                  // scratch
   // By mode.
   std::array<bool, kSentModes.size()> last_had_poses_{};
   std::array<RowsPool, kSentModes.size()> rows_;

@@ -131,7 +131,7 @@ PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
   for (int i = 1; i <= avatars; ++i) {
     const auto number = static_cast<AvatarId>(i);
     const protocol::Placement start = Start(number);
-    Avatar avatar(MakeTestLibrary(), {start.position_m, start.heading_rad});
+    AvatarSimulation avatar(MakeTestLibrary(), {start.position_m, start.heading_rad});
     const auto step = [&](double length_m) {
       return MovementRequest{1, StepRequest{.length_m = length_m}};
     };

@@ -41,7 +41,7 @@ class Server {
  public:
   explicit Server(AvatarId count) {
     for (AvatarId i = 1; i <= count; ++i) {
-      avatars_.emplace(i, Avatar(library_, {DVec3(i, 0.0, 0.0), 0.1 * i}));
+      avatars_.emplace(i, AvatarSimulation(library_, {DVec3(i, 0.0, 0.0), 0.1 * i}));
     }
   }
 
@@ -101,7 +101,7 @@ class Server {
 
  private:
   std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
-  std::map<AvatarId, Avatar> avatars_;
+  std::map<AvatarId, AvatarSimulation> avatars_;
   std::uint64_t step_ = 0;
 };
 

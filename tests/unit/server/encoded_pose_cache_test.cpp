@@ -30,13 +30,13 @@ class Encoder {
     numbers_ = std::make_shared<const std::vector<protocol::AvatarId>>(std::move(numbers));
   }
 
-  const protocol::PoseRows& Encode(PoseMode mode, std::span<const Avatar> avatars) {
+  const protocol::PoseRows& Encode(PoseMode mode, std::span<const AvatarSimulation> avatars) {
     protocol::PoseBatchInfo info;
     info.world = 1;
     info.mode = mode;
     info.joint_count = static_cast<std::uint16_t>(codes_.joints.size());
     EXPECT_TRUE(rows_.Begin(info, numbers_, codes_.codecs.Find(mode)));
-    for (const Avatar& avatar : avatars) {
+    for (const AvatarSimulation& avatar : avatars) {
       EXPECT_TRUE(rows_.Add(0, avatar.pose().root_position_m, avatar.pose().rotations));
     }
     return rows_;
@@ -74,7 +74,7 @@ class Ahead {
   void Compare(std::span<const PoseMode> modes) {
     poses_.Begin(step_, 1.0 / 60.0, shown_);
     for (std::size_t i = 0; i < kCrowd; ++i) {
-      const Avatar& avatar = told_.avatars()[i];
+      const AvatarSimulation& avatar = told_.avatars()[i];
       found_ += avatar.layers().empty() && avatar.movement() != nullptr &&
                 poses_.Has(places_[i], avatar.revision());
       poses_.Ask(places_[i], told_.avatars()[i]);
@@ -264,7 +264,7 @@ TEST(EncodedPoseCache, WhoseRootCanNotBeToldIsNowhereNear) {
 
 // How many poses are made for so many ticks of an avatar whose movement gives way to another every few of them.
 std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
-                          const Avatar& avatar, const std::shared_ptr<PoseScratch>& scratch) {
+                          const AvatarSimulation& avatar, const std::shared_ptr<PoseScratch>& scratch) {
   constexpr std::size_t kShown = 10'000;
   constexpr double kTickS = 1e-4;
   EncodedPoseCache poses(scratch, nullptr);
@@ -286,7 +286,7 @@ std::uint64_t EvaluatedIn(std::uint64_t ticks, std::uint64_t ticks_of_a_course,
 
 TEST(EncodedPoseCache, OfWhoIsSentElsewhereAgainAndAgainFewAreInVain) {
   const auto library = LibraryOf({});
-  Avatar avatar(library, {}, {});
+  AvatarSimulation avatar(library, {}, {});
   ASSERT_TRUE(avatar.Enqueue({.id = 1, .movement = StepRequest{.length_m = 0.6}}));
   avatar.Advance(0.1);
   ASSERT_NE(avatar.movement(), nullptr);

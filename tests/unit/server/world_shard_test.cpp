@@ -168,7 +168,7 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
           ->Execute({.world = world, .session = 1, .seq = 1, .part = std::move(part)}, tick)
           .accepted;
     };
-    std::vector<Avatar> alone;
+    std::vector<AvatarSimulation> alone;
     for (const AvatarId avatar : {1u, 2u}) {
       ASSERT_EQ(budget.Reserve(*world), AvatarBudget::Verdict::kOk);
       ASSERT_EQ(execute(avatar, 1, SpawnPart{{{0, {.avatar = avatar}}}}), 1u);
@@ -190,7 +190,7 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
         ASSERT_TRUE(alone[1].SetLayer({carry, !is_off, 1.0, 0.3, 1.0}).has_value());
       }
       for (const auto& shard : shards) shard->Advance(tick, 1);
-      for (Avatar& avatar : alone) avatar.Advance(kClock.tick_s());
+      for (AvatarSimulation& avatar : alone) avatar.Advance(kClock.tick_s());
       for (const auto& shard : shards) {
         protocol::PoseBatchComposer composer;
         PoseDelivery delivery;

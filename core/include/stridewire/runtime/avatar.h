@@ -97,13 +97,13 @@ struct AvatarOptions {
 /// and the sizes of the steps in time, the poses are the same bytes on every machine. Not
 /// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries) and
 /// `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
-class Avatar {
+class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = 1024;
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
   /// Stands at `start` in the library's stand pose.
-  Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+  AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
          const AvatarOptions& options = {});
 
   /// A swing less than this part of which is left is not sent elsewhere.
@@ -144,17 +144,17 @@ class Avatar {
 
   /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
   /// bit of any pose depends on who else is there.
-  static void AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
+  static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                          SoaPoseEvaluator& evaluator);
 
   /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none of now until
   /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
-  static void AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
+  static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
                             std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
   void ShowPose();
   /// The same for many avatars of one library together.
-  static void ShowPoses(std::span<Avatar* const> avatars, SoaPoseEvaluator& evaluator);
+  static void ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
 
   /// Displayed, in the world.
   [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }

@@ -57,7 +57,7 @@ enum class Interrupt : std::uint8_t {
   kNone,           ///< After all that is queued
   kAfterMovement,  ///< After the movement under way; what is queued is dropped, a stand or walk ends
   /// At once if both feet stand, else when they have landed; what is queued is dropped. A step of the foot
-  /// that swings takes it to its own footprint, if there is swing enough left (Avatar::kLeastSwingLeft). Who
+  /// that swings takes it to its own footprint, if there is swing enough left (AvatarSimulation::kLeastSwingLeft). Who
   /// is to stand finishes the movement first.
   kNow,
 };

@@ -110,7 +110,7 @@ Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> reques
 
 // Sets the layers that go before a movement, and those left of earlier ones.
 Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
-                 Avatar& avatar) {
+                 AvatarSimulation& avatar) {
   for (; next < layers.size() && layers[next].before <= before; ++next) {
     const LayerCue& cue = layers[next];
     const Status status = avatar.SetLayer({.layer = avatar.library().FindLayer(cue.layer),
@@ -189,7 +189,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
   }
 
   const int joint_count = library->skeleton().joint_count();
-  Avatar avatar(library, start, options);
+  AvatarSimulation avatar(library, start, options);
   Synthesis result;
   result.clip.fps = fps;
   result.clip.joint_count = joint_count;
@@ -214,7 +214,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
   }
   std::size_t next = 0;
   while (next < requests.size() || !avatar.idle()) {
-    while (next < requests.size() && avatar.queue_size() < Avatar::kMaxQueue) {
+    while (next < requests.size() && avatar.queue_size() < AvatarSimulation::kMaxQueue) {
       if (Status status = avatar.Enqueue(requests[next]); !status) {
         Error error = status.error();
         error.where = PlaceOf(next, layers) + (error.where.empty() ? "" : "." + error.where);

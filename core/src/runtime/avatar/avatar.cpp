@@ -26,7 +26,7 @@ constexpr std::size_t kUsualQueue = 8;
 
 }  // namespace
 
-Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+AvatarSimulation::AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
                const AvatarOptions& options)
     : options_(options), body_(std::move(library)) {
   events_.reserve(kUsualEvents);
@@ -35,7 +35,7 @@ Avatar::Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& st
   Teleport(start);
 }
 
-void Avatar::Teleport(const BaseFrame& start) {
+void AvatarSimulation::Teleport(const BaseFrame& start) {
   base_ = start;
   ++revision_;
   const Pose& stand = body_.library->stand_pose();
@@ -65,7 +65,7 @@ void Avatar::Teleport(const BaseFrame& start) {
   next_change_.is_any = true;
 }
 
-Status Avatar::Enqueue(const MovementRequest& request, double start_delay_s) {
+Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_delay_s) {
   STRIDEWIRE_CHECK(start_delay_s >= 0.0);
   if (Status status = ValidateRequest(*body_.library, request); !status) return status;
   if (queue_size() >= kMaxQueue) {
@@ -105,7 +105,7 @@ Status Avatar::Enqueue(const MovementRequest& request, double start_delay_s) {
   return {};
 }
 
-Status Avatar::SetLayer(const LayerRequest& request) {
+Status AvatarSimulation::SetLayer(const LayerRequest& request) {
   if (Status status = body_.layers.Set(*body_.library, request); !status) return status;
   body_.layered_pose.rotations.resize(body_.pose.rotations.size());
   next_change_.has_layers = true;
@@ -113,7 +113,7 @@ Status Avatar::SetLayer(const LayerRequest& request) {
   return {};
 }
 
-Status Avatar::SetFootPlanting(bool is_on) {
+Status AvatarSimulation::SetFootPlanting(bool is_on) {
   if (is_on && !body_.library->leg_rig().is_usable) {
     return Fail(ErrorCode::kUnsupported, "the library's legs are not such as can be planted");
   }
@@ -121,7 +121,7 @@ Status Avatar::SetFootPlanting(bool is_on) {
   return {};
 }
 
-int Avatar::CancelQueue() {
+int AvatarSimulation::CancelQueue() {
   const int dropped = queue_size();
   queue_.clear();
   queue_head_ = 0;
@@ -131,28 +131,28 @@ int Avatar::CancelQueue() {
   return dropped;
 }
 
-void Avatar::AddEvent(const AvatarEvent& event) {
+void AvatarSimulation::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
   events_.push_back(event);
   events_.back().time_s = time_s_;
   if (event.type == AvatarEventType::kStarted) started_ = events_.back();
 }
 
-FootState Avatar::MeasureFeet() const {
+FootState AvatarSimulation::MeasureFeet() const {
   return {FootVector(body_.library->skeleton(), body_.pose, Foot::kLeft, base_.heading_rad)};
 }
 
-void Avatar::Advance(double dt_s) {
+void AvatarSimulation::Advance(double dt_s) {
   AdvanceState(dt_s);
   ShowPose();
 }
 
-void Avatar::ShowPose() {
+void AvatarSimulation::ShowPose() {
   if (is_moving_) body_.Evaluate(movement_time_s_);
   body_.ShowLayers();
 }
 
-void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
+void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
                            std::vector<std::uint32_t>* eventful) {
   if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
@@ -168,29 +168,29 @@ void Avatar::AdvanceStates(std::span<Avatar* const> avatars, double dt_s,
   }
 }
 
-void Avatar::ShowPoses(std::span<Avatar* const> avatars, SoaPoseEvaluator& evaluator) {
+void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator) {
   std::array<PoseJob, SoaPose::kLanes> jobs;
   while (!avatars.empty()) {
-    const std::span<Avatar* const> block = avatars.first(std::min(avatars.size(), jobs.size()));
+    const std::span<AvatarSimulation* const> block = avatars.first(std::min(avatars.size(), jobs.size()));
     std::size_t moving = 0;
-    for (Avatar* avatar : block) {
+    for (AvatarSimulation* avatar : block) {
       if (!avatar->is_moving_) continue;
       jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
     }
     EvaluatePoses(evaluator, std::span(jobs).first(moving));
-    for (Avatar* avatar : block) avatar->body_.ShowLayers();
+    for (AvatarSimulation* avatar : block) avatar->body_.ShowLayers();
     avatars = avatars.subspan(block.size());
   }
 }
 
-void Avatar::AdvanceAll(std::span<Avatar* const> avatars, double dt_s,
+void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                         SoaPoseEvaluator& evaluator) {
   AdvanceStates(avatars, dt_s);
   ShowPoses(avatars, evaluator);
 }
 
 // What AdvanceEventfully reads of an avatar that goes on walking.
-void Avatar::PrefetchState() const {
+void AvatarSimulation::PrefetchState() const {
   PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
   PrefetchBytes(&events_, 1);
   PrefetchBytes(&body_.layers, sizeof(body_.layers));
@@ -200,7 +200,7 @@ void Avatar::PrefetchState() const {
 }
 
 // All of Advance but the pose at its end.
-void Avatar::AdvanceState(double dt_s) {
+void AvatarSimulation::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   if (StaysEventFree(dt_s)) {
     movement_time_s_ += dt_s;
@@ -213,7 +213,7 @@ void Avatar::AdvanceState(double dt_s) {
 }
 
 // From an Advance on in which nothing happened.
-double Avatar::NextEventTime() const {
+double AvatarSimulation::NextEventTime() const {
   const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() && events_.empty() &&
                         change_ == AvatarChange{};
   if (!is_event_free) return -1.0;
@@ -222,7 +222,7 @@ double Avatar::NextEventTime() const {
                                      : body_.movement.duration_s();
 }
 
-void Avatar::AdvanceEventfully(double dt_s) {
+void AvatarSimulation::AdvanceEventfully(double dt_s) {
   events_.clear();
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
@@ -263,14 +263,14 @@ void Avatar::AdvanceEventfully(double dt_s) {
   change_.is_idle_other = idle() != std::exchange(was_idle_, idle());
 }
 
-bool Avatar::BringsFeetTogether(const RequestPlan& plan) const {
+bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
   const int end_z = body_.library->group(plan.group).FindParameter(ParameterName::kEndZ);
   if (end_z < 0) return false;
   return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
          std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
 }
 
-bool Avatar::StartNext() {
+bool AvatarSimulation::StartNext() {
   interrupts_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
@@ -312,7 +312,7 @@ bool Avatar::StartNext() {
 }
 
 // The step or jump at the queue's head, or a step that has to go before it.
-void Avatar::StartTransitionPath() {
+void AvatarSimulation::StartTransitionPath() {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue saw to it that the library has the kind
@@ -332,21 +332,21 @@ void Avatar::StartTransitionPath() {
   }
 }
 
-void Avatar::StartInserted(const RequestPlan& plan) {
+void AvatarSimulation::StartInserted(const RequestPlan& plan) {
   const int inserted = closing_steps_ + 1;
   StartPlan(plan, 0);
   closing_steps_ = inserted;
 }
 
 // Takes the request off the queue's head; its id.
-std::uint64_t Avatar::PopQueue() {
+std::uint64_t AvatarSimulation::PopQueue() {
   const std::uint64_t id = queue_[queue_head_++].id;
   if (queue_size() == 0) CancelQueue();
   return id;
 }
 
 // The next step of the walk at the queue's head, which stays there until it has arrived or can not.
-void Avatar::GoOnWalking() {
+void AvatarSimulation::GoOnWalking() {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
@@ -378,13 +378,13 @@ void Avatar::GoOnWalking() {
 }
 
 // Where the ball of a foot is between two movements.
-DVec3 Avatar::StandsAt(Foot foot) const {
+DVec3 AvatarSimulation::StandsAt(Foot foot) const {
   return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
 // How much higher than the standing foot the ground is where a step would land.
-double Avatar::RiseAhead(const StepRequest& step) const {
+double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   const auto f = static_cast<std::size_t>(foot);
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
@@ -395,7 +395,7 @@ double Avatar::RiseAhead(const StepRequest& step) const {
   return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
 }
 
-std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) const {
+std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& request) const {
   if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
     return PlanJump(*body_.library, *jump);
   }
@@ -421,14 +421,14 @@ std::optional<RequestPlan> Avatar::PlanRequest(const MovementRequest& request) c
                        feet_);
 }
 
-void Avatar::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
+void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
   PlanMovement(plan, 0.0);
   BeginMovement(plan, request_id);
 }
 
 // The movement goes on from where both feet stand or, for one that takes over in mid-swing, from the same
 // part of its own swing.
-void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
+void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = body_.library->group(plan.group);
   std::array<double, MotionLibrary::kMaxExamples> weights;  // of which the first ones are touched
   if (options_.run_time_correction) {
@@ -449,7 +449,7 @@ void Avatar::PlanMovement(const RequestPlan& plan, double swing_part) {
 }
 
 // What was planned is under way.
-void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
+void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = group();
   // A footprint that planting reaches is met, whatever the examples span.
   const bool is_met = plan.exact && body_.movement.feet.is_active &&
@@ -482,7 +482,7 @@ void Avatar::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
 
 // A straight walk hangs on its feet along the way only: aside, where the examples have nothing to
 // say, on the body's own line.
-void Avatar::KeepToLine(const DVec3& line_m) {
+void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;
   const DVec3 root = DVec3(body_.blended_pose.root_position_m);
@@ -491,7 +491,7 @@ void Avatar::KeepToLine(const DVec3& line_m) {
   base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
 }
 
-void Avatar::FinishMovement(double at_s) {
+void AvatarSimulation::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
   CaptureBlendSource(at_s);
@@ -531,25 +531,25 @@ void Avatar::FinishMovement(double at_s) {
             .base = base_});
 }
 
-void Avatar::FinishStand() {
+void AvatarSimulation::FinishStand() {
   is_in_stand_ = false;
   last_group_ = body_.library->groups().size();
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
 }
 
-Vec3 Avatar::LandingBall(Foot foot) const {
+Vec3 AvatarSimulation::LandingBall(Foot foot) const {
   if (!body_.movement.feet.is_active)
     return BallPosition(body_.library->skeleton(), body_.pose, foot);
   const DVec3 print = body_.movement.feet.foot(foot).to.position_m;
   return Vec3(print.x, print.y + body_.library->leg_rig().side(foot).ball_height_m, print.z);
 }
 
-double Avatar::StrikeTime() const {
+double AvatarSimulation::StrikeTime() const {
   return body_.movement.warp.keytime_s(
       ContactKeytimesOf(group().kind, group().interval_count()).landing);
 }
 
-void Avatar::ReportFootStrikes(double before_s, double after_s) {
+void AvatarSimulation::ReportFootStrikes(double before_s, double after_s) {
   const MotionGroup& moving = group();
   const double strike_s = StrikeTime();
   if (!(before_s < strike_s && strike_s <= after_s)) return;

@@ -46,7 +46,7 @@ std::string DescribeRejection(const AvatarEvent& event) {
 
 // Plans the movement of a request. False: its footprint had to be met and is not; it is rejected, and everything is
 // as it was before.
-bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
+bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
                            double swing_part) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
@@ -80,7 +80,7 @@ bool Avatar::PlanRequested(const MovementRequest& request, const RequestPlan& pl
 }
 
 // A footprint near one that was missed that the step just planned would meet were it sent there.
-FootprintError Avatar::NearestInReach(const Footprint& asked, const FootprintError& missed,
+FootprintError AvatarSimulation::NearestInReach(const Footprint& asked, const FootprintError& missed,
                                      double swing_part) {
   const Foot moving = MovingFoot(group().kind);
   Footprint tried = asked;
@@ -103,7 +103,7 @@ FootprintError Avatar::NearestInReach(const Footprint& asked, const FootprintErr
 // Where the step just planned brings its foot. What the plan misses is not all of it: that legs are too short for a
 // step up or down shows in the pose only. If there the other foot gives way instead, the one would have landed as
 // far off had the other stayed.
-FootprintError Avatar::LandingErrorFrom(const Footprint& asked) {
+FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();
   const Foot moving = MovingFoot(group().kind);

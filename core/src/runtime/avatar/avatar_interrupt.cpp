@@ -9,20 +9,20 @@
 namespace stridewire {
 
 // When both feet stand again, or if they do the time that it is. Who has begun to jump jumps.
-double Avatar::Landed() const {
+double AvatarSimulation::Landed() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && movement_time_s_ <= swing.release_s
              ? movement_time_s_
              : std::max(movement_time_s_, swing.land_s);
 }
 
-double Avatar::EndOfMovement() const {
+double AvatarSimulation::EndOfMovement() const {
   return interrupts_ && !IsStartDelayed() ? std::min(Landed(), body_.movement.duration_s())
                                   : body_.movement.duration_s();
 }
 
 // The foot in the air is the one that the request at the queue's head moves, and far from landing.
-bool Avatar::RedirectsSwing() const {
+bool AvatarSimulation::RedirectsSwing() const {
   if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) || body_.plants_feet != foot_planting()) {
     return false;
   }
@@ -37,7 +37,7 @@ bool Avatar::RedirectsSwing() const {
 }
 
 // What a movement that begins at `time_s` of this one goes on from.
-void Avatar::CaptureBlendSource(double time_s) {
+void AvatarSimulation::CaptureBlendSource(double time_s) {
   const bool keeps_speed =
       options_.blend == BlendKind::kInertialization && time_s - body_.movement.start_offset_s >= kBlendStepS;
   moved_until_s_ = keeps_speed ? time_s_ : -1.0;
@@ -46,7 +46,7 @@ void Avatar::CaptureBlendSource(double time_s) {
 
 // Tells who shows the avatar elsewhere that the movement under way is left at `time_s`. One that began in the same
 // Advance they know nothing of.
-void Avatar::Leave(double time_s, bool is_redirected) {
+void AvatarSimulation::Leave(double time_s, bool is_redirected) {
   if (change_.has_left || change_.has_begun) {
     change_.is_any = true;
     return;
@@ -60,7 +60,7 @@ void Avatar::Leave(double time_s, bool is_redirected) {
 
 // A step of the foot in the air takes over from the step under way, at the same part of the swing. One that may
 // be refused and is leaves the step under way to go on.
-void Avatar::RedirectSwing() {
+void AvatarSimulation::RedirectSwing() {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
   MovementRequest request = queue_[queue_head_];
@@ -83,7 +83,7 @@ void Avatar::RedirectSwing() {
 }
 
 // Before a movement is planned that feet are planted in as they were not before, or the other way round.
-void Avatar::SwitchPlanting() {
+void AvatarSimulation::SwitchPlanting() {
   if (body_.plants_feet == foot_planting()) return;
   body_.plants_feet = body_.begins_planting = foot_planting();
   change_.is_any = true;

@@ -290,7 +290,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                                SoaPoseEvaluator& evaluator) {
-  constexpr std::size_t kAtOnce = 16;  // as Avatar::AdvanceAll
+  constexpr std::size_t kAtOnce = 16;  // as AvatarSimulation::AdvanceAll
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {
     const auto block = replicas.first(std::min(replicas.size(), kAtOnce));

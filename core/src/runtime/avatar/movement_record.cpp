@@ -36,7 +36,7 @@ class RecordWriter {
   std::vector<std::byte>& out_;
 };
 
-unsigned CommonFlags(const Avatar& avatar) {
+unsigned CommonFlags(const AvatarSimulation& avatar) {
   return (avatar.idle() ? unsigned{record::kIsIdle} : 0u) |
          (avatar.body().plants_feet ? unsigned{record::kPlants} : 0u);
 }
@@ -51,7 +51,7 @@ void WriteWeights(const Movement& movement, RecordWriter& writer) {
   for (const float weight : movement.weights) writer.F32(weight);
 }
 
-void WriteBegun(const Avatar& avatar, unsigned flags, const LandingDecision& choice,
+void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDecision& choice,
                 RecordWriter& writer) {
   const AvatarBody& body = avatar.body();
   const Movement& movement = body.movement;
@@ -68,7 +68,7 @@ void WriteBegun(const Avatar& avatar, unsigned flags, const LandingDecision& cho
 
 }  // namespace
 
-bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out) {
+bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   const AvatarChange& change = avatar.change();
   if (change.is_any) {
     AppendState(avatar, out);
@@ -108,7 +108,7 @@ bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out) {
   return true;
 }
 
-void AppendState(const Avatar& avatar, std::vector<std::byte>& out) {
+void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   const AvatarBody& body = avatar.body();
   const bool is_moving = avatar.movement() != nullptr;
   unsigned flags = CommonFlags(avatar) | record::kIsState;

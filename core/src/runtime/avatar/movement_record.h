@@ -17,10 +17,10 @@ namespace stridewire {
 
 /// Appends what the last Advance changed, the whole state if no less tells it; nothing if nothing but time went on.
 /// Returns whether there was something. May allocate in `out` only.
-bool AppendChange(const Avatar& avatar, std::vector<std::byte>& out);
+bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out);
 
 /// Appends the state after the last Advance, which must be the last thing that was done to the avatar.
-void AppendState(const Avatar& avatar, std::vector<std::byte>& out);
+void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out);
 
 /// No record of an avatar of this library is longer.
 [[nodiscard]] std::size_t MaxRecordBytes(const MotionLibrary& library);

@@ -15,7 +15,7 @@ namespace stridewire::record {
 enum Flag : std::uint16_t {
   kIsState = 1 << 0,
   kMoves = 1 << 1,   // change: a movement began; state: one is under way
-  kIsIdle = 1 << 2,  // Avatar::idle()
+  kIsIdle = 1 << 2,  // AvatarSimulation::idle()
   kPlants = 1 << 3,  // AvatarBody::plants_feet
   kLayers = 1 << 4,  // layers follow; in a state without there are none
   // Of a change.

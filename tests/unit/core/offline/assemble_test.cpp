@@ -414,7 +414,7 @@ TEST(LibraryAssembler, LevelWalksOfALibraryOfBlocksDoNotClimb) {
   LibraryBuilder builder;
   const auto library = builder.Build(*raw);
   ASSERT_TRUE(library.has_value()) << Describe(library.error());
-  Avatar avatar(*library, BaseFrame{});
+  AvatarSimulation avatar(*library, BaseFrame{});
   constexpr int kSteps = 40;
   for (int i = 0; i < kSteps; ++i) {
     ASSERT_TRUE(avatar.Enqueue({static_cast<std::uint64_t>(i), StepRequest{.length_m = 0.3}}));

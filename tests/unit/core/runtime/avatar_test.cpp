@@ -42,15 +42,15 @@ class AvatarTest : public testing::Test {
   }
 
   const std::shared_ptr<const MotionLibrary> library_ = MakeTestLibrary();
-  Avatar avatar_{library_, {}};
+  AvatarSimulation avatar_{library_, {}};
   std::uint64_t last_id_ = 0;
 };
 
 TEST_F(AvatarTest, StandsWhereItIsPut) {
   // Planting bends the toy's straight legs a little.
-  Avatar planted(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
+  AvatarSimulation planted(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
   EXPECT_NEAR(planted.pose().root_position_m.y, 1.9, 0.01);
-  Avatar avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2}, {.foot_planting = false});
+  AvatarSimulation avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2}, {.foot_planting = false});
   EXPECT_NEAR(avatar.pose().root_position_m.x, 2.0, 1e-6);
   EXPECT_NEAR(avatar.pose().root_position_m.y, 1.9, 1e-6);
   const Vec3 before = avatar.pose().root_position_m;
@@ -118,7 +118,7 @@ TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
 TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
   // Ten equal steps last as long as their durations say, whatever the tick.
   for (const double dt : {1.0 / 60.0, 1.0 / 37.0, 0.4}) {
-    Avatar avatar(library_, {});
+    AvatarSimulation avatar(library_, {});
     for (int i = 0; i < 10; ++i) {
       ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.4}}).has_value());
     }
@@ -185,13 +185,13 @@ TEST_F(AvatarTest, BadRequestsAreRefused) {
 }
 
 TEST_F(AvatarTest, QueueIsBounded) {
-  for (int i = 0; i < Avatar::kMaxQueue; ++i) Request(StandRequest{.seconds = 0.0});
+  for (int i = 0; i < AvatarSimulation::kMaxQueue; ++i) Request(StandRequest{.seconds = 0.0});
   const Status status = avatar_.Enqueue({1, StandRequest{}});
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kLimitExceeded);
   // A thousand empty stands in one tick must not outrun the event list.
   const auto events = RunUntilIdle();
-  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), std::size_t{Avatar::kMaxQueue});
+  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), std::size_t{AvatarSimulation::kMaxQueue});
 }
 
 TEST_F(AvatarTest, CancelDropsOnlyWhatHasNotStarted) {
@@ -208,7 +208,7 @@ TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
   LibraryBuilder builder;
   const auto only_left = builder.Build(raw);
   ASSERT_TRUE(only_left.has_value());
-  Avatar avatar(*only_left, {});
+  AvatarSimulation avatar(*only_left, {});
   const auto code = [&](decltype(MovementRequest::movement) movement) {
     const Status status = avatar.Enqueue({1, movement});
     return status ? "none" : std::string(ErrorCodeName(status.error().code));
@@ -265,7 +265,7 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
   const auto library = builder.Build(raw);
   ASSERT_TRUE(library.has_value());
   ASSERT_FALSE((*library)->leg_rig().is_usable);
-  Avatar avatar(*library, {});
+  AvatarSimulation avatar(*library, {});
   EXPECT_FALSE(avatar.foot_planting());
   EXPECT_EQ(avatar.SetFootPlanting(true).error().code, ErrorCode::kUnsupported);
   EXPECT_TRUE(avatar.SetFootPlanting(false).has_value());
@@ -278,18 +278,18 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
 // Quiet is who goes on walking: what ends that is told at once, what happens never while it lasts.
 TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
   const auto library = OpenLibrary("builtin").value();
-  Avatar avatar(library, {});
+  AvatarSimulation avatar(library, {});
   EXPECT_FALSE(avatar.is_event_free());
   for (int i = 0; i < 4; ++i)
     ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{.length_m = 0.5}}));
   int quiet = 0;
   int eventful = 0;
   const auto advance = [&] {
-    Avatar* const one = &avatar;
+    AvatarSimulation* const one = &avatar;
     std::vector<std::uint32_t> places{7};
     const std::uint64_t revision = avatar.revision();
     const double time_s = avatar.time_s();
-    Avatar::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
+    AvatarSimulation::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
     EXPECT_EQ(avatar.time_s(), time_s + 1.0 / 60.0);
     EXPECT_EQ(places.empty(), avatar.is_event_free());
     if (!avatar.is_event_free()) {

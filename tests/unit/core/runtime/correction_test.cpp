@@ -274,7 +274,7 @@ TEST(Terrain, NeverAllocatesWhenAsked) {
 TEST(Correction, IsTheSameWhereverAnAvatarStands) {
   const auto library = MakeTestLibrary();
   const auto weights = [&](const BaseFrame& start) {
-    Avatar avatar(library, start);
+    AvatarSimulation avatar(library, start);
     EXPECT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.47}}));
     avatar.Advance(1.0 / 60.0);
     EXPECT_NE(avatar.movement(), nullptr);
@@ -286,7 +286,7 @@ TEST(Correction, IsTheSameWhereverAnAvatarStands) {
 TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
   const auto library = MakeTestLibrary();
   for (const bool corrected : {true, false}) {
-    Avatar avatar(library, {}, {.run_time_correction = corrected});
+    AvatarSimulation avatar(library, {}, {.run_time_correction = corrected});
     for (const double length_m : {0.33, 0.51, 0.13, 0.47}) {
       ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = length_m}}));
     }
