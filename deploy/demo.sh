@@ -95,7 +95,7 @@ else
     tee "$out/library.log" | sed -n '/^[^ ]/s/^/    /p' || fail "could not build the library"
 fi
 
-# ---- start and stop processes; stop_all runs however the script exits
+# ---- start and stop processes; stop_all runs on every exit of the script
 
 declare -A pids=()
 order=()
