@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
-# Installs what Stridewire is built, tested and shown with, from Debian 12's own packages.
-# Unattended and repeatable; when everything is there it only asks dpkg and returns at once.
+# Installs the Debian 12 packages that are needed to build, test and demonstrate Stridewire.
+# The script asks no questions and can be run again at any time. It returns at once if all packages
+# are installed already.
 #
-#   deploy/install_deps.sh          # to build, test and run the demonstration
-#   deploy/install_deps.sh --lint   # also clang-format and clang-tidy, as .ci/run needs them
-#   deploy/install_deps.sh --no-browser  # not the browser that the viewer is tested in
-#   deploy/install_deps.sh --list   # only print the package names, one a line
+#   deploy/install_deps.sh               # everything for the build, the tests and the demo
+#   deploy/install_deps.sh --lint        # also clang-format and clang-tidy, which .ci/run needs
+#   deploy/install_deps.sh --no-browser  # without Chromium, which only the viewer's tests need
+#   deploy/install_deps.sh --list        # print the package names, one per line, and exit
+#
+# The output of apt-get goes to a log file in $TMPDIR (default: /tmp). The script prints its name.
 set -euo pipefail
 
 build=(
@@ -16,7 +19,7 @@ build=(
   g++
   git
   gnuplot-nox  # Draws the pictures of `stridewire-library report`.
-  libboost1.81-dev  # Asio and Beast. Debian's default 1.74 and this one exclude each other.
+  libboost1.81-dev  # Asio and Beast. It conflicts with Debian's default version, 1.74.
   libcli11-dev
   libeigen3-dev
   libflatbuffers-dev
@@ -30,17 +33,17 @@ build=(
   prometheus-cpp-dev
 )
 tests=(
-  assimp-testmodels  # Two real captures, which the demonstration plays.
+  assimp-testmodels  # Contains two motion captures, which the tests and the demo use.
   libbenchmark-dev
   libgmock-dev
   libgtest-dev
   librapidcheck-dev
 )
-# The web client and the viewer are built with npm. Debian's clashes with one installed from elsewhere,
-# so it is only asked for where there is none.
+# The web client and the viewer are built with npm. Debian's npm conflicts with a Node.js from
+# another source, so the script installs it only if there is no npm yet.
 command -v npm >/dev/null || build+=(nodejs npm)
 browser=(
-  chromium  # What the viewer is tested in.
+  chromium  # The browser tests of the viewer run in it.
 )
 lint=(
   clang-format-19
@@ -66,7 +69,7 @@ if $with_browser; then packages+=("${browser[@]}"); fi
 if $list; then printf '%s\n' "${packages[@]}"; exit 0; fi
 
 command -v dpkg-query >/dev/null && command -v apt-get >/dev/null ||
-  fail "this needs Debian 12 (dpkg and apt-get); elsewhere install the packages of --list by hand"
+  fail "needs Debian 12 (dpkg-query and apt-get); on another system install the packages of --list"
 
 missing=()
 for package in "${packages[@]}"; do
@@ -75,28 +78,35 @@ for package in "${packages[@]}"; do
 done
 if [[ ${#missing[@]} -eq 0 ]]; then exit 0; fi
 
-# Debian 12 is what the versions are right for; say so, and let anyone with a newer one try.
+# Only the versions of Debian 12 are tested. On any other release the script warns and continues.
 release=$(. /etc/os-release && echo "${ID:-unknown} ${VERSION_ID:-}")
 [[ $release == "debian 12" ]] ||
-  echo "install_deps.sh: made for Debian 12, this is $release; trying all the same" >&2
+  echo "install_deps.sh: warning: written for Debian 12, but this is $release" >&2
 
 as_root=()
 if [[ $(id -u) -ne 0 ]]; then
   command -v sudo >/dev/null ||
-    fail "not root and no sudo; as root run: apt-get install ${missing[*]}"
+    fail "needs root or sudo; run as root: apt-get install ${missing[*]}"
   as_root=(sudo)
-  [[ -t 0 ]] || as_root=(sudo -n)  # Nobody there to type a password: fail instead of waiting.
-  "${as_root[@]}" true || fail "sudo refused; as root run: apt-get install ${missing[*]}"
+  [[ -t 0 ]] || as_root=(sudo -n)  # Without a terminal, fail instead of waiting for a password.
+  "${as_root[@]}" true || fail "sudo failed; run as root: apt-get install ${missing[*]}"
 fi
 
-if [[ " ${missing[*]} " == *" libboost1.81-dev "* ]] &&
-   [[ $(dpkg-query -W -f '${db:Status-Status}' libboost1.74-dev 2>/dev/null || true) == installed ]]; then
-  echo "install_deps.sh: libboost1.81-dev replaces libboost1.74-dev, they exclude each other" >&2
+old_boost=$(dpkg-query -W -f '${db:Status-Status}' libboost1.74-dev 2>/dev/null || true)
+if [[ " ${missing[*]} " == *" libboost1.81-dev "* && $old_boost == installed ]]; then
+  echo "install_deps.sh: libboost1.81-dev replaces libboost1.74-dev, because the two conflict" >&2
 fi
 
-echo "Installing ${#missing[@]} Debian packages: ${missing[*]}" >&2
+log=$(mktemp "${TMPDIR:-/tmp}/stridewire-apt.XXXXXX.log") ||
+  fail "cannot create a log file in ${TMPDIR:-/tmp}"
+packages_text="${#missing[@]} packages"
+if [[ ${#missing[@]} -eq 1 ]]; then packages_text="1 package"; fi
+echo "Installing $packages_text (log: $log)" >&2
 apt=("${as_root[@]}" env DEBIAN_FRONTEND=noninteractive LC_ALL=C.UTF-8 apt-get -q -y
      -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300 -o Dpkg::Use-Pty=0)
-"${apt[@]}" update >&2 || echo "install_deps.sh: package lists are not all fresh; going on" >&2
-"${apt[@]}" install --no-install-recommends "${missing[@]}" >&2 ||
-  fail "apt-get could not install everything; its reason is above"
+"${apt[@]}" update >>"$log" 2>&1 ||
+  echo "install_deps.sh: warning: apt-get update failed; the package lists may be out of date" >&2
+if ! "${apt[@]}" install --no-install-recommends "${missing[@]}" >>"$log" 2>&1; then
+  tail -n 20 "$log" >&2
+  fail "apt-get failed; the lines above are the end of $log"
+fi

@@ -1,16 +1,20 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, and runs every test through ctest. Works from any directory.
+# Installs missing packages, builds Stridewire and runs its tests with ctest. The script can be
+# called from any directory.
 #
-#   tests/run.sh                                # everything, optimised build
-#   tests/run.sh --preset asan                  # the same under the address and UB sanitizers
-#   tests/run.sh --label 'unit|integration'     # only tests with such a label
-#   tests/run.sh -- -R Trig                     # whatever follows -- goes to ctest
+#   tests/run.sh                             # every test, release build
+#   tests/run.sh --preset asan               # with the address and undefined-behaviour sanitizers
+#   tests/run.sh --label 'unit|integration'  # only tests with a matching label
+#   tests/run.sh -- -R Trig                  # arguments after -- are passed to ctest
 #
-#   --preset NAME    release (default), debug, asan or tsan: a preset of CMakePresets.json
-#   --label REGEX    only tests whose label matches
-#   --jobs N         compilers at once (default: one per processor); of tests of the release one more
-#   --werror         a compiler warning is an error, as in .ci/run
-#   --no-install     leave the machine's packages alone
+#   --preset NAME    release (default), debug, asan or tsan; see CMakePresets.json
+#   --label REGEX    run only tests whose label matches: unit, integration, fuzz, web, browser
+#   --jobs N         compilers and tests to run in parallel (default: one per processor)
+#   --werror         treat compiler warnings as errors, as .ci/run does
+#   --no-install     do not install packages
+#
+# The last lines are the number of skipped tests with a hint how to enable each of them, and the
+# totals that ctest prints.
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
@@ -35,22 +39,23 @@ while [[ $# -gt 0 ]]; do
     *) bad_usage "unknown option '$1'" ;;
   esac
 done
-[[ $jobs =~ ^[1-9][0-9]*$ ]] || bad_usage "--jobs needs a number, not '$jobs'"
+[[ $jobs =~ ^[1-9][0-9]*$ ]] || bad_usage "--jobs: expected a number above 0, got '$jobs'"
 case "$preset" in
   release | debug | asan | tsan) ;;
-  *) bad_usage "no preset '$preset'; there are release, debug, asan and tsan" ;;
+  *) bad_usage "--preset: expected release, debug, asan or tsan, got '$preset'" ;;
 esac
 
 cd "$root"
 if $install; then deploy/install_deps.sh; fi
 
-# Results may be shared between clones of the project: compilations see paths relative to its root.
+# With paths relative to the root, ccache can share results between clones of the project.
 export CCACHE_BASEDIR="$root" CCACHE_NOHASHDIR=1
 
-# The web client and the viewer are the same however C++ is compiled: with one preset is enough.
+# The web client and the viewer do not depend on how C++ is compiled, so one preset tests them.
+with_npm=true
 if [[ $preset == release ]]; then
   if command -v npm >/dev/null; then configure+=(-DSTRIDEWIRE_BUILD_VIEWER=ON)
-  else echo "run.sh: no npm here: the web client and the viewer are not tested" >&2; fi
+  else with_npm=false; fi
 fi
 
 started=$SECONDS
@@ -58,11 +63,12 @@ cmake --preset "$preset" -DSTRIDEWIRE_BUILD_TESTS=ON "${configure[@]}"
 cmake --build --preset "$preset" --parallel "$jobs"
 built=$SECONDS
 
-# Tests wait for servers, clocks and browsers most of their time; under sanitizers they compute.
+# Most tests wait for servers, clocks and browsers, so one more than there are processors can run.
+# Under sanitizers the tests are limited by the processors.
 test_jobs=$jobs
 if [[ $preset == release ]]; then test_jobs=$((jobs + 1)); fi
 
-# gcc 12's thread sanitizer does not know the addresses that newer kernels hand out at random.
+# The thread sanitizer of gcc 12 fails on newer kernels unless address randomisation is off.
 fixed_addresses=()
 if [[ $preset == tsan ]] && setarch -R true 2>/dev/null; then fixed_addresses=(setarch -R); fi
 
@@ -71,10 +77,54 @@ status=0
   ctest --preset "$preset" --parallel "$test_jobs" ${label:+--label-regex "$label"} "$@" 2>&1 |
   tee "build/$preset/ctest.txt" || status=$?
 
-# ctest has said which tests failed; end with one line for whoever only sees the end.
-totals=$(grep -E 'tests passed, [0-9]+ tests failed out of' "build/$preset/ctest.txt" | tail -n 1 || true)
+# Prints the names of the tests that ctest skipped.
+skipped_tests() {
+  sed -n '/^The following tests did not run:/,/^$/p' "build/$preset/ctest.txt" |
+    sed -nE 's/^[[:space:]]+[0-9]+ - (.*) \(Skipped\)$/\1/p'
+}
+# Prints what the skipped tests reported: why they were skipped.
+skip_reasons() {
+  skipped_tests | awk '
+    NR == FNR { skipped[$0]; next }
+    /^[0-9]+\/[0-9]+ Testing: / { name = $0; sub(/^[^:]*: /, "", name) }
+    /^Output:$/ { is_output = 1; next }
+    /^<end of output>$/ { is_output = 0 }
+    is_output && name in skipped && !/^\[|^Note:/' \
+    - "build/$preset/Testing/Temporary/LastTest.log"
+}
+# Prints what to install for the skipped tests.
+skip_hints() {
+  local reasons captures
+  reasons=$(skip_reasons)
+  captures=$(grep -i 'captures' <<<"$reasons" || true)
+  if grep -q 'assimp-testmodels' <<<"$reasons"; then
+    echo "  assimp-testmodels is not installed: run deploy/install_deps.sh"
+  fi
+  if grep -qv 'assimp-testmodels' <<<"${captures:-assimp-testmodels}"; then
+    echo "  captures are missing: copy BVH files of the CMU database (mocap.cs.cmu.edu) to" \
+         "../shared/mocap/cmu, one folder per subject"
+  fi
+  if grep -qi 'chromium' <<<"$reasons"; then
+    echo "  Chromium is not installed: run deploy/install_deps.sh without --no-browser"
+  fi
+  echo "  The log contains the reason for each skipped test."
+}
+
+totals=$(grep -E 'tests passed, [0-9]+ tests failed out of' "build/$preset/ctest.txt" |
+  tail -n 1 || true)
+skipped=$(skipped_tests | wc -l)
 echo
 echo "$preset: build $((built - started)) s, tests $((SECONDS - built)) s," \
      "log build/$preset/Testing/Temporary/LastTest.log"
-echo "${totals:-ctest ended with $status before it ran a test}"
+if ! $with_npm; then
+  echo "npm is not installed, so the tests of the web client and the viewer were not built:" \
+       "run deploy/install_deps.sh"
+fi
+if ((skipped > 0)); then
+  echo "Some tests were skipped. What they need:"
+  skip_hints
+fi
+echo "skipped: $skipped"
+# Scripts parse the last line. It has the form that ctest prints.
+echo "${totals:-ctest ended with exit code $status before it ran a test}"
 exit "$status"
