@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Draws the same steps with feet sliding and planted: how fast balls go, how high they are, how knees
-bend. Writes SVG with gnuplot; nothing but Python's own library.
+"""Draws the same steps with sliding and with planted feet: ball speeds, ball heights and knee bend.
+
+Writes SVG with gnuplot and needs only Python's standard library.
 
     draw_feet.py SLIDING.bvh PLANTED.bvh OUT.svg [--from 0] [--to 10] [--title TEXT]
 """
@@ -23,7 +24,7 @@ def knee_degrees(frame, hip, knee, ankle):
 
 
 def curves(path, begin_s, end_s):
-    """Rows of time, and of each side: ball speed (m/s), ball height (m), knee (degrees)."""
+    """Rows of time (s) and, per side, ball speed (m/s), ball height (m) and knee bend (degrees)."""
     joints, rows, step_s = read_bvh(path)
     first, last = int(begin_s / step_s), int(end_s / step_s) + 1
     frames = [place(joints, row) for row in rows[first:last]]
@@ -53,7 +54,8 @@ def main():
     options = parser.parse_args()
     script = []
     for name, path in (("sliding", options.sliding), ("planted", options.planted)):
-        script.append("\n".join([f"${name} << EOD"] + curves(path, options.begin, options.end) + ["EOD"]))
+        rows = curves(path, options.begin, options.end)
+        script.append("\n".join([f"${name} << EOD"] + rows + ["EOD"]))
 
     def plot(column):
         return (f"plot $sliding u 1:{column} w l dt 2 lc rgb '#d55e00' t 'left, sliding', "
@@ -68,11 +70,11 @@ set multiplot layout 3,1
 set border 3; set tics nomirror; set lmargin 9; set rmargin 2; set grid y lc rgb '#dddddd'
 set xrange [{options.begin}:{options.end}]; set key top right horizontal
 set title "{options.title}"
-set ylabel 'ball, m/s'; set yrange [0:1.2]
+set ylabel 'ball speed, m/s'; set yrange [0:1.2]
 {plot(2)}
-unset title; unset key; set ylabel 'ball, m high'; set yrange [*:*]
+unset title; unset key; set ylabel 'ball height, m'; set yrange [*:*]
 {plot(3)}
-set ylabel 'knee, degrees'; set xlabel 's'; set yrange [0:*]
+set ylabel 'knee bend, degrees'; set xlabel 's'; set yrange [0:*]
 {plot(4)}
 unset multiplot
 """)

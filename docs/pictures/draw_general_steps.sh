@@ -1,13 +1,16 @@
 #!/bin/sh
-# Draws stairs, slalom and shuffle, on the generated library and on captured ones:
-#   docs/pictures/draw_general_steps.sh build/release/bin/stridewire-library ../shared/mocap/cmu
+# Draws stairs, a slalom and a shuffle, on the generated library and on libraries of captures.
+#
+#   docs/pictures/draw_general_steps.sh build/release/bin/stridewire-library CAPTURES
+#
+# CAPTURES contains the CMU subjects 03, 09, 14 and 16 as folders of BVH files.
 set -eu
 tool=$1
 captures=$2
 here=$(dirname "$0")
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-draw() {  # choreography, folders of captures, title, how to draw
+draw() {  # CHOREOGRAPHY SUBJECTS TITLE [OPTION of draw_steps.py ...]
   name=$1 folders=$2 title=$3
   shift 3
   files=
@@ -18,9 +21,10 @@ draw() {  # choreography, folders of captures, title, how to draw
     from=$library shown="generated library"
     [ $library = builtin ] || { from=$work/captured.swl shown="captures of CMU $folders"; }
     "$tool" synthesize "$from" --choreography "$here/$name.json" --out "$work/steps.bvh" >/dev/null
-    "$here/draw_steps.py" "$work/steps.bvh" "$here/${name}_$library.svg" --title "$title, $shown" "$@"
+    "$here/draw_steps.py" "$work/steps.bvh" "$here/${name}_$library.svg" \
+      --title "$title, $shown" "$@"
   done
 }
 draw stairs "03 14" "stairs of 0.2 m" --every 0.35 --ground feet
-draw slalom "16" "slalom, 0.4 rad a step" --every 0.25
+draw slalom "16" "slalom, 0.4 rad per step" --every 0.25
 draw shuffle "09" "sideways shuffle" --front --every 0.3 --gap -0.55

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Draws a BVH file as a strip of poses and a view from above. The strip looks at the figure from its
-right side, poses spread out where it moves on the spot; the view from above shows where the feet stand (heel
-to toe tip, left orange, right blue), the way of each ankle and of the pelvis. Writes SVG with gnuplot.
+"""Draws a BVH file as a strip of poses and a view from above.
+
+The strip shows the figure from its right side. The view from above shows standing feet from heel to
+toe tip (left orange, right blue) and the paths of ankles and pelvis. Writes SVG with gnuplot.
 
     draw_steps.py STEPS.bvh OUT.svg [--every 0.25] [--from 0] [--to 60] [--front] [--gap 0.35]
                   [--ground Z,Y,Z,Y,...|feet] [--title TEXT]
@@ -23,10 +24,11 @@ def main():
     parser.add_argument("--every", type=float, default=0.25, help="seconds between poses")
     parser.add_argument("--from", dest="begin", type=float, default=0.0)
     parser.add_argument("--to", dest="end", type=float, default=1e9)
-    parser.add_argument("--front", action="store_true", help="look from the front instead")
-    parser.add_argument("--gap", type=float, default=0.0, help="metres that each pose is moved on")
-    parser.add_argument("--ground", default="", help="profile of the ground: Z,Y,Z,Y,...; "
-                        "'feet': treads 14 cm behind the balls that climb onto them, to 1 cm ahead of those that leave them")
+    parser.add_argument("--front", action="store_true", help="show the figure from the front")
+    parser.add_argument("--gap", type=float, default=0.0, help="extra metres between poses")
+    parser.add_argument("--ground", default="",
+                        help="ground profile Z,Y,Z,Y,... or 'feet', which draws treads from 14 cm "
+                        "behind a ball that steps up to 1 cm ahead of a ball that steps down")
     parser.add_argument("--title", default="")
     options = parser.parse_args()
     joints, rows, step_s = read_bvh(options.bvh)
@@ -48,13 +50,14 @@ def main():
         for k, (name, parent, _, _) in enumerate(joints):
             if parent < 0:
                 continue
-            ends = [(sign * p[axis] + options.gap * count, p[1]) for p in (frames[f][parent], frames[f][k])]
+            ends = [(sign * p[axis] + options.gap * count, p[1])
+                    for p in (frames[f][parent], frames[f][k])]
             across += [ends[0][0], ends[1][0]]
             blocks[side(name)].append("\n".join(f"{x:.4f} {y:.4f}" for x, y in ends) + "\n")
     script = [f"${n} << EOD\n" + "\n".join(block) + "\nEOD"
               for n, block in zip(("left", "right", "middle"), blocks)]
 
-    # Where a foot stands: its ball slower than 0.1 m/s for some frames.
+    # A foot stands if its ball is slower than 0.1 m/s for at least 0.12 s.
     stands, ways, holds = [[], []], [[], []], []
     for foot, name in enumerate(("Left", "Right")):
         ankle, ball = index[name + "Foot"], index[name + "ToeBase"]
@@ -71,11 +74,13 @@ def main():
                 dx, dz = at[ball][0] - at[ankle][0], at[ball][2] - at[ankle][2]
                 heel = (at[ankle][0] - 0.45 * dx, at[ankle][2] - 0.45 * dz)
                 holds.append((at[ball][2], at[ball][1]))
-                stands[foot].append(f"{-heel[0]:.4f} {heel[1]:.4f}\n{-at[tip][0]:.4f} {at[tip][2]:.4f}\n")
+                stands[foot].append(f"{-heel[0]:.4f} {heel[1]:.4f}\n"
+                                    f"{-at[tip][0]:.4f} {at[tip][2]:.4f}\n")
     for foot, name in enumerate(("left", "right")):
         script.append(f"${name}_stands << EOD\n" + "\n".join(stands[foot]) + "\nEOD")
         script.append(f"${name}_way << EOD\n" + "\n".join(ways[foot]) + "\nEOD")
-    script.append("$pelvis << EOD\n" + "\n".join(f"{-p[0][0]:.4f} {p[0][2]:.4f}" for p in frames) + "\nEOD")
+    pelvis = "\n".join(f"{-p[0][0]:.4f} {p[0][2]:.4f}" for p in frames)
+    script.append(f"$pelvis << EOD\n{pelvis}\nEOD")
     holds.sort()
     if options.ground == "feet":
         lowest = min(y for _, y in holds)
@@ -104,15 +109,21 @@ set terminal svg size 1200,{total:.0f} font 'sans-serif,13' background '#ffffff'
 set output '{options.svg}'
 set multiplot
 set size 1,{strip_px / total:.4f}; set origin 0,{above_px / total:.4f}; set size ratio -1
-set xrange [{min(across) - 0.2:.2f}:{max(across) + 0.2:.2f}]; set yrange [{min(heights) - 0.1:.2f}:{max(heights) + 0.1:.2f}]
+set xrange [{min(across) - 0.2:.2f}:{max(across) + 0.2:.2f}]
+set yrange [{min(heights) - 0.1:.2f}:{max(heights) + 0.1:.2f}]
 set title "{options.title}"; unset key; set border 3; set tics nomirror
-plot $ground w l lc rgb '#000000' lw 1, $right w l lc rgb '{RIGHT}' lw 1.2, $middle w l lc rgb '{MIDDLE}' lw 1, $left w l lc rgb '{LEFT}' lw 1.2
+plot $ground w l lc rgb '#000000' lw 1, $right w l lc rgb '{RIGHT}' lw 1.2, \\
+  $middle w l lc rgb '{MIDDLE}' lw 1, $left w l lc rgb '{LEFT}' lw 1.2
 set xtics 0.5; unset title; set size 1,{above_px / total:.4f}; set origin 0,0
-set xrange [{min(zs) - 0.3:.2f}:{max(zs) + 0.3:.2f}]; set yrange [{min(xs) - 0.3:.2f}:{max(xs) + 0.3:.2f}]
-set xlabel 'from above, m (ahead to the right, left side up)'
+set xrange [{min(zs) - 0.3:.2f}:{max(zs) + 0.3:.2f}]
+set yrange [{min(xs) - 0.3:.2f}:{max(xs) + 0.3:.2f}]
+set xlabel 'from above, m (forward is right, left is up)'
 set yrange [{-max(xs) - 0.3:.2f}:{-min(xs) + 0.3:.2f}]
-plot $left_way u 2:(-$1) w l lc rgb '{LEFT}' lw 0.6 dt 3, $right_way u 2:(-$1) w l lc rgb '{RIGHT}' lw 0.6 dt 3, \\
-  $pelvis u 2:(-$1) w l lc rgb '{MIDDLE}' lw 1, $left_stands u 2:(-$1) w l lc rgb '{LEFT}' lw 5, $right_stands u 2:(-$1) w l lc rgb '{RIGHT}' lw 5
+plot $left_way u 2:(-$1) w l lc rgb '{LEFT}' lw 0.6 dt 3, \\
+  $right_way u 2:(-$1) w l lc rgb '{RIGHT}' lw 0.6 dt 3, \\
+  $pelvis u 2:(-$1) w l lc rgb '{MIDDLE}' lw 1, \\
+  $left_stands u 2:(-$1) w l lc rgb '{LEFT}' lw 5, \\
+  $right_stands u 2:(-$1) w l lc rgb '{RIGHT}' lw 5
 unset multiplot
 """)
     subprocess.run(["gnuplot"], input="\n".join(script), text=True, check=True)

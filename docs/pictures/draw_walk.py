@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Draws a BVH file as people look at motion: a strip of stick figures from the side, the heights of
-the feet and how fast feet and pelvis go. Writes SVG with gnuplot; nothing but Python's own library.
+"""Draws stick figures of a BVH file from the side, and heights and speeds of feet and pelvis.
+
+Writes SVG with gnuplot and needs only Python's standard library.
 
     draw_walk.py WALK.bvh OUT.svg [--every 0.1] [--from 0] [--to 10] [--title TEXT]
 """
@@ -11,7 +12,7 @@ import sys
 
 
 def read_bvh(path):
-    """Joints [(name, parent, offset, channels)] and the motion rows."""
+    """Returns joints [(name, parent, offset, channels)], the motion rows and the frame time (s)."""
     words = open(path, encoding="utf-8").read().split()
     joints, stack, i = [], [], 0
     while words[i] != "MOTION":
@@ -48,11 +49,12 @@ def turn(axis, degrees):
 
 
 def times(a, b):
-    return tuple(tuple(sum(a[r][k] * b[k][c] for k in range(3)) for c in range(3)) for r in range(3))
+    return tuple(tuple(sum(a[r][k] * b[k][c] for k in range(3)) for c in range(3))
+                 for r in range(3))
 
 
 def place(joints, row):
-    """World positions of all joints in one frame."""
+    """Returns the world positions of all joints in one frame."""
     positions, rotations, at = [], [], 0
     for _, parent, offset, channels in joints:
         local, spin = list(offset), ((1, 0, 0), (0, 1, 0), (0, 0, 1))
@@ -77,7 +79,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("bvh")
     parser.add_argument("svg")
-    parser.add_argument("--every", type=float, default=0.2, help="seconds between figures")
+    parser.add_argument("--every", type=float, default=0.2, help="seconds between stick figures")
     parser.add_argument("--from", dest="begin", type=float, default=0.0)
     parser.add_argument("--to", dest="end", type=float, default=1e9)
     parser.add_argument("--title", default="")
@@ -117,13 +119,19 @@ set multiplot
 set size 1,0.48; set origin 0,0.52; set size ratio -1
 set xrange [{min(z) - 0.6:.2f}:{max(z) + 0.6:.2f}]; set yrange [-0.05:2.0]
 set title "{options.title}"; set xlabel 'm'; unset key; set border 3; set tics nomirror
-plot $right w l lc rgb '#0072b2' lw 1, $middle w l lc rgb '#555555' lw 1, $left w l lc rgb '#d55e00' lw 1, 0 lc rgb '#000000' lw 0.5
+plot $right w l lc rgb '#0072b2' lw 1, $middle w l lc rgb '#555555' lw 1, \\
+  $left w l lc rgb '#d55e00' lw 1, 0 lc rgb '#000000' lw 0.5
 set size noratio; set size 1,0.27; unset title; set key top right horizontal; set xlabel ''
-set xrange [{first * step_s:.2f}:{(first + len(frames)) * step_s:.2f}]; set lmargin 8; set rmargin 2
+set xrange [{first * step_s:.2f}:{(first + len(frames)) * step_s:.2f}]
+set lmargin 8; set rmargin 2
 set origin 0,0.26; set yrange [-0.02:0.6]; set ylabel 'height, m'
-plot $curves u 1:2 w l lc rgb '#d55e00' lw 1.5 t 'left ball', '' u 1:3 w l lc rgb '#0072b2' lw 1.5 t 'right ball', '' u 1:($4-0.7) w l lc rgb '#555555' t 'pelvis less 0.7 m'
+plot $curves u 1:2 w l lc rgb '#d55e00' lw 1.5 t 'left ball', \\
+  '' u 1:3 w l lc rgb '#0072b2' lw 1.5 t 'right ball', \\
+  '' u 1:($4-0.7) w l lc rgb '#555555' t 'pelvis - 0.7 m'
 set origin 0,0; set yrange [0:5.5]; set ylabel 'speed, m/s'; set xlabel 's'
-plot $curves u 1:5 w l lc rgb '#d55e00' lw 1.5 t 'left ball', '' u 1:6 w l lc rgb '#0072b2' lw 1.5 t 'right ball', '' u 1:7 w l lc rgb '#555555' lw 1.5 t 'pelvis'
+plot $curves u 1:5 w l lc rgb '#d55e00' lw 1.5 t 'left ball', \\
+  '' u 1:6 w l lc rgb '#0072b2' lw 1.5 t 'right ball', \\
+  '' u 1:7 w l lc rgb '#555555' lw 1.5 t 'pelvis'
 unset multiplot
 """)
     subprocess.run(["gnuplot"], input="\n".join(script), text=True, check=True)
