@@ -21,9 +21,10 @@
 #include "offline/build/interpolation_error.h"
 #include "stridewire/offline/library_builder.h"
 #include "offline/build/refine.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/movement/movement.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -18,7 +18,7 @@
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/pose_quantization.h"
 
 namespace stridewire {

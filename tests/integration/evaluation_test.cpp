@@ -19,9 +19,12 @@
 #include "base/trig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/reference_evaluation.h"
 #include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

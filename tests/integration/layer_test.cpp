@@ -19,8 +19,9 @@
 #include "offline/build/library_writer.h"
 #include "offline/build/refine.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/terrain.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

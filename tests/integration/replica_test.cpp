@@ -16,7 +16,7 @@
 #include "instruction_sets.h"
 #include "random.h"
 #include "rough_ground.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/avatar_replica.h"
 #include "runtime/avatar/movement_record.h"
 

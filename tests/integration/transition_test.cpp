@@ -18,10 +18,11 @@
 #include "random.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 #include "velocity_steps.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {

@@ -12,7 +12,10 @@
 #include "counted_memory.h"
 #include "random.h"
 #include "stridewire/offline/synthesis.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

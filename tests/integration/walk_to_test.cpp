@@ -12,7 +12,7 @@
 #include "counted_memory.h"
 #include "random.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 namespace {

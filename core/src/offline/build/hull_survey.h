@@ -7,7 +7,8 @@
 
 #include "runtime/weights/correction.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 

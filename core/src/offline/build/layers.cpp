@@ -7,6 +7,7 @@
 
 #include "offline/extract/assemble.h"
 #include "offline/build/library_writer.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

@@ -13,7 +13,8 @@
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

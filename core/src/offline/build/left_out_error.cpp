@@ -5,7 +5,7 @@
 
 #include "runtime/library/convex_hull.h"
 #include "stridewire/runtime/pose.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
 
 namespace stridewire {
 namespace {

@@ -9,6 +9,8 @@
 #include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
 #include "offline/build/transitions.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {

@@ -5,6 +5,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 

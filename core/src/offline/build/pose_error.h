@@ -7,7 +7,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/clip.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
 

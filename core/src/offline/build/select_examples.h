@@ -5,7 +5,7 @@
 
 #include "offline/build/grid_example.h"
 #include "stridewire/offline/raw_library.h"
-#include "stridewire/offline/selection.h"
+#include "stridewire/offline/library_builder.h"
 
 namespace stridewire {
 

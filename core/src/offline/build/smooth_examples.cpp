@@ -11,9 +11,10 @@
 #include "offline/build/pose_error.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/correction.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

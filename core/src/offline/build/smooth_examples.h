@@ -9,7 +9,7 @@
 #include "stridewire/base/error.h"
 #include "runtime/library/cardinal_basis.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 namespace stridewire {
 

@@ -5,6 +5,7 @@
 
 #include "runtime/library/contact_keytimes.h"
 #include "stridewire/runtime/pose.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {

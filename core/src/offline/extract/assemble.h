@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "offline/extract/extract.h"
 #include "stridewire/offline/raw_library.h"
 

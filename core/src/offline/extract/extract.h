@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "offline/extract/contacts.h"
 #include "stridewire/offline/raw_library.h"
 #include "offline/extract/segment.h"

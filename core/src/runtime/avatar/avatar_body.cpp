@@ -1,4 +1,6 @@
-#include "stridewire/runtime/avatar_body.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 
 #include <algorithm>
 #include <utility>

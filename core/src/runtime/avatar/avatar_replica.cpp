@@ -8,6 +8,7 @@
 
 #include "runtime/avatar/record_fields.h"
 #include "base/check.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/avatar_body.h"
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {
 

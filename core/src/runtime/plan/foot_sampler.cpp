@@ -6,6 +6,9 @@
 
 #include "runtime/pose/grid_blend.h"
 #include "base/check.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

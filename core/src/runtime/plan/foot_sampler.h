@@ -4,9 +4,11 @@
 #include <span>
 
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/foot_plan.h"
+#include "runtime/movement/foot_plan.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 

@@ -1,10 +1,11 @@
-#include "stridewire/runtime/transition_path.h"
+#include "runtime/plan/transition_path.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {

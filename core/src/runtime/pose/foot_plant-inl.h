@@ -9,6 +9,8 @@
 
 #include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/pose/simd_math-inl.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {

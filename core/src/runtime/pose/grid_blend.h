@@ -4,7 +4,9 @@
 #include <array>
 
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 

@@ -1,9 +1,10 @@
-#include "stridewire/runtime/layer_stack.h"
+#include "runtime/pose/layer_stack.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "stridewire/runtime/motion_library.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,8 @@
 #include "runtime/pose/grid_blend.h"
 #include "runtime/pose/pose_kernels.h"
 #include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 

@@ -2,8 +2,9 @@
 
 #include <span>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/movement_request.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 

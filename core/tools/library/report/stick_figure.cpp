@@ -4,6 +4,7 @@
 
 #include "gnuplot.h"
 #include "runtime/weights/correction.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -8,7 +8,8 @@
 #include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/open_library.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 #include <gtest/gtest.h>
 

@@ -12,11 +12,12 @@
 #include "counted_memory.h"
 #include "distorted_library.h"
 #include "runtime/weights/end_poses.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/terrain/foot_support.h"
 #include "runtime/weights/measure.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

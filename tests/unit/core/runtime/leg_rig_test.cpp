@@ -1,6 +1,6 @@
 // Inverse kinematics of a leg against forward kinematics, for any target a leg reaches.
 
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 #include <gtest/gtest.h>
 

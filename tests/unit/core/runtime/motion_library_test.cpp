@@ -10,8 +10,9 @@
 
 #include "stridewire/offline/library_builder.h"
 #include "runtime/library/cardinal_basis.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

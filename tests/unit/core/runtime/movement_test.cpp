@@ -1,4 +1,4 @@
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -2,10 +2,13 @@
 
 #include <optional>
 
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/terrain/foot_support.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 

@@ -5,7 +5,7 @@
 
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
 
 namespace stridewire {
 
