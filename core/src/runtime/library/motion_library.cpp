@@ -13,8 +13,8 @@
 #include <cstring>
 #include <string>
 
-#include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
+#include "runtime/library/library_file.h"
 
 namespace stridewire {
 namespace {
@@ -23,26 +23,26 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// What a person's movement stays far below; beyond it arithmetic in floats would suffer.
-constexpr double kMaxParameter = 100.0;  // metres, radians
-constexpr double kMaxRootM = 1000.0;     // from the base frame
+// Limits that no human movement comes near. Larger values would lose too much precision in floats.
+constexpr double kMaxParameter = 100.0;  // Metres or radians.
+constexpr double kMaxRootM = 1000.0;     // From the base frame, along each axis.
 constexpr double kMaxYawRad = 100.0;
 constexpr double kMaxMovementS = 600.0;
 constexpr double kMinScale = 1e-7;
 constexpr double kMaxRadiusFactor = 100.0;
 
-// A parameter may lie this far outside the hull of the examples, in parts of its extent: what
-// requests are clamped to (10 %) and something over.
+// The weights must stay bounded up to this far outside the range of each parameter, as a fraction
+// of that range. Requests are clamped to 10 % outside, so this leaves a margin.
 constexpr double kReach = 0.5;
-// The most that |w| may sum to there, by a bound that grows with the examples: 230 for 70 captured
-// steps in five parameters, whose real sum stays below 3.
+// Limit on the sum of |w|, checked against an upper bound that grows with the number of examples.
+// For 70 captured steps with five parameters the bound is 230, while the real sum stays below 3.
 constexpr double kMaxWeightSum = 1e6;
-// Sums of weights are 1 to this.
+// Tolerance for sums of weights that must be 1.
 constexpr double kSumTolerance = 1e-7;
 
 Vec3 ToVec3(const fb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-// A number that arithmetic can be done with: finite and of a size that cannot overflow later.
+// True if the number is finite and small enough that later arithmetic cannot overflow.
 template <typename T>
 bool IsSane(T value) {
   return std::isfinite(value) && std::fabs(static_cast<double>(value)) <= kLargestNumber;
@@ -94,7 +94,7 @@ Expected<Skeleton> LoadSkeleton(const fb::Skeleton& from) {
   return skeleton;
 }
 
-// Which parameters a kind may have, as a range of names.
+// True if movements of that kind may have that parameter.
 bool NameFitsKind(ParameterName name, MovementKind kind) {
   if (IsStep(kind)) return name <= ParameterName::kTurn;
   return name == ParameterName::kTurn || name == ParameterName::kLength ||
@@ -115,7 +115,7 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
     if (group.FindParameter(name) >= 0) {
       return Fail(ErrorCode::kMalformed, "a parameter stands twice", parameter->name());
     }
-    // Not "a > b", so that what is not a number fails as well.
+    // Written this way so that NaN is rejected.
     if (!(parameter->min() >= -kMaxParameter && parameter->max() <= kMaxParameter &&
           parameter->min() <= parameter->max() && parameter->scale() >= kMinScale &&
           parameter->scale() <= kMaxParameter)) {
@@ -128,7 +128,8 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
   return {};
 }
 
-// Sites lie where the parameters say, so that requests clamped to their hull stay within reach.
+// Checks that all sites are inside the ranges of their parameters. Requests are clamped to the hull
+// of the sites, so they then stay within the bounds that CheckWeightTables verifies.
 Status CheckSites(const MotionGroup& group) {
   const std::size_t d = group.parameters.size();
   for (std::size_t l = 0; l < d; ++l) {
@@ -151,11 +152,11 @@ Status CheckSites(const MotionGroup& group) {
   return {};
 }
 
-// Every row of the weight tables sums to what makes all weights sum to 1 wherever they are taken,
-// and no weight can grow out of hand within reach of the examples.
+// Checks that the weights sum to 1 for all parameters, and that no weight can become huge within
+// kReach of the examples. The constant row of the table must sum to 1 and all other rows to 0.
 Status CheckWeightTables(const MotionGroup& group) {
   const auto n = static_cast<std::size_t>(group.example_count);
-  double bound = 0.0;  // of the sum of |w|
+  double bound = 0.0;  // Upper bound on the sum of |w|.
   const auto check = [&](std::span<const double> row, double wanted, double factor) {
     double sum = 0.0;
     double size = 0.0;
@@ -318,7 +319,7 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   return group;
 }
 
-// What a layer may touch, and keys that can be played.
+// Checks that a layer affects only joints that layers may affect, and that its keys can be played.
 Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_legs) {
   const auto fail = [&](const char* text) { return Fail(ErrorCode::kMalformed, text); };
   if (!IsLayerName(layer.name)) {

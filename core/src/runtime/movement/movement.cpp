@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/pose/pose_kernels.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/pose/pose_kernels.h"
 
 namespace stridewire {
 namespace {
 
-// What goes on faster is no motion of a body. It is cut, so that a join overshoots by 4/27 of it at most.
+// Limits on the speed of a difference pose; no body moves faster. They bound the overshoot of a
+// blend to 4/27 of this speed times the length of the blend.
 constexpr float kMaxJointRadPerS = 20.0f;
 constexpr float kMaxRootMPerS = 4.0f;
 
@@ -18,7 +19,8 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// A small rotation as a vector. Not of the vector's length exactly, but the same bits everywhere.
+// A small rotation as a rotation vector. The length is approximate (2 sin(angle / 2)), which avoids
+// trigonometry that differs between machines.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
@@ -53,10 +55,11 @@ double EaseOutSlope(double s) {
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
-  // Before its beginning a movement is taken to go on as it begins.
+  // Before its start, a movement is extrapolated by reflecting its first moments.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
-                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);
+                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,
+                scratch);
   const auto per_s = static_cast<float>(1.0 / kBlendStepS);
   const Pose& difference = movement.difference;
   const Vec3 entered_m = before.root_position_m - difference.root_position_m;
