@@ -1,4 +1,4 @@
-// Single poses of a movement. Of many at once see pose_stretch.cpp.
+// Evaluates single poses of a movement. soa_pose_evaluator.cpp evaluates many poses at once.
 
 #include <algorithm>
 #include <array>
@@ -35,18 +35,19 @@ void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movem
 
 namespace {
 
-// Where a pose lies in its movement, and how much is left of the poses before.
+// The position of a pose in its movement, and how much of the difference pose remains there.
 struct Place {
   GridPlace grid;
-  float fraction;  // of the difference that is left
-  float slope_s;   // of its velocity
-  double steered;  // EaseOut of the part of the movement behind
-  bool is_eased;   // there is something left of the difference
+  float fraction;  // Remaining fraction of the difference.
+  float slope_s;   // Seconds by which the velocity of the difference is multiplied.
+  double steered;  // EaseOut of the elapsed fraction of the movement.
+  bool is_eased;   // True while part of the difference remains.
 };
 
 using RowScratch = std::array<float, kMaxRowFloats>;
 
-// Makes rotations unit, adds what is left of the poses before and takes the pose into the world.
+// Normalizes the rotations, adds the rest of the difference pose and transforms the pose into world
+// space.
 void FinishPose(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                 const Place& place, RowScratch& row, PoseSpan out) {
   const bool is_inertial = place.is_eased && movement.is_inertial;

@@ -10,10 +10,10 @@ namespace {
 
 bool IsWithin(double value, double low, double high) { return value >= low && value <= high; }
 
-// 0 to 1 with no slope at either end.
+// Eases from 0 to 1 with zero slope at both ends.
 double Ease(double u) { return u >= 1.0 ? 1.0 : u * u * (3.0 - 2.0 * u); }
 
-// The part of the way that is behind, and how fast it is gone there.
+// Elapsed fraction of the current blend.
 double Progress(const LayerStack::Playing& p) {
   return p.elapsed_s >= p.ease_s ? 1.0 : p.elapsed_s / p.ease_s;
 }
@@ -21,7 +21,8 @@ double Progress(const LayerStack::Playing& p) {
 double WeightOf(const LayerStack::Playing& p) {
   const double weight = p.from_weight + (p.to_weight - p.from_weight) * Ease(Progress(p));
   if (p.elapsed_s >= p.slope_s) return std::clamp(weight, 0.0, 1.0);
-  // t (1 - t / T)^2: the slope at first, none at T.
+  // t (1 - t / T)^2 has slope 1 at t = 0 and value and slope 0 at t = T. It lets the weight start
+  // with the slope that it had before.
   const double left = 1.0 - p.elapsed_s / p.slope_s;
   return std::clamp(weight + p.slope * p.elapsed_s * left * left, 0.0, 1.0);
 }
@@ -36,8 +37,8 @@ double SlopeOf(const LayerStack::Playing& p) {
   return slope;
 }
 
-// Heads for another weight and speed from where it is. What slope the weight has runs off within what
-// was left of the way: then it does not overshoot.
+// Starts a blend from the current weight and speed to new ones. The slope that the weight has now
+// fades out within the remaining time of the previous blend, so that the weight does not overshoot.
 void HeadFor(double weight, double speed, double blend_s, LayerStack::Playing& p) {
   const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
   p.slope = SlopeOf(p);
@@ -62,7 +63,7 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
   if (request.layer < 0 || static_cast<std::size_t>(request.layer) >= library.layers().size()) {
     return Fail(ErrorCode::kNotFound, "the library has no such layer", request.layer);
   }
-  // Not "outside", so that what is not a number fails as well.
+  // Written this way so that NaN is rejected.
   if (!IsWithin(request.blend_s, 0.0, kMaxLayerBlendS)) {
     return Fail(ErrorCode::kOutOfRange, "a layer's blend must take 0 to 10 s");
   }
@@ -122,7 +123,7 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 }
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
-  constexpr double kLongestS = 1e6;  // a clip is no longer than ten minutes
+  constexpr double kLongestS = 1e6;  // Far above the longest clip, which takes ten minutes.
   const auto could_be = [&](const Playing& p) {
     const auto is_part = [](double value) { return IsWithin(value, 0.0, 1.0); };
     const auto is_time = [](double value) { return IsWithin(value, 0.0, kLongestS); };
