@@ -6,21 +6,21 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/avatar/record_fields.h"
 #include "base/check.h"
+#include "runtime/avatar/record_fields.h"
 
 namespace stridewire {
 namespace {
 
-// No number of a record is larger: metres, seconds, radians.
+// Limits on the numbers of a record, in metres, seconds or radians, and on weights.
 constexpr double kMostOfANumber = 1e9;
 constexpr float kMostOfAWeight = 1e3f;
-// Products of rotations are not of unit length exactly.
+// Tolerance for the squared length of rotations, which products of rotations need.
 constexpr float kNearlyUnit = 0.02f;
 
 }  // namespace
 
-// Reads the fields of a record. The first thing that is wrong is kept; all that is read after it is 0.
+// Reads the fields of a record. Keeps the first error; every field read after it is 0.
 class AvatarReplica::Reader {
  public:
   explicit Reader(std::span<const std::byte> record) : record_(record) {}
@@ -128,7 +128,8 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   }
 }
 
-// Feet of the movement's kind leave the ground and land when it says.
+// Sets the release and landing times and the root weights of the feet, which follow from the kind
+// and the keytimes of the movement.
 void SetTimes(MovementKind kind, Movement& movement) {
   const SwingTimes times = SwingTimesOf(kind, movement);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -168,7 +169,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
 }
 
 void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
-  // All is read before anything of it is done: what is done allows no going back.
+  // Check each part of the record before applying it, because the steps cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
@@ -192,7 +193,8 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     }
     if (!reader.ok()) return;
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
-    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.CaptureFootLocks(left_s);
+    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0)
+      body_.CaptureFootLocks(left_s);
     is_moving_ = false;
   }
   if (has_begun) {
@@ -212,7 +214,8 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     }
     if (!reader.ok()) return;
     body_.StartWeighted(base);
-    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && time_s >= start_offset_s)) {
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
+          time_s >= start_offset_s)) {
       reader.Refuse("a movement record begins a movement outside of it");
       return;
     }
@@ -253,7 +256,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     if (!reader.ok()) return;
     body_.StartWeighted(base);
     movement.extra_turn_rad = extra_turn_rad;
-    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && movement_time_s_ >= start_offset_s)) {
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
+          movement_time_s_ >= start_offset_s)) {
       reader.Refuse("a movement record begins a movement outside of it");
       return;
     }
@@ -290,7 +294,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                                SoaPoseEvaluator& evaluator) {
-  constexpr std::size_t kAtOnce = 16;  // as AvatarSimulation::AdvanceAll
+  constexpr std::size_t kAtOnce = 16;  // As in AvatarSimulation::AdvanceAll.
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {
     const auto block = replicas.first(std::min(replicas.size(), kAtOnce));
