@@ -1,4 +1,5 @@
-// How movements go on where others ended: the table a library has of it, and what an avatar makes of it.
+// How movements go on where others ended: the table a library has of it, and what an avatar makes
+// of it.
 
 #include <gtest/gtest.h>
 
@@ -13,13 +14,13 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
 #include "random.h"
+#include "runtime/library/library_file.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/avatar.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 #include "velocity_steps.h"
 
@@ -63,8 +64,8 @@ TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
   }
 }
 
-// Legs of 0.9 m at angles that put feet 0.4 m apart: hips come down and knees and feet apart, as far as geometry
-// says. The toy's steps begin and end at rest.
+// Legs of 0.9 m at angles that put feet 0.4 m apart: hips come down and knees and feet apart, as
+// far as geometry says. The toy's steps begin and end at rest.
 TEST(Transitions, DistanceIsHowFarJointsAreApart) {
   const auto library = ToyOf([](double l0, double l1) { return l0 >= 0.2 && l1 == 0.4; });
   const double lower_m = 0.9 - std::sqrt(0.81 - 0.04);
@@ -133,7 +134,7 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
     });
     return library ? "none" : std::string(library.error().text);
   };
-  const std::string refused = "a transition is not between two examples";
+  const std::string refused = "a transition refers to an example that does not exist";
   const std::size_t jump_to_stand = kJump * 4 + kStand;
   EXPECT_EQ(with(jump_to_stand, {0.1f, 3, -1}), "none");
   EXPECT_EQ(with(jump_to_stand, {0.1f, 4, -1}), refused);
@@ -144,8 +145,8 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
   EXPECT_EQ(with(jump_to_stand, {std::numeric_limits<float>::infinity(), 3, -1}), refused);
 }
 
-// What an avatar does when it is asked for movements one after the other, until it stands idle: "left jump", with
-// "+" before what it inserts and "-" before what it refuses, and the reason.
+// What an avatar does when it is asked for movements one after the other, until it stands idle:
+// "left jump", with "+" before what it inserts and "-" before what it refuses, and the reason.
 std::string Does(std::shared_ptr<const MotionLibrary> library,
                  const std::vector<decltype(MovementRequest::movement)>& movements) {
   AvatarSimulation avatar(std::move(library), BaseFrame{});
@@ -209,29 +210,31 @@ TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
   const StepRequest left = Step(Foot::kLeft, 0.5);
   const JumpRequest jump{.length_m = 0.6};
   EXPECT_EQ(Does(strides, {jump, left}), "jump step_left +step_right");
-  EXPECT_EQ(
-      Does(strides, {left, jump, StepRequest{.length_m = 0.5}}),
-      "step_left -(no way leads from step_left to jump in this library) step_right +step_left");
+  EXPECT_EQ(Does(strides, {left, jump, StepRequest{.length_m = 0.5}}),
+            "step_left -(this library has no transition path from step_left to jump) step_right "
+            "+step_left");
   EXPECT_EQ(Does(strides, {left, left}), "step_left +step_right step_left +step_right");
   const std::vector<MovementRequest> requests{{1, left}, {2, jump}};
   const auto synthesis = Synthesize(strides, BaseFrame{}, requests, 60.0);
   ASSERT_FALSE(synthesis.has_value());
   EXPECT_EQ(Describe(synthesis.error()),
-            "movements[1]: no way leads from step_left to jump in this library");
+            "movements[1]: this library has no transition path from step_left to jump");
 }
 
 TEST(Ways, ALibraryOfOneFootSaysSo) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
   const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
-  EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
-            "step_left -(no way leads from step_left to step_left in this library) +step_left");
+  EXPECT_EQ(
+      Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
+      "step_left -(this library has no transition path from step_left to step_left) +step_left");
   // What draws it back is no new step.
   EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.2}, StepRequest{.length_m = 0.2}}),
             "step_left step_left +step_left");
 }
 
-// A jump that flies on at its end: feet are together, but the table says that no step begins so fast.
+// A jump that flies on at its end: feet are together, but the table says that no step begins so
+// fast.
 TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
   RawLibrary raw = MakeToyRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
@@ -244,7 +247,7 @@ TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
   ASSERT_GT(DistanceM(*library, kJump, kLeft), 0.3f);
   const StepRequest left = Step(Foot::kLeft, 0.4);
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, left}),
-            "jump -(no way leads from jump to step_left in this library)");
+            "jump -(this library has no transition path from jump to step_left)");
   // Who has stood goes anywhere.
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, StandRequest{0.1}, left}),
             "jump stand step_left +step_right");
@@ -257,7 +260,7 @@ TEST(Ways, AnOlderLibraryGoesByItsFeet) {
   ASSERT_TRUE(older.has_value());
   const StepRequest left = Step(Foot::kLeft, 0.5);
   EXPECT_EQ(Does(*older, {left, JumpRequest{.length_m = 0.6}}),
-            "step_left -(no way leads from step_left to jump in this library) +step_right");
+            "step_left -(this library has no transition path from step_left to jump) +step_right");
   EXPECT_EQ(Does(Older(*MakeTestLibrary()).value(), {left, left, JumpRequest{.length_m = 0.6}}),
             "step_left +step_right step_left +step_right jump");
 }
@@ -311,8 +314,9 @@ INSTANTIATE_TEST_SUITE_P(Libraries, Joins,
 constexpr int kKinds = 4;  // of MovementKind, the stand last
 constexpr double kFramesPerS = 60.0;
 
-// Steps, jumps and stands in any order. From one movement to the next no joint changes its speed more than half as
-// fast again as inside the examples of both kinds, a stand having none of its own.
+// Steps, jumps and stands in any order. From one movement to the next no joint changes its speed
+// more than half as fast again as inside the examples of both kinds, a stand having none of its
+// own.
 TEST_P(Joins, AreNoRougherThanMovements) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const auto library = LibraryOf(GetParam().subjects);

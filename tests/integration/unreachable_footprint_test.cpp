@@ -11,8 +11,8 @@
 #include "captured_library.h"
 #include "counted_memory.h"
 #include "random.h"
-#include "stridewire/offline/synthesis.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "stridewire/offline/synthesis.h"
 
 namespace stridewire {
 namespace {
@@ -24,8 +24,7 @@ constexpr double kDegrees = 180.0 / M_PI;
 
 MovementRequest StepOnto(std::uint64_t id, Foot foot, const DVec3& place_m, double heading_rad,
                          bool exact_only = true) {
-  return {id,
-          StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
+  return {id, StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
 }
 
 BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
@@ -97,8 +96,9 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
   return seen;
 }
 
-// From a stand or in mid-walk; half of the footprints where a step may well end, the others anywhere around.
-// Whether one is in reach is seen from what the same avatar does when it need not be met.
+// From a stand or in mid-walk; half of the footprints where a step may well end, the others
+// anywhere around. Whether one is in reach is seen from what the same avatar does when it need not
+// be met.
 TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMet) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
@@ -145,7 +145,8 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
         other.Enqueue(StepOnto(id, foot, print.position_m, heading_rad, false)).has_value());
     const Seen near = Watch(other, id, foot, print, stays_m);
     const bool is_outside = near.off_m > 1e-3 || near.off_rad * kDegrees > 0.1;
-    // Half a metre up or down no leg is too short; further a pose does not tell a foot that is a little too high.
+    // Half a metre up or down no leg is too short; further a pose does not tell a foot that is a
+    // little too high.
     const bool is_inside =
         near.off_m <= 0.8e-3 && near.off_rad * kDegrees <= 0.05 && std::fabs(vector.y) < 0.5;
     outside += is_outside;
@@ -205,7 +206,8 @@ class RefusalOfBuiltin : public testing::Test {
       ASSERT_TRUE(avatar.Enqueue(request).has_value());
     }
   }
-  // Both avatars until they stand: bit by bit the same poses, and the same events but for those of refusals.
+  // Both avatars until they stand: bit by bit the same poses, and the same events but for those of
+  // refusals.
   static int AdvanceAlike(AvatarSimulation& refusing, AvatarSimulation& other) {
     int refused = 0;
     for (int tick = 0; tick < 1200 && !(other.idle() && refusing.idle()); ++tick) {
@@ -310,7 +312,8 @@ TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
   TerrainData data;
   data.boxes.push_back({{-5.0, 0.2}, {5.0, 5.0}, 0.2});
   data.boxes.push_back({{-5.0, -5.0}, {5.0, -0.2}, 4.0});
-  AvatarSimulation avatar(library_, BaseFrame{}, {.terrain = Terrain::Make(std::move(data)).value()});
+  AvatarSimulation avatar(library_, BaseFrame{},
+                          {.terrain = Terrain::Make(std::move(data)).value()});
   ASSERT_TRUE(avatar.Enqueue(StepOnto(1, Foot::kLeft, {0.1, 0.0, -0.4}, 0.0)).has_value());
   ASSERT_TRUE(avatar.Enqueue(StepOnto(2, Foot::kLeft, {0.1, 9.0, 0.45}, 0.0)).has_value());
   avatar.Advance(kTickS);
@@ -343,7 +346,7 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
 TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
   const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only has a meaning only beside at_m");
+  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only requires at_m");
   AvatarSimulation sliding(library_, BaseFrame{}, {.foot_planting = false});
   const MovementRequest somewhere = StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0);
   EXPECT_EQ(sliding.Enqueue(somewhere).error().code, ErrorCode::kUnsupported);

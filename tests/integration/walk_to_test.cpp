@@ -1,4 +1,5 @@
-// Walks to random places, on level and on rough ground: they arrive, by a short way, or say why not.
+// Walks to random places, on level and on rough ground: they arrive, by a short way, or say why
+// not.
 
 #include <gtest/gtest.h>
 
@@ -190,7 +191,8 @@ TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
 
 TEST(WalkTo, AllocatesNothingOnTheWay) {
   Random random(3);
-  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{}, {.terrain = RoughGround(random)});
+  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{},
+                          {.terrain = RoughGround(random)});
   WalkRequest goal{.position_m = {2.0, 0.0, 3.0}, .heading_rad = 2.0};
   goal.waypoints_m = {{0.0, 0.0, 2.0}};
   ASSERT_TRUE(avatar.Enqueue({1, goal}).has_value());
@@ -250,7 +252,7 @@ TEST(WalkTo, SaysWhyItCanNot) {
   EXPECT_FALSE(behind.reason.empty());
   EXPECT_LT(behind.steps, 60);
   const Walk edge = GoTo(avatar, {.position_m = {0.0, 0.0, 2.4}});
-  EXPECT_EQ(edge.reason, "the goal lies on an edge or a slope too steep to stand");
+  EXPECT_EQ(edge.reason, "the ground at the goal is too steep or too uneven to stand on");
   // It goes on from there.
   EXPECT_TRUE(GoTo(avatar, {.position_m = {0.5, 0.0, -1.0}, .heading_rad = 3.0}).arrived);
 }

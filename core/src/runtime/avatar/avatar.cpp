@@ -119,7 +119,7 @@ Status AvatarSimulation::SetLayer(const LayerRequest& request) {
 
 Status AvatarSimulation::SetFootPlanting(bool is_on) {
   if (is_on && !body_.library->leg_rig().is_usable) {
-    return Fail(ErrorCode::kUnsupported, "the library's legs are not such as can be planted");
+    return Fail(ErrorCode::kUnsupported, "this skeleton does not support foot planting");
   }
   options_.foot_planting = is_on;
   return {};

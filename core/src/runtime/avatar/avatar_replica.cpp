@@ -31,7 +31,7 @@ class AvatarReplica::Reader {
     if (ok()) status_ = Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(at_));
   }
   void Finish() {
-    if (at_ != record_.size()) Refuse("a movement record is longer than what it tells");
+    if (at_ != record_.size()) Refuse("a movement record has extra bytes at its end");
   }
 
   void F64(double& value) { Number(value); }
@@ -54,12 +54,12 @@ class AvatarReplica::Reader {
   }
   void CheckUnit(Quat& q) {
     if (std::fabs(Dot(q, q) - 1.0f) <= kNearlyUnit) return;
-    Refuse("a rotation of a movement record is not of unit length");
+    Refuse("a rotation in a movement record is not of unit length");
     q = kIdentityQuat;
   }
   void CheckUnit(Vec3& v) {
     if (std::fabs(glm::dot(v, v) - 1.0f) <= kNearlyUnit && v.y > 0.0f) return;
-    Refuse("a normal of a movement record is not of unit length and up");
+    Refuse("a normal in a movement record is not of unit length or does not point up");
     v = Vec3(0.0f, 1.0f, 0.0f);
   }
 
@@ -69,13 +69,13 @@ class AvatarReplica::Reader {
     value = 0;
     Take(&value, sizeof value);
     if (std::fabs(value) <= static_cast<T>(kMostOfANumber)) return;
-    Refuse("a number of a movement record is none or too large");
+    Refuse("a number in a movement record is not finite or is too large");
     value = 0;
   }
   void Take(void* value, std::size_t bytes) {
     if (!ok()) return;
     if (record_.size() - at_ < bytes) {
-      Refuse("a movement record is cut short");
+      Refuse("a movement record is truncated");
       return;
     }
     std::memcpy(value, record_.data() + at_, bytes);
@@ -95,13 +95,13 @@ void ReadLayers(const MotionLibrary& library, LayerStack& layers, Reader& reader
   reader.Index(count);
   std::array<LayerStack::Playing, LayerStack::kMaxLayers> playing{};
   if (count > static_cast<int>(playing.size())) {
-    reader.Refuse("a movement record tells of too many layers");
+    reader.Refuse("a movement record contains too many layers");
     return;
   }
   const auto told = std::span(playing).first(static_cast<std::size_t>(count));
   for (LayerStack::Playing& p : told) record::LayerFields(reader, p);
   if (reader.ok() && !layers.Restore(library, told)) {
-    reader.Refuse("a movement record tells of a layer that cannot be");
+    reader.Refuse("a movement record contains an invalid layer");
   }
 }
 
@@ -111,7 +111,7 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   reader.Index(group);
   if (!reader.ok()) return;
   if (static_cast<std::size_t>(group) >= library.groups().size()) {
-    reader.Refuse("a movement record tells of a group that the library has not");
+    reader.Refuse("a movement record refers to a group that the library does not have");
     return;
   }
   movement.group = group;
@@ -159,7 +159,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
   if ((flags & record::kIsState) != 0) {
     ReadState(flags, reader);
   } else if (!is_known_) {
-    return Fail(ErrorCode::kNotFound, "a change of an avatar of which no state is known");
+    return Fail(ErrorCode::kNotFound, "a change record arrived before the first state record");
   } else {
     ReadChange(flags, reader);
   }
@@ -174,22 +174,22 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
   if (has_left && !is_moving_) {
-    reader.Refuse("a movement record ends a movement that is not under way");
+    reader.Refuse("a movement record ends a movement, but none is in progress");
     return;
   }
   if (has_begun && is_moving_ && !has_left) {
-    reader.Refuse("a movement record begins a movement and ends none");
+    reader.Refuse("a movement record begins a movement before the current one ends");
     return;
   }
   if (has_begun && ((flags & record::kPlants) != 0) != body_.plants_feet) {
-    reader.Refuse("a movement record plants feet that are not, or the other way round");
+    reader.Refuse("a movement record does not agree with the state about foot planting");
     return;
   }
   if (has_left) {
     double left_s = movement.duration_s();
     if ((flags & record::kLeftAtEnd) == 0) reader.F64(left_s);
     if (!(left_s >= 0.0 && left_s <= movement.duration_s())) {
-      reader.Refuse("a movement record ends a movement outside of it");
+      reader.Refuse("a movement record ends a movement at a time outside its duration");
     }
     if (!reader.ok()) return;
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
@@ -216,7 +216,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     body_.StartWeighted(base);
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           time_s >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement outside of it");
+      reader.Refuse("a movement record begins a movement at a time outside its duration");
       return;
     }
     body_.EnterAt(start_offset_s);
@@ -239,7 +239,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   body_.begins_planting = (flags & record::kBeginsPlanting) != 0;
   is_moving_ = (flags & record::kMoves) != 0;
   if (body_.plants_feet && !body_.library->leg_rig().is_usable) {
-    reader.Refuse("a movement record plants feet that the library has not");
+    reader.Refuse("a movement record plants feet, but the library does not support it");
     return;
   }
   if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
@@ -258,7 +258,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     movement.extra_turn_rad = extra_turn_rad;
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           movement_time_s_ >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement outside of it");
+      reader.Refuse("a movement record begins a movement at a time outside its duration");
       return;
     }
     body_.EnterAt(start_offset_s);
@@ -270,7 +270,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
       SetTimes(body_.group().kind, movement);
       record::PlanFields(reader, movement.feet);
       for (const FootResidual& rest : movement.feet.residuals) {
-        if (!(rest.over_s > 0.0)) reader.Refuse("what feet keep ends before it begins");
+        if (!(rest.over_s > 0.0))
+          reader.Refuse("a foot residual in a movement record has no duration");
       }
       movement.feet.packed = PackFootPlan(movement);
     }

@@ -73,11 +73,11 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
     }
   }
   if (!AllFinite(sites) || !AllFinite(pseudo_weights)) {
-    return Fail(ErrorCode::kOutOfRange, "a parameter or weight is not finite");
+    return Fail(ErrorCode::kOutOfRange, "a parameter or a weight is not finite");
   }
   for (const double scale : scales) {
     if (!(scale > 0.0) || !std::isfinite(scale)) {
-      return Fail(ErrorCode::kOutOfRange, "a parameter scale is not positive");
+      return Fail(ErrorCode::kOutOfRange, "a parameter's scale is not positive");
     }
   }
 

@@ -16,7 +16,8 @@ double At(std::span<const double> values, int i) { return values[static_cast<std
 
 Status ValidateKeytimes(std::span<const double> keytimes_s) {
   const int count = static_cast<int>(keytimes_s.size());
-  if (count < 2) return Fail(ErrorCode::kOutOfRange, "a movement needs two keytimes", count);
+  if (count < 2)
+    return Fail(ErrorCode::kOutOfRange, "a movement needs at least two keytimes", count);
   if (count > kMaxIntervals + 1) return Fail(ErrorCode::kOutOfRange, "too many keytimes", count);
   if (keytimes_s[0] != 0.0) return Fail(ErrorCode::kOutOfRange, "the first keytime must be 0");
   for (int i = 0; i + 1 < count; ++i) {

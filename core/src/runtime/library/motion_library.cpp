@@ -109,17 +109,18 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
   for (const fb::Parameter* parameter : *from.parameters()) {
     const auto name = static_cast<ParameterName>(parameter->name());
     if (parameter->name() >= kParameterNameCount || !NameFitsKind(name, group.kind)) {
-      return Fail(ErrorCode::kMalformed, "a parameter's name is unknown or not of its kind",
+      return Fail(ErrorCode::kMalformed,
+                  "a parameter's name is unknown or not valid for the group's kind",
                   parameter->name());
     }
     if (group.FindParameter(name) >= 0) {
-      return Fail(ErrorCode::kMalformed, "a parameter stands twice", parameter->name());
+      return Fail(ErrorCode::kMalformed, "a group has the same parameter twice", parameter->name());
     }
     // Written this way so that NaN is rejected.
     if (!(parameter->min() >= -kMaxParameter && parameter->max() <= kMaxParameter &&
           parameter->min() <= parameter->max() && parameter->scale() >= kMinScale &&
           parameter->scale() <= kMaxParameter)) {
-      return Fail(ErrorCode::kMalformed, "a parameter's range or scale makes no sense",
+      return Fail(ErrorCode::kMalformed, "a parameter's range or scale is invalid",
                   parameter->name());
     }
     group.parameters.push_back(
@@ -181,7 +182,7 @@ Status CheckWeightTables(const MotionGroup& group) {
   }
   if (!sums_are_right) return Fail(ErrorCode::kMalformed, "a group's weights do not sum to 1");
   if (!(bound <= kMaxWeightSum)) {
-    return Fail(ErrorCode::kMalformed, "a group's weights are far too large");
+    return Fail(ErrorCode::kMalformed, "a group's weights are too large");
   }
   return {};
 }
@@ -209,7 +210,8 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
     return Fail(ErrorCode::kMalformed, "a group's weight tables hold a number out of range");
   }
   for (const double dilation : group.dilations) {
-    if (!(dilation > 1e-9)) return Fail(ErrorCode::kMalformed, "a dilation is not positive");
+    if (!(dilation > 1e-9))
+      return Fail(ErrorCode::kMalformed, "a group's dilation is not positive");
   }
   group.radius_factor = from.radius_factor();
   if (!(group.radius_factor > 0.0 && group.radius_factor <= kMaxRadiusFactor)) {
@@ -326,7 +328,7 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
     return fail("a layer's name is not 1 to 32 of a-z, A-Z, 0-9, '_', '-', '.'");
   }
   if (!(layer.fps >= kMinLayerFps && layer.fps <= kMaxLayerFps)) {
-    return fail("a layer's keys a second are out of range");
+    return fail("a layer's frame rate is out of range");
   }
   if (layer.joints.empty() || layer.joints.size() > joints_of_legs.size() ||
       layer.weights.size() != layer.joints.size()) {
@@ -335,16 +337,17 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
   int before = -1;
   for (const int joint : layer.joints) {
     if (joint <= before || static_cast<std::size_t>(joint) >= joints_of_legs.size()) {
-      return fail("a layer's mask names a joint that is not there, or not in order");
+      return fail("a layer's mask lists joints that do not exist or are not in order");
     }
     if (joints_of_legs[static_cast<std::size_t>(joint)]) {
-      return Fail(ErrorCode::kMalformed, "a layer's mask touches the root or a leg", joint);
+      return Fail(ErrorCode::kMalformed, "a layer's mask contains the root or a joint of a leg",
+                  joint);
     }
     before = joint;
   }
   for (const float weight : layer.weights) {
     if (!(weight > 0.0f && weight <= 1.0f))
-      return fail("a layer's mask holds a weight not in (0, 1]");
+      return fail("a layer's mask contains a weight outside (0, 1]");
   }
   const std::size_t key_floats = 4 * layer.joints.size();
   if (layer.rotations.empty() || layer.rotations.size() % key_floats != 0 ||
@@ -356,7 +359,7 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
     const double norm = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] +
                                   double{q[3]} * q[3]);
     if (!(std::fabs(norm - 1.0) <= kUnitTolerance)) {
-      return Fail(ErrorCode::kMalformed, "a layer holds a rotation not of unit length",
+      return Fail(ErrorCode::kMalformed, "a layer contains a rotation that is not of unit length",
                   static_cast<std::int64_t>(i / 4));
     }
   }
@@ -441,7 +444,7 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
   if (size > kMaxFileBytes || size < kLibraryHeaderBytes) {
     close(file);
     return failed(size > kMaxFileBytes ? ErrorCode::kLimitExceeded : ErrorCode::kMalformed,
-                  size > kMaxFileBytes ? "larger than a library may be (1 GiB)"
+                  size > kMaxFileBytes ? "the file is larger than 1 GiB, the limit for libraries"
                                        : "not a Stridewire library: shorter than its header");
   }
   void* mapping = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
@@ -462,7 +465,8 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
 Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::FromBytes(
     std::span<const std::byte> bytes) {
   if (bytes.size() > kMaxFileBytes) {
-    return Fail(ErrorCode::kLimitExceeded, "larger than a library may be (1 GiB)");
+    return Fail(ErrorCode::kLimitExceeded,
+                "the file is larger than 1 GiB, the limit for libraries");
   }
   const std::size_t rounded = (bytes.size() + kAlignment) / kAlignment * kAlignment;
   auto* copy = static_cast<std::byte*>(std::aligned_alloc(kAlignment, rounded));
@@ -484,19 +488,19 @@ Status MotionLibrary::Load() {
   std::uint32_t version = 0;
   std::memcpy(&version, bytes_.data() + 8, 4);
   if (version != static_cast<std::uint32_t>(kFormatVersion)) {
-    return Fail(ErrorCode::kVersionMismatch, "made for another version of the format", version);
+    return Fail(ErrorCode::kVersionMismatch, "the library has another format version", version);
   }
   const std::span<const std::byte> payload = bytes_.subspan(kLibraryHeaderBytes);
   std::uint64_t payload_bytes = 0;
   std::memcpy(&payload_bytes, bytes_.data() + 16, 8);
   if (payload_bytes != payload.size()) {
     return Fail(ErrorCode::kMalformed, payload_bytes > payload.size()
-                                           ? "the file is cut short"
-                                           : "the file goes on past its end");
+                                           ? "the file is truncated"
+                                           : "the file is longer than its header says");
   }
   const auto expected_header = MakeLibraryHeader(payload);
   if (std::memcmp(expected_header.data(), bytes_.data(), kLibraryHeaderBytes) != 0) {
-    return Fail(ErrorCode::kMalformed, "the content does not match its hash: the file is damaged");
+    return Fail(ErrorCode::kMalformed, "the file is damaged: its content does not match its hash");
   }
   hash_ = HashText(HashPayload(payload));
 
@@ -551,7 +555,7 @@ Status MotionLibrary::Load() {
   }
   if (root.layers() == nullptr) return {};
   if (root.layers()->size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kMalformed, "there are too many layers", root.layers()->size());
+    return Fail(ErrorCode::kMalformed, "the library has too many layers", root.layers()->size());
   }
   const std::vector<bool> joints_of_legs = JointsOfLegs(skeleton_);
   for (const fb::Layer* from : *root.layers()) {
@@ -579,7 +583,7 @@ Status MotionLibrary::LoadTransitions(const std::vector<Transition>& transitions
     const Transition& t = transitions[i];
     if (!(t.distance_m >= 0.0f && IsSane(t.distance_m)) ||
         !is_example_of(t.end_example, i / nodes) || !is_example_of(t.start_example, i % nodes)) {
-      return Fail(ErrorCode::kMalformed, "a transition is not between two examples",
+      return Fail(ErrorCode::kMalformed, "a transition refers to an example that does not exist",
                   static_cast<std::int64_t>(i));
     }
   }

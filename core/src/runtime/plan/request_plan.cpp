@@ -257,25 +257,26 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
   };
   if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
     if (!within(step->length_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "length_m: expected a number within 10 m", "step");
     }
     if (step->side_m && !within(*step->side_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "side_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "side_m: expected a number within 10 m", "step");
     }
     if (!within(step->height_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "height_m: expected a number within 10 m", "step");
     }
     if (!within(step->turn_rad, kMaxRequestTurnRad)) {
-      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "step");
+      return Fail(ErrorCode::kOutOfRange, "turn_rad: expected a number within 3.2 rad", "step");
     }
     if (step->at && !is_place(step->at->position_m)) {
-      return Fail(ErrorCode::kOutOfRange, "at_m is not within 1000000 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "at_m: expected numbers within 1000000 m", "step");
     }
     if (step->at && !within(step->at->heading_rad.value_or(0.0), kMaxWalkHeadingRad)) {
-      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
+      return Fail(ErrorCode::kOutOfRange, "heading_rad: expected a number within 10000 rad",
+                  "step");
     }
     if (step->exact_only && !step->at) {
-      return Fail(ErrorCode::kInvalidArgument, "exact_only has a meaning only beside at_m", "step");
+      return Fail(ErrorCode::kInvalidArgument, "exact_only requires at_m", "step");
     }
     const bool found =
         step->foot ? has_kind(StepKind(*step->foot))
@@ -283,42 +284,44 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
     if (!found) return Fail(ErrorCode::kUnsupported, "the library has no such step", "step");
   } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
     if (!within(jump->length_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "jump");
+      return Fail(ErrorCode::kOutOfRange, "length_m: expected a number within 10 m", "jump");
     }
     if (!within(jump->height_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "jump");
+      return Fail(ErrorCode::kOutOfRange, "height_m: expected a number within 10 m", "jump");
     }
     if (!within(jump->turn_rad, kMaxRequestTurnRad)) {
-      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "jump");
+      return Fail(ErrorCode::kOutOfRange, "turn_rad: expected a number within 3.2 rad", "jump");
     }
     if (!has_kind(MovementKind::kJump)) {
       return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
     }
   } else if (const auto* walk = std::get_if<WalkRequest>(&request.movement)) {
     if (!is_place(walk->position_m)) {
-      return Fail(ErrorCode::kOutOfRange, "position_m is not within 1000000 m", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "position_m: expected numbers within 1000000 m",
+                  "walk_to");
     }
     if (!within(walk->heading_rad, kMaxWalkHeadingRad)) {
-      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad",
+      return Fail(ErrorCode::kOutOfRange, "heading_rad: expected a number within 10000 rad",
                   "walk_to");
     }
     if (walk->waypoints_m.size() > kMaxWaypoints) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m holds more than 64 places", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m: expected at most 64 points", "walk_to");
     }
     if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m: expected numbers within 1000000 m",
                   "walk_to");
     }
     if (walk->speed_m_s &&
         !(*walk->speed_m_s >= kMinWalkSpeedMPerS && *walk->speed_m_s <= kMaxWalkSpeedMPerS)) {
-      return Fail(ErrorCode::kOutOfRange, "speed_m_s is not a number from 0.05 to 5", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "speed_m_s: expected a number from 0.05 to 5", "walk_to");
     }
     if (!has_kind(MovementKind::kStepLeft) || !has_kind(MovementKind::kStepRight)) {
-      return Fail(ErrorCode::kUnsupported, "the library has no steps of both feet", "walk_to");
+      return Fail(ErrorCode::kUnsupported, "the library does not have steps of both feet",
+                  "walk_to");
     }
   } else if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
     if (!(stand->seconds >= 0.0 && stand->seconds <= kMaxStandS)) {
-      return Fail(ErrorCode::kOutOfRange, "seconds is not a number from 0 to 3600", "stand");
+      return Fail(ErrorCode::kOutOfRange, "seconds: expected a number from 0 to 3600", "stand");
     }
   }
   return {};

@@ -149,15 +149,15 @@ TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRe
 
 const char* NoPathReason(MovementKind from, MovementKind to) {
   static constexpr std::array<std::array<const char*, 3>, 3> kReasons{
-      {{"no way leads from step_left to step_left in this library",
-        "no way leads from step_left to step_right in this library",
-        "no way leads from step_left to jump in this library"},
-       {"no way leads from step_right to step_left in this library",
-        "no way leads from step_right to step_right in this library",
-        "no way leads from step_right to jump in this library"},
-       {"no way leads from jump to step_left in this library",
-        "no way leads from jump to step_right in this library",
-        "no way leads from jump to jump in this library"}}};
+      {{"this library has no transition path from step_left to step_left",
+        "this library has no transition path from step_left to step_right",
+        "this library has no transition path from step_left to jump"},
+       {"this library has no transition path from step_right to step_left",
+        "this library has no transition path from step_right to step_right",
+        "this library has no transition path from step_right to jump"},
+       {"this library has no transition path from jump to step_left",
+        "this library has no transition path from jump to step_right",
+        "this library has no transition path from jump to jump"}}};
   return kReasons.at(static_cast<std::size_t>(from)).at(static_cast<std::size_t>(to));
 }
 

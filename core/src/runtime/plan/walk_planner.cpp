@@ -235,17 +235,17 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
     progress.least_left = left;
     progress.steps_without = 0;
   } else if (++progress.steps_without > kMaxStepsWithout) {
-    return Refuse("the walk comes no nearer to its goal");
+    return Refuse("the walk makes no progress towards its goal");
   }
   if (++progress.steps > kMaxWalkSteps) {
-    return Refuse("the walk takes more than 10000 steps");
+    return Refuse("the walk needs more than 10000 steps");
   }
 
   StepPlanner planner(library, terrain, stance);
   const bool looks_at_goal =
       terrain != nullptr && (progress.steps == 1 || (is_last_leg && left < kGoalInSightM));
   if (looks_at_goal && !planner.GoalIsGood(course)) {
-    return Refuse("the goal lies on an edge or a slope too steep to stand");
+    return Refuse("the ground at the goal is too steep or too uneven to stand on");
   }
   // First try steps that the library has, then steps that planting has to change much.
   for (const bool is_strict : {true, false}) {
@@ -262,12 +262,12 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
     }
   }
   if (planner.has_seen_heights()) {
-    return Refuse("the way is too high or too low to step on");
+    return Refuse("the ground ahead is too high or too low to step on");
   }
   if (planner.has_seen_bad_ground()) {
-    return Refuse("there is no ground for a foot, but edges and slopes");
+    return Refuse("the ground ahead is too steep or too uneven for a foot");
   }
-  return Refuse("the library has no steps that lead there");
+  return Refuse("the library has no step towards the goal");
 }
 
 }  // namespace stridewire

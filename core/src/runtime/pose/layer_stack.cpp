@@ -65,7 +65,7 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
   }
   // Written this way so that NaN is rejected.
   if (!IsWithin(request.blend_s, 0.0, kMaxLayerBlendS)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's blend must take 0 to 10 s");
+    return Fail(ErrorCode::kOutOfRange, "a layer's blend time must be from 0 to 10 s");
   }
   Playing* on = Find(request.layer, false);
   if (!request.is_on) {
@@ -75,17 +75,17 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
     return {};
   }
   if (!(request.weight > 0.0 && request.weight <= 1.0)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's weight must lie above 0 and up to 1");
+    return Fail(ErrorCode::kOutOfRange, "a layer's weight must be above 0 and at most 1");
   }
   if (!IsWithin(request.speed, kMinLayerSpeed, kMaxLayerSpeed)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's speed must lie from 0.1 to 4");
+    return Fail(ErrorCode::kOutOfRange, "a layer's speed must be from 0.1 to 4");
   }
   if (on == nullptr && library.layers()[static_cast<std::size_t>(request.layer)].is_looping) {
     on = Find(request.layer, true);
   }
   if (on == nullptr) {
     if (playing_.size() == kMaxLayers) {
-      return Fail(ErrorCode::kLimitExceeded, "the avatar plays four layers already", kMaxLayers);
+      return Fail(ErrorCode::kLimitExceeded, "the avatar already plays four layers", kMaxLayers);
     }
     MakeRoom();
     on = &playing_.emplace_back(Playing{.layer = request.layer, .speed = request.speed});
@@ -135,7 +135,7 @@ Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing
            is_time(p.elapsed_s) && is_time(p.ease_s) && is_time(p.blend_s);
   };
   if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, could_be)) {
-    return Fail(ErrorCode::kOutOfRange, "no stack has these layers in play");
+    return Fail(ErrorCode::kOutOfRange, "the layer state is not valid");
   }
   if (!playing.empty()) MakeRoom();
   playing_.assign(playing.begin(), playing.end());

@@ -42,13 +42,14 @@ struct CubicWeights {
 
 Status Clip::Validate() const {
   if (!(fps > 0.0 && fps <= 10000.0)) {
-    return Fail(ErrorCode::kOutOfRange, "a clip's frames a second must lie in (0, 10000]");
+    return Fail(ErrorCode::kOutOfRange,
+                "a clip's frame rate must be above 0 and at most 10000 per second");
   }
-  if (frame_count() < 1) return Fail(ErrorCode::kOutOfRange, "a clip needs a frame");
-  if (joint_count < 1) return Fail(ErrorCode::kOutOfRange, "a clip needs a joint");
+  if (frame_count() < 1) return Fail(ErrorCode::kOutOfRange, "a clip has no frames");
+  if (joint_count < 1) return Fail(ErrorCode::kOutOfRange, "a clip has no joints");
   const std::size_t joints = static_cast<std::size_t>(joint_count);
   if (rotations.size() / joints != root_positions_m.size() || rotations.size() % joints != 0) {
-    return Fail(ErrorCode::kShapeMismatch, "a clip needs one rotation a joint and frame",
+    return Fail(ErrorCode::kShapeMismatch, "a clip needs one rotation per joint and frame",
                 static_cast<std::int64_t>(rotations.size()));
   }
   for (int f = 0; f < frame_count(); ++f) {

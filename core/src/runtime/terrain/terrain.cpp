@@ -25,7 +25,7 @@ bool IsWithin(double value, double limit) { return value >= -limit && value <= l
 
 Status CheckPoint(const GroundPoint& point, const std::string& where) {
   if (IsWithin(point.x, kMaxTerrainPositionM) && IsWithin(point.z, kMaxTerrainPositionM)) return {};
-  return Fail(ErrorCode::kOutOfRange, "is not a number within 1000000 m", where);
+  return Fail(ErrorCode::kOutOfRange, "expected a number within 1000000 m", where);
 }
 
 Status CheckField(const HeightField& field) {
@@ -34,26 +34,26 @@ Status CheckField(const HeightField& field) {
   static_assert(kMaxTerrainHeightM == 1e4 && kMaxTerrainPositionM == 1e6);
   if (auto ok = CheckPoint(field.origin_m, "height_field.origin_m"); !ok) return ok;
   if (!(field.cell_m >= kMinTerrainCellM && field.cell_m <= kMaxTerrainCellM)) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 0.01 to 1000 m",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 0.01 to 1000 m",
                 std::string("height_field.cell_m"));
   }
   if (field.columns < 2 || field.columns > kMaxTerrainColumns) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 2 to 1024",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 2 to 1024",
                 std::string("height_field.columns"), field.columns);
   }
   if (field.rows < 2 || field.rows > kMaxTerrainRows) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 2 to 1024",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 2 to 1024",
                 std::string("height_field.rows"), field.rows);
   }
   if (field.heights_m.size() !=
       static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows)) {
-    return Fail(ErrorCode::kShapeMismatch, "has not columns x rows numbers",
+    return Fail(ErrorCode::kShapeMismatch, "expected columns x rows numbers",
                 std::string("height_field.heights_m"),
                 static_cast<std::int64_t>(field.heights_m.size()));
   }
   for (std::size_t i = 0; i < field.heights_m.size(); ++i) {
     if (!IsWithin(static_cast<double>(field.heights_m[i]), kMaxTerrainHeightM)) {
-      return Fail(ErrorCode::kOutOfRange, "is not a number within 10000 m",
+      return Fail(ErrorCode::kOutOfRange, "expected a number within 10000 m",
                   "height_field.heights_m[" + std::to_string(i) + "]");
     }
   }
@@ -64,10 +64,10 @@ Status CheckBox(const TerrainBox& box, const std::string& where) {
   if (auto ok = CheckPoint(box.min_m, where + ".min_m"); !ok) return ok;
   if (auto ok = CheckPoint(box.max_m, where + ".max_m"); !ok) return ok;
   if (!(box.min_m.x < box.max_m.x && box.min_m.z < box.max_m.z)) {
-    return Fail(ErrorCode::kOutOfRange, "is not above min_m", where + ".max_m");
+    return Fail(ErrorCode::kOutOfRange, "expected values above min_m", where + ".max_m");
   }
   if (!IsWithin(box.height_m, kMaxTerrainHeightM)) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number within 10000 m", where + ".height_m");
+    return Fail(ErrorCode::kOutOfRange, "expected a number within 10000 m", where + ".height_m");
   }
   return {};
 }
@@ -103,7 +103,7 @@ Expected<std::shared_ptr<const Terrain>> Terrain::Make(TerrainData data) {
     if (auto ok = CheckField(*data.height_field); !ok) return std::unexpected(ok.error());
   }
   if (data.boxes.size() > kMaxTerrainBoxes) {
-    return Fail(ErrorCode::kLimitExceeded, "holds more than 65536 boxes", std::string("boxes"));
+    return Fail(ErrorCode::kLimitExceeded, "expected at most 65536 boxes", std::string("boxes"));
   }
   for (std::size_t b = 0; b < data.boxes.size(); ++b) {
     if (auto ok = CheckBox(data.boxes[b], "boxes[" + std::to_string(b) + "]"); !ok) {
@@ -155,7 +155,7 @@ Status Terrain::IndexBoxes() {
   for (std::size_t c = 0; c + 1 < starts_.size(); ++c) {
     static_assert(kMaxTerrainBoxesPerCell == 256);
     if (starts_[c + 1] - starts_[c] > kMaxTerrainBoxesPerCell) {
-      return Fail(ErrorCode::kLimitExceeded, "has more than 256 boxes over one another",
+      return Fail(ErrorCode::kLimitExceeded, "more than 256 boxes overlap in one place",
                   std::string("boxes"), static_cast<std::int64_t>(boxes_[starts_[c]]));
     }
   }
