@@ -1,6 +1,6 @@
 // Mutated library files: each ends as an error, or as a library every group of which can be
-// evaluated and walked with. STRIDEWIRE_FUZZ_COUNT sets how many (500), STRIDEWIRE_FUZZ_SEED repeats
-// a run.
+// evaluated and walked with. STRIDEWIRE_FUZZ_COUNT sets how many (500), STRIDEWIRE_FUZZ_SEED
+// repeats a run.
 
 #include <gtest/gtest.h>
 
@@ -16,11 +16,11 @@
 #include <string>
 #include <vector>
 
-#include "runtime/library/library_file.h"
-#include "offline/builtin/builtin_library.h"
 #include "offline/build/interpolation_error.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/build/refine.h"
+#include "offline/builtin/builtin_library.h"
+#include "runtime/library/library_file.h"
+#include "stridewire/offline/library_builder.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/movement.h"
 #include "test_library.h"
@@ -271,7 +271,7 @@ void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator)
   }
 }
 
-TEST(LibraryMutation, EveryFileEndsAsAnErrorOrALibraryThatCanBePlayed) {
+TEST(LibraryMutation, EveryFileIsRejectedOrCanBePlayed) {
   const char* count_text = std::getenv("STRIDEWIRE_FUZZ_COUNT");
   const char* seed_text = std::getenv("STRIDEWIRE_FUZZ_SEED");
   const std::uint64_t count = count_text != nullptr ? std::strtoull(count_text, nullptr, 10) : 500;

@@ -1,5 +1,6 @@
-// Compact poses: how many bytes they take and how far anything in them is from where it should be, over every frame of
-// every capture there is and over avatars that do all that avatars do; on every instruction set this machine has.
+// Compact poses: how many bytes they take and how far anything in them is from where it should be,
+// over every frame of every capture there is and over avatars that do all that avatars do; on every
+// instruction set this machine has.
 
 #include <gtest/gtest.h>
 
@@ -11,15 +12,15 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
+#include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/library/pose_quantization.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/runtime/avatar.h"
-#include "runtime/library/pose_quantization.h"
 
 namespace stridewire {
 namespace {
@@ -162,7 +163,7 @@ struct Source {
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
-class CompactPosesOf : public testing::TestWithParam<Source> {
+class QuantizedAvatars : public testing::TestWithParam<Source> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -180,14 +181,14 @@ const auto kCaptured = testing::Values(
     Source{"DebianTakes", {kDebianTakes}}, Source{"Subject03", {"03"}}, Source{"Subject05", {"05"}},
     Source{"Subject06", {"06"}}, Source{"Subject09", {"09"}}, Source{"Subject14", {"14"}},
     Source{"Subject16", {"16"}}, Source{"Subject29", {"29"}}, Source{"Subject32", {"32"}});
-INSTANTIATE_TEST_SUITE_P(Generated, CompactPosesOf, testing::Values(Source{"Builtin", {}}),
+INSTANTIATE_TEST_SUITE_P(Generated, QuantizedAvatars, testing::Values(Source{"Builtin", {}}),
                          kNameOf);
-INSTANTIATE_TEST_SUITE_P(Captured, CompactPosesOf, kCaptured, kNameOf);
+INSTANTIATE_TEST_SUITE_P(Captured, QuantizedAvatars, kCaptured, kNameOf);
 
-class CompactCapturesOf : public CompactPosesOf {};
-INSTANTIATE_TEST_SUITE_P(Captured, CompactCapturesOf, kCaptured, kNameOf);
+class QuantizedCaptures : public QuantizedAvatars {};
+INSTANTIATE_TEST_SUITE_P(Captured, QuantizedCaptures, kCaptured, kNameOf);
 
-TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
+TEST_P(QuantizedCaptures, KeepAllFramesWithinAMillimetre) {
   EXPECT_LE(code_.largest_error_m, kLargestErrorM);
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);
@@ -203,7 +204,7 @@ TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
 }
 
 // Of those that are left out the shift is stated, and within it what is shown.
-TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
+TEST_P(QuantizedCaptures, KeepReducedJointsWithinTheStatedError) {
   const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
@@ -217,7 +218,7 @@ TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
 }
 
-TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
+TEST_P(QuantizedAvatars, KeepReducedJointsWithinTheStatedError) {
   const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
@@ -250,7 +251,7 @@ TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
   EXPECT_LE(root.pose_bytes(), 20u);
 }
 
-TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
+TEST_P(QuantizedAvatars, StayWithinAMillimetre) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);
   DrawnCrowd crowd(library_, 20, 5);
@@ -264,7 +265,7 @@ TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
   EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
 }
 
-TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
+TEST_P(QuantizedAvatars, HaveTheSameBytesOnEveryInstructionSet) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
   DrawnCrowd crowd(library_, 7, 6);  // the last block is not full
   std::vector<CompactCodec::Block> blocks;
@@ -292,7 +293,7 @@ TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
   }
 }
 
-TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
+TEST(PoseQuantization, UsesTheIdentityAsReferenceForSmallRotations) {
   const PoseQuantization code = ChoosePoseQuantization(*LibraryOf({}));
   int as_they_are = 0;
   for (std::size_t j = 1; j < code.joints.size(); ++j) {
@@ -309,7 +310,7 @@ TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
 }
 
 // Any tree of joints that turn any way within any ranges: what is stated is kept.
-TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
+TEST(PoseQuantization, KeepsItsBoundForRandomSkeletons) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << '\n';
   Random random(seed);
@@ -377,7 +378,7 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
   EXPECT_GT(closest, 0.3) << "seed " << seed;
 }
 
-TEST(CompactPoses, BonesOfManyMetresGetAllBitsAndSaySo) {
+TEST(PoseQuantization, ReportsTheErrorIfBitsRunOut) {
   Skeleton skeleton;
   skeleton.joints = {{"root", -1, Vec3(0.0f)}, {"far", 0, Vec3(0.0f, 100.0f, 0.0f)}};
   const std::vector<RotationRange> ranges(2);

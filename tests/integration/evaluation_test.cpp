@@ -9,19 +9,19 @@
 #include <string>
 #include <vector>
 
-#include "captured_library.h"
-#include "random_requests.h"
-#include "runtime/plan/foot_sampler.h"
-#include "instruction_sets.h"
-#include "runtime/pose/pose_kernels.h"
-#include "random.h"
-#include "rough_ground.h"
 #include "base/trig.h"
+#include "captured_library.h"
+#include "instruction_sets.h"
+#include "random.h"
+#include "random_requests.h"
+#include "rough_ground.h"
+#include "runtime/plan/foot_sampler.h"
+#include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/pose_kernels.h"
+#include "runtime/pose/reference_evaluation.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/runtime/avatar.h"
-#include "runtime/pose/reference_evaluation.h"
-#include "runtime/pose/evaluation_batcher.h"
 
 namespace stridewire {
 namespace {
@@ -40,7 +40,7 @@ void AppendBytes(const AvatarSimulation& avatar, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(pose.rotations.data()), pose.rotations.size_bytes());
 }
 
-TEST(Evaluation, SinesAreThoseOfTheScalarCode) {
+TEST(Evaluation, SimdSinesMatchScalarSines) {
   Random random(20261122);
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
@@ -79,7 +79,7 @@ double AngleBetween(const DQuat& a, const DQuat& b) {
 }
 
 // What planning looks at side by side is what poses evaluated one by one have.
-TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
+TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   constexpr unsigned kSeed = 20261126;
   const Library library = OpenLibrary("builtin").value();
   const LegRig& rig = library->leg_rig();
@@ -88,8 +88,9 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
   Pose scratch = pose;
   int sampled = 0;
   for (int walk = 0; walk < 40; ++walk) {
-    AvatarSimulation avatar(library, {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
-                            random.Draw(-4.0, 4.0)});
+    AvatarSimulation avatar(library,
+                            {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
+                             random.Draw(-4.0, 4.0)});
     for (int step = 0; step < 6; ++step) {
       const bool jumps = random.Draw(0.0, 1.0) < 0.2;
       MovementRequest request;
@@ -143,7 +144,7 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
 }
 
 // Of what movements leave of the poses before, the largest are halves of a turn.
-TEST(Evaluation, EasesOutDifferencesOfAnySize) {
+TEST(Evaluation, FadesDifferencesOfAnySize) {
   constexpr unsigned kSeed = 20261125;
   constexpr std::size_t kJoints = 37;
   Random random(kSeed);
@@ -248,9 +249,9 @@ struct Sixteen {
   alignas(64) std::array<Lanes, 4 * kJoints> rotations{};
 };
 
-// What is left of the poses before makes rotations longer before they are made unit: one that is too short to have a
-// mean must be seen through it.
-TEST(Evaluation, SeesARotationTooShortInEveryLaneAndJoint) {
+// What is left of the poses before makes rotations longer before they are made unit: one that is
+// too short to have a mean must be seen through it.
+TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   for (const std::int64_t set : InstructionSets()) {
@@ -269,10 +270,10 @@ TEST(Evaluation, SeesARotationTooShortInEveryLaneAndJoint) {
   }
 }
 
-// All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does as well, and then movement
-// mode gets another feature bit: who evaluates movements by the old formulas would show other poses than the server
-// (decision 0021).
-TEST(Evaluation, IsWhatMovementModeStandsFor) {
+// All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does
+// as well, and then movement mode gets another feature bit: who evaluates movements by the old
+// formulas would show other poses than the server (decision 0021).
+TEST(Evaluation, MatchesTheNumberInTheProtocol) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10);
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
@@ -283,7 +284,7 @@ TEST(Evaluation, IsWhatMovementModeStandsFor) {
   EXPECT_EQ(protocol::kFeatureMovementMode, 32'768u);
 }
 
-class EvaluationOf : public testing::TestWithParam<Source> {
+class LibraryEvaluation : public testing::TestWithParam<Source> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -292,7 +293,7 @@ class EvaluationOf : public testing::TestWithParam<Source> {
   Library library_;
 };
 
-TEST_P(EvaluationOf, IsTheReference) {
+TEST_P(LibraryEvaluation, MatchesTheReference) {
   constexpr unsigned kSeed = 1;
   DrawnCrowd crowd(library_, 20, kSeed);
   Pose fast(library_->skeleton().joint_count());
@@ -331,7 +332,7 @@ TEST_P(EvaluationOf, IsTheReference) {
   EXPECT_LT(sampled_rad / poses, 0.02) << "seed " << kSeed;
 }
 
-TEST_P(EvaluationOf, PlantsAsTheReference) {
+TEST_P(LibraryEvaluation, PlantingMatchesTheReference) {
   constexpr unsigned kSeed = 2;
   DrawnCrowd crowd(library_, 20, kSeed);
   const Skeleton& skeleton = library_->skeleton();
@@ -378,7 +379,7 @@ TEST_P(EvaluationOf, PlantsAsTheReference) {
   EXPECT_LT(largest_rad, 1e-4) << "seed " << kSeed;
 }
 
-TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
+TEST_P(LibraryEvaluation, HasTheSameBytesOnEveryInstructionSet) {
   constexpr unsigned kSeed = 7;
   std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick]
   for (const std::int64_t set : InstructionSets()) {
@@ -403,7 +404,7 @@ TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
   std::printf("\n");
 }
 
-TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
+TEST_P(LibraryEvaluation, DoesNotDependOnOtherLanes) {
   constexpr unsigned kSeed = 8;
   std::vector<std::string> alone;
   for (const std::size_t at_once : {1, 3, 16, 29}) {
@@ -431,7 +432,7 @@ Pose ShownAlone(const MotionLibrary& library, const Movement& movement, double t
   return pose;
 }
 
-TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
+TEST_P(LibraryEvaluation, SinglePosesMatchBatches) {
   constexpr unsigned kSeed = 9;
   constexpr std::size_t kCrowd = 37;
   DrawnCrowd crowd(library_, kCrowd, kSeed);
@@ -459,9 +460,9 @@ TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
   EXPECT_GT(poses, 3000);
 }
 
-// Poses of ticks to come, on every instruction set: of movements just begun and half over, on level and on rough ground,
-// planted or not, taken over and settling.
-TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
+// Poses of ticks to come, on every instruction set: of movements just begun and half over, on level
+// and on rough ground, planted or not, taken over and settling.
+TEST_P(LibraryEvaluation, SampleRunsMatchSinglePoses) {
   constexpr unsigned kSeed = 10;
   constexpr std::size_t kCrowd = 41;
   Random random(kSeed);
@@ -515,7 +516,8 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
           ++seen;
           const FootPlan& feet = stretch.movement->feet;
           ++planted[feet.is_active ? 1 : 0];
-          settling += feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
+          settling +=
+              feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
         }
       });
       if (HasFatalFailure()) return;
@@ -531,7 +533,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Libraries, EvaluationOf,
+INSTANTIATE_TEST_SUITE_P(Libraries, LibraryEvaluation,
                          testing::Values(Source{"Builtin", {}}, Source{"Subject01", {kDebianTakes}},
                                          Source{"Subject16", {"16"}}),
                          [](const auto& tested) { return tested.param.name; });

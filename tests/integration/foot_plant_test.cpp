@@ -1,5 +1,5 @@
-// Long random walks on the generated library and on captured ones, looked at from outside: the motion is
-// written as BVH and read back, feet are measured against where they were asked to stand.
+// Long random walks on the generated library and on captured ones, looked at from outside: the
+// motion is written as BVH and read back, feet are measured against where they were asked to stand.
 
 #include <gtest/gtest.h>
 
@@ -50,8 +50,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Walker{"DebianTakes", {kDebianTakes}, 0.5, 0.58, 0.1, 0.2, 0.2}),
     [](const auto& walker) { return walker.param.name; });
 
-// Footprints as a level designer would lay them: each from the one before by random length, side and
-// turn, in the world, all known before the first step is taken.
+// Footprints as a level designer would lay them: each from the one before by random length, side
+// and turn, in the world, all known before the first step is taken.
 struct Trail {
   std::vector<MovementRequest> requests;
   std::vector<Footprint> prints;
@@ -94,7 +94,7 @@ Trail RandomTrail(const Walker& walker, const Library& library, int steps, unsig
   return trail;
 }
 
-TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
+TEST_P(FootPlant, RandomStepsLandOnTheirFootprintsAndStayThere) {
   const Walker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
@@ -168,9 +168,9 @@ TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
   EXPECT_LE(figures.largest_join_step.root_m_s, std::max(0.5, 1.5 * examples.root_m_s));
 }
 
-// A footprint within reach is met, whatever the examples span; of one out of reach the report says how far
-// away the foot landed.
-TEST(Footprints, AreToldToBeMetOrByHowMuchTheyAreMissed) {
+// A footprint within reach is met, whatever the examples span; of one out of reach the report says
+// how far away the foot landed.
+TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   const Library library = OpenLibrary("builtin").value();
   const auto step_to = [&](const Footprint& print) {
     const std::vector<MovementRequest> requests = {

@@ -1,6 +1,6 @@
-// Stairs, a slalom, a shuffle, walking backward and turning on the spot as a user would see them, on
-// the generated library and on captures that span them: knees bend forward, legs do not cross, no foot
-// goes more than 3 cm through the ground.
+// Stairs, a slalom, a shuffle, walking backward and turning on the spot as a user would see them,
+// on the generated library and on captures that span them: knees bend forward, legs do not cross,
+// no foot goes more than 3 cm through the ground.
 
 #include <gtest/gtest.h>
 
@@ -87,8 +87,9 @@ struct Foothold {
   double height_m;
 };
 
-// Ground of stairs along z: treads begin 14 cm behind the ball of whoever climbs onto them, but ahead of
-// the toes of whoever stands below (by 1 cm: they are 9 cm ahead of the ball), and end 1 cm ahead of the ball of whoever goes down from them.
+// Ground of stairs along z: treads begin 14 cm behind the ball of whoever climbs onto them, but
+// ahead of the toes of whoever stands below (by 1 cm: they are 9 cm ahead of the ball), and end 1
+// cm ahead of the ball of whoever goes down from them.
 double GroundAt(const std::vector<Foothold>& holds, double z_m) {
   double height = holds.front().height_m;
   for (std::size_t i = 1; i < holds.size(); ++i) {
@@ -185,7 +186,7 @@ TEST(GeneralStepsBuiltin, ClimbsStairs) {
   }
 }
 
-TEST(GeneralStepsBuiltin, GoesUpAWindingStair) {
+TEST(GeneralStepsBuiltin, ClimbsAWindingStaircase) {
   Steps steps(7, Ahead(0.3, 0.35, 0.15));
   steps.front().turn_rad = 0.0;
   const Looks looks = LookAt("builtin winding stairs", Builtin(), steps);
@@ -204,7 +205,7 @@ TEST(GeneralStepsBuiltin, WalksASlalom) {
   }
 }
 
-TEST(GeneralStepsBuiltin, ShufflesAside) {
+TEST(GeneralStepsBuiltin, StepsSideways) {
   const Library library = Builtin();
   for (const Foot lead : {Foot::kLeft, Foot::kRight}) {
     const Looks looks = LookAt("builtin shuffle", library, Shuffle(lead, 0.4, 0.13));
@@ -244,9 +245,9 @@ INSTANTIATE_TEST_SUITE_P(Steps, GeneralStepsCaptured,
 // Captured people pass their feet more closely, and their markers slide.
 constexpr double kCapturedApartM = 0.02;
 
-// Both subjects climb blocks of about 0.2 m, 0.43 m foot over foot. Stairs of 0.25 m are beyond what they
-// did: clamped to the grown hull, which has to look as well.
-TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
+// Both subjects climb blocks of about 0.2 m, 0.43 m foot over foot. Stairs of 0.25 m are beyond
+// what they did: clamped to the grown hull, which has to look as well.
+TEST_P(GeneralStepsCaptured, ClimbsTheBlocksOfSubjects03And14) {
   const std::vector<std::string> subjects = {"03", "14"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
@@ -261,14 +262,14 @@ TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
   }
 }
 
-TEST_P(GeneralStepsCaptured, WalkASlalomAs16Does) {
+TEST_P(GeneralStepsCaptured, WalksTheSlalomOfSubject16) {
   const std::vector<std::string> subjects = {"16"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
   ExpectGoodLooks(LookAt("16 slalom", library, Slalom(0.6, 0.4)), kCapturedApartM);
 }
 
-TEST_P(GeneralStepsCaptured, GoAsideAndBackwardAs09Does) {
+TEST_P(GeneralStepsCaptured, StepsSidewaysAndBackwardLikeSubject09) {
   const std::vector<std::string> subjects = {"09"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);

@@ -12,12 +12,12 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "random.h"
-#include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/bvh_writer.h"
 #include "offline/build/layers.h"
 #include "offline/build/library_writer.h"
 #include "offline/build/refine.h"
+#include "offline/builtin/builtin_library.h"
+#include "random.h"
+#include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/synthesis.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/terrain.h"
@@ -71,7 +71,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, Layers,
                                          Walker{"DebianTakes", {kDebianTakes}, false}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
+TEST_P(Layers, PlayTheClipAndKeepTheBitsOfLegsAndRoot) {
   const Walker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryWithLayers(walker.subjects);
@@ -144,7 +144,7 @@ TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
   EXPECT_TRUE(SameBits(plain.base().position_m, layered.base().position_m));
 }
 
-TEST(LayerWeights, EaseWithoutAKinkHoweverRequestsInterrupt) {
+TEST(LayerWeights, HaveContinuousSlopeUnderInterruptions) {
   const Library library = LibraryOf({});
   constexpr double kFineS = 1e-3;
   Random random(11);
@@ -171,13 +171,13 @@ TEST(LayerWeights, EaseWithoutAKinkHoweverRequestsInterrupt) {
     before = weight;
     slope_before = slope;
   }
-  // A weight bends by 6 / 0.2 s^2 = 150 a second squared at most, and its way back as much again: in a
-  // millisecond by 0.6 or so. One that forgot its slope would jump by 1.5 / 0.6 s and more.
+  // A weight bends by 6 / 0.2 s^2 = 150 a second squared at most, and its way back as much again:
+  // in a millisecond by 0.6 or so. One that forgot its slope would jump by 1.5 / 0.6 s and more.
   EXPECT_LT(largest_bend, 0.8);
   EXPECT_GT(largest_weight, 0.6);
 }
 
-TEST(LayerWeights, AClipPlayedOnceEasesOutBeforeItsEndAndMakesRoom) {
+TEST(LayerWeights, FadeOutBeforeTheEndOfANonLoopingClip) {
   RawLibrary raw = GenerateBuiltinLibrary();
   raw.layers[0].is_looping = false;
   LibraryBuilder builder;
@@ -195,7 +195,7 @@ TEST(LayerWeights, AClipPlayedOnceEasesOutBeforeItsEndAndMakesRoom) {
   EXPECT_NEAR(time_s, library->layers()[0].duration_s(), 2.5 * kTickS);
 }
 
-TEST(LayerRequests, WhatMakesNoSenseIsRefusedAndChangesNothing) {
+TEST(LayerRequests, InvalidRequestsAreRejectedWithoutEffect) {
   RawLibrary raw = GenerateBuiltinLibrary();
   for (int i = 0; i < 4; ++i) {
     raw.layers.push_back(raw.layers[0]);
@@ -227,7 +227,7 @@ TEST(LayerRequests, WhatMakesNoSenseIsRefusedAndChangesNothing) {
   EXPECT_EQ(stack.playing().size(), 4u);
 }
 
-TEST(LayerRequests, NoTickAllocates) {
+TEST(LayerRequests, TicksDoNotAllocate) {
   const Library library = LibraryOf({});
   AvatarSimulation avatar(library, {});
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
@@ -244,7 +244,7 @@ TEST(LayerRequests, NoTickAllocates) {
   EXPECT_LE(counted_memory::PeakBytes(), before);
 }
 
-TEST(LayerFiles, AMaskThatTouchesALegOrTheRootIsRefused) {
+TEST(LayerFiles, MasksWithLegsOrTheRootAreRejected) {
   LibraryBuilder builder;
   for (const char* joint : {"Hips", "LeftUpLeg", "RightFoot", "LeftToeBase"}) {
     RawLibrary raw = GenerateBuiltinLibrary();
@@ -270,7 +270,7 @@ TEST(LayerFiles, AMaskThatTouchesALegOrTheRootIsRefused) {
   }
 }
 
-TEST(LayerFiles, LayersAreInTheHashAndComeThroughRefinement) {
+TEST(LayerFiles, LayersAffectTheHashAndSurviveRefinement) {
   RawLibrary raw = GenerateBuiltinLibrary();
   LibraryBuilder builder;
   const Library with = builder.Build(raw).value();
@@ -291,7 +291,7 @@ TEST(LayerFiles, LayersAreInTheHashAndComeThroughRefinement) {
   EXPECT_EQ(refined->library->hash(), with->hash());
 }
 
-TEST(LayerFiles, AnotherSkeletonAndTimesOutsideTheCaptureAreRefused) {
+TEST(LayerFiles, OtherSkeletonsAndTimesOutsideTheCaptureAreRejected) {
   const Library library = LibraryOf({});
   std::ostringstream text;
   Clip clip;
@@ -320,7 +320,7 @@ TEST(LayerFiles, AnotherSkeletonAndTimesOutsideTheCaptureAreRefused) {
   EXPECT_EQ(std::ranges::count(*mask, 1.0f), 3);
 }
 
-TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
+TEST(LayerFiles, CapturedLoopsCloseSmoothly) {
   const std::filesystem::path take = ModelFile("01_01.bvh");
   if (take.empty()) GTEST_SKIP() << "no captures of Debian's package assimp-testmodels";
   const Capture capture = ReadBvh(take).value();
@@ -346,7 +346,7 @@ TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
   EXPECT_FLOAT_EQ(of("RightHand"), 1.0f);
 }
 
-TEST(LayersInChoreographies, BeginAndEndWithMovementsAndLeaveLegsAlone) {
+TEST(LayersInChoreographies, BeginAndEndWithMovementsAndKeepTheLegs) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests = {{1, StepRequest{.length_m = 0.5}},
                                                  {3, StepRequest{.length_m = 0.5}},

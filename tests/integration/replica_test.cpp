@@ -1,4 +1,5 @@
-// Who is told what an avatar begins shows the same bytes in every tick, on whatever instruction set.
+// Who is told what an avatar begins shows the same bytes in every tick, on whatever instruction
+// set.
 
 #include <gtest/gtest.h>
 
@@ -12,13 +13,13 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
+#include "random_requests.h"
 #include "rough_ground.h"
-#include "stridewire/runtime/avatar.h"
 #include "runtime/avatar/avatar_replica.h"
 #include "runtime/avatar/movement_record.h"
+#include "stridewire/runtime/avatar.h"
 
 namespace stridewire {
 namespace {
@@ -104,7 +105,7 @@ int Begun(const AvatarSimulation& avatar) {
   }));
 }
 
-class Replica : public testing::TestWithParam<Manner> {
+class ReplicaLibraries : public testing::TestWithParam<Manner> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -114,7 +115,7 @@ class Replica : public testing::TestWithParam<Manner> {
 };
 
 // One is told from the beginning, another from some tick on.
-TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
+TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
   Random random(kSeed);
@@ -165,7 +166,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
 }
 
 // Walking, as most avatars do most of the time.
-TEST_P(Replica, AStepTakesFewBytes) {
+TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261124;
   Random random(kSeed);
@@ -177,7 +178,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
   std::size_t largest_state = 0;
   for (int walker = 0; walker < 10; ++walker) {
     AvatarSimulation avatar(library_, BaseFrame{},
-                  {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
+                            {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
     for (int tick = 0; tick < 3000; ++tick) {
       if (avatar.idle()) {
         (void)avatar.Enqueue({1, WalkRequest{.position_m = DVec3(random.Draw(0.0, 50.0), 0.0,
@@ -210,7 +211,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
 }
 
 // What one machine's avatar did is shown by others, whose vectors are of another width.
-TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
+TEST_P(ReplicaLibraries, HasTheSameBytesOnEveryInstructionSet) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261125;
   constexpr int kTicks = 400 / kFewer;
@@ -264,14 +265,14 @@ TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
   std::printf("\n");
 }
 
-INSTANTIATE_TEST_SUITE_P(Libraries, Replica,
+INSTANTIATE_TEST_SUITE_P(Libraries, ReplicaLibraries,
                          testing::Values(Manner{"Builtin", {}, 1.0 / 60.0, 10'000},
                                          Manner{"BuiltinAtFiveTicks", {}, 0.2, 2'000},
                                          Manner{"Subject01", {kDebianTakes}, 1.0 / 60.0, 2'000},
                                          Manner{"Subject16", {"16"}, 1.0 / 60.0, 2'000}),
                          [](const auto& tested) { return tested.param.name; });
 
-TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
+TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   constexpr unsigned kSeed = 20261127;
   Random random(kSeed);
   const Library library = LibraryOf({});
@@ -294,7 +295,7 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
 }
 
 // Bytes that were damaged, and foreign ones: refused, or shown as something.
-TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
+TEST(AvatarReplica, SurvivesDamagedRecords) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   const Library library = LibraryOf({});
@@ -344,7 +345,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
   EXPECT_GT(shown, 100);
 }
 
-TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
+TEST(AvatarReplica, IsUnknownBeforeAState) {
   const Library library = LibraryOf({});
   AvatarSimulation avatar(library, BaseFrame{});
   avatar.Advance(1.0 / 60.0);

@@ -1,4 +1,5 @@
-// Planting switched off and on at any time: nothing jumps, and feet that are planted again stand still.
+// Planting switched off and on at any time: nothing jumps, and feet that are planted again stand
+// still.
 
 #include <gtest/gtest.h>
 
@@ -20,7 +21,8 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar, Random& random) {
+MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar,
+                              Random& random) {
   MovementRequest request{
       1, {}, random.Draw(0, 1) < 0.6 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
@@ -129,8 +131,8 @@ Figures SwitchAll(const RandomWalker& walker, const Library& library, double sec
   return figures;
 }
 
-// The largest of some hundred joins is compared with the largest of others. `climb_m_s`: what coming onto the ground
-// adds.
+// The largest of some hundred joins is compared with the largest of others. `climb_m_s`: what
+// coming onto the ground adds.
 void ExpectNoJumps(const Figures& figures, const VelocityStep& examples, double climb_m_s = 0.0) {
   for (const Join join : {kGoesOff, kGoesOn}) {
     ASSERT_GT(figures.joins[join], 4 * kRandomWalkers);
@@ -149,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, SwitchPlanting,
                                          RandomWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
+TEST_P(SwitchPlanting, IsSmoothAtAnyTimeAndFeetStandStillAfterwards) {
   const RandomWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
@@ -172,7 +174,7 @@ TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
 }
 
 // Unplanted, a body walks through hills as if they were not there, up to a metre into them.
-TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
+TEST(SwitchPlantingOnHills, MovesFeetSmoothlyOntoTheGround) {
   const Library library = LibraryOf({});
   const unsigned seed = 20261122;
   HeightField field{.origin_m = {-50.0, -50.0}, .cell_m = 0.25, .columns = 401, .rows = 401};
@@ -233,7 +235,7 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
                 6.0 * deepest_m / (kEaseOutS * kEaseOutS) * kTickS);
 }
 
-TEST(SwitchPlantingOff, WhatMustBeMetIsRefusedAtOnceOrWhenItsTurnComes) {
+TEST(SwitchPlantingOff, RejectsNewAndQueuedExactPlacements) {
   AvatarSimulation avatar(LibraryOf({}), BaseFrame{});
   const MovementRequest must{
       2, StepRequest{.foot = Foot::kRight, .at = {{{-0.1, 0.0, 0.9}, 0.0}}, .exact_only = true}};

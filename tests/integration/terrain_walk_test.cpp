@@ -1,5 +1,5 @@
-// Walks over stepping stones, stairs, a ramp and hills, looked at from outside: how deep soles go into the
-// ground, how high they pass over it, whether they stand on it.
+// Walks over stepping stones, stairs, a ramp and hills, looked at from outside: how deep soles go
+// into the ground, how high they pass over it, whether they stand on it.
 
 #include <gtest/gtest.h>
 
@@ -22,7 +22,8 @@ constexpr double kFps = 60.0;
 constexpr double kDeepestM = 0.002;
 constexpr double kMostDriftM = 0.001;
 constexpr double kLeastClearanceM = 0.01;
-// A sole that ends where the ground is this much below its ball's is over an edge, on slopes to 20 degrees.
+// A sole that ends where the ground is this much below its ball's is over an edge, on slopes to 20
+// degrees.
 constexpr double kEdgeM = 0.1;
 
 struct Walker {
@@ -238,14 +239,14 @@ INSTANTIATE_TEST_SUITE_P(Libraries, TerrainWalk, testing::Values(kBuiltin, kSubj
 INSTANTIATE_TEST_SUITE_P(Libraries, SteppingStones,
                          testing::Values(kBuiltin, kSubject16, kSubject01), kName);
 
-TEST_P(SteppingStones, AreSteppedOnOneByOne) {
+TEST_P(SteppingStones, AreUsedOneByOne) {
   for (const unsigned seed : {1u, 2u, 3u}) {
     Random random(seed);
     ExpectGoodLooks(LookAt("stones", library_, Stones(random, 30, GetParam())));
   }
 }
 
-TEST_P(TerrainWalk, ClimbsStairsUpAndDown) {
+TEST_P(TerrainWalk, WalksStairsUpAndDown) {
   for (const double rise_m : {0.15, 0.2, 0.25}) {
     ExpectGoodLooks(LookAt("stairs", library_, Stairs(rise_m, 0.34, 5)));
   }

@@ -50,7 +50,7 @@ std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
   return LibraryBuilder().Build(raw).value();
 }
 
-TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
+TEST(Transitions, ClosingStepsFitJumpsAndTheStand) {
   const auto library = MakeTestLibrary();
   ASSERT_EQ(library->transitions().size(), 16u);
   for (const std::size_t step : {kLeft, kRight}) {
@@ -66,7 +66,7 @@ TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
 
 // Legs of 0.9 m at angles that put feet 0.4 m apart: hips come down and knees and feet apart, as
 // far as geometry says. The toy's steps begin and end at rest.
-TEST(Transitions, DistanceIsHowFarJointsAreApart) {
+TEST(Transitions, DistanceMeasuresJointPositions) {
   const auto library = ToyOf([](double l0, double l1) { return l0 >= 0.2 && l1 == 0.4; });
   const double lower_m = 0.9 - std::sqrt(0.81 - 0.04);
   const double hips = 3.0 * lower_m * lower_m;
@@ -81,7 +81,7 @@ TEST(Transitions, DistanceIsHowFarJointsAreApart) {
 }
 
 // A jump that flies on at its end: what has to stop counts with 0.1 s of its speed.
-TEST(Transitions, VelocityCounts) {
+TEST(Transitions, DistanceIncludesVelocities) {
   RawLibrary raw = MakeToyRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
@@ -117,7 +117,7 @@ Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& librar
   });
 }
 
-TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
+TEST(Transitions, AreOptionalInALibrary) {
   const auto older = Older(*MakeTestLibrary());
   ASSERT_TRUE(older.has_value()) << Describe(older.error());
   EXPECT_TRUE((*older)->transitions().empty());
@@ -125,7 +125,7 @@ TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
   EXPECT_EQ((*older)->groups().size(), 3u);
 }
 
-TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
+TEST(Transitions, RejectsAnInvalidTable) {
   const auto with = [](std::size_t place, fb::Transition transition) {
     const auto library = Changed(*MakeTestLibrary(), [&](std::uint8_t* payload) {
       const auto* all = fb::GetMotionLibrary(payload)->transitions()->Data();
@@ -174,7 +174,7 @@ std::string Does(std::shared_ptr<const MotionLibrary> library,
 
 StepRequest Step(Foot foot, double length_m) { return {.foot = foot, .length_m = length_m}; }
 
-TEST(Ways, AreAsShortAsCanBe) {
+TEST(TransitionPath, IsAsShortAsPossible) {
   const auto library = OpenLibrary("builtin").value();
   const StepRequest left = Step(Foot::kLeft, 0.6);
   const StepRequest right = Step(Foot::kRight, 0.6);
@@ -193,7 +193,7 @@ TEST(Ways, AreAsShortAsCanBe) {
             "step_left step_left jump");
 }
 
-TEST(Ways, AStepOfTheSameFootIsWhatWasAskedFor) {
+TEST(TransitionPath, KeepsTheRequestedFoot) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests{{1, Step(Foot::kLeft, 0.6)},
                                               {2, Step(Foot::kLeft, 0.5)}};
@@ -204,7 +204,7 @@ TEST(Ways, AStepOfTheSameFootIsWhatWasAskedFor) {
   EXPECT_LT(synthesis.movements[2].landing_error_m, 0.001);
 }
 
-TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
+TEST(TransitionPath, ReportsThatFeetCannotComeTogether) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   ASSERT_GT(DistanceM(*strides, kLeft, kJump), 0.1f);
   const StepRequest left = Step(Foot::kLeft, 0.5);
@@ -221,7 +221,7 @@ TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
             "movements[1]: this library has no transition path from step_left to jump");
 }
 
-TEST(Ways, ALibraryOfOneFootSaysSo) {
+TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
   const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
@@ -235,7 +235,7 @@ TEST(Ways, ALibraryOfOneFootSaysSo) {
 
 // A jump that flies on at its end: feet are together, but the table says that no step begins so
 // fast.
-TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
+TEST(TransitionPath, RejectsDistantTransitions) {
   RawLibrary raw = MakeToyRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
@@ -254,7 +254,7 @@ TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
 }
 
 // Without a table its feet alone decide.
-TEST(Ways, AnOlderLibraryGoesByItsFeet) {
+TEST(TransitionPath, UsesFootPositionsWithoutATable) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   const auto older = Older(*strides);
   ASSERT_TRUE(older.has_value());
@@ -265,7 +265,7 @@ TEST(Ways, AnOlderLibraryGoesByItsFeet) {
             "step_left +step_right step_left +step_right jump");
 }
 
-TEST(Ways, AreFoundWithoutAllocating) {
+TEST(TransitionPath, DoesNotAllocate) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   for (const auto& library : {OpenLibrary("builtin").value(), strides}) {
     AvatarSimulation avatar(library, BaseFrame{});
@@ -288,7 +288,7 @@ TEST(Ways, AreFoundWithoutAllocating) {
   }
 }
 
-TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
+TEST(TransitionPath, RejectsMissingKindsImmediately) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.groups.pop_back();
   const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
@@ -305,8 +305,8 @@ struct Subject {
 };
 void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
 
-class Joins : public testing::TestWithParam<Subject> {};
-INSTANTIATE_TEST_SUITE_P(Libraries, Joins,
+class TransitionSmoothness : public testing::TestWithParam<Subject> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, TransitionSmoothness,
                          testing::Values(Subject{"Builtin", {}}, Subject{"Subject16", {"16"}},
                                          Subject{"Debian", {kDebianTakes}}),
                          [](const auto& subject) { return subject.param.name; });
@@ -317,7 +317,7 @@ constexpr double kFramesPerS = 60.0;
 // Steps, jumps and stands in any order. From one movement to the next no joint changes its speed
 // more than half as fast again as inside the examples of both kinds, a stand having none of its
 // own.
-TEST_P(Joins, AreNoRougherThanMovements) {
+TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const auto library = LibraryOf(GetParam().subjects);
   std::array<double, kKinds> inside{};

@@ -40,8 +40,8 @@ struct Walker {
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-class Refusals : public testing::TestWithParam<Walker> {};
-INSTANTIATE_TEST_SUITE_P(Libraries, Refusals,
+class ExactPlacementLibraries : public testing::TestWithParam<Walker> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, ExactPlacementLibraries,
                          testing::Values(Walker{"Builtin", {}}, Walker{"Subject16", {"16"}},
                                          Walker{"Debian", {kDebianTakes}}),
                          [](const auto& walker) { return walker.param.name; });
@@ -99,7 +99,7 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
 // From a stand or in mid-walk; half of the footprints where a step may well end, the others
 // anywhere around. Whether one is in reach is seen from what the same avatar does when it need not
 // be met.
-TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMet) {
+TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261122;
@@ -196,7 +196,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
   EXPECT_GT(outside, footprints / 5);
 }
 
-class RefusalOfBuiltin : public testing::Test {
+class ExactPlacement : public testing::Test {
  protected:
   // Queues steps, of which those with an odd id are far out of reach and are to be met.
   static void Queue(AvatarSimulation& avatar, std::initializer_list<std::uint64_t> ids) {
@@ -236,7 +236,7 @@ class RefusalOfBuiltin : public testing::Test {
   AvatarSimulation other_{library_, BaseFrame{}};
 };
 
-TEST_F(RefusalOfBuiltin, TheQueueGoesOnAsIfItHadNotBeenThere) {
+TEST_F(ExactPlacement, RejectionDoesNotAffectOtherRequests) {
   Queue(avatar_, {1, 2, 4, 5, 7, 6, 9});
   Queue(other_, {2, 4, 6});
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 4);
@@ -244,7 +244,7 @@ TEST_F(RefusalOfBuiltin, TheQueueGoesOnAsIfItHadNotBeenThere) {
   EXPECT_LT(std::fabs(apart.z), 0.12);  // closed to a stand
 }
 
-TEST_F(RefusalOfBuiltin, SaysWhereTheNearestFootprintWouldBe) {
+TEST_F(ExactPlacement, ReportsTheNearestFootprintInReach) {
   Queue(avatar_, {1});
   avatar_.Advance(kTickS);
   ASSERT_EQ(avatar_.events().size(), 2u);
@@ -268,7 +268,7 @@ TEST_F(RefusalOfBuiltin, SaysWhereTheNearestFootprintWouldBe) {
             "the goal is a hole");
 }
 
-TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
+TEST_F(ExactPlacement, KeepsTheSwingIfARedirectionIsRejected) {
   for (AvatarSimulation* avatar : {&avatar_, &other_}) {
     Queue(*avatar, {2, 4});
     while (avatar->movement() == nullptr ||
@@ -286,7 +286,7 @@ TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 1);
 }
 
-TEST_F(RefusalOfBuiltin, ASwingIsRedirectedToWhatItReaches) {
+TEST_F(ExactPlacement, RedirectsASwingToAFootprintInReach) {
   ASSERT_TRUE(avatar_.Enqueue(StepOnto(2, Foot::kLeft, {0.1, 0.0, 0.5}, 0.0)).has_value());
   avatar_.Advance(kTickS);
   while (avatar_.movement()->feet.foot(Foot::kLeft).IsPlanted(avatar_.movement_time_s())) {
@@ -308,7 +308,7 @@ TEST_F(RefusalOfBuiltin, ASwingIsRedirectedToWhatItReaches) {
   EXPECT_NEAR(SeenFoot(avatar_, Foot::kLeft).ball_m.z, 0.4, 1e-3);
 }
 
-TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
+TEST_F(ExactPlacement, TakesTheHeightFromTheGround) {
   TerrainData data;
   data.boxes.push_back({{-5.0, 0.2}, {5.0, 5.0}, 0.2});
   data.boxes.push_back({{-5.0, -5.0}, {5.0, -0.2}, 4.0});
@@ -324,7 +324,7 @@ TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
   EXPECT_NEAR(avatar.base().position_m.y, 0.2, 0.01);
 }
 
-TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
+TEST_F(ExactPlacement, DoesNotAllocateAndLimitsRejectionsPerTick) {
   for (int i = 0; i < AvatarSimulation::kMaxQueue; ++i) Queue(avatar_, {2ull * i + 1});
   const std::size_t before = counted_memory::LiveBytes();
   counted_memory::ResetPeak();
@@ -343,7 +343,7 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
   EXPECT_GE(ticks, AvatarSimulation::kMaxQueue / AvatarSimulation::kMaxEventsPerAdvance);
 }
 
-TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
+TEST_F(ExactPlacement, RequiresAFootprintAndFootPlanting) {
   const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
   EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only requires at_m");
@@ -358,7 +358,7 @@ TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
   EXPECT_EQ(avatar_.queue_size(), 0);
 }
 
-TEST_F(RefusalOfBuiltin, SynthesisTellsWhatItLeftOut) {
+TEST_F(ExactPlacement, SynthesisReportsRejectedSteps) {
   const std::vector<MovementRequest> requests = {
       {1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}},
       StepOnto(2, Foot::kRight, {0.0, 0.0, 5.0}, 0.0),

@@ -100,9 +100,9 @@ void ExpectAStraightWalk(const Library& library, double length_m) {
   EXPECT_GT(base.position_m.z, 90 * length_m);
 }
 
-TEST(BuiltinWalk, JoinsAreSmooth) { ExpectASmoothWalk(Builtin(), 0.35, 0.75, 200); }
+TEST(BuiltinWalk, IsSmooth) { ExpectASmoothWalk(Builtin(), 0.35, 0.75, 200); }
 
-TEST(BuiltinWalk, EqualStepsGoStraight) {
+TEST(BuiltinWalk, IsStraightWithEqualSteps) {
   for (const double length_m : {0.35, 0.55, 0.75}) ExpectAStraightWalk(Builtin(), length_m);
 }
 
@@ -117,9 +117,9 @@ class CapturedWalk : public testing::TestWithParam<bool> {
   Library library_;
 };
 
-TEST_P(CapturedWalk, JoinsAreSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
+TEST_P(CapturedWalk, IsSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
 
-TEST_P(CapturedWalk, EqualStepsGoStraight) {
+TEST_P(CapturedWalk, IsStraightWithEqualSteps) {
   for (const double length_m : {0.55, 0.65, 0.75}) ExpectAStraightWalk(library_, length_m);
 }
 

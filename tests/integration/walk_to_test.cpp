@@ -157,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, WalkTo,
                                          Walker{"Subject16", {"16"}, 1.0, 0.85}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(WalkTo, AThousandPlacesOnLevelGround) {
+TEST_P(WalkTo, ReachesRandomGoalsOnLevelGround) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261121;
@@ -166,7 +166,7 @@ TEST_P(WalkTo, AThousandPlacesOnLevelGround) {
   EXPECT_GE(WalkAbout(GetParam().name, library, nullptr, random), GetParam().least_level);
 }
 
-TEST_P(WalkTo, AThousandPlacesOnRoughGround) {
+TEST_P(WalkTo, ReachesRandomGoalsOnRoughGround) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261122;
@@ -176,7 +176,7 @@ TEST_P(WalkTo, AThousandPlacesOnRoughGround) {
   EXPECT_GE(WalkAbout(GetParam().name, library, ground, random), GetParam().least_rough);
 }
 
-TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
+TEST(WalkTo, AppliesANewGoalFromTheNextStep) {
   AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   ASSERT_TRUE(avatar.Enqueue({1, WalkRequest{.position_m = {0.0, 0.0, 5.0}}}).has_value());
   for (int i = 0; i < 60; ++i) avatar.Advance(kTickS);
@@ -189,7 +189,7 @@ TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
   EXPECT_LT(walk.path_m, 5.0);
 }
 
-TEST(WalkTo, AllocatesNothingOnTheWay) {
+TEST(WalkTo, DoesNotAllocate) {
   Random random(3);
   AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{},
                           {.terrain = RoughGround(random)});
@@ -205,7 +205,7 @@ TEST(WalkTo, AllocatesNothingOnTheWay) {
   EXPECT_LE(counted_memory::PeakBytes(), before);
 }
 
-TEST(WalkTo, PassesItsWaypoints) {
+TEST(WalkTo, PassesWaypoints) {
   AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   WalkRequest goal{.position_m = {4.0, 0.0, 0.0}, .heading_rad = 3.0};
   goal.waypoints_m = {{0.0, 0.0, 3.0}, {4.0, 0.0, 3.0}};
@@ -226,7 +226,7 @@ TEST(WalkTo, PassesItsWaypoints) {
   EXPECT_LT(std::hypot(avatar.base().position_m.x - 4.0, avatar.base().position_m.z), 0.01);
 }
 
-TEST(WalkTo, KeepsToASpeedItsStepsHave) {
+TEST(WalkTo, KeepsTheRequestedSpeed) {
   const Library library = OpenLibrary("builtin").value();
   double seconds[2];
   const double speeds_m_s[2] = {0.5, 1.0};
@@ -242,7 +242,7 @@ TEST(WalkTo, KeepsToASpeedItsStepsHave) {
   EXPECT_LT(seconds[1], 0.7 * seconds[0]);
 }
 
-TEST(WalkTo, SaysWhyItCanNot) {
+TEST(WalkTo, ReportsWhyItFails) {
   const Library library = OpenLibrary("builtin").value();
   const Ground wall =
       Terrain::Make({.height_field = {}, .boxes = {{{-20.0, 2.0}, {20.0, 2.5}, 1.5}}}).value();

@@ -6,9 +6,9 @@
 #include <limits>
 #include <vector>
 
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 
 namespace stridewire {
@@ -46,7 +46,7 @@ class AvatarTest : public testing::Test {
   std::uint64_t last_id_ = 0;
 };
 
-TEST_F(AvatarTest, StandsWhereItIsPut) {
+TEST_F(AvatarTest, StandsAtTheGivenBaseFrame) {
   // Planting bends the toy's straight legs a little.
   AvatarSimulation planted(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
   EXPECT_NEAR(planted.pose().root_position_m.y, 1.9, 0.01);
@@ -59,7 +59,7 @@ TEST_F(AvatarTest, StandsWhereItIsPut) {
   EXPECT_TRUE(avatar.idle());
 }
 
-TEST_F(AvatarTest, WalksAndClosesItsFeet) {
+TEST_F(AvatarTest, ClosesItsFeetAfterAWalk) {
   for (int i = 0; i < 4; ++i) Request(StepRequest{.length_m = 0.4});
   const auto events = RunUntilIdle();
   const auto started = Of(events, AvatarEventType::kStarted);
@@ -77,7 +77,7 @@ TEST_F(AvatarTest, WalksAndClosesItsFeet) {
   EXPECT_NEAR(feet.z, 0.0, 0.01);
 }
 
-TEST_F(AvatarTest, PoseIsContinuousThroughJoins) {
+TEST_F(AvatarTest, PoseIsContinuousBetweenMovements) {
   Request(StepRequest{.length_m = 0.5});
   Request(StepRequest{.length_m = 0.2});
   Request(StepRequest{.foot = Foot::kRight, .length_m = 0.6});  // the same foot again: a wild join
@@ -102,7 +102,7 @@ TEST_F(AvatarTest, PoseIsContinuousThroughJoins) {
   EXPECT_LT(largest_m, 0.015f);
 }
 
-TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
+TEST_F(AvatarTest, ClosesItsFeetBeforeAJumpAndAStand) {
   Request(StepRequest{.length_m = 0.4});
   Request(JumpRequest{.length_m = 0.6});
   Request(StepRequest{.length_m = 0.4});
@@ -115,7 +115,7 @@ TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
   EXPECT_EQ(started[5].kind, MovementKind::kStand);
 }
 
-TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
+TEST_F(AvatarTest, CarriesRemainingTimeToTheNextMovement) {
   // Ten equal steps last as long as their durations say, whatever the tick.
   for (const double dt : {1.0 / 60.0, 1.0 / 37.0, 0.4}) {
     AvatarSimulation avatar(library_, {});
@@ -134,7 +134,7 @@ TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
   }
 }
 
-TEST_F(AvatarTest, ClampsWhatTheExamplesDoNotSpanAndSaysSo) {
+TEST_F(AvatarTest, ReportsClampedAndExtrapolatedRequests) {
   Request(StepRequest{.length_m = 5.0});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
@@ -143,13 +143,13 @@ TEST_F(AvatarTest, ClampsWhatTheExamplesDoNotSpanAndSaysSo) {
   EXPECT_LT(started[0].applied.values[1], 0.7);
 }
 
-TEST_F(AvatarTest, ReportsWhatItsLibraryCannotDo) {
+TEST_F(AvatarTest, ReportsParametersThatTheLibraryLacks) {
   Request(StepRequest{.length_m = 0.3, .height_m = 0.2, .turn_rad = 0.5});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
 }
 
-TEST_F(AvatarTest, ALongWalkStaysStraightAndLevel) {
+TEST_F(AvatarTest, LongWalkStaysStraightAndLevel) {
   for (int i = 0; i < 200; ++i) {
     Request(StepRequest{.length_m = 0.2 + 0.4 * ((i * 7) % 11) / 10.0});
   }
@@ -167,7 +167,7 @@ TEST_F(AvatarTest, ALongWalkStaysStraightAndLevel) {
   EXPECT_LT(highest, 0.92f);
 }
 
-TEST_F(AvatarTest, BadRequestsAreRefused) {
+TEST_F(AvatarTest, RejectsInvalidRequests) {
   const auto code = [&](decltype(MovementRequest::movement) movement) {
     const Status status = avatar_.Enqueue({1, movement});
     return status ? "none" : std::string(ErrorCodeName(status.error().code));
@@ -191,17 +191,18 @@ TEST_F(AvatarTest, QueueIsBounded) {
   EXPECT_EQ(status.error().code, ErrorCode::kLimitExceeded);
   // A thousand empty stands in one tick must not outrun the event list.
   const auto events = RunUntilIdle();
-  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), std::size_t{AvatarSimulation::kMaxQueue});
+  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(),
+            std::size_t{AvatarSimulation::kMaxQueue});
 }
 
-TEST_F(AvatarTest, CancelDropsOnlyWhatHasNotStarted) {
+TEST_F(AvatarTest, CancelQueueKeepsTheCurrentMovement) {
   for (int i = 0; i < 5; ++i) Request(StepRequest{.length_m = 0.4});
   avatar_.Advance(kTickS);
   EXPECT_EQ(avatar_.CancelQueue(), 4);
   EXPECT_EQ(Of(RunUntilIdle(), AvatarEventType::kFinished).size(), 2u);
 }
 
-TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
+TEST_F(AvatarTest, RejectsKindsThatTheLibraryLacks) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.groups.pop_back();
   raw.groups.pop_back();
@@ -220,7 +221,7 @@ TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
   EXPECT_TRUE(avatar.idle());
 }
 
-TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
+TEST_F(AvatarTest, StartDelayAppliesOnlyWhileStanding) {
   const auto ticks_until = [&](auto is_so) {
     int ticks = 0;
     for (; ticks < 1000 && !is_so(); ++ticks) avatar_.Advance(kTickS);
@@ -230,7 +231,8 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
     return avatar_.started() != nullptr && avatar_.started()->request_id == id;
   };
   const auto ask = [&](std::uint64_t id, int delay_ticks, Interrupt interrupt = Interrupt::kNone) {
-    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, delay_ticks * kTickS));
+    EXPECT_TRUE(
+        avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, delay_ticks * kTickS));
   };
   ask(1, 5);
   ask(2, 100);  // goes on from the one before: not held
@@ -241,7 +243,8 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   EXPECT_LT(ticks_until([&] { return begun(3); }), 90);
   ticks_until([&] { return avatar_.idle(); });
 
-  // Asked again and again it does not wait for ever, and a smaller command is not held by a larger one.
+  // Asked again and again it does not wait for ever, and a smaller command is not held by a larger
+  // one.
   ask(4, 10, Interrupt::kNow);
   for (int i = 0; i < 5; ++i) avatar_.Advance(kTickS);
   ask(5, 10, Interrupt::kNow);
@@ -257,8 +260,9 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   EXPECT_EQ(ticks_until([&] { return begun(8); }), 5);
 }
 
-// Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read that is not.
-TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
+// Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read
+// that is not.
+TEST_F(AvatarTest, DoesNotPlantFeetIfTheLegsShareAnAnkle) {
   RawLibrary raw = MakeToyRawLibrary();
   raw.skeleton.legs[0].ankle = raw.skeleton.legs[1].ankle;
   LibraryBuilder builder;
@@ -276,7 +280,7 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
 }
 
 // Quiet is who goes on walking: what ends that is told at once, what happens never while it lasts.
-TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
+TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
   const auto library = OpenLibrary("builtin").value();
   AvatarSimulation avatar(library, {});
   EXPECT_FALSE(avatar.is_event_free());

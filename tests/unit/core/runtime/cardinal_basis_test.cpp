@@ -17,7 +17,7 @@ double Sum(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-TEST(CubicBSpline, IsTwiceContinuous) {
+TEST(CubicBSpline, HasContinuousSecondDerivative) {
   const double h = 1e-4;
   for (const double knot : {1.0, 2.0}) {
     EXPECT_NEAR(CubicBSpline(knot - 1e-12), CubicBSpline(knot + 1e-12), 1e-10);
@@ -35,7 +35,7 @@ TEST(CubicBSpline, IsTwiceContinuous) {
 // Random sets in 1 to 7 dimensions: what the method promises of the weights everywhere.
 class RandomSites : public testing::TestWithParam<int> {};
 
-TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
+TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
   const auto d = static_cast<std::size_t>(GetParam());
   const unsigned seed = 7000 + static_cast<unsigned>(GetParam());
   std::mt19937 random(seed);
@@ -75,7 +75,7 @@ TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, RandomSites, testing::Range(1, 8));
 
-TEST(CardinalBasis, SumsToOneUnderRankDeficiencyBecauseParametersAreCentred) {
+TEST(CardinalBasis, WeightsSumToOneUnderRankDeficiency) {
   // All sites on a line far from the origin: the uncentred fit errs by 0.2 here (method).
   std::vector<double> sites;
   for (int i = 0; i < 6; ++i) sites.insert(sites.end(), {3.0 + 0.1 * i, 7.0 - 0.2 * i});
@@ -88,7 +88,7 @@ TEST(CardinalBasis, SumsToOneUnderRankDeficiencyBecauseParametersAreCentred) {
   }
 }
 
-TEST(CardinalBasis, IsDense) {
+TEST(CardinalBasis, UsesAllExamplesBetweenSites) {
   // The paper calls most weights zero; the linear part makes them dense.
   std::vector<double> sites;
   for (int i = 0; i < 4; ++i) {
@@ -118,7 +118,7 @@ TEST(CardinalBasis, IsDense) {
   EXPECT_LT(largest_sum, 2.5);
 }
 
-TEST(CardinalBasis, PseudoexamplesReceiveTheirWeights) {
+TEST(CardinalBasis, ReproducesTheWeightsOfPseudoexamples) {
   const std::vector<double> sites = {0.0, 1.0, 2.0, 0.6};
   const std::vector<double> pseudo = {0.5, 0.3, 0.2};
   const auto fit = CardinalBasisFit{1, 3, sites, pseudo, std::vector<double>{1.0}}.Run();
@@ -132,7 +132,7 @@ TEST(CardinalBasis, PseudoexamplesReceiveTheirWeights) {
   }
 }
 
-TEST(CardinalBasis, BadInputIsAnswered) {
+TEST(CardinalBasis, RejectsInvalidInput) {
   const std::vector<double> scale = {1.0};
   const auto code = [&](std::vector<double> sites, int n, std::vector<double> scales) {
     const auto fit = CardinalBasisFit{1, n, sites, {}, scales}.Run();

@@ -43,7 +43,7 @@ Clip MakeClip(double fps, int frames) {
   return clip;
 }
 
-TEST(Clip, ValidateNamesWhatIsWrong) {
+TEST(Clip, ValidateReportsEveryError) {
   const Clip good = MakeClip(30.0, 10);
   EXPECT_TRUE(good.Validate().has_value());
 
@@ -79,7 +79,7 @@ TEST(Clip, ValidateNamesWhatIsWrong) {
   EXPECT_TRUE(long_rotation.Validate().has_value());
 }
 
-TEST(Clip, SignsBecomeContinuousAndRotationsStay) {
+TEST(Clip, MakeSignContinuousKeepsRotations) {
   const std::uint64_t seed = std::random_device{}();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
   std::mt19937_64 random(seed);
@@ -100,7 +100,7 @@ TEST(Clip, SignsBecomeContinuousAndRotationsStay) {
   }
 }
 
-TEST(SampleClip, AtASampleGivesTheSample) {
+TEST(SampleClip, ReturnsSamplesUnchanged) {
   const Clip clip = MakeClip(120.0, 50);
   Pose pose(2);
   for (int f = 0; f < 50; ++f) {
@@ -112,7 +112,7 @@ TEST(SampleClip, AtASampleGivesTheSample) {
   }
 }
 
-TEST(SampleClip, FollowsASmoothMotionBetweenSamples) {
+TEST(SampleClip, InterpolatesSmoothMotion) {
   const Clip clip = MakeClip(30.0, 60);
   Pose pose(2);
   double worst_m = 0.0;
@@ -132,7 +132,7 @@ TEST(SampleClip, FollowsASmoothMotionBetweenSamples) {
   EXPECT_LT(worst_rad, 1e-3);
 }
 
-TEST(SampleClip, VelocityHasNoStepsAtSamples) {
+TEST(SampleClip, HasContinuousVelocityAtSamples) {
   Clip clip = MakeClip(30.0, 40);
   // Uneven data, so that a piecewise linear reading would kink clearly; random signs as well.
   std::mt19937_64 random(11);
@@ -172,7 +172,7 @@ TEST(SampleClip, VelocityHasNoStepsAtSamples) {
   EXPECT_LT(largest_spin_kink, 1.0);
 }
 
-TEST(SampleClip, ClampsTimeAndTakesOneFrame) {
+TEST(SampleClip, ClampsTimeAndAcceptsASingleFrame) {
   const Clip clip = MakeClip(30.0, 10);
   Pose pose(2);
   for (const double t : {-1.0, -std::numeric_limits<double>::infinity(), std::nan("")}) {

@@ -12,9 +12,9 @@
 #include "counted_memory.h"
 #include "distorted_library.h"
 #include "runtime/weights/end_poses.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/foot_support.h"
-#include "runtime/weights/measure.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
 
@@ -46,8 +46,9 @@ struct Scratch {
     cache.Clear();
     return MeasureMovement(library, movement, cache, pose);
   }
-  // How far that may be from what is measured without poses, metres: theirs are floats, and too few examples may
-  // have weights of a thousand that place the root a hundred metres from where they do together.
+  // How far that may be from what is measured without poses, metres: theirs are floats, and too few
+  // examples may have weights of a thousand that place the root a hundred metres from where they do
+  // together.
   double RoundingM(const MotionGroup& group, const GridLayout& layout) {
     double far_m = 0.0;
     for (const int point : {0, group.grid_point_count - 1}) {
@@ -72,7 +73,7 @@ std::uint32_t Seed() { return std::random_device{}(); }
 
 class InDimensions : public testing::TestWithParam<int> {};
 
-TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
+TEST_P(InDimensions, ReachesRequestsInsideTheHull) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -98,11 +99,12 @@ TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
       EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
     }
   }
-  // Else nothing was there to correct: of 600 random libraries one misses by 0.09 mm at most, four in a row do not.
+  // Else nothing was there to correct: of 600 random libraries one misses by 0.09 mm at most, four
+  // in a row do not.
   EXPECT_GT(largest_m, 1e-4);
 }
 
-TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
+TEST_P(InDimensions, NeverIncreasesTheErrorAndKeepsWeightsBounded) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -131,7 +133,7 @@ TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
 }
 
 // J is what differences say, at weights that are a blend and beyond the hull.
-TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
+TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -171,7 +173,7 @@ TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
 }
 
 // Requests next to each other get weights next to each other, wherever they lie.
-TEST_P(InDimensions, IsContinuousInWhatIsAsked) {
+TEST_P(InDimensions, IsContinuousInTheRequest) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -212,7 +214,7 @@ TEST_P(InDimensions, IsContinuousInWhatIsAsked) {
 
 INSTANTIATE_TEST_SUITE_P(Correction, InDimensions, testing::Range(1, 8));
 
-TEST(Correction, WithoutIterationsChangesNothing) {
+TEST(Correction, ChangesNothingWithoutIterations) {
   const auto library = MakeDistortedLibrary(3, 20, 0.6, 5);
   std::mt19937 random(1);
   Scratch scratch(*library);
@@ -226,7 +228,7 @@ TEST(Correction, WithoutIterationsChangesNothing) {
   EXPECT_EQ(correction.iterations, 0);
 }
 
-TEST(Correction, LeavesAnExampleAlone) {
+TEST(Correction, KeepsTheWeightsOfAnExample) {
   const auto library = MakeDistortedLibrary(4, 30, 0.6, 6);
   Scratch scratch(*library);
   const MotionGroup& group = library->group(0);
@@ -252,7 +254,7 @@ TEST(Correction, NeverAllocates) {
   EXPECT_GT(correction.iterations, 1);
 }
 
-TEST(Terrain, NeverAllocatesWhenAsked) {
+TEST(Terrain, QueriesDoNotAllocate) {
   TerrainData data;
   data.height_field = HeightField{{-1, -1}, 0.5, 3, 3, {0, 1, 0, 1, 0, 1, 0, 1, 0}};
   for (int b = 0; b < 100; ++b) data.boxes.push_back({{0.1 * b, 0}, {0.1 * b + 0.2, 1}, 0.01 * b});
@@ -270,8 +272,9 @@ TEST(Terrain, NeverAllocatesWhenAsked) {
   EXPECT_GT(sum, 0.0);
 }
 
-// Where a movement starts has no part in its weights: a client that evaluates it far away gets the same.
-TEST(Correction, IsTheSameWhereverAnAvatarStands) {
+// Where a movement starts has no part in its weights: a client that evaluates it far away gets the
+// same.
+TEST(Correction, DoesNotDependOnTheBaseFrame) {
   const auto library = MakeTestLibrary();
   const auto weights = [&](const BaseFrame& start) {
     AvatarSimulation avatar(library, start);
@@ -283,7 +286,7 @@ TEST(Correction, IsTheSameWhereverAnAvatarStands) {
   EXPECT_EQ(weights({}), weights({{1.0, 2.0, 3.0}, 0.0}));
 }
 
-TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
+TEST(Correction, CanBeDisabledForAnAvatar) {
   const auto library = MakeTestLibrary();
   for (const bool corrected : {true, false}) {
     AvatarSimulation avatar(library, {}, {.run_time_correction = corrected});

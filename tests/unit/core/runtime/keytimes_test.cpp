@@ -11,7 +11,7 @@ namespace {
 
 const std::vector<double> kKeytimes = {0.0, 0.1, 0.45, 0.5};
 
-TEST(Keytimes, GenericTimeIsEquation3) {
+TEST(Keytimes, GenericTimeMatchesEquation3) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.0), 0.0);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.05), 0.5);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.1), 1.0);
@@ -19,25 +19,25 @@ TEST(Keytimes, GenericTimeIsEquation3) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.5), 3.0) << "t = K_n, which Eq. (3) leaves out";
 }
 
-TEST(Keytimes, TimesOutsideAreClamped) {
+TEST(Keytimes, ClampsTimesOutside) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, -1.0), 0.0);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 9.0), 3.0);
   EXPECT_DOUBLE_EQ(TimeAtGenericTime(kKeytimes, -1.0), 0.0);
   EXPECT_DOUBLE_EQ(TimeAtGenericTime(kKeytimes, 9.0), 0.5);
 }
 
-TEST(Keytimes, OfEmptyIntervalsTheLastOneWins) {
+TEST(Keytimes, UsesTheLastOfSeveralEmptyIntervals) {
   const std::vector<double> keytimes = {0.0, 0.2, 0.2, 0.4};
   EXPECT_DOUBLE_EQ(GenericTime(keytimes, 0.2), 2.0);
 }
 
-TEST(Keytimes, InverseUndoesGenericTime) {
+TEST(Keytimes, TimeAtGenericTimeIsTheInverse) {
   for (double t = 0.0; t <= 0.5; t += 0.001) {
     EXPECT_NEAR(TimeAtGenericTime(kKeytimes, GenericTime(kKeytimes, t)), t, 1e-12);
   }
 }
 
-TEST(Keytimes, InvalidOnesAreRejected) {
+TEST(Keytimes, RejectsInvalidKeytimes) {
   EXPECT_TRUE(ValidateKeytimes(kKeytimes).has_value());
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>{0.0}).has_value());
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>(kMaxIntervals + 2, 0.0)).has_value());
@@ -48,7 +48,7 @@ TEST(Keytimes, InvalidOnesAreRejected) {
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>{0.0, NAN}).has_value());
 }
 
-TEST(BlendKeytimes, AtAnExampleGivesItsKeytimes) {
+TEST(BlendKeytimes, ReproducesTheKeytimesOfAnExample) {
   const std::vector<double> examples = {0.0, 0.1, 0.5, 0.6, 0.0, 0.2, 0.7, 1.0};
   std::vector<double> out(4);
   BlendKeytimes(examples, std::vector<float>{0.0f, 1.0f}, out);
@@ -95,7 +95,7 @@ class TimeWarpTest : public testing::Test {
   const TimeWarp warp_{kKeytimes, cells_};
 };
 
-TEST_F(TimeWarpTest, KeytimesFallOnGridPoints) {
+TEST_F(TimeWarpTest, MapsKeytimesToGridPoints) {
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.0), 0.0);
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.1), 3.0);
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.45), 13.0);
@@ -120,13 +120,13 @@ TEST_F(TimeWarpTest, IsMonotoneAndContinuousInVelocity) {
   }
 }
 
-TEST_F(TimeWarpTest, InverseUndoesIt) {
+TEST_F(TimeWarpTest, TimeAtIsTheInverse) {
   for (double u = 0.0; u <= 15.0; u += 0.01) {
     ASSERT_NEAR(warp_.GridPosition(warp_.TimeAt(u)), u, 1e-9);
   }
 }
 
-TEST(TimeWarp, StaysNearTheLinearMap) {
+TEST(TimeWarp, StaysCloseToTheLinearMap) {
   // Step keytimes whose interval rates differ by a factor of 4, as when blending 0.51 and 0.90 s.
   const std::vector<double> keytimes = {0.0, 0.12, 0.55, 0.62};
   const std::vector<int> cells = {2, 13, 2};

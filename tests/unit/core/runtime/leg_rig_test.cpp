@@ -31,7 +31,7 @@ class SolveLegTest : public testing::Test {
 };
 using SolveLegs = SolveLegTest;
 
-TEST_F(SolveLegs, PutsTheAnkleWhereItIsAskedFor) {
+TEST_F(SolveLegs, MovesTheAnkleToTheTarget) {
   ASSERT_TRUE(rig_.is_usable);
   int reached = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -70,7 +70,7 @@ TEST_F(SolveLegs, PutsTheAnkleWhereItIsAskedFor) {
   EXPECT_GT(reached, 1000);
 }
 
-TEST_F(SolveLegs, LeavesALegAloneThatIsThere) {
+TEST_F(SolveLegs, KeepsALegThatIsAtItsTarget) {
   for (int i = 0; i < 500; ++i) {
     Pose pose = library_->stand_pose();
     const Foot foot = i % 2 == 0 ? Foot::kLeft : Foot::kRight;

@@ -92,7 +92,7 @@ double RandomEighth(std::mt19937& random) {
   return 0.125 * std::uniform_int_distribution<int>(-56, 56)(random);
 }
 
-TEST(Terrain, NothingIsFlat) {
+TEST(Terrain, EmptyTerrainIsFlat) {
   const auto terrain = MakeTerrain({});
   EXPECT_EQ(terrain->HeightAt(3.0, -4.0), 0.0);
   EXPECT_EQ(terrain->NormalAt(3.0, -4.0), Vec3(0, 1, 0));
@@ -135,14 +135,14 @@ TEST(Terrain, BordersBelongToBoxAndField) {
   EXPECT_EQ(terrain->HighestWithin(1.8, 1.8, 0.29), 0.25);
 }
 
-TEST(Terrain, SeamsOfSlabsAreNoGaps) {
+TEST(Terrain, AdjacentBoxesHaveNoGap) {
   const auto terrain =
       MakeTerrain({{}, {{{0, 0}, {1, 1}, 0.3}, {{1, 0}, {2, 1}, 0.3}, {{0, 1}, {2, 2}, 0.3}}});
   EXPECT_EQ(terrain->LowestWithin(1.0, 1.0, 0.5), 0.3);
   EXPECT_EQ(terrain->LowestWithin(1.0, 0.3, 0.5), 0.0);
 }
 
-TEST(Terrain, AgreesWithBruteForce) {
+TEST(Terrain, MatchesBruteForce) {
   const unsigned seed = 20261121;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -160,7 +160,7 @@ TEST(Terrain, AgreesWithBruteForce) {
   }
 }
 
-TEST(Terrain, DiscsHoldWhatLiesInThem) {
+TEST(Terrain, DiscQueriesBoundAllHeightsInside) {
   const unsigned seed = 77;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -206,7 +206,7 @@ TEST(Terrain, DiscsHoldWhatLiesInThem) {
   }
 }
 
-TEST(Terrain, NormalIsThatOfTheHeight) {
+TEST(Terrain, NormalMatchesTheHeights) {
   const unsigned seed = 4;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -232,7 +232,7 @@ TEST(Terrain, NormalIsThatOfTheHeight) {
   }
 }
 
-TEST(Terrain, SupportOnASlopeIsTheSlope) {
+TEST(Terrain, FootSupportOnASlopeMatchesTheSlope) {
   HeightField field = MakeField({-5, -5}, 1.0, 11, 11);
   for (int j = 0; j < 11; ++j) {
     for (int i = 0; i < 11; ++i) {
@@ -252,7 +252,7 @@ TEST(Terrain, SupportOnASlopeIsTheSlope) {
   }
 }
 
-TEST(Terrain, SupportTellsEdgesFromSlopes) {
+TEST(Terrain, FootSupportDistinguishesEdgesFromSlopes) {
   // A slab that ends at z = 1, a wall that begins at z = 3.
   const auto terrain = MakeTerrain({{}, {{{-1, 0}, {1, 1}, 0.2}, {{-1, 3}, {1, 4}, 0.5}}});
   const FootSupport on = SupportOf(*terrain, 0.0, 0.9, 0.0, {0.18, 0.08, 0.05});
@@ -282,7 +282,7 @@ TEST(Terrain, SupportTellsEdgesFromSlopes) {
   EXPECT_NEAR(side_over.gap_m, 0.2, 1e-12);
 }
 
-TEST(Terrain, SupportOfASoleWithoutAnAreaIsALineOrPoint) {
+TEST(Terrain, FootSupportAcceptsASoleWithoutArea) {
   HeightField field = MakeField({-5, -5}, 10.0, 2, 2);
   field.heights_m = {0, 0, 2, 2};  // Rises along z by 0.2.
   const auto terrain = MakeTerrain({field, {}});
@@ -293,7 +293,7 @@ TEST(Terrain, SupportOfASoleWithoutAnAreaIsALineOrPoint) {
   EXPECT_NEAR(point.plane_height_m, 1.0, 1e-12);
 }
 
-TEST(Terrain, NumbersThatAreNotFiniteLieOutside) {
+TEST(Terrain, TreatsNonFiniteCoordinatesAsOutside) {
   HeightField field = MakeField({-1, -1}, 1.0, 3, 3);
   std::fill(field.heights_m.begin(), field.heights_m.end(), 1.0f);
   const auto terrain = MakeTerrain({field, {{{-1, -1}, {1, 1}, 2.0}}});
@@ -314,7 +314,7 @@ void ExpectRefused(TerrainData data, ErrorCode code, const std::string& where) {
   EXPECT_EQ(terrain.error().where, where);
 }
 
-TEST(Terrain, RefusesNamingTheField) {
+TEST(Terrain, ErrorsNameTheField) {
   const HeightField good = MakeField({0, 0}, 0.5, 2, 3);
   const auto field = [&good](auto change) {
     TerrainData data{good, {}};
@@ -351,7 +351,7 @@ TEST(Terrain, RefusesNamingTheField) {
                 ErrorCode::kLimitExceeded, "boxes");
 }
 
-TEST(Terrain, TakesWhatTheLimitsAllow) {
+TEST(Terrain, AcceptsTheLargestTerrain) {
   HeightField field = MakeField({-1e6, 1e6}, kMaxTerrainCellM, 1024, 1024);
   field.heights_m.back() = 1e4f;
   const auto large = MakeTerrain({field, {}});
@@ -379,7 +379,7 @@ TEST(Terrain, TakesWhatTheLimitsAllow) {
 }
 
 // A box thinner than anything, and a world wider than the index has cells for.
-TEST(Terrain, IndexTakesAnyShape) {
+TEST(Terrain, IndexesBoxesOfAnyShape) {
   const double next = std::nextafter(1.0, 2.0);
   const auto terrain = MakeTerrain({{}, {{{1, 1}, {next, next}, 0.25}}});
   EXPECT_EQ(terrain->HeightAt(1.0, next), 0.25);
