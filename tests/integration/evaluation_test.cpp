@@ -1,4 +1,5 @@
-// The fast evaluation beside the plain one, and on every instruction set this machine has.
+// Compares the fast evaluation with the reference evaluation, on every instruction set of this
+// machine.
 
 #include <gtest/gtest.h>
 #include <xxhash.h>
@@ -30,7 +31,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 
 struct Source {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
@@ -78,7 +79,7 @@ double AngleBetween(const DQuat& a, const DQuat& b) {
   return 2.0 * std::atan2(glm::length(DVec3(turn.x, turn.y, turn.z)), std::fabs(turn.w));
 }
 
-// What planning looks at side by side is what poses evaluated one by one have.
+// FootSampler must return the feet of poses that are evaluated one by one.
 TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   constexpr unsigned kSeed = 20261126;
   const Library library = OpenLibrary("builtin").value();
@@ -107,7 +108,8 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
       for (int tick = 0; tick < ticks; ++tick) avatar.Advance(1.0 / 60.0);
       if (avatar.movement() == nullptr) continue;
       Movement movement = *avatar.movement();
-      if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);  // no mean
+      // Rotations without a mean.
+      if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);
       std::vector<double> times_s(static_cast<std::size_t>(random.Draw(1.0, 16.99)));
       for (double& time_s : times_s) {
         time_s = random.Draw(0.0, random.Draw(0.0, 1.0) < 0.5 ? 0.3 : movement.duration_s() + 0.01);
@@ -143,7 +145,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   EXPECT_GT(sampled, 300);
 }
 
-// Of what movements leave of the poses before, the largest are halves of a turn.
+// Difference poses of up to half a turn.
 TEST(Evaluation, FadesDifferencesOfAnySize) {
   constexpr unsigned kSeed = 20261125;
   constexpr std::size_t kJoints = 37;
@@ -183,7 +185,7 @@ TEST(Evaluation, FadesDifferencesOfAnySize) {
   EXPECT_LT(worst_rad, 1e-6) << "seed " << kSeed;
 }
 
-// Sixteen rows side by side, all of which are eased out and go on as fast as they did.
+// Sixteen rows side by side, all with an inertial difference pose.
 struct Sixteen {
   static constexpr std::size_t kJoints = 5;
   static constexpr std::size_t kRowFloats = GridLayout(kJoints).row_floats;
@@ -249,8 +251,8 @@ struct Sixteen {
   alignas(64) std::array<Lanes, 4 * kJoints> rotations{};
 };
 
-// What is left of the poses before makes rotations longer before they are made unit: one that is
-// too short to have a mean must be seen through it.
+// Difference poses make rotations longer before they are normalized. A rotation that is too short
+// to have a mean must still be detected.
 TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
@@ -270,9 +272,9 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
   }
 }
 
-// All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does
-// as well, and then movement mode gets another feature bit: who evaluates movements by the old
-// formulas would show other poses than the server (decision 0021).
+// All machines produce this hash (decision 0002). If a formula changes intentionally, the hash
+// changes, and the protocol needs a new number for movement mode. Otherwise clients that evaluate
+// movements with the old formulas would display other poses than the server (decision 0021).
 TEST(Evaluation, MatchesTheNumberInTheProtocol) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10);
   std::string bytes;
@@ -302,7 +304,7 @@ TEST_P(LibraryEvaluation, MatchesTheReference) {
   GridCache cache(library_->layout());
   double largest_m = 0.0;
   double largest_rad = 0.0;
-  double sampled_rad = 0.0;  // sum
+  double sampled_rad = 0.0;  // Sum over all poses.
   int poses = 0;
   for (int tick = 0; tick < 600; ++tick) {
     crowd.Advance();
@@ -328,7 +330,7 @@ TEST_P(LibraryEvaluation, MatchesTheReference) {
   EXPECT_GT(poses, 4000);
   EXPECT_LT(largest_m, 1e-5) << "seed " << kSeed;
   EXPECT_LT(largest_rad, 1e-5) << "seed " << kSeed;
-  // Blending before interpolating, or after: two ways to the same pose, nearly.
+  // Blending before or after interpolating gives nearly the same pose.
   EXPECT_LT(sampled_rad / poses, 0.02) << "seed " << kSeed;
 }
 
@@ -381,7 +383,7 @@ TEST_P(LibraryEvaluation, PlantingMatchesTheReference) {
 
 TEST_P(LibraryEvaluation, HasTheSameBytesOnEveryInstructionSet) {
   constexpr unsigned kSeed = 7;
-  std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick]
+  std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick].
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
     DrawnCrowd crowd(library_, 24, kSeed);
@@ -423,7 +425,7 @@ TEST_P(LibraryEvaluation, DoesNotDependOnOtherLanes) {
   }
 }
 
-// What is displayed of a movement, worked out for this one pose.
+// Evaluates the displayed pose of a movement on its own.
 Pose ShownAlone(const MotionLibrary& library, const Movement& movement, double time_s) {
   Pose pose(library.skeleton().joint_count());
   GridCache cache(library.layout());
@@ -460,8 +462,8 @@ TEST_P(LibraryEvaluation, SinglePosesMatchBatches) {
   EXPECT_GT(poses, 3000);
 }
 
-// Poses of ticks to come, on every instruction set: of movements just begun and half over, on level
-// and on rough ground, planted or not, taken over and settling.
+// Runs of poses on every instruction set: of movements at their start and in their middle, on level
+// and uneven ground, with and without planting, redirected, and with a plant fade.
 TEST_P(LibraryEvaluation, SampleRunsMatchSinglePoses) {
   constexpr unsigned kSeed = 10;
   constexpr std::size_t kCrowd = 41;

@@ -1,5 +1,5 @@
-// Requests that take over from a movement under way, at any time: no joint changes its speed at
-// once and no foot that stands slides.
+// Requests that interrupt a movement at any time. No joint may change its speed abruptly, and no
+// standing foot may slide.
 
 #include <gtest/gtest.h>
 
@@ -47,16 +47,15 @@ MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation
 }
 
 struct Figures {
-  int requests = 0;  // while a movement was under way
+  int requests = 0;  // Requests during a movement.
   int cut_short = 0;
-  double largest_drift_m = 0.0;  // of a foot from where it stood when it was said to stand
-  std::vector<double>
-      at_cuts;  // largest change of a joint's angular velocity at each interrupt, rad/s
-  double largest_at_joins = 0.0;  // wherever a movement begins
+  double largest_drift_m = 0.0;   // Drift of a standing foot.
+  std::vector<double> at_cuts;    // Largest change of angular velocity at each interrupt, rad/s.
+  double largest_at_joins = 0.0;  // The same at every start of a movement.
   double largest_elsewhere = 0.0;
 };
 
-// Looks at one avatar after every frame.
+// Measures one avatar after every frame.
 class Observer {
  public:
   Observer(const AvatarSimulation& avatar, Figures& figures)
@@ -76,7 +75,7 @@ class Observer {
   }
 
  private:
-  static constexpr int kFramesOfJoin = 3;  // a change of velocity shows in three poses
+  static constexpr int kFramesOfJoin = 3;  // A change of velocity affects three poses.
 
   void LookAtJoints() {
     const double step = steps_.Add(avatar_.pose()).joint_rad_s;
@@ -175,7 +174,7 @@ TEST_P(InterruptLibraries, IsSmoothAtAnyTime) {
 
 class InterruptBuiltin : public testing::Test {
  protected:
-  // Advances until `done`, or for 20 s; the events meanwhile.
+  // Advances until `done` returns true, or for 20 s. Returns the events.
   template <typename Done>
   std::vector<AvatarEvent> AdvanceUntil(const Done& done) {
     std::vector<AvatarEvent> events;

@@ -1,5 +1,4 @@
-// Who is told what an avatar begins shows the same bytes in every tick, on whatever instruction
-// set.
+// Replicas must display the same bytes as the avatar in every tick, on every instruction set.
 
 #include <gtest/gtest.h>
 
@@ -36,20 +35,20 @@ std::string BytesOf(ConstPoseSpan pose) {
 bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
 #ifdef __SANITIZE_ADDRESS__
-constexpr int kFewer = 10;  // of all: twenty times as slow
+constexpr int kFewer = 10;  // Divisor for sanitizer builds, which are twenty times as slow.
 #else
 constexpr int kFewer = 1;
 #endif
 
 struct Manner {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
   double tick_s;
-  int movements;  // as many at least
+  int movements;  // Minimum number of movements.
 };
 void PrintTo(const Manner& manner, std::ostream* out) { *out << manner.name; }
 
-// An avatar to which all that can happen to one happens, as `random` has it.
+// An avatar that receives all kinds of requests at random.
 class RandomlyDriven {
  public:
   RandomlyDriven(Library library, Random& random)
@@ -60,7 +59,7 @@ class RandomlyDriven {
                  .blend = Draws(0.8) ? BlendKind::kInertialization : BlendKind::kCubic,
                  .terrain = Draws(0.5) ? RoughGround(random) : nullptr}) {}
 
-  // What is done to it between two ticks.
+  // Changes something about the avatar between two ticks.
   void Stir() {
     if (Draws(avatar_.queue_size() == 0 ? 0.2 : 0.02)) {
       const MovementRequest request = DrawRequest(random_, avatar_);
@@ -90,7 +89,7 @@ std::string Refusal(AvatarReplica& replica, const Bytes& record) {
 struct Figures {
   int movements = 0;
   std::size_t records = 0;
-  std::size_t states = 0;  // of records
+  std::size_t states = 0;  // Bytes of records.
   std::size_t poses = 0;
 };
 
@@ -114,7 +113,7 @@ class ReplicaLibraries : public testing::TestWithParam<Manner> {
   Library library_;
 };
 
-// One is told from the beginning, another from some tick on.
+// One replica receives all records, another one joins later.
 TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
@@ -165,7 +164,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   EXPECT_GT(figures.records, figures.states);
 }
 
-// Walking, as most avatars do most of the time.
+// Walking, which is what most avatars do most of the time.
 TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261124;
@@ -210,7 +209,7 @@ TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
   EXPECT_LT(largest_state, MaxRecordBytes(*library_));
 }
 
-// What one machine's avatar did is shown by others, whose vectors are of another width.
+// A replica on a machine with another vector width displays the same bytes.
 TEST_P(ReplicaLibraries, HasTheSameBytesOnEveryInstructionSet) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261125;
@@ -294,7 +293,7 @@ TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   }
 }
 
-// Bytes that were damaged, and foreign ones: refused, or shown as something.
+// Damaged and foreign bytes must be rejected or displayed as something, without a crash.
 TEST(AvatarReplica, SurvivesDamagedRecords) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
@@ -329,7 +328,7 @@ TEST(AvatarReplica, SurvivesDamagedRecords) {
       (is_taken ? shown : refused) += 1;
       EXPECT_EQ(other.is_known(), is_taken);
       Advance(other, evaluator, 1.0 / 60.0);
-      // What was cut short or is too long is never taken.
+      // Records that are truncated or too long are always rejected.
       Bytes shorter = record;
       shorter.resize(below(record.size()));
       EXPECT_FALSE(AvatarReplica(replica).Apply(shorter).has_value()) << "seed " << kSeed;

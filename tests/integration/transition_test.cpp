@@ -1,5 +1,5 @@
-// How movements go on where others ended: the table a library has of it, and what an avatar makes
-// of it.
+// Transitions between movements: the table in a library, and the steps that an avatar inserts
+// because of it.
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@
 namespace stridewire {
 namespace {
 
-// Groups of the toy library, and the stand behind them.
+// Groups of the test library, followed by the stand.
 constexpr std::size_t kLeft = 0;
 constexpr std::size_t kRight = 1;
 constexpr std::size_t kJump = 2;
@@ -37,7 +37,7 @@ float DistanceM(const MotionLibrary& library, std::size_t from, std::size_t to) 
   return library.FindTransition(from, to)->distance_m;
 }
 
-// The toy library of steps as long as `is_kept` likes them, and its jumps.
+// The test library with only those steps whose length satisfies `is_kept`, and with its jumps.
 template <typename IsKept>
 std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
   RawLibrary raw = MakeToyRawLibrary();
@@ -64,8 +64,8 @@ TEST(Transitions, ClosingStepsFitJumpsAndTheStand) {
   }
 }
 
-// Legs of 0.9 m at angles that put feet 0.4 m apart: hips come down and knees and feet apart, as
-// far as geometry says. The toy's steps begin and end at rest.
+// Legs of 0.9 m at angles that put the feet 0.4 m apart. The expected distances of hips, knees and
+// feet follow from geometry. The steps of the test library begin and end at rest.
 TEST(Transitions, DistanceMeasuresJointPositions) {
   const auto library = ToyOf([](double l0, double l1) { return l0 >= 0.2 && l1 == 0.4; });
   const double lower_m = 0.9 - std::sqrt(0.81 - 0.04);
@@ -75,12 +75,12 @@ TEST(Transitions, DistanceMeasuresJointPositions) {
   const double expected_m = std::sqrt((hips + knees + feet) / 7.0);
   EXPECT_NEAR(DistanceM(*library, kLeft, kJump), expected_m, 0.01);
   EXPECT_NEAR(DistanceM(*library, kRight, kStand), expected_m, 0.01);
-  // The left foot ahead is where a right step begins, not a left one.
+  // With the left foot ahead, the next step is a right step, not a left one.
   EXPECT_LT(DistanceM(*library, kLeft, kRight), 0.02f);
   EXPECT_GT(DistanceM(*library, kLeft, kLeft), 0.17f);
 }
 
-// A jump that flies on at its end: what has to stop counts with 0.1 s of its speed.
+// A jump that still moves at its end. The speed counts with 0.1 s.
 TEST(Transitions, DistanceIncludesVelocities) {
   RawLibrary raw = MakeToyRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
@@ -95,7 +95,7 @@ TEST(Transitions, DistanceIncludesVelocities) {
   EXPECT_NEAR(DistanceM(*library, kJump, kJump), 0.0, 0.001);
 }
 
-// The same library with its bytes changed and a header that fits them.
+// The library with changed bytes and a header that matches them.
 template <typename Change>
 Expected<std::shared_ptr<const MotionLibrary>> Changed(const MotionLibrary& library,
                                                        Change change) {
@@ -107,7 +107,7 @@ Expected<std::shared_ptr<const MotionLibrary>> Changed(const MotionLibrary& libr
   return MotionLibrary::FromBytes(bytes);
 }
 
-// The library as it was written before there were transitions.
+// The library in the format before transitions were added.
 Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& library) {
   return Changed(library, [](std::uint8_t* payload) {
     const auto* root = fb::GetMotionLibrary(payload);
@@ -145,8 +145,8 @@ TEST(Transitions, RejectsAnInvalidTable) {
   EXPECT_EQ(with(jump_to_stand, {std::numeric_limits<float>::infinity(), 3, -1}), refused);
 }
 
-// What an avatar does when it is asked for movements one after the other, until it stands idle:
-// "left jump", with "+" before what it inserts and "-" before what it refuses, and the reason.
+// Describes what an avatar does with a sequence of requests until it is idle, for example "left
+// jump". Inserted steps have the prefix "+", rejected requests the prefix "-" and the reason.
 std::string Does(std::shared_ptr<const MotionLibrary> library,
                  const std::vector<decltype(MovementRequest::movement)>& movements) {
   AvatarSimulation avatar(std::move(library), BaseFrame{});
@@ -187,7 +187,7 @@ TEST(TransitionPath, IsAsShortAsPossible) {
             "step_left +step_right stand step_left +step_right");
   EXPECT_EQ(Does(library, {jump, right, jump}), "jump step_right +step_left jump");
   EXPECT_EQ(Does(library, {jump, jump, stand, jump}), "jump jump stand jump");
-  // Nothing is in the way of feet that are together, nor of one that is drawn back to the other.
+  // Feet that are together, or a step that brings them together, need no inserted step.
   EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.0), left}), "step_left step_left +step_right");
   EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.3), Step(Foot::kLeft, 0.0), jump}),
             "step_left step_left jump");
@@ -228,13 +228,13 @@ TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
   EXPECT_EQ(
       Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
       "step_left -(this library has no transition path from step_left to step_left) +step_left");
-  // What draws it back is no new step.
+  // The step that brings the feet together is not a new request.
   EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.2}, StepRequest{.length_m = 0.2}}),
             "step_left step_left +step_left");
 }
 
-// A jump that flies on at its end: feet are together, but the table says that no step begins so
-// fast.
+// A jump that still moves at its end: the feet are together, but according to the table no step
+// starts that fast.
 TEST(TransitionPath, RejectsDistantTransitions) {
   RawLibrary raw = MakeToyRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
@@ -248,12 +248,12 @@ TEST(TransitionPath, RejectsDistantTransitions) {
   const StepRequest left = Step(Foot::kLeft, 0.4);
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, left}),
             "jump -(this library has no transition path from jump to step_left)");
-  // Who has stood goes anywhere.
+  // After a stand, every movement is possible.
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, StandRequest{0.1}, left}),
             "jump stand step_left +step_right");
 }
 
-// Without a table its feet alone decide.
+// Without a table, only the positions of the feet matter.
 TEST(TransitionPath, UsesFootPositionsWithoutATable) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   const auto older = Older(*strides);
@@ -301,7 +301,7 @@ TEST(TransitionPath, RejectsMissingKindsImmediately) {
 
 struct Subject {
   const char* name;
-  std::vector<std::string> subjects;  // none: generated
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
 
@@ -311,12 +311,12 @@ INSTANTIATE_TEST_SUITE_P(Libraries, TransitionSmoothness,
                                          Subject{"Debian", {kDebianTakes}}),
                          [](const auto& subject) { return subject.param.name; });
 
-constexpr int kKinds = 4;  // of MovementKind, the stand last
+constexpr int kKinds = 4;  // Number of MovementKind values; the stand is last.
 constexpr double kFramesPerS = 60.0;
 
-// Steps, jumps and stands in any order. From one movement to the next no joint changes its speed
-// more than half as fast again as inside the examples of both kinds, a stand having none of its
-// own.
+// Steps, jumps and stands in any order. Between two movements, no joint may change its velocity by
+// more than 1.5 times the largest change inside the examples of both kinds. A stand has no
+// examples.
 TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const auto library = LibraryOf(GetParam().subjects);
@@ -361,7 +361,8 @@ TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
         since_s = 0.0;
         ++counts[from][to];
         if (!is_start || event.kind == MovementKind::kStand) continue;
-        // Nothing is inserted that feet do not need, and a jump does not wait for less.
+        // Steps are inserted only if the feet need them, and a jump waits only as long as
+        // necessary.
         const FootState feet{
             FootVector(library->skeleton(), avatar.pose(), Foot::kLeft, avatar.base().heading_rad)};
         if (event.request_id == 0) {

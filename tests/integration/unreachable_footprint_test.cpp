@@ -1,4 +1,4 @@
-// Steps to footprints that must be met: those out of reach are not played, all others are met.
+// Steps with exact placement: those out of reach are rejected, all others land on their footprint.
 
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
@@ -46,19 +46,20 @@ INSTANTIATE_TEST_SUITE_P(Libraries, ExactPlacementLibraries,
                                          Walker{"Debian", {kDebianTakes}}),
                          [](const auto& walker) { return walker.param.name; });
 
-// Where the foot of a step and the one that stays are from when it lands until it is over.
+// The error of both feet from landing to the end of a step.
 struct Seen {
   bool is_rejected = false;
-  double off_m = 0.0;  // of either from where it was to be
+  double off_m = 0.0;  // Distance of either foot from its target.
   double off_rad = 0.0;
 };
 
-// Advances until the request has ended; nobody but the pose is asked where feet are.
+// Advances until the request has ended and measures the feet from the displayed pose only.
 Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprint& asked,
            const DVec3& stays_m) {
   const double ball_m = avatar.library().leg_rig().side(foot).ball_height_m;
   Seen seen;
-  constexpr double kJustBeforeS = 1e-4;  // its end, so that nothing of what follows is seen
+  // Stop just before the end, so that the next movement has no effect.
+  constexpr double kJustBeforeS = 1e-4;
   bool has_finished = false;
   int looks = 0;
   for (int tick = 0; tick < 1200 && !has_finished; ++tick) {
@@ -84,7 +85,7 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
     const DVec3 away = lands.ball_m - asked.position_m;
     const DVec3 drawn = stays.ball_m - stays_m;
     seen.off_m = std::max({seen.off_m, std::hypot(away.x, away.z), std::hypot(drawn.x, drawn.z)});
-    // Heels go up, and balls with them.
+    // If the heel rises, the ball rises with it.
     for (const double up_m : {away.y - ball_m, drawn.y - ball_m}) {
       if (std::fabs(up_m) > 0.1) seen.off_m = std::max(seen.off_m, std::fabs(up_m));
     }
@@ -96,9 +97,9 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
   return seen;
 }
 
-// From a stand or in mid-walk; half of the footprints where a step may well end, the others
-// anywhere around. Whether one is in reach is seen from what the same avatar does when it need not
-// be met.
+// From a stand or during a walk. Half of the footprints are at probable ends of a step, the others
+// anywhere around. Whether a footprint is in reach is determined with a copy of the avatar that
+// does not require exact placement.
 TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
@@ -116,7 +117,7 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
   const char* asked = std::getenv("STRIDEWIRE_FOOTPRINTS");
   const int footprints = asked == nullptr ? kFootprints : std::atoi(asked);
   for (std::uint64_t id = 1; id <= static_cast<std::uint64_t>(footprints); ++id) {
-    // Near the origin, where floats are fine.
+    // Stay near the origin, where floats are precise.
     if (glm::length(avatar.base().position_m) > 30.0) avatar.Teleport(BaseFrame{});
     if (random.Draw(0, 1) < 0.3) {
       while (!avatar.idle()) avatar.Advance(kTickS);
@@ -133,7 +134,7 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
     if (before != nullptr) stays_m = before->feet.foot(OtherFoot(foot)).to.position_m;
     const double sign = foot == Foot::kLeft ? 1.0 : -1.0;
     const bool is_near = random.Draw(0, 1) < 0.5;
-    const double far_m = random.Draw(0, 1) < 0.5 ? 0.0 : 2.5;  // up or down
+    const double far_m = random.Draw(0, 1) < 0.5 ? 0.0 : 2.5;  // Sometimes far up or down.
     heading_rad += is_near ? random.Draw(-0.3, 0.3) : random.Draw(-1.2, 1.2);
     const DVec3 vector = is_near ? DVec3(sign * random.Draw(0.1, 0.3), 0.0, random.Draw(0.1, 0.7))
                                  : DVec3(sign * random.Draw(-0.4, 1.0), random.Draw(-far_m, far_m),
@@ -145,8 +146,8 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
         other.Enqueue(StepOnto(id, foot, print.position_m, heading_rad, false)).has_value());
     const Seen near = Watch(other, id, foot, print, stays_m);
     const bool is_outside = near.off_m > 1e-3 || near.off_rad * kDegrees > 0.1;
-    // Half a metre up or down no leg is too short; further a pose does not tell a foot that is a
-    // little too high.
+    // Within half a metre up or down no leg is too short. Further away, the pose does not show
+    // whether a foot is slightly too high.
     const bool is_inside =
         near.off_m <= 0.8e-3 && near.off_rad * kDegrees <= 0.05 && std::fabs(vector.y) < 0.5;
     outside += is_outside;
@@ -169,7 +170,7 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
       worst_m = std::max(worst_m, seen.off_m);
       worst_rad = std::max(worst_rad, seen.off_rad);
     }
-    // On from there, in mid-walk.
+    // Continue from there, during the walk.
     if (!seen.is_rejected) {
       ASSERT_TRUE(avatar.Enqueue(StepOnto(id, foot, print.position_m, heading_rad)).has_value());
     } else {
@@ -198,7 +199,7 @@ TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
 
 class ExactPlacement : public testing::Test {
  protected:
-  // Queues steps, of which those with an odd id are far out of reach and are to be met.
+  // Queues steps. Those with an odd id require exact placement and are far out of reach.
   static void Queue(AvatarSimulation& avatar, std::initializer_list<std::uint64_t> ids) {
     for (const std::uint64_t id : ids) {
       MovementRequest request{id, StepRequest{.length_m = 0.5}};
@@ -206,8 +207,8 @@ class ExactPlacement : public testing::Test {
       ASSERT_TRUE(avatar.Enqueue(request).has_value());
     }
   }
-  // Both avatars until they stand: bit by bit the same poses, and the same events but for those of
-  // refusals.
+  // Advances both avatars until they stand. They must display the same bits and have the same
+  // events, except for rejections.
   static int AdvanceAlike(AvatarSimulation& refusing, AvatarSimulation& other) {
     int refused = 0;
     for (int tick = 0; tick < 1200 && !(other.idle() && refusing.idle()); ++tick) {
@@ -241,7 +242,7 @@ TEST_F(ExactPlacement, RejectionDoesNotAffectOtherRequests) {
   Queue(other_, {2, 4, 6});
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 4);
   const DVec3 apart = FootVector(library_->skeleton(), avatar_.pose(), Foot::kLeft, 0.0);
-  EXPECT_LT(std::fabs(apart.z), 0.12);  // closed to a stand
+  EXPECT_LT(std::fabs(apart.z), 0.12);  // The feet are together.
 }
 
 TEST_F(ExactPlacement, ReportsTheNearestFootprintInReach) {

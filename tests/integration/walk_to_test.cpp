@@ -1,5 +1,5 @@
-// Walks to random places, on level and on rough ground: they arrive, by a short way, or say why
-// not.
+// Walks to random places, on level and uneven ground. They must arrive on a short path or report a
+// reason.
 
 #include <gtest/gtest.h>
 
@@ -26,13 +26,13 @@ constexpr double kDegree = M_PI / 180.0;
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
-  double least_level;                 // part of the walks that arrive, on level ground …
-  double least_rough;                 // … and on rough ground
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
+  double least_level;                 // Least fraction of walks that arrive on level ground.
+  double least_rough;                 // Least fraction of walks that arrive on uneven ground.
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-// Hills below 20 degrees, and slabs to step onto lying about.
+// Hills with slopes below 20 degrees, and slabs to step onto.
 Ground RoughGround(Random& random) {
   HeightField field{{-10.0, -10.0}, 0.5, 41, 41, {}};
   const double phase[3] = {random.Draw(0, 6), random.Draw(0, 6), random.Draw(0, 6)};
@@ -61,10 +61,10 @@ struct Walk {
   bool arrived = false;
   std::string reason;
   int steps = 0;
-  double away_m = 0.0;  // of the base from the goal
+  double away_m = 0.0;  // Distance of the base from the goal.
   double away_rad = 0.0;
-  double root_m = 0.0;  // of the displayed root
-  double path_m = 0.0;  // of the base from step to step
+  double root_m = 0.0;  // Distance of the displayed root from the goal.
+  double path_m = 0.0;  // Length of the path of the base.
 };
 
 Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
@@ -95,7 +95,7 @@ Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
   return walk;
 }
 
-// A thousand walks; the part of them that arrived.
+// Walks to a thousand random goals. Returns the fraction that arrived.
 double WalkAbout(const char* name, const Library& library, const Ground& ground, Random& random) {
   std::map<std::string, int> reasons;
   int arrived = 0;
@@ -117,7 +117,7 @@ double WalkAbout(const char* name, const Library& library, const Ground& ground,
       start.position_m.y = ground->HeightAt(start.position_m.x, start.position_m.z);
     }
     WalkRequest goal;
-    // Half of them nearby, where the ways are many.
+    // Half of the goals are close, where there are many ways to get there.
     goal.position_m = i % 2 == 0 ? place() : start.position_m + 0.2 * place();
     goal.heading_rad = random.Draw(-M_PI, M_PI);
     AvatarSimulation avatar(library, start, {.terrain = ground});
@@ -253,7 +253,7 @@ TEST(WalkTo, ReportsWhyItFails) {
   EXPECT_LT(behind.steps, 60);
   const Walk edge = GoTo(avatar, {.position_m = {0.0, 0.0, 2.4}});
   EXPECT_EQ(edge.reason, "the ground at the goal is too steep or too uneven to stand on");
-  // It goes on from there.
+  // The avatar accepts the next walk.
   EXPECT_TRUE(GoTo(avatar, {.position_m = {0.5, 0.0, -1.0}, .heading_rad = 3.0}).arrived);
 }
 

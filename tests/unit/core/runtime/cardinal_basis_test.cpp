@@ -32,7 +32,7 @@ TEST(CubicBSpline, HasContinuousSecondDerivative) {
   EXPECT_EQ(CubicBSpline(7.0), 0.0);
 }
 
-// Random sets in 1 to 7 dimensions: what the method promises of the weights everywhere.
+// Random sites in 1 to 7 dimensions.
 class RandomSites : public testing::TestWithParam<int> {};
 
 TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
@@ -46,7 +46,7 @@ TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
     for (double& value : sites) value = 5.0 + 0.4 * coordinate(random);
     const auto fit =
         CardinalBasisFit{static_cast<int>(d), static_cast<int>(n), sites, {}, scales}.Run();
-    if (!fit) {  // in 1-D, 60 random sites may touch
+    if (!fit) {  // In one dimension, two of 60 random sites may be too close.
       ASSERT_EQ(fit.error().code, ErrorCode::kIllConditioned);
       ASSERT_EQ(d, 1u);
       continue;
@@ -60,7 +60,8 @@ TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
     }
     for (int sample = 0; sample < 300; ++sample) {
       std::vector<double> p(d);
-      for (double& value : p) value = 5.0 + 0.8 * coordinate(random);  // also far outside
+      // Also far outside the sites.
+      for (double& value : p) value = 5.0 + 0.8 * coordinate(random);
       EvaluateWeights(View(*fit), p, weights);
       ASSERT_NEAR(Sum(weights), 1.0, 1e-9) << "seed " << seed << " n " << n;
       if (n < d + 2) continue;
@@ -76,7 +77,8 @@ TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
 INSTANTIATE_TEST_SUITE_P(Dimensions, RandomSites, testing::Range(1, 8));
 
 TEST(CardinalBasis, WeightsSumToOneUnderRankDeficiency) {
-  // All sites on a line far from the origin: the uncentred fit errs by 0.2 here (method).
+  // All sites are on a line far from the origin. Without centred parameters, the sum of the weights
+  // would be off by 0.2.
   std::vector<double> sites;
   for (int i = 0; i < 6; ++i) sites.insert(sites.end(), {3.0 + 0.1 * i, 7.0 - 0.2 * i});
   const auto fit = CardinalBasisFit{2, 6, sites, {}, std::vector<double>{1.0, 1.0}}.Run();
@@ -89,7 +91,7 @@ TEST(CardinalBasis, WeightsSumToOneUnderRankDeficiency) {
 }
 
 TEST(CardinalBasis, UsesAllExamplesBetweenSites) {
-  // The paper calls most weights zero; the linear part makes them dense.
+  // The paper says that most weights are zero. With the linear part they are not.
   std::vector<double> sites;
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {

@@ -49,8 +49,8 @@ TEST(ConvexHull, AcceptsSingleAndRepeatedPoints) {
       2.0, 1e-12);
 }
 
-// Optimality in any dimension: no vertex lies further towards the target than the answer
-// (for the nearest point x of a convex set, (v - x) . (target - x) <= 0 for every v).
+// Checks the optimality condition in any dimension: for the nearest point x of a convex set, (v -
+// x) . (target - x) <= 0 holds for every vertex v.
 TEST(ConvexHull, SatisfiesTheOptimalityCondition) {
   const unsigned seed = 5150;
   std::mt19937 random(seed);

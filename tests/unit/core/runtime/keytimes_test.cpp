@@ -56,7 +56,8 @@ TEST(BlendKeytimes, ReproducesTheKeytimesOfAnExample) {
 }
 
 TEST(BlendKeytimes, StaysIncreasingUnderNegativeWeights) {
-  // Random sets and weights far outside the hull: sum w K alone turns negative (method: -45 ms).
+  // Random keytimes and weights far outside the hull, for which sum w K alone decreases (by 45 ms
+  // in the paper's method).
   const unsigned seed = 20261;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> length(0.03, 0.6);
@@ -111,7 +112,8 @@ TEST_F(TimeWarpTest, IsMonotoneAndContinuousInVelocity) {
     const double u = warp_.GridPosition(t);
     ASSERT_GE(u, last);
     const double rate = (warp_.GridPosition(t + h) - warp_.GridPosition(t)) / h;
-    // The piecewise linear map jumps from 30 to 28.6 to 40 cells a second within one step here.
+    // The piecewise linear map would jump from 30 to 28.6 to 40 cells per second within one step
+    // here.
     if (!std::isnan(last_rate)) {
       ASSERT_NEAR(rate, last_rate, 0.1) << t;
     }
@@ -127,7 +129,8 @@ TEST_F(TimeWarpTest, TimeAtIsTheInverse) {
 }
 
 TEST(TimeWarp, StaysCloseToTheLinearMap) {
-  // Step keytimes whose interval rates differ by a factor of 4, as when blending 0.51 and 0.90 s.
+  // Keytimes of a step whose intervals differ in rate by a factor of 4, as when blending steps of
+  // 0.51 s and 0.90 s.
   const std::vector<double> keytimes = {0.0, 0.12, 0.55, 0.62};
   const std::vector<int> cells = {2, 13, 2};
   const TimeWarp warp(keytimes, cells);

@@ -137,7 +137,8 @@ TEST(LibraryBuilder, StoresTheClips) {
         EvaluateBlend(group, library->layout(), movement, t, cache, got);
         SampleClip(example.clip, t, expected);
         largest_rad = std::max(largest_rad, LargestJointAngle(got, expected));
-        // The toy jump leaves the ground with a kink, which 30 Hz rounds off.
+        // The jump of the test library takes off with a step in velocity, which sampling at 30 Hz
+        // smooths.
         ASSERT_LT(glm::length(got.root_position_m - expected.root_position_m), 0.015f);
       }
     }

@@ -37,7 +37,7 @@ TEST(PoseArithmetic, AddUndoesSubtract) {
 }
 
 TEST(PoseArithmetic, SumsDoNotCommute) {
-  // Sums do not commute: r_A r_B instead of r_B r_A ends far away (method: 133 degrees off).
+  // Sums do not commute: with r_A r_B instead of r_B r_A the result is up to 133 degrees off.
   std::mt19937 random(kSeed);
   const Pose a = RandomPose(random);
   const Pose b = RandomPose(random);
@@ -49,7 +49,8 @@ TEST(PoseArithmetic, SumsDoNotCommute) {
 }
 
 TEST(PoseArithmetic, ScalingTakesTheShortArc) {
-  // A difference of 6.2 degrees stored with w < 0 shows as 177 degrees half-way if taken as it is.
+  // A difference of 6.2 degrees that is stored with w < 0 must not be interpolated along the long
+  // arc, where it would be 177 degrees half-way.
   const double half = 0.5 * 6.2 * M_PI / 180.0;
   Pose difference(1);
   difference.rotations[0] =
@@ -105,7 +106,7 @@ TEST(ForwardKinematics, ComputesPositionsAndRotations) {
   Pose pose(3);
   pose.root_position_m = {1, 2, 3};
   const float s = std::sqrt(0.5f);
-  pose.rotations[1] = Quat(s, 0.0f, 0.0f, s);  // 90 degrees about z: y becomes -x
+  pose.rotations[1] = Quat(s, 0.0f, 0.0f, s);  // 90 degrees about z turns y into -x.
   std::vector<Vec3> positions(3);
   std::vector<Quat> rotations(3);
   ForwardKinematics(skeleton, pose, positions, rotations);
