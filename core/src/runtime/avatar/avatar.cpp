@@ -1,10 +1,9 @@
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 #include <utility>
 #include <vector>
 
 #include "base/check.h"
-#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {

@@ -7,28 +7,30 @@
 #include "base/check.h"
 #include "base/prefetch.h"
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/weights/correction.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/weights/correction.h"
 
 namespace stridewire {
 namespace {
 
-// A library may not reach a stand in one step from a long stride; a second one must be worth taking.
+// After a long stride, one step may not suffice to bring the feet together. A second step must
+// bring them closer by at least this much.
 constexpr double kClosingGainM = 0.03;
 
-// Events one movement can add in a tick: started, two foot-strikes, finished, a walk's end or a refusal, and the
-// next started.
+// A movement can add up to this many events in one tick: started, two foot strikes, finished, the
+// end of a walk or a rejection, and the start of the next movement.
 constexpr std::size_t kEventReserve = 7;
-// Of a tick: finished, started, foot-strike. Room for more is made when there are more.
+// A tick usually has at most three events: finished, started and foot strike. The list grows if
+// there are more.
 constexpr std::size_t kUsualEvents = 3;
-// Requests a queue keeps room for.
+// A queue keeps memory for this many requests.
 constexpr std::size_t kUsualQueue = 8;
 
 }  // namespace
 
-AvatarSimulation::AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
-               const AvatarOptions& options)
+AvatarSimulation::AvatarSimulation(std::shared_ptr<const MotionLibrary> library,
+                                   const BaseFrame& start, const AvatarOptions& options)
     : options_(options), body_(std::move(library)) {
   events_.reserve(kUsualEvents);
   stand_feet_.left_from_right_m =
@@ -52,7 +54,7 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   body_.begins_planting = false;
   if (body_.plants_feet) {
     body_.locks = FootLocksOf(body_.library->skeleton(), body_.library->leg_rig(), body_.pose,
-                          start.position_m.y, options_.terrain.get());
+                              start.position_m.y, options_.terrain.get());
     StandOn(body_.locks, body_.movement);
     body_.earlier_feet[0] = CorrectFeet(body_.library->skeleton(), body_.library->leg_rig(),
                                         body_.movement, 0.0, body_.blended_pose);
@@ -78,7 +80,7 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
       kept_.resize(1);
       kept_.front().pose = Pose(body_.library->skeleton().joint_count());
       MakeRoom(*body_.library, kept_.front().movement);
-      events_.reserve(kMaxEventsPerAdvance);  // refusals may come many at once
+      events_.reserve(kMaxEventsPerAdvance);  // One tick may reject many requests.
     }
   }
   const double earlier_start_s = start_not_before_s_;
@@ -91,13 +93,15 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
   }
   if (queue_size() == 0) {
     start_not_before_s_ = time_s_ + start_delay_s;
-    if (earlier_start_s > time_s_) start_not_before_s_ = std::min(start_not_before_s_, earlier_start_s);
+    if (earlier_start_s > time_s_)
+      start_not_before_s_ = std::min(start_not_before_s_, earlier_start_s);
   }
   if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
-  // In small steps, and given back: a crowd's queues are long at once, but not for long.
+  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole
+  // crowd tend to be long at the same time, but only briefly.
   if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
   if (queue_.size() == queue_.capacity()) {
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
@@ -116,7 +120,7 @@ Status AvatarSimulation::SetLayer(const LayerRequest& request) {
 
 Status AvatarSimulation::SetFootPlanting(bool is_on) {
   if (is_on && !body_.library->leg_rig().is_usable) {
-    return Fail(ErrorCode::kUnsupported, "the library's legs are not such as can be planted");
+    return Fail(ErrorCode::kUnsupported, "this skeleton does not support foot planting");
   }
   options_.foot_planting = is_on;
   return {};
@@ -154,7 +158,7 @@ void AvatarSimulation::ShowPose() {
 }
 
 void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                           std::vector<std::uint32_t>* eventful) {
+                                     std::vector<std::uint32_t>* eventful) {
   if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
@@ -169,10 +173,12 @@ void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars,
   }
 }
 
-void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator) {
+void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
+                                 SoaPoseEvaluator& evaluator) {
   std::array<PoseJob, SoaPose::kLanes> jobs;
   while (!avatars.empty()) {
-    const std::span<AvatarSimulation* const> block = avatars.first(std::min(avatars.size(), jobs.size()));
+    const std::span<AvatarSimulation* const> block =
+        avatars.first(std::min(avatars.size(), jobs.size()));
     std::size_t moving = 0;
     for (AvatarSimulation* avatar : block) {
       if (!avatar->is_moving_) continue;
@@ -185,12 +191,12 @@ void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars, Soa
 }
 
 void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                        SoaPoseEvaluator& evaluator) {
+                                  SoaPoseEvaluator& evaluator) {
   AdvanceStates(avatars, dt_s);
   ShowPoses(avatars, evaluator);
 }
 
-// What AdvanceEventfully reads of an avatar that goes on walking.
+// Prefetches what AdvanceEventfully reads of a walking avatar.
 void AvatarSimulation::PrefetchState() const {
   PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
   PrefetchBytes(&events_, 1);
@@ -200,7 +206,7 @@ void AvatarSimulation::PrefetchState() const {
   PrefetchBytes(&body_.movement.feet.is_active, 1);
 }
 
-// All of Advance but the pose at its end.
+// Advances everything except the pose.
 void AvatarSimulation::AdvanceState(double dt_s) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   if (StaysEventFree(dt_s)) {
@@ -213,10 +219,10 @@ void AvatarSimulation::AdvanceState(double dt_s) {
   next_event_s_ = NextEventTime();
 }
 
-// From an Advance on in which nothing happened.
+// Movement time of the next event. Returns -1 if the last Advance was not event-free.
 double AvatarSimulation::NextEventTime() const {
-  const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() && events_.empty() &&
-                        change_ == AvatarChange{};
+  const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() &&
+                             events_.empty() && change_ == AvatarChange{};
   if (!is_event_free) return -1.0;
   const double strike_s = StrikeTime();
   return movement_time_s_ < strike_s ? std::min(strike_s, body_.movement.duration_s())
@@ -229,8 +235,8 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   for (;;) {
-    // Movements shorter than a tick could otherwise outrun the event list; the rest of the time
-    // is then spent in the next tick.
+    // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
+    // full, nothing more starts or ends in this tick.
     const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
     if (is_moving_) {
       const double before_s = movement_time_s_;
@@ -276,7 +282,7 @@ bool AvatarSimulation::StartNext() {
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
   if (is_walking_ && (is_empty || stand != nullptr)) {
-    // The walk ends here: bring the feet together, so that nobody freezes in mid-air.
+    // The walk ends here. Bring the feet together, so that the avatar does not stop in mid-stride.
     is_walking_ = false;
     SwitchPlanting();
     const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
@@ -312,13 +318,13 @@ bool AvatarSimulation::StartNext() {
   return true;
 }
 
-// The step or jump at the queue's head, or a step that has to go before it.
+// Starts the step or jump at the head of the queue, or a step that must come before it.
 void AvatarSimulation::StartTransitionPath() {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
-  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue saw to it that the library has the kind
-  const TransitionPath way =
-      FindTransitionPath(*body_.library, request, direct, {feet_, last_moved_, last_group_, closing_steps_});
+  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
+  const TransitionPath way = FindTransitionPath(*body_.library, request, direct,
+                                                {feet_, last_moved_, last_group_, closing_steps_});
   if (way.is_inserted) {
     StartInserted(*way.plan);
   } else if (way.plan) {
@@ -339,14 +345,15 @@ void AvatarSimulation::StartInserted(const RequestPlan& plan) {
   closing_steps_ = inserted;
 }
 
-// Takes the request off the queue's head; its id.
+// Removes the request at the head of the queue and returns its id.
 std::uint64_t AvatarSimulation::PopQueue() {
   const std::uint64_t id = queue_[queue_head_++].id;
   if (queue_size() == 0) CancelQueue();
   return id;
 }
 
-// The next step of the walk at the queue's head, which stays there until it has arrived or can not.
+// Starts the next step of the walk at the head of the queue. The request stays in the queue until
+// the walk has arrived or is rejected.
 void AvatarSimulation::GoOnWalking() {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -378,13 +385,13 @@ void AvatarSimulation::GoOnWalking() {
   }
 }
 
-// Where the ball of a foot is between two movements.
+// Position of a foot between two movements: its footprint, or the ball if feet are not planted.
 DVec3 AvatarSimulation::StandsAt(Foot foot) const {
   return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
-// How much higher than the standing foot the ground is where a step would land.
+// Height of the ground where a step would land above the ground at the standing foot, in metres.
 double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   const auto f = static_cast<std::size_t>(foot);
@@ -406,7 +413,7 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
     return PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
   }
 
-  // By footprint: the same as seen from the foot that stays.
+  // A step to a footprint is planned relative to the foot that stays.
   Footprint exact{step.at->position_m, step.at->heading_rad.value_or(base_.heading_rad)};
   exact.heading_rad = UnwrapAngle(exact.heading_rad, base_.heading_rad);
   if (options_.terrain != nullptr) {
@@ -427,11 +434,12 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
   BeginMovement(plan, request_id);
 }
 
-// The movement goes on from where both feet stand or, for one that takes over in mid-swing, from the same
-// part of its own swing.
+// Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the
+// same fraction `swing_part` of its own swing.
 void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = body_.library->group(plan.group);
-  std::array<double, MotionLibrary::kMaxExamples> weights;  // of which the first ones are touched
+  // Only the first elements are used, one per example of the group.
+  std::array<double, MotionLibrary::kMaxExamples> weights;
   if (options_.run_time_correction) {
     CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next), weights,
                    body_.movement);
@@ -445,14 +453,15 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) 
     const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
     body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
-  // Who stood has no speed to keep.
+  // An avatar that was standing has no speed to keep.
   body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
 }
 
-// What was planned is under way.
+// Starts the movement that was just planned.
 void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = group();
-  // A footprint that planting reaches is met, whatever the examples span.
+  // If planting reaches the requested footprint, the step is not clamped, even if its parameters
+  // are.
   const bool is_met = plan.exact && body_.movement.feet.is_active &&
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
@@ -481,8 +490,8 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
             .clamped = is_met ? false : plan.clamped});
 }
 
-// A straight walk hangs on its feet along the way only: aside, where the examples have nothing to
-// say, on the body's own line.
+// Keeps straight steps on the line of the walk. Groups without a sideways parameter determine the
+// position of the base only along the walking direction. Sideways, it follows the body.
 void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;
@@ -499,7 +508,8 @@ void AvatarSimulation::FinishMovement(double at_s) {
   Leave(at_s, false);
   movement_time_s_ = at_s;
   ++revision_;
-  // Without planting the base is the root's own and rises by what the library says.
+  // Without planting, the base frame follows the root, and its height changes by the movement's own
+  // rise.
   const BaseFrame before = base_;
   base_ = BaseAfter(body_.movement, body_.pose);
   base_.position_m.y = before.position_m.y + (has_moved ? ground_rise_m_ : 0.0);

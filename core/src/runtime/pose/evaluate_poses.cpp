@@ -11,7 +11,8 @@
 namespace stridewire {
 namespace {
 
-// What goes on faster is no motion of a body. It is cut, so that a join overshoots by 4/27 of it at most.
+// Limits on the speed of a difference pose; no body moves faster. They bound the overshoot of a
+// blend to 4/27 of this speed times the length of the blend.
 constexpr float kMaxJointRadPerS = 20.0f;
 constexpr float kMaxRootMPerS = 4.0f;
 
@@ -20,7 +21,8 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// A small rotation as a vector. Not of the vector's length exactly, but the same bits everywhere.
+// A small rotation as a rotation vector. The length is approximate (2 sin(angle / 2)), which avoids
+// trigonometry that differs between machines.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
@@ -65,18 +67,19 @@ void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movem
 
 namespace {
 
-// Where a pose lies in its movement, and how much is left of the poses before.
+// The position of a pose in its movement, and how much of the difference pose remains there.
 struct Place {
   GridPlace grid;
-  float fraction;  // of the difference that is left
-  float slope_s;   // of its velocity
-  double steered;  // EaseOut of the part of the movement behind
-  bool is_eased;   // there is something left of the difference
+  float fraction;  // Remaining fraction of the difference.
+  float slope_s;   // Seconds by which the velocity of the difference is multiplied.
+  double steered;  // EaseOut of the elapsed fraction of the movement.
+  bool is_eased;   // True while part of the difference remains.
 };
 
 using RowScratch = std::array<float, kMaxRowFloats>;
 
-// Makes rotations unit, adds what is left of the poses before and takes the pose into the world.
+// Normalizes the rotations, adds the rest of the difference pose and transforms the pose into world
+// space.
 void FinishPose(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                 const Place& place, RowScratch& row, PoseSpan out) {
   const bool is_inertial = place.is_eased && movement.is_inertial;
@@ -159,7 +162,7 @@ void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const 
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement) {
-  // Before its beginning a movement is taken to go on as it begins.
+  // Before its start, a movement is extrapolated by reflecting its first moments.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
                 movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);

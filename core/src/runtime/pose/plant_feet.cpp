@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/pose/pose_kernels.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
 
-// Cubic with given values and slopes at both ends of [0, length].
+// Cubic Hermite curve with the given values and slopes at both ends of [0, length_s].
 DVec3 Hermite(const DVec3& p0, const DVec3& v0, const DVec3& p1, const DVec3& v1, double length_s,
               double t) {
   const double s = std::clamp(t / length_s, 0.0, 1.0);
@@ -26,22 +26,22 @@ double SmoothMax(double a, double b, double soft_m) {
   return 0.5 * (a + b + std::sqrt(d * d + soft_m * soft_m));
 }
 
-// Part of the swing that is over, 0 to 1.
+// Elapsed fraction of the foot's swing, 0 before release and 1 after landing.
 double SwingAt(const FootTrajectory& track, double time_s) {
   if (time_s <= track.release_s) return 0.0;
   if (time_s >= track.land_s) return 1.0;
   return (time_s - track.release_s) / (track.land_s - track.release_s);
 }
 
-// Eased from 0 to 1 within the window [from, to] of the swing: a foot that climbs rises early, one
-// that descends sinks late.
+// Fraction of the change in height that is complete, eased from 0 to 1. A foot that steps up rises
+// early in the swing; a foot that steps down descends late.
 double RiseAt(double swing, double rise_m) {
   const double from = rise_m > 0.0 ? 0.0 : kSinkFrom;
   return 1.0 - EaseOut((swing - from) / (1.0 - kSinkFrom));
 }
 
-// How far a standing foot's heading is held: wholly with the sole down, not at all with the heel up,
-// where the foot is too short from above to have one.
+// How strongly the heading of a standing foot is locked: fully while the sole is on the ground, not
+// at all with the heel up. Seen from above, a foot on its toes is too short to have a heading.
 double HeadingLockShare(double flatness) {
   return 1.0 - EaseOut((flatness - kHeelUp) / (kSoleDown - kHeelUp));
 }
@@ -55,7 +55,7 @@ Quat RotationFromUp(const Vec3& normal) {
   return Normalise(Quat(1.0f + normal.y, normal.z, 0.0f, -normal.x));
 }
 
-// How far the root goes along with the correction of a foot.
+// The part of a foot's correction by which the root moves as well.
 DVec3 RootShare(const FootCorrection& correction) {
   return correction.root_weight * correction.offset_m + correction.root_shift_m;
 }
@@ -113,7 +113,8 @@ FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
   const auto& turn = track.turn_rad;
   const double turned = 1.0 - EaseOut(swing);
   double free_rad = turn[0] + settled * (turn[1] - turn[0]) + turned * (turn[2] - turn[1]);
-  // A standing foot does not turn with the body; one in the air catches up, and stands again.
+  // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
+  // up with the turn that the body will have made by the time it lands.
   const auto steered = [&](double at_s) {
     return movement.extra_turn_rad * (1.0 - EaseOut(at_s / duration_s));
   };
@@ -162,7 +163,7 @@ FeetCorrection CorrectFeet(const Skeleton& skeleton, const LegRig& rig, const Mo
 }
 
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
-              const std::array<FeetCorrection, 2>& planned, Movement& movement) {
+                  const std::array<FeetCorrection, 2>& planned, Movement& movement) {
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
@@ -180,13 +181,13 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                                WrapAngle(turn_of(planned[1]) - turn_of(planned[0])));
     rest.over_s = movement.ease_out_s;
     if (is_planted) {
-      // It stands: only its height and what turns with the heel up goes on.
+      // A standing foot keeps only its height and the turn it has while its heel is up.
       rest.offset_m.x = rest.offset_m.z = rest.offset_m_s.x = rest.offset_m_s.z = 0.0;
     } else {
       rest.over_s = track.land_s - movement.start_offset_s;
     }
   }
-  // The root goes along with what the feet keep; only what is missing then is its own.
+  // The root follows the residuals of the feet. Its own residual is only the remaining difference.
   std::array<DVec3, 2> root{planned[0].root_m, planned[1].root_m};
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t f = 0; f < 2; ++f) {
@@ -201,7 +202,8 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
 
 namespace {
 
-// How deep a sole is below the ground a print lies on, taken for a plane; less the further it is away.
+// Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
+// between the foot and the footprint.
 double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Side& side,
                   const LegPose& leg, const DVec3& ball, const Quat& turn) {
   const DVec3 print = stands.position_m;
@@ -221,7 +223,8 @@ double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Sid
   return near * SmoothMax(0.0, depth_m, kSoftGroundM);
 }
 
-// How much higher a foot must be so that its sole is not below the ground it leaves or lands on.
+// Height by which to raise a foot so that its sole stays above the ground that it leaves and the
+// ground that it lands on.
 double LiftOutOfGround(const FootTrajectory& track, double time_s, const LegRig::Side& side,
                        const LegPose& leg, const DVec3& ball, const Quat& turn) {
   const double second = 1.0 - EaseOut((SwingAt(track, time_s) - kGroundFrom) / kGroundOver);
@@ -246,7 +249,8 @@ std::array<std::size_t, 3> JointsOf(const LegRig::Side& side) {
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose) {
   const FootPlan& plan = movement.feet;
   if (!(time_s < movement.start_offset_s + plan.plant_fade_s)) return;
-  const auto part = static_cast<float>(EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s));
+  const auto part =
+      static_cast<float>(EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s));
   pose.root_position_m += part * plan.plant_fade_root_m;
   for (std::size_t f = 0; f < 2; ++f) {
     const auto joints = JointsOf(rig.sides[f]);
@@ -264,13 +268,14 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   struct Side {
     LegPose leg;
     FootCorrection correction;
-    Quat turn = kIdentityQuat;  // of the foot
-    DVec3 ankle_m{0.0};         // wanted, in the world
+    Quat turn = kIdentityQuat;  // Rotation of the foot in world axes.
+    DVec3 ankle_m{0.0};         // Target position of the ankle in the world.
   };
   std::array<Side, 2> sides;
   const DVec3 root = DVec3(pose.root_position_m);
-  const double settled =
-      plan.plant_fade_s > 0.0 ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s) : 1.0;
+  const double settled = plan.plant_fade_s > 0.0
+                             ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s)
+                             : 1.0;
   DVec3 shift(0.0);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     Side& side = sides[static_cast<std::size_t>(foot)];
@@ -290,7 +295,7 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
   }
   shift += RootResidual(movement, time_s);
 
-  // Down until both ankles are in reach.
+  // Lower the root until both legs can reach their ankle targets.
   double lower_m = 0.0;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const Side& side = sides[static_cast<std::size_t>(foot)];
@@ -304,7 +309,8 @@ void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Mov
     const DVec3 reach = side.ankle_m - (root + shift + DVec3(hip));
     const double flat_squared = reach.x * reach.x + reach.z * reach.z;
     const double drop_squared = allowed_m * allowed_m - flat_squared;
-    // A foot too far to the side is not reached by going down: only as far as makes sense.
+    // Lowering the root cannot reach a foot that is too far away horizontally. Limit how far it
+    // goes down for such a foot.
     const double deepest_m = 0.5 * length_m;
     const double drop_m = std::sqrt(std::max(drop_squared, deepest_m * deepest_m));
     lower_m = SmoothMax(lower_m, -reach.y - drop_m, kSoftLowerM);

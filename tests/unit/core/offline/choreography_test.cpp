@@ -184,7 +184,7 @@ const BadText kBadTexts[] = {
     {R"({"terrain":[],"movements":[]})", ErrorCode::kMalformed,
      "c.json: terrain: is not an object"},
     {R"({"terrain":{"boxes":[{"min_m":[0,0],"max_m":[1,0],"height_m":0.5}]},"movements":[]})",
-     ErrorCode::kOutOfRange, "c.json: terrain.boxes[0].max_m: is not above min_m"},
+     ErrorCode::kOutOfRange, "c.json: terrain.boxes[0].max_m: expected values above min_m"},
     {R"({"start":[],"movements":[]})", ErrorCode::kMalformed, "c.json: start: is not an object"},
     {R"({"start":{"x":0},"movements":[]})", ErrorCode::kMalformed,
      "c.json: start.x: is not a key known here"},
