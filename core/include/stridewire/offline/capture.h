@@ -8,15 +8,15 @@
 
 namespace stridewire {
 
-/// A whole recording as read from a file, already in our conventions: metres, +Y up, facing +Z at
-/// identity rotations.
+/// A recording read from a file and converted to Stridewire's conventions: metres, +Y up, facing +Z
+/// at identity rotations.
 struct Capture {
-  std::string path;   ///< As given on the command line.
-  Skeleton skeleton;  ///< With its legs found.
+  std::string path;   ///< The path as passed to the reader.
+  Skeleton skeleton;  ///< Its legs are set.
   Clip clip;
-  double unit_m = 1.0;             ///< Length of one file unit, found or given.
-  int first_frame = 0;             ///< Frames before it are an artificial pose, to be left out.
-  std::vector<std::string> notes;  ///< What was assumed or mended, one sentence each.
+  double unit_m = 1.0;             ///< Length of one file unit in metres, detected or given.
+  int first_frame = 0;             ///< Frames before this one hold an artificial pose; skip them.
+  std::vector<std::string> notes;  ///< Assumptions and repairs, one sentence each.
 };
 
 }  // namespace stridewire

@@ -8,47 +8,50 @@
 
 namespace stridewire {
 
-/// Which of the examples found go into a library.
+/// Decides which extracted examples become part of a library.
 struct SelectionOptions {
-  /// Every step left out must be made by the ones kept within this: mean distance of its joints at
-  /// equal generic times, and how far the hull of the ones kept (grown by 10 %) misses its
-  /// parameters, metres (a radian counts 0.5 m). 0: no step is left out.
+  /// Largest error, in metres, with which the kept examples must reproduce every example that is
+  /// left out. The error is the mean joint distance at equal generic times. It also includes the
+  /// distance of the parameters from the hull of the kept examples, grown by 10 %; a radian counts
+  /// as 0.5 m. 0: leaves out nothing.
   double max_pose_error_m = 0.0;
-  /// Steps whose poses or durations miss what all others make of their parameters by this many
-  /// deviations (1.4826 MAD) more than is usual are outliers. 0: none is. Only steps inside the hull of
-  /// the others, in groups of at least eight, and at most one in ten: what lies at the edge is rare, not
-  /// wrong.
+  /// Threshold for outliers, in robust deviations (1.4826 MAD) above the typical error. The error
+  /// of a step compares its poses and duration with those the other examples predict for its
+  /// parameters. Only steps inside the hull of the others can be outliers, since steps at the edge
+  /// are rare rather than wrong. Applies to groups of at least eight and drops at most one in ten.
+  /// 0: drops nothing.
   double outlier_deviations = 0.0;
 };
 
-/// What became of an example.
+/// The result of the selection for one example.
 enum class ExampleFate : std::uint8_t {
-  kKept,       ///< Stands in the library
-  kAveraged,   ///< Stands in the library as part of an average
-  kRedundant,  ///< Left out: the ones kept make it, or an average it would be part of
-  kOutlier     ///< Left out: unlike all others
+  kKept,       ///< Stored in the library.
+  kAveraged,   ///< Stored in the library as part of an average.
+  kRedundant,  ///< Left out: the kept examples reproduce it, or the average that contains it.
+  kOutlier     ///< Left out: it differs too much from all others.
 };
 
-/// "kept", "averaged", "redundant", "outlier".
+/// Returns "kept", "averaged", "redundant" or "outlier".
 [[nodiscard]] std::string_view ExampleFateName(ExampleFate fate);
 
 struct SelectedExample {
   std::string source;
   bool mirrored = false;
   ExampleFate fate = ExampleFate::kKept;
-  int example = -1;      ///< Index in the library's group; -1: left out
-  double error_m = 0.0;  ///< Of one left out: how far what is made of its parameters is from it
-  std::string reason;    ///< A sentence
+  int example = -1;      ///< Index in the group of the library; -1: left out.
+  double error_m = 0.0;  ///< If left out: its distance from the movement synthesized in its place.
+  std::string reason;    ///< One sentence.
 };
 
-/// What was selected of a group, in the order of the examples found.
+/// The result of the selection for one group. Examples are in the order of extraction.
 struct GroupSelection {
   int group = 0;
   MovementKind kind = MovementKind::kStepLeft;
   std::vector<SelectedExample> examples;
-  /// What the examples stored were made smooth by (LibraryBuilder::smooths); 0: they are as captured.
+  /// Ridge parameter that was used to smooth the stored examples (LibraryBuilder::smooths). 0: the
+  /// examples are stored as captured.
   double ridge = 0.0;
-  double ridge_radius = 0.0;  ///< Of the radial functions, in spreads of the parameters
+  double ridge_radius = 0.0;  ///< Radius of the smoothing kernel, in spreads of the parameters.
 
   [[nodiscard]] int Count(ExampleFate fate) const;
 };
