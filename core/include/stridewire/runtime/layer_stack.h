@@ -14,7 +14,7 @@ class MotionLibrary;
 /// Asks for one of a library's layer clips over the movement, or for its end.
 struct LayerRequest {
   int layer = 0;  ///< Index in MotionLibrary::layers().
-  bool is_on = true;
+  bool enabled = true;
   double weight = 1.0;   ///< In (0, 1], on top of the clip's mask. Unused when off.
   double blend_s = 0.3;  ///< How long weight and speed take to get there: [0, kMaxLayerBlendS].
   double speed = 1.0;    ///< [kMinLayerSpeed, kMaxLayerSpeed]; 1: as recorded. Unused when off.

@@ -147,14 +147,14 @@ Status ReadStand(const JsonField& field, StandRequest& stand) {
 }
 
 Status ReadLayer(const JsonField& field, LayerCue& cue) {
-  if (auto ok = CheckKeys(field, {"name", "off", "weight", "blend_s", "speed"}); !ok) return ok;
+  if (auto ok = CheckKeys(field, {"name", "enabled", "weight", "blend_s", "speed"}); !ok) return ok;
   const json* name = field.Find("name");
   if (name == nullptr) return Fail(ErrorCode::kMalformed, "is missing", field.WhereOf("name"));
   if (!name->is_string() || name->get<std::string>().empty()) {
     return Fail(ErrorCode::kMalformed, "is not the name of a layer", field.WhereOf("name"));
   }
   cue.layer = name->get<std::string>();
-  if (auto ok = ReadFlag(field, "off", cue.is_off); !ok) return ok;
+  if (auto ok = ReadFlag(field, "enabled", cue.enabled); !ok) return ok;
   if (auto ok = ReadNumber(field, "weight", kWeight, cue.weight); !ok) return ok;
   if (auto ok = ReadNumber(field, "blend_s", kBlend, cue.blend_s); !ok) return ok;
   return ReadNumber(field, "speed", kLayerSpeed, cue.speed);

@@ -114,7 +114,7 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
   for (; next < layers.size() && layers[next].before <= before; ++next) {
     const LayerCue& cue = layers[next];
     const Status status = avatar.SetLayer({.layer = avatar.library().FindLayer(cue.layer),
-                                           .is_on = !cue.is_off,
+                                           .enabled = cue.enabled,
                                            .weight = cue.weight,
                                            .blend_s = cue.blend_s,
                                            .speed = cue.speed});

@@ -59,7 +59,7 @@ TEST(ParseChoreography, LayersStandBetweenMovements) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"movements":[{"layer":{"name":"wave"}},{"step":{"length_m":0.5}},
           {"layer":{"name":"carry","weight":0.5,"blend_s":0.75,"speed":2}},
-          {"layer":{"name":"wave","off":true}},{"stand":{"seconds":1}}]})",
+          {"layer":{"name":"wave","enabled":false}},{"stand":{"seconds":1}}]})",
       "c.json");
   ASSERT_TRUE(read.has_value()) << Describe(read.error());
   ASSERT_EQ(read->movements.size(), 2u);
@@ -73,9 +73,9 @@ TEST(ParseChoreography, LayersStandBetweenMovements) {
   EXPECT_EQ(read->layers[1].weight, 0.5);
   EXPECT_EQ(read->layers[1].blend_s, 0.75);
   EXPECT_EQ(read->layers[1].speed, 2.0);
-  EXPECT_FALSE(read->layers[1].is_off);
+  EXPECT_TRUE(read->layers[1].enabled);
   EXPECT_EQ(read->layers[2].before, 1u);
-  EXPECT_TRUE(read->layers[2].is_off);
+  EXPECT_FALSE(read->layers[2].enabled);
 
   const auto refused = [](const char* layer) {
     const std::string text =
@@ -87,8 +87,8 @@ TEST(ParseChoreography, LayersStandBetweenMovements) {
               testing::HasSubstr("layer.name: is not the name of a layer"));
   EXPECT_THAT(refused(R"({"name":"a","weight":1.5})"),
               testing::HasSubstr("layer.weight: is not a number from 0 to 1"));
-  EXPECT_THAT(refused(R"({"name":"a","off":1})"),
-              testing::HasSubstr("layer.off: is neither true nor false"));
+  EXPECT_THAT(refused(R"({"name":"a","enabled":1})"),
+              testing::HasSubstr("layer.enabled: is neither true nor false"));
   EXPECT_THAT(refused(R"({"name":"a","mask":1})"), testing::HasSubstr("mask"));
   EXPECT_EQ(ParseChoreography(R"({"movements":[{"layer":{"name":"a"}}]})", "c.json").error().code,
             ErrorCode::kOutOfRange);
