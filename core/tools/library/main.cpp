@@ -1,4 +1,4 @@
-// stridewire-library: builds motion libraries from captures, inspects them and synthesizes from them.
+// stridewire-library: builds motion libraries from captures, inspects them and synthesizes motion.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
