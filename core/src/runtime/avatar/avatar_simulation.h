@@ -78,7 +78,7 @@ class AvatarSimulation {
   /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without a jump. A swing is
   /// not sent elsewhere meanwhile, and what waits in the queue for a footprint that must be met is rejected while it
   /// is off. kUnsupported: to be on, but the library's legs are not such as can be planted.
-  [[nodiscard]] Status SetFootPlanting(bool is_on);
+  [[nodiscard]] Status SetFootPlanting(bool enabled);
   /// As last set; false where the library's legs can not.
   [[nodiscard]] bool foot_planting() const {
     return options_.foot_planting && body_.library->leg_rig().is_usable;

@@ -5,7 +5,6 @@
 
 #include "runtime/library/keytimes.h"
 #include "runtime/library/cardinal_basis.h"
-#include "runtime/pose/pose_kernels.h"
 
 namespace stridewire {
 double EaseOut(double s) {
