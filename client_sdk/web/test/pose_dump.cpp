@@ -27,7 +27,8 @@ int main(int argc, char** argv) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   for (int count = 0; count < wanted;) {
     if (std::chrono::steady_clock::now() > end) {
-      std::fprintf(stderr, "web_pose_dump: received only %d of %d poses within 120 s\n", count, wanted);
+      std::fprintf(stderr, "web_pose_dump: received only %d of %d poses within 120 s\n", count,
+                   wanted);
       return 1;
     }
     if (!client->NextPose(world, avatar, tick, pose) || pose.missing()) {

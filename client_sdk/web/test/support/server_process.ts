@@ -69,7 +69,9 @@ export async function run(program: string, args: string[]): Promise<string> {
 export async function until(what: string, holds: () => boolean, seconds = 120): Promise<void> {
   const endMs = performance.now() + 1000 * seconds;
   while (!holds()) {
-    if (performance.now() > endMs) throw new Error(`timed out after ${seconds} s, waiting until ${what}`);
+    if (performance.now() > endMs) {
+      throw new Error(`timed out after ${seconds} s, waiting until ${what}`);
+    }
     await new Promise((resolve) => setTimeout(resolve, 10));
   }
 }
