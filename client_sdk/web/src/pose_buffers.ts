@@ -1,6 +1,6 @@
 import type {CrowdPose, Pose} from './types';
 
-/** Room for one pose. */
+/** Creates an output buffer for `World.sample`. It grows with the skeleton if necessary. */
 export function createPose(jointCount = 0): Pose {
   return {
     rotations: new Float32Array(4 * jointCount),
@@ -13,7 +13,7 @@ export function createPose(jointCount = 0): Pose {
   };
 }
 
-/** Room for the poses of a crowd. */
+/** Creates an output buffer for `sampleAll`. `count` avatars fit into it without reallocation. */
 export function createCrowdPose(count = 0, jointCount = 0): CrowdPose {
   const out = {
     count: 0,
@@ -27,21 +27,21 @@ export function createCrowdPose(count = 0, jointCount = 0): CrowdPose {
   return out;
 }
 
-/** @internal Makes `out` large enough for `count` figures. */
+/** Grows `out` until `count` avatars fit into it. Keeps its contents. @internal */
 export function reserve(out: CrowdPose, count: number, jointCount: number): void {
   if (out.avatars.length < count) {
-    // A quarter more, so that a growing crowd does not make new arrays with every avatar.
-    const room = Math.ceil(count * 1.25);
-    out.avatars = grown(new Uint32Array(room), out.avatars);
-    out.flags = grown(new Uint8Array(room), out.flags);
-    out.rootsM = grown(new Float32Array(3 * room), out.rootsM);
+    // A quarter more than needed, so that a growing crowd does not reallocate for every avatar.
+    const capacity = Math.ceil(count * 1.25);
+    out.avatars = copyInto(new Uint32Array(capacity), out.avatars);
+    out.flags = copyInto(new Uint8Array(capacity), out.flags);
+    out.rootsM = copyInto(new Float32Array(3 * capacity), out.rootsM);
   }
   if (out.rotations.length < 4 * count * jointCount) {
-    out.rotations = grown(new Float32Array(4 * out.avatars.length * jointCount), out.rotations);
+    out.rotations = copyInto(new Float32Array(4 * out.avatars.length * jointCount), out.rotations);
   }
 }
 
-function grown<T extends Uint32Array | Uint8Array | Float32Array>(to: T, from: T): T {
+function copyInto<T extends Uint32Array | Uint8Array | Float32Array>(to: T, from: T): T {
   to.set(from as never);
   return to;
 }
