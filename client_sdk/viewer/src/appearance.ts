@@ -1,6 +1,6 @@
 // What the scene is drawn as: what somebody chose, or what the machine keeps up with.
 
-import type {Asked} from './address.js';
+import type {Asked} from './url_options.js';
 import {Quality} from './quality.js';
 import type {FigureStyle, QualityChoice} from './quality.js';
 import {basePixelRatio} from './renderer.js';

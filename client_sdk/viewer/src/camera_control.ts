@@ -1,7 +1,7 @@
 // Where the page looks from: at everybody, at the one followed, or where somebody turned it to.
 
 import {Orbit} from './scene/camera.js';
-import type {Chosen, Shown} from './shown.js';
+import type {Chosen, Shown} from './world_pane.js';
 
 const followDistanceM = 5.2;
 

@@ -2,7 +2,7 @@
 
 import {h, setText} from './dom.js';
 import type {Client} from './sdk.js';
-import type {Shown} from './shown.js';
+import type {Shown} from './world_pane.js';
 
 export class ConnectionStatus {
   private readonly word = h('span', {});

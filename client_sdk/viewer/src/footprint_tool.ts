@@ -3,7 +3,7 @@
 import type {Inspector} from './panels/inspector.js';
 import {nextRequestId} from './request_ids.js';
 import type {MovementRequest, QueuedRequest, Vec3, WorldEvent} from './sdk.js';
-import type {Chosen, Shown} from './shown.js';
+import type {Chosen, Shown} from './world_pane.js';
 
 /** What the tool needs of the page. */
 export interface FootprintHost {

@@ -2,7 +2,7 @@
 
 import {nextRequestId} from './request_ids.js';
 import type {Vec3, WorldEvent} from './sdk.js';
-import type {Chosen, Shown} from './shown.js';
+import type {Chosen, Shown} from './world_pane.js';
 import type {FootprintHost} from './footprint_tool.js';
 import type {GoalMark} from './scene/world_view.js';
 

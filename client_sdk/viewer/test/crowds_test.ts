@@ -4,11 +4,11 @@ import {test} from 'node:test';
 import * as THREE from 'three';
 
 import {matrixFloats, solve} from '../src/scene/kinematics.js';
-import {restPositions} from '../src/scene/figure.js';
-import {LineCrowd} from '../src/scene/line_crowd.js';
-import {lineFigure} from '../src/scene/line_figure.js';
-import {Region, buildBody} from '../src/scene/skeleton_body.js';
-import {SkinnedCrowd} from '../src/scene/skinned_crowd.js';
+import {restPositions} from '../src/scene/body_parts.js';
+import {LineCrowd} from '../src/scene/stick_figure_crowd.js';
+import {lineFigure} from '../src/scene/stick_figure.js';
+import {Region, buildBody} from '../src/scene/body_mesh.js';
+import {SkinnedCrowd} from '../src/scene/cpu_skinned_crowd.js';
 import {captured} from './skeletons.js';
 
 const lights = {

@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {restPositions} from '../src/scene/figure.js';
-import type {SkeletonLike} from '../src/scene/figure.js';
+import {restPositions} from '../src/scene/body_parts.js';
+import type {SkeletonLike} from '../src/scene/body_parts.js';
 import {carry, matrixFloats, solve} from '../src/scene/kinematics.js';
 import {plain} from './skeletons.js';
 

@@ -3,8 +3,8 @@ import {test} from 'node:test';
 
 import {matchingTime, samplePose, timeOf} from '../src/library/clip_pose.js';
 import {niceTop, widest} from '../src/library/library_page.js';
-import {Latest} from '../src/library/library_source.js';
-import type {Clip} from '../src/library/library_source.js';
+import {Latest} from '../src/library/library_client.js';
+import type {Clip} from '../src/library/library_client.js';
 import {scaleColour} from '../src/library/parameter_plane.js';
 
 function clip(keytimesS: number[], timesS: number[], roots: number[], rotations: number[]): Clip {

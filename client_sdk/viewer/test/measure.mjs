@@ -5,7 +5,7 @@
 // Each crowd lives in a world of its own, spawned and walked by the page itself. STRIDEWIRE_QUERY is added to
 // the address, STRIDEWIRE_WARM_S is how long it runs before (22: till the recording is full).
 
-import {BareBrowser} from './bare_browser.mjs';
+import {BareBrowser} from './devtools_browser.mjs';
 
 const [link, onlyCount, onlyStyle, file] = process.argv.slice(2);
 if (!link) {

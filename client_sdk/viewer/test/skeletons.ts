@@ -1,6 +1,6 @@
 // Skeletons as servers describe them, for tests.
 
-import type {LegLike, SkeletonLike} from '../src/scene/figure.js';
+import type {LegLike, SkeletonLike} from '../src/scene/body_parts.js';
 
 type Row = [name: string, parent: string, x: number, y: number, z: number];
 

@@ -3,8 +3,8 @@ import {test} from 'node:test';
 
 import {Playback} from '../src/playback.js';
 import {meanSince, parseMetrics} from '../src/prometheus.js';
-import {genericTime, stateAt} from '../src/time_line.js';
-import {movements} from '../src/wander.js';
+import {genericTime, stateAt} from '../src/timeline.js';
+import {movements} from '../src/random_walkers.js';
 
 test('generic time is the keytime index and the share of the way to the next', () => {
   const keys = [0, 0.3, 0.8, 1];

@@ -1,7 +1,7 @@
 // Poses between a clip's frames, and times of two clips that belong together.
 
-import type {Clip} from './library_source.js';
-import {genericTime} from '../time_line.js';
+import type {Clip} from './library_client.js';
+import {genericTime} from '../timeline.js';
 
 /** The time at which a movement has this generic time. */
 export function timeOf(keytimesS: readonly number[], generic: number): number {

@@ -4,11 +4,11 @@ import {Slider, button, degrees, h, press, setText} from '../dom.js';
 import type {RendererInfo} from '../renderer.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from '../theme.js';
 import type {ThemeName} from '../theme.js';
-import {genericTime} from '../time_line.js';
-import {Latest} from './library_source.js';
-import type {Clip, Group, GroupEntry, LibraryEntry, LibrarySource, Step} from './library_source.js';
+import {genericTime} from '../timeline.js';
+import {Latest} from './library_client.js';
+import type {Clip, Group, GroupEntry, LibraryEntry, LibrarySource, Step} from './library_client.js';
 import {ParameterPlane, label, scaleColour} from './parameter_plane.js';
-import {StepStage} from './step_stage.js';
+import {StepStage} from './step_preview.js';
 
 const mapCells = 48;
 /** Between one showing of the movement and the next. */

@@ -3,7 +3,7 @@
 import {h} from '../dom.js';
 import {probe} from '../renderer.js';
 import {LibraryPage} from './library_page.js';
-import {LibrarySource} from './library_source.js';
+import {LibrarySource} from './library_client.js';
 
 const root = document.getElementById('app')!;
 const info = probe();

@@ -2,7 +2,7 @@
 // points, and the point that is wanted, which can be dragged.
 
 import {h} from '../dom.js';
-import type {ErrorMap, Group} from './library_source.js';
+import type {ErrorMap, Group} from './library_client.js';
 
 /** Dark blue to yellow by lightness, so that it reads without colour vision (after cividis). */
 const scale: readonly [number, number, number][] = [

@@ -2,7 +2,7 @@
 
 import {degrees, h, setText, svg} from '../dom.js';
 import type {AvatarState, MovementState, QueuedRequest, World} from '../sdk.js';
-import {genericTime, stateAt} from '../time_line.js';
+import {genericTime, stateAt} from '../timeline.js';
 
 const everyMs = 200;
 const keptS = 22;

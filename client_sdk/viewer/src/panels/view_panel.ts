@@ -2,7 +2,7 @@
 
 import {h, setText} from '../dom.js';
 import type {FigureStyle, QualityChoice} from '../quality.js';
-import type {Cost, Stream} from '../stream.js';
+import type {Cost, Stream} from '../pose_stream.js';
 import {formatBytes} from './plot.js';
 
 type Choice = 'auto' | FigureStyle;

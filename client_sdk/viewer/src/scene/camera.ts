@@ -3,7 +3,7 @@
 
 import * as THREE from 'three';
 
-import type {Ground} from '../terrain.js';
+import type {Ground} from '../terrain_surface.js';
 
 const minDistanceM = 1.2;
 const maxDistanceM = 160;

@@ -4,14 +4,14 @@
 import * as THREE from 'three';
 
 import type {CrowdPose} from '../sdk.js';
-import {restPositions} from './figure.js';
-import type {SkeletonLike} from './figure.js';
+import {restPositions} from './body_parts.js';
+import type {SkeletonLike} from './body_parts.js';
 import {carry, matrixFloats, solve} from './kinematics.js';
-import {LineCrowd} from './line_crowd.js';
-import {buildBody} from './skeleton_body.js';
-import {SkinnedCrowd} from './skinned_crowd.js';
+import {LineCrowd} from './stick_figure_crowd.js';
+import {buildBody} from './body_mesh.js';
+import {SkinnedCrowd} from './cpu_skinned_crowd.js';
 import type {FigureStyle} from '../quality.js';
-import type {Ground} from '../terrain.js';
+import type {Ground} from '../terrain_surface.js';
 
 const textureWidth = 1024;
 

@@ -2,8 +2,8 @@
 
 import * as THREE from 'three';
 
-import type {Ground} from '../terrain.js';
-import {Marks} from './marks.js';
+import type {Ground} from '../terrain_surface.js';
+import {Marks} from './ground_decals.js';
 
 const printFragment = /* glsl */ `
 precision highp float;

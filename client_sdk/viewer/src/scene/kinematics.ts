@@ -1,6 +1,6 @@
 // Forward kinematics in typed arrays: what a crowd's shader needs, for every joint of every avatar.
 
-import type {SkeletonLike} from './figure.js';
+import type {SkeletonLike} from './body_parts.js';
 
 /** Floats of a joint's matrix: three rows of four, rotation and translation. */
 export const matrixFloats = 12;

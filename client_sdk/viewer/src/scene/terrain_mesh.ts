@@ -3,7 +3,7 @@
 import * as THREE from 'three';
 
 import type {HeightField, Terrain} from '../sdk.js';
-import type {Ground} from '../terrain.js';
+import type {Ground} from '../terrain_surface.js';
 import type {GroundColours} from './grid.js';
 import {gridLines} from './grid_lines.js';
 

@@ -11,11 +11,11 @@ import type {Lights} from './crowd_mesh.js';
 import {mostPrints} from '../quality.js';
 import type {FigureStyle} from '../quality.js';
 import {matrixFloats} from './kinematics.js';
-import {Ground} from '../terrain.js';
+import {Ground} from '../terrain_surface.js';
 import {Footprints} from './footprints.js';
 import {Grid} from './grid.js';
 import type {GroundColours} from './grid.js';
-import {blobs, goalKinds, goals, planned, rings} from './marks.js';
+import {blobs, goalKinds, goals, planned, rings} from './ground_decals.js';
 import {TerrainMesh} from './terrain_mesh.js';
 
 const markCapacity = 8192;

@@ -2,7 +2,7 @@
 
 import {Slider, button, h, press, setText} from '../dom.js';
 import type {MovementRequest, Vec3} from '../sdk.js';
-import type {TerrainName} from '../terrain.js';
+import type {TerrainName} from '../terrain_surface.js';
 
 /** What a click on the ground is. */
 export type GroundTool = 'feet' | 'walk';

@@ -1,10 +1,10 @@
 // What the Drive panel and keys command, and whom: the chosen avatar, or everybody of a world.
 
 import type {AvatarState, MovementRequest, World} from './sdk.js';
-import type {Chosen, Shown} from './shown.js';
-import {makeTerrain} from './terrain.js';
-import type {TerrainName} from './terrain.js';
-import {Wander} from './wander.js';
+import type {Chosen, Shown} from './world_pane.js';
+import {makeTerrain} from './terrain_surface.js';
+import type {TerrainName} from './terrain_surface.js';
+import {Wander} from './random_walkers.js';
 
 /** What it needs of the page. */
 export interface DriverHost {

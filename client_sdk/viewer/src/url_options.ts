@@ -1,7 +1,7 @@
 // What the page's address asks for, see README.md; what it does not understand it leaves as it is.
 
 import type {FigureStyle, QualityChoice} from './quality.js';
-import {rates, type Stream} from './stream.js';
+import {rates, type Stream} from './pose_stream.js';
 
 export interface Asked {
   readonly figures: 'auto' | FigureStyle;

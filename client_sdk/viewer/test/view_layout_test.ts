@@ -1,7 +1,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {shareOut} from '../src/scene/share_out.js';
+import {shareOut} from '../src/scene/view_layout.js';
 
 const views = (n: number) => Array.from({length: n}, () => ({
   free: {x: 0, y: 0, width: 0, height: 0}, box: {x: 0, y: 0, width: 0, height: 0}}));

@@ -1,9 +1,9 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {figureOf, restPositions} from '../src/scene/figure.js';
-import {lineFigure} from '../src/scene/line_figure.js';
-import {Region, buildBody} from '../src/scene/skeleton_body.js';
+import {figureOf, restPositions} from '../src/scene/body_parts.js';
+import {lineFigure} from '../src/scene/stick_figure.js';
+import {Region, buildBody} from '../src/scene/body_mesh.js';
 import {captured, makeSkeleton, plain} from './skeletons.js';
 
 for (const [name, skeleton] of [['plain', plain()], ['captured', captured()]] as const) {

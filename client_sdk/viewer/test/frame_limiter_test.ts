@@ -1,8 +1,8 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {readAddress} from '../src/address.js';
-import {FrameCap} from '../src/frame_cap.js';
+import {readAddress} from '../src/url_options.js';
+import {FrameCap} from '../src/frame_limiter.js';
 
 /** Times at which frames are drawn, on a display of so many Hz. */
 function drawn(cap: FrameCap, displayHz: number, fromMs: number, seconds: number): number[] {

@@ -3,10 +3,10 @@
 
 import * as THREE from 'three';
 
-import {CrowdPoints} from './crowd_points.js';
-import {lineFigure} from './line_figure.js';
-import type {LineFigure} from './line_figure.js';
-import type {SkeletonLike} from './figure.js';
+import {CrowdPoints} from './cpu_crowd_geometry.js';
+import {lineFigure} from './stick_figure.js';
+import type {LineFigure} from './stick_figure.js';
+import type {SkeletonLike} from './body_parts.js';
 import {matrixFloats} from './kinematics.js';
 
 export interface LineLights {

@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import type {Terrain} from '../src/sdk.js';
-import {Ground, makeTerrain} from '../src/terrain.js';
+import {Ground, makeTerrain} from '../src/terrain_surface.js';
 
 const box = (x0: number, z0: number, x1: number, z1: number, heightM: number) =>
   ({minM: [x0, z0] as const, maxM: [x1, z1] as const, heightM});

@@ -2,9 +2,9 @@
 // only. Points are joints first, then some that a joint carries; a line has the colour of its second
 // point.
 
-import {add, figureOf, length, normalised, subtract} from './figure.js';
-import type {SkeletonLike, Vec} from './figure.js';
-import {Region} from './skeleton_body.js';
+import {add, figureOf, length, normalised, subtract} from './body_parts.js';
+import type {SkeletonLike, Vec} from './body_parts.js';
+import {Region} from './body_mesh.js';
 
 export interface LineFigure {
   readonly pointCount: number;

@@ -7,10 +7,10 @@ import type {RendererInfo} from '../renderer.js';
 import {createCrowdPose} from '../sdk.js';
 import {Orbit, ViewCamera, listenToPointers} from '../scene/camera.js';
 import {CrowdMesh} from '../scene/crowd_mesh.js';
-import type {SkeletonLike} from '../scene/figure.js';
+import type {SkeletonLike} from '../scene/body_parts.js';
 import {Grid} from '../scene/grid.js';
 import type {ViewColours} from '../scene/world_view.js';
-import type {Clip} from './library_source.js';
+import type {Clip} from './library_client.js';
 import {durationOf, matchingTime, samplePose} from './clip_pose.js';
 
 const apartM = 1.1;

@@ -1,7 +1,7 @@
 // What the animator's page asks of the server: libraries, groups, steps of any parameters, and how far
 // they miss what was asked.
 
-import type {LegLike, SkeletonLike} from '../scene/figure.js';
+import type {LegLike, SkeletonLike} from '../scene/body_parts.js';
 
 export interface GroupEntry {
   readonly kind: string;

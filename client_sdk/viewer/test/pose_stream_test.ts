@@ -2,7 +2,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import type {Statistics} from '../src/sdk.js';
-import {StreamCosts, nameOf, observationOf, type Stream} from '../src/stream.js';
+import {StreamCosts, nameOf, observationOf, type Stream} from '../src/pose_stream.js';
 
 const all: Stream = {mode: 'quantised', detail: 'all', everyNTicks: 1};
 const root: Stream = {mode: 'quantised', detail: 'root', everyNTicks: 4};

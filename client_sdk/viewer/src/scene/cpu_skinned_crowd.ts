@@ -4,9 +4,9 @@
 
 import * as THREE from 'three';
 
-import {CrowdPoints} from './crowd_points.js';
+import {CrowdPoints} from './cpu_crowd_geometry.js';
 import {matrixFloats} from './kinematics.js';
-import type {Body} from './skeleton_body.js';
+import type {Body} from './body_mesh.js';
 
 export interface BodyLights {
   readonly sun: THREE.Vector3;

@@ -1,6 +1,6 @@
 import type {WorldView} from './scene/world_view.js';
 import type {Subscription, World} from './sdk.js';
-import type {Wander} from './wander.js';
+import type {Wander} from './random_walkers.js';
 
 /** A world on the page. */
 export interface Shown {

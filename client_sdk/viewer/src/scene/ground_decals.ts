@@ -3,7 +3,7 @@
 
 import * as THREE from 'three';
 
-import type {Ground} from '../terrain.js';
+import type {Ground} from '../terrain_surface.js';
 
 // Four corners a mark, worked out once where it is set: drawn as instances, each mark would be a
 // draw of its own for a processor.

@@ -6,8 +6,8 @@
 //     (  )====(  )====(  )  cap      axes, and who moves it. Sizes are shares of the figure's
 //                                    height, as anthropometric tables give them.
 
-import {add, figureOf, length, mix, normalised, subtract} from './figure.js';
-import type {Anchor, Figure, SkeletonLike, Vec} from './figure.js';
+import {add, figureOf, length, mix, normalised, subtract} from './body_parts.js';
+import type {Anchor, Figure, SkeletonLike, Vec} from './body_parts.js';
 
 /** What a vertex shows; the shader colours it. */
 export const Region = {skin: 0, shirt: 1, trousers: 2, shoes: 3, hair: 4} as const;
