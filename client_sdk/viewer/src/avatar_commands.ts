@@ -1,121 +1,129 @@
-// What the Drive panel and keys command, and whom: the chosen avatar, or everybody of a world.
+// Sends the commands of the command panel and of keys to the selected avatar, or to all avatars of
+// a world.
 
-import type {AvatarState, MovementRequest, World} from './sdk.js';
-import type {Chosen, Shown} from './world_pane.js';
-import {makeTerrain} from './terrain_surface.js';
-import type {TerrainName} from './terrain_surface.js';
-import {Wander} from './random_walkers.js';
+import {RandomWalkers} from './random_walkers.js';
+import {makeSampleTerrain} from './sample_terrains.js';
+import type {SampleTerrainName} from './sample_terrains.js';
+import type {AvatarState, MovementRequest, Reply, World} from './sdk.js';
+import type {AvatarSelection, WorldPane} from './world_pane.js';
 
-/** What it needs of the page. */
-export interface DriverHost {
-  chosen(): Chosen | null;
-  /** The world that commands go to. */
-  driven(): Shown | null;
-  choose(shown: Shown | null, avatar: number): void;
-  /** The camera takes in all of them. */
-  reframe(): void;
+/** The parts of the page that commands use. */
+export interface CommandHost {
+  selection(): AvatarSelection | null;
+  /** The world that receives commands. */
+  commandedPane(): WorldPane | null;
+  /** Avatar 0: clears the selection. */
+  select(pane: WorldPane | null, avatar: number): void;
+  /** Moves the camera so that all avatars are in view. */
+  frameAllAvatars(): void;
+  /** Shows the present again if the user was looking at the recording. */
   goLive(): void;
-  say(text: string): void;
-  /** They have nothing more to do. */
-  cancelled(shown: Shown, avatars: readonly number[]): void;
-  /** Whether the server tells what avatars play. */
-  tellsLayers(): boolean;
-  /** The ground is one that has no name here. */
-  forgetGround(): void;
+  /** Shows a message to the user. */
+  notify(text: string): void;
+  /** Called after the queues of these avatars have been cleared. */
+  onCancelled(pane: WorldPane, avatars: readonly number[]): void;
+  /** Whether the server reports the layers that avatars play. */
+  reportsLayers(): boolean;
+  /** Shows in the panel that the terrain is none of the sample terrains. */
+  resetTerrainChoice(): void;
 }
 
-export const wanderersAtFirst = 8;
+/** Number of avatars spawned into an empty world. */
+export const initialWalkerCount = 8;
 
-export class Driver {
-  everybody = false;
-  /** The world whose ground is about to change as we asked. */
-  private groundAsked: World | null = null;
-  private groundOf: World | null = null;
-  /** Layers that this page has started or heard of, "avatar layer". */
-  private readonly playing = new WeakMap<World, Set<string>>();
-  /** Whose planting this page has switched off, or has heard to be off. */
-  private readonly sliding = new WeakMap<World, Set<number>>();
+/** States that the server sent before a toggle may arrive this long after the toggle's reply. */
+const staleStateMs = 1000;
 
-  /** Switches whose outcome the server's word may not have yet. */
-  private switching = 0;
+export class AvatarCommands {
+  /** Whether commands go to all avatars of the world instead of the selected one. */
+  allAvatars = false;
+  /** The world whose terrain this page is changing. */
+  private terrainRequestedFor: World | null = null;
+  private terrainChoiceWorld: World | null = null;
+  /** Layers that play as far as the page knows; each entry is "avatar layer". */
+  private readonly playingLayers = new WeakMap<World, Set<string>>();
+  /** Avatars whose foot planting is off as far as the page knows. */
+  private readonly unplantedAvatars = new WeakMap<World, Set<number>>();
+  /** While above 0, reported states may be older than a toggle and are ignored. */
+  private recentToggles = 0;
 
-  constructor(private readonly host: DriverHost) {}
+  constructor(private readonly host: CommandHost) {}
 
-  /** Whom commands go to. */
-  avatars(): number[] {
-    const shown = this.host.driven();
-    if (!shown) return [];
-    if (this.everybody) return [...shown.world.avatars()];
-    const chosen = this.host.chosen();
-    if (chosen) return [chosen.avatar];
-    return shown.world.avatars().length === 1 ? [...shown.world.avatars()] : [];
+  /** The avatars that receive commands. */
+  targets(): number[] {
+    const pane = this.host.commandedPane();
+    if (!pane) return [];
+    if (this.allAvatars) return [...pane.world.avatars()];
+    const selection = this.host.selection();
+    if (selection) return [selection.avatar];
+    return pane.world.avatars().length === 1 ? [...pane.world.avatars()] : [];
   }
 
+  /** Requests a movement for each target. */
   request(make: (avatar: number) => MovementRequest): void {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    if (!shown || avatars.length === 0) {
-      this.host.say('Click a figure first, or command everybody.');
-      return;
-    }
+    const to = this.addressees();
+    if (!to) return;
+    const {pane, avatars} = to;
     this.host.goLive();
-    void shown.world.request(avatars.map(make)).then((reply) => {
-      if (!reply.ok) this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
-      else this.host.say(avatars.length === 1 ? 'Asked for.' : `Asked ${avatars.length} avatars.`);
+    void pane.world.request(avatars.map(make)).then((reply) => {
+      if (!reply.ok) this.notifyRefused(reply);
+      else if (avatars.length === 1) this.host.notify('Movement queued.');
+      else this.host.notify(`Movements queued for ${avatars.length} avatars.`);
     });
   }
 
-  setGround(name: TerrainName): void {
-    const shown = this.host.driven();
-    if (!shown) return;
-    this.groundAsked = shown.world;
-    void shown.world.setTerrain(makeTerrain(name)).then((reply) => {
-      this.host.say(reply.ok ? `The ground of ${shown.world.name} is another now.` : `Refused: ${reply.text}`);
-      if (reply.ok) return;
-      this.groundAsked = null;
-      this.host.forgetGround();
+  setTerrain(name: SampleTerrainName): void {
+    const pane = this.host.commandedPane();
+    if (!pane) return;
+    this.terrainRequestedFor = pane.world;
+    void pane.world.setTerrain(makeSampleTerrain(name)).then((reply) => {
+      if (reply.ok) {
+        this.host.notify(`Changed the terrain of ${pane.world.name}.`);
+        return;
+      }
+      this.host.notify(`Refused: ${reply.text}`);
+      this.terrainRequestedFor = null;
+      this.host.resetTerrainChoice();
     });
   }
 
-  /** A world's ground is another now: ours stays chosen, another's is not known by name. */
-  groundChanged(world: World): void {
-    if (this.groundAsked !== world) this.host.forgetGround();
-    this.groundAsked = null;
+  /** The panel keeps its choice if this page has changed the terrain, and resets it otherwise. */
+  onTerrainChanged(world: World): void {
+    if (this.terrainRequestedFor !== world) this.host.resetTerrainChoice();
+    this.terrainRequestedFor = null;
   }
 
-  /** The panel speaks of this world's ground from now on. */
-  lookAt(world: World): void {
-    if (world === this.groundOf) return;
-    this.groundOf = world;
-    this.host.forgetGround();
+  /**
+   * Call with the world that receives commands. If it is another one, the panel's choice is reset.
+   */
+  setTerrainChoiceWorld(world: World): void {
+    if (world === this.terrainChoiceWorld) return;
+    this.terrainChoiceWorld = world;
+    this.host.resetTerrainChoice();
   }
 
-  /** Whether all whom commands go to play it, as far as this page knows. */
-  plays(layer: string): boolean {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    const playing = shown && this.playing.get(shown.world);
+  /** Whether all targets play the layer, as far as the page knows. */
+  isLayerPlaying(layer: string): boolean {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    const playing = pane && this.playingLayers.get(pane.world);
     return !!playing && avatars.length > 0 &&
       avatars.every((avatar) => playing.has(`${avatar} ${layer}`));
   }
 
-  /** They begin with it, or end it if all of them play it. */
+  /** Stops the layer if all targets play it, and otherwise starts it. */
   toggleLayer(layer: string): void {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    if (!shown || avatars.length === 0) {
-      this.host.say('Click a figure first, or command everybody.');
-      return;
-    }
-    const {world} = shown;
-    const off = this.plays(layer);
-    const playing = this.playing.get(world) ?? new Set<string>();
-    this.playing.set(world, playing);
+    const to = this.addressees();
+    if (!to) return;
+    const {pane: {world}, avatars} = to;
+    const off = this.isLayerPlaying(layer);
+    const playing = this.playingLayers.get(world) ?? new Set<string>();
+    this.playingLayers.set(world, playing);
     this.host.goLive();
-    ++this.switching;
+    ++this.recentToggles;
     void world.setLayers(avatars.map((avatar) => ({avatar, layer, off}))).then((reply) => {
       if (!reply.ok || reply.accepted === 0) {
-        this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
+        this.notifyRefused(reply);
         return;
       }
       const refused = new Set(reply.items.map((item) => item.avatar));
@@ -123,143 +131,169 @@ export class Driver {
         if (off) playing.delete(`${avatar} ${layer}`);
         else if (!refused.has(avatar)) playing.add(`${avatar} ${layer}`);
       }
-    }).finally(() => this.settle());
+    }).finally(() => this.expireToggle());
   }
 
-  /** Whether the feet of all whom commands go to are planted, as far as this page knows. */
-  plants(): boolean {
-    const shown = this.host.driven();
-    const sliding = shown && this.sliding.get(shown.world);
-    return !sliding || !this.avatars().some((avatar) => sliding.has(avatar));
+  /** Whether foot planting is on for all targets, as far as the page knows. */
+  areFeetPlanted(): boolean {
+    const pane = this.host.commandedPane();
+    const unplanted = pane && this.unplantedAvatars.get(pane.world);
+    return !unplanted || !this.targets().some((avatar) => unplanted.has(avatar));
   }
 
-  /** The server has told of one. */
-  hear(world: World, {avatar, plantingOff, layers}: AvatarState): void {
-    if (this.switching > 0) return;
-    if (plantingOff) this.slidingIn(world).add(avatar);
-    else this.sliding.get(world)?.delete(avatar);
-    if (!this.host.tellsLayers()) return;
-    const playing = this.playing.get(world) ?? new Set<string>();
-    this.playing.set(world, playing);
+  /** Call with each state that the server reports. */
+  onAvatarState(world: World, {avatar, plantingOff, layers}: AvatarState): void {
+    if (this.recentToggles > 0) return;
+    if (plantingOff) this.unplantedIn(world).add(avatar);
+    else this.unplantedAvatars.get(world)?.delete(avatar);
+    if (!this.host.reportsLayers()) return;
+    const playing = this.playingLayers.get(world) ?? new Set<string>();
+    this.playingLayers.set(world, playing);
     for (const name of world.layers) {
-      if (layers.some(({layer, ending}) => layer === name && !ending)) playing.add(`${avatar} ${name}`);
+      const plays = layers.some(({layer, ending}) => layer === name && !ending);
+      if (plays) playing.add(`${avatar} ${name}`);
       else playing.delete(`${avatar} ${name}`);
     }
   }
 
-  private slidingIn(world: World): Set<number> {
-    const sliding = this.sliding.get(world) ?? new Set<number>();
-    this.sliding.set(world, sliding);
-    return sliding;
-  }
-
-  /** Feet are planted from their next movements on, or no more if all of them are. */
+  /** Turns foot planting off if it is on for all targets, and otherwise on. */
   togglePlanting(): void {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    if (!shown || avatars.length === 0) {
-      this.host.say('Click a figure first, or command everybody.');
-      return;
-    }
-    const {world} = shown;
-    const on = !this.plants();
+    const to = this.addressees();
+    if (!to) return;
+    const {pane: {world}, avatars} = to;
+    const on = !this.areFeetPlanted();
     this.host.goLive();
-    ++this.switching;
+    ++this.recentToggles;
     void world.setPlanting(avatars, on).then((reply) => {
       if (!reply.ok || reply.accepted === 0) {
-        this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
+        this.notifyRefused(reply);
         return;
       }
-      this.host.say(on ? 'Feet stand still from the next movement on.' :
-        'Feet slide as the examples have them from the next movement on.');
+      this.host.notify(`Foot planting is ${on ? 'on' : 'off'} from the next movement.`);
       const refused = new Set(reply.items.map((item) => item.avatar));
-      const sliding = this.slidingIn(world);
+      const unplanted = this.unplantedIn(world);
       for (const avatar of avatars) {
-        if (on) sliding.delete(avatar);
-        else if (!refused.has(avatar)) sliding.add(avatar);
+        if (on) unplanted.delete(avatar);
+        else if (!refused.has(avatar)) unplanted.add(avatar);
       }
-    }).finally(() => this.settle());
+    }).finally(() => this.expireToggle());
   }
 
-  /** What was asked before a switch and is answered after it does not count. */
-  private settle(): void {
-    setTimeout(() => --this.switching, 1000);
-  }
-
+  /** Clears the queues of all targets. */
   cancel(): void {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    if (!shown || avatars.length === 0) return;
-    for (const avatar of avatars) shown.wander?.drop(avatar);
-    this.host.cancelled(shown, avatars);
-    void shown.world.cancel(avatars).then((reply) => {
-      this.host.say(reply.ok ? 'Queue cleared.' : `Refused: ${reply.text}`);
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (!pane || avatars.length === 0) return;
+    for (const avatar of avatars) pane.randomWalkers?.remove(avatar);
+    this.host.onCancelled(pane, avatars);
+    void pane.world.cancel(avatars).then((reply) => {
+      this.host.notify(reply.ok ? 'Queue cleared.' : `Refused: ${reply.text}`);
     });
   }
 
+  /** Removes all targets from their world. */
   remove(): void {
-    const shown = this.host.driven();
-    const avatars = this.avatars();
-    if (!shown || avatars.length === 0) return;
-    void shown.world.remove(avatars).then((reply) => {
-      if (!reply.ok) this.host.say(`Refused: ${reply.items[0]?.text || reply.text}`);
-      else if (avatars.includes(this.host.chosen()?.avatar ?? 0)) this.host.choose(null, 0);
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (!pane || avatars.length === 0) return;
+    void pane.world.remove(avatars).then((reply) => {
+      if (!reply.ok) this.notifyRefused(reply);
+      else if (avatars.includes(this.host.selection()?.avatar ?? 0)) this.host.select(null, 0);
     });
   }
 
-  /** Puts avatars where there is room; they leave when this page does. */
-  async spawn(shown: Shown | null, count: number, wander: boolean): Promise<void> {
-    if (!shown) return;
-    const centre = shown.view.view.target;
-    const already = shown.world.avatars().length;
+  /**
+   * Spawns avatars on a spiral, outside those that are there already. The server removes them when
+   * the page closes.
+   */
+  async spawn(pane: WorldPane | null, count: number, walkRandomly: boolean): Promise<void> {
+    if (!pane) return;
+    const centre = pane.view.viewCamera.target;
+    const already = pane.world.avatars().length;
     const items: {positionM: readonly [number, number, number]; headingRad: number}[] = [];
     for (let i = 0; i < count; ++i) {
       const k = already === 0 ? i : already + i;
       const r = 1.1 * Math.sqrt(k);
-      const angle = k * 2.399963;
+      const angle = k * 2.399963;  // The golden angle distributes avatars evenly.
       const x = (already ? centre.x : 0) + r * Math.sin(angle);
       const z = (already ? centre.z : 0) + r * Math.cos(angle);
       items.push({
-        positionM: [x, shown.view.ground.heightAt(x, z), z] as const,
+        positionM: [x, pane.view.terrain.heightAt(x, z), z] as const,
         headingRad: count > 1 ? angle : 0,
       });
     }
-    const reply = await shown.world.spawn(items);
+    const reply = await pane.world.spawn(items);
     if (!reply.ok) {
-      this.host.say(`Refused: ${reply.items.find((item) => item.text)?.text || reply.text}`);
+      this.host.notify(`Refused: ${reply.items.find((item) => item.text)?.text || reply.text}`);
       return;
     }
-    for (const item of reply.items) shown.ours.add(item.avatar);
-    if (wander) {
-      shown.wander ??= new Wander(shown.world, (text) => this.host.say(`Refused: ${text}`));
+    for (const item of reply.items) pane.ownAvatars.add(item.avatar);
+    if (walkRandomly) {
+      const walkers = this.randomWalkersOf(pane);
       reply.items.forEach((item, i) => {
         const {positionM, headingRad} = items[i]!;
-        shown.wander!.add(item.avatar, positionM[0], positionM[2], headingRad);
+        walkers.add(item.avatar, positionM[0], positionM[2], headingRad);
       });
-      this.host.reframe();
+      this.host.frameAllAvatars();
     } else if (count === 1 && reply.items[0]) {
-      this.host.choose(shown, reply.items[0].avatar);
+      this.host.select(pane, reply.items[0].avatar);
     }
   }
 
-  toggleWander(): void {
-    const shown = this.host.driven();
-    if (!shown) return;
-    if (shown.wander && shown.wander.size > 0) {
-      shown.wander.stop();
+  /**
+   * Stops all random walkers of the world if there are any. Otherwise it starts the selected
+   * avatar; without a selection, the avatars that this page has spawned; without those, or if
+   * commands go to all avatars, every avatar of the world. If the world is empty, it spawns new
+   * ones.
+   */
+  toggleRandomWalk(): void {
+    const pane = this.host.commandedPane();
+    if (!pane) return;
+    if (pane.randomWalkers && pane.randomWalkers.size > 0) {
+      pane.randomWalkers.clear();
       return;
     }
-    const chosen = this.host.chosen();
-    const avatars = chosen && !this.everybody ? [chosen.avatar] :
-      this.everybody || shown.ours.size === 0 ? [...shown.world.avatars()] : [...shown.ours];
+    const selection = this.host.selection();
+    const avatars = selection && !this.allAvatars ? [selection.avatar] :
+      this.allAvatars || pane.ownAvatars.size === 0 ? [...pane.world.avatars()] :
+        [...pane.ownAvatars];
     if (avatars.length === 0) {
-      void this.spawn(shown, wanderersAtFirst, true);
+      void this.spawn(pane, initialWalkerCount, true);
       return;
     }
-    shown.wander ??= new Wander(shown.world, (text) => this.host.say(`Refused: ${text}`));
+    const walkers = this.randomWalkersOf(pane);
     for (const avatar of avatars) {
-      const at = shown.view.place(avatar);
-      shown.wander.add(avatar, at?.x ?? 0, at?.z ?? 0, at?.headingRad ?? 0);
+      const at = pane.view.locate(avatar);
+      walkers.add(avatar, at?.x ?? 0, at?.z ?? 0, at?.headingRad ?? 0);
     }
+  }
+
+  /** The targets and their pane. If there are none, notifies the user and returns null. */
+  private addressees(): {pane: WorldPane; avatars: number[]} | null {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (pane && avatars.length > 0) return {pane, avatars};
+    this.host.notify('Select an avatar first, or command all avatars.');
+    return null;
+  }
+
+  private randomWalkersOf(pane: WorldPane): RandomWalkers {
+    pane.randomWalkers ??=
+      new RandomWalkers(pane.world, (text) => this.host.notify(`Refused: ${text}`));
+    return pane.randomWalkers;
+  }
+
+  private unplantedIn(world: World): Set<number> {
+    const unplanted = this.unplantedAvatars.get(world) ?? new Set<number>();
+    this.unplantedAvatars.set(world, unplanted);
+    return unplanted;
+  }
+
+  private expireToggle(): void {
+    setTimeout(() => --this.recentToggles, staleStateMs);
+  }
+
+  private notifyRefused(reply: Reply): void {
+    this.host.notify(`Refused: ${reply.items[0]?.text || reply.text}`);
   }
 }

@@ -1,19 +1,22 @@
-/** Draws at most so many frames a second, and no fewer on average, however often the display asks. */
-export class FrameCap {
-  /** Between two frames, on average; 0: every frame that the display asks for is drawn. */
-  readonly leastMs: number;
+/**
+ * Limits the frame rate. Its mean is the requested rate, whatever the display's refresh rate is.
+ */
+export class FrameLimiter {
+  /** Mean time between two drawn frames in milliseconds; 0 without a limit. */
+  readonly intervalMs: number;
   private dueMs = 0;
 
+  /** `framesPerS` Infinity means no limit. */
   constructor(framesPerS: number) {
-    this.leastMs = 1000 / framesPerS;
+    this.intervalMs = 1000 / framesPerS;
   }
 
-  /** Once for each frame the display asks for: whether to draw it. */
-  draws(nowMs: number): boolean {
+  /** Call once per animation frame. Returns whether to draw it. */
+  shouldDraw(nowMs: number): boolean {
     if (nowMs < this.dueMs) return false;
-    // Frames that a pause kept from being drawn are not made good.
-    const late = nowMs - this.dueMs > 2 * this.leastMs;
-    this.dueMs = (late ? nowMs : this.dueMs) + this.leastMs;
+    // Frames that were missed during a pause are not made up for.
+    const late = nowMs - this.dueMs > 2 * this.intervalMs;
+    this.dueMs = (late ? nowMs : this.dueMs) + this.intervalMs;
     return true;
   }
 }

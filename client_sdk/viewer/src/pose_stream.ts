@@ -1,78 +1,85 @@
-// How poses travel to the page, and what that costs.
+// How the server sends poses to the page, and how many bytes that takes.
 
 import type {PoseDetail, PoseMode, Statistics} from './sdk.js';
 
-export const rates = [1, 2, 4] as const;
+export const tickIntervals = [1, 2, 4] as const;
 
-export interface Stream {
+export interface PoseStream {
   readonly mode: PoseMode;
-  /** Of quantised poses; full ones have all joints. */
+  /** Joints of quantised poses. Full poses always have all joints. */
   readonly detail: PoseDetail;
-  readonly everyNTicks: (typeof rates)[number];
+  /** The server sends only the poses of every n-th tick. */
+  readonly everyNTicks: (typeof tickIntervals)[number];
 }
 
-/** What is asked of the server. */
-export function observationOf({mode, detail, everyNTicks}: Stream) {
+/** Returns the arguments for `World.observe`. */
+export function observationFor({mode, detail, everyNTicks}: PoseStream) {
   return {mode, detail: mode === 'full' ? 'all' as const : detail, everyNTicks, withEvents: true};
 }
 
-export function nameOf(stream: Stream): string {
-  const {mode, detail, everyNTicks} = observationOf(stream);
+/** A name for users, for example "Quantised, root only, ¼ rate". */
+export function streamName(stream: PoseStream): string {
+  const {mode, detail, everyNTicks} = observationFor(stream);
   return (mode === 'full' ? 'Full' : 'Quantised') +
-    {all: '', fewer: ', fewer', root: ', root'}[detail] +
+    {all: '', fewer: ', fewer joints', root: ', root only'}[detail] +
     {1: '', 2: ', ½ rate', 4: ', ¼ rate'}[everyNTicks];
 }
 
-export interface Cost {
+export interface StreamCost {
   readonly name: string;
-  readonly now: boolean;
-  readonly bytesAPose: number;
+  /** Whether this is the stream in use. */
+  readonly active: boolean;
+  readonly bytesPerPose: number;
   readonly bytesPerS: number;
 }
 
-/** What was under way in another stream has arrived by then. */
+/** After a change of stream, poses of the old one may arrive for this long. */
 const settleMs = 500;
 const windowMs = 1000;
 
 /**
- * What streams cost that were on, one after the other: the bytes of poses with their numbers and headers. Of other avatars than
- * there are now nothing is kept, for that could not be compared.
+ * Measures the cost of each stream that the user has tried: bytes of poses, including avatar ids
+ * and batch headers. A change of the number of avatars discards all measurements, because costs of
+ * different crowds cannot be compared.
  */
 export class StreamCosts {
-  private readonly known = new Map<string, {bytesAPose: number; bytesPerS: number}>();
+  private readonly measured = new Map<string, {bytesPerPose: number; bytesPerS: number}>();
   private current = '';
   private avatars = -1;
-  private from: {ms: number; bytes: number; poses: number} | null = null;
-  private sinceMs = 0;
+  private windowStart: {ms: number; bytes: number; poses: number} | null = null;
+  private changedMs = 0;
 
-  /** Call now and then; true: there is something new. */
-  measure(ms: number, stream: Stream, avatars: number, {poseBytesReceived, posesReceived}: Statistics): boolean {
+  /** Call several times per second. Returns whether `costs` has changed. */
+  measure(
+    ms: number, stream: PoseStream, avatars: number,
+    {poseBytesReceived, posesReceived}: Statistics): boolean {
     if (avatars === 0) return false;
-    const name = nameOf(stream);
+    const name = streamName(stream);
     if (avatars !== this.avatars || name !== this.current) {
-      if (avatars !== this.avatars) this.known.clear();
+      if (avatars !== this.avatars) this.measured.clear();
       this.avatars = avatars;
       this.current = name;
-      this.sinceMs = ms;
-      this.from = null;
+      this.changedMs = ms;
+      this.windowStart = null;
       return true;
     }
-    if (ms - this.sinceMs < settleMs) return false;
+    if (ms - this.changedMs < settleMs) return false;
     const now = {ms, bytes: poseBytesReceived, poses: posesReceived};
-    this.from ??= now;
-    const {from} = this;
-    if (ms - from.ms < windowMs) return false;
-    this.from = now;
-    if (now.poses === from.poses) return false;
-    this.known.set(name, {
-      bytesAPose: (now.bytes - from.bytes) / (now.poses - from.poses),
-      bytesPerS: 1000 * (now.bytes - from.bytes) / (ms - from.ms)});
+    this.windowStart ??= now;
+    const start = this.windowStart;
+    if (ms - start.ms < windowMs) return false;
+    this.windowStart = now;
+    if (now.poses === start.poses) return false;
+    this.measured.set(name, {
+      bytesPerPose: (now.bytes - start.bytes) / (now.poses - start.poses),
+      bytesPerS: 1000 * (now.bytes - start.bytes) / (ms - start.ms)});
     return true;
   }
 
-  /** The dearest first. */
-  get costs(): readonly Cost[] {
-    return [...this.known].map(([name, cost]) => ({name, now: name === this.current, ...cost}))
+  /** Sorted by bytes per second, the most expensive stream first. */
+  get costs(): readonly StreamCost[] {
+    return [...this.measured]
+      .map(([name, cost]) => ({name, active: name === this.current, ...cost}))
       .sort((a, b) => b.bytesPerS - a.bytesPerS);
   }
 }

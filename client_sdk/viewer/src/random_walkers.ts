@@ -1,16 +1,18 @@
-// Avatars that walk by themselves: whoever runs out of things to do is given a few steps, a turn
-// towards home when far away, now and then a jump or a rest.
+// Avatars that walk at random: whenever one is about to run out of movements, it is sent a few
+// steps, and sometimes a jump or a pause. Avatars that are far from the origin turn towards it.
 
 import type {MovementRequest, World, WorldEvent} from './sdk.js';
 
 const homeRadiusM = 4;
-const stepsAtOnce = 4;
-const rewalkAfterMs = 400;
+const stepsPerRequest = 4;
+/** Shortest time between two requests for the same avatar. */
+const minRequestIntervalMs = 400;
 
-export class Wander {
-  private readonly walkers = new Map<number, {pending: number; askedMs: number}>();
+export class RandomWalkers {
+  private readonly walkers = new Map<number, {pending: number; requestedMs: number}>();
   private readonly unsubscribe: () => void;
 
+  /** `onRefused` receives the server's reason when it refuses a request. */
   constructor(
     private readonly world: World, private readonly onRefused: (text: string) => void,
     private readonly random: () => number = Math.random) {
@@ -20,24 +22,25 @@ export class Wander {
   get size(): number {
     return this.walkers.size;
   }
-  has(avatar: number): boolean {
-    return this.walkers.has(avatar);
-  }
 
+  /**
+   * Starts to send movements to an avatar that stands at `x`, `z` (metres) and faces `headingRad`.
+   */
   add(avatar: number, x = 0, z = 0, headingRad = 0): void {
     if (this.walkers.has(avatar)) return;
-    this.walkers.set(avatar, {pending: 0, askedMs: -1e9});
-    this.walk(avatar, x, z, headingRad);
+    this.walkers.set(avatar, {pending: 0, requestedMs: -1e9});
+    this.requestMovements(avatar, x, z, headingRad);
   }
 
-  drop(avatar: number): void {
+  /** Stops sending movements to the avatar. It still performs those in its queue. */
+  remove(avatar: number): void {
     this.walkers.delete(avatar);
   }
-  stop(): void {
+  clear(): void {
     this.walkers.clear();
   }
   dispose(): void {
-    this.stop();
+    this.clear();
     this.unsubscribe();
   }
 
@@ -52,18 +55,18 @@ export class Wander {
       walker.pending = 0;
     }
     const now = performance.now();
-    if (walker.pending <= 1 && now - walker.askedMs > rewalkAfterMs &&
+    if (walker.pending <= 1 && now - walker.requestedMs > minRequestIntervalMs &&
         (event.type === 'finished' || event.type === 'idle')) {
-      this.walk(event.avatar, event.basePositionM[0]!, event.basePositionM[2]!,
+      this.requestMovements(event.avatar, event.basePositionM[0]!, event.basePositionM[2]!,
         event.baseHeadingRad);
     }
   }
 
-  private walk(avatar: number, x: number, z: number, headingRad: number): void {
+  private requestMovements(avatar: number, x: number, z: number, headingRad: number): void {
     const walker = this.walkers.get(avatar)!;
-    const items = movements(avatar, x, z, headingRad, this.random);
+    const items = randomMovements(avatar, x, z, headingRad, this.random);
     walker.pending += items.length;
-    walker.askedMs = performance.now();
+    walker.requestedMs = performance.now();
     void this.world.request(items).then((reply) => {
       if (reply.ok) return;
       this.walkers.delete(avatar);
@@ -72,22 +75,23 @@ export class Wander {
   }
 }
 
-/** The next few movements of a wanderer whose base frame is at x, z and looks along the heading. */
-export function movements(
-  avatar: number, x: number, z: number, headingRad: number, random: () => number): MovementRequest[] {
+/** Movements for an avatar whose base frame is at `x`, `z` (metres) and faces `headingRad`. */
+export function randomMovements(
+  avatar: number, x: number, z: number, headingRad: number,
+  random: () => number): MovementRequest[] {
   const dice = random();
   if (dice < 0.08) return [{avatar, type: 'stand', seconds: 0.6 + random() * 1.2}];
-  const away = Math.hypot(x, z);
-  // The angle from where it looks to where home is, left positive.
-  let home = Math.atan2(-x, -z) - headingRad;
-  home = Math.atan2(Math.sin(home), Math.cos(home));
-  const turn = away > homeRadiusM ? Math.max(-0.35, Math.min(0.35, home / stepsAtOnce)) :
-    (random() - 0.5) * 0.5;
+  const distanceM = Math.hypot(x, z);
+  // Angle from the heading to the direction of the origin; positive to the left.
+  let homeRad = Math.atan2(-x, -z) - headingRad;
+  homeRad = Math.atan2(Math.sin(homeRad), Math.cos(homeRad));
+  const turnRad = distanceM > homeRadiusM ?
+    Math.max(-0.35, Math.min(0.35, homeRad / stepsPerRequest)) : (random() - 0.5) * 0.5;
   const items: MovementRequest[] = [];
-  for (let i = 0; i < stepsAtOnce; ++i) {
-    items.push({avatar, type: 'step', foot: 'auto', lengthM: 0.45 + random() * 0.25, turnRad: turn});
+  for (let i = 0; i < stepsPerRequest; ++i) {
+    items.push({avatar, type: 'step', foot: 'auto', lengthM: 0.45 + random() * 0.25, turnRad});
   }
-  if (dice > 0.93 && away < homeRadiusM) {
+  if (dice > 0.93 && distanceM < homeRadiusM) {
     items.push({avatar, type: 'jump', lengthM: 0.75 + random() * 0.3, turnRad: 0});
   }
   return items;

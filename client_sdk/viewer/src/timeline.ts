@@ -1,6 +1,7 @@
-// Generic time: the index of the last keytime passed plus the share of the way to the next.
-
-/** Generic time at `timeS` after the movement's start; within 0 and the last index. */
+/**
+ * Generic time of a movement `timeS` seconds after its start: the index of the last keytime passed
+ * plus the fraction of the way to the next one. Clamped to 0 and the last index.
+ */
 export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number {
   const last = keytimesS.length - 1;
   if (last < 1 || timeS <= keytimesS[0]!) return 0;
@@ -13,7 +14,10 @@ export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number
   return last;
 }
 
-/** The state asked for that was valid nearest to a time: the last one not after it, else the first. */
+/**
+ * Of `states`, sorted by time, the last one that is not later than `timeS`. If all are later, the
+ * first one; if there are none, null.
+ */
 export function stateAt<T extends {readonly timeS: number}>(
   states: readonly T[], timeS: number): T | null {
   let best: T | null = null;

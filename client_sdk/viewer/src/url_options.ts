@@ -1,34 +1,37 @@
-// What the page's address asks for, see README.md; what it does not understand it leaves as it is.
+// Options in the page's URL, see README.md. Unknown names and invalid values are ignored.
 
 import type {FigureStyle, QualityChoice} from './quality.js';
-import {rates, type Stream} from './pose_stream.js';
+import {tickIntervals, type PoseStream} from './pose_stream.js';
 
-export interface Asked {
+export interface UrlOptions {
   readonly figures: 'auto' | FigureStyle;
-  readonly stream: Stream;
+  readonly poseStream: PoseStream;
   readonly quality: QualityChoice;
-  /** So many frames a second at most; infinite: as many as the display shows. */
-  readonly framesPerS: number;
+  /** Upper limit of drawn frames per second. Infinity: the display's refresh rate. */
+  readonly maxFramesPerS: number;
+  /** Names of the worlds to show; empty: the page chooses. */
   readonly worlds: readonly string[];
 }
 
-const mostFramesPerS = 240;
+const frameRateLimit = 240;
 
-export function readAddress(search: string): Asked {
+/** `search` is the query string, for example `?world=plaza&frames=30`. */
+export function parseUrlOptions(search: string): UrlOptions {
   const query = new URLSearchParams(search);
-  const oneOf = <T extends string>(name: string, values: readonly T[], otherwise: T): T =>
-    values.find((value) => value === query.get(name)) ?? otherwise;
+  const oneOf = <T extends string>(name: string, values: readonly T[], fallback: T): T =>
+    values.find((value) => value === query.get(name)) ?? fallback;
   const frames = query.get('frames') ?? '';
-  const framesPerS = /^\d{1,3}$/.test(frames) ? Number(frames) : 0;
+  const requestedRate = /^\d{1,3}$/.test(frames) ? Number(frames) : 0;
   return {
     figures: oneOf('figures', ['auto', 'bodies', 'lines'], 'auto'),
-    stream: {
+    poseStream: {
       mode: oneOf('mode', ['quantised', 'full'], 'quantised'),
       detail: oneOf('detail', ['all', 'fewer', 'root'], 'all'),
-      everyNTicks: rates.find((rate) => query.get('every') === String(rate)) ?? 1,
+      everyNTicks: tickIntervals.find((interval) => query.get('every') === String(interval)) ?? 1,
     },
     quality: oneOf('quality', ['auto', 'high', 'low'], 'auto'),
-    framesPerS: framesPerS >= 1 && framesPerS <= mostFramesPerS ? framesPerS : Infinity,
+    maxFramesPerS:
+      requestedRate >= 1 && requestedRate <= frameRateLimit ? requestedRate : Infinity,
     worlds: query.getAll('world').filter((name) => name !== ''),
   };
 }

@@ -1,5 +1,6 @@
-// A browser that nothing watches: Playwright has every message of a page's WebSockets told to it, which
-// costs as much as drawing when poses of a thousand avatars come in. For measurements.
+// Controls Chromium by the DevTools protocol, for measurements. Playwright would distort them: it
+// receives a copy of every WebSocket message, which for a thousand avatars costs as much as
+// drawing.
 
 import {spawn} from 'node:child_process';
 import {once} from 'node:events';
@@ -11,73 +12,75 @@ import WebSocket from 'ws';
 
 import {findChromium, switches} from './browser.mjs';
 
-export class BareBrowser {
+export class DevToolsBrowser {
   static async launch() {
     const executable = findChromium();
-    if (!executable) throw new Error('there is no Chromium; on Debian: apt-get install chromium');
-    const browser = new BareBrowser();
+    if (!executable) throw new Error('Chromium not found; on Debian: apt-get install chromium');
+    const browser = new DevToolsBrowser();
     browser.folder = mkdtempSync(join(tmpdir(), 'stridewire-browser-'));
     browser.child = spawn(executable, [
       ...switches, '--remote-debugging-port=0', `--user-data-dir=${browser.folder}`, 'about:blank',
     ], {stdio: ['ignore', 'ignore', 'pipe']});
-    let said = '';
+    let output = '';
     browser.child.stderr.setEncoding('utf8');
-    const link = await new Promise((resolve, reject) => {
+    const url = await new Promise((resolve, reject) => {
       browser.child.stderr.on('data', (text) => {
-        said += said.length < 10_000 ? text : '';
-        const found = /DevTools listening on (\S+)/.exec(said);
-        if (found) resolve(found[1]);
+        output += output.length < 10_000 ? text : '';
+        const match = /DevTools listening on (\S+)/.exec(output);
+        if (match) resolve(match[1]);
       });
       browser.child.on('error', reject);
-      browser.child.on('close', () => reject(new Error(`the browser ended: ${said}`)));
+      browser.child.on('close', () => reject(new Error(`the browser ended: ${output}`)));
     });
-    browser.socket = new WebSocket(link, {maxPayload: 256 * 1024 * 1024});
-    browser.asked = new Map();
-    browser.last = 0;
+    browser.socket = new WebSocket(url, {maxPayload: 256 * 1024 * 1024});
+    browser.pending = new Map();
+    browser.lastId = 0;
     browser.socket.on('message', (text) => {
       const {id, result, error} = JSON.parse(text);
-      const waiting = browser.asked.get(id);
-      if (!waiting) return;
-      browser.asked.delete(id);
-      if (error) waiting.reject(new Error(error.message));
-      else waiting.resolve(result);
+      const request = browser.pending.get(id);
+      if (!request) return;
+      browser.pending.delete(id);
+      if (error) request.reject(new Error(error.message));
+      else request.resolve(result);
     });
     await once(browser.socket, 'open');
     return browser;
   }
 
   send(method, params = {}, sessionId = undefined) {
-    const id = ++this.last;
+    const id = ++this.lastId;
     this.socket.send(JSON.stringify({id, method, params, sessionId}));
-    return new Promise((resolve, reject) => this.asked.set(id, {resolve, reject}));
+    return new Promise((resolve, reject) => this.pending.set(id, {resolve, reject}));
   }
 
-  /** Processor time of all its processes so far. */
+  /** Total processor time of all browser processes. */
   async processorS() {
     const {processInfo} = await this.send('SystemInfo.getProcessInfo');
     return processInfo.reduce((sum, {cpuTime}) => sum + cpuTime, 0);
   }
 
-  async open(link, width, height) {
+  /** Opens a page of this size. `evaluate(f, argument)` calls f in the page. */
+  async open(url, width, height) {
     const {targetId} = await this.send('Target.createTarget', {url: 'about:blank'});
     const {sessionId} = await this.send('Target.attachToTarget', {targetId, flatten: true});
     const send = (method, params) => this.send(method, params, sessionId);
-    await send('Emulation.setDeviceMetricsOverride', {width, height, deviceScaleFactor: 1, mobile: false});
-    await send('Page.navigate', {url: link});
+    await send('Emulation.setDeviceMetricsOverride',
+      {width, height, deviceScaleFactor: 1, mobile: false});
+    await send('Page.navigate', {url});
     const evaluate = async (f, argument) => {
       const expression = `(${f})(${JSON.stringify(argument) ?? ''})`;
       const {result, exceptionDetails} = await send(
         'Runtime.evaluate', {expression, awaitPromise: true, returnByValue: true});
-      if (exceptionDetails) throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
-      return result.value;
+      if (!exceptionDetails) return result.value;
+      throw new Error(exceptionDetails.exception?.description ?? exceptionDetails.text);
     };
-    const until = async (f, argument) => {
+    const waitFor = async (f, argument) => {
       while (!await evaluate(f, argument).catch(() => false)) {
         await new Promise((resolve) => setTimeout(resolve, 100));
       }
     };
     return {
-      send, evaluate, until,
+      send, evaluate, waitFor,
       close: () => this.send('Target.closeTarget', {targetId}),
       screenshot: async (file) => writeFileSync(
         file, Buffer.from((await send('Page.captureScreenshot')).data, 'base64')),

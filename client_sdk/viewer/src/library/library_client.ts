@@ -1,5 +1,5 @@
-// What the animator's page asks of the server: libraries, groups, steps of any parameters, and how far
-// they miss what was asked.
+// HTTP requests of the library page: libraries, groups of examples, synthesized steps and error
+// maps.
 
 import type {LegLike, SkeletonLike} from '../scene/body_parts.js';
 
@@ -14,14 +14,18 @@ export interface LibraryEntry {
   readonly hash: string;
   readonly groups: readonly GroupEntry[];
 }
+/** A parameter, and its range over the group's examples. */
 export interface Parameter {
   readonly name: string;
   readonly min: number;
   readonly max: number;
 }
+/** An example or pseudoexample as a point in parameter space. */
 export interface Site {
+  /** Its parameters, in the order of `Group.parameters`. */
   readonly p: readonly number[];
   readonly is_example: boolean;
+  /** Where an example comes from, for example the capture that it was cut from. */
   readonly source?: string;
   readonly mirrored?: boolean;
 }
@@ -30,16 +34,21 @@ export interface Group {
   readonly parameters: readonly Parameter[];
   readonly sites: readonly Site[];
 }
-/** A movement as frames, from its base frame. */
+/** A movement as frames, relative to its base frame. */
 export interface Clip {
   readonly times_s: readonly number[];
-  readonly roots_m: readonly number[];    // 3 a frame
-  readonly rotations: readonly number[];  // 4 a joint and frame
+  /** 3 numbers per frame. */
+  readonly roots_m: readonly number[];
+  /** Quaternions, 4 numbers per joint and frame. */
+  readonly rotations: readonly number[];
   readonly keytimes_s: readonly number[];
   readonly heading_change_rad: number;
   readonly weights: readonly number[];
+  /** Sum of the absolute weights. */
   readonly weight_sum: number;
+  /** Parameters after clamping. */
   readonly applied: readonly number[];
+  /** Parameters measured in the synthesized movement. */
   readonly measured: readonly number[];
 }
 export interface Step extends Clip {
@@ -49,16 +58,21 @@ export interface Step extends Clip {
   readonly iterations: number;
   readonly extrapolated: boolean;
 }
-/** Cells from the lowest y up, each row from the lowest x; null where requests do not get. */
+/** Errors over a plane of two parameters. */
 export interface ErrorMap {
   readonly x: readonly [number, number];
   readonly y: readonly [number, number];
+  /** Number of cells per side. */
   readonly cells: number;
+  /**
+   * Rows from the lowest y, each from the lowest x. Null where the server would clamp the
+   * parameters, because they are too far outside the hull of the examples.
+   */
   readonly errors_mm: readonly (number | null)[];
   readonly largest_m: number;
 }
 
-interface SkeletonMessage {
+interface SkeletonJson {
   readonly names: readonly string[];
   readonly parents: readonly number[];
   readonly offsets_m: readonly number[];
@@ -69,8 +83,9 @@ interface SkeletonMessage {
   }[];
 }
 
-export class LibrarySource {
-  /** `base`: "" for the server this page came from, else "http://host:port". */
+/** Requests fail with an Error whose message can be shown to the user. */
+export class LibraryClient {
+  /** `base`: empty for the server that served this page, or "http://host:port". */
   constructor(private readonly base: string) {}
 
   libraries(): Promise<LibraryEntry[]> {
@@ -78,7 +93,7 @@ export class LibrarySource {
   }
 
   async skeleton(hash: string): Promise<SkeletonLike> {
-    const it = await this.get<SkeletonMessage>(`/libraries/${hash}/skeleton.json`);
+    const it = await this.get<SkeletonJson>(`/libraries/${hash}/skeleton.json`);
     const [left, right] = it.legs.map((leg): LegLike => ({
       hip: leg.hip, knee: leg.knee, ankle: leg.ankle, ball: leg.ball,
       ballOffsetM: leg.ball_offset_m, toeTipOffsetM: leg.toe_tip_offset_m,
@@ -94,7 +109,8 @@ export class LibrarySource {
     return this.get(`/libraries/${hash}/${group}/sites.json`);
   }
   step(hash: string, group: number, p: readonly number[], corrected: boolean): Promise<Step> {
-    return this.get(`/libraries/${hash}/${group}/step.json?p=${text(p)}&correction=${+corrected}`);
+    return this.get(`/libraries/${hash}/${group}/step.json?p=${parametersText(p)}` +
+      `&correction=${+corrected}`);
   }
   example(hash: string, group: number, index: number): Promise<Clip> {
     return this.get(`/libraries/${hash}/${group}/example.json?index=${index}`);
@@ -102,7 +118,7 @@ export class LibrarySource {
   errors(
     hash: string, group: number, x: number, y: number, p: readonly number[], cells: number,
     corrected: boolean): Promise<ErrorMap> {
-    return this.get(`/libraries/${hash}/${group}/errors.json?x=${x}&y=${y}&p=${text(p)}` +
+    return this.get(`/libraries/${hash}/${group}/errors.json?x=${x}&y=${y}&p=${parametersText(p)}` +
       `&cells=${cells}&correction=${+corrected}`);
   }
 
@@ -111,38 +127,38 @@ export class LibrarySource {
     try {
       response = await fetch(this.base + path);
     } catch {
-      throw new Error('No server answers: start stridewired, then reload this page.');
+      throw new Error('No server responds. Start stridewired, then reload this page.');
     }
     if (!response.ok) throw new Error((await response.text()).trim());
     return await response.json() as T;
   }
 }
 
-function text(p: readonly number[]): string {
+function parametersText(p: readonly number[]): string {
   return p.map((value) => value.toFixed(5)).join(',');
 }
 
-/** Asks for the newest of what is wanted, one at a time: what came in between is left out. */
-export class Latest<Wish> {
-  private waiting: Wish | null = null;
+/** Executes one request at a time. Of requests that arrive in the meantime, it keeps the newest. */
+export class LatestRequest<T> {
+  private waiting: T | null = null;
   private busy = false;
 
   constructor(
-    private readonly work: (wish: Wish) => Promise<void>,
+    private readonly execute: (request: T) => Promise<void>,
     private readonly failed: (error: Error) => void) {}
 
-  want(wish: Wish): void {
-    this.waiting = wish;
+  submit(request: T): void {
+    this.waiting = request;
     if (!this.busy) void this.run();
   }
 
   private async run(): Promise<void> {
     this.busy = true;
     while (this.waiting !== null) {
-      const wish = this.waiting;
+      const request = this.waiting;
       this.waiting = null;
       try {
-        await this.work(wish);
+        await this.execute(request);
       } catch (error) {
         this.failed(error as Error);
       }

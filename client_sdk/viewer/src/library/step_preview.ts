@@ -1,4 +1,4 @@
-// The scene of the animator's page: the synthesized movement, and the example beside it.
+// The 3D preview of the library page: the synthesized step, and an example beside it.
 
 import * as THREE from 'three';
 
@@ -13,9 +13,10 @@ import type {ViewColours} from '../scene/world_view.js';
 import type {Clip} from './library_client.js';
 import {durationOf, matchingTime, samplePose} from './clip_pose.js';
 
-const apartM = 1.1;
+/** Distance between the two avatars. */
+const spacingM = 1.1;
 
-export class StepStage {
+export class StepPreview {
   readonly canvas: HTMLCanvasElement;
   step: Clip | null = null;
   example: Clip | null = null;
@@ -27,10 +28,11 @@ export class StepStage {
   private crowd: CrowdMesh | null = null;
   private skeleton: SkeletonLike | null = null;
 
-  constructor(canvas: HTMLCanvasElement, info: RendererInfo, private readonly colours: ViewColours) {
+  constructor(
+    canvas: HTMLCanvasElement, info: RendererInfo, private readonly colours: ViewColours) {
     this.canvas = canvas;
     this.renderer = makeRenderer(canvas, info);
-    this.scene.add(new Grid(colours.ground, info.software).object);
+    this.scene.add(new Grid(colours.terrain, info.software).object);
     this.orbit.turn(0.2, -0.1);
     this.orbit.setDistance(4.2);
     this.orbit.advance(Infinity);
@@ -72,6 +74,7 @@ export class StepStage {
     this.renderer.setClearColor(colour);
   }
 
+  /** Draws the step at `timeS`, and the example at the same generic time. */
   draw(timeS: number, dtS: number): void {
     const {crowd, skeleton, step, example, pose} = this;
     const {clientWidth: width, clientHeight: height} = this.canvas;
@@ -81,9 +84,9 @@ export class StepStage {
     if (crowd && skeleton && step) {
       const joints = skeleton.jointCount;
       pose.count = example ? 2 : 1;
-      samplePose(step, joints, timeS, example ? apartM / 2 : 0, pose.rootsM, pose.rotations, 0);
+      samplePose(step, joints, timeS, example ? spacingM / 2 : 0, pose.rootsM, pose.rotations, 0);
       if (example) {
-        samplePose(example, joints, matchingTime(step, example, timeS), -apartM / 2, pose.rootsM,
+        samplePose(example, joints, matchingTime(step, example, timeS), -spacingM / 2, pose.rootsM,
           pose.rotations, 1);
       }
       crowd.update(pose);
@@ -97,12 +100,13 @@ export class StepStage {
     this.renderer.render(this.scene, this.view.camera);
   }
 
-  /** Where the two figures' heads are, CSS pixels, to write beside. */
-  headOf(index: number): {x: number; y: number} | null {
+  /** Position for a label above avatar `index`, in CSS pixels, or null if it is not drawn. */
+  labelPosition(index: number): {x: number; y: number} | null {
     const {crowd} = this;
     if (!crowd || index >= crowd.count) return null;
     const root = index * crowd.skeleton.jointCount * 3;
-    const point = new THREE.Vector3(crowd.positions[root]!, crowd.heightM * 1.04, crowd.positions[root + 2]!);
+    const point = new THREE.Vector3(
+      crowd.positions[root]!, crowd.heightM * 1.04, crowd.positions[root + 2]!);
     point.project(this.view.camera);
     return {
       x: (point.x * 0.5 + 0.5) * this.canvas.clientWidth,

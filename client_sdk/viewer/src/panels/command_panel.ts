@@ -1,208 +1,216 @@
-// Commands: steps, jumps, standing, avatars come and go.
+// The command panel: movements, layers, spawning and removing avatars, and the terrain.
 
-import {Slider, button, h, press, setText} from '../dom.js';
+import {Slider, button, h, setPressed, setText} from '../dom.js';
+import type {SampleTerrainName} from '../sample_terrains.js';
 import type {MovementRequest, Vec3} from '../sdk.js';
-import type {TerrainName} from '../terrain_surface.js';
 
-/** What a click on the ground is. */
-export type GroundTool = 'feet' | 'walk';
+/** What a click on the ground requests. */
+export type ClickTool = 'step' | 'walk';
 
-export interface DriveActions {
-  /** Sends movements to whoever is driven. */
+export interface CommandActions {
+  /** Requests a movement for every avatar that receives commands. */
   request(make: (avatar: number) => MovementRequest): void;
   spawn(count: number): void;
   remove(): void;
   cancel(): void;
-  wander(): void;
-  everybody(on: boolean): void;
-  /** Clicks on the ground ask for this from now on. */
-  tool(tool: GroundTool | null): void;
-  /** To x, z, past which the next walk is to come first. */
-  pass(x: number, z: number): void;
-  /** Heading null: the way it comes. */
-  walk(x: number, z: number, headingRad: number | null): void;
-  ground(name: TerrainName): void;
-  /** Begins with a layer, or ends it. */
-  layer(name: string): void;
-  /** Plants feet, or no more. */
-  planting(): void;
+  toggleRandomWalk(): void;
+  setAllAvatars(on: boolean): void;
+  /** Sets what clicks on the ground request. Null: they select avatars. */
+  setTool(tool: ClickTool | null): void;
+  addWaypoint(x: number, z: number): void;
+  /** Requests a walk. With heading null, the avatar keeps its direction of arrival. */
+  walkTo(x: number, z: number, headingRad: number | null): void;
+  setTerrain(name: SampleTerrainName): void;
+  toggleLayer(name: string): void;
+  togglePlanting(): void;
 }
 
-const grounds: readonly (readonly [TerrainName, string])[] = [
-  ['flat', 'Flat'], ['stairs', 'Stairs'], ['ramp', 'Ramp'], ['stones', 'Slabs'], ['hills', 'Hills']];
+/** How long a message stays in the panel. */
+const messageMs = 8000;
 
-export class DrivePanel {
+const sampleTerrains: readonly (readonly [SampleTerrainName, string])[] = [
+  ['flat', 'Flat'], ['stairs', 'Stairs'], ['ramp', 'Ramp'], ['slabs', 'Slabs'], ['hills', 'Hills']];
+
+export class CommandPanel {
   readonly element: HTMLElement;
+  /** The active tool; null if clicks on the ground select avatars. */
+  tool: ClickTool | null = null;
+
   private readonly target = h('p', {class: 'target', 'aria-live': 'polite'});
   private readonly message = h('p', {class: 'message', role: 'status'});
   private readonly length = new Slider('step-length', 'Step length', 0, 0.9, 0.01, 0.6,
     (v) => `${v.toFixed(2)} m`);
   private readonly turn = new Slider('turn', 'Turn', -60, 60, 1, 0,
     (v) => v === 0 ? 'straight' : `${Math.abs(v)}° ${v > 0 ? 'left' : 'right'}`);
-  private readonly jumpLength = new Slider('jump-length', 'Jump by', 0.2, 2, 0.05, 0.9,
+  private readonly jumpLength = new Slider('jump-length', 'Jump length', 0.2, 2, 0.05, 0.9,
     (v) => `${v.toFixed(2)} m`);
-  private readonly seconds = new Slider('stand-seconds', 'Stand for', 0.2, 5, 0.1, 1,
+  private readonly seconds = new Slider('stand-seconds', 'Stand duration', 0.2, 5, 0.1, 1,
     (v) => `${v.toFixed(1)} s`);
-  private readonly wanderButton: HTMLButtonElement;
-  private readonly one: HTMLButtonElement[] = [];
-  private readonly tools: Readonly<Record<GroundTool, HTMLButtonElement>>;
-  private readonly toolsRow: HTMLElement;
-  private readonly exact = h('input', {type: 'checkbox', id: 'drive-must'});
-  private readonly exactRow: HTMLElement;
-  private canRefuse = false;
+  private readonly randomWalkButton: HTMLButtonElement;
+  /** Buttons that are disabled while no avatar receives commands. */
+  private readonly avatarButtons: HTMLButtonElement[] = [];
+  private readonly toolButtons: Readonly<Record<ClickTool, HTMLButtonElement>>;
+  private readonly toolRow: HTMLElement;
+  private readonly exactOnlyBox = h('input', {type: 'checkbox', id: 'command-exact-only'});
+  private readonly exactOnlyRow: HTMLElement;
+  private supportsExactOnly = false;
   private readonly walkX = h('input', {type: 'number', id: 'walk-x', step: 'any', value: '0'});
   private readonly walkZ = h('input', {type: 'number', id: 'walk-z', step: 'any', value: '2'});
   private readonly walkHeading = h('input',
     {type: 'number', id: 'walk-heading', step: 'any', placeholder: 'any'});
   private readonly walkRow: HTMLElement;
-  private readonly planting: HTMLButtonElement;
+  private readonly plantingButton: HTMLButtonElement;
   private readonly layerButtons = new Map<string, HTMLButtonElement>();
-  private readonly layers = h('div', {class: 'buttons three'});
-  private readonly layersRow = h('div', {class: 'tool-row layers', role: 'group', 'aria-label': 'While it moves'},
-    h('span', {}, 'While it moves'), this.layers);
-  private readonly ground = h('select', {id: 'drive-ground'});
-  private readonly groundRow: HTMLElement;
-  private messageUntil = 0;
-  /** What a click on the ground is now. */
-  tool: GroundTool | null = null;
+  private readonly layerGroup = h('div', {class: 'buttons three'});
+  private readonly layerRow = h('div',
+    {class: 'tool-row layers', role: 'group', 'aria-label': 'While moving'},
+    h('span', {}, 'While moving'), this.layerGroup);
+  private readonly terrainSelect = h('select', {id: 'command-terrain'});
+  private readonly terrainRow: HTMLElement;
+  private messageUntilMs = 0;
 
-  constructor(private readonly actions: DriveActions) {
-    const all = h('input', {type: 'checkbox', id: 'drive-all'});
-    all.addEventListener('change', () => actions.everybody(all.checked));
+  constructor(private readonly actions: CommandActions) {
+    const all = h('input', {type: 'checkbox', id: 'command-all'});
+    all.addEventListener('change', () => actions.setAllAvatars(all.checked));
     const make = (label: string, key: string, act: () => void, options: {class?: string} = {}) => {
       const element = button(label, {...options, key}, act);
-      this.one.push(element);
+      this.avatarButtons.push(element);
       return element;
     };
-    this.wanderButton = button('Let them wander', {icon: 'wander', key: 'G', class: 'wide'},
-      () => actions.wander());
-    this.planting = make('Plant feet', 'K', () => actions.planting());
-    this.planting.id = 'drive-planting';
-    this.planting.hidden = true;
-    this.layers.append(this.planting);
-    this.tools = {
-      feet: button('Place feet', {key: 'T'}, () => this.toggleTool('feet')),
-      walk: button('Send there', {key: 'M'}, () => this.toggleTool('walk')),
+    this.randomWalkButton = button('Walk randomly', {icon: 'randomWalk', key: 'G', class: 'wide'},
+      () => actions.toggleRandomWalk());
+    this.plantingButton = make('Plant feet', 'K', () => actions.togglePlanting());
+    this.plantingButton.id = 'command-planting';
+    this.plantingButton.hidden = true;
+    this.layerGroup.append(this.plantingButton);
+    this.toolButtons = {
+      step: button('Step there', {key: 'T'}, () => this.toggleTool('step')),
+      walk: button('Walk there', {key: 'M'}, () => this.toggleTool('walk')),
     };
-    for (const tool of Object.values(this.tools)) {
-      tool.hidden = true;
-      press(tool, false);
+    for (const element of Object.values(this.toolButtons)) {
+      element.hidden = true;
+      setPressed(element, false);
     }
-    this.tools.feet.id = 'drive-place';
-    this.tools.walk.id = 'drive-walk';
-    this.toolsRow = h('div', {class: 'tool-row', role: 'group', 'aria-label': 'Clicks on the ground'},
-      h('span', {}, 'Clicks on the ground'),
-      h('div', {class: 'buttons two'}, this.tools.feet, this.tools.walk));
-    this.exactRow = h('label', {class: 'check', for: this.exact.id, title: 'A foot that cannot land there stays'},
-      this.exact, 'There or not at all');
-    this.exactRow.hidden = true;
+    this.toolButtons.step.id = 'command-step-there';
+    this.toolButtons.walk.id = 'command-walk-there';
+    this.toolRow = h('div', {class: 'tool-row', role: 'group', 'aria-label': 'Click the ground to'},
+      h('span', {}, 'Click the ground to'),
+      h('div', {class: 'buttons two'}, this.toolButtons.step, this.toolButtons.walk));
+    this.exactOnlyRow = h('label', {class: 'check', for: this.exactOnlyBox.id,
+      title: 'The step is rejected if the foot cannot reach the exact point'},
+      this.exactOnlyBox, 'Exact placement only');
+    this.exactOnlyRow.hidden = true;
     const field = (input: HTMLInputElement, label: string) => {
       input.addEventListener('keydown', (e) => {
-        if (e.key === 'Enter') this.walk();
+        if (e.key === 'Enter') this.startWalk();
       });
       return h('div', {}, h('label', {for: input.id}, label), input);
     };
-    this.walkRow = h('div', {class: 'walk', role: 'group', 'aria-label': 'Walk to a place'},
-      h('div', {class: 'fields'}, field(this.walkX, 'To x, m'), field(this.walkZ, 'z, m'),
-        field(this.walkHeading, 'Heading, °')),
+    this.walkRow = h('div', {class: 'walk', role: 'group', 'aria-label': 'Walk to a point'},
+      h('div', {class: 'fields'}, field(this.walkX, 'To x (m)'), field(this.walkZ, 'z (m)'),
+        field(this.walkHeading, 'Heading (°)')),
       h('div', {class: 'buttons two'},
-        make('Pass by', '', () => this.pass()), make('Walk there', '', () => this.walk())));
-    this.ground.append(h('option', {value: ''}, 'As it is'),
-      ...grounds.map(([name, label]) => h('option', {value: name}, label)));
-    this.ground.addEventListener('change', () => {
-      if (this.ground.value !== '') actions.ground(this.ground.value as TerrainName);
+        make('Add waypoint', '', () => this.addWaypoint()),
+        make('Start walk', '', () => this.startWalk())));
+    this.terrainSelect.append(h('option', {value: ''}, 'Current'),
+      ...sampleTerrains.map(([name, label]) => h('option', {value: name}, label)));
+    this.terrainSelect.addEventListener('change', () => {
+      const {value} = this.terrainSelect;
+      if (value !== '') actions.setTerrain(value as SampleTerrainName);
     });
-    this.groundRow = h('div', {class: 'row'},
-      h('label', {for: 'drive-ground'}, 'Ground of this world'), this.ground);
-    this.toolsRow.hidden = this.walkRow.hidden = this.groundRow.hidden = this.layersRow.hidden = true;
+    this.terrainRow = h('div', {class: 'row'},
+      h('label', {for: 'command-terrain'}, 'Terrain of this world'), this.terrainSelect);
+    this.toolRow.hidden = this.walkRow.hidden = true;
+    this.terrainRow.hidden = this.layerRow.hidden = true;
     this.element = h('div', {class: 'panel-body'},
       this.target,
-      h('label', {class: 'check', for: 'drive-all'}, all, 'Command everybody here'),
-      this.toolsRow, this.exactRow, this.length.element, this.turn.element,
+      h('label', {class: 'check', for: 'command-all'}, all, 'Command all avatars'),
+      this.toolRow, this.exactOnlyRow, this.length.element, this.turn.element,
       h('div', {class: 'buttons three'},
         make('Left foot', 'A', () => this.step('left')),
         make('Step', 'W', () => this.step('auto'), {class: 'primary'}),
         make('Right foot', 'D', () => this.step('right'))),
       h('div', {class: 'pair'}, this.jumpLength.element, make('Jump', 'J', () => this.jump())),
       h('div', {class: 'pair'}, this.seconds.element, make('Stand', 'S', () => this.stand())),
-      this.walkRow, this.layersRow,
+      this.walkRow, this.layerRow,
       h('div', {class: 'buttons three'},
         make('Clear queue', 'X', () => actions.cancel()),
         button('Spawn', {key: 'B'}, () => actions.spawn(1)),
         make('Remove', 'Delete', () => actions.remove())),
-      this.wanderButton, this.groundRow, this.message);
+      this.randomWalkButton, this.terrainRow, this.message);
   }
 
-  /** What the server can do is offered. */
-  offer(footprints: boolean, walks: boolean, terrain: boolean, refusals: boolean): void {
-    this.canRefuse = refusals;
-    this.exactRow.hidden = !refusals || this.tool !== 'feet';
-    this.tools.feet.hidden = !footprints;
-    this.tools.walk.hidden = this.walkRow.hidden = !walks;
-    this.toolsRow.hidden = !footprints && !walks;
-    this.groundRow.hidden = !terrain;
-    if (this.tool !== null && this.tools[this.tool].hidden) this.toggleTool(this.tool);
+  /** Shows the controls that the server supports, and hides the others. */
+  setFeatures(footprints: boolean, walks: boolean, terrain: boolean, exactOnly: boolean): void {
+    this.supportsExactOnly = exactOnly;
+    this.exactOnlyRow.hidden = !exactOnly || this.tool !== 'step';
+    this.toolButtons.step.hidden = !footprints;
+    this.toolButtons.walk.hidden = this.walkRow.hidden = !walks;
+    this.toolRow.hidden = !footprints && !walks;
+    this.terrainRow.hidden = !terrain;
+    if (this.tool !== null && this.toolButtons[this.tool].hidden) this.toggleTool(this.tool);
   }
-  /** Planting can be switched; `on`: their feet are planted. */
-  offerPlanting(can: boolean, on: boolean): void {
-    this.planting.hidden = !can;
-    press(this.planting, on);
-    this.layersRow.hidden = !can && this.layerButtons.size === 0;
+  /** `on`: whether foot planting is on for all avatars that receive commands. */
+  setPlanting(supported: boolean, on: boolean): void {
+    this.plantingButton.hidden = !supported;
+    setPressed(this.plantingButton, on);
+    this.layerRow.hidden = !supported && this.layerButtons.size === 0;
   }
-  /** A button for each layer of the world. */
-  offerLayers(names: readonly string[], plays: (name: string) => boolean): void {
+  /** Shows a button for each layer of the world. */
+  setLayers(names: readonly string[], isPlaying: (name: string) => boolean): void {
     if (names.join(' ') !== [...this.layerButtons.keys()].join(' ')) {
       this.layerButtons.clear();
       for (const name of names) {
         const element = button(name.charAt(0).toUpperCase() + name.slice(1), {},
-          () => this.actions.layer(name));
-        element.id = `drive-layer-${name}`;
+          () => this.actions.toggleLayer(name));
+        element.id = `command-layer-${name}`;
         this.layerButtons.set(name, element);
       }
-      this.layers.replaceChildren(this.planting, ...this.layerButtons.values());
-      this.layersRow.hidden = this.planting.hidden && names.length === 0;
+      this.layerGroup.replaceChildren(this.plantingButton, ...this.layerButtons.values());
+      this.layerRow.hidden = this.plantingButton.hidden && names.length === 0;
     }
-    for (const [name, element] of this.layerButtons) press(element, plays(name));
+    for (const [name, element] of this.layerButtons) setPressed(element, isPlaying(name));
   }
-  /** Takes it up instead of the other, or lays it down. */
-  toggleTool(tool: GroundTool): void {
-    if (this.tools[tool].hidden && this.tool !== tool) return;
+  /** Activates the tool instead of the other one, or deactivates it. */
+  toggleTool(tool: ClickTool): void {
+    if (this.toolButtons[tool].hidden && this.tool !== tool) return;
     this.tool = this.tool === tool ? null : tool;
-    for (const name of ['feet', 'walk'] as const) press(this.tools[name], this.tool === name);
-    this.exactRow.hidden = !this.canRefuse || this.tool !== 'feet';
-    this.actions.tool(this.tool);
+    for (const name of ['step', 'walk'] as const) {
+      setPressed(this.toolButtons[name], this.tool === name);
+    }
+    this.exactOnlyRow.hidden = !this.supportsExactOnly || this.tool !== 'step';
+    this.actions.setTool(this.tool);
   }
-  /** A foot that cannot land where it is asked to is not to step at all. */
-  get mustBeMet(): boolean {
-    return this.canRefuse && this.exact.checked;
+  /** Whether a step is rejected if the foot cannot reach the exact point. */
+  get exactOnly(): boolean {
+    return this.supportsExactOnly && this.exactOnlyBox.checked;
   }
-  /** A walk was asked for on the ground. */
-  showGoal(atM: Vec3, headingRad: number | null): void {
+  /** Copies the goal of a walk to the fields. */
+  setGoalFields(atM: Vec3, headingRad: number | null): void {
     this.walkX.value = atM[0].toFixed(2);
     this.walkZ.value = atM[2].toFixed(2);
     this.walkHeading.value = headingRad === null ? '' : (headingRad * 180 / Math.PI).toFixed(0);
   }
-  private place(): {x: number; z: number} | null {
+  private readGoalFields(): {x: number; z: number} | null {
     const [x, z] = [this.walkX.valueAsNumber, this.walkZ.valueAsNumber];
     if (Number.isFinite(x) && Number.isFinite(z)) return {x, z};
-    this.say('A place is x and z in metres.');
+    this.showMessage('Enter x and z in metres.');
     return null;
   }
-  private pass(): void {
-    const place = this.place();
-    if (place) this.actions.pass(place.x, place.z);
+  private addWaypoint(): void {
+    const point = this.readGoalFields();
+    if (point) this.actions.addWaypoint(point.x, point.z);
   }
-  private walk(): void {
-    const place = this.place();
-    const degreesLeft = this.walkHeading.valueAsNumber;
-    if (place) {
-      this.actions.walk(
-        place.x, place.z, Number.isFinite(degreesLeft) ? degreesLeft * Math.PI / 180 : null);
-    }
+  private startWalk(): void {
+    const point = this.readGoalFields();
+    const headingDeg = this.walkHeading.valueAsNumber;
+    if (!point) return;
+    this.actions.walkTo(
+      point.x, point.z, Number.isFinite(headingDeg) ? headingDeg * Math.PI / 180 : null);
   }
-  /** Somebody gave the world a ground; nobody knows which of ours it is. */
-  forgetGround(): void {
-    this.ground.value = '';
+  /** Shows that the world's terrain is none of the sample terrains. */
+  resetTerrainChoice(): void {
+    this.terrainSelect.value = '';
   }
 
   step(foot: 'auto' | 'left' | 'right'): void {
@@ -222,25 +230,28 @@ export class DrivePanel {
   nudgeTurn(degreesMore: number): void {
     this.turn.value = this.turn.value + degreesMore;
   }
-  nudgeLength(more: number): void {
-    this.length.value = this.length.value + more;
+  nudgeLength(metresMore: number): void {
+    this.length.value = this.length.value + metresMore;
   }
 
-  show(target: string, drivable: boolean, wandering: number): void {
+  /** `target` names the avatars that receive commands; `walkers` of them walk at random. */
+  update(target: string, hasTarget: boolean, walkers: number): void {
     setText(this.target, target);
-    for (const element of [...this.one, ...this.layerButtons.values()]) element.disabled = !drivable;
-    press(this.wanderButton, wandering > 0);
-    const label = this.wanderButton.querySelector('span')!;
-    setText(label, wandering > 0 ? `Stop wandering (${wandering})` : 'Let them wander');
-    this.wanderButton.setAttribute('aria-label', label.textContent!);
-    if (this.messageUntil && performance.now() > this.messageUntil) {
-      this.messageUntil = 0;
+    for (const element of [...this.avatarButtons, ...this.layerButtons.values()]) {
+      element.disabled = !hasTarget;
+    }
+    setPressed(this.randomWalkButton, walkers > 0);
+    const label = this.randomWalkButton.querySelector('span')!;
+    setText(label, walkers > 0 ? `Stop random walk (${walkers})` : 'Walk randomly');
+    this.randomWalkButton.setAttribute('aria-label', label.textContent!);
+    if (this.messageUntilMs && performance.now() > this.messageUntilMs) {
+      this.messageUntilMs = 0;
       setText(this.message, '');
     }
   }
 
-  say(text: string): void {
+  showMessage(text: string): void {
     setText(this.message, text);
-    this.messageUntil = performance.now() + 8000;
+    this.messageUntilMs = performance.now() + messageMs;
   }
 }

@@ -1,5 +1,5 @@
-// Points of a whole crowd in one buffer, worked out by the script, so that the shader only projects them;
-// in one draw call, drawn up to as many avatars as there are.
+// Buffers for a crowd whose points the CPU transforms, so that the shader only projects them. The
+// whole crowd is one draw call, which suits software renderers.
 
 import * as THREE from 'three';
 
@@ -25,23 +25,23 @@ SMOOTHNESS in vec3 vColour;
 out vec4 colour;
 void main() { colour = vec4(vColour, 1.0); }`;
 
-export class CrowdPoints {
-  readonly geometry = new THREE.BufferGeometry();
+export class CpuCrowdGeometry {
+  readonly buffers = new THREE.BufferGeometry();
   readonly material: THREE.RawShaderMaterial;
-  /** Of points, 3 each, by avatar. */
+  /** World positions, 3 numbers per point; the points of one avatar are contiguous. */
   readonly positions: Float32Array;
-  /** Colours of points, 4 each: red, green, blue, 255. */
+  /** Colours, 4 numbers per point: red, green, blue, 255. */
   readonly tints: Uint8ClampedArray;
   private readonly position: THREE.BufferAttribute;
   private readonly tint: THREE.BufferAttribute;
 
   /**
-   * `indices`: what one avatar of `pointCount` points is drawn by, pairs or triples of them; `flat`: colours
-   * are those of a pair's or triple's last point.
+   * `capacity`: number of avatars. `pointCount`: points per avatar. `indices`: the lines or
+   * triangles of one avatar. `flat`: each has the colour of its last point, without interpolation.
    */
   constructor(
-    private readonly capacity: number, readonly pointCount: number, private readonly indices: ArrayLike<number>,
-    flat: boolean, fogColour: THREE.Color) {
+    private readonly capacity: number, readonly pointCount: number,
+    private readonly indices: ArrayLike<number>, flat: boolean, fogColour: THREE.Color) {
     this.positions = new Float32Array(capacity * pointCount * 3);
     this.tints = new Uint8ClampedArray(capacity * pointCount * 4).fill(255);
     this.position = new THREE.BufferAttribute(this.positions, 3);
@@ -51,12 +51,14 @@ export class CrowdPoints {
     const all = capacity * pointCount > 65535 ? new Uint32Array(capacity * indices.length) :
       new Uint16Array(capacity * indices.length);
     for (let i = 0; i < capacity; ++i) {
-      for (let k = 0; k < indices.length; ++k) all[i * indices.length + k] = i * pointCount + indices[k]!;
+      for (let k = 0; k < indices.length; ++k) {
+        all[i * indices.length + k] = i * pointCount + indices[k]!;
+      }
     }
-    this.geometry.setAttribute('position', this.position);
-    this.geometry.setAttribute('tint', this.tint);
-    this.geometry.setIndex(new THREE.BufferAttribute(all, 1));
-    this.geometry.setDrawRange(0, 0);
+    this.buffers.setAttribute('position', this.position);
+    this.buffers.setAttribute('tint', this.tint);
+    this.buffers.setIndex(new THREE.BufferAttribute(all, 1));
+    this.buffers.setDrawRange(0, 0);
     this.material = new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader, fragmentShader,
       defines: {SMOOTHNESS: flat ? 'flat' : 'smooth'},
@@ -64,30 +66,30 @@ export class CrowdPoints {
     });
   }
 
-  /** How `object`, which draws these, is drawn: always, and after the ground. */
-  drawnBy<T extends THREE.Object3D>(object: T): T {
+  /** Sets up an object that draws the buffers: never culled, and drawn after the terrain. */
+  configure<T extends THREE.Object3D>(object: T): T {
     object.frustumCulled = false;
     object.renderOrder = 3;
     return object;
   }
 
-  /** The positions of the first `count` avatars are others now. */
-  moved(count: number): void {
-    this.geometry.setDrawRange(0, count * this.indices.length);
+  /** Uploads the positions of the first `count` avatars, and draws only these. */
+  uploadPositions(count: number): void {
+    this.buffers.setDrawRange(0, count * this.indices.length);
     this.position.clearUpdateRanges();
     this.position.addUpdateRange(0, count * this.pointCount * 3);
     this.position.needsUpdate = true;
   }
 
-  /** Their colours are. */
-  tinted(count = this.capacity): void {
+  /** Uploads the colours of the first `count` avatars. */
+  uploadTints(count = this.capacity): void {
     this.tint.clearUpdateRanges();
     this.tint.addUpdateRange(0, count * this.pointCount * 4);
     this.tint.needsUpdate = true;
   }
 
   dispose(): void {
-    this.geometry.dispose();
+    this.buffers.dispose();
     this.material.dispose();
   }
 }

@@ -1,30 +1,33 @@
-// A figure of lines: every bone, a ring for the head, outlines of the feet; or, for a crowd, limbs
-// only. Points are joints first, then some that a joint carries; a line has the colour of its second
+// Builds a stick figure for a skeleton: a line per bone, rings for the head and outlines of the
+// feet. The simplified version has about half as many lines. A line has the colour of its second
 // point.
 
-import {add, figureOf, length, normalised, subtract} from './body_parts.js';
+import {add, findBodyParts, length, normalised, subtract} from './body_parts.js';
 import type {SkeletonLike, Vec} from './body_parts.js';
 import {Region} from './body_mesh.js';
 
-export interface LineFigure {
+export interface StickFigure {
+  /** Joints and extra points together. */
   readonly pointCount: number;
-  /** Pairs of points. */
+  /** Pairs of point indices. */
   readonly lines: readonly number[];
-  /** What a point, as the end of a line, shows: a `Region`. */
+  /** For each point, the `Region` of lines that end there. */
   readonly regions: Uint8Array;
-  /** The first points: joints. */
+  /** Joint indices of the first points. */
   readonly joints: Uint16Array;
-  /** The points after them: who carries them, and where they lie in the rest pose. */
+  /** For each of the other points, the joint that it moves with. */
   readonly extraJoints: Uint16Array;
+  /** Their positions in the rest pose, 3 numbers per point. */
   readonly extraRest: Float32Array;
 }
 
-export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
-  const figure = figureOf(skeleton);
-  const h = figure.heightM;
-  const at = (j: number): Vec => [figure.rest[j * 3]!, figure.rest[j * 3 + 1]!, figure.rest[j * 3 + 2]!];
+export function buildStickFigure(skeleton: SkeletonLike, simplified = false): StickFigure {
+  const parts = findBodyParts(skeleton);
+  const h = parts.heightM;
+  const at = (j: number): Vec =>
+    [parts.rest[j * 3]!, parts.rest[j * 3 + 1]!, parts.rest[j * 3 + 2]!];
 
-  // Joints as points, in the order in which they are needed.
+  // Joints become points in the order in which lines need them.
   const joints: number[] = [];
   const place = new Map<number, number>();
   const regions: number[] = [];
@@ -38,7 +41,7 @@ export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
     }
     return i;
   };
-  // Extra points are numbered from -1 down until it is known how many joints come before them.
+  // Extra points have temporary indices -1, -2, ..., until the number of joint points is known.
   const extraJoints: number[] = [];
   const extraRest: number[] = [];
   const extraRegions: number[] = [];
@@ -50,27 +53,27 @@ export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
   };
 
   const part = new Map<number, number>();
-  for (const leg of figure.legs) {
+  for (const leg of parts.legs) {
     for (const joint of [leg.knee.joint, leg.ankle.joint]) part.set(joint, Region.trousers);
     if (leg.ball.joint !== leg.ankle.joint) part.set(leg.ball.joint, Region.shoes);
   }
-  for (const arm of figure.arms) part.set(arm.wrist.joint, Region.skin);
+  for (const arm of parts.arms) part.set(arm.wrist.joint, Region.skin);
   const lines: number[] = [];
   const bone = (from: number, to: number): void => {
     if (from === to || length(subtract(at(from), at(to))) < 1e-4) return;
     lines.push(point(from), point(to, part.get(to)));
   };
-  if (simple && figure.trunk.length > 1) {
-    const first = figure.trunk[0]!.joint;
-    const middle = figure.trunk[figure.trunk.length >> 1]!.joint;
+  if (simplified && parts.trunk.length > 1) {
+    const first = parts.trunk[0]!.joint;
+    const middle = parts.trunk[parts.trunk.length >> 1]!.joint;
     bone(first, middle);
-    bone(middle, figure.head.joint);
-    for (const {shoulder, elbow, wrist} of figure.arms) {
+    bone(middle, parts.head.joint);
+    for (const {shoulder, elbow, wrist} of parts.arms) {
       bone(middle, shoulder.joint);
       bone(shoulder.joint, elbow.joint);
       bone(elbow.joint, wrist.joint);
     }
-    for (const {hip, knee, ankle} of figure.legs) {
+    for (const {hip, knee, ankle} of parts.legs) {
       bone(first, hip.joint);
       bone(hip.joint, knee.joint);
       bone(knee.joint, ankle.joint);
@@ -82,21 +85,21 @@ export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
   }
 
   const r = 0.06 * h;
-  const centre: Vec = [figure.head.at[0], figure.crownY - r, figure.head.at[2] + 0.01 * h];
-  const sides = simple ? 4 : 6;
-  for (const u of (simple ? [[0.7, 0, 0.7]] : [[1, 0, 0], [0, 0, 1]]) as Vec[]) {
+  const centre: Vec = [parts.head.at[0], parts.crownY - r, parts.head.at[2] + 0.01 * h];
+  const sides = simplified ? 4 : 6;
+  for (const u of (simplified ? [[0.7, 0, 0.7]] : [[1, 0, 0], [0, 0, 1]]) as Vec[]) {
     const ring: number[] = [];
     for (let s = 0; s < sides; ++s) {
       const angle = (s + 0.5) / sides * 2 * Math.PI;
-      ring.push(extra(figure.head.joint, add(
+      ring.push(extra(parts.head.joint, add(
         add(centre, u, Math.cos(angle) * r * 0.8), [0, 1, 0], Math.sin(angle) * r), Region.skin));
     }
     ring.forEach((p, s) => lines.push(p, ring[(s + 1) % sides]!));
   }
-  for (const {ankle, ball, toe} of figure.legs) {
+  for (const {ankle, ball, toe} of parts.legs) {
     const tip = extra(ball.joint, toe, Region.shoes);
-    if (!simple) {
-      const sole = figure.groundY;
+    if (!simplified) {
+      const sole = parts.groundY;
       const back = normalised([ankle.at[0] - toe[0], 0, ankle.at[2] - toe[2]], [0, 0, -1]);
       const heel = extra(
         ankle.joint, add([ankle.at[0], sole, ankle.at[2]], back, 0.03 * h), Region.shoes);
@@ -105,8 +108,8 @@ export function lineFigure(skeleton: SkeletonLike, simple = false): LineFigure {
     }
     lines.push(point(ankle.joint), tip);
   }
-  if (!simple) {
-    for (const arm of figure.arms) {
+  if (!simplified) {
+    for (const arm of parts.arms) {
       lines.push(point(arm.wrist.joint), extra(arm.wrist.joint, arm.tip, Region.skin));
     }
   }

@@ -1,43 +1,41 @@
-// A crowd drawn by lines, for machines whose processor draws: the points of all avatars are worked
-// out here and lie in one buffer, so that the shader only projects them.
+// A crowd drawn as stick figures, for software renderers and slow GPUs. The CPU computes the points
+// of all avatars.
 
 import * as THREE from 'three';
 
-import {CrowdPoints} from './cpu_crowd_geometry.js';
-import {lineFigure} from './stick_figure.js';
-import type {LineFigure} from './stick_figure.js';
+import {CpuCrowdGeometry} from './cpu_crowd_geometry.js';
+import {buildStickFigure} from './stick_figure.js';
+import type {StickFigure} from './stick_figure.js';
 import type {SkeletonLike} from './body_parts.js';
-import {matrixFloats} from './kinematics.js';
+import {floatsPerMatrix} from './kinematics.js';
 
-export interface LineLights {
+export interface StickFigureLights {
   readonly fogColour: THREE.Color;
   readonly accent: THREE.Color;
 }
 
-export class LineCrowd {
+export class StickFigureCrowd {
   readonly object: THREE.LineSegments;
-  private readonly figure: LineFigure;
+  private readonly figure: StickFigure;
   private readonly jointCount: number;
-  private readonly points: CrowdPoints;
+  private readonly geometry: CpuCrowdGeometry;
 
-  constructor(skeleton: SkeletonLike, private readonly lights: LineLights, capacity: number,
-    simple: boolean) {
-    this.figure = lineFigure(skeleton, simple);
+  /** `capacity`: number of avatars. `simplified`: about half as many lines. */
+  constructor(
+    skeleton: SkeletonLike, private readonly lights: StickFigureLights, capacity: number,
+    simplified: boolean) {
+    this.figure = buildStickFigure(skeleton, simplified);
     this.jointCount = skeleton.jointCount;
     const {pointCount, lines} = this.figure;
-    this.points = new CrowdPoints(capacity, pointCount, lines, true, lights.fogColour);
-    this.object = this.points.drawnBy(
-      new THREE.LineSegments(this.points.geometry, this.points.material));
+    this.geometry = new CpuCrowdGeometry(capacity, pointCount, lines, true, lights.fogColour);
+    this.object = this.geometry.configure(
+      new THREE.LineSegments(this.geometry.buffers, this.geometry.material));
   }
 
-  get pointCount(): number {
-    return this.figure.pointCount;
-  }
-
-  /** Points of the first `count` avatars, from what `solve` gave. */
+  /** Updates the first `count` avatars, from the results of `computeJointTransforms`. */
   update(matrices: Float32Array, positions: Float32Array, count: number): void {
     const {figure: {joints, extraJoints, extraRest}, jointCount} = this;
-    const out = this.points.positions;
+    const out = this.geometry.positions;
     let to = 0;
     for (let i = 0; i < count; ++i) {
       for (let k = 0; k < joints.length; ++k) {
@@ -46,36 +44,37 @@ export class LineCrowd {
         out[to++] = positions[from + 1]!;
         out[to++] = positions[from + 2]!;
       }
-      const first = i * jointCount * matrixFloats;
+      const first = i * jointCount * floatsPerMatrix;
       for (let e = 0; e < extraJoints.length; ++e) {
-        const m = first + extraJoints[e]! * matrixFloats;
+        const m = first + extraJoints[e]! * floatsPerMatrix;
         const x = extraRest[e * 3]!;
         const y = extraRest[e * 3 + 1]!;
         const z = extraRest[e * 3 + 2]!;
-        out[to++] = matrices[m]! * x + matrices[m + 1]! * y + matrices[m + 2]! * z + matrices[m + 3]!;
-        out[to++] = matrices[m + 4]! * x + matrices[m + 5]! * y + matrices[m + 6]! * z + matrices[m + 7]!;
-        out[to++] = matrices[m + 8]! * x + matrices[m + 9]! * y + matrices[m + 10]! * z + matrices[m + 11]!;
+        for (let row = m; row < m + floatsPerMatrix; row += 4) {
+          out[to++] = matrices[row]! * x + matrices[row + 1]! * y + matrices[row + 2]! * z +
+            matrices[row + 3]!;
+        }
       }
     }
-    this.points.moved(count);
+    this.geometry.uploadPositions(count);
   }
 
-  /** Colours of one avatar: `shirt`, or the accent when it is chosen. */
-  dress(i: number, shirt: THREE.Color, chosen: boolean): void {
+  /** Sets the colours of avatar `i`. A selected avatar has the accent colour. */
+  setColours(i: number, shirt: THREE.Color, selected: boolean): void {
     const {figure: {regions, pointCount}} = this;
-    const out = this.points.tints;
+    const out = this.geometry.tints;
     for (let p = 0; p < pointCount; ++p) {
-      const c = chosen ? this.lights.accent : regionColour(regions[p]!, shirt);
+      const c = selected ? this.lights.accent : regionColour(regions[p]!, shirt);
       const at = (i * pointCount + p) * 4;
       out[at] = 255 * Math.min(1, c.r * 1.1 + 0.08);
       out[at + 1] = 255 * Math.min(1, c.g * 1.1 + 0.08);
       out[at + 2] = 255 * Math.min(1, c.b * 1.1 + 0.08);
     }
-    this.points.tinted();
+    this.geometry.uploadTints();
   }
 
   dispose(): void {
-    this.points.dispose();
+    this.geometry.dispose();
   }
 }
 

@@ -1,11 +1,12 @@
-import type {Box} from './camera.js';
+import type {PageRect} from './camera.js';
 
 /**
- * Divides the scene among views, side by side or, where it is higher than wide, one above the other: each
- * gets an equal part of what panels leave `free`, and draws in a `box` that goes on beneath them to the edges.
+ * Divides the page among views: side by side, or above each other if the area that panels leave
+ * free (`free`, in CSS pixels) is taller than wide. Each view gets an equal part of it. Viewports
+ * also extend beneath the panels, so that together they cover the page.
  */
-export function shareOut(
-  views: readonly {free: Box; box: Box}[],
+export function layOutViews(
+  views: readonly {freeArea: PageRect; viewport: PageRect}[],
   free: {readonly x0: number; readonly x1: number; readonly y0: number; readonly y1: number},
   width: number, height: number): void {
   const {x0, x1, y0, y1} = free;
@@ -15,17 +16,17 @@ export function shareOut(
     const from = i / n;
     const to = (i + 1) / n;
     if (across) {
-      Object.assign(view.free, {
+      Object.assign(view.freeArea, {
         x: x0 + (x1 - x0) * from, y: y0, width: (x1 - x0) / n, height: y1 - y0});
-      const left = i === 0 ? 0 : view.free.x;
+      const left = i === 0 ? 0 : view.freeArea.x;
       const end = i === n - 1 ? width : x0 + (x1 - x0) * to;
-      Object.assign(view.box, {x: left, y: 0, width: end - left, height});
+      Object.assign(view.viewport, {x: left, y: 0, width: end - left, height});
     } else {
-      Object.assign(view.free, {
+      Object.assign(view.freeArea, {
         x: x0, y: y0 + (y1 - y0) * from, width: x1 - x0, height: (y1 - y0) / n});
-      const start = i === 0 ? 0 : view.free.y;
+      const start = i === 0 ? 0 : view.freeArea.y;
       const end = i === n - 1 ? height : y0 + (y1 - y0) * to;
-      Object.assign(view.box, {x: 0, y: start, width, height: end - start});
+      Object.assign(view.viewport, {x: 0, y: start, width, height: end - start});
     }
   });
 }
