@@ -3,7 +3,7 @@
 find_program(STRIDEWIRE_NODE NAMES node nodejs REQUIRED)
 find_program(STRIDEWIRE_NPM npm REQUIRED)
 
-# What the lock file says, from the registry; again only when the lock file changed.
+# Installs the packages of the lock file, again only when the lock file changes.
 set(STRIDEWIRE_NODE_MODULES ${CMAKE_CURRENT_LIST_DIR}/node_modules/.stridewire-stamp)
 add_custom_command(OUTPUT ${STRIDEWIRE_NODE_MODULES}
   COMMAND ${STRIDEWIRE_NPM} ci --no-progress --loglevel=error
@@ -11,14 +11,15 @@ add_custom_command(OUTPUT ${STRIDEWIRE_NODE_MODULES}
   WORKING_DIRECTORY ${CMAKE_CURRENT_LIST_DIR}
   DEPENDS ${CMAKE_CURRENT_LIST_DIR}/package.json ${CMAKE_CURRENT_LIST_DIR}/package-lock.json
           ${CMAKE_CURRENT_LIST_DIR}/web/package.json ${CMAKE_CURRENT_LIST_DIR}/viewer/package.json
-  COMMENT "Fetching what the web client is built with"
+  COMMENT "Installing npm packages for the web client"
   VERBATIM)
 add_custom_target(web_modules DEPENDS ${STRIDEWIRE_NODE_MODULES})
 
-# stridewire_node_test(NAME LABEL SECONDS ARGUMENTS…): a script of tests for node, run in the caller's folder.
-# Whatever it skips counts as failed: ctest hands it all that it needs.
+# stridewire_node_test(NAME LABEL SECONDS ARGUMENTS...): runs a test script with node in the caller's
+# folder. A skipped test counts as a failure, because ctest provides everything that it needs.
 function(stridewire_node_test name label seconds)
-  add_test(NAME ${name} COMMAND ${STRIDEWIRE_NODE} ${ARGN} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  add_test(NAME ${name} COMMAND ${STRIDEWIRE_NODE} ${ARGN}
+           WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
   set_tests_properties(${name} PROPERTIES LABELS ${label} TIMEOUT ${seconds}
     FAIL_REGULAR_EXPRESSION " skipped [1-9]")
 endfunction()

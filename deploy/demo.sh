@@ -204,7 +204,7 @@ cat <<TEXT
 Stridewire is running. A simulated game server moves $avatars avatars in each of two worlds:
     generated   uses the library that Stridewire generates
     $(printf '%-9s' "$world")   uses ${library#"$root"/}
-The world slabs has uneven ground and no avatars. Spawn one there in the viewer, choose "Send there"
+The world slabs has uneven ground and no avatars. Spawn one there in the viewer, choose "Walk there"
 and click a slab.
 Output:
     $out/{generated,$world}.bvh   recordings of avatar 1, $record_s s long

@@ -527,7 +527,7 @@ export class App {
     const pane = this.commandedPane();
     const {client, commandPanel, commands} = this;
     commandPanel.setFeatures(client.serverHas('footprints'), client.serverHas('walks'),
-      client.serverHas('terrain'), client.serverHas('refusals'));
+      client.serverHas('terrain'), client.serverHas('exactOnly'));
     const state = this.playback.live ? this.inspector.state : null;
     if (state && this.selected && state.avatar === this.selected.avatar) {
       commands.onAvatarState(this.selected.pane.world, state);

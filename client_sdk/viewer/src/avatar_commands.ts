@@ -121,7 +121,7 @@ export class AvatarCommands {
     this.playingLayers.set(world, playing);
     this.host.goLive();
     ++this.recentToggles;
-    void world.setLayers(avatars.map((avatar) => ({avatar, layer, off}))).then((reply) => {
+    void world.setLayers(avatars.map((avatar) => ({avatar, layer, enabled: !off}))).then((reply) => {
       if (!reply.ok || reply.accepted === 0) {
         this.notifyRefused(reply);
         return;
@@ -142,9 +142,9 @@ export class AvatarCommands {
   }
 
   /** Call with each state that the server reports. */
-  onAvatarState(world: World, {avatar, plantingOff, layers}: AvatarState): void {
+  onAvatarState(world: World, {avatar, plantingEnabled, layers}: AvatarState): void {
     if (this.recentToggles > 0) return;
-    if (plantingOff) this.unplantedIn(world).add(avatar);
+    if (!plantingEnabled) this.unplantedIn(world).add(avatar);
     else this.unplantedAvatars.get(world)?.delete(avatar);
     if (!this.host.reportsLayers()) return;
     const playing = this.playingLayers.get(world) ?? new Set<string>();

@@ -92,7 +92,7 @@ export class FootprintTool {
     const exact = this.host.exactOnly();
     if (exact) this.exactRequests.add(requestId);
     void pane.world.request([
-      {avatar, type: 'step', requestId, foot: 'auto', atM, ...(exact ? {mustBeMet: true} : {})},
+      {avatar, type: 'step', requestId, foot: 'auto', atM, ...(exact ? {exactOnly: true} : {})},
     ]).then((reply) => {
       this.host.notify(reply.ok ? `Requested a step to ${pointText(atM)}.` :
         `Refused: ${reply.items[0]?.text || reply.text}`);
@@ -225,7 +225,7 @@ export class FootprintTool {
           avatar, requestId: item.requestId, type, foot, lengthM, heightM, turnRad, seconds,
           waypointsM,
           ...(target === null ? {} : {atM: target}),
-          ...(item.mustBeMet ? {mustBeMet: true} : {}),
+          ...(item.exactOnly ? {exactOnly: true} : {}),
           ...(item.sideM === null ? {} : {sideM: item.sideM}),
           ...(item.headingRad === null ? {} : {headingRad: item.headingRad}),
           ...(item.speedMPerS === null ? {} : {speedMPerS: item.speedMPerS}),

@@ -21,7 +21,7 @@ export function observationFor({mode, detail, everyNTicks}: PoseStream) {
 export function streamName(stream: PoseStream): string {
   const {mode, detail, everyNTicks} = observationFor(stream);
   return (mode === 'full' ? 'Full' : 'Quantised') +
-    {all: '', fewer: ', fewer joints', root: ', root only'}[detail] +
+    {all: '', reduced: ', reduced joints', root: ', root only'}[detail] +
     {1: '', 2: ', ½ rate', 4: ', ¼ rate'}[everyNTicks];
 }
 

@@ -26,7 +26,7 @@ export function parseUrlOptions(search: string): UrlOptions {
     figures: oneOf('figures', ['auto', 'bodies', 'lines'], 'auto'),
     poseStream: {
       mode: oneOf('mode', ['quantised', 'full'], 'quantised'),
-      detail: oneOf('detail', ['all', 'fewer', 'root'], 'all'),
+      detail: oneOf('detail', ['all', 'reduced', 'root'], 'all'),
       everyNTicks: tickIntervals.find((interval) => query.get('every') === String(interval)) ?? 1,
     },
     quality: oneOf('quality', ['auto', 'high', 'low'], 'auto'),

@@ -67,7 +67,7 @@ await picture('viewer_streams', 1280, 720, 'light', bothWorlds, async (page) => 
   await page.click('button[aria-controls=panel-commands]');
   await page.click('button[aria-controls=panel-view]');
   const choices =
-    ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-fewer'];
+    ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-reduced'];
   for (const id of choices) {
     await page.click(`label[for=${id}]`);
     await page.waitForTimeout(4000);

@@ -192,8 +192,8 @@ export class Inspector {
     const span = Math.max(movement.endTimeS - movement.startTimeS, 1e-6);
     const x = (t: number): number => 8 + Math.min(1, Math.max(0, t / span)) * 264;
     const parts: SVGElement[] = [svg('line', {class: 'axis', x1: 8, y1: 20, x2: 272, y2: 20})];
-    if (movement.easeS > 0) {
-      const width = x(movement.easeS) - 8;
+    if (movement.easeOutS > 0) {
+      const width = x(movement.easeOutS) - 8;
       parts.push(svg('rect', {class: 'ease', x: 8, y: 16, width, height: 8}));
     }
     let right = -100;
@@ -233,13 +233,13 @@ export class Inspector {
     // The user's choice stays while the parameters are the same.
     if (names.join() === this.axisNames) return;
     this.axisNames = names.join();
-    const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
+    const count = n > 0 ? Math.floor(movement.exampleParameters.length / n) : 0;
     const spread = names.map((name, k) => {
       let low = Infinity;
       let high = -Infinity;
       for (let i = 0; i < count; ++i) {
-        low = Math.min(low, movement.sites[i * n + k]!);
-        high = Math.max(high, movement.sites[i * n + k]!);
+        low = Math.min(low, movement.exampleParameters[i * n + k]!);
+        high = Math.max(high, movement.exampleParameters[i * n + k]!);
       }
       return {k, spread: high - low, main: name === 'endZ' || name === 'length' ? 1 : 0};
     }).sort((a, b) => b.main - a.main || b.spread - a.spread);
@@ -267,7 +267,7 @@ export class Inspector {
   private showScatter(movement: MovementState): void {
     const names = movement.parameterNames as readonly string[];
     const n = names.length;
-    const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
+    const count = n > 0 ? Math.floor(movement.exampleParameters.length / n) : 0;
     this.scatter.replaceChildren();
     if (count === 0) return;
     const applied = movement.applied as Readonly<Record<string, number>>;
@@ -276,8 +276,8 @@ export class Inspector {
     const xs: number[] = [];
     const ys: number[] = [];
     for (let i = 0; i < count; ++i) {
-      xs.push(movement.sites[i * n + this.axisX]!);
-      ys.push(flat ? 0 : movement.sites[i * n + this.axisY]!);
+      xs.push(movement.exampleParameters[i * n + this.axisX]!);
+      ys.push(flat ? 0 : movement.exampleParameters[i * n + this.axisY]!);
     }
     const px = at[this.axisX]!;
     const py = flat ? 0 : at[this.axisY]!;

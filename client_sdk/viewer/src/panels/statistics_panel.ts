@@ -49,7 +49,7 @@ export class StatisticsPanel {
     if (nowMs - this.lastMs < updateIntervalMs) return;
     this.lastMs = nowMs;
     const s = this.statistics();
-    const now = {ms: nowMs, bytes: s.bytesReceived, missed: s.posesMissed, frames: framesDrawn};
+    const now = {ms: nowMs, bytes: s.bytesReceived, missed: s.heldSamples, frames: framesDrawn};
     if (this.before) {
       const seconds = (now.ms - this.before.ms) / 1000;
       this.current.bytesPerS = (now.bytes - this.before.bytes) / seconds;

@@ -27,7 +27,7 @@ export class ViewPanel {
     figures: FigureChoice; quality: QualityChoice; stream: PoseStream;
   }) {
     this.detailChoice = radios(
-      'Joints', 'detail', [['all', 'All'], ['fewer', 'Fewer'], ['root', 'Root only']],
+      'Joints', 'detail', [['all', 'All'], ['reduced', 'Reduced'], ['root', 'Root only']],
       initial.stream.detail, (value) => actions.stream({detail: value as PoseStream['detail']}));
     this.element = h('div', {class: 'panel-body'},
       radios('Draw avatars as', 'figures',

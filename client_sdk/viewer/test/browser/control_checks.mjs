@@ -365,7 +365,7 @@ function streamChecks(t) {
     }],
     // Columns: the detail, its flag in poses, its name in the table, and the minimum bytes saved.
     ...[
-      ['root', 16, 'Quantised, root only', 70], ['fewer', 8, 'Quantised, fewer joints', 5],
+      ['root', 16, 'Quantised, root only', 70], ['reduced', 8, 'Quantised, reduced joints', 5],
       ['all', 0, 'Quantised', 0],
     ].map(([detail, flag, name, savedBytes]) => [`view: detail-${detail}`, async () => {
       const all = await t.streamCost('Quantised');

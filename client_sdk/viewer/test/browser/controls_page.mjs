@@ -151,7 +151,7 @@ export async function openControlsPage(browser, server, client, alpha) {
     await look(() => window.stridewire.playback.goLive());
     if ((await alpha.inspect(state.avatar)).queueSize < 4) await requestSteps();
     await eventually('a step is inspected', () =>
-      window.stridewire.inspected?.movement?.sites.length > 0);
+      window.stridewire.inspected?.movement?.exampleParameters.length > 0);
     await look(() => window.stridewire.playback.pause());
     await frames(3);
     return look(() => window.stridewire.inspected?.movement?.parameterNames.length >= 2 &&
@@ -292,7 +292,7 @@ export function sharedChecks(t) {
     /** The button must also show what other clients set. */
     async togglesPlanting(act) {
       const isPlanted = (on) => waitFor(`planting is ${on ? 'on' : 'off'}`, async () =>
-        (await alpha.inspect(state.avatar)).plantingOff === !on &&
+        (await alpha.inspect(state.avatar)).plantingEnabled === on &&
         await t.isPressed('command-planting') === on);
       await isPlanted(true);
       for (const on of [false, true]) {
