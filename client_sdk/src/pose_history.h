@@ -6,19 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "pose_stamp.h"
 #include "stridewire/base/math.h"
-#include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::client {
-
-/// What is known of one received pose beside its numbers.
-struct PoseStamp {
-  std::uint64_t tick = 0;
-  double time_s = 0.0;         ///< On the server's clock.
-  bool discontinuity = false;  ///< Not to be interpolated from the one before.
-  bool standing = false;
-  protocol::PoseDetail detail = protocol::PoseDetail::kAll;
-};
 
 /// The last poses of one avatar, oldest first: the jitter buffer. A ring that takes its memory when
 /// it is made and none later; a full ring forgets its oldest pose.

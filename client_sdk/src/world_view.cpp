@@ -137,8 +137,8 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3
   track.seen_tick = stamp.tick;
 }
 
-void WorldView::Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-                     ConstPoseSpan pose) {
+void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+                       ConstPoseSpan pose) {
   if (stamp.tick % shown_every_ != 0 || !Wants(avatar)) return;
   if (Track* track = TrackOf(avatar); track != nullptr) {
     Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose.root_position_m,
@@ -156,7 +156,7 @@ Status WorldView::Take(const protocol::Movements& movements, ReplicaSet& evaluat
   ++counts.batches;
   shown_every_ = std::max<std::uint64_t>(every_n_ticks, 1);
   shown_counts_ = &counts;
-  const Status status = evaluated.Take(movements, *this);
+  const Status status = evaluated.Apply(movements, *this);
   Forget(movements.server_time_s);
   return status;
 }

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "replica_set.h"
 #include "pose_history.h"
+#include "replica_set.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 
@@ -67,7 +67,7 @@ class WorldView : public PoseSink {
   /// a pose that is none, or another figure than announced; what came before it is kept.
   Status Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
-  /// Poses that are evaluated here, of every `every_n_ticks`th tick: Show and Gone until `tick` is over.
+  /// Poses that are evaluated here, of every `every_n_ticks`th tick: OnPose and OnGone until `tick` is over.
   Status Take(const protocol::Movements& movements, ReplicaSet& evaluated,
               std::uint64_t every_n_ticks, Counts& counts);
 
@@ -102,9 +102,9 @@ class WorldView : public PoseSink {
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
   using Tracks = std::map<protocol::AvatarId, Track>;
 
-  void Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-            ConstPoseSpan pose) override;
-  void Gone(protocol::AvatarId avatar) override { Remove(avatar); }
+  void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+              ConstPoseSpan pose) override;
+  void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override {
     return !filter_ || filter_->contains(avatar);
   }
@@ -129,8 +129,7 @@ class WorldView : public PoseSink {
   std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
-  std::map<protocol::AvatarId, std::uint64_t>
-      left_;  // since which tick; forgotten after a while
+  std::map<protocol::AvatarId, std::uint64_t> left_;  // since which tick; forgotten after a while
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
   std::uint64_t shown_every_ = 1;   // while movements are taken in

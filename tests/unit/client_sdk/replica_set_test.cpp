@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
-#include "stridewire/runtime/avatar.h"
 #include "runtime/avatar/movement_record.h"
+#include "stridewire/runtime/avatar.h"
 #include "test_library.h"
 
 namespace stridewire::client {
@@ -19,15 +19,14 @@ using protocol::Movements;
 constexpr double kTickS = 1.0 / 60.0;
 
 struct Screen : PoseSink {
-  void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
-            ConstPoseSpan pose) override {
+  void OnPose(AvatarId avatar, std::uint16_t, const PoseStamp& stamp, ConstPoseSpan pose) override {
     Pose& kept = shown[avatar];
     kept.root_position_m = pose.root_position_m;
     kept.rotations.assign(pose.rotations.begin(), pose.rotations.end());
     stamps[avatar] = stamp;
     gone.erase(avatar);
   }
-  void Gone(AvatarId avatar) override { gone.insert(avatar); }
+  void OnGone(AvatarId avatar) override { gone.insert(avatar); }
   [[nodiscard]] bool Wants(AvatarId avatar) const override { return avatar != unwanted; }
 
   std::map<AvatarId, Pose> shown;
@@ -110,13 +109,13 @@ TEST(ReplicaSet, ShowsFromTheStatesOn) {
   Screen screen;
   ReplicaSet view(server.library(), kTickS, 100);
   for (int i = 0; i < 30; ++i) (void)server.Step();
-  ASSERT_TRUE(view.Take(server.Step(), screen));
+  ASSERT_TRUE(view.Apply(server.Step(), screen));
   EXPECT_EQ(view.avatar_count(), 0u);
-  ASSERT_TRUE(view.Take(server.States(), screen));
+  ASSERT_TRUE(view.Apply(server.States(), screen));
   EXPECT_EQ(server.Same(screen), 5);
   EXPECT_TRUE(screen.stamps[1].discontinuity);
   for (int i = 0; i < 200; ++i) {
-    ASSERT_TRUE(view.Take(server.Step(), screen));
+    ASSERT_TRUE(view.Apply(server.Step(), screen));
     ASSERT_EQ(server.Same(screen), 5);
   }
   EXPECT_FALSE(screen.stamps[1].discontinuity);
@@ -126,18 +125,18 @@ TEST(ReplicaSet, StepsOfOneTickAreShownOnceAndPartsWaitForEachOther) {
   Server server(5);
   Screen screen;
   ReplicaSet view(server.library(), kTickS, 100);
-  ASSERT_TRUE(view.Take(server.Step(), screen));  // all are new: states
+  ASSERT_TRUE(view.Apply(server.Step(), screen));  // all are new: states
   ASSERT_EQ(server.Same(screen), 5);
   const std::uint64_t before = screen.stamps[1].tick;
-  ASSERT_TRUE(view.Take(server.Step(1), screen));
+  ASSERT_TRUE(view.Apply(server.Step(1), screen));
   EXPECT_EQ(screen.stamps[1].tick, before);
   Movements first = server.Step();
   Movements second = server.Empty();
   first.parts = second.parts = 2;
   second.part = 1;
-  ASSERT_TRUE(view.Take(first, screen));
+  ASSERT_TRUE(view.Apply(first, screen));
   EXPECT_EQ(screen.stamps[1].tick, before);
-  ASSERT_TRUE(view.Take(second, screen));
+  ASSERT_TRUE(view.Apply(second, screen));
   EXPECT_EQ(server.Same(screen), 5);
 }
 
@@ -145,24 +144,24 @@ TEST(ReplicaSet, KnowsNobodyBehindAGapUntilStatesCome) {
   Server server(5);
   Screen screen;
   ReplicaSet view(server.library(), kTickS, 100);
-  ASSERT_TRUE(view.Take(server.Step(), screen));
-  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Take(server.Step(), screen));
+  ASSERT_TRUE(view.Apply(server.Step(), screen));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Apply(server.Step(), screen));
   (void)server.Step();
-  ASSERT_TRUE(view.Take(server.Step(), screen));
+  ASSERT_TRUE(view.Apply(server.Step(), screen));
   EXPECT_EQ(view.avatar_count(), 0u);
   EXPECT_EQ(screen.gone.size(), 5u);
-  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Take(server.Step(), screen));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Apply(server.Step(), screen));
   EXPECT_EQ(server.Same(screen), 0);
-  ASSERT_TRUE(view.Take(server.States(), screen));
+  ASSERT_TRUE(view.Apply(server.States(), screen));
   for (int i = 0; i < 50; ++i) {
-    ASSERT_TRUE(view.Take(server.Step(), screen));
+    ASSERT_TRUE(view.Apply(server.Step(), screen));
     ASSERT_EQ(server.Same(screen), 5);
   }
   // A part that is missing is a gap, too.
   Movements half = server.Step();
   half.parts = 2;
   half.part = 1;
-  ASSERT_TRUE(view.Take(half, screen));
+  ASSERT_TRUE(view.Apply(half, screen));
   EXPECT_EQ(view.avatar_count(), 0u);
 }
 
@@ -171,12 +170,12 @@ TEST(ReplicaSet, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
   Screen screen;
   screen.unwanted = 2;
   ReplicaSet view(server.library(), kTickS, 3);
-  ASSERT_TRUE(view.Take(server.Step(), screen));
+  ASSERT_TRUE(view.Apply(server.Step(), screen));
   EXPECT_EQ(view.avatar_count(), 3u);  // 1, 3, 4
   Movements message = server.Step();
   Server::Add(message, 3, protocol::kMovementGone);
   Server::Add(message, 5, protocol::kMovementGone);
-  ASSERT_TRUE(view.Take(message, screen));
+  ASSERT_TRUE(view.Apply(message, screen));
   EXPECT_EQ(view.avatar_count(), 2u);
   EXPECT_EQ(screen.gone, std::set<AvatarId>{3});
 }
@@ -188,7 +187,7 @@ TEST(ReplicaSet, ARecordThatIsNoneIsRefused) {
   Movements message = server.Step();
   message.records.pop_back();
   --message.ends.back();
-  const Status status = view.Take(message, screen);
+  const Status status = view.Apply(message, screen);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
 }

@@ -3,9 +3,9 @@
 # prints that number. A crowd is held if a run of stridewire-load crosses none of the thresholds; as other
 # programs may have been in its way, it has two tries. What each try measured goes to stderr.
 #
-#   tests/load/largest_crowd.sh
-#   tests/load/largest_crowd.sh --from 5000 --to 40000 --within 500 --seconds 60
-#   tests/load/largest_crowd.sh --fail-if 'ticks_missed>0' --fail-if 'tick_ms.p99>10' -- --partial-observers 100
+#   tests/bench/largest_crowd.sh
+#   tests/bench/largest_crowd.sh --from 5000 --to 40000 --within 500 --seconds 60
+#   tests/bench/largest_crowd.sh --fail-if 'ticks_missed>0' --fail-if 'tick_ms.p99>10' -- --partial-observers 100
 #
 #   --from N, --to N  a crowd that is held for sure, and one that is not (default: 1000, 60000)
 #   --within N        how near the number has to be (default: 500)

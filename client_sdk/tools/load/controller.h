@@ -53,7 +53,7 @@ class Controller final : public Session {
   struct Pending {
     Command command = Command::kJoin;
     std::vector<protocol::AvatarId> avatars;  ///< kSpawn
-    std::uint64_t items = 0;                      ///< kRequest
+    std::uint64_t items = 0;                  ///< kRequest
   };
   struct Walker {
     Wanderer wanderer;

@@ -76,16 +76,16 @@ class Observer final : public Session {
     int index = 0;
     std::size_t joint_count = 0;
     std::vector<protocol::AvatarId> watched;  ///< Growing; empty: all
-    std::vector<Seen> seen;                       ///< Of each of them
-    std::uint64_t back_tick = 0;                  ///< First seen on this connection; 0: none yet
-    protocol::CompactCodecs codecs;               ///< Of compact poses, if the server tells them
+    std::vector<Seen> seen;                   ///< Of each of them
+    std::uint64_t back_tick = 0;              ///< First seen on this connection; 0: none yet
+    protocol::CompactCodecs codecs;           ///< Of compact poses, if the server tells them
     /// Only to measure latency: all poses, as they came, each with room for the longest.
     std::vector<std::byte> last_poses;
     std::vector<std::size_t> last_sizes;
     std::size_t most_pose_bytes = 0;
     std::vector<Stream> streams;
     std::unique_ptr<client::ReplicaSet> evaluated;  ///< In mode movement.
-    std::uint64_t batches_dropped = 0;                ///< As the server told on this connection
+    std::uint64_t batches_dropped = 0;              ///< As the server told on this connection
   };
 
   void OnWelcome() override;

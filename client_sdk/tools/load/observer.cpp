@@ -45,8 +45,7 @@ void Observer::WatchSome(std::size_t which) {
   avatar_count_ = some;
 }
 
-std::optional<std::size_t> Observer::IndexIn(const World& world,
-                                             protocol::AvatarId number) const {
+std::optional<std::size_t> Observer::IndexIn(const World& world, protocol::AvatarId number) const {
   if (!run_.layout.IsOurs(world.index, number))
     return std::nullopt;  // Somebody else's, in our world.
   if (world.watched.empty()) return run_.layout.IndexIn(number);
@@ -176,8 +175,8 @@ class BatchScreen final : public client::PoseSink {
       : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),
         wants_(std::move(wants)) {}
 
-  void Show(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
-            ConstPoseSpan pose) override {
+  void OnPose(protocol::AvatarId avatar, std::uint16_t, const client::PoseStamp& stamp,
+              ConstPoseSpan pose) override {
     const std::size_t begin = poses.size();
     poses.resize(begin + bytes_);
     const Status encoded = protocol::EncodePose(protocol::PoseMode::kFull, pose.root_position_m,
@@ -189,7 +188,7 @@ class BatchScreen final : public client::PoseSink {
         static_cast<std::uint8_t>((stamp.discontinuity ? protocol::kPoseDiscontinuity : 0) |
                                   (stamp.standing ? protocol::kPoseStanding : 0)));
   }
-  void Gone(protocol::AvatarId) override {}
+  void OnGone(protocol::AvatarId) override {}
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override { return wants_(avatar); }
 
   std::vector<protocol::AvatarId> avatars;
@@ -210,10 +209,9 @@ void Observer::OnMovements(const protocol::Movements& movements, std::size_t fra
     return Lose("movements of a world that is not observed");
   }
   World& world = worlds_[found->second];
-  BatchScreen screen(world.joint_count, [&](protocol::AvatarId avatar) {
-    return IndexIn(world, avatar).has_value();
-  });
-  if (const Status taken = world.evaluated->Take(movements, screen); !taken) {
+  BatchScreen screen(world.joint_count,
+                     [&](protocol::AvatarId avatar) { return IndexIn(world, avatar).has_value(); });
+  if (const Status taken = world.evaluated->Apply(movements, screen); !taken) {
     return Invalid(world, movements.tick, Describe(taken.error()));
   }
   if (run_.window.Contains(movements.tick)) counts_.bytes_received += frame_bytes;
