@@ -201,7 +201,7 @@ TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
   User user(server.port());
   user.Spawn(30);  // at x = 1 to 30 m
   const stridewire_rate_ring rings[] = {{10.5, 1}, {20.5, 2}};
-  stridewire_pose_detail details[] = {STRIDEWIRE_DETAIL_ALL, STRIDEWIRE_DETAIL_FEWER};
+  stridewire_pose_detail details[] = {STRIDEWIRE_DETAIL_ALL, STRIDEWIRE_DETAIL_REDUCED};
   stridewire_region region{0.0, 0.0, 100.0, -1.0, rings, 2, details};
   stridewire_observation observation{};
   observation.mode = STRIDEWIRE_FULL;
@@ -213,7 +213,7 @@ TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
   details[1] = static_cast<stridewire_pose_detail>(3);
   EXPECT_EQ(user.client.ObserveRegion(user.world, observation, region).status(),
             STRIDEWIRE_INVALID_ARGUMENT);
-  details[1] = STRIDEWIRE_DETAIL_FEWER;
+  details[1] = STRIDEWIRE_DETAIL_REDUCED;
   std::uint32_t subscription = 0;
   ASSERT_TRUE(user.client.ObserveRegion(user.world, observation, region, &subscription));
   // Avatars up to `all` and up to `fewer` are shown so, the others by their root.
@@ -223,7 +223,7 @@ TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
         client::Pose pose;
         if (!user.client.LatestPose(user.world, avatar, pose) || pose.missing()) return false;
         const int detail = avatar <= all     ? STRIDEWIRE_DETAIL_ALL
-                           : avatar <= fewer ? STRIDEWIRE_DETAIL_FEWER
+                           : avatar <= fewer ? STRIDEWIRE_DETAIL_REDUCED
                                              : STRIDEWIRE_DETAIL_ROOT;
         if (pose.detail != detail) return false;
       }
@@ -318,7 +318,7 @@ TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
   User root(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
   const std::array<std::pair<User*, stridewire_pose_detail>, 3> observers = {
       {{&all, STRIDEWIRE_DETAIL_ALL},
-       {&fewer, STRIDEWIRE_DETAIL_FEWER},
+       {&fewer, STRIDEWIRE_DETAIL_REDUCED},
        {&root, STRIDEWIRE_DETAIL_ROOT}}};
   for (const auto& [observer, detail] : observers) {
     ASSERT_TRUE(observer->client.Observe(
@@ -713,7 +713,7 @@ TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
   };
   ASSERT_TRUE(until([&] { return sample(before); }));
   ASSERT_TRUE(user.client.SetLayers(
-      user.world, {client::LayerOn(1, "wave", 1.0, 0.1), client::LayerOn(1, "dance")}));
+      user.world, {client::StartLayer(1, "wave", 1.0, 0.1), client::StartLayer(1, "dance")}));
   const auto refused = user.Next(STRIDEWIRE_EVENT_ITEM);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->item_index, 1u);
@@ -729,7 +729,7 @@ TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
   for (const char* name : {"Hips", "LeftUpLeg", "RightLeg", "LeftFoot"}) {
     EXPECT_FALSE(turned(name)) << name;
   }
-  ASSERT_TRUE(user.client.SetLayers(user.world, {client::LayerOff(1, "wave", 0.1)}));
+  ASSERT_TRUE(user.client.SetLayers(user.world, {client::FadeOutLayer(1, "wave", 0.1)}));
   EXPECT_TRUE(until([&] { return sample(pose) && !turned("RightArm"); }));
   EXPECT_EQ(daemon.Terminate(), 0);
 }
@@ -738,7 +738,7 @@ TEST(ClientAndServer, AWalkArrives) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
-  ASSERT_TRUE(user.client.Request(user.world, {client::WalkTo(1, 7, 1.2, 0.0, 0.8, 0.5)}));
+  ASSERT_TRUE(user.client.Request(user.world, {client::WalkTo(1, 7, {1.2, 0.0, 0.8}, 0.5)}));
   auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
   int steps = 0;
   for (; finished && finished->kind != STRIDEWIRE_KIND_STAND; ++steps) {
@@ -758,7 +758,7 @@ TEST(ClientAndServer, AStepGoesToItsFootprint) {
   User user(daemon.port());
   user.Spawn(1);
   ASSERT_TRUE(user.client.Request(
-      user.world, {client::StepTo(1, 7, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT)}));
+      user.world, {client::StepTo(1, 7, {1.1, 0.0, 0.45}, 0.0, STRIDEWIRE_FOOT_LEFT)}));
   const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
   ASSERT_TRUE(strike);
   EXPECT_EQ(strike->foot, STRIDEWIRE_FOOT_LEFT);
@@ -775,8 +775,8 @@ TEST(ClientAndServer, AStepOutOfReachIsRejectedIfItMustBeMet) {
             STRIDEWIRE_INVALID_ARGUMENT);
   ASSERT_TRUE(user.client.Request(
       user.world,
-      {client::ExactOnly(client::StepTo(1, 7, 1.1, 0.0, 5.0, 0.0, STRIDEWIRE_FOOT_LEFT)),
-       client::ExactOnly(client::StepTo(1, 8, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT))}));
+      {client::ExactOnly(client::StepTo(1, 7, {1.1, 0.0, 5.0}, 0.0, STRIDEWIRE_FOOT_LEFT)),
+       client::ExactOnly(client::StepTo(1, 8, {1.1, 0.0, 0.45}, 0.0, STRIDEWIRE_FOOT_LEFT))}));
   const auto rejected = user.Next(STRIDEWIRE_EVENT_REJECTED);
   ASSERT_TRUE(rejected);
   EXPECT_EQ(rejected->request_id, 7u);

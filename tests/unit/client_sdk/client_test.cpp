@@ -198,7 +198,9 @@ TEST_F(ClientTest, GivesRawAndInterpolatedPoses) {
   EXPECT_TRUE(pose.missing());
   EXPECT_EQ(client_->SamplePose(77, 1, between_s, pose).status(), STRIDEWIRE_NO_SUCH_WORLD);
   float small[4];
-  EXPECT_EQ(stridewire_client_sample_pose(client_->get(), world_, 1, between_s, &pose, small, 1),
+  pose.rotations_xyzw = small;
+  pose.joint_capacity = 1;
+  EXPECT_EQ(stridewire_client_sample_pose(client_->get(), world_, 1, between_s, &pose),
             STRIDEWIRE_BUFFER_TOO_SMALL);
   EXPECT_EQ(pose.joint_count, 3u);
 
@@ -472,11 +474,11 @@ TEST(ClientArguments, NullAndNonsenseAreAnswered) {
   observation.avatar_count = 3;
   EXPECT_EQ(stridewire_client_observe(client, 1, &observation, nullptr, nullptr),
             STRIDEWIRE_INVALID_ARGUMENT);
-  stridewire_pose pose;
-  EXPECT_EQ(stridewire_client_sample_pose(client, 1, 1, std::nan(""), &pose, nullptr, 0),
+  stridewire_pose pose{};
+  EXPECT_EQ(stridewire_client_sample_pose(client, 1, 1, std::nan(""), &pose),
             STRIDEWIRE_OUT_OF_RANGE);
-  EXPECT_EQ(stridewire_client_latest_pose(client, 1, 1, &pose, nullptr, 5),
-            STRIDEWIRE_INVALID_ARGUMENT);
+  pose.joint_capacity = 5;
+  EXPECT_EQ(stridewire_client_latest_pose(client, 1, 1, &pose), STRIDEWIRE_INVALID_ARGUMENT);
   EXPECT_EQ(stridewire_client_wait_event(client, -1.0), STRIDEWIRE_INVALID_ARGUMENT);
   EXPECT_EQ(stridewire_client_wait_event(client, 0.0), STRIDEWIRE_TIMEOUT);
   double time_s = 0.0;
