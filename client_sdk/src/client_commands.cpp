@@ -229,7 +229,7 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
       // Copies at most one byte more than a name may have: a longer name is rejected in any case.
       message.items.push_back({.avatar = l.avatar,
                                .layer = {l.name, strnlen(l.name, protocol::kMaxNameBytes + 1)},
-                               .is_off = l.fade_out != 0,
+                               .fade_out = l.fade_out != 0,
                                .weight = l.weight,
                                .blend_s = l.blend_s,
                                .speed = l.speed});
@@ -247,7 +247,7 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
   return Submit(client, command, [&](Session& session, std::uint64_t& id) {
     protocol::SetPlanting message;
     message.avatars.assign(planting->avatars, planting->avatars + planting->avatar_count);
-    message.is_off = planting->enabled == 0;
+    message.enabled = planting->enabled != 0;
     return session.SetPlanting(world, std::move(message), id);
   });
 }

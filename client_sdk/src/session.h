@@ -174,7 +174,7 @@ class Session {
     std::deque<Command> unsent;
     std::map<protocol::SubscriptionId, Subscription> subscriptions;
     std::map<protocol::AvatarId, protocol::Placement> spawned;  ///< Ours, and where they are.
-    std::uint64_t told_dropped_batches = 0;                         ///< By the last Lagging.
+    std::uint64_t told_dropped_batches = 0;                     ///< By the last Lagging.
     std::unique_ptr<WorldView> view;
     std::unique_ptr<ReplicaSet> evaluated;  ///< While movements are observed.
     std::optional<protocol::TerrainInfo> terrain;

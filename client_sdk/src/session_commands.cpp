@@ -9,7 +9,8 @@ namespace stridewire::client {
 
 namespace {
 
-// Of an avatar whose poses are evaluated here: its part of the memory that all may have besides their histories.
+// Of an avatar whose poses are evaluated here: its part of the memory that all may have besides
+// their histories.
 constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 
 }  // namespace
@@ -37,7 +38,8 @@ void Session::Pump() {
     if (status) {
       ++commands_resent_;
     } else {
-      // It could be encoded before; a server that has lowered its limits since gets a gap and says so.
+      // It could be encoded before; a server that has lowered its limits since gets a gap and says
+      // so.
       last_text_ = Describe(status.error());
     }
   }
@@ -70,7 +72,7 @@ Session::Readiness Session::PrepareMovements(World& world, const Command& comman
       !world.subscriptions.contains(observe->subscription) || !Understands(command.message)) {
     return Readiness::kReady;
   }
-  auto library = libraries_.Want(world.view->library_hash());
+  auto library = libraries_.Get(world.view->library_hash());
   if (!library) {
     world.subscriptions.erase(observe->subscription);
     UpdateFilter(world);
@@ -85,20 +87,20 @@ Session::Readiness Session::PrepareMovements(World& world, const Command& comman
   if (*library == nullptr) return Readiness::kWaits;
   if (world.evaluated == nullptr) {
     world.evaluated = std::make_unique<ReplicaSet>(*library, 1.0 / tick_hz_,
-                                                     options_.max_pose_bytes / kReplicaBytes);
+                                                   options_.max_pose_bytes / kReplicaBytes);
   }
   return Readiness::kReady;
 }
 
 void Session::AskForLibraries() {
   if (state_ != State::kReady || (features_ & protocol::kFeatureMovementMode) == 0) return;
-  const auto may_ask = [&](const std::string& hash) {
+  const auto may_request = [&](const std::string& hash) {
     return std::ranges::any_of(worlds_, [&](const auto& item) {
       const World& world = item.second;
       return world.server_id != 0 && world.view->library_hash() == hash;
     });
   };
-  if (const auto question = libraries_.TakeQuestion(may_ask)) {
+  if (const auto question = libraries_.TakeRequest(may_request)) {
     const Status status = encoder_.Encode(*question, output_);
     if (!status) last_text_ = Describe(status.error());
   }

@@ -316,7 +316,7 @@ void Session::Handle(const protocol::PoseBatch& message, double now_s) {
   if (world == nullptr || !world->view->has_info() || world->subscriptions.empty()) return;
   clock_.AddSample(now_s, message.info.server_time_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, message.info.mode);
-  if (Status status = world->view->Take(message, every_n_ticks, counts_); !status) {
+  if (Status status = world->view->Apply(message, every_n_ticks, counts_); !status) {
     BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }
 }
@@ -330,7 +330,7 @@ void Session::Handle(const protocol::Movements& message, double now_s) {
   if (world == nullptr || world->evaluated == nullptr) return;
   clock_.AddSample(now_s, message.server_time_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
-  if (Status status = world->view->Take(message, *world->evaluated, every_n_ticks, counts_);
+  if (Status status = world->view->Apply(message, *world->evaluated, every_n_ticks, counts_);
       !status) {
     BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }

@@ -170,7 +170,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     }
     std::span<const std::uint32_t> left = all;
     while (!left.empty() && status) {
-      const auto part = left.first(composer.Fitting(rows, left));
+      const auto part = left.first(composer.CountThatFit(rows, left));
       frame.clear();
       status = composer.Compose(rows, part, {}, frame);
       left = left.subspan(part.size());

@@ -242,7 +242,7 @@ TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
 
   // Compact ones: a good pose with some bits changed.
   for (const auto& [name, mode] : {std::pair("pose_batch_compact", PoseMode::kCompact),
-                                   std::pair("pose_batch_fewer", PoseMode::kCompactFewer),
+                                   std::pair("pose_batch_fewer", PoseMode::kCompactReduced),
                                    std::pair("pose_batch_root", PoseMode::kCompactRoot)}) {
     SCOPED_TRACE(name);
     const CompactCodec& codec = *SampleCodecs().Find(mode);

@@ -35,9 +35,9 @@ std::string BytesOf(ConstPoseSpan pose) {
 bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
 #ifdef __SANITIZE_ADDRESS__
-constexpr int kFewer = 10;  // of all: twenty times as slow
+constexpr int kReduced = 10;  // of all: twenty times as slow
 #else
-constexpr int kFewer = 1;
+constexpr int kReduced = 1;
 #endif
 
 struct Manner {
@@ -121,7 +121,7 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   SoaPoseEvaluator evaluator(*library_, 1);
   Figures figures;
   constexpr int kTicks = 3000;
-  for (int round = 0; figures.movements < manner.movements / kFewer; ++round) {
+  for (int round = 0; figures.movements < manner.movements / kReduced; ++round) {
     RandomlyDriven driven(library_, random);
     AvatarSimulation& avatar = driven.avatar();
     AvatarReplica first(library_);
@@ -213,7 +213,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
 TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261125;
-  constexpr int kTicks = 400 / kFewer;
+  constexpr int kTicks = 400 / kReduced;
   constexpr std::size_t kAvatars = 20;
   struct Tick {
     std::vector<Bytes> records;

@@ -67,7 +67,7 @@ inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                           {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
   info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
   info.rotation_codes = RotationCodes();
-  info.fewer_joints = FewerJoints();
+  info.reduced_joints = FewerJoints();
   return info;
 }
 

@@ -211,7 +211,7 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
                 "--mode " + mode);
   }
   if (detail == "fewer") {
-    options.detail = protocol::PoseDetail::kFewer;
+    options.detail = protocol::PoseDetail::kReduced;
   } else if (detail == "root") {
     options.detail = protocol::PoseDetail::kRoot;
   } else if (detail != "all") {

@@ -12,7 +12,7 @@ const char* ModeName(protocol::PoseMode mode) {
     case protocol::PoseMode::kFull: return "full";
     case protocol::PoseMode::kQuantised:
     case protocol::PoseMode::kCompact: return "quantised";
-    case protocol::PoseMode::kCompactFewer: return "quantised, fewer joints";
+    case protocol::PoseMode::kCompactReduced: return "quantised, fewer joints";
     case protocol::PoseMode::kCompactRoot: return "quantised, the root";
     case protocol::PoseMode::kMovement: return "movement";
   }

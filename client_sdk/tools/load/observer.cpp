@@ -27,7 +27,8 @@ Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint&
   }
 }
 
-// Each as far from the next one as the last of them, and one further than those of the observer before.
+// Each as far from the next one as the last of them, and one further than those of the observer
+// before.
 void Observer::WatchSome(std::size_t which) {
   const std::size_t all = avatar_count_;
   const std::size_t some = std::min(static_cast<std::size_t>(run_.options.partial_avatars), all);
@@ -105,7 +106,7 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
   if (protocol::IsCompact(SentMode())) {
     std::vector<std::int16_t> parents;
     for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
-    auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.fewer_joints);
+    auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints);
     const protocol::CompactCodec* codec = codecs ? codecs->Find(SentMode()) : nullptr;
     if (codec == nullptr) return Lose("a world without codes for its compact poses");
     world.most_pose_bytes = std::max(world.most_pose_bytes, codec->pose_bytes());

@@ -73,7 +73,7 @@ class RegionMembers {
   [[nodiscard]] const Ring& RingAt(double distance_m2) const;
   void SumUp();
 
-  protocol::GroundPlace centre_m_;
+  protocol::GroundPoint centre_m_;
   double radius_m_ = 0.0;
   double leave_at_m_ = 0.0;
   [[nodiscard]] std::span<const Ring> rings() const { return std::span(rings_).first(ring_count_); }

@@ -494,10 +494,10 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
     for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
   }
   std::vector<RotationQuantization> codes;
-  std::vector<std::uint16_t> fewer_joints;
+  std::vector<std::uint16_t> reduced_joints;
   if ((features_ & protocol::kFeatureCompact) != 0) {
     codes = world.codes->joints;
-    if ((features_ & protocol::kFeatureDetail) != 0) fewer_joints = world.codes->fewer_joints;
+    if ((features_ & protocol::kFeatureDetail) != 0) reduced_joints = world.codes->reduced_joints;
   }
   Send(protocol::WorldInfo{.seq = seq,
                            .world = world.id,
@@ -508,7 +508,7 @@ void Session::SendWorldInfo(Seq seq, const Membership& membership) {
                            .skeleton = ToWire(world.library->skeleton()),
                            .layers = std::move(layers),
                            .rotation_codes = std::move(codes),
-                           .fewer_joints = std::move(fewer_joints)});
+                           .reduced_joints = std::move(reduced_joints)});
 }
 
 void Session::SendTerrain(const World& world, bool also_flat) {

@@ -271,7 +271,7 @@ void Session::Execute(protocol::SetPlanting&& command) {
            "the feature 'planting' was not agreed on in the handshake");
     return;
   }
-  SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, !command.is_off});
+  SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, command.enabled});
 }
 
 void Session::Execute(protocol::SetTerrain&& command) {

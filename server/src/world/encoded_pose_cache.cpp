@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kRootBytes = sizeof(Vec3);
 constexpr unsigned kModes = PoseScratch::kModes;  // bits of each kind in Others::flags
 constexpr std::size_t kPieceBytes = protocol::CompactCodec::kPieceBytes;
-static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMostBehind + 1);
+static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMaxTrailingPieces + 1);
 
 }  // namespace
 

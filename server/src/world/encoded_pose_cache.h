@@ -110,7 +110,7 @@ class EncodedPoseCache {
 
   struct Encoded {
     std::span<const std::byte> bytes;  ///< Empty: the pose can not be told
-    bool is_wide = false;              ///< As in kQuantised (kPoseWide)
+    bool is_wide = false;              ///< As in kQuantised (kPoseUncompressed)
   };
   /// This step's, of who has it. `mode` is one of SetModes.
   [[nodiscard]] Encoded Of(const Place& place, protocol::PoseMode mode) const;

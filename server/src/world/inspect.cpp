@@ -60,7 +60,7 @@ protocol::AvatarState Inspect(const AvatarSimulation& avatar, std::size_t max_si
   if (const AvatarEvent* started = avatar.started()) {
     state.movement = CurrentMovementOf(avatar, *started, max_site_bytes);
   }
-  state.is_planting_off = !avatar.foot_planting();
+  state.planting_enabled = avatar.foot_planting();
   for (const LayerStack::Playing& playing : avatar.layers().playing()) {
     state.layers.push_back(
         {.layer =

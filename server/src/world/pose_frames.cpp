@@ -20,13 +20,13 @@ std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
     return SharedFrame(std::move(frame));
   };
   std::vector<std::span<const std::uint32_t>> parts;
-  std::size_t fitting = composer.Fitting(rows, picked);
+  std::size_t fitting = composer.CountThatFit(rows, picked);
   if (fitting == picked.size()) return {compose(picked, 0, 1)};
   while (!picked.empty() && parts.size() < protocol::kMaxBatchParts) {
     STRIDEWIRE_CHECK(fitting > 0);  // the smallest frame limit holds several of kMaxJoints
     parts.push_back(picked.first(fitting));
     picked = picked.subspan(fitting);
-    fitting = composer.Fitting(rows, picked);
+    fitting = composer.CountThatFit(rows, picked);
   }
   metrics.pose_errors.Add(picked.size());
   std::vector<SharedFrame> frames;

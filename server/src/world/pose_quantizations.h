@@ -13,7 +13,7 @@ namespace stridewire::server {
 /// How the compact poses of a library's worlds are told.
 struct PoseCodes {
   std::vector<RotationQuantization> joints;
-  std::vector<std::uint16_t> fewer_joints;  ///< Told at protocol::PoseDetail::kFewer.
+  std::vector<std::uint16_t> reduced_joints;  ///< Told at protocol::PoseDetail::kReduced.
   protocol::CompactCodecs codecs;
 };
 

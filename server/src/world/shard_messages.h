@@ -126,7 +126,7 @@ struct StatesAnswer {
 /// Modes in which poses are sent, in the order of their numbers.
 inline constexpr std::array kSentModes{
     protocol::PoseMode::kFull, protocol::PoseMode::kQuantised, protocol::PoseMode::kCompact,
-    protocol::PoseMode::kCompactFewer, protocol::PoseMode::kCompactRoot};
+    protocol::PoseMode::kCompactReduced, protocol::PoseMode::kCompactRoot};
 /// A mode's place among them.
 [[nodiscard]] constexpr std::size_t ModeIndex(protocol::PoseMode mode) {
   return static_cast<std::size_t>(mode) - (mode > protocol::PoseMode::kMovement ? 1 : 0);

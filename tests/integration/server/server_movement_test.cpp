@@ -238,7 +238,7 @@ class Crowd {
     client_.Send(protocol::SetLayers{
         .seq = client_.NextSeq(), .world = world_, .items = {{avatar, "wave"}}});
     client_.Send(protocol::SetPlanting{
-        .seq = client_.NextSeq(), .world = world_, .avatars = {avatar}, .is_off = true});
+        .seq = client_.NextSeq(), .world = world_, .avatars = {avatar}, .enabled = false});
     ASSERT_TRUE(client_.Await<protocol::Reply>());
     ASSERT_TRUE(client_.Await<protocol::Reply>());
   }

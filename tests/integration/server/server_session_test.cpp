@@ -884,27 +884,27 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
   const auto world = client.Join("hall");
   ASSERT_TRUE(world);
   ASSERT_TRUE(client.Spawn(world->world, {{1, {}}, {2, {}}, {3, {}}}));
-  const auto set = [&](RawClient& who, std::vector<protocol::AvatarId> avatars, bool is_off) {
+  const auto set = [&](RawClient& who, std::vector<protocol::AvatarId> avatars, bool enabled) {
     who.Send(protocol::SetPlanting{
-        .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .is_off = is_off});
+        .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .enabled = enabled});
     return who.Await<Reply>();
   };
-  const auto is_off = [&](protocol::AvatarId avatar) {
+  const auto is_enabled = [&](protocol::AvatarId avatar) {
     client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
     const auto state = client.Await<protocol::AvatarState>();
     EXPECT_TRUE(state && state->code == StatusCode::kOk);
-    return state->is_planting_off;
+    return state->planting_enabled;
   };
-  const auto reply = set(client, {1, 9, 3}, true);
+  const auto reply = set(client, {1, 9, 3}, false);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->code, StatusCode::kOk);
   EXPECT_EQ(reply->accepted, 2u);
   ASSERT_EQ(reply->items.size(), 1u);
   EXPECT_EQ(reply->items[0].index, 1u);
   EXPECT_EQ(reply->items[0].code, StatusCode::kNoSuchAvatar);
-  EXPECT_TRUE(is_off(1));
-  EXPECT_FALSE(is_off(2));
-  EXPECT_TRUE(is_off(3));
+  EXPECT_FALSE(is_enabled(1));
+  EXPECT_TRUE(is_enabled(2));
+  EXPECT_FALSE(is_enabled(3));
 
   const protocol::StepMovement must{.foot = protocol::FootChoice::kLeft,
                                     .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0},
@@ -914,17 +914,17 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
   EXPECT_EQ(sliding->accepted, 1u);
   ASSERT_EQ(sliding->items.size(), 1u);
   EXPECT_EQ(sliding->items[0].code, StatusCode::kNoMovement);
-  ASSERT_TRUE(set(client, {1}, false));
-  EXPECT_FALSE(is_off(1));
+  ASSERT_TRUE(set(client, {1}, true));
+  EXPECT_TRUE(is_enabled(1));
   EXPECT_EQ(client.Request(world->world, {{1, 9, must}})->accepted, 1u);
 
   RawClient observer = server.Connect();
   ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
-  EXPECT_EQ(set(observer, {1}, true)->code, StatusCode::kNotAllowed);
+  EXPECT_EQ(set(observer, {1}, false)->code, StatusCode::kNotAllowed);
   RawClient old = server.Connect();
   ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
   ASSERT_TRUE(old.Join("hall"));
-  EXPECT_EQ(set(old, {1}, true)->code, StatusCode::kUnsupported);
+  EXPECT_EQ(set(old, {1}, false)->code, StatusCode::kUnsupported);
 }
 
 TEST_F(ServerSessionOfOne, StepsToAFootprint) {

@@ -268,7 +268,7 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
   const auto world = client.Join("w");
   const auto old_world = old.Join("w", protocol::Role::kObserver);
   ASSERT_TRUE(world && old_world);
-  EXPECT_TRUE(old_world->fewer_joints.empty());
+  EXPECT_TRUE(old_world->reduced_joints.empty());
   const auto observe = [&](RawClient& who, PoseDetail detail, std::uint16_t every_n_ticks = 1) {
     who.Send(protocol::Observe{.seq = who.NextSeq(),
                                .world = world->world,
@@ -280,16 +280,16 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
                                .detail = detail});
     return who.Await<protocol::Reply>()->code;
   };
-  EXPECT_EQ(observe(old, PoseDetail::kFewer), StatusCode::kUnsupported);
+  EXPECT_EQ(observe(old, PoseDetail::kReduced), StatusCode::kUnsupported);
   EXPECT_EQ(observe(old, PoseDetail::kAll), StatusCode::kOk);
 
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
   const auto codecs =
-      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->fewer_joints).value();
+      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->reduced_joints).value();
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   ASSERT_TRUE(client.Request(world->world, Steps(1, 40, 0.6)));
-  constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot};
+  constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kRoot};
   // Those of the root come half as often.
   for (const PoseDetail detail : kDetails) {
     ASSERT_EQ(observe(client, detail, detail == PoseDetail::kRoot ? 2 : 1), StatusCode::kOk);
@@ -314,17 +314,17 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
   }
   EXPECT_EQ(bytes[PoseMode::kCompactRoot], 18u);
   // Toys hardly have what could be left out.
-  EXPECT_LE(bytes[PoseMode::kCompactFewer], bytes[PoseMode::kCompact]);
+  EXPECT_LE(bytes[PoseMode::kCompactReduced], bytes[PoseMode::kCompact]);
   int compared = 0;
   for (const auto& [tick, modes] : seen) {
     if (modes.size() < 3) continue;
     ++compared;
     for (std::size_t j = 0; j < parents.size(); ++j) {
       const bool is_told =
-          std::ranges::binary_search(world->fewer_joints, static_cast<std::uint16_t>(j));
+          std::ranges::binary_search(world->reduced_joints, static_cast<std::uint16_t>(j));
       const Quat& reference = world->rotation_codes[j].reference;
       const Quat& all = modes.at(PoseMode::kCompact)[j];
-      EXPECT_EQ(modes.at(PoseMode::kCompactFewer)[j], is_told ? all : reference) << j;
+      EXPECT_EQ(modes.at(PoseMode::kCompactReduced)[j], is_told ? all : reference) << j;
       EXPECT_EQ(modes.at(PoseMode::kCompactRoot)[j], j == 0 ? all : reference) << j;
     }
   }
@@ -629,7 +629,7 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
                           .every_n_ticks = 4,
                           .detail = protocol::PoseDetail::kRoot};
   asked.region = protocol::Region{{0.0, 0.0}, 40.5, 3.0, {{10.5, 1}, {20.5, 2}}, {}};
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
   const auto observe = [&] {
     asked.seq = player.NextSeq();
     player.Send(asked);
@@ -653,7 +653,7 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   heard.ticks.clear();
   hear(200);  // two shards: 3.5 batches a tick
   shows(1, 10, PoseMode::kCompact);
-  shows(11, 20, PoseMode::kCompactFewer);
+  shows(11, 20, PoseMode::kCompactReduced);
   shows(21, 40, PoseMode::kCompactRoot);
   EXPECT_EQ(heard.mode.size(), 40u);
   for (const auto& [avatar, ticks] : heard.ticks) {
@@ -673,7 +673,7 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   ASSERT_EQ(observe(), StatusCode::kOk);
   hear(100);
   shows(1, 15, PoseMode::kCompact);
-  shows(16, 25, PoseMode::kCompactFewer);
+  shows(16, 25, PoseMode::kCompactReduced);
   shows(26, 45, PoseMode::kCompactRoot);
   // And with the Observe's detail everywhere.
   asked.region->ring_details.clear();
@@ -685,7 +685,7 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   EXPECT_TRUE(heard.left.empty());
 
   // A region is found by the detail beyond its rings.
-  asked.detail = protocol::PoseDetail::kFewer;
+  asked.detail = protocol::PoseDetail::kReduced;
   EXPECT_EQ(observe(), StatusCode::kNoSuchSubscription);
   // Without the feature rings have none.
   RawClient other = server.Connect();
@@ -716,7 +716,7 @@ TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
                           .every_n_ticks = 3600,
                           .detail = protocol::PoseDetail::kRoot};
   asked.region = protocol::Region{{0.0, 0.0}, 40.0, 3.0, {{2.0, 1}, {2.3, 1}}, {}};
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
   player.Send(asked);
   ASSERT_EQ(player.Await<Reply>(take)->code, StatusCode::kOk);
   const auto hear_until = [&](auto&& condition) {
@@ -741,7 +741,7 @@ TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
       protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {7}});
   EXPECT_TRUE(hear_until([&] { return heard.left[7] == 1; }));
   EXPECT_EQ(heard.entered[7], 1);
-  EXPECT_EQ(heard.mode[7], PoseMode::kCompactFewer);
+  EXPECT_EQ(heard.mode[7], PoseMode::kCompactReduced);
 }
 
 TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {

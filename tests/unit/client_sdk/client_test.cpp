@@ -145,11 +145,11 @@ TEST_F(ClientTest, CarriesACrowdInOneCommand) {
   const auto cancel = connection_.Expect<protocol::CancelQueue>();
   ASSERT_TRUE(cancel);
   EXPECT_EQ(cancel->avatars, (std::vector<std::uint32_t>{4, 5}));
-  for (const bool is_off : {true, false}) {
+  for (const bool enabled : {false, true}) {
     const auto planting = connection_.Expect<protocol::SetPlanting>();
     ASSERT_TRUE(planting);
-    EXPECT_EQ(planting->is_off, is_off);
-    EXPECT_EQ(planting->avatars.size(), is_off ? 2u : 1u);
+    EXPECT_EQ(planting->enabled, enabled);
+    EXPECT_EQ(planting->avatars.size(), enabled ? 1u : 2u);
   }
   const auto remove = connection_.Expect<protocol::Remove>();
   ASSERT_TRUE(remove);

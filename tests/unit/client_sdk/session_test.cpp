@@ -519,15 +519,15 @@ TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
 
 TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
   const stridewire_world world = Joined();
-  EXPECT_EQ(session_->SetPlanting(world, {0, 0, {4, 5}, true}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->SetPlanting(world, {0, 0, {4, 5}, false}, command_), STRIDEWIRE_OK);
   const auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(std::get<protocol::SetPlanting>(sent[0]).avatars,
             (std::vector<protocol::AvatarId>{4, 5}));
-  EXPECT_TRUE(std::get<protocol::SetPlanting>(sent[0]).is_off);
+  EXPECT_FALSE(std::get<protocol::SetPlanting>(sent[0]).enabled);
 
   const stridewire_world old = JoinedWithout(protocol::kFeaturePlanting);
-  EXPECT_EQ(session_->SetPlanting(old, {0, 0, {4}, true}, command_), STRIDEWIRE_OK);
+  EXPECT_EQ(session_->SetPlanting(old, {0, 0, {4}, false}, command_), STRIDEWIRE_OK);
   EXPECT_TRUE(Sent().empty());
   const auto events = Events();
   ASSERT_EQ(events.size(), 1u);
@@ -558,7 +558,7 @@ TEST_F(SessionTest, ObservesMovementsOnceItHasTheLibrary) {
   auto task = session_->TakeLibraryTask();
   ASSERT_TRUE(task);
   EXPECT_EQ(task->hash, info.library_hash);
-  session_->OnLibraryTask(task->hash, Do(*task));
+  session_->OnLibraryTask(task->hash, RunLibraryTask(*task));
   auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   const auto question = std::get<protocol::FetchLibrary>(sent[0]);
@@ -573,7 +573,7 @@ TEST_F(SessionTest, ObservesMovementsOnceItHasTheLibrary) {
   task = session_->TakeLibraryTask();
   ASSERT_TRUE(task);
   EXPECT_TRUE(Events().empty());
-  session_->OnLibraryTask(task->hash, Do(*task));
+  session_->OnLibraryTask(task->hash, RunLibraryTask(*task));
   EXPECT_TRUE(Sent().empty());
   events = Events();
   ASSERT_EQ(events.size(), 1u);

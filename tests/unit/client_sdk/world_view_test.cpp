@@ -18,7 +18,7 @@ class WorldViewTest : public testing::Test {
     const auto frame = toy::PoseFrame(1, tick, avatars, mode, shard, toy::kJoints, is_partial);
     const auto message =
         protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
-    return view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
+    return view_.Apply(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
   }
 
   PoseBudget budget_{std::size_t{1} << 20, 0};
@@ -71,13 +71,13 @@ TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
 
 // Rings of a region are of several modes; who crosses one goes on in another.
 TEST_F(WorldViewTest, WhoCrossesARingOfARegionGoesOnInAnotherDetail) {
-  constexpr auto kFewer = protocol::PoseMode::kCompactFewer;
+  constexpr auto kReduced = protocol::PoseMode::kCompactReduced;
   constexpr auto kRoot = protocol::PoseMode::kCompactRoot;
   for (std::uint64_t tick = 60; tick <= 63; ++tick) {
     const bool has_crossed = tick >= 62;
     ASSERT_TRUE(Take(
         tick, has_crossed ? std::vector<toy::AvatarAt>{{1}, {2}} : std::vector<toy::AvatarAt>{{1}},
-        0, kFewer, true));
+        0, kReduced, true));
     if (!has_crossed) {
       ASSERT_TRUE(Take(tick, {{2}}, 0, kRoot, true));
     }
@@ -86,7 +86,7 @@ TEST_F(WorldViewTest, WhoCrossesARingOfARegionGoesOnInAnotherDetail) {
   const PoseHistory& history = *view_.Find(2);
   ASSERT_EQ(history.size(), 4u);
   EXPECT_EQ(history.stamp(1).detail, protocol::PoseDetail::kRoot);
-  EXPECT_EQ(history.stamp(2).detail, protocol::PoseDetail::kFewer);
+  EXPECT_EQ(history.stamp(2).detail, protocol::PoseDetail::kReduced);
   EXPECT_FALSE(history.stamp(2).discontinuity);
   EXPECT_EQ(counts_.missing, 0u);
   EXPECT_EQ(counts_.refused, 0u);
@@ -189,7 +189,7 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
   const protocol::Message message = Decoded(frame);
   const auto& batch = std::get<protocol::PoseBatch>(message);
   view_.SetFilter(std::set<std::uint32_t>{2, 3});
-  ASSERT_TRUE(view_.Take(batch, 1, counts_));
+  ASSERT_TRUE(view_.Apply(batch, 1, counts_));
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2, 3}));
   for (const std::uint32_t avatar : {2u, 3u}) {
     const PoseHistory& history = *view_.Find(avatar);
@@ -201,9 +201,9 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
   // Of a world whose codes were not told they mean nothing.
   protocol::WorldInfo uncoded = toy::WorldInfo(1, 1, "plaza");
   uncoded.rotation_codes.clear();
-  uncoded.fewer_joints.clear();
+  uncoded.reduced_joints.clear();
   view_.SetInfo(uncoded);
-  const Status status = view_.Take(batch, 1, counts_);
+  const Status status = view_.Apply(batch, 1, counts_);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
 }
@@ -211,11 +211,11 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
 TEST_F(WorldViewTest, WhatADetailLeavesOutIsTheReference) {
   using protocol::PoseDetail;
   std::uint64_t tick = 60;
-  for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot}) {
+  for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kRoot}) {
     ++tick;
     const auto frame = toy::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail));
     const protocol::Message message = Decoded(frame);  // borrows the frame
-    ASSERT_TRUE(view_.Take(std::get<protocol::PoseBatch>(message), 1, counts_));
+    ASSERT_TRUE(view_.Apply(std::get<protocol::PoseBatch>(message), 1, counts_));
     const PoseHistory& history = *view_.Find(1);
     const std::size_t newest = history.size() - 1;
     EXPECT_EQ(history.stamp(newest).detail, detail);
@@ -233,7 +233,7 @@ TEST_F(WorldViewTest, RefusesAnotherFigureAndTicksThatRunBackwards) {
   const auto frame = toy::PoseFrame(1, 1, {{1}}, protocol::PoseMode::kFull, 0, 5);
   const auto message =
       protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
-  EXPECT_FALSE(view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_));
+  EXPECT_FALSE(view_.Apply(std::get<protocol::PoseBatch>(message.value()), 1, counts_));
   ASSERT_TRUE(Take(5, {{1}}));
   EXPECT_FALSE(Take(4, {{1}}));
 }

@@ -395,19 +395,19 @@ TEST(Check, WorldInfo) {
       with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,
       "WorldInfo.rotation_codes");
   W with_fewer = with_codes;
-  with_fewer.fewer_joints = {0, 1};
+  with_fewer.reduced_joints = {0, 1};
   EXPECT_TRUE(Check(with_fewer));
   Refused<W>(
       with_fewer, [](W& m) { m.rotation_codes.clear(); }, ErrorCode::kShapeMismatch,
       "WorldInfo.fewer_joints");
   Refused<W>(
-      with_fewer, [](W& m) { m.fewer_joints.resize(m.skeleton.joints.size() + 1); },
+      with_fewer, [](W& m) { m.reduced_joints.resize(m.skeleton.joints.size() + 1); },
       ErrorCode::kShapeMismatch, "WorldInfo.fewer_joints");
   const auto last = static_cast<std::uint16_t>(good.skeleton.joints.size());
   for (const std::vector<std::uint16_t>& wrong :
        {std::vector<std::uint16_t>{1}, {0, 0}, {0, last}, {0, 1, 1}}) {
     Refused<W>(
-        with_fewer, [&](W& m) { m.fewer_joints = wrong; }, ErrorCode::kMalformed,
+        with_fewer, [&](W& m) { m.reduced_joints = wrong; }, ErrorCode::kMalformed,
         "WorldInfo.fewer_joints");
   }
 }
@@ -469,8 +469,8 @@ TEST(Check, PoseBatch) {
       "PoseBatch.poses");
 
   // The second is wide: the first may have any length.
-  static const std::vector<std::uint8_t> one_wide = {kPoseStanding, kPoseWide};
-  static const std::vector<std::uint8_t> all_wide = {kPoseWide, kPoseWide};
+  static const std::vector<std::uint8_t> one_wide = {kPoseStanding, kPoseUncompressed};
+  static const std::vector<std::uint8_t> all_wide = {kPoseUncompressed, kPoseUncompressed};
   const std::size_t wide = PoseBytes(PoseMode::kQuantised, 3);
   const auto compact = [&](const std::vector<std::uint8_t>& of, std::size_t bytes) {
     return B{
@@ -528,7 +528,7 @@ TEST(Check, WhatMustBeMetIsThere) {
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
   EXPECT_EQ(status.error().where, "Request.at_m");
-  EXPECT_STREQ(status.error().text, "must be met and is not there");
+  EXPECT_STREQ(status.error().text, "must_be_met without at_m");
 }
 
 TEST(Check, Footprints) {

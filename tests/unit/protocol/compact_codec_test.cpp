@@ -253,7 +253,7 @@ TEST(CompactCodec, StreamsWhatItCopies) {
     block.CopyBytes(i, copied);
     alignas(64) std::array<std::byte, 128> streamed;
     streamed.fill(std::byte{0xaa});
-    const std::size_t pieces = codec.pieces() + CompactCodec::kMostBehind;
+    const std::size_t pieces = codec.pieces() + CompactCodec::kMaxTrailingPieces;
     block.StreamBytes(i, pieces, streamed.data());
     EXPECT_TRUE(std::ranges::equal(std::span(streamed).first(24), copied)) << i;
     const auto behind = std::span(streamed).subspan(pieces * CompactCodec::kPieceBytes);
@@ -308,9 +308,11 @@ TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
     return code(codes);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(with([](RotationQuantization& c) { c.smallest_three_bits = 0; }, 0), ErrorCode::kMalformed);
+  EXPECT_EQ(with([](RotationQuantization& c) { c.smallest_three_bits = 0; }, 0),
+            ErrorCode::kMalformed);
   for (const std::uint8_t bits : {1, 7, 16, 255}) {
-    EXPECT_EQ(with([&](RotationQuantization& c) { c.smallest_three_bits = bits; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.smallest_three_bits = bits; }),
+              ErrorCode::kOutOfRange);
   }
   EXPECT_EQ(with([](RotationQuantization& c) { c.bits[2] = 17; }), ErrorCode::kOutOfRange);
   for (const float bad : {nan, -2.0f, 0.0f}) {

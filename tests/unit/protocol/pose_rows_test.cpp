@@ -83,9 +83,8 @@ TEST(PoseBatchComposer, HoldsExactlyTheRowsPicked) {
 
 TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
   PoseRows rows;
-  ASSERT_TRUE(rows.Begin(
-      Info(PoseMode::kQuantised),
-      std::make_shared<const std::vector<AvatarId>>(std::vector<AvatarId>{1, 2, 3, 4, 5})));
+  ASSERT_TRUE(rows.Begin(Info(PoseMode::kQuantised), std::make_shared<const std::vector<AvatarId>>(
+                                                         std::vector<AvatarId>{1, 2, 3, 4, 5})));
   const std::vector<Quat> rotations(kJoints, kIdentityQuat);
   rows.SkipTo(1);
   ASSERT_TRUE(rows.Add(7, RootOf(2), rotations));
@@ -151,7 +150,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
       const AvatarId a = row + 1;
       ASSERT_EQ(rows.has_pose(row), has_pose(a)) << a;
       if (!has_pose(a)) continue;
-      const int wide = a % 5 == 0 ? kPoseWide : 0;
+      const int wide = a % 5 == 0 ? kPoseUncompressed : 0;
       ASSERT_EQ(decoded.batch.avatars[i], a);
       ASSERT_EQ(decoded.batch.flags[i++], (a % 4) | wide);
       ASSERT_EQ(reader.Next().size(), wide != 0 ? 24u : codec.pose_bytes());
@@ -180,7 +179,7 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
   PoseBatchComposer composer(limits);
   std::vector<std::uint32_t> picked(100);
   std::iota(picked.begin(), picked.end(), 0u);
-  const std::size_t fitting = composer.Fitting(rows, picked);
+  const std::size_t fitting = composer.CountThatFit(rows, picked);
   // All but what the batch says of itself and less than one more avatar takes.
   const std::size_t avatar_bytes = PoseBytes(PoseMode::kFull, kJoints) + sizeof(AvatarId) + 1;
   EXPECT_GT((fitting + 1) * avatar_bytes + 128, 4096u);
@@ -212,7 +211,7 @@ TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
       ASSERT_TRUE(rows.Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, numbers));
       const std::vector<Quat> rotations(joints, kIdentityQuat);
       while (rows.size() < avatars.size()) ASSERT_TRUE(rows.Add(0, Vec3(0.0f), rotations));
-      const std::size_t fitting = composer.Fitting(rows, all);
+      const std::size_t fitting = composer.CountThatFit(rows, all);
       ASSERT_GT(fitting, 0u);
       ASSERT_LT(fitting, all.size());
       std::vector<std::byte> frame;

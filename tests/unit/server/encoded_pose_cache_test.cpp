@@ -93,7 +93,7 @@ class Ahead {
         const EncodedPoseCache::Encoded told = poses_.Of(places_[i], mode);
         ASSERT_TRUE(std::ranges::equal(told.bytes, rows.poses(i, i)))
             << "step " << step_ << ", avatar " << i << ", mode " << static_cast<int>(mode);
-        ASSERT_EQ(told.is_wide, (rows.flags(i) & protocol::kPoseWide) != 0);
+        ASSERT_EQ(told.is_wide, (rows.flags(i) & protocol::kPoseUncompressed) != 0);
         wide_ += told.is_wide;
         ++poses_compared_;
       }
@@ -144,7 +144,7 @@ class Ahead {
   int poses_compared_ = 0;
 };
 
-constexpr std::array kAll{PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot};
+constexpr std::array kAll{PoseMode::kCompact, PoseMode::kCompactReduced, PoseMode::kCompactRoot};
 
 // Codes by which a bent knee can not be told.
 std::shared_ptr<const PoseCodes> CodesForStraightKnees(const MotionLibrary& library) {
@@ -157,7 +157,7 @@ std::shared_ptr<const PoseCodes> CodesForStraightKnees(const MotionLibrary& libr
     codes->joints[static_cast<std::size_t>(leg.knee)].least_w = 0.98f;
   }
   codes->codecs =
-      protocol::CompactCodecs::Make(codes->joints, parents, codes->fewer_joints).value();
+      protocol::CompactCodecs::Make(codes->joints, parents, codes->reduced_joints).value();
   return codes;
 }
 

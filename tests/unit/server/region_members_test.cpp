@@ -171,17 +171,17 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
   RegionMembers members;
   protocol::Region region{{0.0, 0.0}, 24.0, 5.0, {{6.0, 2}, {12.0, 3}, {18.0, 6}}, {}};
   using protocol::PoseDetail;
-  region.ring_details = {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kAll};
+  region.ring_details = {PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kAll};
   members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
   EXPECT_THAT(members.modes(),
-              testing::UnorderedElementsAre(PoseMode::kCompact, PoseMode::kCompactFewer,
+              testing::UnorderedElementsAre(PoseMode::kCompact, PoseMode::kCompactReduced,
                                             PoseMode::kCompactRoot));
   EXPECT_EQ(members.every(PoseMode::kCompact), 2);
-  EXPECT_EQ(members.every(PoseMode::kCompactFewer), 3);
+  EXPECT_EQ(members.every(PoseMode::kCompactReduced), 3);
   EXPECT_EQ(members.every(PoseMode::kCompactRoot), 4);
   EXPECT_EQ(members.every(PoseMode::kQuantised), 0);
   EXPECT_EQ(members.reach(PoseMode::kCompact), (RegionFilter{0.0, 0.0, 18.0, 0.0, true}));
-  EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionFilter{0.0, 0.0, 12.0, 6.0, true}));
+  EXPECT_EQ(members.reach(PoseMode::kCompactReduced), (RegionFilter{0.0, 0.0, 12.0, 6.0, true}));
   EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionFilter{0.0, 0.0, 29.0, 18.0, true}));
 
   std::map<AvatarId, std::pair<float, float>> at;
@@ -211,7 +211,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
                         at.at(number).second - region.centre_m.z);
     };
     for (const PoseMode mode :
-         {PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot}) {
+         {PoseMode::kCompact, PoseMode::kCompactReduced, PoseMode::kCompactRoot}) {
       if (tick % members.every(mode) != 0) continue;
       const RegionFilter reach = members.reach(mode);
       std::set<AvatarId> without;
@@ -231,7 +231,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
         const bool was = inside.contains(number);
         const double distance_m = at.contains(number) ? distance_of(number) : 1e9;
         const auto [every, of] = distance_m <= 6.0    ? std::pair(2u, PoseMode::kCompact)
-                                 : distance_m <= 12.0 ? std::pair(3u, PoseMode::kCompactFewer)
+                                 : distance_m <= 12.0 ? std::pair(3u, PoseMode::kCompactReduced)
                                  : distance_m <= 18.0 ? std::pair(6u, PoseMode::kCompact)
                                                       : std::pair(4u, PoseMode::kCompactRoot);
         if (was && distance_m > 29.0) left.push_back(number);

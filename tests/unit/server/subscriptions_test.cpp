@@ -42,7 +42,7 @@ TEST(Subscriptions, WantOfARegionAllModesOfItsRings) {
   EXPECT_TRUE(all.has_detail());
   protocol::Observe asked{.world = kWorld, .mode = PoseMode::kCompactRoot, .every_n_ticks = 12};
   asked.region = protocol::Region{{0.0, 0.0}, 60.0, 4.0, {{8.0, 1}, {20.0, 2}}, {}};
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
   RegionMembers region;
   region.Move(*asked.region, 8.0, asked.every_n_ticks, asked.mode);
   all.Add(
@@ -50,14 +50,14 @@ TEST(Subscriptions, WantOfARegionAllModesOfItsRings) {
       {.world = kWorld, .mode = asked.mode, .every_n_ticks = 12, .avatars = {}, .region = region});
   const auto every = [&](PoseMode mode) { return all.EveryOf(kWorld, mode).some; };
   EXPECT_EQ(every(PoseMode::kCompact), 1);
-  EXPECT_EQ(every(PoseMode::kCompactFewer), 2);
+  EXPECT_EQ(every(PoseMode::kCompactReduced), 2);
   EXPECT_EQ(every(PoseMode::kCompactRoot), 12);
-  EXPECT_EQ(all.ReachOf(kWorld, PoseMode::kCompactFewer)->beyond_m, 8.0);
+  EXPECT_EQ(all.ReachOf(kWorld, PoseMode::kCompactReduced)->beyond_m, 8.0);
   EXPECT_FALSE(all.ReachOf(kWorld, PoseMode::kFull));
   EXPECT_EQ(all.region_count(), 1u);
   PoseDelivery delivery = DeliveryOf({1}, 4);
   for (const auto& [mode, share] : {std::pair(PoseMode::kCompact, Share::kRegion),
-                                    std::pair(PoseMode::kCompactFewer, Share::kRegion),
+                                    std::pair(PoseMode::kCompactReduced, Share::kRegion),
                                     std::pair(PoseMode::kCompactRoot, Share::kNone),  // not due
                                     std::pair(PoseMode::kFull, Share::kNone)}) {
     delivery.mode = mode;
@@ -71,7 +71,7 @@ TEST(Subscriptions, WantOfARegionAllModesOfItsRings) {
   asked.mode = PoseMode::kCompactRoot;
   EXPECT_TRUE(all.MoveRegion(1, asked, 8.0));
   EXPECT_EQ(every(PoseMode::kCompact), 1);
-  EXPECT_FALSE(all.Watches(kWorld, PoseMode::kCompactFewer));
+  EXPECT_FALSE(all.Watches(kWorld, PoseMode::kCompactReduced));
   // Resumed by a client that knows of no details, then of no compact poses.
   all.SetCompact(true, false);
   EXPECT_FALSE(all.has_detail());
