@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "frame_builder.h"
-#include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::protocol {

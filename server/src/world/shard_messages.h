@@ -51,7 +51,7 @@ struct CancelPart {
 };
 struct PlantingPart {
   std::vector<AvatarRef> avatars;
-  bool is_on = true;
+  bool enabled = true;
 };
 /// Removes what a session spawned: it has ended, or left the world.
 struct ReleasePart {};

@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
-#include "stridewire/runtime/avatar.h"
 #include "test_library.h"
 
 namespace stridewire::client {
