@@ -49,8 +49,8 @@ stridewire_status Change(stridewire_client* client, const Call& call) {
   return status;
 }
 
-/// Calls `call(session, id)`, where `id` receives the number of the command. Stores the number, or 0
-/// on failure, in `command` unless that is null.
+/// Calls `call(session, id)`, where `id` receives the number of the command. Stores the number, or
+/// 0 on failure, in `command` unless that is null.
 template <typename Call>
 stridewire_status Submit(stridewire_client* client, std::uint64_t* command, const Call& call) {
   return Change(client, [&](Session& session) {

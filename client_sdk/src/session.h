@@ -25,6 +25,7 @@
 
 namespace stridewire::client {
 
+/// Options of a session; see stridewire_client_options.
 struct SessionOptions {
   std::string client_name = "stridewire-client";
   std::string auth_token;
@@ -37,45 +38,48 @@ struct SessionOptions {
   double ping_interval_s = 1.0;
   double render_delay_s = 0.1;
   bool respawn = false;
-  std::string library_folder;  ///< Empty: libraries are fetched anew by every client.
+  std::string library_folder;  ///< Cache of libraries. Empty: no cache.
   std::uint64_t seed = 1;
 };
 
-/// The client's side of protocol/STATE_MACHINE.md, without socket, clock or thread: bytes and times
-/// are arguments, so tests replay any order of things.
+/// The client's side of protocol/STATE_MACHINE.md. It has no socket, clock or thread: bytes and
+/// times are arguments, so that tests can replay any sequence.
 ///
 ///   kIdle --Open--> kWaiting --StartConnecting--> kConnecting --OnConnected--> kGreeting
 ///                     ^   ^                            |                          | Welcome
 ///                     |   +----------- failed ---------+                          v
-///                     +------------- lost, or the server ends the session ----- kReady --Close-->
-///   kClosed: refused for good.                                                      kClosing --> kIdle
+///                     +------------- lost, or the server ends the session ----- kReady
+///                                                                                  | Close
+///   kClosed: the server refused the client permanently.                            v
+///                                                                   kIdle <--- kClosing
 ///
-/// A command passes through three places: `unsent` of its world (until WorldInfo told the server's
-/// number of that world, and while too much is under way), `unanswered_` in order of seq, and its
-/// REPLY event. A lost session gives worlds and subscriptions their commands anew, ahead of what
-/// had not been sent.
+/// A command is first in `unsent` of its world, until the world has a server id and the output
+/// buffer has room. Then it is in `unanswered_`, in order of seq, and finally it becomes a REPLY
+/// event. After a lost session, the session joins its worlds and subscribes again before it sends
+/// unsent commands.
 class Session {
  public:
   enum class State : std::uint8_t {
     kIdle,
-    kWaiting,     ///< For the next attempt.
-    kConnecting,  ///< TCP.
-    kGreeting,    ///< Hello sent.
-    kReady,
-    kClosing,  ///< Goodbye is going out.
+    kWaiting,     ///< Waits for the next attempt to connect.
+    kConnecting,  ///< The TCP connection is being established.
+    kGreeting,    ///< Hello was sent; Welcome is expected.
+    kReady,       ///< The handshake is complete.
+    kClosing,     ///< Goodbye is being sent.
     kClosed,
   };
 
-  /// Bytes waiting for the socket above which no further command is encoded.
+  /// While more bytes than this wait for the socket, no further command is encoded.
   static constexpr std::size_t kMaxOutputBytes = std::size_t{1} << 20;
   static constexpr std::size_t kMaxWorlds = 256;
+  /// Longest time to send Goodbye, in seconds.
   static constexpr double kGoodbye_s = 1.0;
-  /// A connection that was ready for this long starts the back-off afresh.
+  /// If a connection was ready for this time, the back-off starts again with its shortest delay.
   static constexpr double kStable_s = 2.0;
 
   explicit Session(const SessionOptions& options);
 
-  // ---- the caller's side
+  // ---- called by the application
 
   stridewire_status Open(double now_s);
   void Close(double now_s);
@@ -107,9 +111,9 @@ class Session {
   stridewire_status Ping(double now_s);
 
   [[nodiscard]] EventQueue& events() { return events_; }
-  /// Nullptr: no such world.
+  /// Returns null if the world does not exist.
   [[nodiscard]] const WorldView* FindWorld(stridewire_world world) const;
-  /// The ground of a world that there is, as the server last told.
+  /// Returns the terrain of an existing world, as last received.
   [[nodiscard]] const std::optional<protocol::TerrainInfo>& TerrainOf(
       stridewire_world world) const {
     return worlds_.at(world).terrain;
@@ -119,28 +123,28 @@ class Session {
   [[nodiscard]] double tick_hz() const { return tick_hz_; }
   [[nodiscard]] stridewire_statistics Statistics() const;
 
-  // ---- the network's side. Times do not go back.
+  // ---- called by the network thread. Times never decrease.
 
-  /// Whether an attempt is due; then call StartConnecting.
+  /// Returns whether to start an attempt to connect, with StartConnecting.
   [[nodiscard]] bool ConnectDue(double now_s) const;
   void StartConnecting(double now_s);
   void OnConnected(double now_s);
   void OnBytes(std::span<const std::byte> bytes, double now_s);
-  /// The attempt failed or the connection broke.
+  /// The attempt to connect has failed, or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
-  /// Time-outs and pings.
+  /// Handles timeouts and sends pings.
   void AdvanceTime(double now_s);
-  /// Whether a socket belongs to this state; if not any more, the network closes it.
+  /// Returns whether the state needs a socket. If not, the network thread closes it.
   [[nodiscard]] bool NeedsSocket() const;
-  /// Grows with every connection, so that late bytes of an old one are told apart.
+  /// Increases with every connection, so that late results of an old connection are recognized.
   [[nodiscard]] std::uint64_t connection_number() const { return connection_number_; }
-  /// Work on libraries for who holds no lock (Do), and what came of it.
+  /// Returns the next task for RunLibraryTask, if any. Report its result with OnLibraryTask.
   [[nodiscard]] std::optional<LibraryTask> TakeLibraryTask() { return libraries_.TakeTask(); }
   void OnLibraryTask(const std::string& hash,
                      Expected<std::shared_ptr<const MotionLibrary>> result);
-  /// Takes what is to be written, in place of `bytes`' content; false: nothing.
+  /// Moves the pending output to `bytes`. Returns false if there is none.
   [[nodiscard]] bool TakeOutput(std::vector<std::byte>& bytes);
-  /// What TakeOutput gave has been written.
+  /// The bytes from the last TakeOutput were written.
   void OnOutputWritten();
 
  private:
@@ -153,7 +157,7 @@ class Session {
   struct Command {
     std::uint64_t id = 0;
     stridewire_world world = 0;
-    bool own = false;  ///< Given by the session itself, after it was lost.
+    bool own = false;  ///< The session created it after a lost session.
     std::size_t bytes = 0;
     CommandMessage message;
   };
@@ -168,25 +172,27 @@ class Session {
     State state = State::kWanted;
     std::string name;
     protocol::Role role = protocol::Role::kController;
-    protocol::WorldId server_id = 0;  ///< 0: not known.
+    protocol::WorldId server_id = 0;  ///< 0: unknown.
     std::uint64_t join_command = 0;
-    bool join_answered = false;  ///< The caller has had its REPLY.
+    bool join_answered = false;  ///< The application has received its REPLY.
     std::deque<Command> unsent;
     std::map<protocol::SubscriptionId, Subscription> subscriptions;
-    std::map<protocol::AvatarId, protocol::Placement> spawned;  ///< Ours, and where they are.
-    std::uint64_t told_dropped_batches = 0;                     ///< By the last Lagging.
+    std::map<protocol::AvatarId, protocol::Placement>
+        spawned;                             ///< Own avatars with their last base frames.
+    std::uint64_t last_dropped_batches = 0;  ///< Count in the last Lagging.
     std::unique_ptr<WorldView> view;
-    std::unique_ptr<ReplicaSet> evaluated;  ///< While movements are observed.
+    std::unique_ptr<ReplicaSet> replicas;  ///< Not null while movements are observed.
     std::optional<protocol::TerrainInfo> terrain;
   };
 
-  /// Refuses a call, remembering why.
+  /// Stores the error for last_error and returns `status`.
   stridewire_status Refuse(stridewire_status status, std::string_view text);
   [[nodiscard]] bool IsOpen() const;
-  /// Enqueue, and what can be sent is.
+  /// Calls Enqueue and then sends what can be sent.
   template <typename Message>
   stridewire_status SendCommand(stridewire_world world, Message message, std::size_t bytes,
                                 std::uint64_t& command);
+  /// Checks a command and appends it to the unsent commands of its world.
   template <typename Message>
   stridewire_status Enqueue(stridewire_world world, Message message, std::size_t bytes,
                             std::uint64_t& command);
@@ -194,20 +200,20 @@ class Session {
   [[nodiscard]] static std::uint64_t EveryNTicks(const World& world, protocol::PoseMode mode);
   World* FindByServerId(protocol::WorldId id, stridewire_world& handle);
 
-  /// Encodes what may go out now.
+  /// Encodes all commands that may be sent now.
   void Pump();
   [[nodiscard]] bool MaySend() const;
   void Send(Command command);
-  /// Whether an Observe may go out; it waits for the library its movements are of, or ends here.
-  enum class Readiness : std::uint8_t { kReady, kWaits, kRefused };
+  /// Returns whether a command may be sent. An Observe of movements waits for its library, or is
+  /// answered here if the library is not available.
+  enum class Readiness : std::uint8_t { kReady, kWaits, kAnswered };
   Readiness PrepareMovements(World& world, const Command& command);
-  void AskForLibraries();
-  /// Whether this server knows what it is asked.
-  [[nodiscard]] bool Understands(const CommandMessage& message) const;
-  void TakeTerrain(stridewire_world handle, const std::optional<protocol::TerrainInfo>& terrain);
+  void RequestLibraries();
+  void SetTerrainOf(stridewire_world handle, const std::optional<protocol::TerrainInfo>& terrain);
   void FailAll(stridewire_status status, std::string_view text);
   void FailUnsent(World& world, stridewire_status status, std::string_view text);
-  /// Ends a command: its REPLY (a NOTICE if it was our own and failed), and its place is free.
+  /// Ends a command with a REPLY event, or with a NOTICE event if the session created it and it
+  /// failed.
   void Answer(const Command& command, stridewire_status status, std::string_view text = {},
               std::uint32_t accepted = 0);
 
@@ -224,18 +230,18 @@ class Session {
   void Handle(const protocol::LibraryPiece& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
   template <typename Message>
-  void Handle(const Message& message, double now_s);  ///< What a server may not send.
+  void Handle(const Message& message, double now_s);  ///< Messages that a server must not send.
 
   void OnJoinReply(World& world, const protocol::Reply& reply, double now_s);
   void OnSpawnReply(World& world, const protocol::Spawn& spawn, const protocol::Reply& reply);
   void OnRemoveReply(World& world, const protocol::Remove& remove, const protocol::Reply& reply);
   void OnObserveReply(World& world, const protocol::Observe& observe, const protocol::Reply& reply);
   void FollowSpawned(World& world, const protocol::Event& event);
-  /// The server knows nothing of us: what is wanted gets its commands anew.
-  void StartAnew();
-  void ForgetEverything();
-  void BreakOff(stridewire_status status, std::string_view text, double now_s);
-  void CloseForGood(stridewire_status status, std::string_view text);
+  /// A new session has begun. Queues the commands that restore worlds and subscriptions.
+  void RestoreSession();
+  void Reset();
+  void LoseConnection(stridewire_status status, std::string_view text, double now_s);
+  void CloseWithError(stridewire_status status, std::string_view text);
   void SendPing(double now_s);
   [[nodiscard]] stridewire_event MakeEvent(stridewire_event_type type, stridewire_world world = 0,
                                            stridewire_status status = STRIDEWIRE_OK,
@@ -256,34 +262,33 @@ class Session {
   std::uint32_t next_subscription_ = 1;
   std::uint64_t next_command_ = 1;
   std::map<protocol::Seq, Command> unanswered_;
-  protocol::Seq resend_from_ = 0;  ///< Unanswered ones from here on have to go out again; 0: none.
-  std::size_t command_count_ = 0;  ///< The caller's, unsent and unanswered.
+  protocol::Seq resend_from_ = 0;  ///< First command to send again after a resume; 0: none.
+  std::size_t command_count_ = 0;  ///< Unsent and unanswered commands of the application.
   std::size_t command_bytes_ = 0;
 
-  // The session as the server knows it.
+  // State of the session on the server.
   bool had_session_ = false;
-  std::vector<std::byte> resume_token_;  ///< Empty once the server has ended the session.
+  std::vector<std::byte> resume_token_;  ///< Empty if the server has ended the session.
   protocol::Seq next_seq_ = 1;
   std::uint64_t last_events_number_ = 0;
-  std::uint64_t features_ = 0;
   protocol::ServerLimits limits_;
   double tick_hz_ = 60.0;
 
-  // The connection.
+  // State of the connection.
   std::uint64_t connection_number_ = 0;
   double next_attempt_s_ = 0.0;
-  double deadline_s_ = 0.0;  ///< Of connecting, greeting or closing.
+  double deadline_s_ = 0.0;  ///< Timeout of kConnecting, kGreeting and kClosing.
   double ready_s_ = 0.0;
   double heard_s_ = 0.0;
   double next_ping_s_ = 0.0;
   std::uint64_t ping_nonce_ = 0;
-  std::set<std::uint64_t> asked_pings_;  ///< Whose Pong the caller waits for; at most 64.
+  std::set<std::uint64_t> pending_pings_;  ///< Pings of the application without Pong; at most 64.
   std::optional<protocol::FrameReader> reader_;
   protocol::Encoder encoder_;
   std::vector<std::byte> output_;
 
   WorldView::Counts counts_;
-  std::deque<double> rtts_s_;  ///< The last 16.
+  std::deque<double> rtts_s_;  ///< Of the last 16 pings.
   std::uint64_t bytes_received_ = 0;
   std::uint64_t bytes_sent_ = 0;
   std::uint64_t dropped_batches_ = 0;

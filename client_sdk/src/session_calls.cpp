@@ -1,4 +1,4 @@
-// The part of a session that its caller calls: what is wanted of the server becomes commands.
+// Functions of a session that the application calls. They check arguments and create commands.
 
 #include <algorithm>
 #include <utility>
@@ -10,8 +10,8 @@ namespace stridewire::client {
 
 namespace {
 
-constexpr std::size_t kMaxSubscriptions = 256;  // Of one world.
-constexpr std::size_t kMaxAskedPings = 64;
+constexpr std::size_t kMaxSubscriptions = 256;  // Per world.
+constexpr std::size_t kMaxPendingPings = 64;
 
 stridewire_status ToStatus(ErrorCode code) {
   switch (code) {
@@ -35,9 +35,9 @@ stridewire_status Session::Open(double now_s) {
     case State::kIdle:
     case State::kClosing:
     case State::kClosed: break;
-    default: return Refuse(STRIDEWIRE_ALREADY_CONNECTED, "the client is connected already");
+    default: return Refuse(STRIDEWIRE_ALREADY_CONNECTED, "the client is already connected");
   }
-  ForgetEverything();
+  Reset();
   backoff_.Reset();
   last_status_ = STRIDEWIRE_OK;
   last_text_.clear();
@@ -49,13 +49,13 @@ stridewire_status Session::Open(double now_s) {
 void Session::Close(double now_s) {
   if (state_ == State::kIdle || state_ == State::kClosing) return;
   const bool was_closed = state_ == State::kClosed;
-  const bool say_goodbye = state_ == State::kReady;
+  const bool sends_goodbye = state_ == State::kReady;
   FailAll(STRIDEWIRE_CANCELLED, "the client was disconnected");
   auto output = std::move(output_);
   const std::uint64_t connection = connection_number_;
-  ForgetEverything();
+  Reset();
   state_ = State::kIdle;
-  if (say_goodbye) {
+  if (sends_goodbye) {
     output_ = std::move(output);
     if (encoder_.Encode(protocol::Goodbye{}, output_)) {
       state_ = State::kClosing;
@@ -80,7 +80,8 @@ bool Session::IsOpen() const {
 template <typename Message>
 stridewire_status Session::Enqueue(stridewire_world world, Message message, std::size_t bytes,
                                    std::uint64_t& command) {
-  // The numbers come when it is sent; the rest is checked now, when the caller can still be told.
+  // Seq and world are set when the command is sent. All other fields are checked now, so that the
+  // call can report errors.
   message.seq = 1;
   if constexpr (requires { message.world; }) message.world = 1;
   if (Status status = protocol::Check(message); !status) {
@@ -90,12 +91,12 @@ stridewire_status Session::Enqueue(stridewire_world world, Message message, std:
   const auto found = worlds_.find(world);
   if (found == worlds_.end()) return Refuse(STRIDEWIRE_NO_SUCH_WORLD, "no world has this number");
   if (found->second.state == World::State::kRefused || found->second.state == World::State::kLeft) {
-    return Refuse(STRIDEWIRE_NOT_JOINED, "the server refused this world, or it was left");
+    return Refuse(STRIDEWIRE_NOT_JOINED, "the world is not joined");
   }
   bytes += sizeof(Command);
   if (command_count_ >= options_.max_commands ||
       command_bytes_ + bytes > options_.max_command_bytes) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are without an answer");
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are unanswered");
   }
   ++command_count_;
   command_bytes_ += bytes;
@@ -112,10 +113,10 @@ stridewire_status Session::JoinWorld(std::string_view name, protocol::Role role,
   if (!IsOpen()) return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
   for (auto& [handle, other] : worlds_) {
     if (other.name == name && other.state != World::State::kRefused) {
-      return Refuse(STRIDEWIRE_ALREADY_JOINED, "a world of this name is joined already");
+      return Refuse(STRIDEWIRE_ALREADY_JOINED, "a world of this name is already joined");
     }
   }
-  // A refused world makes room for trying again.
+  // A world that the server refused can be joined again.
   std::erase_if(worlds_, [&](const auto& entry) {
     return entry.second.name == name && entry.second.state == World::State::kRefused;
   });
@@ -123,7 +124,7 @@ stridewire_status Session::JoinWorld(std::string_view name, protocol::Role role,
     return Refuse(STRIDEWIRE_LIMIT_REACHED, "too many worlds are joined");
   }
   if (command_count_ >= options_.max_commands) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are without an answer");
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are unanswered");
   }
   world = next_world_++;
   command = next_command_++;
@@ -149,10 +150,10 @@ stridewire_status Session::LeaveWorld(stridewire_world world, std::uint64_t& com
   if (never_sent) {
     const Command leave = std::move(left.unsent.back());
     left.unsent.pop_back();
-    FailUnsent(left, STRIDEWIRE_NOT_JOINED, "the world was left");
+    FailUnsent(left, STRIDEWIRE_NOT_JOINED, "the client left the world");
     if (!left.join_answered) {
       Answer(Command{left.join_command, world, false, 0, {}}, STRIDEWIRE_NOT_JOINED,
-             "the world was left");
+             "the client left the world");
     }
     Answer(leave, STRIDEWIRE_OK);
     worlds_.erase(world);
@@ -246,7 +247,7 @@ stridewire_status Session::MoveRegion(std::uint32_t subscription, protocol::Regi
     Pump();
     return STRIDEWIRE_OK;
   }
-  return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this number");
+  return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this subscription number");
 }
 
 stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64_t& command) {
@@ -260,7 +261,7 @@ stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64
     }
     world.subscriptions.erase(found);
     if (world.subscriptions.empty()) world.view->ClearPoses();
-    if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.evaluated.reset();
+    if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.replicas.reset();
     UpdateFilter(world);
     Pump();
     return STRIDEWIRE_OK;
@@ -270,11 +271,11 @@ stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64
 
 stridewire_status Session::Ping(double now_s) {
   if (state_ != State::kReady) return Refuse(STRIDEWIRE_NOT_READY, "the client is not connected");
-  if (asked_pings_.size() >= kMaxAskedPings) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many pings are without an answer");
+  if (pending_pings_.size() >= kMaxPendingPings) {
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many pings are unanswered");
   }
   SendPing(now_s);
-  asked_pings_.insert(ping_nonce_);
+  pending_pings_.insert(ping_nonce_);
   return STRIDEWIRE_OK;
 }
 
@@ -296,19 +297,19 @@ void Session::UpdateFilter(World& world) {
 
 std::uint64_t Session::EveryNTicks(const World& world, protocol::PoseMode mode) {
   const protocol::PoseDetail detail = protocol::DetailOf(mode);
-  // What was asked for as quantised.
+  // Compact poses belong to subscriptions of kQuantised.
   if (protocol::IsCompact(mode)) mode = protocol::PoseMode::kQuantised;
   std::uint64_t every = 0;
   const auto add = [&](protocol::PoseDetail of, std::uint64_t n) {
     if (of == detail) every = every == 0 ? n : std::min(every, n);
   };
   for (const auto& [id, subscription] : world.subscriptions) {
-    const protocol::Observe& asked = subscription.message;
-    if (asked.mode != mode) continue;
-    add(asked.detail, asked.every_n_ticks);
-    if (!asked.region) continue;
-    for (std::size_t i = 0; i < asked.region->ring_details.size(); ++i) {
-      add(asked.region->ring_details[i], asked.region->rings[i].every_n_ticks);
+    const protocol::Observe& observe = subscription.message;
+    if (observe.mode != mode) continue;
+    add(observe.detail, observe.every_n_ticks);
+    if (!observe.region) continue;
+    for (std::size_t i = 0; i < observe.region->ring_details.size(); ++i) {
+      add(observe.region->ring_details[i], observe.region->rings[i].every_n_ticks);
     }
   }
   return every;

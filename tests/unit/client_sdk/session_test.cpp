@@ -50,23 +50,6 @@ class SessionTest : public testing::Test {
     return world;
   }
 
-  /// Joined() with a new session and a server that does not know of a feature; nothing waits to be seen.
-  stridewire_world JoinedWithout(std::uint64_t feature) {
-    Use({});
-    EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
-    Connect();
-    protocol::Welcome welcome = toy::Welcome();
-    welcome.features &= ~feature;
-    Tell(welcome);
-    stridewire_world world = 0;
-    EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, world, command_),
-              STRIDEWIRE_OK);
-    LetIn();
-    (void)Events();
-    (void)Sent();
-    return world;
-  }
-
   /// Answers the JoinWorld that has been sent.
   void LetIn(protocol::WorldId server_id = 5) {
     const auto sent = Sent();
@@ -447,7 +430,7 @@ TEST_F(SessionTest, AWorldHasTheGroundThatTheServerToldOfLast) {
   EXPECT_THAT(EventTypes(), testing::Contains(int{STRIDEWIRE_EVENT_TERRAIN}));
 }
 
-TEST_F(SessionTest, SendsGroundsFootprintsAndWalksToAServerThatKnowsThem) {
+TEST_F(SessionTest, SendsTerrainFootprintsAndWalks) {
   const stridewire_world world = Joined();
   EXPECT_EQ(session_->SetTerrain(world, {0, 0, Slab(0.25)}, command_), STRIDEWIRE_OK);
   protocol::Request request = StepOf(1, 9);
@@ -471,30 +454,9 @@ TEST_F(SessionTest, SendsGroundsFootprintsAndWalksToAServerThatKnowsThem) {
   bad.terrain->height_field->heights_m.pop_back();
   EXPECT_NE(session_->SetTerrain(world, bad, command_), STRIDEWIRE_OK);
   EXPECT_THAT(session_->last_text(), testing::HasSubstr("heights_m"));
-
-  Use({});
-  EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
-  Connect();
-  protocol::Welcome welcome = toy::Welcome();
-  welcome.features = protocol::kFeatureResume;
-  Tell(welcome);
-  stridewire_world old = 0;
-  EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kController, old, command_), 0);
-  LetIn();
-  (void)Events();
-  EXPECT_EQ(session_->SetTerrain(old, {0, 0, Slab(0.25)}, command_), STRIDEWIRE_OK);
-  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
-  EXPECT_EQ(session_->Request(old, walk, command_), STRIDEWIRE_OK);
-  EXPECT_TRUE(Sent().empty());
-  const auto events = Events();
-  ASSERT_EQ(events.size(), 3u);
-  EXPECT_EQ(events[2].status, STRIDEWIRE_UNSUPPORTED);
-  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
-  EXPECT_EQ(events[1].status, STRIDEWIRE_UNSUPPORTED);
-  EXPECT_EQ(session_->Statistics().commands_waiting, 0u);
 }
 
-TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
+TEST_F(SessionTest, SendsExactFootprints) {
   protocol::Request request = StepOf(1, 9);
   protocol::StepMovement step{.at = protocol::Footprint{DVec3(1.0, 0.25, -2.0), 0.5},
                               .exact_only = true};
@@ -504,20 +466,9 @@ TEST_F(SessionTest, AsksToBeMetOnlyOfAServerThatKnowsRefusals) {
   const auto sent = Sent();
   ASSERT_EQ(sent.size(), 1u);
   EXPECT_EQ(std::get<protocol::Request>(sent[0]).items, request.items);
-
-  const stridewire_world old = JoinedWithout(protocol::kFeatureRefusals);
-  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
-  EXPECT_TRUE(Sent().empty());
-  const auto events = Events();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
-  step.exact_only = false;
-  request.items[0].movement = step;
-  EXPECT_EQ(session_->Request(old, request, command_), STRIDEWIRE_OK);
-  EXPECT_EQ(Sent().size(), 1u);
 }
 
-TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
+TEST_F(SessionTest, SendsPlanting) {
   const stridewire_world world = Joined();
   EXPECT_EQ(session_->SetPlanting(world, {0, 0, {4, 5}, false}, command_), STRIDEWIRE_OK);
   const auto sent = Sent();
@@ -525,13 +476,6 @@ TEST_F(SessionTest, SwitchesPlantingOnlyOnAServerThatKnowsOfIt) {
   EXPECT_EQ(std::get<protocol::SetPlanting>(sent[0]).avatars,
             (std::vector<protocol::AvatarId>{4, 5}));
   EXPECT_FALSE(std::get<protocol::SetPlanting>(sent[0]).enabled);
-
-  const stridewire_world old = JoinedWithout(protocol::kFeaturePlanting);
-  EXPECT_EQ(session_->SetPlanting(old, {0, 0, {4}, false}, command_), STRIDEWIRE_OK);
-  EXPECT_TRUE(Sent().empty());
-  const auto events = Events();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
 }
 
 TEST_F(SessionTest, ObservesMovementsOnceItHasTheLibrary) {
@@ -581,15 +525,6 @@ TEST_F(SessionTest, ObservesMovementsOnceItHasTheLibrary) {
   EXPECT_EQ(events[0].status, STRIDEWIRE_MALFORMED);
   Tell(protocol::Movements{.world = 5, .step = 1});
   EXPECT_EQ(session_->state(), State::kReady);
-
-  const stridewire_world old = JoinedWithout(protocol::kFeatureMovementMode);
-  EXPECT_EQ(session_->Observe(old, {.mode = protocol::PoseMode::kMovement, .avatars = {}},
-                              subscription, command_),
-            STRIDEWIRE_OK);
-  EXPECT_TRUE(Sent().empty());
-  events = Events();
-  ASSERT_EQ(events.size(), 1u);
-  EXPECT_EQ(events[0].status, STRIDEWIRE_UNSUPPORTED);
 }
 
 TEST_F(SessionTest, CommandsAreBounded) {

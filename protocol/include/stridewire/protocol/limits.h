@@ -27,6 +27,8 @@ inline constexpr std::uint64_t kFeatureRegions = 16'384;  ///< Observe::region, 
 /// PoseMode::kMovement, FetchLibrary. Both sides evaluate movements by the same formulas: when
 /// these change, another bit. 8 stood for those before library format 3.
 inline constexpr std::uint64_t kFeatureMovementMode = 32'768;
+/// All features.
+inline constexpr std::uint64_t kAllFeatures = 0xfff7;
 
 // Limits of messages. A receiver rejects a message that exceeds one with kLimitExceeded.
 
