@@ -1,19 +1,21 @@
 #!/usr/bin/env bash
-# largest_crowd.sh: finds by bisection how many wandering avatars a server of this machine holds at 60 Hz, and
-# prints that number. A crowd is held if a run of stridewire-load crosses none of the thresholds; as other
-# programs may have been in its way, it has two tries. What each try measured goes to stderr.
+# Finds by bisection how many wandering avatars a server on this machine can handle at 60 Hz, and
+# prints that number. A crowd size passes if a run of stridewire-load fulfils no --fail-if
+# condition. Each size has two attempts, because other programs can disturb a run. Measurements are
+# printed to stderr.
 #
 #   tests/bench/largest_crowd.sh
 #   tests/bench/largest_crowd.sh --from 5000 --to 40000 --within 500 --seconds 60
-#   tests/bench/largest_crowd.sh --fail-if 'ticks_missed>0' --fail-if 'tick_ms.p99>10' -- --partial-observers 100
+#   tests/bench/largest_crowd.sh --fail-if 'ticks_missed>0' --fail-if 'tick_ms.p99>10' \
+#     -- --partial-observers 100
 #
-#   --from N, --to N  a crowd that is held for sure, and one that is not (default: 1000, 60000)
-#   --within N        how near the number has to be (default: 500)
-#   --seconds S       measured in each try (default: 20)
-#   --shards N        of the server (default: 2)
-#   --fail-if TEXT    as of stridewire-load, may be given several times (default: ticks_missed>0)
-#   --bin DIR         where the programs are (default: build/release/bin)
-#   -- OPTION ...     for stridewire-load (default: --observers 1)
+#   --from N, --to N  a crowd size that passes, and one that fails (default: 1000, 60000)
+#   --within N        stop when the interval is this small (default: 500)
+#   --seconds S       duration of each measurement (default: 20)
+#   --shards N        number of shards of the server (default: 2)
+#   --fail-if TEXT    condition of stridewire-load; can be repeated (default: ticks_missed>0)
+#   --bin DIR         folder of the programs (default: build/release/bin)
+#   -- OPTION ...     further options for stridewire-load (default: --observers 1)
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
@@ -43,8 +45,8 @@ done
 [[ ${#fail_ifs[@]} -gt 0 ]] || fail_ifs=(--fail-if 'ticks_missed>0')
 [[ " ${more[*]} " == *" --observers "* ]] || more+=(--observers 1)
 
-# held N: 0 if a server of its own held N avatars, 1 if not; what else goes wrong ends the search.
-held() {
+# passes N: returns 0 if a new server can handle N avatars, else 1. Any other error ends the search.
+passes() {
   local ready server result=0 output
   exec 3< <(exec "$bin/stridewired" --listen 127.0.0.1:0 --http 127.0.0.1:0 --shards "$shards" \
     --log-level error --max-avatars 100000 --max-avatars-per-world 100000 \
@@ -66,6 +68,6 @@ held() {
 
 while [[ $((to - from)) -gt $within ]]; do
   middle=$(((from + to) / 2))
-  if held "$middle" || held "$middle"; then from=$middle; else to=$middle; fi
+  if passes "$middle" || passes "$middle"; then from=$middle; else to=$middle; fi
 done
 echo "$from"

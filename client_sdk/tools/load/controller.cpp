@@ -8,9 +8,8 @@
 namespace stridewire::load {
 namespace {
 
-/// Between avatars when they are put into a world; enough room for a look at them.
-constexpr double kSpacingM = 3.0;
-constexpr double kFirstOutingWithinS = 2.0;
+constexpr double kSpacingM = 3.0;  // between spawned avatars
+constexpr double kFirstPlanWithinS = 2.0;
 constexpr double kPauseBetweenChoreographiesS = 0.5;
 constexpr std::int64_t kRetryNs = 5'000'000;
 
@@ -86,7 +85,7 @@ void Controller::OnLost(const std::string& why, bool by_us) {
 
 void Controller::OnReply(const protocol::Reply& reply) {
   const auto found = pending_.find(reply.seq);
-  if (found == pending_.end()) return Lose("a reply to nothing");
+  if (found == pending_.end()) return Lose("the server sent an unexpected Reply");
   const Pending pending = std::move(found->second);
   pending_.erase(found);
   const bool is_ok = reply.code == protocol::StatusCode::kOk;
@@ -98,7 +97,7 @@ void Controller::OnReply(const protocol::Reply& reply) {
     case Command::kRemoveLast: has_cleaned_up_ = true; return Finish();
     case Command::kJoin:
       if (!is_ok) {
-        run_.Problem(name() + ": the server would not let it join: " +
+        run_.Problem(name() + ": the server refused the join: " +
                      std::string(protocol::StatusCodeName(reply.code)) + " " + reply.text);
         return;
       }
@@ -109,7 +108,7 @@ void Controller::OnReply(const protocol::Reply& reply) {
 }
 
 protocol::Placement Controller::Place(protocol::AvatarId number) const {
-  // A square of avatars around the origin, or around the choreography's start.
+  // Avatars form a square around the origin, or around the start of the choreography.
   const std::size_t index = run_.layout.IndexIn(number);
   const auto side = static_cast<std::size_t>(
       std::max(1.0, std::ceil(std::sqrt(static_cast<double>(walkers_.size())))));
@@ -150,8 +149,8 @@ void Controller::Remove(const std::vector<protocol::AvatarId>& avatars, Command 
 }
 
 void Controller::OnSpawnReply(const protocol::Reply& reply, const Pending& pending) {
-  // An earlier run that was broken off, or our own lost connection, may have left some there.
-  std::vector<protocol::AvatarId> left_over;
+  // An aborted run or a lost connection can leave avatars behind.
+  std::vector<protocol::AvatarId> existing;
   std::size_t refused = 0;
   std::string why;
   if (reply.code != protocol::StatusCode::kOk) {
@@ -160,9 +159,10 @@ void Controller::OnSpawnReply(const protocol::Reply& reply, const Pending& pendi
   }
   for (const protocol::ReplyItem& item : reply.items) {
     if (item.code == protocol::StatusCode::kOk) continue;
-    if (item.index >= pending.avatars.size()) return Lose("a reply about an avatar not asked for");
+    if (item.index >= pending.avatars.size())
+      return Lose("a Reply has an item that was not in the command");
     if (item.code == protocol::StatusCode::kAvatarExists && pending.command == Command::kSpawn) {
-      left_over.push_back(pending.avatars[item.index]);
+      existing.push_back(pending.avatars[item.index]);
     } else {
       ++refused;
       why = "avatar " + std::to_string(pending.avatars[item.index]) + ": " +
@@ -173,10 +173,10 @@ void Controller::OnSpawnReply(const protocol::Reply& reply, const Pending& pendi
     run_.Problem(name() + ": the server refused " + std::to_string(refused) + " avatars, e.g. " +
                  why);
   }
-  spawned_count_ += pending.avatars.size() - left_over.size();
-  if (!left_over.empty()) {
-    Remove(left_over, Command::kRemove);
-    Spawn(left_over, Command::kSpawnAgain);
+  spawned_count_ += pending.avatars.size() - existing.size();
+  if (!existing.empty()) {
+    Remove(existing, Command::kRemove);
+    Spawn(existing, Command::kSpawnAgain);
   }
   if (spawned_count_ == walkers_.size()) {
     has_spawned_ = true;
@@ -191,7 +191,7 @@ void Controller::StartMoving() {
     walkers_[i].next = 0;
     walkers_[i].waiting = 0;
     Schedule(i, now_ns + static_cast<std::int64_t>(
-                             1e9 * walkers_[i].wanderer.FirstStart(kFirstOutingWithinS)));
+                             1e9 * walkers_[i].wanderer.FirstStart(kFirstPlanWithinS)));
   }
   ArmTimer();
 }
@@ -221,7 +221,7 @@ void Controller::SendDue() {
       due_.pop();
       counts_.send_late.RecordNs(now_ns - due.at_ns);
       if (run_.choreography == nullptr) {
-        AddOuting(due, now_ns, request);
+        AddWanderPlan(due, now_ns, request);
       } else {
         AddChoreography(due.walker, due.at_ns, now_ns, request);
       }
@@ -232,41 +232,41 @@ void Controller::SendDue() {
   ArmTimer();
 }
 
-void Controller::AddOuting(const Due& due, std::int64_t now_ns, protocol::Request& request) {
-  Outing outing = walkers_[due.walker].wanderer.Next(may_jump_);
+void Controller::AddWanderPlan(const Due& due, std::int64_t now_ns, protocol::Request& request) {
+  WanderPlan plan = walkers_[due.walker].wanderer.Next(can_jump_);
   const std::uint32_t limit = welcome().limits.max_queue;
-  if (limit > 0 && outing.movements.size() > limit) outing.movements.resize(limit);
+  if (limit > 0 && plan.movements.size() > limit) plan.movements.resize(limit);
   const protocol::AvatarId number = run_.layout.Number(world_, due.walker);
   if (probes_ != nullptr) {
     probes_->Schedule(number - 1, last_request_ + 1, due.at_ns, now_ns);
   }
-  for (const Movement& movement : outing.movements) {
+  for (const Movement& movement : plan.movements) {
     request.items.push_back(
         {.avatar = number, .request_id = ++last_request_, .movement = movement});
   }
-  Schedule(due.walker, due.at_ns + static_cast<std::int64_t>(1e9 * outing.period_s));
+  Schedule(due.walker, due.at_ns + static_cast<std::int64_t>(1e9 * plan.period_s));
 }
 
-std::size_t Controller::Ahead() const {
+std::size_t Controller::MaxQueuedMovements() const {
   const std::uint32_t limit = welcome().limits.max_queue;
-  return limit > 0 ? std::min<std::size_t>(limit, kMaxAhead) : kMaxAhead;
+  return limit > 0 ? std::min<std::size_t>(limit, kMaxQueuedMovements) : kMaxQueuedMovements;
 }
 
 void Controller::AddChoreography(std::size_t walker, std::int64_t due_ns, std::int64_t now_ns,
                                  protocol::Request& request) {
   const std::vector<MovementRequest>& movements = run_.choreography->movements;
   const protocol::AvatarId number = run_.layout.Number(world_, walker);
-  Walker& who = walkers_[walker];
-  if (who.next == 0 && probes_ != nullptr &&
+  Walker& state = walkers_[walker];
+  if (state.next == 0 && probes_ != nullptr &&
       !std::holds_alternative<StandRequest>(movements.front().movement)) {
     probes_->Schedule(number - 1, last_request_ + 1, due_ns, now_ns);
   }
-  while (who.next < movements.size() && who.waiting < Ahead()) {
+  while (state.next < movements.size() && state.waiting < MaxQueuedMovements()) {
     request.items.push_back({.avatar = number,
                              .request_id = ++last_request_,
-                             .movement = ToMovement(movements[who.next])});
-    ++who.next;
-    ++who.waiting;
+                             .movement = ToMovement(movements[state.next])});
+    ++state.next;
+    ++state.waiting;
   }
 }
 
@@ -291,10 +291,10 @@ void Controller::OnRequestReply(const protocol::Reply& reply, const Pending& pen
     if (item.code == protocol::StatusCode::kOk) continue;
     ++counts_.requests_rejected;
     ++counts_.rejected_by_code[item.code];
-    // A library without jumps is no fault of the server's; asking once is enough.
+    // The library has no jumps, so do not request further ones.
     if (item.code == protocol::StatusCode::kNoMovement ||
         item.code == protocol::StatusCode::kUnsupported) {
-      may_jump_ = false;
+      can_jump_ = false;
     }
     if (!run_.layout.IsOurs(world_, item.avatar)) continue;
     if (probes_ != nullptr) probes_->Rejected(item.avatar - 1, item.request_id);
@@ -333,7 +333,8 @@ void Controller::OnEvent(const protocol::Event& event) {
   }
   if (run_.choreography == nullptr || walker.waiting == 0) return;
   --walker.waiting;
-  if (walker.waiting == Ahead() / 2 && walker.next < run_.choreography->movements.size()) {
+  if (walker.waiting == MaxQueuedMovements() / 2 &&
+      walker.next < run_.choreography->movements.size()) {
     Schedule(index, NowNs());
     ArmTimer();
   }

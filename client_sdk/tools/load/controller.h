@@ -16,32 +16,34 @@
 
 namespace stridewire::load {
 
-/// What a controller counted; read it when its thread has ended.
+/// Counters of a controller. Read them after its thread has ended.
 struct ControllerCounts {
   std::uint64_t requests_sent = 0;
   std::uint64_t requests_accepted = 0;
-  std::uint64_t requests_rejected = 0;  ///< At once, or when their turn came.
+  std::uint64_t requests_rejected = 0;  ///< In the Reply, or later by an event.
   std::map<protocol::StatusCode, std::uint64_t> rejected_by_code;
-  LatencyHistogram send_late;  ///< From when a request was to be sent to when it was.
+  LatencyHistogram send_late;  ///< Delay from the planned to the actual sending.
 };
 
-/// A simulated game server: puts the avatars of one world there, asks for their movements by a plan,
-/// and takes them away at the end. What it asks for in one moment goes out in one message.
+/// A simulated game server. It spawns the avatars of one world, requests movements according to a
+/// plan and removes the avatars at the end. Requests that are due at the same time are sent in one
+/// message.
 class Controller final : public Session {
  public:
   static constexpr std::size_t kMaxItemsPerMessage = 2048;
-  /// Commands without an answer; beyond, requests wait (and their latency tells).
+  /// Most unanswered commands. Further requests wait, which increases their latency.
   static constexpr std::size_t kMaxUnanswered = 64;
-  /// Of a choreography at most so many movements wait in the server.
-  static constexpr std::size_t kMaxAhead = 48;
+  /// Most queued movements of a choreography per avatar.
+  static constexpr std::size_t kMaxQueuedMovements = 48;
 
   Controller(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
              int world, LatencyProbes* probes);
 
-  /// All its avatars live.
+  /// Returns whether all avatars are spawned.
   [[nodiscard]] bool has_spawned() const { return has_spawned_.load(); }
   [[nodiscard]] bool has_cleaned_up() const { return has_cleaned_up_.load(); }
 
+  /// Stops requesting movements.
   void StopMoving() { moves_ = false; }
   /// Removes the avatars, then finishes.
   void CleanUp();
@@ -57,8 +59,8 @@ class Controller final : public Session {
   };
   struct Walker {
     Wanderer wanderer;
-    std::size_t next = 0;     ///< Choreography: its movement that is asked for next
-    std::size_t waiting = 0;  ///< Choreography: asked for and not started
+    std::size_t next = 0;     ///< Choreography: index of the next movement.
+    std::size_t waiting = 0;  ///< Choreography: requested but not started.
   };
   struct Due {
     std::int64_t at_ns = 0;
@@ -83,17 +85,17 @@ class Controller final : public Session {
   void Schedule(std::size_t walker, std::int64_t at_ns);
   void ArmTimer();
   void SendDue();
-  /// Adds what is due for a walker to `request`.
-  void AddOuting(const Due& due, std::int64_t now_ns, protocol::Request& request);
+  /// Adds the next movements of an avatar to `request`.
+  void AddWanderPlan(const Due& due, std::int64_t now_ns, protocol::Request& request);
   void AddChoreography(std::size_t walker, std::int64_t due_ns, std::int64_t now_ns,
                        protocol::Request& request);
   void SendRequest(protocol::Request& request);
-  /// How many movements of a choreography may wait.
-  [[nodiscard]] std::size_t Ahead() const;
+  /// Returns how many movements of a choreography may be queued per avatar.
+  [[nodiscard]] std::size_t MaxQueuedMovements() const;
 
   RunState& run_;
   const int world_;
-  LatencyProbes* probes_;  ///< Null: nobody watches.
+  LatencyProbes* probes_;  ///< Null: no observer measures latency here.
   protocol::WorldId world_id_ = 0;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t spawned_count_ = 0;
@@ -101,7 +103,7 @@ class Controller final : public Session {
   std::priority_queue<Due, std::vector<Due>, std::greater<>> due_;
   boost::asio::steady_timer timer_;
   protocol::RequestId last_request_ = 0;
-  bool may_jump_ = true;
+  bool can_jump_ = true;
   bool moves_ = true;
   ControllerCounts counts_;
   std::atomic<bool> has_spawned_{false};

@@ -8,7 +8,7 @@
 
 namespace stridewire::load {
 
-/// Collects what went wrong, from any thread: the first kMaxKept texts and how many more there were.
+/// Collects error texts: the first kMaxKept, and the number of further ones. Thread-safe.
 class ErrorLog {
  public:
   static constexpr std::size_t kMaxKept = 50;
@@ -18,7 +18,7 @@ class ErrorLog {
     if (texts_.size() < kMaxKept) {
       texts_.push_back(std::move(text));
     } else {
-      ++left_out_;
+      ++omitted_;
     }
   }
 
@@ -30,14 +30,14 @@ class ErrorLog {
   [[nodiscard]] std::vector<std::string> Texts() const {
     const std::lock_guard lock(mutex_);
     std::vector<std::string> texts = texts_;
-    if (left_out_ > 0) texts.push_back("and " + std::to_string(left_out_) + " more");
+    if (omitted_ > 0) texts.push_back("and " + std::to_string(omitted_) + " more");
     return texts;
   }
 
  private:
   mutable std::mutex mutex_;
   std::vector<std::string> texts_;
-  std::uint64_t left_out_ = 0;
+  std::uint64_t omitted_ = 0;
 };
 
 }  // namespace stridewire::load

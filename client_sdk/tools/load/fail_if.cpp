@@ -27,13 +27,13 @@ Expected<FailIf> FailIf::Parse(std::string_view text) {
   condition.text_ = Trimmed(text);
   const std::size_t at = text.find_first_of("<>=!");
   if (at == std::string_view::npos) {
-    return Fail(ErrorCode::kMalformed, "needs a comparison, such as ticks_missed>0", where);
+    return Fail(ErrorCode::kMalformed, "expected a comparison, for example ticks_missed>0", where);
   }
   condition.name_ = Trimmed(text.substr(0, at));
   const std::vector<std::string> names = ReportNumberNames();
   if (std::find(names.begin(), names.end(), condition.name_) == names.end()) {
     return Fail(ErrorCode::kMalformed,
-                "names no number of the report; these are numbers: poses_received, ticks_missed, "
+                "unknown name; the report has for example poses_received, ticks_missed, "
                 "tick_ms.p99, step_latency_ms.max, requests.rejected, reconnects, errors",
                 where);
   }
@@ -49,7 +49,7 @@ Expected<FailIf> FailIf::Parse(std::string_view text) {
       std::find_if(std::begin(kSymbols), std::end(kSymbols),
                    [rest](const Symbol& each) { return rest.starts_with(each.text); });
   if (symbol == std::end(kSymbols)) {
-    return Fail(ErrorCode::kMalformed, "has no such comparison; there are > >= < <= == !=", where);
+    return Fail(ErrorCode::kMalformed, "unknown comparison; expected > >= < <= == or !=", where);
   }
   condition.operator_ = symbol->meaning;
   const std::string_view number = Trimmed(rest.substr(symbol->text.size()));
@@ -57,7 +57,7 @@ Expected<FailIf> FailIf::Parse(std::string_view text) {
       std::from_chars(number.data(), number.data() + number.size(), condition.number_);
   if (code != std::errc() || end != number.data() + number.size() ||
       !std::isfinite(condition.number_)) {
-    return Fail(ErrorCode::kMalformed, "has no number after its comparison", where);
+    return Fail(ErrorCode::kMalformed, "expected a number after the comparison", where);
   }
   return condition;
 }

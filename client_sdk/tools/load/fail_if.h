@@ -9,19 +9,19 @@
 
 namespace stridewire::load {
 
-/// A threshold on a number of the report: `ticks_missed>0`, `step_latency_ms.p99 >= 50`.
+/// A condition on a number of the report, for example `step_latency_ms.p99 >= 50`.
 ///
 ///   NAME OPERATOR NUMBER      OPERATOR: > >= < <= == !=
 class FailIf {
  public:
-  /// kMalformed with `where` = "--fail-if 'TEXT'".
+  /// Fails with kMalformed; `where` is "--fail-if 'TEXT'".
   [[nodiscard]] static Expected<FailIf> Parse(std::string_view text);
 
-  /// Whether the run fails by it. A number that could not be measured fails, too: what nobody has
-  /// seen was not within its threshold.
+  /// Returns whether the condition is true. A number that could not be measured makes it true as
+  /// well, so that a missing measurement does not pass as a success.
   [[nodiscard]] bool Fails(const LoadReport& report) const;
 
-  /// Why it failed: "ticks_missed>0: it is 3".
+  /// Describes the failure, for example "ticks_missed>0: it is 3".
   [[nodiscard]] std::string Explain(const LoadReport& report) const;
 
   [[nodiscard]] const std::string& name() const { return name_; }

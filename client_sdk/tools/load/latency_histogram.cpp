@@ -7,11 +7,11 @@
 namespace stridewire::load {
 namespace {
 
-constexpr int kExactBits = 8;                         // Values below 256 have bins of their own,
-constexpr int kBinsAnOctave = 1 << (kExactBits - 1);  // then every octave has 128.
+constexpr int kExactBits = 8;  // Values below 256 have bins of their own.
+constexpr int kBinsPerOctave = 1 << (kExactBits - 1);
 constexpr std::size_t kExactBins = std::size_t{1} << kExactBits;
 
-/// How far a value is shifted so that it has kExactBits bits.
+/// Returns by how many bits to shift a value right so that kExactBits bits remain.
 int Shift(std::int64_t us) {
   return std::max(0, static_cast<int>(std::bit_width(static_cast<std::uint64_t>(us))) - kExactBits);
 }
@@ -19,15 +19,15 @@ int Shift(std::int64_t us) {
 std::size_t BinOf(std::int64_t us) {
   const int shift = Shift(us);
   if (shift == 0) return static_cast<std::size_t>(us);
-  const auto within = static_cast<std::size_t>(us >> shift) - kBinsAnOctave;
-  return kExactBins + static_cast<std::size_t>(shift - 1) * kBinsAnOctave + within;
+  const auto within = static_cast<std::size_t>(us >> shift) - kBinsPerOctave;
+  return kExactBins + static_cast<std::size_t>(shift - 1) * kBinsPerOctave + within;
 }
 
-/// The largest value of a bin.
+/// Returns the largest value of a bin.
 std::int64_t UpperUs(std::size_t bin) {
   if (bin < kExactBins) return static_cast<std::int64_t>(bin);
-  const std::size_t shift = (bin - kExactBins) / kBinsAnOctave + 1;
-  const std::size_t within = (bin - kExactBins) % kBinsAnOctave + kBinsAnOctave;
+  const std::size_t shift = (bin - kExactBins) / kBinsPerOctave + 1;
+  const std::size_t within = (bin - kExactBins) % kBinsPerOctave + kBinsPerOctave;
   return static_cast<std::int64_t>(((within + 1) << shift) - 1);
 }
 

@@ -5,26 +5,27 @@
 
 namespace stridewire::load {
 
-/// Counts times in log-linear bins, as HdrHistogram does: single microseconds up to 255, from there
-/// 128 bins an octave. A quantile is never below the true one and at most 1/128 (0.8 %) above it;
-/// the maximum is exact. A fixed 29 KiB; Record never allocates. Not thread-safe: one a thread, then
-/// Merge.
+/// Counts times in log-linear bins like HdrHistogram: bins of 1 us up to 255 us, then 128 bins per
+/// octave. Quantiles are rounded up by at most 1/128 (0.8 %); the maximum is exact to 1 us. Takes
+/// 29 KiB and allocates in its constructor only. Not thread-safe: use one per thread and merge
+/// them.
 class LatencyHistogram {
  public:
-  /// Longer times count as this long (19 hours).
+  /// Longer times are counted as this time (19 hours).
   static constexpr std::int64_t kMaxUs = (std::int64_t{1} << 36) - 1;
 
   LatencyHistogram();
 
-  /// Nanoseconds are rounded up to whole microseconds; negative times count as 0.
+  /// Adds a time, rounded up to whole microseconds. Negative times count as 0.
   void RecordNs(std::int64_t time_ns);
 
+  /// Adds all times of another histogram.
   void Merge(const LatencyHistogram& other);
 
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] double max_ms() const { return 1e-3 * static_cast<double>(max_us_); }
 
-  /// The time that a share `q` in [0, 1] of all times does not exceed; 0 when there are none.
+  /// Returns the q-quantile in milliseconds, q from 0 to 1. Returns 0 if there are no times.
   [[nodiscard]] double QuantileMs(double q) const;
 
  private:

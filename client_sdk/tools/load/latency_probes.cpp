@@ -1,12 +1,14 @@
 #include "latency_probes.h"
 
+#include "base/check.h"
+
 namespace stridewire::load {
 
 void LatencyProbes::Schedule(std::size_t avatar, std::uint64_t request, std::int64_t scheduled_ns,
                              std::int64_t now_ns) {
   Probe& probe = probes_[avatar];
   if (probe.request != 0) Close(probe, now_ns);
-  probe = Probe{};
+  STRIDEWIRE_CHECK(request != 0 && probe.request == 0);
   probe.request = request;
   probe.scheduled_ns = scheduled_ns;
   ++open_count_;
@@ -42,6 +44,7 @@ void LatencyProbes::Pose(std::size_t avatar, std::uint64_t tick, std::int64_t ar
 
 void LatencyProbes::Abandon(std::size_t avatar) {
   if (probes_[avatar].request == 0) return;
+  STRIDEWIRE_CHECK(open_count_ > 0);
   probes_[avatar] = Probe{};
   --open_count_;
 }
@@ -57,6 +60,7 @@ std::size_t LatencyProbes::Finish(std::int64_t now_ns) {
 }
 
 void LatencyProbes::Close(Probe& probe, std::int64_t moved_ns) {
+  STRIDEWIRE_CHECK(probe.request != 0 && open_count_ > 0);
   times_.RecordNs(moved_ns - probe.scheduled_ns);
   probe = Probe{};
   --open_count_;

@@ -8,40 +8,40 @@
 
 namespace stridewire::load {
 
-/// Measures how long steps take from their plan to the screen: one probe an avatar at a time, from
-/// the time a step was to be sent to the arrival of the first pose that moves by it.
+/// Measures the latency of steps, from the planned sending of the request to the arrival of the
+/// first pose that shows the step. Each avatar has at most one probe at a time.
 ///
 ///   scheduled      sent           started (event, tick s)      first pose with tick >= s
 ///       |-----------|----------------------|-------------------------| that differs from the last
 ///       |<------------------------- latency ------------------------>|
 ///
-/// The event tells when the movement began, the pose that it can be seen; either may arrive first.
-/// Avatars are indices 0 to n - 1. Not thread-safe.
+/// Event and pose can arrive in either order. Avatars are indices 0 to n - 1. Not thread-safe.
 class LatencyProbes {
  public:
   explicit LatencyProbes(std::size_t avatar_count) : probes_(avatar_count) {}
 
-  /// Starts a probe. One still open for that avatar is closed, and counts with the time it has
-  /// waited by now: a server that never shows a step must not look faster for it.
+  /// Starts a probe. An open probe of the avatar is closed and counts with the time until `now_ns`,
+  /// so that a server that never shows a step does not appear faster.
   void Schedule(std::size_t avatar, std::uint64_t request, std::int64_t scheduled_ns,
                 std::int64_t now_ns);
 
-  /// The request's movement began at `tick`. Other requests of that avatar are ignored.
+  /// The movement of a request has started at `tick`. Requests without a probe are ignored.
   void Started(std::size_t avatar, std::uint64_t request, std::uint64_t tick);
 
-  /// The request will not be done: nothing to measure.
+  /// The server has rejected a request. Its probe is closed without a measurement.
   void Rejected(std::size_t avatar, std::uint64_t request);
 
-  /// A pose arrived at the observer that measures; `changed`: it differs from the one before.
+  /// A pose has arrived. `changed` states whether it differs from the previous one.
   void Pose(std::size_t avatar, std::uint64_t tick, std::int64_t arrived_ns, bool changed);
 
-  /// Nobody watches this avatar for a while, by our own doing: closes its probe uncounted.
+  /// Closes the probe of an avatar without a measurement, because its observer was dropped
+  /// (--churn).
   void Abandon(std::size_t avatar);
 
-  /// Only what is scheduled from now on, or is open now, is counted.
+  /// Discards all measurements. Open probes stay open.
   void StartCounting() { times_ = LatencyHistogram(); }
 
-  /// Closes what has not moved; these count with the time they have waited. Returns how many.
+  /// Closes all open probes, which count with the time until `now_ns`. Returns their number.
   std::size_t Finish(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t open_count() const { return open_count_; }
@@ -49,10 +49,10 @@ class LatencyProbes {
 
  private:
   struct Probe {
-    std::uint64_t request = 0;  ///< 0: not open
+    std::uint64_t request = 0;  ///< 0: the probe is closed.
     std::int64_t scheduled_ns = 0;
-    std::uint64_t started_tick = 0;  ///< 0: not known yet
-    // The first and the last change seen while the tick of its start was not known.
+    std::uint64_t started_tick = 0;  ///< 0: unknown.
+    // First and last changed pose that arrived before the `started` event.
     std::uint64_t first_tick = 0;
     std::int64_t first_ns = 0;
     std::uint64_t last_tick = 0;

@@ -11,19 +11,20 @@ namespace stridewire::load {
 namespace {
 
 constexpr const char* kFooter = R"(
-What is measured
-  poses_expected   avatars x observers x ticks of the measured window, however many of these ticks
-                   the server did or sent; of partial observers what they watch. The window opens when all observers see all avatars.
-  tick_ms          how long the server's ticks took, from its own histogram: p50 and p99 are
-                   interpolated within its bins. ticks_missed is the server's count, over all shards.
-  step_latency_ms  from when a step was to be sent by the plan (not from when it was) to the arrival
-                   of the first pose that moves by it: at a tick not before its `started` event and
-                   different from the pose before. Only steps that start from a stand are measured.
-                   A step that has not moved at the end counts with the time it has waited.
-  errors           what went wrong, and what this program itself could not keep up with.
+Results:
+  poses_expected   observed avatars x ticks of the measurement, summed over all observers. The
+                   measurement starts when all observers have received poses of all avatars.
+  tick_ms          duration of the server's ticks, from its own histogram. p50 and p99 are
+                   interpolated within a bin.
+  ticks_missed     ticks that the server has skipped, over all shards.
+  step_latency_ms  time from the planned sending of a step to the arrival of the first pose that
+                   shows it: the first changed pose whose tick is not before the `started` event.
+                   Only steps from standing are measured. A step without such a pose at the end
+                   counts with the time until then.
+  errors           failures, and delays of stridewire-load itself that affect the results.
 
-Exit code: 0 done, 2 bad options, 1 anything else: a server that is not there or goes away, a pose
-that fails its checks, a --fail-if that holds.
+Exit code: 0 success; 2 invalid options; 1 if the server is not reachable or the connection is lost,
+if a pose fails a check, or if a --fail-if condition is true.
 
 Examples:
   stridewire-load --connect 127.0.0.1:7420 --avatars 1000 --observers 4 --seconds 30
@@ -36,13 +37,13 @@ Examples:
                   --fail-if 'ticks_missed>0' --fail-if 'step_latency_ms.p99>50'
 )";
 
-constexpr const char* kOutOfRange = "is out of its range (see --help)";
+constexpr const char* kOutOfRange = "is out of range (see --help)";
 
 Expected<Address> ParseAddress(const std::string& text, const char* option) {
   const std::string where = std::string(option) + " " + text.substr(0, 300);
   const auto fail = [&where] {
-    return Fail(ErrorCode::kMalformed, "is not HOST:PORT, such as 127.0.0.1:7420 or [::1]:7420",
-                where);
+    return Fail(ErrorCode::kMalformed,
+                "expected HOST:PORT, for example 127.0.0.1:7420 or [::1]:7420", where);
   };
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) return fail();
@@ -51,7 +52,7 @@ Expected<Address> ParseAddress(const std::string& text, const char* option) {
   if (address.host.starts_with('[') && address.host.ends_with(']')) {
     address.host = address.host.substr(1, address.host.size() - 2);
   } else if (address.host.find(':') != std::string::npos) {
-    return fail();  // An IPv6 address without brackets: which colon is the port's?
+    return fail();  // An IPv6 address without brackets is ambiguous.
   }
   const char* const end = text.data() + text.size();
   const auto [stop, code] = std::from_chars(text.data() + colon + 1, end, address.port);
@@ -62,9 +63,9 @@ Expected<Address> ParseAddress(const std::string& text, const char* option) {
   return address;
 }
 
-/// "--avatars 0", for errors.
+/// Formats an option and its value for an error message.
 template <typename T>
-std::string Given(const char* option, T value) {
+std::string OptionText(const char* option, T value) {
   std::string text = std::to_string(value);
   if constexpr (std::is_floating_point_v<T>) {
     text.erase(text.find_last_not_of('0') + 1);
@@ -75,8 +76,8 @@ std::string Given(const char* option, T value) {
 
 template <typename T>
 Status CheckRange(const char* option, T value, T min, T max) {
-  if (value >= min && value <= max) return {};  // NaN fails, too.
-  return Fail(ErrorCode::kOutOfRange, kOutOfRange, Given(option, value));
+  if (value >= min && value <= max) return {};  // Written this way so that NaN is rejected.
+  return Fail(ErrorCode::kOutOfRange, kOutOfRange, OptionText(option, value));
 }
 
 Status CheckRanges(const LoadOptions& options) {
@@ -95,16 +96,16 @@ Status CheckRanges(const LoadOptions& options) {
     if (!check) return check;
   }
   if (options.worlds > options.avatars) {
-    return Fail(ErrorCode::kInvalidArgument, "leaves worlds without an avatar",
-                Given("--worlds", options.worlds));
+    return Fail(ErrorCode::kInvalidArgument, "exceeds the number of avatars",
+                OptionText("--worlds", options.worlds));
   }
   if (options.partial_observers > 0 && options.partial_avatars > options.avatars) {
-    return Fail(ErrorCode::kInvalidArgument, "is more than there are",
-                Given("--partial-avatars", options.partial_avatars));
+    return Fail(ErrorCode::kInvalidArgument, "exceeds the number of avatars",
+                OptionText("--partial-avatars", options.partial_avatars));
   }
   if (options.churn_per_s > 0.0 && options.observers + options.partial_observers == 0) {
-    return Fail(ErrorCode::kInvalidArgument, "has no observers to drop and bring back",
-                Given("--churn", options.churn_per_s));
+    return Fail(ErrorCode::kInvalidArgument, "needs at least one observer",
+                OptionText("--churn", options.churn_per_s));
   }
   return {};
 }
@@ -118,12 +119,11 @@ std::string ToText(const Address& address) {
 
 Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv) {
   CLI::App app(
-      "Loads a Stridewire server: game servers that make avatars walk, and observers that count "
-      "and "
-      "check the poses.",
+      "Loads a Stridewire server with simulated game servers, which move avatars, and with "
+      "observers, which count and check the poses they receive.",
       "stridewire-load");
   app.footer(kFooter);
-  app.set_help_flag("-h,--help", "Print this and end");
+  app.set_help_flag("-h,--help", "Print this help and exit");
   app.set_version_flag("--version", std::string("stridewire-load ") + kVersion);
 
   LoadCommandLine line;
@@ -135,45 +135,50 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   std::string observe = "all";
   bool wander = false;
   std::vector<std::string> fail_ifs;
-  app.add_option("--connect", connect, "The server, HOST:PORT")->required();
+  app.add_option("--connect", connect, "Address of the server, HOST:PORT")->required();
   app.add_option(
       "--http", http,
-      "Its HTTP address, for /metrics; 'none': do not ask [host of --connect, port + 1]");
-  app.add_option("--worlds", options.worlds, "Worlds load-0, load-1, ... (1 to 1000) [1]");
+      "HTTP address of the server's metrics, HOST:PORT, or none [host and port + 1 of --connect]");
+  app.add_option("--worlds", options.worlds,
+                 "Number of worlds, named load-0, load-1, ... (1 to 1000) [1]");
   app.add_option("--avatars", options.avatars,
-                 "Avatars 1 to N, spread over the worlds in turn (1 to 100000)")
+                 "Number of avatars, distributed over the worlds (1 to 100000)")
       ->required();
-  app.add_option("--observers", options.observers, "Sessions that watch (0 to 10000)")->required();
+  app.add_option("--observers", options.observers,
+                 "Number of sessions that observe all avatars (0 to 10000)")
+      ->required();
   app.add_option("--partial-observers", options.partial_observers,
-                 "Beside those, sessions that watch some avatars only (0 to 10000) [0]");
+                 "Number of further sessions that observe some avatars only (0 to 10000) [0]");
   app.add_option("--partial-avatars", options.partial_avatars,
-                 "How many each of these watches, spread over the crowd, not the same ones [100]");
-  app.add_option("--seconds", options.seconds, "Length of the measured window (0.1 to 3600)")
+                 "Avatars per partial observer, distributed over the crowd [100]");
+  app.add_option("--seconds", options.seconds, "Duration of the measurement (0.1 to 3600)")
       ->required();
   app.add_option("--mode", mode,
-                 "How poses are sent: full or quantised; movement: evaluated here [quantised]");
-  app.add_option("--detail", detail,
-                 "Joints that are sent: all, fewer or root; others than all quantised [all]");
+                 "How the server sends poses: full, quantised or movement [quantised]");
+  app.add_option("--detail", detail, "Joints of quantised poses: all, reduced or root [all]");
   app.add_option("--library", options.library,
-                 "What the server's worlds have, for --mode movement [builtin]")
+                 "Library of the server's worlds, for --mode movement [builtin]")
       ->type_name("FILE");
   app.add_option("--choreography", options.choreography,
-                 "What each avatar does, over and over; repeated from where it stands then")
+                 "Movements that each avatar repeats, from wherever it stands")
       ->type_name("C.json");
-  app.add_flag("--wander", wander, "Random steps, stands and jumps; so without --choreography");
-  app.add_option("--churn", options.churn_per_s,
-                 "This many times a second one observer drops its connection and comes back");
+  app.add_flag("--wander", wander,
+               "Random steps, stands and jumps (the default without --choreography)");
+  app.add_option(
+      "--churn", options.churn_per_s,
+      "Reconnects per second: each drops the connection of one observer (0 to 1000) [0]");
   app.add_option("--observe", observe,
-                 "all: every observer watches every world; one: world i mod worlds [all]");
-  app.add_option("--threads", options.threads,
-                 "Threads; the first has the game servers, the others only observers [1]");
+                 "Worlds per observer: all, or one, which is observer index modulo worlds [all]");
+  app.add_option(
+      "--threads", options.threads,
+      "Number of threads. The first runs the game servers, the others only observers [1]");
   app.add_option(
       "--verify-one-in", options.verify_one_in,
-      "Decode and check each n-th batch only, when this program is what is too slow [1]");
-  CLI::Option* seed = app.add_option("--seed", options.seed, "Seed of the wandering [random]");
+      "Decode and check only every n-th batch, if this program is too slow otherwise [1]");
+  CLI::Option* seed = app.add_option("--seed", options.seed, "Seed for --wander [random]");
   app.add_flag("--json", options.json, "Print the result as one JSON object");
   app.add_option("--fail-if", fail_ifs,
-                 "End with 1 if this holds, e.g. 'ticks_missed>0'; may be given several times")
+                 "Exit with 1 if this condition is true, e.g. 'ticks_missed>0'. Can be repeated")
       ->allow_extra_args(false);
 
   try {
@@ -207,30 +212,30 @@ Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv)
   } else if (mode == "movement") {
     options.mode = protocol::PoseMode::kMovement;
   } else if (mode != "quantised") {
-    return Fail(ErrorCode::kInvalidArgument, "is not full, quantised or movement",
+    return Fail(ErrorCode::kInvalidArgument, "expected full, quantised or movement",
                 "--mode " + mode);
   }
-  if (detail == "fewer") {
+  if (detail == "reduced") {
     options.detail = protocol::PoseDetail::kReduced;
   } else if (detail == "root") {
     options.detail = protocol::PoseDetail::kRoot;
   } else if (detail != "all") {
-    return Fail(ErrorCode::kInvalidArgument, "is not all, fewer or root", "--detail " + detail);
+    return Fail(ErrorCode::kInvalidArgument, "expected all, reduced or root", "--detail " + detail);
   }
   if (options.detail != protocol::PoseDetail::kAll &&
       options.mode != protocol::PoseMode::kQuantised) {
-    return Fail(ErrorCode::kInvalidArgument, "goes with --mode quantised", "--detail " + detail);
+    return Fail(ErrorCode::kInvalidArgument, "needs --mode quantised", "--detail " + detail);
   }
   if (observe != "all" && observe != "one") {
-    return Fail(ErrorCode::kInvalidArgument, "is neither all nor one", "--observe " + observe);
+    return Fail(ErrorCode::kInvalidArgument, "expected all or one", "--observe " + observe);
   }
   options.observe_all = observe == "all";
   if (wander && !options.choreography.empty()) {
-    return Fail(ErrorCode::kInvalidArgument, "excludes --choreography", "--wander");
+    return Fail(ErrorCode::kInvalidArgument, "cannot be used with --choreography", "--wander");
   }
   if (seed->count() == 0) options.seed = std::random_device{}();
   if (fail_ifs.size() > static_cast<std::size_t>(kMaxFailIfs)) {
-    return Fail(ErrorCode::kLimitExceeded, "may be given 32 times", "--fail-if");
+    return Fail(ErrorCode::kLimitExceeded, "can be used at most 32 times", "--fail-if");
   }
   for (const std::string& text : fail_ifs) {
     Expected<FailIf> fail_if = FailIf::Parse(text);

@@ -11,16 +11,17 @@
 
 namespace stridewire::load {
 
-/// HOST:PORT; an IPv6 address stands in brackets.
+/// Host name or IP address, and port.
 struct Address {
   std::string host;
   std::uint16_t port = 0;
   bool operator==(const Address&) const = default;
 };
 
+/// Formats as HOST:PORT, with brackets around an IPv6 address.
 [[nodiscard]] std::string ToText(const Address& address);
 
-/// What bounds a run, whatever is asked for.
+// Upper limits of the options.
 inline constexpr int kMaxAvatars = 100'000;
 inline constexpr int kMaxWorlds = 1000;
 inline constexpr int kMaxObservers = 10'000;
@@ -29,34 +30,36 @@ inline constexpr double kMaxChurnPerS = 1000.0;
 inline constexpr int kMaxThreads = 64;
 inline constexpr int kMaxFailIfs = 32;
 
+/// Options of a run. The fields correspond to the command line options.
 struct LoadOptions {
   Address server;
-  std::optional<Address> http;  ///< Empty: the server's metrics are not read.
+  std::optional<Address> http;  ///< HTTP address of the server. Empty: do not read metrics.
   int worlds = 1;
   int avatars = 0;
   int observers = 0;
-  int partial_observers = 0;  ///< Beside them, such as name avatars.
-  int partial_avatars = 100;  ///< How many each of those names.
+  int partial_observers = 0;  ///< Observers that subscribe to some avatars only.
+  int partial_avatars = 100;  ///< Avatars per partial observer.
   double seconds = 10.0;
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   protocol::PoseDetail detail = protocol::PoseDetail::kAll;
-  std::string library = "builtin";  ///< The server's, in mode movement.
-  std::string choreography;         ///< A file; empty: the avatars wander.
-  bool observe_all = true;          ///< Every observer watches every world; else one each, in turn.
+  std::string library = "builtin";  ///< Library of the server's worlds, for mode movement.
+  std::string choreography;         ///< File name. Empty: the avatars wander.
+  bool observe_all = true;          ///< True: each observer watches all worlds. False: one world.
   double churn_per_s = 0.0;
   int threads = 1;
-  int verify_one_in = 1;  ///< Observers decode and check each n-th batch.
+  int verify_one_in = 1;  ///< Observers decode and check every n-th batch.
   std::uint64_t seed = 0;
   bool json = false;
   std::vector<FailIf> fail_ifs;
 };
 
+/// A parsed command line.
 struct LoadCommandLine {
-  std::string text;  ///< Not empty: help or version, to be printed instead of a run.
+  std::string text;  ///< Help or version to print instead of a run, or empty.
   LoadOptions options;
 };
 
-/// Reads the options. Errors name the option; the text ends up on stderr with exit code 2.
+/// Parses and checks the command line. An error names the option.
 [[nodiscard]] Expected<LoadCommandLine> ReadLoadCommandLine(int argc, const char* const* argv);
 
 }  // namespace stridewire::load

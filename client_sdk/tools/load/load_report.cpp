@@ -12,8 +12,8 @@ const char* ModeName(protocol::PoseMode mode) {
     case protocol::PoseMode::kFull: return "full";
     case protocol::PoseMode::kQuantised:
     case protocol::PoseMode::kCompact: return "quantised";
-    case protocol::PoseMode::kCompactReduced: return "quantised, fewer joints";
-    case protocol::PoseMode::kCompactRoot: return "quantised, the root";
+    case protocol::PoseMode::kCompactReduced: return "quantised, reduced joints";
+    case protocol::PoseMode::kCompactRoot: return "quantised, root only";
     case protocol::PoseMode::kMovement: return "movement";
   }
   return "";
@@ -21,7 +21,7 @@ const char* ModeName(protocol::PoseMode mode) {
 
 using nlohmann::ordered_json;
 
-/// Three decimals are more than any of these times is good for.
+/// Rounds to three decimals.
 double Rounded(double value) { return std::round(value * 1000.0) / 1000.0; }
 
 ordered_json ToValue(const std::optional<Quantiles>& quantiles) {
@@ -77,7 +77,7 @@ ordered_json ToDocument(const LoadReport& report) {
           {"partial_avatars", report.partial_avatars}};
 }
 
-/// "tick_ms.p99" -> the value there.
+/// Finds a value by its path, for example "tick_ms.p99".
 const ordered_json* Find(const ordered_json& document, std::string_view path) {
   const ordered_json* value = &document;
   while (!path.empty()) {
@@ -109,8 +109,9 @@ std::string Format(const char* format, auto... values) {
   return text;
 }
 
-std::string Line(const char* name, const std::optional<Quantiles>& quantiles, const char* without) {
-  if (!quantiles) return Format("%-15s %s\n", name, without);
+std::string Line(const char* name, const std::optional<Quantiles>& quantiles,
+                 const char* if_missing) {
+  if (!quantiles) return Format("%-15s %s\n", name, if_missing);
   return Format("%-15s p50 %.3f ms, p99 %.3f ms, max %.3f ms\n", name, quantiles->p50,
                 quantiles->p99, quantiles->max);
 }
@@ -118,7 +119,7 @@ std::string Line(const char* name, const std::optional<Quantiles>& quantiles, co
 }  // namespace
 
 std::string ToJson(const LoadReport& report) {
-  // Errors may quote what a server sent.
+  // Errors can quote text of the server that is not valid UTF-8.
   return ToDocument(report).dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
@@ -143,20 +144,20 @@ std::string ToText(const LoadReport& report) {
         count(report.poses_invalid), count(report.batches_dropped));
     if (report.poses_received > 0) {
       text += Format(
-          "bytes           %llu, %.1f a pose; %.0f %% of the poses moved\n",
+          "bytes           %llu, %.1f per pose; %.0f %% of the poses moved\n",
           count(report.bytes_received),
           static_cast<double>(report.bytes_received) / static_cast<double>(report.poses_received),
           100.0 * report.moving_share.value_or(0.0));
     }
   }
-  text += Line("server tick", report.tick_ms, "not known: no metrics");
+  text += Line("server tick", report.tick_ms, "unknown: no metrics");
   if (report.ticks_missed) text += Format("ticks missed    %llu\n", count(*report.ticks_missed));
-  text += Line("step latency", report.step_latency_ms, "no step was measured");
+  text += Line("step latency", report.step_latency_ms, "no steps were measured");
   text += Format("requests        %llu sent, %llu accepted, %llu rejected\n",
                  count(report.requests_sent), count(report.requests_accepted),
                  count(report.requests_rejected));
   text += Format("reconnects      %llu\n", count(report.reconnects));
-  text += Format("own             %.2f s processor time, late by p99 %.3f ms, max %.3f ms\n",
+  text += Format("this program    %.2f s processor time, late by p99 %.3f ms, max %.3f ms\n",
                  report.own_cpu_s, report.own_loop_late_ms.p99, report.own_loop_late_ms.max);
   for (const std::string& error : report.errors) text += "error           " + error + "\n";
   return text;

@@ -27,31 +27,33 @@ namespace {
 namespace asio = boost::asio;
 using asio::ip::tcp;
 
-/// The window opens this long after all is set up, so that no tick of it has been yet.
+/// Time between the end of the setup and the first measured tick.
 constexpr double kWindowLeadS = 0.1;
-/// Observers that are connecting at the same time.
+/// Most observers that connect at the same time.
 constexpr std::size_t kMaxOpening = 64;
-/// A dropped observer (--churn) comes back after this.
+/// Delay before a dropped observer (--churn) reconnects.
 constexpr double kChurnPauseS = 0.2;
-/// From here on this program's own lateness spoils what it measures, and it says so.
+/// If this program's own delays exceed this, they affect the results, and the report contains a
+/// warning.
 constexpr double kOwnLateP99Ms = 5.0;
 
-/// A thread with its sessions, which it polls, and a measure of how late it runs.
+/// A thread that polls its sessions and measures its own delays.
 class Worker {
  public:
-  static constexpr std::int64_t kBeatNs = 10'000'000;
-  static constexpr std::size_t kPollEvery = 10;  ///< Beats.
+  static constexpr std::int64_t kPollIntervalNs = 10'000'000;
+  /// Each poll handles one of this many groups of sessions.
+  static constexpr std::size_t kPollGroups = 10;
 
   ~Worker() { Stop(); }
 
   ThreadContext& context() { return context_; }
 
-  /// Before Start, or on the thread.
+  /// Call it before Start, or on the thread.
   void Add(Session& session) { sessions_.push_back(&session); }
 
   void Start() {
-    next_beat_ns_ = NowNs();
-    Beat();
+    next_poll_ns_ = NowNs();
+    SchedulePoll();
     thread_ = std::thread([this] { context_.io.run(); });
   }
 
@@ -60,7 +62,7 @@ class Worker {
     asio::post(context_.io, std::forward<F>(task));
   }
 
-  /// Posts and waits until it is done.
+  /// Runs a task on the thread and waits until it is done.
   template <typename F>
   void Run(F&& task) {
     std::promise<void> done;
@@ -81,28 +83,28 @@ class Worker {
   const LatencyHistogram& late() const { return late_; }
 
  private:
-  void Beat() {
-    next_beat_ns_ += kBeatNs;
+  void SchedulePoll() {
+    next_poll_ns_ += kPollIntervalNs;
     timer_.expires_at(
-        std::chrono::steady_clock::time_point(std::chrono::nanoseconds(next_beat_ns_)));
+        std::chrono::steady_clock::time_point(std::chrono::nanoseconds(next_poll_ns_)));
     timer_.async_wait([this](const boost::system::error_code& code) {
       if (code) return;
       const std::int64_t now_ns = NowNs();
-      late_.RecordNs(now_ns - next_beat_ns_);
-      next_beat_ns_ = std::max(next_beat_ns_, now_ns - kBeatNs);  // No burst after a stall.
-      for (std::size_t i = beat_ % kPollEvery; i < sessions_.size(); i += kPollEvery) {
+      late_.RecordNs(now_ns - next_poll_ns_);
+      next_poll_ns_ = std::max(next_poll_ns_, now_ns - kPollIntervalNs);  // No burst after a stall.
+      for (std::size_t i = poll_count_ % kPollGroups; i < sessions_.size(); i += kPollGroups) {
         sessions_[i]->Poll(now_ns);
       }
-      ++beat_;
-      Beat();
+      ++poll_count_;
+      SchedulePoll();
     });
   }
 
   ThreadContext context_;
   asio::steady_timer timer_{context_.io};
   std::vector<Session*> sessions_;
-  std::int64_t next_beat_ns_ = 0;
-  std::size_t beat_ = 0;
+  std::int64_t next_poll_ns_ = 0;
+  std::size_t poll_count_ = 0;
   LatencyHistogram late_;
   std::thread thread_;
 };
@@ -120,8 +122,8 @@ double OwnCpuS() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Raises the soft limit on open files as far as needed.
-bool MayOpenFiles(std::size_t count) {
+/// Raises the soft limit on open files if necessary. Returns whether `count` files can be opened.
+bool AllowOpenFiles(std::size_t count) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return true;
   if (limit.rlim_cur >= count) return true;
@@ -157,8 +159,9 @@ class LoadRun {
   [[nodiscard]] std::optional<ServerMetrics> Scrape();
   [[nodiscard]] std::uint64_t OpenWindow();
   void Churn(std::int64_t now_ns);
-  void TellProgress(std::int64_t now_ns, const char* what);
-  /// Sleeps in small steps until `done()`; false when time is up or the run is stopped.
+  void ReportProgress(std::int64_t now_ns, const char* what);
+  /// Polls `done` until it returns true. Returns false after the deadline, or if the run is
+  /// stopped.
   template <typename F>
   bool WaitUntil(std::int64_t deadline_ns, const char* what, F&& done);
 
@@ -168,7 +171,7 @@ class LoadRun {
   const std::function<void(const std::string&)>& progress_;
   tcp::endpoint server_;
   std::optional<LatencyProbes> probes_;
-  // Sessions live in the contexts of workers: declared later, they go first.
+  // Sessions use the contexts of the workers and must be destroyed before them.
   std::vector<std::unique_ptr<Worker>> workers_;
   std::vector<std::unique_ptr<Controller>> controllers_;
   std::vector<std::unique_ptr<Observer>> observers_;
@@ -191,19 +194,19 @@ bool LoadRun::WaitUntil(std::int64_t deadline_ns, const char* what, F&& done) {
     if (done()) return true;
     const std::int64_t now_ns = NowNs();
     if (stop_ || now_ns >= deadline_ns) return false;
-    TellProgress(now_ns, what);
+    ReportProgress(now_ns, what);
     std::this_thread::sleep_for(
         std::chrono::nanoseconds(std::min<std::int64_t>(5'000'000, deadline_ns - now_ns)));
   }
 }
 
-void LoadRun::TellProgress(std::int64_t now_ns, const char* what) {
+void LoadRun::ReportProgress(std::int64_t now_ns, const char* what) {
   if (now_ns < next_progress_ns_) return;
   next_progress_ns_ = now_ns + kSecondNs;
   const auto count =
       std::ranges::count_if(observers_, [](const auto& observer) { return observer->sees_all(); });
   progress_(std::string(what) + ": " + std::to_string(count) + " of " +
-            std::to_string(observers_.size()) + " observers see all avatars" +
+            std::to_string(observers_.size()) + " observers receive all avatars" +
             (opened_ns_ == 0 ? std::string()
                              : ", " + std::to_string((now_ns - opened_ns_) / kSecondNs) + " s of " +
                                    std::to_string(static_cast<int>(options_.seconds))));
@@ -226,7 +229,7 @@ bool LoadRun::Resolve() {
 
 void LoadRun::MakeSessions() {
   for (int i = 0; i < options_.threads; ++i) workers_.push_back(std::make_unique<Worker>());
-  // Latency is measured by one observer a world, on the thread of the controllers.
+  // One observer per world measures latency. It runs on the thread of the controllers.
   const bool measures = options_.observers > 0;
   if (measures) probes_.emplace(static_cast<std::size_t>(options_.avatars));
   const int measuring_count = options_.observe_all ? 1 : options_.worlds;
@@ -261,7 +264,7 @@ bool LoadRun::OpenObservers() {
     return seeing == observers_.size();
   });
   if (!all_see && !stop_) {
-    run_.Problem("not every observer saw every avatar within " +
+    run_.Problem("some observers did not receive all avatars within " +
                  std::to_string(static_cast<int>(kSetUpTimeoutS)) + " s");
   }
   return all_see && !run_.failed;
@@ -269,10 +272,10 @@ bool LoadRun::OpenObservers() {
 
 bool LoadRun::SetUp() {
   constexpr std::size_t kOtherFiles = 64;
-  if (!MayOpenFiles(static_cast<std::size_t>(options_.worlds + options_.observers +
-                                             options_.partial_observers) +
-                    kOtherFiles)) {
-    run_.Problem("the system does not let this program open so many connections (ulimit -n)");
+  if (!AllowOpenFiles(static_cast<std::size_t>(options_.worlds + options_.observers +
+                                               options_.partial_observers) +
+                      kOtherFiles)) {
+    run_.Problem("too many connections for the limit on open files (ulimit -n)");
     return false;
   }
   if (!Resolve()) return false;
@@ -282,13 +285,13 @@ bool LoadRun::SetUp() {
     workers_[0]->Post([controller = controller.get()] { controller->Open(); });
   }
   const auto deadline_ns = NowNs() + static_cast<std::int64_t>(1e9 * kSetUpTimeoutS);
-  const bool all_there = WaitUntil(deadline_ns, "putting avatars into worlds", [&] {
+  const bool all_there = WaitUntil(deadline_ns, "spawning avatars", [&] {
     return run_.failed || std::ranges::all_of(controllers_, [](const auto& controller) {
              return controller->has_spawned();
            });
   });
   if (!all_there && !stop_) {
-    run_.Problem("the server did not take all avatars within " +
+    run_.Problem("the server did not spawn all avatars within " +
                  std::to_string(static_cast<int>(kSetUpTimeoutS)) + " s");
   }
   return all_there && !run_.failed && OpenObservers();
@@ -299,11 +302,11 @@ std::optional<ServerMetrics> LoadRun::Scrape() {
   Expected<ServerMetrics> metrics = ScrapeServerMetrics(*options_.http, kScrapeTimeoutS);
   if (metrics) return std::move(*metrics);
   run_.errors.Add(Describe(metrics.error()) +
-                  "; tick_ms and ticks_missed are not known (--http HOST:PORT or none)");
+                  "; tick_ms and ticks_missed are unknown (see --http)");
   return std::nullopt;
 }
 
-/// Sets the window a moment ahead; returns how many ticks it has.
+/// Sets the measurement window, which starts kWindowLeadS from now. Returns its number of ticks.
 std::uint64_t LoadRun::OpenWindow() {
   const double tick_hz = run_.tick_hz;
   const auto ticks =
@@ -327,7 +330,7 @@ void LoadRun::Churn(std::int64_t now_ns) {
 }
 
 void LoadRun::Measure() {
-  // Nothing is counted before; what the threads have counted so far is thrown away on them.
+  // Discard everything that was counted during the setup.
   for (const auto& worker : workers_) {
     worker->Run([&] { worker->StartCounting(); });
   }
@@ -350,7 +353,7 @@ void LoadRun::Measure() {
   for (const auto& controller : controllers_) {
     workers_[0]->Post([controller = controller.get()] { controller->StopMoving(); });
   }
-  // What is under way at the end still comes.
+  // Wait for steps in progress and for the last poses.
   const std::int64_t grace_ns = NowNs() + static_cast<std::int64_t>(1e9 * kGraceS);
   (void)WaitUntil(grace_ns, "finishing", [&] {
     std::size_t open_probes = 0;
@@ -436,12 +439,11 @@ LoadReport LoadRun::Report() {
   }
   if (unfinished_count_ > 0) {
     run_.errors.Add(std::to_string(unfinished_count_) +
-                    " steps had not moved by the end; they count with the time they had waited");
+                    " steps had no visible pose at the end; they count with the time until then");
   }
   if (report.batches_dropped > 0) {
     run_.errors.Add("the server dropped " + std::to_string(report.batches_dropped) +
-                    " batches for observers that were too slow to read them: this program, or the "
-                    "network");
+                    " batches because this program or the network was too slow");
   }
   LatencyHistogram late;
   for (const auto& worker : workers_) late.Merge(worker->late());
@@ -453,11 +455,10 @@ LoadReport LoadRun::Report() {
     const auto text = [](double ms) {
       return std::to_string(ms).substr(0, std::to_string(ms).size() - 3);
     };
-    run_.errors.Add("this program could not keep up itself: its loop was late by p99 " +
-                    text(report.own_loop_late_ms.p99) + " ms, max " +
-                    text(report.own_loop_late_ms.max) + " ms, its requests by p99 " +
-                    text(report.own_send_late_ms.p99) +
-                    " ms; latencies and lost poses may be its own");
+    run_.errors.Add(
+        "this program was too slow: its loop was late by p99 " + text(report.own_loop_late_ms.p99) +
+        " ms, max " + text(report.own_loop_late_ms.max) + " ms, its requests by p99 " +
+        text(report.own_send_late_ms.p99) + " ms; this affects latencies and missing poses");
   }
   report.errors = run_.errors.Texts();
   report.failed = run_.failed;

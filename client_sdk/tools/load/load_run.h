@@ -12,15 +12,15 @@
 
 namespace stridewire::load {
 
-/// How long a run may take beyond its measured window.
-inline constexpr double kSetUpTimeoutS = 30.0;  ///< Until all avatars are there and seen.
-inline constexpr double kGraceS = 1.0;          ///< For poses and steps under way at the end.
-inline constexpr double kScrapeTimeoutS = 2.0;  ///< Twice.
+// A run takes at most this much longer than its measurement.
+inline constexpr double kSetUpTimeoutS = 30.0;  ///< Until all observers see all avatars.
+inline constexpr double kGraceS = 1.0;          ///< For steps in progress at the end.
+inline constexpr double kScrapeTimeoutS = 2.0;  ///< For each of two reads of the metrics.
 
-/// Loads a server and reports what was measured; what went wrong is in `errors` and `failed`. Blocks
-/// for at most kSetUpTimeoutS + seconds + some seconds. `choreography` null: the avatars wander. `library` is the
-/// worlds', in mode movement.
-/// `stop` set from elsewhere ends the run early; `progress` is told a line a second.
+/// Loads a server and returns the measurements. Failures are in `errors` and `failed` of the
+/// report. Blocks for `seconds` plus the times above. If `choreography` is null, the avatars
+/// wander. `library` is needed in mode movement only. Setting `stop` ends the run early. `progress`
+/// receives one line of text per second.
 [[nodiscard]] LoadReport RunLoad(const LoadOptions& options, const Choreography* choreography,
                                  std::shared_ptr<const MotionLibrary> library,
                                  const std::atomic<bool>& stop,

@@ -1,4 +1,4 @@
-// stridewire-load: options in, one report out. All else is in load_run.h.
+// stridewire-load: reads the options, runs the load (load_run.h) and prints a report.
 #include <unistd.h>
 
 #include <algorithm>
@@ -37,21 +37,21 @@ int Run(int argc, char** argv) {
       std::fprintf(stderr, "stridewire-load: --choreography %s\n", Describe(read.error()).c_str());
       return 2;
     }
-    // Its avatars stand in many places: what is fixed to one place is not for them.
+    // Avatars repeat the choreography in many places, so it must not refer to world positions.
     const bool is_fixed = std::ranges::any_of(read->movements, [](const MovementRequest& request) {
       const auto* step = std::get_if<StepRequest>(&request.movement);
       return (step != nullptr && step->at.has_value()) ||
              std::holds_alternative<WalkRequest>(request.movement);
     });
     if (!read->layers.empty()) {
-      std::fprintf(stderr, "stridewire-load: --choreography %s: layers are not played by a load\n",
+      std::fprintf(stderr, "stridewire-load: --choreography %s: layers are not supported here\n",
                    options.choreography.c_str());
       return 2;
     }
     if (is_fixed || read->terrain != nullptr) {
       std::fprintf(stderr,
-                   "stridewire-load: --choreography %s: at_m, walk_to and terrain belong to one "
-                   "place, and avatars stand in many\n",
+                   "stridewire-load: --choreography %s: at_m, walk_to and terrain are not "
+                   "supported, because avatars start in many places\n",
                    options.choreography.c_str());
       return 2;
     }
@@ -69,17 +69,17 @@ int Run(int argc, char** argv) {
   std::signal(SIGINT, OnSignal);
   std::signal(SIGTERM, OnSignal);
   std::signal(SIGPIPE, SIG_IGN);
-  const bool tells_progress = isatty(STDERR_FILENO) != 0;
+  const bool shows_progress = isatty(STDERR_FILENO) != 0;
   const LoadReport report = RunLoad(options, options.choreography.empty() ? nullptr : &choreography,
-                                    library, stop, [tells_progress](const std::string& text) {
-                                      if (tells_progress)
+                                    library, stop, [shows_progress](const std::string& text) {
+                                      if (shows_progress)
                                         std::fprintf(stderr, "\r\033[K%s", text.c_str());
                                     });
-  if (tells_progress) std::fputs("\r\033[K", stderr);
+  if (shows_progress) std::fputs("\r\033[K", stderr);
 
   std::fputs((options.json ? ToJson(report) + "\n" : ToText(report)).c_str(), stdout);
   bool failed = report.failed;
-  // With --json the errors are inside the object, and someone may only look at stderr.
+  // Repeat the first error on stderr, because with --json it is inside the object.
   if (report.failed && !report.errors.empty()) {
     std::fprintf(stderr, "stridewire-load: %s\n", report.errors.front().c_str());
   }

@@ -23,13 +23,13 @@ Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint&
     avatar_count_ += added.seen.size();
   }
   if (index >= run.options.observers) {
-    WatchSome(static_cast<std::size_t>(index - run.options.observers));
+    SelectAvatars(static_cast<std::size_t>(index - run.options.observers));
   }
 }
 
 // Each as far from the next one as the last of them, and one further than those of the observer
 // before.
-void Observer::WatchSome(std::size_t which) {
+void Observer::SelectAvatars(std::size_t which) {
   const std::size_t all = avatar_count_;
   const std::size_t some = std::min(static_cast<std::size_t>(run_.options.partial_avatars), all);
   for (std::size_t i = 0; i < some; ++i) {
@@ -47,8 +47,7 @@ void Observer::WatchSome(std::size_t which) {
 }
 
 std::optional<std::size_t> Observer::IndexIn(const World& world, protocol::AvatarId number) const {
-  if (!run_.layout.IsOurs(world.index, number))
-    return std::nullopt;  // Somebody else's, in our world.
+  if (!run_.layout.IsOurs(world.index, number)) return std::nullopt;  // Not an avatar of this run.
   if (world.watched.empty()) return run_.layout.IndexIn(number);
   const auto found = std::ranges::lower_bound(world.watched, number);
   if (found == world.watched.end() || *found != number) return std::nullopt;
@@ -80,26 +79,28 @@ void Observer::OnMessage(protocol::Message& message, std::size_t frame_bytes, st
   if (const auto* lagging = std::get_if<protocol::Lagging>(&message)) {
     const auto world = world_by_id_.find(lagging->world);
     if (world == world_by_id_.end()) return;
-    std::uint64_t& told = worlds_[world->second].batches_dropped;
-    if (lagging->dropped_batches > told) counts_.batches_dropped += lagging->dropped_batches - told;
-    told = lagging->dropped_batches;
+    std::uint64_t& reported = worlds_[world->second].batches_dropped;
+    if (lagging->dropped_batches > reported)
+      counts_.batches_dropped += lagging->dropped_batches - reported;
+    reported = lagging->dropped_batches;
   }
 }
 
 void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
   const auto pending = pending_joins_.find(info.seq);
-  if (pending == pending_joins_.end()) return Lose("a world that was not joined");
+  if (pending == pending_joins_.end())
+    return Lose("the server sent WorldInfo of a world that was not joined");
   World& world = worlds_[pending->second];
   world.joint_count = info.skeleton.joints.size();
-  // What is evaluated here is checked as if it had been sent in full.
-  const bool evaluates = run_.options.mode == protocol::PoseMode::kMovement;
-  world.most_pose_bytes = protocol::PoseBytes(
-      evaluates ? protocol::PoseMode::kFull : run_.options.mode, world.joint_count);
-  if (evaluates) {
+  // Evaluated poses are checked like full poses.
+  const bool is_evaluated = run_.options.mode == protocol::PoseMode::kMovement;
+  world.max_pose_bytes = protocol::PoseBytes(
+      is_evaluated ? protocol::PoseMode::kFull : run_.options.mode, world.joint_count);
+  if (is_evaluated) {
     if (info.library_hash != run_.library->hash()) {
-      return run_.Problem(name() + ": --library is not that of world " + info.name);
+      return run_.Problem(name() + ": --library differs from the library of world " + info.name);
     }
-    world.evaluated =
+    world.replicas =
         std::make_unique<client::ReplicaSet>(run_.library, 1.0 / run_.tick_hz, world.seen.size());
   }
   world.codecs = {};
@@ -108,12 +109,12 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
     for (const protocol::JointInfo& joint : info.skeleton.joints) parents.push_back(joint.parent);
     auto codecs = protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints);
     const protocol::CompactCodec* codec = codecs ? codecs->Find(SentMode()) : nullptr;
-    if (codec == nullptr) return Lose("a world without codes for its compact poses");
-    world.most_pose_bytes = std::max(world.most_pose_bytes, codec->pose_bytes());
+    if (codec == nullptr) return Lose("WorldInfo has no rotation codes");
+    world.max_pose_bytes = std::max(world.max_pose_bytes, codec->pose_bytes());
     world.codecs = *std::move(codecs);
   }
   if (probes_ != nullptr) {
-    world.last_poses.assign(world.seen.size() * world.most_pose_bytes, {});
+    world.last_poses.assign(world.seen.size() * world.max_pose_bytes, {});
     world.last_sizes.assign(world.seen.size(), 0);
   }
   rotations_.resize(std::max(rotations_.size(), world.joint_count));
@@ -139,9 +140,9 @@ protocol::PoseMode Observer::SentMode() const {
 void Observer::OnReply(const protocol::Reply& reply) {
   const bool joins = pending_joins_.erase(reply.seq) > 0;
   const bool observes = pending_observes_.erase(reply.seq) > 0;
-  if (!joins && !observes) return Lose("a reply to nothing");
+  if (!joins && !observes) return Lose("the server sent an unexpected Reply");
   if (reply.code == protocol::StatusCode::kOk) return;
-  run_.Problem(name() + ": the server would not let it " + (joins ? "join" : "observe") + ": " +
+  run_.Problem(name() + ": the server refused to let it " + (joins ? "join" : "observe") + ": " +
                std::string(protocol::StatusCodeName(reply.code)) + " " + reply.text);
 }
 
@@ -152,9 +153,8 @@ void Observer::OnLost(const std::string& why, bool by_us) {
       const std::uint64_t last = seen.tick != 0 ? seen.tick : latest_tick_.load();
       seen = Seen{.away_since = seen.away_since == 0 && by_us ? last + 1 : seen.away_since};
     }
-    world.back_tick = 0;
-    for (Stream& stream : world.streams)
-      stream.tick = 0;  // A server that was restarted may count anew.
+    world.first_tick = 0;
+    for (Stream& stream : world.streams) stream.tick = 0;  // A restarted server counts from 0.
     if (probes_ != nullptr && by_us) {
       for (std::size_t i = 0; i < world.seen.size(); ++i) {
         probes_->Abandon(run_.layout.Number(world.index, i) - 1);
@@ -169,10 +169,10 @@ void Observer::OnLost(const std::string& why, bool by_us) {
 
 namespace {
 
-// The poses of one message of movements, as a batch would have them.
-class BatchScreen final : public client::PoseSink {
+// Collects the poses of one Movements message in the layout of a batch.
+class BatchSink final : public client::PoseSink {
  public:
-  BatchScreen(std::size_t joint_count, std::function<bool(protocol::AvatarId)> wants)
+  BatchSink(std::size_t joint_count, std::function<bool(protocol::AvatarId)> wants)
       : bytes_(protocol::PoseBytes(protocol::PoseMode::kFull, joint_count)),
         wants_(std::move(wants)) {}
 
@@ -206,28 +206,28 @@ class BatchScreen final : public client::PoseSink {
 void Observer::OnMovements(const protocol::Movements& movements, std::size_t frame_bytes,
                            std::int64_t now_ns) {
   const auto found = world_by_id_.find(movements.world);
-  if (found == world_by_id_.end() || worlds_[found->second].evaluated == nullptr) {
-    return Lose("movements of a world that is not observed");
+  if (found == world_by_id_.end() || worlds_[found->second].replicas == nullptr) {
+    return Lose("the server sent Movements of a world that is not observed");
   }
   World& world = worlds_[found->second];
-  BatchScreen screen(world.joint_count,
-                     [&](protocol::AvatarId avatar) { return IndexIn(world, avatar).has_value(); });
-  if (const Status taken = world.evaluated->Apply(movements, screen); !taken) {
+  BatchSink sink(world.joint_count,
+                 [&](protocol::AvatarId avatar) { return IndexIn(world, avatar).has_value(); });
+  if (const Status taken = world.replicas->Apply(movements, sink); !taken) {
     return Invalid(world, movements.tick, Describe(taken.error()));
   }
   if (run_.window.Contains(movements.tick)) counts_.bytes_received += frame_bytes;
-  const bool is_shown = movements.more_steps == 0 && movements.part + 1 == movements.parts;
-  if (!is_shown) return;
+  const bool has_poses = movements.more_steps == 0 && movements.part + 1 == movements.parts;
+  if (!has_poses) return;
   const protocol::PoseBatch batch{{.world = movements.world,
                                    .shard = movements.shard,
                                    .tick = movements.tick,
                                    .server_time_s = movements.server_time_s,
                                    .mode = protocol::PoseMode::kFull,
                                    .joint_count = static_cast<std::uint16_t>(world.joint_count)},
-                                  screen.avatars,
-                                  screen.flags,
-                                  screen.poses};
-  // States come beside what changed in their tick.
+                                  sink.avatars,
+                                  sink.flags,
+                                  sink.poses};
+  // States have the same tick as the changes before them.
   if (!movements.states && !AdvanceStream(world, batch)) return;
   TakePoses(world, batch, now_ns);
 }
@@ -235,11 +235,12 @@ void Observer::OnMovements(const protocol::Movements& movements, std::size_t fra
 void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes,
                        std::int64_t now_ns) {
   const auto found = world_by_id_.find(batch.info.world);
-  if (found == world_by_id_.end()) return Lose("poses of a world that is not observed");
+  if (found == world_by_id_.end())
+    return Lose("the server sent poses of a world that is not observed");
   World& world = worlds_[found->second];
   const std::uint64_t tick = batch.info.tick;
   if (batch.info.mode != SentMode() || batch.info.joint_count != world.joint_count) {
-    return Invalid(world, tick, "a batch of another mode or number of joints than agreed");
+    return Invalid(world, tick, "a batch has another mode or number of joints than requested");
   }
   if (!AdvanceStream(world, batch)) return;
   if (run_.window.Contains(tick)) counts_.bytes_received += frame_bytes;
@@ -249,7 +250,7 @@ void Observer::OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes
 void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns) {
   const std::uint64_t tick = batch.info.tick;
   const bool counts = run_.window.Contains(tick);
-  if (world.back_tick == 0) world.back_tick = tick;
+  if (world.first_tick == 0) world.first_tick = tick;
   const bool verifies =
       batch_number_++ % static_cast<std::uint64_t>(run_.options.verify_one_in) == 0;
   protocol::PoseBatchReader reader(batch, world.codecs.Find(batch.info.mode));
@@ -260,7 +261,8 @@ void Observer::TakePoses(World& world, const protocol::PoseBatch& batch, std::in
     if (!index) continue;
     Seen& seen = world.seen[*index];
     if (seen.tick >= tick) {
-      Invalid(world, tick, "avatar " + std::to_string(number) + " came twice, or too late");
+      Invalid(world, tick,
+              "avatar " + std::to_string(number) + " appeared twice, or its tick is old");
       continue;
     }
     if (seen.tick == 0) ++seen_count_;
@@ -280,8 +282,8 @@ std::uint64_t Observer::ExcusedBefore(const World& world, const Seen& seen,
                                       std::uint64_t tick) const {
   if (seen.away_since == 0) return 0;
   std::uint64_t end = tick;
-  if (world.back_tick != 0) {
-    end = std::min(end, world.back_tick + static_cast<std::uint64_t>(kBackS * run_.tick_hz));
+  if (world.first_tick != 0) {
+    end = std::min(end, world.first_tick + static_cast<std::uint64_t>(kReconnectS * run_.tick_hz));
   }
   return run_.window.CountBetween(seen.away_since, end - 1);
 }
@@ -295,7 +297,7 @@ bool Observer::AdvanceStream(World& world, const protocol::PoseBatch& batch) {
   }
   const std::uint64_t tick = batch.info.tick;
   if (tick <= stream->tick) {
-    Invalid(world, tick, "a batch that is not newer than the last one of its shard");
+    Invalid(world, tick, "the tick of a batch does not increase");
     return false;
   }
   stream->tick = tick;
@@ -333,8 +335,8 @@ void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size
                        std::span<const std::byte> pose, std::int64_t now_ns) {
   const protocol::AvatarId number = batch.avatars[i];
   const std::size_t index = run_.layout.IndexIn(number);
-  if (pose.size() > world.most_pose_bytes) return;  // None that will decode.
-  std::byte* const last = world.last_poses.data() + index * world.most_pose_bytes;
+  if (pose.size() > world.max_pose_bytes) return;  // The pose is invalid.
+  std::byte* const last = world.last_poses.data() + index * world.max_pose_bytes;
   const bool changed =
       world.last_sizes[index] != pose.size() || std::memcmp(last, pose.data(), pose.size()) != 0;
   const bool is_first = world.seen[index].tick == 0;
@@ -342,7 +344,7 @@ void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size
     std::memcpy(last, pose.data(), pose.size());
     world.last_sizes[index] = pose.size();
   }
-  // What was asked for while nobody watched, by our own doing, tells nothing of the server.
+  // A step that was requested while this observer was dropped cannot be measured.
   if (is_first && was_dropped_) probes_->Abandon(number - 1);
   if (changed && !is_first) probes_->Pose(number - 1, batch.info.tick, now_ns, true);
 }
@@ -360,7 +362,7 @@ void Observer::UpdateProgress() {
   for (const World& world : worlds_) {
     for (const Stream& stream : world.streams) {
       newest = std::max(newest, stream.tick);
-      // A shard that has none of them says so once.
+      // A shard without observed avatars sends a single empty batch.
       saw_last = saw_last && (stream.tick >= run_.window.last() || stream.avatar_count == 0);
     }
   }

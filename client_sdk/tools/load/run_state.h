@@ -15,7 +15,8 @@
 
 namespace stridewire::load {
 
-/// Which avatars live in which world: avatar k (1 to N) in world (k - 1) mod W, under its number k.
+/// Distribution of N avatars over W worlds. Avatar k, 1 to N, is in world (k - 1) mod W and has id
+/// k.
 struct Layout {
   int avatars = 1;
   int worlds = 1;
@@ -23,23 +24,23 @@ struct Layout {
   [[nodiscard]] std::size_t CountIn(int world) const {
     return static_cast<std::size_t>((avatars - world + worlds - 1) / worlds);
   }
-  /// Number of the i-th avatar of a world.
+  /// Returns the id of the i-th avatar of a world.
   [[nodiscard]] std::uint32_t Number(int world, std::size_t i) const {
     return static_cast<std::uint32_t>(world) + 1 +
            static_cast<std::uint32_t>(i) * static_cast<std::uint32_t>(worlds);
   }
-  /// Whether an avatar of that number is one of ours in that world.
+  /// Returns whether this id belongs to an avatar of this run in that world.
   [[nodiscard]] bool IsOurs(int world, std::uint32_t number) const {
     return number >= 1 && number <= static_cast<std::uint32_t>(avatars) &&
            (number - 1) % static_cast<std::uint32_t>(worlds) == static_cast<std::uint32_t>(world);
   }
-  /// Inverse of Number.
+  /// Returns the index of an avatar in its world; the inverse of Number.
   [[nodiscard]] std::size_t IndexIn(std::uint32_t number) const {
     return (number - 1) / static_cast<std::uint32_t>(worlds);
   }
 };
 
-/// The measured window in ticks, first and last included. Set once; readers on any thread.
+/// The measured ticks, from the first to the last inclusive. Set once, read by any thread.
 class TickWindow {
  public:
   void Set(std::uint64_t first, std::uint64_t last) {
@@ -52,7 +53,7 @@ class TickWindow {
     const std::uint64_t first = first_.load();
     return first != 0 && tick >= first && tick <= last_.load();
   }
-  /// How many ticks from `from` to `to`, both included, lie in the window.
+  /// Returns how many ticks from `from` to `to`, both inclusive, are in the window.
   [[nodiscard]] std::uint64_t CountBetween(std::uint64_t from, std::uint64_t to) const {
     const std::uint64_t first = first_.load();
     if (first == 0) return 0;
@@ -66,16 +67,16 @@ class TickWindow {
   std::atomic<std::uint64_t> last_{0};
 };
 
-/// What all sessions of a run share.
+/// State that all sessions of a run share.
 struct RunState {
-  RunState(const LoadOptions& load_options, const Choreography* moves,
-           std::shared_ptr<const MotionLibrary> of_poses)
+  RunState(const LoadOptions& load_options, const Choreography* movements,
+           std::shared_ptr<const MotionLibrary> motion_library)
       : options(load_options),
-        choreography(moves),
-        library(std::move(of_poses)),
+        choreography(movements),
+        library(std::move(motion_library)),
         layout{load_options.avatars, load_options.worlds} {}
 
-  /// Something went wrong that ends with exit code 1.
+  /// Logs an error that makes the run fail with exit code 1.
   void Problem(std::string text) {
     failed = true;
     errors.Add(std::move(text));
@@ -83,12 +84,12 @@ struct RunState {
 
   const LoadOptions& options;
   const Choreography* choreography;                    ///< Null: the avatars wander.
-  const std::shared_ptr<const MotionLibrary> library;  ///< In mode movement.
+  const std::shared_ptr<const MotionLibrary> library;  ///< Not null in mode movement.
   const Layout layout;
   TickWindow window;
   ErrorLog errors;
   std::atomic<bool> failed{false};
-  std::atomic<bool> is_ending{false};  ///< Connections that close now are no problem.
+  std::atomic<bool> is_ending{false};  ///< From now on, lost connections are not errors.
   std::atomic<double> tick_hz{60.0};
 };
 

@@ -19,7 +19,7 @@ namespace http = boost::beast::http;
 
 constexpr std::size_t kMaxPageBytes = std::size_t{4} << 20;
 
-/// One line: name, labels as they stand between the braces, value.
+/// A line of the page. `labels` is the text between the braces.
 struct Sample {
   std::string_view name;
   std::string_view labels;
@@ -50,7 +50,7 @@ bool ReadSample(std::string_view line, Sample& sample) {
   line.remove_prefix(name_end);
   sample.labels = {};
   if (line.starts_with('{')) {
-    // A closing brace inside a quoted value is none; the last one of the line is.
+    // A quoted value can contain braces, so the last one ends the labels.
     const std::size_t close = line.rfind('}');
     if (close == std::string_view::npos) return false;
     sample.labels = line.substr(1, close - 1);
@@ -59,7 +59,7 @@ bool ReadSample(std::string_view line, Sample& sample) {
   return ReadNumber(TakeWord(line), sample.value);
 }
 
-/// The value of label `le`, the bin's upper bound.
+/// Reads the label `le`, which is the upper bound of a bin.
 bool ReadBound(std::string_view labels, double& bound) {
   constexpr std::string_view kLabel = "le=\"";
   const std::size_t at = labels.find(kLabel);
@@ -69,7 +69,7 @@ bool ReadBound(std::string_view labels, double& bound) {
 }
 
 Error SystemError(const Address& address, const boost::system::error_code& code) {
-  return Error{ErrorCode::kIo, "the server's metrics cannot be read", -1,
+  return Error{ErrorCode::kIo, "cannot read the server's metrics", -1,
                "http://" + ToText(address) + "/metrics: " + code.message()};
 }
 
@@ -98,13 +98,12 @@ Expected<ServerMetrics> ParseServerMetrics(std::string_view text) {
     if (line.empty() || line.starts_with('#')) continue;
     Sample sample;
     if (!ReadSample(line, sample)) {
-      return Fail(ErrorCode::kMalformed, "a line of the server's metrics cannot be read",
-                  line_number);
+      return Fail(ErrorCode::kMalformed, "invalid line in the server's metrics", line_number);
     }
     if (sample.name == "stridewire_tick_seconds_bucket") {
       double bound = 0.0;
       if (!ReadBound(sample.labels, bound)) {
-        return Fail(ErrorCode::kMalformed, "a bin of the server's metrics has no bound",
+        return Fail(ErrorCode::kMalformed, "a bin in the server's metrics has no bound",
                     line_number);
       }
       metrics.tick_bins[bound] += sample.value;
@@ -119,12 +118,11 @@ Expected<ServerMetrics> ParseServerMetrics(std::string_view text) {
   }
   for (const Wanted& each : wanted) {
     if (!each.found) {
-      return Fail(ErrorCode::kNotFound, "the server's metrics do not have it",
-                  std::string(each.name));
+      return Fail(ErrorCode::kNotFound, "missing in the server's metrics", std::string(each.name));
     }
   }
   if (metrics.tick_bins.empty()) {
-    return Fail(ErrorCode::kNotFound, "the server's metrics do not have it",
+    return Fail(ErrorCode::kNotFound, "missing in the server's metrics",
                 std::string("stridewire_tick_seconds_bucket"));
   }
   return metrics;
@@ -161,12 +159,12 @@ Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeo
           });
         });
       });
-  // The stream's own timeout does not cover looking up the name.
+  // The timeout of the stream does not include the name resolution.
   io.run_for(std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * (timeout_s + 1.0))));
   if (!io.stopped()) result = asio::error::timed_out;
   if (result) return std::unexpected(SystemError(address, result));
   if (response.get().result() != http::status::ok) {
-    return Fail(ErrorCode::kIo, "the server's metrics cannot be read: HTTP status",
+    return Fail(ErrorCode::kIo, "cannot read the server's metrics: HTTP status",
                 "http://" + ToText(address) + "/metrics", response.get().result_int());
   }
   Expected<ServerMetrics> metrics = ParseServerMetrics(response.get().body());
@@ -182,7 +180,7 @@ Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeo
 Quantiles TicksBetween(const ServerMetrics& before, const ServerMetrics& after) {
   Quantiles ticks;
   ticks.max = 1e3 * (after.tick_max_s > before.tick_max_s
-                         ? after.tick_max_s  // It grew, so it was in between.
+                         ? after.tick_max_s  // The new maximum is from this interval.
                          : after.tick_max_since_scrape_s);
   const auto count_below = [&](double bound, double count) {
     const auto earlier = before.tick_bins.find(bound);

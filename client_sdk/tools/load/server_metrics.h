@@ -11,26 +11,27 @@
 
 namespace stridewire::load {
 
-/// What a run needs of the server's /metrics: one scrape.
+/// Values from one read of the server's /metrics page.
 struct ServerMetrics {
   std::map<double, double> tick_bins;  ///< Upper bound in seconds -> cumulative count, all shards.
-  double tick_max_s = 0.0;             ///< Since the server started.
+  double tick_max_s = 0.0;             ///< Maximum since the server started.
   double tick_max_since_scrape_s = 0.0;
   double ticks_missed = 0.0;
   double avatars = 0.0;
 };
 
-/// Reads Prometheus text (0.0.4); samples of one name with different labels are added, of maxima the
-/// largest is taken. kMalformed: a line it cannot read (index: the line); kNotFound: a metric that is
-/// not there, `where` is its name.
+/// Parses the Prometheus text format 0.0.4. Sums samples of one name with different labels; for
+/// maxima it takes the largest. Fails with kMalformed (`index` is the line) or kNotFound (`where`
+/// is the missing metric).
 [[nodiscard]] Expected<ServerMetrics> ParseServerMetrics(std::string_view text);
 
-/// Asks the server; blocks for `timeout_s` at most. kIo: `where` tells whom and what the system said.
+/// Reads the page over HTTP. Blocks for at most `timeout_s` + 1 s. Fails with kIo, where `where`
+/// has the address and the reason, and with the errors of ParseServerMetrics.
 [[nodiscard]] Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeout_s);
 
-/// Times of the ticks between two scrapes. Quantiles are interpolated within the server's bins (as
-/// Prometheus does) and not above the maximum. The maximum is that since the earlier scrape, if
-/// nobody else read the page meanwhile; otherwise at least that since they did.
+/// Computes the durations of the ticks between two reads. Quantiles are interpolated within bins,
+/// as in Prometheus, and limited to the maximum. If another program has read the page between the
+/// two reads, the maximum can be too small, because each read resets it.
 [[nodiscard]] Quantiles TicksBetween(const ServerMetrics& before, const ServerMetrics& after);
 
 }  // namespace stridewire::load

@@ -15,7 +15,7 @@ using asio::ip::tcp;
 
 constexpr double kFirstBackOffS = 0.1;
 constexpr double kMaxBackOffS = 2.0;
-/// Read from one socket before the others have their turn.
+/// Bytes to read from a socket before other sockets are served.
 constexpr std::size_t kMaxReadAtOnce = std::size_t{128} << 10;
 
 std::int64_t ToNs(double seconds) { return static_cast<std::int64_t>(seconds * 1e9); }
@@ -56,7 +56,7 @@ void Session::Open() {
 void Session::Finish() {
   if (state_ == State::kFinished) return;
   if (state_ == State::kReady) {
-    // As much as the system takes at once: this is the end, nobody waits for it.
+    // Best effort: the session does not wait until the Goodbye is sent.
     if (writing_.empty() && context_.encoder.Encode(protocol::Goodbye{}, waiting_)) {
       boost::system::error_code ignored;
       socket_->write_some(asio::buffer(waiting_), ignored);
@@ -81,12 +81,12 @@ void Session::Lose(const std::string& why) {
   state_ = State::kWaiting;
   back_off_s_ = std::clamp(2.0 * back_off_s_, kFirstBackOffS, kMaxBackOffS);
   deadline_ns_ = NowNs() + ToNs(back_off_s_);
-  // Once a loss: that coming back fails, again and again, is no news.
-  if (!std::exchange(is_loss_told_, true)) OnLost(why, false);
+  // Report a loss once, not every failed attempt to reconnect.
+  if (!std::exchange(is_loss_reported_, true)) OnLost(why, false);
 }
 
 void Session::Close() {
-  ++connection_;  // Whatever is still under way finds its connection gone.
+  ++connection_;  // Pending handlers of the old connection do nothing.
   if (socket_) {
     boost::system::error_code ignored;
     (void)socket_->close(ignored);
@@ -102,20 +102,20 @@ void Session::Poll(std::int64_t now_ns) {
       return;
     case State::kConnecting:
     case State::kGreeting:
-      if (now_ns >= deadline_ns_) Lose("no answer within 5 s");
+      if (now_ns >= deadline_ns_) Lose("the server did not answer within 5 s");
       return;
     case State::kReady: break;
   }
   const std::int64_t idle_ns = ToNs(welcome_.limits.idle_timeout_s);
   if (idle_ns <= 0) return;
-  if (now_ns - heard_ns_ > idle_ns) return Lose("nothing heard from the server for too long");
+  if (now_ns - received_ns_ > idle_ns) return Lose("the server sent nothing for too long");
   if (now_ns - sent_ns_ > idle_ns / 3) {
     Send(protocol::Ping{.nonce = next_nonce_++, .time_s = 1e-9 * static_cast<double>(now_ns)});
   }
 }
 
 void Session::WaitToRead() {
-  // Waiting needs no memory; a session that hears nothing costs only its socket.
+  // Waiting for readability needs no buffer, so an idle session takes little memory.
   socket_->async_wait(tcp::socket::wait_read,
                       [this, id = connection_](const boost::system::error_code& code) {
                         if (id != connection_) return;
@@ -133,15 +133,15 @@ void Session::Read() {
     if (code == asio::error::would_block || code == asio::error::try_again) break;
     if (code) return Lose("connection lost: " + code.message());
     taken += size;
-    heard_ns_ = NowNs();
+    received_ns_ = NowNs();
     std::span<const std::byte> bytes = buffer.first(size);
     for (;;) {
       const auto next = reader_->Next(bytes);
-      if (!next) return Lose("bad frame from the server: " + Describe(next.error()));
+      if (!next) return Lose("invalid frame from the server: " + Describe(next.error()));
       if (!*next) break;
       const std::uint64_t id = connection_;
       Handle(**next);
-      if (id != connection_) return;  // What was heard ended the connection.
+      if (id != connection_) return;  // The message has ended the connection.
     }
     if (size < buffer.size()) break;
   }
@@ -151,32 +151,32 @@ void Session::Read() {
 void Session::Handle(const protocol::FrameView& frame) {
   Expected<protocol::Message> message = protocol::DecodeMessage(frame);
   if (!message) {
-    return Lose("bad " + std::string(protocol::MessageTypeName(frame.type)) +
+    return Lose("invalid " + std::string(protocol::MessageTypeName(frame.type)) +
                 " from the server: " + Describe(message.error()));
   }
   if (auto* welcome = std::get_if<protocol::Welcome>(&*message)) {
-    if (state_ != State::kGreeting) return Lose("Welcome out of turn");
+    if (state_ != State::kGreeting) return Lose("unexpected Welcome");
     welcome_ = std::move(*welcome);
     state_ = State::kReady;
     next_seq_ = 1;
     back_off_s_ = 0.0;
     if (was_ready_) ++reconnect_count_;
     was_ready_ = true;
-    is_loss_told_ = false;
+    is_loss_reported_ = false;
     return OnWelcome();
   }
   if (const auto* error = std::get_if<protocol::ErrorNotice>(&*message);
       error != nullptr && error->fatal) {
-    return Lose("the server says " + std::string(protocol::StatusCodeName(error->code)) + ": " +
-                error->text);
+    return Lose("error from the server: " + std::string(protocol::StatusCodeName(error->code)) +
+                ": " + error->text);
   }
   if (const auto* goodbye = std::get_if<protocol::Goodbye>(&*message)) {
-    return Lose("the server says goodbye (" + std::string(protocol::StatusCodeName(goodbye->code)) +
+    return Lose("the server sent Goodbye (" + std::string(protocol::StatusCodeName(goodbye->code)) +
                 ")");
   }
   if (std::holds_alternative<protocol::Pong>(*message)) return;
-  if (state_ != State::kReady) return Lose("a message before Welcome");
-  OnMessage(*message, protocol::kFrameHeaderBytes + frame.payload.size(), heard_ns_);
+  if (state_ != State::kReady) return Lose("the server sent a message before Welcome");
+  OnMessage(*message, protocol::kFrameHeaderBytes + frame.payload.size(), received_ns_);
 }
 
 void Session::Write() {
@@ -184,7 +184,7 @@ void Session::Write() {
   std::swap(writing_, waiting_);
   written_ = 0;
   sent_ns_ = NowNs();
-  // Most messages fit into the system's buffer at once; only what does not waits.
+  // The socket buffer usually accepts the whole message at once.
   boost::system::error_code code;
   written_ = socket_->write_some(asio::buffer(writing_), code);
   if (code && code != asio::error::would_block && code != asio::error::try_again) {

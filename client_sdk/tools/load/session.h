@@ -16,7 +16,7 @@
 
 namespace stridewire::load {
 
-/// The one clock of a run.
+/// Current time of the steady clock in nanoseconds.
 [[nodiscard]] inline std::int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())
@@ -25,7 +25,7 @@ namespace stridewire::load {
 
 inline constexpr std::int64_t kSecondNs = 1'000'000'000;
 
-/// What the sessions of one thread share, so that each of thousands stays small.
+/// Resources that all sessions of a thread share, so that a session takes little memory.
 struct ThreadContext {
   boost::asio::io_context io{1};
   protocol::Encoder encoder;
@@ -33,47 +33,54 @@ struct ThreadContext {
       std::vector<std::uint64_t>(32'768);  ///< 256 KiB, aligned
 };
 
-/// One client session over TCP, straight on the protocol library: connects, greets, keeps alive,
-/// numbers commands, and comes back with a new session when the connection is lost. It never asks
-/// for an old session (resume): a simulated client that lost its connection begins anew.
+/// A client session over TCP. It connects, sends Hello and pings, and numbers commands. After a
+/// lost connection it starts a new session; it never resumes one.
 ///
-/// Lives on one thread (its ThreadContext's); `Poll` is called there about ten times a second.
+///   kNew --Open--> kConnecting --> kGreeting --Welcome--> kReady --Finish--> kFinished
+///                       ^              |                     |
+///                       |         Lose, Drop            Lose, Drop
+///                       +---- kWaiting <---------------------+
+///
+/// All calls must be on the thread of its ThreadContext, which calls `Poll` about ten times per
+/// second.
 class Session {
  public:
-  static constexpr std::size_t kMaxWaitingBytes = std::size_t{16} << 20;  ///< To be sent.
-  static constexpr double kConnectTimeoutS = 5.0;  ///< From connecting to Welcome.
+  static constexpr std::size_t kMaxWaitingBytes = std::size_t{16}
+                                                  << 20;  ///< Limit of unsent bytes.
+  static constexpr double kConnectTimeoutS = 5.0;         ///< From connecting to Welcome.
 
   Session(ThreadContext& context, boost::asio::ip::tcp::endpoint server, std::string name);
   virtual ~Session() = default;
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
+  /// Connects to the server.
   void Open();
 
-  /// Says Goodbye, if it is greeted, and closes; does not come back.
+  /// Sends Goodbye if ready, and closes the connection for good.
   void Finish();
 
-  /// Drops the connection without a word and comes back after `pause_s`.
+  /// Drops the connection and reconnects after `pause_s`.
   void Drop(double pause_s);
 
-  /// Timeouts, pings, coming back.
+  /// Handles timeouts, pings and reconnects.
   void Poll(std::int64_t now_ns);
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] bool finished() const { return state_ == State::kFinished; }
   [[nodiscard]] std::uint64_t reconnect_count() const { return reconnect_count_; }
-  /// Whether everything given to Send has gone to the system.
+  /// Returns whether the operating system has accepted all messages.
   [[nodiscard]] bool all_sent() const { return writing_.empty() && waiting_.empty(); }
 
  protected:
-  /// Sends a message. One that cannot be encoded or would wait in too long a line ends the
-  /// connection, as Lost tells.
+  /// Sends a message. Closes the connection if the message cannot be encoded or if too many bytes
+  /// are unsent.
   template <typename M>
   void Send(const M& message) {
     if (!connected()) return;
     const Status encoded = context_.encoder.Encode(message, waiting_);
-    if (!encoded) return Lose("could not encode a message: " + Describe(encoded.error()));
-    if (waiting_.size() > kMaxWaitingBytes) return Lose("the server does not read what it is sent");
+    if (!encoded) return Lose("cannot encode a message: " + Describe(encoded.error()));
+    if (waiting_.size() > kMaxWaitingBytes) return Lose("the server reads too slowly");
     Write();
   }
 
@@ -81,16 +88,17 @@ class Session {
   [[nodiscard]] const protocol::Welcome& welcome() const { return welcome_; }
   [[nodiscard]] ThreadContext& context() { return context_; }
 
-  /// Greeted: a new session has begun, nothing is joined.
+  /// A new session has begun. No world is joined.
   virtual void OnWelcome() = 0;
-  /// Any message but Welcome, Pong, Goodbye and a fatal Error. `frame_bytes` counts the header, too.
+  /// Handles every message except Welcome, Pong, Goodbye and fatal errors. `frame_bytes` includes
+  /// the header.
   virtual void OnMessage(protocol::Message& message, std::size_t frame_bytes,
                          std::int64_t now_ns) = 0;
-  /// The connection is gone, or there never was one; by_us: Drop. It comes back by itself; what
-  /// fails on the way back is not told again.
+  /// The connection was lost or could not be established; `by_us` if Drop caused it. The session
+  /// reconnects. Failed attempts to reconnect cause no further call.
   virtual void OnLost(const std::string& why, bool by_us) = 0;
 
-  /// Ends the connection because of something the server did; comes back.
+  /// Closes the connection because of an error and reconnects later.
   void Lose(const std::string& why);
 
  private:
@@ -110,7 +118,7 @@ class Session {
   const boost::asio::ip::tcp::endpoint server_;
   const std::string name_;
   State state_ = State::kNew;
-  /// Counts connections, so that what is left over from an old one is recognised and ignored.
+  /// Number of the connection. Handlers of earlier connections compare it and do nothing.
   std::uint64_t connection_ = 0;
   std::optional<boost::asio::ip::tcp::socket> socket_;
   std::optional<protocol::FrameReader> reader_;
@@ -120,13 +128,13 @@ class Session {
   protocol::Welcome welcome_;
   protocol::Seq next_seq_ = 1;
   std::uint64_t next_nonce_ = 1;
-  std::int64_t deadline_ns_ = 0;  ///< kConnecting, kGreeting: give up; kWaiting: try again
-  std::int64_t heard_ns_ = 0;
+  std::int64_t deadline_ns_ = 0;  ///< Timeout, or time of the next attempt.
+  std::int64_t received_ns_ = 0;
   std::int64_t sent_ns_ = 0;
   double back_off_s_ = 0.0;
   std::uint64_t reconnect_count_ = 0;
   bool was_ready_ = false;
-  bool is_loss_told_ = false;
+  bool is_loss_reported_ = false;
 };
 
 }  // namespace stridewire::load

@@ -3,7 +3,7 @@
 namespace stridewire::load {
 namespace {
 
-// What a movement takes at most, roughly, over the libraries we know.
+// Approximate longest durations of movements in the known libraries.
 constexpr double kStepS = 0.75;
 constexpr double kJumpS = 2.5;
 constexpr double kClosingStepS = 1.5;
@@ -27,34 +27,34 @@ int SmallRandom::Integer(int min, int max) {
 }
 
 Wanderer::Wanderer(std::uint64_t seed, std::uint32_t avatar) : random_(seed) {
-  // Neighbouring seeds and avatars must not give shifted copies of one sequence.
+  // Mix seed and avatar, so that neighbouring values do not yield shifted copies of one sequence.
   random_ = SmallRandom(random_.Next() ^ (std::uint64_t{avatar} * 0xd1342543de82ef95U));
 }
 
-Outing Wanderer::Next(bool may_jump) {
-  Outing outing;
-  outing.period_s = kClosingStepS + random_.Uniform(0.0, 1.0);
-  if (may_jump && random_.Uniform(0.0, 1.0) < 0.1) {
-    outing.movements.emplace_back(protocol::JumpMovement{.length_m = random_.Uniform(0.4, 1.2)});
-    outing.period_s += kJumpS;
-    return outing;
+WanderPlan Wanderer::Next(bool can_jump) {
+  WanderPlan plan;
+  plan.period_s = kClosingStepS + random_.Uniform(0.0, 1.0);
+  if (can_jump && random_.Uniform(0.0, 1.0) < 0.1) {
+    plan.movements.emplace_back(protocol::JumpMovement{.length_m = random_.Uniform(0.4, 1.2)});
+    plan.period_s += kJumpS;
+    return plan;
   }
   const int steps = random_.Integer(6, 16);
   const int pause_after = random_.Uniform(0.0, 1.0) < 0.2 ? random_.Integer(2, steps - 1) : -1;
   for (int step = 0; step < steps; ++step) {
     const bool turns = random_.Uniform(0.0, 1.0) < 0.25;
-    outing.movements.emplace_back(
+    plan.movements.emplace_back(
         protocol::StepMovement{.length_m = random_.Uniform(0.4, 0.7),
                                .side_m = {},
                                .turn_rad = turns ? random_.Uniform(-0.3, 0.3) : 0.0});
-    outing.period_s += kStepS;
+    plan.period_s += kStepS;
     if (step + 1 == pause_after) {
       const double seconds = random_.Uniform(0.3, 1.5);
-      outing.movements.emplace_back(protocol::StandMovement{.seconds = seconds});
-      outing.period_s += seconds + kClosingStepS;
+      plan.movements.emplace_back(protocol::StandMovement{.seconds = seconds});
+      plan.period_s += seconds + kClosingStepS;
     }
   }
-  return outing;
+  return plan;
 }
 
 }  // namespace stridewire::load

@@ -9,7 +9,7 @@ namespace stridewire::load {
 
 using Movement = decltype(protocol::RequestItem::movement);
 
-/// Random numbers in eight bytes, so that a hundred thousand avatars may each have theirs
+/// Random numbers with a state of eight bytes, so that each of many avatars can have its own
 /// (SplitMix64: Steele, Lea, Flood 2014).
 class SmallRandom {
  public:
@@ -24,25 +24,25 @@ class SmallRandom {
   std::uint64_t state_;
 };
 
-/// Movements to be asked for at once, and how long to leave the avatar alone after that.
-struct Outing {
-  std::vector<Movement> movements;  ///< The first one moves: a step or a jump, never a stand.
-  double period_s = 0.0;            ///< Until the next outing, ample for these movements.
+/// Movements to request at once, and the time until the next plan.
+struct WanderPlan {
+  std::vector<Movement> movements;  ///< The first is a step or jump, never a stand.
+  double period_s = 0.0;            ///< Time until the next plan. Longer than these movements.
 };
 
-/// Where an avatar wanders: walks of 6 to 16 steps with turns and now and then a pause, or a jump.
+/// Plans random movements of an avatar: 6 to 16 steps with turns and sometimes a pause, or a jump.
 ///
-/// The plan does not depend on what the server does (an open loop): a server that falls behind is
-/// asked for as much as one that does not, and its delays are measured, not waited for. The period
-/// leaves every avatar time to come to a stand, so each outing starts from one.
+/// The plan does not depend on the server (open loop). A slow server therefore receives as many
+/// requests as a fast one, and its delays become visible. The period lets every avatar come to a
+/// stand, so that each plan starts from standing.
 class Wanderer {
  public:
   Wanderer(std::uint64_t seed, std::uint32_t avatar);
 
-  /// The next outing; without jumps when the world's library has none.
-  [[nodiscard]] Outing Next(bool may_jump);
+  /// Returns the next plan. It contains jumps only if `can_jump`.
+  [[nodiscard]] WanderPlan Next(bool can_jump);
 
-  /// When the first one begins, so that not all avatars start at the same moment.
+  /// Returns a random start time of the first plan, so that avatars do not start simultaneously.
   [[nodiscard]] double FirstStart(double within_s) { return random_.Uniform(0.0, within_s); }
 
  private:

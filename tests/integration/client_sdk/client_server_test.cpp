@@ -593,7 +593,7 @@ TEST(Record, FailsClearlyWithoutServerOrAvatar) {
     arguments[11] = "1";
     const auto nobody = RecordTool(arguments);
     EXPECT_EQ(nobody.exit_code, 1);
-    EXPECT_THAT(nobody.err, HasSubstr("avatar 77 of world \"plaza\" did not show up"));
+    EXPECT_THAT(nobody.err, HasSubstr("avatar 77 of world \"plaza\" sent no pose within"));
   }
   const auto refused = RecordTool(RecordArguments(address, out));
   EXPECT_EQ(refused.exit_code, 1);
