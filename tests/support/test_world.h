@@ -13,7 +13,7 @@
 #include "stridewire/protocol/pose_rows.h"
 
 /// What a small, made-up server would say, for tests of clients.
-namespace stridewire::toy {
+namespace stridewire::test_world {
 
 inline constexpr int kJoints = 3;
 inline constexpr double kTickHz = 60.0;
@@ -128,4 +128,4 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   return frame;
 }
 
-}  // namespace stridewire::toy
+}  // namespace stridewire::test_world

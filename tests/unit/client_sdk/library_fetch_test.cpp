@@ -26,14 +26,15 @@ protocol::LibraryPiece PieceOf(const MotionLibrary& library,
           .bytes = {part.begin(), part.end()}};
 }
 
-// Does all there is to be done; `server` gives out its library. How many questions it took.
+// Runs all tasks and answers all requests with the library of `server`. Returns the number of
+// requests.
 int Bring(LibraryFetch& fetch, const MotionLibrary& server) {
   int questions = 0;
   for (;;) {
     if (const auto task = fetch.TakeTask()) {
       fetch.OnTask(task->hash, RunLibraryTask(*task));
     } else if (const auto question = fetch.TakeRequest(Always)) {
-      EXPECT_FALSE(fetch.TakeRequest(Always));  // one at a time
+      EXPECT_FALSE(fetch.TakeRequest(Always));  // only one pending request
       ++questions;
       fetch.OnPiece(PieceOf(server, *question));
     } else {
@@ -42,7 +43,7 @@ int Bring(LibraryFetch& fetch, const MotionLibrary& server) {
   }
 }
 
-TEST(LibraryFetch, BringsItOnceAndThenTakesItFromItsFolder) {
+TEST(LibraryFetch, FetchesOnceAndThenReadsTheFolder) {
   const auto library = MakeTestLibrary();
   const test::ScratchFolder scratch;
   const std::string folder = scratch.File("new/folder");
@@ -62,7 +63,7 @@ TEST(LibraryFetch, BringsItOnceAndThenTakesItFromItsFolder) {
   EXPECT_EQ(Bring(second, *library), 0);
   EXPECT_NE(second.Get(library->hash()).value(), nullptr);
 
-  // Damaged, it is fetched again and put in its place.
+  // A damaged file is fetched again and replaced.
   std::ofstream(kept, std::ios::binary | std::ios::in).seekp(100).write("x", 1);
   LibraryFetch third(folder);
   (void)third.Get(library->hash());
@@ -71,7 +72,7 @@ TEST(LibraryFetch, BringsItOnceAndThenTakesItFromItsFolder) {
   EXPECT_EQ(MotionLibrary::Open(kept).value()->hash(), library->hash());
 }
 
-TEST(LibraryFetch, NoFolderIsNoError) {
+TEST(LibraryFetch, WorksWithoutAFolder) {
   const auto library = MakeTestLibrary();
   for (const char* folder : {"", "/dev/null/not a folder"}) {
     LibraryFetch fetch(folder);
@@ -81,7 +82,7 @@ TEST(LibraryFetch, NoFolderIsNoError) {
   }
 }
 
-TEST(LibraryFetch, GoesOnWhereAConnectionBroke) {
+TEST(LibraryFetch, ContinuesAfterAConnectionLoss) {
   const auto library = MakeTestLibrary();
   LibraryFetch fetch("");
   (void)fetch.Get(library->hash());
@@ -92,14 +93,14 @@ TEST(LibraryFetch, GoesOnWhereAConnectionBroke) {
   EXPECT_FALSE(fetch.TakeRequest([](const std::string&) { return false; }));
   const auto again = fetch.TakeRequest(Always);
   ASSERT_TRUE(again);
-  fetch.OnPiece(PieceOf(*library, *asked));  // the old one's answer is nobody's
+  fetch.OnPiece(PieceOf(*library, *asked));  // ignored: answers the request before the loss
   EXPECT_FALSE(fetch.TakeRequest(Always));
   fetch.OnPiece(PieceOf(*library, *again));
   (void)Bring(fetch, *library);
   EXPECT_NE(fetch.Get(library->hash()).value(), nullptr);
 }
 
-TEST(LibraryFetch, RefusesWhatIsNotTheLibraryAndTriesAgainWhenAsked) {
+TEST(LibraryFetch, RejectsWrongBytesAndRetriesOnRequest) {
   const auto library = MakeTestLibrary();
   const test::ScratchFolder scratch;
   LibraryFetch fetch(scratch.File("."));
@@ -121,7 +122,8 @@ TEST(LibraryFetch, RefusesWhatIsNotTheLibraryAndTriesAgainWhenAsked) {
     ASSERT_FALSE(wanted);
     EXPECT_EQ(wanted.error().code, code);
   };
-  spoilt([](protocol::LibraryPiece&) {}, ErrorCode::kMalformed);  // whole, but another
+  spoilt([](protocol::LibraryPiece&) {},
+         ErrorCode::kMalformed);  // a complete but different library
   spoilt([](protocol::LibraryPiece& piece) { piece.bytes[0] ^= std::byte{1}; },
          ErrorCode::kMalformed);
   spoilt([](protocol::LibraryPiece& piece) { piece.bytes.clear(); }, ErrorCode::kMalformed);

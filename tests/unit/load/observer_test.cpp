@@ -50,22 +50,23 @@ class ObserverTest : public ::testing::Test {
   void Greet() {
     connection_ = server_.Accept();
     ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
-    connection_.Send(toy::Welcome());
+    connection_.Send(test_world::Welcome());
     const auto join = connection_.Expect<protocol::JoinWorld>();
     ASSERT_TRUE(join.has_value());
     EXPECT_EQ(join->name, "load-0");
     EXPECT_EQ(join->role, protocol::Role::kObserver);
-    connection_.Send(toy::WorldInfo(join->seq, kWorld, join->name));
-    connection_.Send(toy::Ok(join->seq));
+    connection_.Send(test_world::WorldInfo(join->seq, kWorld, join->name));
+    connection_.Send(test_world::Ok(join->seq));
     const auto observe = connection_.Expect<protocol::Observe>();
     ASSERT_TRUE(observe.has_value());
     EXPECT_EQ(observe->world, kWorld);
     EXPECT_EQ(observe->mode, protocol::PoseMode::kFull);
-    connection_.Send(toy::Ok(observe->seq));
+    connection_.Send(test_world::Ok(observe->seq));
   }
 
-  void SendTick(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars = {{1}, {2}, {3}}) {
-    connection_.SendBytes(toy::PoseFrame(kWorld, tick, avatars));
+  void SendTick(std::uint64_t tick,
+                const std::vector<test_world::AvatarAt>& avatars = {{1}, {2}, {3}}) {
+    connection_.SendBytes(test_world::PoseFrame(kWorld, tick, avatars));
   }
 
   /// Sends one more message and waits until the observer has handled it and all messages before it.
@@ -131,7 +132,7 @@ TEST_F(ObserverTest, CountsThePosesOfTheWindow) {
   std::size_t bytes = 0;
   for (std::uint64_t tick = kFirstTick - 2; tick <= kLastTick + 2; ++tick) {
     SendTick(tick, {{1}, {2, protocol::kPoseStanding}, {3}});
-    bytes = toy::PoseFrame(kWorld, tick, {{1}, {2}, {3}}).size();
+    bytes = test_world::PoseFrame(kWorld, tick, {{1}, {2}, {3}}).size();
   }
   Sync();
   EXPECT_TRUE(observer_.sees_all());
@@ -166,19 +167,19 @@ TEST(PartialObserver, ObservesTheRequestedNumberOfAvatars) {
     std::thread thread([&] { context.io.run(); });
     FakeConnection connection = server.Accept();
     EXPECT_TRUE(connection.Expect<protocol::Hello>().has_value());
-    connection.Send(toy::Welcome());
+    connection.Send(test_world::Welcome());
     std::vector<std::vector<protocol::AvatarId>> named;
     for (protocol::WorldId world = 1; world <= 2; ++world) {
       const auto join = connection.Expect<protocol::JoinWorld>();
       ASSERT_TRUE(join.has_value());
-      connection.Send(toy::WorldInfo(join->seq, world, join->name));
-      connection.Send(toy::Ok(join->seq));
+      connection.Send(test_world::WorldInfo(join->seq, world, join->name));
+      connection.Send(test_world::Ok(join->seq));
     }
     for (int world = 0; world < 2; ++world) {
       const auto observe = connection.Expect<protocol::Observe>();
       ASSERT_TRUE(observe.has_value());
       named.push_back(observe->avatars);
-      connection.Send(toy::Ok(observe->seq));
+      connection.Send(test_world::Ok(observe->seq));
     }
     // The crowd in order of worlds is 1 3 5 7 9, 2 4 6 8 10. The second observer starts one later.
     if (which == 0) {
@@ -226,7 +227,7 @@ TEST_F(ObserverTest, ReportsAnAvatarThatAppearsTwice) {
   Greet();
   SendTick(kFirstTick, {{1}, {2}, {1}});
   connection_.SendBytes(
-      toy::PoseFrame(kWorld, kFirstTick, {{2}}, protocol::PoseMode::kFull, /*shard=*/1));
+      test_world::PoseFrame(kWorld, kFirstTick, {{2}}, protocol::PoseMode::kFull, /*shard=*/1));
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 2u);
@@ -239,7 +240,7 @@ TEST_F(ObserverTest, ReportsAnUnflaggedDiscontinuity) {
   Greet();
   // The test avatars walk at 1.5 m/s. They need 133 s for 200 m, but cannot move 1 m in one tick.
   const auto frame_at = [](std::uint64_t tick, float x_m, std::uint8_t flags) {
-    return toy::PoseFrame(kWorld, tick, {{1, flags, Vec3(x_m, 1.0f, 0.0f)}});
+    return test_world::PoseFrame(kWorld, tick, {{1, flags, Vec3(x_m, 1.0f, 0.0f)}});
   };
   connection_.SendBytes(frame_at(100, 0.0f, 0));
   connection_.SendBytes(frame_at(101, 0.2f, 0));
@@ -255,7 +256,7 @@ TEST_F(ObserverTest, ReportsAnUnflaggedDiscontinuity) {
 
 TEST_F(ObserverTest, ReportsAnInvalidPose) {
   Greet();
-  std::vector<std::byte> frame = toy::PoseFrame(kWorld, kFirstTick, {{1}});
+  std::vector<std::byte> frame = test_world::PoseFrame(kWorld, kFirstTick, {{1}});
   // Replaces every 1.0f by 2.0f, so that no quaternion is a unit quaternion.
   constexpr std::array kOne = {std::byte{0}, std::byte{0}, std::byte{0x80}, std::byte{0x3f}};
   constexpr std::array kTwo = {std::byte{0}, std::byte{0}, std::byte{0}, std::byte{0x40}};
@@ -273,9 +274,10 @@ TEST_F(ObserverTest, ReportsAnInvalidPose) {
 
 TEST_F(ObserverTest, ReportsAnotherModeOrSkeleton) {
   Greet();
-  connection_.SendBytes(toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kQuantised));
   connection_.SendBytes(
-      toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kFull, 0, toy::kJoints + 1));
+      test_world::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kQuantised));
+  connection_.SendBytes(test_world::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kFull,
+                                              0, test_world::kJoints + 1));
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 0u);
@@ -298,7 +300,7 @@ TEST_F(ObserverTest, SumsTheBatchesThatTheServerDropped) {
 TEST_F(ObserverTest, ReportsARefusedJoin) {
   connection_ = server_.Accept();
   ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
-  connection_.Send(toy::Welcome());
+  connection_.Send(test_world::Welcome());
   const auto join = connection_.Expect<protocol::JoinWorld>();
   ASSERT_TRUE(join.has_value());
   protocol::Reply reply;
