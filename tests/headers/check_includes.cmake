@@ -1,13 +1,18 @@
-# cmake -DROOT=<project> -P check_includes.cmake: which part of the project may include what.
+# cmake -DROOT=<project> -P check_includes.cmake
+# Checks which part of the project may include which other part.
 #
-#   public headers   the standard library, GLM and other public headers; never Boost, FlatBuffers or
-#                    any other library that stays hidden
-#   base <- runtime <- offline; protocol and client never include the server, nor core the protocol
+#   public headers   may include the standard library, GLM and other public headers, but no Boost,
+#                    FlatBuffers or other library that a user of Stridewire does not need
+#   components       base <- runtime <- offline; core does not include the protocol; neither the
+#                    protocol nor the client includes the server
+#   rooms            the folders of a component in a fixed order; files of a room include only this
+#                    room and rooms before it
 cmake_minimum_required(VERSION 3.25)
 set(found 0)
 set(failures 0)
 
-# Every #include of the files below DIRECTORY has to match ALLOWED and not FORBIDDEN (regexes; empty: no rule).
+# check(DIRECTORY ALLOWED FORBIDDEN REASON): every #include of the files below DIRECTORY must match
+# the regular expression ALLOWED and must not match FORBIDDEN. An empty expression means no rule.
 function(check directory allowed forbidden reason)
   file(GLOB_RECURSE files
        ${ROOT}/${directory}/*.h ${ROOT}/${directory}/*.hpp ${ROOT}/${directory}/*.cpp)
@@ -48,7 +53,35 @@ foreach(kind c cpp src samples)  # Its tools may: stridewire-record writes BVH.
   check(client_sdk/${kind} "" "^stridewire/offline/" "${reason}")
 endforeach()
 
+# check_rooms(DIRECTORY PREFIX ROOM...): checks the rooms of DIRECTORY, listed from bottom to top.
+# Sources include a header of a room as "PREFIX<room>/<header>". Each folder must be a listed room.
+function(check_rooms directory prefix)
+  file(GLOB folders RELATIVE ${ROOT}/${directory} LIST_DIRECTORIES true ${ROOT}/${directory}/*/)
+  foreach(folder IN LISTS folders)
+    if(IS_DIRECTORY ${ROOT}/${directory}/${folder} AND NOT folder IN_LIST ARGN)
+      message(SEND_ERROR "${directory}/${folder} is not in the list of rooms of this test")
+      math(EXPR failures "${failures} + 1")
+    endif()
+  endforeach()
+  set(above ${ARGN})
+  foreach(room IN LISTS ARGN)
+    list(REMOVE_AT above 0)
+    if(above)
+      list(JOIN above "|" names)
+      check(${directory}/${room} "" "^${prefix}(${names})/"
+            "a room includes only rooms that are below it")
+    endif()
+  endforeach()
+  set(found ${found} PARENT_SCOPE)
+  set(failures ${failures} PARENT_SCOPE)
+endfunction()
+
+check_rooms(core/src/runtime "runtime/"
+            skeleton terrain library movement pose weights plan avatar)
+check_rooms(core/src/offline "offline/" base capture extract build builtin choreography)
+check_rooms(server/src "" base net world session app)
+
 if(found EQUAL 0)
-  message(FATAL_ERROR "found no #include at all below ${ROOT}")
+  message(FATAL_ERROR "no #include found below ${ROOT}")
 endif()
-message(STATUS "${found} includes looked at, ${failures} wrong")
+message(STATUS "${found} includes checked, ${failures} wrong")
