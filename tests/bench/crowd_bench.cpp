@@ -17,7 +17,7 @@
 #include "runtime/weights/correction.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "world/encoded_pose_cache.h"
 
 namespace stridewire {

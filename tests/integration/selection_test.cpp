@@ -41,7 +41,7 @@ struct Steps {
   }
 
   [[nodiscard]] Selected Select(const SelectionOptions& options, double diameter_m) const {
-    return SelectExamples(examples, units, diameter_m, options, layout, skeleton, group);
+    return SelectExamplesJob{examples, units, diameter_m, options, layout, skeleton, group}.Run();
   }
 
   // Mean over all examples of how far each is from what the stored ones make of its parameters, when it

@@ -11,9 +11,10 @@
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire::server {
 namespace {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire::server {
 namespace {

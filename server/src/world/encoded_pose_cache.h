@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "base/prefetch.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluation_batcher.h"
-#include "stridewire/base/prefetch.h"
 #include "stridewire/protocol/compact_codecs.h"
-#include "stridewire/runtime/avatar.h"
 
 namespace stridewire::server {
 

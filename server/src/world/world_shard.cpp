@@ -194,7 +194,7 @@ void WorldShard::SetLayers(const LayerPart& part, CommandResult& result) {
     }
     const Status status =
         it->second.avatar.SetLayer({.layer = world_->library->FindLayer(asked.layer),
-                                    .is_on = !asked.is_off,
+                                    .enabled = !asked.is_off,
                                     .weight = asked.weight,
                                     .blend_s = asked.blend_s,
                                     .speed = asked.speed});

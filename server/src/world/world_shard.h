@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "base/metrics.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
 #include "world/encoded_pose_cache.h"
 #include "world/pose_frames.h"
 #include "world/shard_messages.h"

@@ -11,10 +11,10 @@
 #include <set>
 
 #include "counted_memory.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
-#include "stridewire/runtime/avatar.h"
 #include "test_library.h"
 #include "test_server.h"
 

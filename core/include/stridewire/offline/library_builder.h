@@ -1,46 +1,99 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stridewire/base/error.h"
 #include "stridewire/offline/raw_library.h"
-#include "stridewire/offline/selection.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
 
-/// Turns a RawLibrary into library bytes: one generic-time grid a group, examples resampled on it,
-/// hemispheres aligned, near duplicates averaged, weights solved.
+/// Which of the extracted examples LibraryBuilder keeps.
+struct SelectionOptions {
+  /// Upper bound on the error of a step that is left out: the mean distance between its joints and
+  /// those of the step blended from the kept examples, at equal generic times. It also bounds how far
+  /// the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres; one
+  /// radian counts as 0.5 m. 0 keeps every step.
+  double max_pose_error_m = 0.0;
+  /// A step is an outlier if its pose or duration differs from what all other steps predict for its
+  /// parameters by this many deviations (1.4826 MAD) more than usual. Only steps inside the hull of
+  /// the others are tested, in groups of at least eight, and at most one in ten is removed: steps at
+  /// the edge of the hull are rare, not wrong. 0 disables the test.
+  double outlier_deviations = 0.0;
+};
+
+/// What LibraryBuilder did with an extracted example.
+enum class ExampleFate : std::uint8_t {
+  kKept,       ///< Stored as an example of its own.
+  kAveraged,   ///< Stored as part of an average.
+  kRedundant,  ///< Left out because the kept examples reproduce it.
+  kOutlier     ///< Left out because it differs from all other examples.
+};
+
+/// "kept", "averaged", "redundant" or "outlier".
+[[nodiscard]] std::string_view ExampleFateName(ExampleFate fate);
+
+/// What LibraryBuilder did with one extracted example, and why.
+struct SelectedExample {
+  std::string source;  ///< RawExample::source.
+  bool mirrored = false;
+  ExampleFate fate = ExampleFate::kKept;
+  int example = -1;      ///< Index in the library's group; -1 if left out.
+  double error_m = 0.0;  ///< If left out: distance to the step blended with its parameters, metres.
+  std::string reason;    ///< One sentence.
+};
+
+/// The selection of one group, in the order of RawGroup::examples.
+struct GroupSelection {
+  int group = 0;  ///< Index in MotionLibrary::groups().
+  MovementKind kind = MovementKind::kStepLeft;
+  std::vector<SelectedExample> examples;
+  /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths); 0 if they
+  /// are stored as captured.
+  double ridge = 0.0;
+  double ridge_radius = 0.0;  ///< Radius of the radial functions, in spreads of the parameters.
+
+  /// Number of examples with this fate.
+  [[nodiscard]] int Count(ExampleFate fate) const;
+};
+
+/// Builds a MotionLibrary from a RawLibrary. It resamples the examples of each group on a common
+/// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
+/// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// One that keeps a representative selection of captured movements: those within 5 cm of each other
-  /// averaged, outliers of five deviations and what the others make within 2.5 cm left out, the rest
-  /// made smooth.
+  /// Returns a builder configured to keep a representative selection of captured movements: it
+  /// averages movements within 5 cm of each other, drops outliers beyond five deviations and
+  /// movements that the rest reproduces within 2.5 cm, and smooths what remains.
   [[nodiscard]] static LibraryBuilder Selecting();
 
-  double grid_fps = 30.0;  ///< About this many grid cells a second of mean duration, more where
-                           ///< an example would be stored worse than 0.45 degrees otherwise.
-  /// Average examples whose parameters all lie within this of each other (complete linkage),
-  /// metres (a radian counts 0.5 m). 0: none.
+  /// Grid cells per second of mean duration, approximately. Intervals where an example would
+  /// otherwise be stored with an error above 0.45 degrees get more.
+  double grid_fps = 30.0;
+  /// Averages examples whose parameters all lie within this distance of each other, in metres; a
+  /// radian counts as 0.5 m. Uses complete linkage. 0: averages nothing.
   double cluster_diameter = 0.0;
-  /// Which of the averages to leave out; by default none.
+  /// Which examples (after averaging) to leave out; by default none.
   SelectionOptions selection;
-  /// Store the examples chosen as a smooth function of their parameters has them, which all but outliers
-  /// decide: what they have in common stays, what is one's own goes. How smooth is chosen by the poses of
-  /// examples left out. Groups of fewer than four examples for each number of a linear function (d + 1)
-  /// stay as they are.
+  /// Replaces the selected examples by a smooth function of their parameters that is robust against
+  /// outliers. This keeps what the examples have in common and removes individual variation.
+  /// Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d + 1) examples
+  /// (d parameters) remain unchanged.
   bool smooths = false;
 
   struct Note {
     int group = 0;
     std::string text;
   };
-  std::vector<Note> notes;  ///< Filled by Build: merged duplicates, directions no example spans.
-  std::vector<GroupSelection> selections;  ///< Filled by Build, one a group.
+  /// Output of Build: merged duplicates and parameter directions in which no example varies.
+  std::vector<Note> notes;
+  std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
 
-  /// kOutOfRange, kShapeMismatch, kIllConditioned; `where` names group and example.
+  /// Errors: kOutOfRange, kShapeMismatch or kIllConditioned; `where` names the group and example.
   [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Build(const RawLibrary& raw);
 };
 

@@ -11,9 +11,9 @@
 #include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
 #include "offline/extract/mirror.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/skeleton/foot_vector.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {
@@ -124,7 +124,7 @@ TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
   rehung.skeleton.joints[3].parent = 0;
   EXPECT_THAT(assembler.Add(rehung).error,
               testing::MatchesRegex(
-                  "its joint LeftFoot hangs on .+ where in synthetic.bvh it hangs on .+"));
+                  "its joint LeftFoot has the parent .+ where in synthetic.bvh the parent is .+"));
   Capture fewer = PlainWalk();
   fewer.skeleton.joints.pop_back();
   EXPECT_EQ(assembler.Add(fewer).error, "it has 11 joints, synthetic.bvh has 12");

@@ -13,6 +13,7 @@
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -196,7 +196,7 @@ TEST_F(SmoothExamples, HaveWiderRadiiInManyDimensionsAndSaneWeights) {
     const MotionGroup& group = library_->group(g);
     std::vector<double> scales;
     for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
-    const auto wide = FitOverSmooth(group.sites, scales);
+    const auto wide = FitSmoothBasis(group.sites, scales);
     ASSERT_TRUE(wide.has_value());
     const double factor = wide->radius_factor;
     EXPECT_NEAR(wide->basis.dilations[0] / group.dilations[0], factor, 1e-12);
