@@ -87,7 +87,7 @@ class HttpServer {
   SlowPage slow_page_;
   int waiting_requests_ = 0;
   boost::asio::thread_pool worker_{
-      1};  // last, so that it is joined before the members that it uses are destroyed
+      1};  // declared last, so that its thread ends before other members are destroyed
 };
 
 }  // namespace stridewire::server

@@ -54,7 +54,6 @@ void Shard::Prepare(const TickClock& clock, std::vector<Shard*> shards) {
   clock_ = clock;
   shards_ = std::move(shards);
   STRIDEWIRE_CHECK(shards_.at(static_cast<std::size_t>(index_)) == this);
-  outboxes_.resize(shards_.size());
 }
 
 void Shard::Start() {
@@ -120,7 +119,7 @@ void Shard::Tick() {
         return WorldOf(command.world).Execute(command, tick_);
       },
       [this](int from_shard, CommandResult&& result) {
-        OutboxOf(from_shard).results.push_back(std::move(result));
+        outboxes_[from_shard].results.push_back(std::move(result));
       });
   if (delayed_spawns > 0) metrics_.Reached(Limit::kSpawnsPerTick, delayed_spawns);
   for (auto& [id, world] : worlds_) world->Advance(tick, static_cast<int>(caught_up) + 1);
@@ -140,11 +139,12 @@ void Shard::AnswerRequests() {
     protocol::AvatarState state =
         WorldOf(request.world).Inspect(request.avatar, tick_, config_.limits.max_control_bytes / 2);
     state.nonce = request.nonce;
-    OutboxOf(request.from_shard).inspections.push_back({request.session, std::move(state)});
+    outboxes_[request.from_shard].inspections.push_back({request.session, std::move(state)});
   }
   inspect_requests_.clear();
   for (const StatesRequest& request : states_requests_) {
-    OutboxOf(request.from_shard).states.push_back(WorldOf(request.world).States(request, encoder_));
+    outboxes_[request.from_shard].states.push_back(
+        WorldOf(request.world).States(request, encoder_));
   }
   states_requests_.clear();
 }
@@ -154,20 +154,20 @@ void Shard::Publish() {
     if (const auto events = world->TakeEvents()) {
       for (int shard = 0; shard < shard_count(); ++shard) {
         if (!world->interest().WantsEvents(shard)) continue;
-        OutboxOf(shard).events.push_back({id, tick_, events});
+        outboxes_[shard].events.push_back({id, tick_, events});
       }
     }
     if (MovementDelivery movements; world->TakeMovements(tick_, movements)) {
       for (int shard = 0; shard < shard_count(); ++shard) {
         if (!world->interest().WantsMovements(shard)) continue;
-        OutboxOf(shard).movements.push_back(movements);
+        outboxes_[shard].movements.push_back(movements);
       }
     }
     PublishPoses(*world);
   }
   // The own outbox is posted as well, because sending is not part of the tick.
-  for (std::size_t shard = 0; shard < outboxes_.size(); ++shard) {
-    if (!outboxes_[shard].empty()) shards_[shard]->Post(std::exchange(outboxes_[shard], {}));
+  for (auto& [shard, outbox] : std::exchange(outboxes_, {})) {
+    shards_.at(static_cast<std::size_t>(shard))->Post(std::move(outbox));
   }
 }
 
@@ -184,7 +184,7 @@ void Shard::PublishPoses(WorldShard& world) {
     if (!world.Encode(mode, tick_, total.all, composer_, delivery)) continue;
     for (int shard = 0; shard < shard_count(); ++shard) {
       const auto demand = world.interest().DemandOf(shard, mode, tick_);
-      if (demand.all || demand.subset) OutboxOf(shard).poses.push_back(delivery);
+      if (demand.all || demand.subset) outboxes_[shard].poses.push_back(delivery);
     }
   }
 }
@@ -326,8 +326,6 @@ WorldShard& Shard::WorldOf(const std::shared_ptr<World>& world) {
   return *entry;
 }
 
-ShardOutbox& Shard::OutboxOf(int shard) { return outboxes_.at(static_cast<std::size_t>(shard)); }
-
 void Shard::InterestChanged(const std::shared_ptr<World>& world) { interests_.Update(world); }
 
 // ---- sessions
@@ -360,7 +358,7 @@ void Shard::AdoptNow(Arrival&& arrival) {
 }
 
 void Shard::DestroySession(SessionId session) {
-  // Posted, because the session is the caller.
+  // The session is the caller, so it is destroyed later.
   asio::post(context_, [this, session] {
     const auto it = sessions_.find(session);
     if (it == sessions_.end() || !it->second->is_ended()) return;

@@ -97,7 +97,6 @@ class Shard : public SessionHost {
   void AdoptNow(Arrival&& arrival);
   Session* FindSession(SessionId session);
   WorldShard& WorldOf(const std::shared_ptr<World>& world);
-  ShardOutbox& OutboxOf(int shard);
 
   const int index_;
   const Config& config_;
@@ -123,7 +122,7 @@ class Shard : public SessionHost {
   InterestTracker interests_;  // of sessions_
   protocol::Encoder encoder_;
   protocol::PoseBatchComposer composer_;
-  std::vector<ShardOutbox> outboxes_;  // by receiving shard
+  std::map<int, ShardOutbox> outboxes_;  // by receiving shard; only those with contents
   std::vector<std::weak_ptr<Connection>> connections_;
   bool is_draining_ = false;
 };

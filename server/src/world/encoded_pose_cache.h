@@ -58,7 +58,7 @@ struct PoseScratch {
 ///   empty       The slot contains no pose.
 ///   scheduled   FinishStep will evaluate the poses of a movement. Until then, the movement must
 ///               exist and must not change.
-///   timed       The slot contains `count` poses: those of first_step, first_step + steps_apart, ...
+///   timed       The slot contains `count` poses, for steps first_step, first_step + steps_apart...
 ///               If the avatar's revision has changed, or no pose is left for the current step,
 ///               Contains returns false and the slot must be scheduled or stored again.
 ///   constant    The slot contains one pose for all steps, because the avatar stands still.

@@ -218,11 +218,6 @@ struct ShardOutbox {
   std::vector<InspectResult> inspections;
   std::vector<MovementDelivery> movements;
   std::vector<StatesResult> states;  ///< Delivered after the movements of the same tick.
-
-  [[nodiscard]] bool empty() const {
-    return results.empty() && events.empty() && poses.empty() && inspections.empty() &&
-           movements.empty() && states.empty();
-  }
 };
 
 /// Asks the main thread for a world, which it creates if necessary.
