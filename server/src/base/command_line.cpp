@@ -115,9 +115,7 @@ Expected<CommandLine> ReadCommandLine(int argc, const char* const* argv,
       value = environment(where);
     }
     if (!value) continue;
-    Status status = keys[i].set(result.config, *value);
-    if (!status) {
-      status.error().where = where + " " + *value;
+    if (Status status = keys[i].Set(result.config, *value, where + " " + *value); !status) {
       return std::unexpected(status.error());
     }
   }

@@ -9,8 +9,8 @@
 #include <limits>
 #include <thread>
 
-#include "stridewire/protocol/limits.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/protocol/limits.h"
 
 namespace stridewire::server {
 namespace {
@@ -121,6 +121,7 @@ ConfigKey Number(const char* name, const char* help, T Owner::* member, T min, T
   return {.name = name,
           .section = kIsLimit ? "limits" : "",
           .help = fmt::format("{} ({} to {})", help, min, max),
+          .range = fmt::format("{} to {}", min, max),
           .set = [=](Config& config, std::string_view text) -> Status {
             T value{};
             if (!ParseWhole(text, value)) {
@@ -301,6 +302,15 @@ std::string QuotedList(std::string_view list) {
 int Config::shard_count() const {
   if (shards > 0) return shards;
   return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, kMaxShards);
+}
+
+Status ConfigKey::Set(Config& config, std::string_view value, std::string where) const {
+  Status status = set(config, value);
+  if (status) return {};
+  const bool is_out_of_range = status.error().code == ErrorCode::kOutOfRange && !range.empty();
+  if (is_out_of_range) where += fmt::format(" (expected {})", range);
+  status.error().where = std::move(where);
+  return status;
 }
 
 std::string ConfigKey::option() const {

@@ -65,11 +65,15 @@ struct ConfigKey {
   std::string name;     ///< "tick_hz"
   std::string section;  ///< "" or "limits"
   std::string help;
+  std::string range;     ///< Allowed values of a number, such as "1 to 1000"; empty otherwise.
   bool is_text = false;  ///< The file contains the value in quotes.
   bool is_flag = false;
   bool is_list = false;  ///< A TOML array of strings in the file, comma-separated elsewhere.
   std::function<Status(Config&, std::string_view)> set;
   std::function<std::string(const Config&)> get;
+
+  /// Sets the value from text. The error contains `where` and the allowed range.
+  [[nodiscard]] Status Set(Config& config, std::string_view value, std::string where) const;
 
   [[nodiscard]] std::string option() const;       ///< "--tick-hz"
   [[nodiscard]] std::string environment() const;  ///< "STRIDEWIRE_TICK_HZ"

@@ -58,9 +58,7 @@ Status SetKey(const ConfigKey& key, const toml::node& node, const std::string& w
                               : "expected a number",
                 where);
   }
-  Status status = key.set(config, *text);
-  if (!status) status.error().where = where;
-  return status;
+  return key.Set(config, *text, fmt::format("{} = {}", where, *text));
 }
 
 Status ReadWorld(const toml::table& table, const std::string& name, const std::string& file,

@@ -111,7 +111,7 @@ TEST(Config, FileErrorsContainFileLineAndKey) {
       {"listen = \"localhost\"", "f.toml:1: listen", "HOST:PORT"},
       {"listen = \"h:70000\"", "f.toml:1: listen", "0 to 65535"},
       {"tick_hz = \"60\"", "f.toml:1: tick_hz", "expected a number"},
-      {"tick_hz = 0", "f.toml:1: tick_hz", "out of range"},
+      {"tick_hz = 0", "f.toml:1: tick_hz = 0 (expected 1 to 1000)", "out of range"},
       {"tick_hz = nan", "f.toml:1: tick_hz", "out of range"},
       {"shards = 1.5", "f.toml:1: shards", "integer"},
       {"allowed_origins = \"https://a.example\"", "f.toml:1: allowed_origins", "list of strings"},
