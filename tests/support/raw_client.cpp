@@ -56,7 +56,7 @@ RawClient& RawClient::operator=(RawClient&& other) noexcept {
 }
 
 void RawClient::Abort() {
-  // A reset, not an orderly end.
+  // Reset the connection instead of closing it gracefully.
   const linger hard{1, 0};
   setsockopt(socket_, SOL_SOCKET, SO_LINGER, &hard, sizeof(hard));
   close(std::exchange(socket_, -1));
@@ -74,7 +74,7 @@ void RawClient::SendBytes(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) {  // the server has closed; what it said can still be read
+    if (sent <= 0) {  // the server has closed; received data can still be read
       return;
     }
     bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -171,8 +171,7 @@ std::optional<protocol::Reply> RawClient::Observe(protocol::WorldId world,
   return Await<protocol::Reply>();
 }
 
-std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count,
-                                         double length_m) {
+std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count, double length_m) {
   std::vector<protocol::RequestItem> items;
   for (int i = 1; i <= count; ++i) {
     items.push_back({.avatar = avatar,
