@@ -60,7 +60,6 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features = protocol::kAllFeatures;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {

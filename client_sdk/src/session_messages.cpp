@@ -48,7 +48,7 @@ void Session::Handle(const protocol::Welcome& message, double now_s) {
     return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
                           "the server resumed a session that does not exist", now_s);
   }
-  if (message.protocol < protocol::kProtocolMin || message.protocol > protocol::kProtocolMax) {
+  if (message.protocol != protocol::kProtocolVersion) {
     return CloseWithError(STRIDEWIRE_VERSION_MISMATCH, "the server uses another protocol version");
   }
   state_ = State::kReady;

@@ -104,7 +104,6 @@ void Unpack(Unpacker& u, const wire::Hello& w, Hello& m) {
   m.protocol_min = w.protocol_min();
   m.protocol_max = w.protocol_max();
   u.Text(w.client_name(), kMaxNameBytes, m.client_name, "Hello.client_name");
-  m.features = w.features();
   u.Text(w.auth_token(), kMaxAuthTokenBytes, m.auth_token, "Hello.auth_token");
   u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Hello.resume_token", m.resume_token);
   m.last_events_number = w.last_events_number();
@@ -251,7 +250,6 @@ void Unpack(Unpacker& u, const wire::Goodbye& w, Goodbye& m) {
 
 void Unpack(Unpacker& u, const wire::Welcome& w, Welcome& m) {
   m.protocol = w.protocol();
-  m.features = w.features();
   m.session = w.session();
   u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Welcome.resume_token", m.resume_token);
   m.resumed = w.resumed();

@@ -31,7 +31,7 @@ Offset<wire::Hello> Build(FlatBufferBuilder& b, const Hello& m) {
   const auto auth = Text(b, m.auth_token);
   const auto resume = m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>()
                                              : Bytes(b, m.resume_token);
-  return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, m.features, auth, resume,
+  return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, auth, resume,
                            m.last_events_number);
 }
 
@@ -167,8 +167,8 @@ Offset<wire::Welcome> Build(FlatBufferBuilder& b, const Welcome& m) {
                                             : Bytes(b, m.resume_token);
   const auto name = Text(b, m.server_name);
   const auto version = Text(b, m.server_version);
-  return wire::CreateWelcome(b, m.protocol, m.features, m.session, token, m.resumed, m.last_seq,
-                             m.tick_hz, name, version, limits);
+  return wire::CreateWelcome(b, m.protocol, m.session, token, m.resumed, m.last_seq, m.tick_hz,
+                             name, version, limits);
 }
 
 Offset<wire::Leg> Build(FlatBufferBuilder& b, const LegInfo& leg) {

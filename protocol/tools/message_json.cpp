@@ -34,13 +34,10 @@ std::string Hex(const std::vector<std::byte>& bytes) {
 }
 
 Json Fields(const Hello& m) {
-  return {{"protocol_min", m.protocol_min},
-          {"protocol_max", m.protocol_max},
-          {"client_name", m.client_name},
-          {"features", Decimal(m.features)},
-          {"auth_token", m.auth_token},
-          {"resume_token", Hex(m.resume_token)},
-          {"last_events_number", Decimal(m.last_events_number)}};
+  return {
+      {"protocol_min", m.protocol_min},      {"protocol_max", m.protocol_max},
+      {"client_name", m.client_name},        {"auth_token", m.auth_token},
+      {"resume_token", Hex(m.resume_token)}, {"last_events_number", Decimal(m.last_events_number)}};
 }
 
 Json Fields(const JoinWorld& m) {
@@ -149,7 +146,6 @@ Json Fields(const Goodbye& m) { return {{"code", Number(m.code)}, {"text", m.tex
 
 Json Fields(const Welcome& m) {
   return {{"protocol", m.protocol},
-          {"features", Decimal(m.features)},
           {"session", Decimal(m.session)},
           {"resume_token", Hex(m.resume_token)},
           {"resumed", m.resumed},

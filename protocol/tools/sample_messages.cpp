@@ -224,10 +224,8 @@ std::vector<SampleMessage> SampleMessages() {
   const auto add = [&](const char* name, Message message) {
     samples.push_back({name, std::move(message)});
   };
-  add("hello",
-      Hello{1, 3, "game-server \xe2\x9c\x93", kFeatureResume | kFeatureQuantised, "", {}, 0});
-  add("hello_resume", Hello{1, 1, "game-server", kFeatureResume | kFeatureEventReplay,
-                            "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
+  add("hello", Hello{1, 3, "game-server \xe2\x9c\x93", "", {}, 0});
+  add("hello_resume", Hello{1, 1, "game-server", "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
   add("join_world", JoinWorld{1, "plaza", Role::kObserver});
   add("leave_world", LeaveWorld{9, 3});
   add("spawn", Spawn{2, 3, {{0, {DVec3(0.0), 0.0}}, {41, {DVec3(1.5, 0.25, -2.0), 1.75}}}});
@@ -273,9 +271,8 @@ std::vector<SampleMessage> SampleMessages() {
   add("ping", Ping{0x0123456789abcdefu, 12.5});
   add("inspect_avatar", InspectAvatar{0x0123456789abcdefu, 3, 41});
   add("goodbye", Goodbye{StatusCode::kShuttingDown, "the server is going down"});
-  add("welcome",
-      Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0, "stridewired",
-              "0.1.0", ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
+  add("welcome", Welcome{1, 77, Token(32), true, 3, 60.0, "stridewired", "0.1.0",
+                         ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
   add("world_info", WorldInfo{1, 3, "plaza", Role::kController, 123'000,
                               "0f1e2d3c4b5a69788796a5b4c3d2e1f0", Skeleton()});
   add("reply_ok", Reply{6, StatusCode::kOk, "", 1, {}});

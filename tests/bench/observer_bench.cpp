@@ -178,8 +178,6 @@ class Host final : public server::SessionHost {
     STRIDEWIRE_CHECK(status.has_value());
     protocol::Hello hello;
     hello.client_name = "bench";
-    hello.features =
-        protocol::kFeatureQuantised | protocol::kFeatureCompact | protocol::kFeatureRegions;
     sessions_.back()->Attach(std::move(connection), hello, false, commands);
   }
 

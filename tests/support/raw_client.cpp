@@ -127,11 +127,9 @@ bool RawClient::AwaitClose(std::chrono::milliseconds patience) {
   return is_closed_;
 }
 
-std::optional<protocol::Welcome> RawClient::SayHello(std::uint64_t features,
-                                                     std::vector<std::byte> resume_token,
+std::optional<protocol::Welcome> RawClient::SayHello(std::vector<std::byte> resume_token,
                                                      std::uint64_t last_events_number) {
   Send(protocol::Hello{.client_name = "test",
-                       .features = features,
                        .auth_token = {},
                        .resume_token = std::move(resume_token),
                        .last_events_number = last_events_number});

@@ -60,8 +60,7 @@ class RawClient {
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
   // Common exchanges: each sends one message and waits for its answer.
-  std::optional<protocol::Welcome> SayHello(std::uint64_t features = ~std::uint64_t{0},
-                                            std::vector<std::byte> resume_token = {},
+  std::optional<protocol::Welcome> SayHello(std::vector<std::byte> resume_token = {},
                                             std::uint64_t last_events_number = 0);
   std::optional<protocol::WorldInfo> Join(const std::string& world,
                                           protocol::Role role = protocol::Role::kController);

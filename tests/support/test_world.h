@@ -20,12 +20,6 @@ inline constexpr double kTickHz = 60.0;
 
 inline protocol::Welcome Welcome(bool resumed = false) {
   protocol::Welcome welcome;
-  welcome.features =
-      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureWalks |
-      protocol::kFeatureTakeovers | protocol::kFeatureQuantised | protocol::kFeatureTerrain |
-      protocol::kFeatureFootprints | protocol::kFeatureLayers | protocol::kFeatureRefusals |
-      protocol::kFeaturePlanting | protocol::kFeatureMovementMode | protocol::kFeatureCompact |
-      protocol::kFeatureDetail;
   welcome.session = 7;
   welcome.resume_token = std::vector<std::byte>(16, std::byte{0x5a});
   welcome.resumed = resumed;

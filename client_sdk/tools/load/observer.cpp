@@ -132,9 +132,9 @@ void Observer::OnWorldInfo(const protocol::WorldInfo& info) {
 }
 
 protocol::PoseMode Observer::SentMode() const {
-  const bool is_compact = run_.options.mode == protocol::PoseMode::kQuantised &&
-                          (welcome().features & protocol::kFeatureCompact) != 0;
-  return is_compact ? protocol::CompactMode(run_.options.detail) : run_.options.mode;
+  return run_.options.mode == protocol::PoseMode::kQuantised
+             ? protocol::CompactMode(run_.options.detail)
+             : run_.options.mode;
 }
 
 void Observer::OnReply(const protocol::Reply& reply) {

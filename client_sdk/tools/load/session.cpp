@@ -46,28 +46,29 @@ void Session::Open() {
     state_ = State::kGreeting;
     protocol::Hello hello;
     hello.client_name = name_;
-    hello.features = protocol::kFeatureQuantised | protocol::kFeatureCompact |
-                     protocol::kFeatureDetail | protocol::kFeatureMovementMode;
     WaitToRead();
     Send(hello);
   });
 }
 
+void Session::SendGoodbye() {
+  if (state_ != State::kReady || !writing_.empty()) return;
+  if (!context_.encoder.Encode(protocol::Goodbye{}, waiting_)) return;
+  // Best effort: the session does not wait until the Goodbye is sent.
+  boost::system::error_code ignored;
+  socket_->write_some(asio::buffer(waiting_), ignored);
+}
+
 void Session::Finish() {
   if (state_ == State::kFinished) return;
-  if (state_ == State::kReady) {
-    // Best effort: the session does not wait until the Goodbye is sent.
-    if (writing_.empty() && context_.encoder.Encode(protocol::Goodbye{}, waiting_)) {
-      boost::system::error_code ignored;
-      socket_->write_some(asio::buffer(waiting_), ignored);
-    }
-  }
+  SendGoodbye();
   Close();
   state_ = State::kFinished;
 }
 
 void Session::Drop(double pause_s) {
   if (state_ == State::kFinished || state_ == State::kWaiting) return;
+  SendGoodbye();
   Close();
   state_ = State::kWaiting;
   back_off_s_ = 0.0;

@@ -60,7 +60,7 @@ class Session {
   /// Sends Goodbye if ready, and closes the connection for good.
   void Finish();
 
-  /// Drops the connection and reconnects after `pause_s`.
+  /// Ends the session and connects again after `pause_s`.
   void Drop(double pause_s);
 
   /// Handles timeouts, pings and reconnects.
@@ -107,6 +107,7 @@ class Session {
   [[nodiscard]] bool connected() const {
     return state_ == State::kGreeting || state_ == State::kReady;
   }
+  void SendGoodbye();
   void Close();
   void WaitToRead();
   void Read();

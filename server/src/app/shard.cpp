@@ -280,8 +280,7 @@ void Shard::Deliver(ShardOutbox&& outbox) {
     if (Session* session = FindSession(result.session)) session->OnInspected(result.state);
   }
   for (const EventDelivery& delivery : outbox.events) {
-    SharedEvents events(delivery, encoder_);
-    for (Session* session : interests_.WatchersOf(delivery.world)) session->OnEvents(events);
+    for (Session* session : interests_.WatchersOf(delivery.world)) session->OnEvents(delivery);
   }
   for (const MovementDelivery& delivery : outbox.movements) {
     SharedMovements movements(delivery, encoder_);

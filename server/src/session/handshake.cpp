@@ -116,11 +116,11 @@ void Handshakes::Accept(std::unique_ptr<Transport> transport,
 }
 
 void Handshakes::OnHello(Handshake& handshake, const protocol::Hello& hello) {
-  if (hello.protocol_min > protocol::kProtocolMax || hello.protocol_max < protocol::kProtocolMin) {
-    handshake.Refuse(StatusCode::kVersionMismatch, "this server supports protocol versions " +
-                                                       std::to_string(protocol::kProtocolMin) +
-                                                       " to " +
-                                                       std::to_string(protocol::kProtocolMax));
+  if (hello.protocol_min > protocol::kProtocolVersion ||
+      hello.protocol_max < protocol::kProtocolVersion) {
+    handshake.Refuse(StatusCode::kVersionMismatch, "this server supports protocol version " +
+                                                       std::to_string(protocol::kProtocolVersion) +
+                                                       " only");
     return;
   }
   Arrival arrival;

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "base/check.h"
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
-#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire::server {
 
@@ -38,16 +38,8 @@ void Session::Attach(std::shared_ptr<Connection> connection, const protocol::Hel
   const Limits& limits = context_.host.config().limits;
   context_.connection = std::move(connection);
   client_name_ = hello.client_name;
-  std::uint64_t offered = kServerFeatures;
-  if (limits.resume_window_s <= 0.0) offered &= ~protocol::kFeatureResume;
-  context_.features = hello.features & offered;
-  constexpr std::uint64_t kCompact = protocol::kFeatureQuantised | protocol::kFeatureCompact;
-  stream_.subscriptions().SetCompact((context_.features & kCompact) == kCompact,
-                                     context_.Has(protocol::kFeatureDetail));
 
   protocol::Welcome welcome;
-  welcome.protocol = std::min(hello.protocol_max, protocol::kProtocolMax);
-  welcome.features = context_.features;
   welcome.session = context_.identity.id;
   welcome.resume_token = context_.identity.token;
   welcome.resumed = resumed;
@@ -80,7 +72,7 @@ void Session::Detach() {
   context_.connection = nullptr;
   context_.host.metrics().connections_closed.Add();
   detached_since_ = Clock::now();
-  if (!context_.Has(protocol::kFeatureResume)) {
+  if (context_.host.config().limits.resume_window_s <= 0.0) {
     End();
     return;
   }
@@ -264,11 +256,6 @@ void Session::OnMessage(protocol::Message&& message) {
 }
 
 void Session::Inspect(const protocol::InspectAvatar& message) {
-  if (!context_.Has(protocol::kFeatureInspect)) {
-    context_.host.metrics().protocol_errors.Add();
-    Fail(StatusCode::kUnexpectedMessage, "InspectAvatar needs the feature 'inspect'");
-    return;
-  }
   const auto refuse = [&](StatusCode code, const char* text) {
     context_.Send(protocol::AvatarState{.nonce = message.nonce,
                                         .world = message.world,
@@ -297,24 +284,10 @@ void Session::OnInspected(const protocol::AvatarState& state) {
   // The request may belong to an ended session with the same id.
   if (pending_inspections_ == 0) return;
   --pending_inspections_;
-  const auto is_walk = [](const protocol::RequestItem& item) {
-    return std::holds_alternative<protocol::WalkMovement>(item.movement);
-  };
-  if (context_.Has(protocol::kFeatureWalks) || std::ranges::none_of(state.queue, is_walk)) {
-    context_.Send(state);
-    return;
-  }
-  protocol::AvatarState without_walks = state;
-  std::erase_if(without_walks.queue, is_walk);
-  context_.Send(without_walks);
+  context_.Send(state);
 }
 
 void Session::SendLibraryPiece(const protocol::FetchLibrary& message) {
-  if (!context_.Has(protocol::kFeatureMovementMode)) {
-    context_.host.metrics().protocol_errors.Add();
-    Fail(StatusCode::kUnexpectedMessage, "FetchLibrary needs the feature 'movement mode'");
-    return;
-  }
   protocol::LibraryPiece piece{.nonce = message.nonce, .hash = message.hash};
   const auto refuse = [&](StatusCode code, const char* text) {
     piece.code = code;

@@ -15,14 +15,6 @@
 
 namespace stridewire::server {
 
-/// The features that this server supports.
-inline constexpr std::uint64_t kServerFeatures =
-    protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
-    protocol::kFeatureInspect | protocol::kFeatureTerrain | protocol::kFeatureFootprints |
-    protocol::kFeatureWalks | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-    protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
-    protocol::kFeatureCompact | protocol::kFeatureDetail | protocol::kFeatureRegions;
-
 /// One client: the worlds that it has joined, its subscriptions and its commands. A session lives
 /// on one shard. If its connection is lost, it waits for the client to resume it
 /// (STATE_MACHINE.md).
@@ -59,7 +51,7 @@ class Session : private ConnectionHandler {
   void OnPoses(SharedPoses& poses) { stream_.OnPoses(poses); }
   void OnMovements(SharedMovements& movements) { stream_.OnMovements(movements); }
   void OnStates(const StatesResult& result) { stream_.OnStates(result); }
-  void OnEvents(SharedEvents& events) { stream_.OnEvents(events); }
+  void OnEvents(const EventDelivery& delivery) { stream_.OnEvents(delivery); }
 
   /// Checks timeouts and sends messages that are due. Called several times per second.
   void Housekeep(Clock::time_point now);

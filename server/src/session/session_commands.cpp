@@ -19,10 +19,6 @@ namespace {
 
 constexpr const char* kNotJoinedText = "this session has not joined that world";
 
-std::string FeatureMissing(std::string_view feature) {
-  return "the feature '" + std::string(feature) + "' was not negotiated in the handshake";
-}
-
 // Distributes the items of a command to the shards that own their avatars. Each item keeps its
 // index in the command.
 template <typename Item, typename Part>
@@ -35,26 +31,6 @@ void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
     const auto shard = static_cast<std::size_t>(ShardOf(item.avatar, shard_count));
     parts[shard].items.push_back({index++, std::move(item)});
   }
-}
-
-// Returns the name of a feature that the requests need and the client has not negotiated, or null.
-const char* MissingFeature(const std::vector<protocol::RequestItem>& items,
-                           const SessionContext& context) {
-  for (const protocol::RequestItem& item : items) {
-    const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
-    const bool is_walk = std::holds_alternative<protocol::WalkMovement>(item.movement);
-    if (step != nullptr && step->at && !context.Has(protocol::kFeatureFootprints)) {
-      return "footprints";
-    }
-    if (is_walk && !context.Has(protocol::kFeatureWalks)) return "walks";
-    if (item.interrupt != protocol::Interrupt::kNone && !context.Has(protocol::kFeatureTakeovers)) {
-      return "takeovers";
-    }
-    if (step != nullptr && step->exact_only && !context.Has(protocol::kFeatureRefusals)) {
-      return "refusals";
-    }
-  }
-  return nullptr;
 }
 
 // A refused item takes less than 256 bytes of a Reply.
@@ -288,15 +264,7 @@ void SessionCommands::Leave(WorldId id) {
 void SessionCommands::SendWorldInfo(Seq seq, const Membership& membership) {
   const World& world = *membership.world;
   std::vector<std::string> layers;
-  if (context_.Has(protocol::kFeatureLayers)) {
-    for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
-  }
-  std::vector<RotationQuantization> rotation_codes;
-  std::vector<std::uint16_t> fewer_joints;
-  if (context_.Has(protocol::kFeatureCompact)) {
-    rotation_codes = world.quantizations->joints;
-    if (context_.Has(protocol::kFeatureDetail)) fewer_joints = world.quantizations->reduced_joints;
-  }
+  for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
   context_.Send(protocol::WorldInfo{.seq = seq,
                                     .world = world.id,
                                     .name = world.name,
@@ -305,8 +273,8 @@ void SessionCommands::SendWorldInfo(Seq seq, const Membership& membership) {
                                     .library_hash = world.library->hash(),
                                     .skeleton = ToWire(world.library->skeleton()),
                                     .layers = std::move(layers),
-                                    .rotation_codes = std::move(rotation_codes),
-                                    .fewer_joints = std::move(fewer_joints)});
+                                    .rotation_codes = world.quantizations->joints,
+                                    .reduced_joints = world.quantizations->reduced_joints});
 }
 
 // ---- avatars
@@ -357,10 +325,6 @@ void SessionCommands::Execute(protocol::Spawn&& command) {
 void SessionCommands::Execute(protocol::Request&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
-  if (const char* feature = MissingFeature(command.items, context_)) {
-    Answer(command.seq, StatusCode::kUnsupported, FeatureMissing(feature));
-    return;
-  }
   // Count avatars; all requests of an avatar are usually in a row.
   std::size_t avatars = 0;
   for (std::size_t i = 0; i < command.items.size(); ++i) {
@@ -379,10 +343,6 @@ void SessionCommands::Execute(protocol::Request&& command) {
 void SessionCommands::Execute(protocol::SetLayers&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
-  if (!context_.Has(protocol::kFeatureLayers)) {
-    Answer(command.seq, StatusCode::kUnsupported, FeatureMissing("layers"));
-    return;
-  }
   const std::size_t item_count = command.items.size();
   std::vector<LayerPart> parts(static_cast<std::size_t>(context_.host.shard_count()));
   Distribute(std::move(command.items), parts);
@@ -399,10 +359,6 @@ void SessionCommands::Execute(protocol::CancelQueue&& command) {
 }
 
 void SessionCommands::Execute(protocol::SetPlanting&& command) {
-  if (!context_.Has(protocol::kFeaturePlanting)) {
-    Answer(command.seq, StatusCode::kUnsupported, FeatureMissing("planting"));
-    return;
-  }
   SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, command.enabled});
 }
 
@@ -411,10 +367,6 @@ void SessionCommands::Execute(protocol::SetPlanting&& command) {
 void SessionCommands::Execute(protocol::SetTerrain&& command) {
   const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr) return;
-  if (!context_.Has(protocol::kFeatureTerrain)) {
-    Answer(command.seq, StatusCode::kUnsupported, FeatureMissing("terrain"));
-    return;
-  }
   // The cost of validating and sending a terrain, in items.
   std::size_t numbers = 0;
   if (command.terrain) {
@@ -449,19 +401,9 @@ void SessionCommands::Execute(protocol::Observe&& command) {
   const auto refuse = [&](StatusCode code, std::string text) {
     Answer(command.seq, code, std::move(text));
   };
-  const bool has_ring_details = command.region && !command.region->ring_details.empty();
-  if ((command.detail != protocol::PoseDetail::kAll || has_ring_details) &&
-      !subscriptions.has_detail()) {
-    return refuse(StatusCode::kUnsupported,
-                  "the features 'compact poses' and 'levels of detail' were not negotiated in the "
-                  "handshake");
-  }
-  command.mode = subscriptions.SentMode(command.mode, command.detail);
+  command.mode = Subscriptions::SentMode(command.mode, command.detail);
   const Membership* membership = context_.FindWorld(command.world);
   if (membership == nullptr) return refuse(StatusCode::kNotJoined, kNotJoinedText);
-  if (command.region && !context_.Has(protocol::kFeatureRegions)) {
-    return refuse(StatusCode::kUnsupported, FeatureMissing("regions"));
-  }
   if (command.replace) return MoveRegion(command, membership->world);
   if (subscriptions.Contains(command.subscription)) {
     return refuse(StatusCode::kSubscriptionExists, "a subscription with this id exists already");
@@ -470,12 +412,6 @@ void SessionCommands::Execute(protocol::Observe&& command) {
     context_.host.metrics().Reached(Limit::kSubscriptions);
     return refuse(StatusCode::kLimitReached,
                   "the session has too many subscriptions (max_subscriptions)");
-  }
-  if (command.mode == PoseMode::kMovement && !context_.Has(protocol::kFeatureMovementMode)) {
-    return refuse(StatusCode::kUnsupported, FeatureMissing("movement mode"));
-  }
-  if (command.mode == PoseMode::kQuantised && !context_.Has(protocol::kFeatureQuantised)) {
-    return refuse(StatusCode::kUnsupported, FeatureMissing("quantised poses"));
   }
   if (command.region ? subscriptions.ObservesWorld(command.world)
                      : subscriptions.HasRegion(command.world)) {

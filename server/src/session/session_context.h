@@ -26,10 +26,8 @@ struct SessionContext {
   SessionHost& host;
   SessionIdentity identity;
   std::shared_ptr<Connection> connection;  ///< Null while the session waits for its client.
-  std::uint64_t features = 0;              ///< Negotiated features, protocol::kFeature...
   std::map<WorldId, Membership> worlds;
 
-  [[nodiscard]] bool Has(std::uint64_t feature) const { return (features & feature) != 0; }
   [[nodiscard]] Membership* FindWorld(WorldId world) {
     const auto it = worlds.find(world);
     return it == worlds.end() ? nullptr : &it->second;

@@ -32,15 +32,6 @@ void ForEachEventFrame(const EventDelivery& delivery, Function&& function) {
 
 }  // namespace
 
-const std::vector<SharedFrame>& SharedEvents::frames() {
-  if (frames_.empty()) {
-    ForEachEventFrame(delivery_, [this](protocol::Events&& message) {
-      if (auto frame = EncodeFrame(encoder_, message)) frames_.push_back(std::move(frame));
-    });
-  }
-  return frames_;
-}
-
 PoseDelivery SharedPoses::Compose(std::span<const std::uint32_t> rows, bool is_partial) {
   PoseDelivery batch{.world = delivery_.world,
                      .mode = delivery_.mode,
@@ -67,8 +58,6 @@ SessionStream::SessionStream(SessionContext& context)
 // ---- what the session needs
 
 bool SessionStream::WantsEvents(WorldId world) const {
-  // Without a connection, events are useful only if they are sent again later.
-  if (context_.connection == nullptr && !context_.Has(protocol::kFeatureEventReplay)) return false;
   const Membership* membership = context_.FindWorld(world);
   if (membership == nullptr) return false;
   return membership->role == protocol::Role::kController || subscriptions_.WantsEvents(world);
@@ -178,20 +167,11 @@ void SessionStream::CountDroppedBatches(WorldId world, std::uint64_t batches) {
 
 // ---- events
 
-void SessionStream::OnEvents(SharedEvents& events) {
-  const EventDelivery& delivery = events.delivery();
+void SessionStream::OnEvents(const EventDelivery& delivery) {
   if (!WantsEvents(delivery.world)) return;
   std::uint64_t dropped = 0;
-  if (!context_.Has(protocol::kFeatureEventReplay)) {
-    bool is_full = false;
-    for (const SharedFrame& frame : events.frames()) {
-      is_full |= !context_.connection->SendEvents(frame);
-    }
-    if (is_full) dropped = delivery.events->size();
-  } else {
-    ForEachEventFrame(
-        delivery, [&](protocol::Events&& message) { dropped += SendEvents(std::move(message)); });
-  }
+  ForEachEventFrame(delivery,
+                    [&](protocol::Events&& message) { dropped += SendEvents(std::move(message)); });
   CountDroppedEvents(delivery.world, dropped);
 }
 
@@ -220,14 +200,12 @@ void SessionStream::SendRegionChange(WorldId world, std::uint64_t tick,
 }
 
 std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
-  const bool is_stored = context_.Has(protocol::kFeatureEventReplay);
-  message.number = is_stored ? ++events_number_ : 0;
+  message.number = ++events_number_;
   const SharedFrame frame = EncodeFrame(context_.host.encoder(), message);
   if (frame == nullptr) return 0;
   const bool was_sent = context_.connection != nullptr && context_.connection->SendEvents(frame);
   // If the send queue is full, the message is dropped. Sent later, it would be out of order.
   if (context_.connection != nullptr && !was_sent) return message.events.size();
-  if (!is_stored) return 0;
   event_replay_.Add({message.number, message.events.size(), was_sent, frame});
   const std::uint64_t dropped = event_replay_.TakeDropped();
   if (dropped > 0) context_.host.metrics().Reached(Limit::kEventReplay);
@@ -255,12 +233,12 @@ void SessionStream::SendLagging(Membership& membership) {
 // ---- terrain
 
 void SessionStream::OnTerrain(WorldId world, const SharedFrame& frame) {
-  if (context_.connection == nullptr || !context_.Has(protocol::kFeatureTerrain)) return;
+  if (context_.connection == nullptr) return;
   if (context_.worlds.contains(world)) context_.connection->SendTerrain(world, frame);
 }
 
 void SessionStream::SendTerrain(const World& world, bool even_if_flat) {
-  if (context_.connection == nullptr || !context_.Has(protocol::kFeatureTerrain)) return;
+  if (context_.connection == nullptr) return;
   if (const auto terrain = world.terrain.Get()) {
     context_.connection->SendTerrain(world.id, terrain->frame);
   } else if (even_if_flat) {

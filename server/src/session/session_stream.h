@@ -17,21 +17,6 @@
 
 namespace stridewire::server {
 
-/// The frames of one EventDelivery, without message numbers. They are encoded once, when the first
-/// session needs them.
-class SharedEvents {
- public:
-  SharedEvents(const EventDelivery& delivery, protocol::Encoder& encoder)
-      : delivery_(delivery), encoder_(encoder) {}
-  [[nodiscard]] const std::vector<SharedFrame>& frames();
-  [[nodiscard]] const EventDelivery& delivery() const { return delivery_; }
-
- private:
-  const EventDelivery& delivery_;
-  protocol::Encoder& encoder_;
-  std::vector<SharedFrame> frames_;
-};
-
 /// The frames of one MovementDelivery. They are encoded once, when the first session needs them.
 class SharedMovements {
  public:
@@ -103,7 +88,7 @@ class SessionStream {
   void OnPoses(SharedPoses& poses);
   void OnMovements(SharedMovements& movements);
   void OnStates(const StatesResult& result);
-  void OnEvents(SharedEvents& events);
+  void OnEvents(const EventDelivery& delivery);
   void OnTerrain(WorldId world, const SharedFrame& frame);
 
   /// Continues after a new connection has been set. Sends stored events after message number

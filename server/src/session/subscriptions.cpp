@@ -26,23 +26,8 @@ auto FindRegionIn(Map& subscriptions, WorldId world, PoseMode mode)
 
 }  // namespace
 
-PoseMode Subscriptions::SentMode(PoseMode mode, PoseDetail detail) const {
-  if (mode != PoseMode::kQuantised && !IsCompact(mode)) return mode;
-  if (!is_compact_) return PoseMode::kQuantised;
-  return CompactMode(has_detail_ ? detail : PoseDetail::kAll);
-}
-
-void Subscriptions::SetCompact(bool is_compact, bool has_detail) {
-  if (is_compact == is_compact_ && has_detail == has_detail_) return;
-  is_compact_ = is_compact;
-  has_detail_ = has_detail;
-  channels_.clear();
-  for (auto& [id, subscription] : all_) {
-    const auto sent_mode = [this](PoseMode mode) { return SentMode(mode, DetailOf(mode)); };
-    subscription.mode = sent_mode(subscription.mode);
-    if (subscription.region) subscription.region->MapModes(sent_mode);
-    UpdateChannels(subscription);
-  }
+PoseMode Subscriptions::SentMode(PoseMode mode, PoseDetail detail) {
+  return mode == PoseMode::kQuantised ? CompactMode(detail) : mode;
 }
 
 std::vector<PoseMode> Subscriptions::ModesOf(const Subscription& subscription) {

@@ -32,15 +32,10 @@ class Subscriptions {
   /// The part of a delivery that the session sends to its client.
   enum class Share : std::uint8_t { kNone, kAll, kSubset, kRegion };
 
-  /// Sets whether quantised poses are sent in a compact mode, and whether less detail is possible.
-  /// Also applies to existing subscriptions.
-  void SetCompact(bool is_compact, bool has_detail);
-  /// Returns the mode in which poses are sent if a client requests `mode` and `detail`. If levels
-  /// of detail are not available, the mode has full detail. All other functions use sent modes.
-  [[nodiscard]] protocol::PoseMode SentMode(protocol::PoseMode mode,
-                                            protocol::PoseDetail detail) const;
-  /// True if levels of detail are available.
-  [[nodiscard]] bool has_detail() const { return is_compact_ && has_detail_; }
+  /// Returns the mode in which poses are sent if a client requests `mode` and `detail`. All other
+  /// functions use sent modes.
+  [[nodiscard]] static protocol::PoseMode SentMode(protocol::PoseMode mode,
+                                                   protocol::PoseDetail detail);
 
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
@@ -109,8 +104,6 @@ class Subscriptions {
   void UpdateChannels(const Subscription& subscription);
   void UpdateSelectedCount();
 
-  bool is_compact_ = false;
-  bool has_detail_ = false;
   std::map<protocol::SubscriptionId, Subscription> all_;
   std::map<Key, Channel> channels_;
   std::size_t selected_count_ = 0;

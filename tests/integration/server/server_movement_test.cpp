@@ -125,8 +125,7 @@ server::Config BuiltinConfig(int shards) {
 class DualObserver {
  public:
   DualObserver(TestServer& server, const std::string& world, int receive_buffer_bytes = 0)
-      : client_(server.Connect(receive_buffer_bytes)),
-        evaluated_(OpenLibrary("builtin").value()) {
+      : client_(server.Connect(receive_buffer_bytes)), evaluated_(OpenLibrary("builtin").value()) {
     EXPECT_TRUE(client_.SayHello());
     world_ = client_.Join(world, protocol::Role::kObserver)->world;
   }
@@ -410,21 +409,6 @@ TEST_P(ServerMovementOf, RestartsASlowReaderWithNewStates) {
   // On a busy machine, more may be dropped in the meantime.
   both.ReceiveUntil([&] { return both.evaluated().avatar_count() == watched; });
   EXPECT_GT(both.Compare(), static_cast<int>(kLargeCrowd) * 30);
-}
-
-TEST(ServerMovement, RequiresItsFeature) {
-  TestServer server(BuiltinConfig(1));
-  RawClient client = server.Connect();
-  ASSERT_TRUE(client.SayHello(~protocol::kFeatureMovementMode));
-  const auto world = client.Join("w");
-  ASSERT_TRUE(world);
-  const auto reply = client.Observe(world->world, 1, PoseMode::kMovement);
-  ASSERT_TRUE(reply);
-  EXPECT_EQ(reply->code, protocol::StatusCode::kUnsupported);
-  client.Send(protocol::FetchLibrary{1, world->library_hash, 0, 1000});
-  const auto error = client.Await<protocol::ErrorNotice>();
-  ASSERT_TRUE(error);
-  EXPECT_EQ(error->code, protocol::StatusCode::kUnexpectedMessage);
 }
 
 TEST(ServerMovement, SendsItsLibraryInPieces) {

@@ -40,17 +40,8 @@ TEST(ServerSession, AnswersHelloWithWelcome) {
   EXPECT_FALSE(welcome->resumed);
   EXPECT_EQ(welcome->last_seq, 0u);
   EXPECT_EQ(welcome->tick_hz, 60.0);
-  EXPECT_EQ(welcome->features, server::kServerFeatures);
   EXPECT_EQ(welcome->limits.max_queue, 256u);
   EXPECT_EQ(welcome->limits.max_items, protocol::kMaxItems);
-}
-
-TEST(ServerSession, NegotiatesFeaturesThatBothSupport) {
-  TestServer server;
-  RawClient client = server.Connect();
-  const auto welcome = client.SayHello(protocol::kFeatureQuantised | 1ull << 63);
-  ASSERT_TRUE(welcome);
-  EXPECT_EQ(welcome->features, protocol::kFeatureQuantised);
 }
 
 struct BadGreeting {
@@ -193,14 +184,6 @@ TEST(ServerSession, AnswersInspectAvatar) {
     refused += state->code == StatusCode::kLimitReached ? 1 : 0;
   }
   EXPECT_LT(refused, kQuestions);
-
-  // The message is allowed only if the feature was negotiated.
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  old.Send(protocol::InspectAvatar{1, 1, 1});
-  const auto notice = old.Await<ErrorNotice>();
-  ASSERT_TRUE(notice);
-  EXPECT_EQ(notice->code, StatusCode::kUnexpectedMessage);
 }
 
 TEST(ServerSession, WalksAnAvatarAndSendsItsEvents) {
@@ -459,7 +442,7 @@ TEST(ServerSession, ResumesAfterALostConnection) {
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
 
   RawClient again = server.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token, last_number);
+  const auto back = again.SayHello(welcome->resume_token, last_number);
   ASSERT_TRUE(back);
   EXPECT_TRUE(back->resumed);
   EXPECT_EQ(back->session, welcome->session);
@@ -503,7 +486,7 @@ TEST(ServerSession, ReplacesAHalfOpenConnection) {
   const auto welcome = old.SayHello();
   ASSERT_TRUE(welcome);
   RawClient fresh = server.Connect();
-  const auto back = fresh.SayHello(~0ull, welcome->resume_token);
+  const auto back = fresh.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_TRUE(back->resumed);
   const auto notice = old.Await<ErrorNotice>();
@@ -533,7 +516,7 @@ TEST(ServerSession, EndsAfterTheResumeWindow) {
   ASSERT_TRUE(
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_ended) == 1; }));
   RawClient again = server.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  const auto back = again.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_FALSE(back->resumed);
   EXPECT_NE(back->session, welcome->session);
@@ -571,7 +554,7 @@ TEST(ServerSession, StartsANewSessionAfterARestart) {
   // The server can use the same port at once, although old connections are still closing.
   TestServer restarted(config);
   RawClient again = restarted.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  const auto back = again.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_FALSE(back->resumed);
   EXPECT_TRUE(again.Join("w"));
@@ -591,7 +574,7 @@ TEST(ServerSession, SurvivesMutatedFrames) {
   };
   for (int round = 0; round < 200; ++round) {
     RawClient client = server.Connect();
-    ASSERT_TRUE(client.SayHello(0));
+    ASSERT_TRUE(client.SayHello());
     for (const std::vector<std::byte>& frame : frames) {
       std::vector<std::byte> mutated = frame;
       const unsigned flips = random() % 3;
@@ -634,14 +617,11 @@ TEST(ServerSession, SendsTheTerrainToAllSessionsOfAWorld) {
   const protocol::WorldTerrain terrain{world->world, Slab(0.5)};
   EXPECT_EQ(observer.Await<protocol::WorldTerrain>(), terrain);
 
-  // A client that joins later receives the terrain, too, unless it does not support terrain.
+  // A client that joins later receives the terrain, too.
   RawClient late = server.Connect();
   ASSERT_TRUE(late.SayHello());
   ASSERT_TRUE(late.Join("hall"));
   EXPECT_EQ(late.Await<protocol::WorldTerrain>(), terrain);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(old.Join("hall"));
 
   const auto refused = set(Slab(20'000.0));
   ASSERT_TRUE(refused);
@@ -655,14 +635,6 @@ TEST(ServerSession, SendsTheTerrainToAllSessionsOfAWorld) {
   const auto not_allowed = observer.Await<Reply>();
   ASSERT_TRUE(not_allowed);
   EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
-  old.Send(protocol::SetTerrain{.seq = old.NextSeq(), .world = world->world});
-  bool received_terrain = false;
-  const auto unsupported = old.Await<Reply>([&](const protocol::Message& message) {
-    received_terrain |= std::holds_alternative<protocol::WorldTerrain>(message);
-  });
-  ASSERT_TRUE(unsupported);
-  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
-  EXPECT_FALSE(received_terrain);
 }
 
 TEST(ServerSession, SendsTheCurrentTerrainWhenResumed) {
@@ -680,24 +652,11 @@ TEST(ServerSession, SendsTheCurrentTerrainWhenResumed) {
         protocol::SetTerrain{.seq = other.NextSeq(), .world = world->world, .terrain = terrain});
     ASSERT_TRUE(other.Await<Reply>());
     client = server.Connect();
-    const auto back = client.SayHello(~0ull, welcome->resume_token);
+    const auto back = client.SayHello(welcome->resume_token);
     ASSERT_TRUE(back && back->resumed);
     EXPECT_EQ(client.Await<protocol::WorldTerrain>(),
               (protocol::WorldTerrain{world->world, terrain}));
   }
-}
-
-// Returns the reply to a movement that needs a feature which the client has not negotiated.
-std::optional<StatusCode> WhatOldClientsHear(
-    TestServer& server, const decltype(protocol::RequestItem::movement)& movement,
-    protocol::Interrupt interrupt = protocol::Interrupt::kNone) {
-  RawClient old = server.Connect();
-  if (!old.SayHello(protocol::kFeatureQuantised)) return {};
-  const auto world = old.Join("hall");
-  if (!world) return {};
-  const auto reply = old.Request(world->world, {{1, 9, movement, interrupt}});
-  if (!reply) return {};
-  return reply->code;
 }
 
 // A session that controls one avatar.
@@ -726,7 +685,6 @@ TEST_F(ServerSessionOfOne, AcceptsWalksOnlyWithTheirFeature) {
   ASSERT_TRUE(too_fast);
   ASSERT_EQ(too_fast->items.size(), 1u);
   EXPECT_EQ(too_fast->items[0].code, StatusCode::kOutOfRange);
-  EXPECT_EQ(WhatOldClientsHear(server_, walk), StatusCode::kUnsupported);
 }
 
 TEST_F(ServerSessionOfOne, InterruptsMovements) {
@@ -749,9 +707,6 @@ TEST_F(ServerSessionOfOne, InterruptsMovements) {
     }
   }
   EXPECT_EQ(finished, (std::vector<protocol::RequestId>{7, 9}));
-  EXPECT_EQ(WhatOldClientsHear(server_, protocol::StepMovement{}, protocol::Interrupt::kNow),
-            StatusCode::kUnsupported);
-  EXPECT_NE(WhatOldClientsHear(server_, protocol::StepMovement{}), StatusCode::kUnsupported);
 }
 
 TEST_F(ServerSessionOfOne, ReachesOrRejectsExactFootprints) {
@@ -780,24 +735,6 @@ TEST_F(ServerSessionOfOne, ReachesOrRejectsExactFootprints) {
   EXPECT_LT(rejected.position_m.z, 2.0);
   EXPECT_EQ(heard[3].request_id, 8u);
   EXPECT_NEAR(heard[2].position_m.z, 0.45, 1e-3);
-
-  EXPECT_EQ(WhatOldClientsHear(server_, far), StatusCode::kUnsupported);
-}
-
-TEST_F(ServerSessionOfOne, AcceptsExactOnlyWithItsFeature) {
-  RawClient before = server_.Connect();
-  ASSERT_TRUE(before.SayHello(protocol::kFeatureFootprints));
-  const auto world = before.Join("hall");
-  ASSERT_TRUE(world);
-  protocol::StepMovement step{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0}};
-  const auto taken = before.Request(world->world, {{1, 9, step}});
-  ASSERT_TRUE(taken);
-  EXPECT_EQ(taken->accepted, 1u);
-  step.exact_only = true;
-  const auto refused = before.Request(world->world, {{1, 10, step}});
-  ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->code, StatusCode::kUnsupported);
-  EXPECT_NE(refused->text.find("refusals"), std::string::npos) << refused->text;
 }
 
 TEST(ServerSession, AcceptsLayersOnlyWithTheirFeature) {
@@ -865,17 +802,9 @@ TEST(ServerSession, AcceptsLayersOnlyWithTheirFeature) {
   const auto not_allowed = set(observer, world->world, {{1, "wave"}});
   ASSERT_TRUE(not_allowed);
   EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  const auto old_world = old.Join("hall");
-  ASSERT_TRUE(old_world);
-  EXPECT_TRUE(old_world->layers.empty());
-  const auto unsupported = set(old, world->world, {{1, "wave"}});
-  ASSERT_TRUE(unsupported);
-  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
 }
 
-TEST(ServerSession, AcceptsSetPlantingOnlyWithItsFeature) {
+TEST(ServerSession, SetsPlanting) {
   server::Config config = TestConfig();
   config.shards = 3;
   config.library = "builtin";
@@ -922,10 +851,6 @@ TEST(ServerSession, AcceptsSetPlantingOnlyWithItsFeature) {
   RawClient observer = server.Connect();
   ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
   EXPECT_EQ(set(observer, {1}, false)->code, StatusCode::kNotAllowed);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(old.Join("hall"));
-  EXPECT_EQ(set(old, {1}, false)->code, StatusCode::kUnsupported);
 }
 
 TEST_F(ServerSessionOfOne, StepsToAFootprint) {
@@ -934,7 +859,6 @@ TEST_F(ServerSessionOfOne, StepsToAFootprint) {
   const auto reply = client_.Request(world_, {{1, 7, step}});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->accepted, 1u) << (reply->items.empty() ? "" : reply->items[0].text);
-  EXPECT_EQ(WhatOldClientsHear(server_, step), StatusCode::kUnsupported);
 }
 
 }  // namespace

@@ -205,7 +205,7 @@ TEST(ServerStream, ResumesOverEitherTransport) {
         Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
 
     auto second = connect(second_web);
-    const auto back = second->SayHello(~0ull, welcome->resume_token);
+    const auto back = second->SayHello(welcome->resume_token);
     ASSERT_TRUE(back);
     EXPECT_TRUE(back->resumed);
     EXPECT_EQ(back->session, welcome->session);
@@ -228,7 +228,7 @@ TEST(ServerStream, ReplacesAHalfOpenConnection) {
   const auto welcome = old.SayHello();
   ASSERT_TRUE(welcome);
   RawClient fresh = server.Connect();
-  const auto back = fresh.SayHello(~0ull, welcome->resume_token);
+  const auto back = fresh.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_TRUE(back->resumed);
   const auto notice = old.Await<ErrorNotice>();
@@ -256,7 +256,7 @@ TEST(ServerStream, KeepsTheSessionAfterAClosedWebSocketButNotAfterGoodbye) {
   ASSERT_TRUE(
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
   WebClient again(server.http_port());
-  EXPECT_TRUE(again.SayHello(~0ull, welcome->resume_token)->resumed);
+  EXPECT_TRUE(again.SayHello(welcome->resume_token)->resumed);
 }
 
 TEST(ServerStream, ReportsAShutdown) {
@@ -605,7 +605,7 @@ TEST(ServerStream, SurvivesMutatedFrames) {
   };
   for (int round = 0; round < 100; ++round) {
     WebClient client(server.http_port());
-    ASSERT_TRUE(client.SayHello(0));
+    ASSERT_TRUE(client.SayHello());
     for (const std::vector<std::byte>& frame : frames) {
       std::vector<std::byte> mutated = frame;
       const unsigned flips = random() % 3;

@@ -71,18 +71,14 @@ std::vector<protocol::SpawnItem> OnALine(AvatarId count) {
 // Encoded poses by avatar and by ticks since its first movement started.
 using PoseStreams = std::map<AvatarId, std::map<std::uint64_t, std::vector<std::byte>>>;
 
-// Features without compact poses.
-constexpr std::uint64_t kWithoutCompact = ~protocol::kFeatureCompact;
-
-PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
-                         std::uint64_t features = kWithoutCompact) {
+PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
   server::Config config = TestConfig(shards);
   config.max_catch_up_ticks = 1000;  // late ticks must not lose time
   config.limits.observer_backlog_ticks = 1000;
   TestServer server(config);
   RawClient client = server.Connect();
   PoseStreams streams;
-  if (!client.SayHello(features)) return streams;
+  if (!client.SayHello()) return streams;
   const auto world = client.Join("stage");
   std::vector<protocol::SpawnItem> spawns;
   std::vector<protocol::RequestItem> requests;
@@ -250,11 +246,9 @@ TEST(ServerWorld, ProducesIdenticalBytesForAnyNumberOfShards) {
     SCOPED_TRACE(shards);
     ExpectSameWhereBothHave(one, PlayOnServer(shards, kAvatars, PoseMode::kFull));
   }
-  const PoseStreams quantised = PlayOnServer(4, kAvatars, PoseMode::kQuantised);
-  ExpectSameWhereBothHave(quantised, PlayAlone(kAvatars, PoseMode::kQuantised, quantised));
   // Compact poses are encoded in batches with other avatars, which depend on the shards.
-  const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised, ~0ull);
-  ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised, ~0ull));
+  const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised);
+  ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised));
 }
 
 // Each session receives only the detail that it requested, and other details are not encoded.
@@ -262,12 +256,10 @@ TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
   using protocol::PoseDetail;
   TestServer server(TestConfig(2));
   RawClient client = server.Connect();
-  RawClient old = server.Connect();
-  ASSERT_TRUE(client.SayHello() && old.SayHello(~protocol::kFeatureDetail));
+  RawClient other = server.Connect();
+  ASSERT_TRUE(client.SayHello() && other.SayHello());
   const auto world = client.Join("w");
-  const auto old_world = old.Join("w", protocol::Role::kObserver);
-  ASSERT_TRUE(world && old_world);
-  EXPECT_TRUE(old_world->reduced_joints.empty());
+  ASSERT_TRUE(world && other.Join("w", protocol::Role::kObserver));
   const auto observe = [&](RawClient& who, PoseDetail detail, std::uint16_t every_n_ticks = 1) {
     who.Send(protocol::Observe{.seq = who.NextSeq(),
                                .world = world->world,
@@ -279,8 +271,7 @@ TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
                                .detail = detail});
     return who.Await<protocol::Reply>()->code;
   };
-  EXPECT_EQ(observe(old, PoseDetail::kReduced), StatusCode::kUnsupported);
-  EXPECT_EQ(observe(old, PoseDetail::kAll), StatusCode::kOk);
+  EXPECT_EQ(observe(other, PoseDetail::kAll), StatusCode::kOk);
 
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
@@ -331,30 +322,27 @@ TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
 }
 
 // Compares the poses that two observers of one avatar receive in the same ticks.
-TEST(ServerWorld, SendsCompactPosesOnlyWithTheirFeature) {
+TEST(ServerWorld, SendsQuantisedPosesInCompactMode) {
   TestServer server(TestConfig(1));
-  RawClient with = server.Connect();
-  RawClient without = server.Connect();
-  const auto welcome = with.SayHello();
-  ASSERT_TRUE(welcome && without.SayHello(kWithoutCompact));
-  const auto world = with.Join("w");
-  const auto old_world = without.Join("w", protocol::Role::kObserver);
-  ASSERT_TRUE(world && old_world);
-  EXPECT_TRUE(old_world->rotation_codes.empty());
+  RawClient quantised = server.Connect();
+  RawClient full = server.Connect();
+  ASSERT_TRUE(quantised.SayHello() && full.SayHello());
+  const auto world = quantised.Join("w");
+  ASSERT_TRUE(world && full.Join("w", protocol::Role::kObserver));
   ASSERT_EQ(world->rotation_codes.size(), world->skeleton.joints.size());
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
   const auto codec = protocol::CompactCodec::Make(world->rotation_codes, parents).value();
   ASSERT_LT(codec.pose_bytes(), protocol::PoseBytes(PoseMode::kQuantised, parents.size()));
 
-  ASSERT_TRUE(with.Spawn(world->world, {{.avatar = 1}}));
-  ASSERT_TRUE(with.Request(world->world, Steps(1, 20, 0.6)));
-  ASSERT_EQ(with.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
-  ASSERT_EQ(without.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  ASSERT_TRUE(quantised.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(quantised.Request(world->world, Steps(1, 20, 0.6)));
+  ASSERT_EQ(quantised.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  ASSERT_EQ(full.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
   std::map<std::uint64_t, std::vector<Quat>> seen;
   std::size_t bytes = 0;
   while (seen.size() < 30) {
-    const auto batch = with.Await<protocol::PoseBatch>();
+    const auto batch = quantised.Await<protocol::PoseBatch>();
     ASSERT_TRUE(batch);
     ASSERT_EQ(batch->info.mode, PoseMode::kCompact);
     ASSERT_THAT(batch->avatars, ElementsAre(1u));
@@ -368,27 +356,19 @@ TEST(ServerWorld, SendsCompactPosesOnlyWithTheirFeature) {
   EXPECT_LE(bytes, 30 * codec.pose_bytes() + 200);
   int compared = 0;
   while (compared < 5) {
-    const auto batch = without.Await<protocol::PoseBatch>();
+    const auto batch = full.Await<protocol::PoseBatch>();
     ASSERT_TRUE(batch);
-    ASSERT_EQ(batch->info.mode, PoseMode::kQuantised);
+    ASSERT_EQ(batch->info.mode, PoseMode::kFull);
     if (!seen.contains(batch->info.tick)) continue;
     ++compared;
     Vec3 root;
     std::vector<Quat> rotations(parents.size());
-    ASSERT_TRUE(protocol::DecodePose(PoseMode::kQuantised, batch->pose(0), root, rotations));
+    ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, batch->pose(0), root, rotations));
     for (std::size_t j = 0; j < parents.size(); ++j) {
       // Each joint compensates the errors of its ancestors: up to two errors of 0.23 degrees.
       EXPECT_LE(AngleBetween(rotations[j], seen[batch->info.tick][j]), 0.009) << j;
     }
   }
-  // A client that resumes without the feature receives no compact poses.
-  with.Abort();
-  with = server.Connect();
-  const auto back = with.SayHello(kWithoutCompact, welcome->resume_token);
-  ASSERT_TRUE(back && back->resumed);
-  const auto batch = with.Await<protocol::PoseBatch>();
-  ASSERT_TRUE(batch);
-  EXPECT_EQ(batch->info.mode, PoseMode::kQuantised);
 }
 
 // ---- subscriptions
@@ -580,15 +560,6 @@ TEST(ServerWorld, TracksAMovingRegion) {
   // A region must be the only subscription of its world.
   player.Send(protocol::Observe{.seq = player.NextSeq(), .world = world->world, .subscription = 2});
   EXPECT_EQ(player.Await<Reply>(take)->code, StatusCode::kNotAllowed);
-
-  // Without the feature, regions are rejected.
-  RawClient other = server.Connect();
-  ASSERT_TRUE(other.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
-  protocol::Observe without{.seq = other.NextSeq(), .world = world->world, .subscription = 1};
-  without.region = protocol::Region{{0.0, 0.0}, 1.0, {}, {}, {}};
-  other.Send(without);
-  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
 }
 
 /// The poses that an observer of a region receives.
@@ -687,16 +658,6 @@ TEST(ServerWorld, SendsEachRingInItsDetailAndInterval) {
   // Moving a region requires the same detail beyond its rings.
   asked.detail = protocol::PoseDetail::kReduced;
   EXPECT_EQ(observe(), StatusCode::kNoSuchSubscription);
-  // Without the feature, rings cannot have levels of detail.
-  RawClient other = server.Connect();
-  ASSERT_TRUE(other.SayHello(~protocol::kFeatureDetail));
-  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
-  asked.seq = other.NextSeq();
-  asked.replace = false;
-  asked.detail = protocol::PoseDetail::kAll;
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kRoot};
-  other.Send(asked);
-  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
 }
 
 // An avatar walks from ring to ring, to one whose poses are sent once per minute. Then it is
@@ -751,7 +712,7 @@ TEST(ServerWorld, SendsEventsToSubscribersAndControllers) {
   RawClient other = server.Connect();
   RawClient watcher = server.Connect();
   ASSERT_TRUE(controller.SayHello());
-  ASSERT_TRUE(other.SayHello(0));  // without event replay, messages are shared and not numbered
+  ASSERT_TRUE(other.SayHello());
   ASSERT_TRUE(watcher.SayHello());
   const auto world = controller.Join("w");
   ASSERT_TRUE(world);
@@ -762,7 +723,7 @@ TEST(ServerWorld, SendsEventsToSubscribersAndControllers) {
   for (RawClient* client : {&other, &watcher}) {
     const auto events = client->Await<protocol::Events>();
     ASSERT_TRUE(events);
-    EXPECT_EQ(events->number, client == &other ? 0u : 1u);
+    EXPECT_EQ(events->number, 1u);
     EXPECT_EQ(events->events[0].type, EventType::kSpawned);
     EXPECT_EQ(events->events[0].avatar, 4u);
     EXPECT_EQ(events->events[0].base, (protocol::Placement{{1, 2, 3}, 4}));

@@ -133,7 +133,6 @@ TEST_F(SessionTest, JoinsAWorld) {
   EXPECT_EQ(session_->Open(now_s_), STRIDEWIRE_OK);
   const protocol::Hello hello = Connect();
   EXPECT_TRUE(hello.resume_token.empty());
-  EXPECT_TRUE(hello.features & protocol::kFeatureResume);
   stridewire_world world = 0;
   // A command before Welcome waits.
   EXPECT_EQ(session_->JoinWorld("plaza", protocol::Role::kObserver, world, command_),

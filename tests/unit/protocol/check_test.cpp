@@ -11,7 +11,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Hello GoodHello() { return {1, 1, "client", 0, "", {}, 0}; }
+Hello GoodHello() { return {1, 1, "client", "", {}, 0}; }
 JoinWorld GoodJoin() { return {1, "plaza", Role::kController}; }
 Spawn GoodSpawn() { return {1, 2, {{0, {}}, {3, {}}}}; }
 Request GoodRequest() {

@@ -215,7 +215,7 @@ TEST(Decode, NeedsOneDetailPerRing) {
               "Region.ring_details");
 }
 
-TEST(Decode, AcceptsUnknownStatusCodesAndBits) {
+TEST(Decode, AcceptsUnknownStatusCodesAndReservedFields) {
   FlatBufferBuilder builder;
   const auto reply = Finished(builder, wire::CreateReply(builder, 1, 499));
   const auto message = DecodeMessage({MessageType::kReply, reply});
@@ -223,8 +223,13 @@ TEST(Decode, AcceptsUnknownStatusCodesAndBits) {
   EXPECT_EQ(static_cast<int>(std::get<Reply>(*message).code), 499);
   builder.Clear();
   const auto name = builder.CreateString("x");
-  const auto hello = Finished(
-      builder, wire::CreateHello(builder, 1, 1, name, std::numeric_limits<std::uint64_t>::max()));
+  // The fourth field of Hello is reserved.
+  const auto start = builder.StartTable();
+  builder.AddElement<std::uint16_t>(4, 1, 0);
+  builder.AddElement<std::uint16_t>(6, 1, 0);
+  builder.AddOffset(8, name);
+  builder.AddElement<std::uint64_t>(10, std::numeric_limits<std::uint64_t>::max(), 0);
+  const auto hello = Finished(builder, flatbuffers::Offset<wire::Hello>(builder.EndTable(start)));
   EXPECT_TRUE(DecodeMessage({MessageType::kHello, hello}));
 }
 
@@ -252,8 +257,7 @@ TEST(Decode, RejectsLongTextsBeforeCopying) {
   builder.Clear();
   const auto name = text(1);
   const auto token = text(4097);
-  ExpectError(MessageType::kHello,
-              Finished(builder, wire::CreateHello(builder, 1, 1, name, 0, token)),
+  ExpectError(MessageType::kHello, Finished(builder, wire::CreateHello(builder, 1, 1, name, token)),
               ErrorCode::kLimitExceeded, "Hello.auth_token");
   builder.Clear();
   ExpectError(MessageType::kJoinWorld,
@@ -329,11 +333,11 @@ TEST(Decode, RejectsLongListsBeforeCopying) {
   const auto name = builder.CreateString("x");
   const auto bytes = builder.CreateVector(token);
   ExpectError(MessageType::kHello,
-              Finished(builder, wire::CreateHello(builder, 1, 1, name, 0, 0, bytes)),
+              Finished(builder, wire::CreateHello(builder, 1, 1, name, 0, bytes)),
               ErrorCode::kLimitExceeded, "Hello.resume_token");
   builder.Clear();
   ExpectError(MessageType::kWelcome,
-              Finished(builder, wire::CreateWelcome(builder, 1, 0, 1, builder.CreateVector(token))),
+              Finished(builder, wire::CreateWelcome(builder, 1, 1, builder.CreateVector(token))),
               ErrorCode::kLimitExceeded, "Welcome.resume_token");
   builder.Clear();
   {

@@ -37,8 +37,6 @@ PoseDelivery DeliveryOf(const std::vector<AvatarId>& avatars, std::uint64_t tick
 
 TEST(Subscriptions, ObserveAllModesOfTheRingsOfARegion) {
   Subscriptions all;
-  all.SetCompact(true, true);
-  EXPECT_TRUE(all.has_detail());
   protocol::Observe observe{.world = kWorld, .mode = PoseMode::kCompactRoot, .every_n_ticks = 12};
   observe.region = protocol::Region{{0.0, 0.0}, 60.0, 4.0, {{8.0, 1}, {20.0, 2}}, {}};
   observe.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
@@ -73,14 +71,6 @@ TEST(Subscriptions, ObserveAllModesOfTheRingsOfARegion) {
   EXPECT_TRUE(all.MoveRegion(1, observe, 8.0));
   EXPECT_EQ(interval(PoseMode::kCompact), 1);
   EXPECT_FALSE(all.Observes(kWorld, PoseMode::kCompactReduced));
-  // The client resumes without levels of detail, then without compact poses.
-  all.SetCompact(true, false);
-  EXPECT_FALSE(all.has_detail());
-  EXPECT_EQ(interval(PoseMode::kCompact), 1);
-  EXPECT_EQ(interval(PoseMode::kCompactRoot), 0);
-  all.SetCompact(false, false);
-  EXPECT_EQ(interval(PoseMode::kQuantised), 1);
-  EXPECT_EQ(interval(PoseMode::kCompact), 0);
   EXPECT_TRUE(all.Remove(1).has_value());
   EXPECT_FALSE(all.ObservesWorld(kWorld));
 }

@@ -5,30 +5,9 @@
 
 namespace stridewire::protocol {
 
-/// Versions of the messages this build speaks; Hello and Welcome agree on one.
-inline constexpr std::uint16_t kProtocolMin = 1;
-inline constexpr std::uint16_t kProtocolMax = 1;
-
-/// Feature bits of Hello and Welcome: what both sides set may be used. Unknown bits are ignored.
-inline constexpr std::uint64_t kFeatureResume = 1;        ///< Sessions outlive a connection.
-inline constexpr std::uint64_t kFeatureEventReplay = 2;   ///< Events missed are sent again.
-inline constexpr std::uint64_t kFeatureQuantised = 4;     ///< PoseMode::kQuantised.
-inline constexpr std::uint64_t kFeatureInspect = 16;      ///< InspectAvatar, AvatarState.
-inline constexpr std::uint64_t kFeatureTerrain = 32;      ///< SetTerrain, WorldTerrain.
-inline constexpr std::uint64_t kFeatureFootprints = 64;   ///< Steps to a place (StepMovement::at).
-inline constexpr std::uint64_t kFeatureWalks = 128;       ///< WalkMovement.
-inline constexpr std::uint64_t kFeatureTakeovers = 256;   ///< RequestItem::interrupt.
-inline constexpr std::uint64_t kFeatureLayers = 512;      ///< SetLayers, WorldInfo::layers.
-inline constexpr std::uint64_t kFeatureRefusals = 1024;   ///< StepMovement::exact_only.
-inline constexpr std::uint64_t kFeaturePlanting = 2048;   ///< SetPlanting.
-inline constexpr std::uint64_t kFeatureCompact = 4096;    ///< PoseMode::kCompact.
-inline constexpr std::uint64_t kFeatureDetail = 8192;     ///< Observe::detail.
-inline constexpr std::uint64_t kFeatureRegions = 16'384;  ///< Observe::region, kEntered, kLeft.
-/// PoseMode::kMovement, FetchLibrary. Both sides evaluate movements by the same formulas: when
-/// these change, another bit. 8 stood for those before library format 3.
-inline constexpr std::uint64_t kFeatureMovementMode = 32'768;
-/// All features.
-inline constexpr std::uint64_t kAllFeatures = 0xfff7;
+/// Version of the protocol. Hello and Welcome must have it, else the connection is closed. It changes if
+/// the meaning of messages changes, or the formulas by which client and server evaluate movement records.
+inline constexpr std::uint16_t kProtocolVersion = 1;
 
 // Limits of messages. A receiver rejects a message that exceeds one with kLimitExceeded.
 

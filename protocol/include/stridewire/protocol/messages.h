@@ -59,11 +59,10 @@ struct Placement {
 /// First message of a connection.
 struct Hello {
   static constexpr MessageType kType = MessageType::kHello;
-  std::uint16_t protocol_min = kProtocolMin;  ///< 1 <= min <= max
-  std::uint16_t protocol_max = kProtocolMax;
+  std::uint16_t protocol_min = kProtocolVersion;  ///< At least 1, at most protocol_max.
+  std::uint16_t protocol_max = kProtocolVersion;
   std::string client_name;  ///< For the server's log, 1 to kMaxNameBytes.
-  std::uint64_t features = 0;
-  std::string auth_token;  ///< May be empty.
+  std::string auth_token;   ///< May be empty.
   std::vector<std::byte>
       resume_token;  ///< From Welcome, to resume a session. Empty: a new session.
   std::uint64_t last_events_number = 0;  ///< On resume: the last received Events::number.
@@ -362,13 +361,12 @@ struct ServerLimits {
 /// Accepts a Hello.
 struct Welcome {
   static constexpr MessageType kType = MessageType::kWelcome;
-  std::uint16_t protocol = kProtocolMax;  ///< Protocol version of the connection.
-  std::uint64_t features = 0;             ///< Features that client and server have in common.
-  std::uint64_t session = 0;              ///< Not 0.
-  std::vector<std::byte> resume_token;    ///< Secret for Hello after a lost connection.
-  bool resumed = false;                   ///< False: the session is new.
-  Seq last_seq = 0;                       ///< Last command that the server accepted; 0 if new.
-  double tick_hz = 60.0;                  ///< Above 0.
+  std::uint16_t protocol = kProtocolVersion;  ///< Protocol version of the connection.
+  std::uint64_t session = 0;                  ///< Not 0.
+  std::vector<std::byte> resume_token;        ///< Secret for Hello after a lost connection.
+  bool resumed = false;                       ///< False: the session is new.
+  Seq last_seq = 0;                           ///< Last command that the server accepted; 0 if new.
+  double tick_hz = 60.0;                      ///< Above 0.
   std::string server_name;
   std::string server_version;
   ServerLimits limits;
