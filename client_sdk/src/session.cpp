@@ -11,25 +11,9 @@ namespace stridewire::client {
 
 namespace {
 
-/// Copies as many whole UTF-8 characters as fit, and a terminating 0.
-void CopyText(std::string_view text, char* out, std::size_t out_bytes) {
-  std::size_t length = std::min(text.size(), out_bytes - 1);
-  if (length < text.size()) {
-    while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
-  }
-  if (length > 0) std::memcpy(out, text.data(), length);  // An empty text may have a null pointer.
-  out[length] = '\0';
-}
+constexpr std::size_t kMaxPendingPings = 64;
 
 }  // namespace
-
-Session::Session(const SessionOptions& options)
-    : options_(options),
-      backoff_(options.seed),
-      events_(options.max_events),
-      libraries_(options.library_folder) {
-  pose_budget_.limit_bytes = options.max_pose_bytes;
-}
 
 template <typename Message>
 void Session::Handle(const Message&, double now_s) {
@@ -195,15 +179,50 @@ void Session::Reset() {
   output_.clear();
 }
 
-stridewire_event Session::MakeEvent(stridewire_event_type type, stridewire_world world,
-                                    stridewire_status status, std::string_view text) const {
-  stridewire_event event{};
-  event.type = type;
-  event.world = world;
-  event.status = status;
-  event.group = -1;
-  CopyText(text, event.text, sizeof event.text);
-  return event;
+stridewire_status Session::Open(double now_s) {
+  switch (state_) {
+    case State::kIdle:
+    case State::kClosing:
+    case State::kClosed: break;
+    default: return Refuse(STRIDEWIRE_ALREADY_CONNECTED, "the client is already connected");
+  }
+  Reset();
+  backoff_.Reset();
+  last_status_ = STRIDEWIRE_OK;
+  last_text_.clear();
+  state_ = State::kWaiting;
+  next_attempt_s_ = now_s;
+  return STRIDEWIRE_OK;
+}
+
+void Session::Close(double now_s) {
+  if (state_ == State::kIdle || state_ == State::kClosing) return;
+  const bool was_closed = state_ == State::kClosed;
+  const bool sends_goodbye = state_ == State::kReady;
+  FailAll(STRIDEWIRE_CANCELLED, "the client was disconnected");
+  auto output = std::move(output_);
+  const std::uint64_t connection = connection_number_;
+  Reset();
+  state_ = State::kIdle;
+  if (sends_goodbye) {
+    output_ = std::move(output);
+    if (encoder_.Encode(protocol::Goodbye{}, output_)) {
+      state_ = State::kClosing;
+      connection_number_ = connection;
+      deadline_s_ = now_s + kGoodbye_s;
+    }
+  }
+  if (!was_closed) events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED));
+}
+
+stridewire_status Session::Ping(double now_s) {
+  if (state_ != State::kReady) return Refuse(STRIDEWIRE_NOT_READY, "the client is not connected");
+  if (pending_pings_.size() >= kMaxPendingPings) {
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many pings are unanswered");
+  }
+  SendPing(now_s);
+  pending_pings_.insert(ping_nonce_);
+  return STRIDEWIRE_OK;
 }
 
 }  // namespace stridewire::client

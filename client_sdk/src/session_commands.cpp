@@ -1,10 +1,11 @@
 // Functions of a session that send commands and end them.
 
+#include "session_commands.h"
+
 #include <algorithm>
 #include <utility>
 
 #include "base/check.h"
-#include "session.h"
 
 namespace stridewire::client {
 
@@ -15,13 +16,13 @@ constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 
 }  // namespace
 
-bool Session::MaySend() const {
+bool SessionCommands::MaySend() const {
   const std::size_t max_unanswered =
       std::clamp<std::size_t>(limits_.reply_memory, 1, protocol::kReplyCache);
   return output_.size() < kMaxOutputBytes && unanswered_.size() < max_unanswered;
 }
 
-void Session::Pump() {
+void SessionCommands::Pump() {
   if (state_ != State::kReady) return;
 
   // Commands that the server may have received before the resume are sent first, in order.
@@ -65,7 +66,7 @@ void Session::Pump() {
   RequestLibraries();
 }
 
-Session::Readiness Session::PrepareMovements(World& world, const Command& command) {
+SessionCommands::Readiness SessionCommands::PrepareMovements(World& world, const Command& command) {
   const auto* observe = std::get_if<protocol::Observe>(&command.message);
   if (observe == nullptr || observe->mode != protocol::PoseMode::kMovement ||
       !world.subscriptions.contains(observe->subscription)) {
@@ -91,7 +92,7 @@ Session::Readiness Session::PrepareMovements(World& world, const Command& comman
   return Readiness::kReady;
 }
 
-void Session::RequestLibraries() {
+void SessionCommands::RequestLibraries() {
   if (state_ != State::kReady) return;
   const auto may_request = [&](const std::string& hash) {
     return std::ranges::any_of(worlds_, [&](const auto& item) {
@@ -105,13 +106,13 @@ void Session::RequestLibraries() {
   }
 }
 
-void Session::OnLibraryTask(const std::string& hash,
-                            Expected<std::shared_ptr<const MotionLibrary>> result) {
+void SessionCommands::OnLibraryTask(const std::string& hash,
+                                    Expected<std::shared_ptr<const MotionLibrary>> result) {
   libraries_.OnTask(hash, std::move(result));
   Pump();
 }
 
-void Session::Send(Command command) {
+void SessionCommands::Send(Command command) {
   const World& world = worlds_.at(command.world);
   const Status status = std::visit(
       [&](auto& message) {
@@ -137,8 +138,8 @@ void Session::Send(Command command) {
   unanswered_.emplace(next_seq_++, std::move(command));
 }
 
-void Session::Answer(const Command& command, stridewire_status status, std::string_view text,
-                     std::uint32_t accepted) {
+void SessionCommands::Answer(const Command& command, stridewire_status status,
+                             std::string_view text, std::uint32_t accepted) {
   if (command.own) {
     if (status == STRIDEWIRE_OK) return;
     events_.Push(MakeEvent(STRIDEWIRE_EVENT_NOTICE, command.world, status, text));
@@ -153,11 +154,11 @@ void Session::Answer(const Command& command, stridewire_status status, std::stri
   events_.Push(event);
 }
 
-void Session::FailUnsent(World& world, stridewire_status status, std::string_view text) {
+void SessionCommands::FailUnsent(World& world, stridewire_status status, std::string_view text) {
   for (const Command& command : std::exchange(world.unsent, {})) Answer(command, status, text);
 }
 
-void Session::FailAll(stridewire_status status, std::string_view text) {
+void SessionCommands::FailAll(stridewire_status status, std::string_view text) {
   for (const auto& [seq, command] : std::exchange(unanswered_, {})) {
     if (std::holds_alternative<protocol::JoinWorld>(command.message))
       continue;  // Answered below, with their worlds.

@@ -428,7 +428,7 @@ TEST_F(SessionTest, StoresTheLastTerrainOfAWorld) {
   session_->OnLost(STRIDEWIRE_CONNECTION_LOST, "", now_s_);
   (void)Events();
   Ready(false);
-  EXPECT_FALSE(session_->TerrainOf(world)) << "a new session will be told anew";
+  EXPECT_FALSE(session_->TerrainOf(world)) << "the server sends it again in a new session";
   EXPECT_THAT(EventTypes(), testing::Contains(int{STRIDEWIRE_EVENT_TERRAIN}));
 }
 

@@ -93,7 +93,7 @@ class ObserverTest : public ::testing::Test {
     EXPECT_TRUE(connection_.WaitForClose());
     OnThread([&] { observer_.Poll(NowNs() + kSecondNs); });
     Greet();
-    synced_dropped_ = 1;  // A new connection counts anew; the total goes on.
+    synced_dropped_ = 1;  // The count of a new connection starts at 0; the total continues.
   }
 
   template <typename F>
