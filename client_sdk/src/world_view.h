@@ -135,8 +135,8 @@ class WorldView : public PoseSink {
   std::map<protocol::AvatarId, std::uint64_t> left_;  // tick at which an avatar left the region
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
-  std::uint64_t replica_every_n_ticks_ = 1;  // during Apply of Movements
-  Counts* replica_counts_ = nullptr;         // during Apply of Movements
+  std::uint64_t replica_every_n_ticks_ = 1;  // set while Apply(Movements) runs
+  Counts* replica_counts_ = nullptr;         // set while Apply(Movements) runs
 };
 
 }  // namespace stridewire::client

@@ -44,9 +44,10 @@ class ReplicaSet {
   /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 10 KB.
   ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s, std::size_t max_avatars);
 
-  /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded for too
-  /// many shards, and with the error of AvatarReplica::Apply for an invalid record or a record made
-  /// with another library. After an error the shard's avatars stay unknown until their next states.
+  /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded for
+  /// too many shards, and with the error of AvatarReplica::Apply for an invalid record or a record
+  /// made with another library. After an error the shard's avatars stay unknown until their next
+  /// states.
   [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }

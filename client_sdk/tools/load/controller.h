@@ -31,9 +31,9 @@ struct ControllerCounts {
 class Controller final : public Session {
  public:
   static constexpr std::size_t kMaxItemsPerMessage = 2048;
-  /// Most unanswered commands. Further requests wait, which increases their latency.
+  /// Maximum number of unanswered commands. Further requests wait, which increases their latency.
   static constexpr std::size_t kMaxUnanswered = 64;
-  /// Most queued movements of a choreography per avatar.
+  /// Maximum number of queued movements of a choreography per avatar.
   static constexpr std::size_t kMaxQueuedMovements = 48;
 
   Controller(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,

@@ -29,7 +29,7 @@ using asio::ip::tcp;
 
 /// Time between the end of the setup and the first measured tick.
 constexpr double kWindowLeadS = 0.1;
-/// Most observers that connect at the same time.
+/// Maximum number of observers that connect at the same time.
 constexpr std::size_t kMaxOpening = 64;
 /// Delay before a dropped observer (--churn) reconnects.
 constexpr double kChurnPauseS = 0.2;

@@ -1,7 +1,8 @@
-# cmake -DBUILD=<build folder of Stridewire> -DCONSUMERS=<this folder> -DSCRATCH=<folder to overwrite>
+# cmake -DBUILD=<build folder of Stridewire> -DCONSUMERS=<this folder> -DSCRATCH=<folder to
+# overwrite>
 #       -DC=<C compiler> -DCXX=<C++ compiler> -P run.cmake
-# Installs Stridewire into SCRATCH/prefix. Then it configures, builds and runs a C++ and a C project that
-# use the installed package.
+# Installs Stridewire into SCRATCH/prefix. Then it configures, builds and runs a C++ and a C project
+# that use the installed package.
 cmake_minimum_required(VERSION 3.25)
 
 function(run)

@@ -53,19 +53,19 @@ extern "C" {
 #define STRIDEWIRE_MAX_NAME_BYTES 64
 /// Size of the text in an event, including the terminating 0. Longer texts are truncated.
 #define STRIDEWIRE_MAX_TEXT_BYTES 160
-/// Most spawns, avatars or movements in one call.
+/// Maximum number of spawns, avatars or movements per call.
 #define STRIDEWIRE_MAX_ITEMS 65536
-/// Most joints of a skeleton.
+/// Maximum number of joints of a skeleton.
 #define STRIDEWIRE_MAX_JOINTS 256
-/// Most columns, and most rows, of a height field.
+/// Maximum number of columns, and of rows, of a height field.
 #define STRIDEWIRE_MAX_TERRAIN_COLUMNS 1024
-/// Most boxes of a terrain.
+/// Maximum number of boxes of a terrain.
 #define STRIDEWIRE_MAX_TERRAIN_BOXES 65536
-/// Most parameters of a movement.
+/// Maximum number of parameters of a movement.
 #define STRIDEWIRE_MAX_PARAMETERS 7
-/// Most waypoints of a walk.
+/// Maximum number of waypoints of a walk.
 #define STRIDEWIRE_MAX_WAYPOINTS 64
-/// Most rings of a region.
+/// Maximum number of rings of a region.
 #define STRIDEWIRE_MAX_RATE_RINGS 4
 
 /// Result of a call or command. The hundreds tell who can act: 1xx the caller, 2xx the author of
@@ -143,7 +143,8 @@ typedef struct stridewire_client_options {
   uint32_t abi_version;  ///< STRIDEWIRE_ABI_VERSION; set by _init.
   /// Capacity of the event queue, 16 to 2^24. A full queue drops its oldest event. Default 65536.
   uint32_t max_events;
-  /// Most unanswered commands, 1 to 2^20. Further commands fail with COMMANDS_FULL. Default 4096.
+  /// Maximum number of unanswered commands, 1 to 2^20. Further commands fail with COMMANDS_FULL.
+  /// Default 4096.
   uint32_t max_commands;
   /// Poses stored per avatar, 2 to 4096. Default 32.
   uint32_t pose_history;
@@ -154,8 +155,7 @@ typedef struct stridewire_client_options {
   size_t max_pose_bytes;
   /// Delay of the render time behind the server time in seconds, 0 to 10. Default 0.1.
   double render_delay_s;
-  /// Timeout for the TCP connection, and again for the handshake, in seconds, 0.01 to 600. Default
-  /// 5.
+  /// Timeout for the TCP connection and for the handshake, each in seconds, 0.01 to 600. Default 5.
   double connect_timeout_s;
   /// Interval of pings in seconds, 0.01 to 600. The client shortens it to a third of the server's
   /// idle timeout. Default 1.
@@ -338,7 +338,7 @@ typedef struct stridewire_height_field {
   double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
   uint32_t columns;        ///< Samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
   uint32_t rows;           ///< Samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
-  const float* heights_m;  ///< columns * rows heights in rows along x.
+  const float* heights_m;  ///< columns * rows heights, row by row along x.
 } stridewire_height_field;
 
 /// A block with vertical sides and a flat top.
@@ -398,7 +398,7 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 /// How the server sends poses.
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,  ///< As float32, without loss.
-  /// Compressed. No joint or end site moves by more than 1 mm.
+  /// Compressed. The error of each joint and end site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
   /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
@@ -642,7 +642,7 @@ typedef struct stridewire_terrain {
 
 /// Arrays that receive the parts of a terrain. An array may be NULL if its capacity is 0.
 typedef struct stridewire_terrain_buffers {
-  float* heights_m;  ///< Receives columns * rows heights in rows along x.
+  float* heights_m;  ///< Receives columns * rows heights, row by row along x.
   size_t height_capacity;
   stridewire_terrain_box* boxes;
   size_t box_capacity;

@@ -5,8 +5,9 @@
 
 namespace stridewire::protocol {
 
-/// Version of the protocol. Hello and Welcome must have it, else the connection is closed. It changes if
-/// the meaning of messages changes, or the formulas by which client and server evaluate movement records.
+/// Version of the protocol. Hello and Welcome must have it, else the connection is closed. It
+/// changes if the meaning of messages changes, or the formulas by which client and server evaluate
+/// movement records.
 inline constexpr std::uint16_t kProtocolVersion = 1;
 
 // Limits of messages. A receiver rejects a message that exceeds one with kLimitExceeded.

@@ -197,7 +197,7 @@ struct HeightFieldInfo {
   double cell_m = 0.0;           ///< Distance between neighbouring samples.
   std::uint16_t columns = 0;     ///< Along x, 2 to kMaxTerrainColumns.
   std::uint16_t rows = 0;        ///< Along z, 2 to kMaxTerrainColumns.
-  std::vector<float> heights_m;  ///< columns * rows heights in rows along x.
+  std::vector<float> heights_m;  ///< columns * rows heights, row by row along x.
   bool operator==(const HeightFieldInfo&) const = default;
 };
 
@@ -375,7 +375,7 @@ struct Welcome {
 
 /// A joint of a skeleton.
 struct JointInfo {
-  std::string name;            ///< Unique in its skeleton.
+  std::string name;            ///< Unique in the skeleton.
   std::int16_t parent = -1;    ///< Below the joint's own index. -1 for the root, joint 0.
   Vec3 offset_m = Vec3(0.0f);  ///< Position relative to the parent.
   bool operator==(const JointInfo&) const = default;
@@ -506,8 +506,8 @@ enum class EventType : std::uint8_t {
   kLeft = 9,     ///< The avatar has left that region or the world.
 };
 
-/// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m, 4
-/// end_y_m, 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m.
+/// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m,
+/// 4 end_y_m, 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m.
 struct ParameterSet {
   std::array<std::uint8_t, kMaxParameters> names{};
   std::array<double, kMaxParameters> values{};
