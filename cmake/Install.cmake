@@ -1,5 +1,5 @@
-# `cmake --install`: the libraries, their headers, the programs, and what find_package(stridewire)
-# needs to offer stridewire::core, stridewire::offline, stridewire::protocol and stridewire::client.
+# `cmake --install` installs the libraries, their headers, the programs and the package files with which
+# find_package(stridewire) provides stridewire::core, ::offline, ::protocol and ::client.
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/stridewire)
@@ -30,6 +30,10 @@ foreach(program stridewired stridewire-library stridewire-record stridewire-load
   endif()
 endforeach()
 
+# Libraries that the C++ compiler links and the C compiler does not, for projects without C++.
+set(STRIDEWIRE_CXX_RUNTIME ${CMAKE_CXX_IMPLICIT_LINK_LIBRARIES})
+list(REMOVE_ITEM STRIDEWIRE_CXX_RUNTIME ${CMAKE_C_IMPLICIT_LINK_LIBRARIES})
+list(TRANSFORM STRIDEWIRE_CXX_RUNTIME REPLACE "(.+)" "$<LINK_ONLY:\\1>")
 install(EXPORT stridewireTargets NAMESPACE stridewire:: DESTINATION ${package_dir})
 configure_package_config_file(cmake/stridewireConfig.cmake.in
   ${PROJECT_BINARY_DIR}/stridewireConfig.cmake INSTALL_DESTINATION ${package_dir})

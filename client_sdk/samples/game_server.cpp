@@ -1,5 +1,5 @@
-// A simulated game server: puts a few avatars into a world and keeps them busy. Each walks some
-// steps, stops, stands for a while, perhaps jumps, and starts again.
+// A simulated game server. It spawns a few avatars in a world and requests movements: each avatar
+// walks some steps, stands for a while, sometimes jumps, and starts again.
 //
 //   sample_game_server --connect 127.0.0.1:7420 --world plaza --avatars 4 --seconds 30
 //   sample_game_server --world captured --step-m 0.4 0.55 --jump-m 0.8 1.05 --turn-rad 0.2
@@ -38,7 +38,7 @@ struct Settings {
   std::array<double, 2> step_m = {0.35, 0.7};
   std::array<double, 2> jump_m = {0.4, 1.2};
   double turn_rad = 0.0;
-  double home_m = 0.0;  // 0: wherever their steps lead
+  double home_m = 0.0;  // 0: no limit
 };
 
 volatile std::sig_atomic_t stop_requested = 0;
@@ -56,11 +56,11 @@ class GameServer {
     return client_.JoinWorld(settings_.world, STRIDEWIRE_CONTROLLER, world_, &join_command_);
   }
 
-  // False: there is no point in going on.
+  // Handles an event. Returns false after an error that ends the program.
   bool Handle(const stridewire_event& event) {
     switch (event.type) {
       case STRIDEWIRE_EVENT_WORLD_JOINED:
-        // After a lost session the client itself spawns them again.
+        // After a lost session the client library spawns the avatars again.
         if (!spawned_) Spawn();
         break;
       case STRIDEWIRE_EVENT_REPLY:
@@ -71,19 +71,19 @@ class GameServer {
         }
         break;
       case STRIDEWIRE_EVENT_ITEM:
-        // Not every library has jumps.
+        // The library has no jumps.
         if (event.status == STRIDEWIRE_NO_MOVEMENT) can_jump_ = false;
         refused_ += event.status != STRIDEWIRE_OK;
         break;
-      case STRIDEWIRE_EVENT_SPAWNED: KeepBusy(event); break;
+      case STRIDEWIRE_EVENT_SPAWNED: RequestMovements(event); break;
       case STRIDEWIRE_EVENT_ACCEPTED:
         if (IsOurs(event.avatar) && last_requests_[event.avatar] == event.request_id) {
           last_requests_[event.avatar] = 0;
         }
         break;
       case STRIDEWIRE_EVENT_IDLE:
-        // Idle from before our last request arrived does not count.
-        if (IsOurs(event.avatar) && last_requests_[event.avatar] == 0) KeepBusy(event);
+        // Ignore an idle event from before the server accepted the last request.
+        if (IsOurs(event.avatar) && last_requests_[event.avatar] == 0) RequestMovements(event);
         break;
       case STRIDEWIRE_EVENT_STARTED:
         jumps_ += event.kind == STRIDEWIRE_KIND_JUMP;
@@ -92,10 +92,10 @@ class GameServer {
       case STRIDEWIRE_EVENT_FOOT_STRIKE: ++foot_strikes_; break;
       case STRIDEWIRE_EVENT_REJECTED: ++refused_; break;
       case STRIDEWIRE_EVENT_CONNECTION_LOST:
-        std::printf("%s: connection lost, trying again\n", settings_.world.c_str());
+        std::printf("%s: connection lost, reconnecting\n", settings_.world.c_str());
         break;
       case STRIDEWIRE_EVENT_CLOSED:
-        std::fprintf(stderr, "%s: the server refused us: %s\n", settings_.world.c_str(),
+        std::fprintf(stderr, "%s: the server closed the connection: %s\n", settings_.world.c_str(),
                      event.text);
         return false;
       default: break;
@@ -104,13 +104,13 @@ class GameServer {
   }
 
   void Report() const {
-    std::printf("%s: %u avatars, so far %d steps, %d jumps, %d foot-strikes heard, %d refused\n",
+    std::printf("%s: %u avatars: %d steps, %d jumps, %d foot strikes, %d refused requests\n",
                 settings_.world.c_str(), settings_.avatars, steps_, jumps_, foot_strikes_,
                 refused_);
     std::fflush(stdout);
   }
 
-  // What the user set out to see has been seen.
+  // The server has executed steps and reported foot strikes.
   bool successful() const { return steps_ > 0 && foot_strikes_ > 0; }
 
  private:
@@ -120,7 +120,7 @@ class GameServer {
     return from + (to - from) * std::generate_canonical<double, 53>(random_);
   }
 
-  // A row of avatars, side by side, looking along +z.
+  // Spawns the avatars in a row, facing +Z.
   void Spawn() {
     std::vector<stridewire_spawn> spawns;
     for (std::uint32_t avatar = 1; avatar <= settings_.avatars; ++avatar) {
@@ -129,7 +129,8 @@ class GameServer {
     spawned_ = static_cast<bool>(client_.Spawn(world_, spawns));
   }
 
-  // By how much each of `steps` steps turns: anyhow, or back towards the middle of where they began.
+  // Returns the turn of each of `steps` steps: random, or towards the start if the avatar is too
+  // far away.
   double Turn(const stridewire_event& event, int steps) {
     const double x = 0.75 * (settings_.avatars - 1) - event.base_position_m[0];
     const double z = -event.base_position_m[2];
@@ -141,8 +142,8 @@ class GameServer {
     return std::clamp(turn_rad / steps, -settings_.turn_rad, settings_.turn_rad);
   }
 
-  // `event` tells who has nothing to do, where it stands and looks.
-  void KeepBusy(const stridewire_event& event) {
+  // Requests movements for the avatar of an event, which is idle at the base frame of the event.
+  void RequestMovements(const stridewire_event& event) {
     const std::uint32_t avatar = event.avatar;
     if (!IsOurs(avatar)) return;
     std::vector<stridewire_movement> movements;
@@ -170,7 +171,7 @@ class GameServer {
   Client& client_;
   const Settings& settings_;
   std::mt19937_64 random_;
-  std::vector<std::uint64_t> last_requests_;  // By avatar, until accepted; 0: accepted
+  std::vector<std::uint64_t> last_requests_;  // per avatar: the last request, or 0 if accepted
   stridewire_world world_ = 0;
   std::uint64_t join_command_ = 0;
   std::uint64_t request_id_ = 0;
@@ -189,7 +190,7 @@ int Run(const Settings& settings) {
   stridewire_status status = STRIDEWIRE_OK;
   auto client = Client::Create(options, &status);
   if (!client) {
-    std::fprintf(stderr, "cannot make a client: %s\n", stridewire_status_text(status));
+    std::fprintf(stderr, "cannot create a client: %s\n", stridewire_status_text(status));
     return 1;
   }
   if (const auto result = client->Connect(settings.host, settings.port); !result) {
@@ -220,7 +221,7 @@ int Run(const Settings& settings) {
   }
   game.Report();
   if (!game.successful()) {
-    std::fprintf(stderr, "%s: no avatar took a step. %s\n", settings.world.c_str(),
+    std::fprintf(stderr, "%s: no avatar has taken a step. %s\n", settings.world.c_str(),
                  client->LastError().c_str());
     return 1;
   }
@@ -233,27 +234,27 @@ int main(int argc, char** argv) {
   Settings settings;
   std::string connect = "127.0.0.1:7420";
   CLI::App app(
-      "A simulated game server: puts avatars into a world and lets them walk, stop and jump.\n"
+      "A simulated game server that lets avatars walk, stand and jump.\n"
       "  sample_game_server --connect 127.0.0.1:7420 --world plaza --avatars 4 --seconds 30");
-  app.add_option("--connect", connect, "HOST:PORT of stridewired")->capture_default_str();
+  app.add_option("--connect", connect, "Address of stridewired, HOST:PORT")->capture_default_str();
   app.add_option("--world", settings.world, "Name of the world")->capture_default_str();
-  app.add_option("--avatars", settings.avatars, "How many")
+  app.add_option("--avatars", settings.avatars, "Number of avatars")
       ->check(CLI::Range(1, 10'000))
       ->capture_default_str();
-  app.add_option("--seconds", settings.seconds, "How long; 0: until Ctrl-C")
+  app.add_option("--seconds", settings.seconds, "Duration; 0: until Ctrl-C")
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  app.add_option("--report-s", settings.report_s, "A line about it all this often")
+  app.add_option("--report-s", settings.report_s, "Interval of status lines")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  app.add_option("--seed", settings.seed, "Other avatars' lives")->capture_default_str();
+  app.add_option("--seed", settings.seed, "Seed of the random movements")->capture_default_str();
   app.add_option("--step-m", settings.step_m, "Shortest and longest step")
       ->check(CLI::Range(0.0, 2.0));
-  app.add_option("--jump-m", settings.jump_m, "Shortest and longest jump; 0 0: none")
+  app.add_option("--jump-m", settings.jump_m, "Shortest and longest jump; 0 0: no jumps")
       ->check(CLI::Range(0.0, 5.0));
-  app.add_option("--turn-rad", settings.turn_rad, "A step turns at most this much")
+  app.add_option("--turn-rad", settings.turn_rad, "Largest turn per step")
       ->check(CLI::Range(0.0, 1.6));
-  app.add_option("--home-m", settings.home_m, "They turn back when further than this; 0: never")
+  app.add_option("--home-m", settings.home_m, "Largest distance from the start; 0: no limit")
       ->check(CLI::Range(0.0, 1e4));
   try {
     app.parse(argc, argv);

@@ -1,4 +1,4 @@
-// Walks one avatar: walk_one_avatar [HOST [PORT [SECONDS]]]. Goes on when the server was restarted.
+// Lets one avatar walk: walk_one_avatar [HOST [PORT [SECONDS]]]. Survives a restart of the server.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -15,15 +15,15 @@ int main(int argc, char** argv) {
 
   Options options;
   options.client_name = "walk_one_avatar";
-  options.respawn = 1;  // After a restart of the server: where it last was.
+  options.respawn = 1;  // After a restart of the server, spawn the avatar again.
   auto client = Client::Create(options);
   stridewire_world world = 0;
   if (!client || !client->Connect(host, port) ||
       !client->JoinWorld("sample", STRIDEWIRE_CONTROLLER, world)) {
-    std::fprintf(stderr, "walk_one_avatar: %s:%d is no place to connect to\n", host, port);
+    std::fprintf(stderr, "walk_one_avatar: cannot connect to %s:%d\n", host, port);
     return 2;
   }
-  // All of this waits in the client until the server is there.
+  // The client queues these commands until it is connected.
   (void)client->Spawn(world, {{avatar, {0.0, 0.0, 0.0}, 0.0}});
   (void)client->Observe(world, STRIDEWIRE_QUANTISED);
 
@@ -34,12 +34,12 @@ int main(int argc, char** argv) {
   const auto end = start + std::chrono::duration<double>(seconds);
   for (auto next = start; next < end; next += std::chrono::milliseconds(100)) {
     double wait_s = 0.0;
-    do {  // Events until the next tenth of a second.
+    do {  // Handle events for a tenth of a second.
       while (client->PollEvent(event)) {
         std::printf("event %d: %s\n", event.type,
                     event.text[0] != '\0' ? event.text : stridewire_status_name(event.status));
-        if (event.type != STRIDEWIRE_EVENT_IDLE) continue;  // It stands and has nothing to do.
-        std::vector<stridewire_movement> movements;         // Four steps, then a rest.
+        if (event.type != STRIDEWIRE_EVENT_IDLE) continue;  // Request more when it is idle.
+        std::vector<stridewire_movement> movements;         // Four steps and a pause.
         for (int i = 0; i < 4; ++i) movements.push_back(Step(avatar, ++request, 0.55));
         movements.push_back(Stand(avatar, ++request, 0.5));
         (void)client->Request(world, movements);

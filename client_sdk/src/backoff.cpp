@@ -2,12 +2,15 @@
 
 #include <algorithm>
 
+#include "base/check.h"
+
 namespace stridewire::client {
 
 double Backoff::Next() {
-  const double wait_s = longest_wait_s_;
-  longest_wait_s_ = std::min(2.0 * longest_wait_s_, kLongest_s);
-  return wait_s * (1.0 - kJitter * std::uniform_real_distribution<double>(0.0, 1.0)(random_));
+  STRIDEWIRE_CHECK(max_delay_s_ >= kFirst_s && max_delay_s_ <= kLongest_s);
+  const double delay_s = max_delay_s_;
+  max_delay_s_ = std::min(2.0 * max_delay_s_, kLongest_s);
+  return delay_s * (1.0 - kJitter * std::uniform_real_distribution<double>(0.0, 1.0)(random_));
 }
 
 }  // namespace stridewire::client

@@ -5,9 +5,9 @@
 
 namespace stridewire::client {
 
-/// How long to wait before the next attempt: kFirst_s, doubled with every attempt up to kLongest_s,
-/// each shortened at random by up to kJitter of itself, so that the clients of a server that went
-/// away do not all come back in the same instant (STATE_MACHINE.md, "Timeouts").
+/// Delays between attempts to connect. The first delay is kFirst_s, and every attempt doubles it up
+/// to kLongest_s. Each delay is shortened by a random fraction of up to kJitter, so that the
+/// clients of a restarted server do not reconnect all at once (STATE_MACHINE.md, "Timeouts").
 class Backoff {
  public:
   static constexpr double kFirst_s = 0.1;
@@ -16,15 +16,15 @@ class Backoff {
 
   explicit Backoff(std::uint64_t seed) : random_(seed) {}
 
-  /// Wait before the next attempt, in [(1 - kJitter) d, d].
+  /// Returns the delay before the next attempt in seconds.
   [[nodiscard]] double Next();
 
-  /// An attempt has succeeded.
-  void Reset() { longest_wait_s_ = kFirst_s; }
+  /// Starts again with kFirst_s, after a successful attempt.
+  void Reset() { max_delay_s_ = kFirst_s; }
 
  private:
   std::mt19937_64 random_;
-  double longest_wait_s_ = kFirst_s;
+  double max_delay_s_ = kFirst_s;
 };
 
 }  // namespace stridewire::client

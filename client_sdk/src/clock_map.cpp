@@ -3,16 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
+
 namespace stridewire::client {
 
 void ClockMap::AddSample(double local_s, double server_s) {
+  STRIDEWIRE_CHECK(!ready_ || local_s >= at_local_s_);
   const double offset_s = local_s - server_s;
   const auto number = static_cast<std::int64_t>(std::floor(local_s / kBucket_s));
 
-  if (ready_ && std::abs(offset_s - wanted_offset_s_) > kSnap_s) {
-    // Later by that much is only a late message as long as others are not; a lone one is left to the
-    // window. Earlier by that much no delay explains.
-    if (offset_s < wanted_offset_s_) Reset();
+  if (ready_ && std::abs(offset_s - target_offset_s_) > kSnap_s) {
+    // A much larger offset may be a single late message, so the window decides. A much smaller
+    // offset cannot be explained by delays: the server's clock has changed.
+    if (offset_s < target_offset_s_) Reset();
   }
   Bucket& bucket = buckets_[static_cast<std::size_t>(number % kBuckets + kBuckets) % kBuckets];
   if (bucket.number != number) bucket = Bucket{number, offset_s};
@@ -37,14 +40,17 @@ void ClockMap::AddSample(double local_s, double server_s) {
     }
   }
   at_local_s_ = local_s;
-  wanted_offset_s_ = smallest_s;
+  target_offset_s_ = smallest_s;
 }
 
 double ClockMap::OffsetAt(double local_s) const {
   const double most_s = kSlew * std::max(0.0, local_s - at_local_s_);
-  return offset_s_ + std::clamp(wanted_offset_s_ - offset_s_, -most_s, most_s);
+  return offset_s_ + std::clamp(target_offset_s_ - offset_s_, -most_s, most_s);
 }
 
-double ClockMap::ServerTime(double local_s) const { return local_s - OffsetAt(local_s); }
+double ClockMap::ServerTime(double local_s) const {
+  STRIDEWIRE_CHECK(ready_);
+  return local_s - OffsetAt(local_s);
+}
 
 }  // namespace stridewire::client

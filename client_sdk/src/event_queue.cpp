@@ -1,8 +1,11 @@
 #include "event_queue.h"
 
+#include "base/check.h"
+
 namespace stridewire::client {
 
 void EventQueue::Push(const stridewire_event& event) {
+  STRIDEWIRE_CHECK(capacity_ > 0 && events_.size() <= capacity_);
   if (events_.size() == capacity_) {
     events_.pop_front();
     ++dropped_;

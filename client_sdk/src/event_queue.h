@@ -9,15 +9,16 @@
 
 namespace stridewire::client {
 
-/// Events waiting to be polled, at most `capacity`: a full queue drops its oldest event, counts it
-/// and tells so in the next one that is taken.
+/// Events that the application has not polled yet. A full queue drops its oldest event and reports
+/// the number of dropped events in the next event that is taken.
 class EventQueue {
  public:
+  /// `capacity` is above 0.
   explicit EventQueue(std::size_t capacity) : capacity_(capacity) {}
 
   void Push(const stridewire_event& event);
 
-  /// Takes the oldest ones; returns how many were written.
+  /// Moves the oldest events to `out` and returns their number.
   std::size_t Take(std::span<stridewire_event> out);
 
   [[nodiscard]] bool empty() const { return events_.empty(); }

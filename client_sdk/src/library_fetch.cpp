@@ -7,13 +7,15 @@
 #include <system_error>
 #include <utility>
 
+#include "base/check.h"
+
 namespace stridewire::client {
 
 namespace fs = std::filesystem;
 
 namespace {
 
-// A server's text becomes a file's name: nothing but a hash.
+// The hash comes from the server and becomes a file name, so any other text is rejected.
 bool IsHash(const std::string& text) {
   constexpr std::size_t kDigits = 32;
   return text.size() == kDigits && std::ranges::all_of(text, [](char c) {
@@ -21,16 +23,17 @@ bool IsHash(const std::string& text) {
          });
 }
 
-Expected<std::shared_ptr<const MotionLibrary>> Checked(
+Expected<std::shared_ptr<const MotionLibrary>> CheckHash(
     Expected<std::shared_ptr<const MotionLibrary>> opened, const std::string& hash) {
   if (opened && (*opened)->hash() != hash) {
-    return Fail(ErrorCode::kMalformed, "a library is not the one its hash says");
+    return Fail(ErrorCode::kMalformed, "the library has another hash than requested");
   }
   return opened;
 }
 
-// Whoever looks for it finds a whole file or none.
-void Keep(const LibraryTask& task) {
+// Writes the file under a temporary name and renames it, so that readers find a complete file or
+// none.
+void Store(const LibraryTask& task) {
   std::error_code ignored;
   fs::create_directories(task.folder, ignored);
   const fs::path path = fs::path(task.folder) / (task.hash + ".swl");
@@ -46,24 +49,24 @@ void Keep(const LibraryTask& task) {
 
 }  // namespace
 
-Expected<std::shared_ptr<const MotionLibrary>> Do(const LibraryTask& task) {
+Expected<std::shared_ptr<const MotionLibrary>> RunLibraryTask(const LibraryTask& task) {
   if (task.file.empty()) {
     const fs::path path = fs::path(task.folder) / (task.hash + ".swl");
     std::error_code ignored;
     if (task.folder.empty() || !fs::is_regular_file(path, ignored)) {
-      return Fail(ErrorCode::kNotFound, "the folder has no such library");
+      return Fail(ErrorCode::kNotFound, "the folder does not contain the library");
     }
-    auto opened = Checked(MotionLibrary::Open(path), task.hash);
-    if (!opened) return Fail(ErrorCode::kNotFound, "what the folder has is damaged");
+    auto opened = CheckHash(MotionLibrary::Open(path), task.hash);
+    if (!opened) return Fail(ErrorCode::kNotFound, "the library in the folder is damaged");
     return opened;
   }
-  auto opened = Checked(MotionLibrary::FromBytes(task.file), task.hash);
-  if (opened && !task.folder.empty()) Keep(task);
+  auto opened = CheckHash(MotionLibrary::FromBytes(task.file), task.hash);
+  if (opened && !task.folder.empty()) Store(task);
   return opened;
 }
 
-Expected<std::shared_ptr<const MotionLibrary>> LibraryFetch::Want(const std::string& hash) {
-  if (!IsHash(hash)) return Fail(ErrorCode::kUnsupported, "the world's library has no hash");
+Expected<std::shared_ptr<const MotionLibrary>> LibraryFetch::Get(const std::string& hash) {
+  if (!IsHash(hash)) return Fail(ErrorCode::kUnsupported, "the world's library has no valid hash");
   Entry& entry = entries_[hash];
   if (entry.error) {
     Error error = *std::move(entry.error);
@@ -76,12 +79,12 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryFetch::Want(const std::str
 std::optional<LibraryTask> LibraryFetch::TakeTask() {
   for (auto& [hash, entry] : entries_) {
     if (entry.error) continue;
-    if (entry.state == Entry::State::kToLook) {
-      entry.state = Entry::State::kLooking;
+    if (entry.state == Entry::State::kToOpen) {
+      entry.state = Entry::State::kOpening;
       return LibraryTask{hash, folder_, {}};
     }
-    if (entry.state == Entry::State::kToCheck) {
-      entry.state = Entry::State::kChecking;
+    if (entry.state == Entry::State::kToVerify) {
+      entry.state = Entry::State::kVerifying;
       return LibraryTask{hash, folder_, std::exchange(entry.file, {})};
     }
   }
@@ -93,44 +96,49 @@ void LibraryFetch::OnTask(const std::string& hash,
   const auto it = entries_.find(hash);
   if (it == entries_.end()) return;
   Entry& entry = it->second;
+  STRIDEWIRE_CHECK(entry.state == Entry::State::kOpening ||
+                   entry.state == Entry::State::kVerifying);
   if (result) {
-    entry.state = Entry::State::kThere;
+    entry.state = Entry::State::kReady;
     entry.library = *std::move(result);
-  } else if (entry.state == Entry::State::kLooking) {
+  } else if (entry.state == Entry::State::kOpening) {
     entry.state = Entry::State::kFetching;
   } else {
     entry.error = std::move(result.error());
   }
 }
 
-std::optional<protocol::FetchLibrary> LibraryFetch::TakeQuestion(
-    const std::function<bool(const std::string& hash)>& may_ask) {
-  if (!asked_.empty()) return std::nullopt;
+std::optional<protocol::FetchLibrary> LibraryFetch::TakeRequest(
+    const std::function<bool(const std::string& hash)>& may_request) {
+  if (!requested_.empty()) return std::nullopt;
   for (auto& [hash, entry] : entries_) {
-    if (entry.error || entry.state != Entry::State::kFetching || !may_ask(hash)) continue;
-    asked_ = hash;
+    if (entry.error || entry.state != Entry::State::kFetching || !may_request(hash)) continue;
+    requested_ = hash;
     return protocol::FetchLibrary{++nonce_, hash, entry.file.size(), kPieceBytes};
   }
   return std::nullopt;
 }
 
 void LibraryFetch::OnPiece(const protocol::LibraryPiece& piece) {
-  if (asked_.empty() || piece.nonce != nonce_) return;
-  const std::string hash = std::exchange(asked_, {});
+  if (requested_.empty() || piece.nonce != nonce_) return;
+  const std::string hash = std::exchange(requested_, {});
   const auto it = entries_.find(hash);
   if (it == entries_.end()) return;
   Entry& entry = it->second;
+  STRIDEWIRE_CHECK(entry.state == Entry::State::kFetching);
   if (piece.code != protocol::StatusCode::kOk) {
-    entry.error = Error{ErrorCode::kNotFound, "the server does not give out its library", -1, {}};
+    entry.error = Error{ErrorCode::kNotFound, "the server does not provide the library", -1, {}};
   } else if (piece.offset != entry.file.size() || piece.bytes.empty()) {
-    entry.error =
-        Error{ErrorCode::kMalformed, "a piece of the library is not the one asked for", -1, {}};
+    entry.error = Error{ErrorCode::kMalformed,
+                        "the server sent another piece of the library than requested",
+                        -1,
+                        {}};
   } else {
     entry.file.insert(entry.file.end(), piece.bytes.begin(), piece.bytes.end());
-    if (entry.file.size() >= piece.total_bytes) entry.state = Entry::State::kToCheck;
+    if (entry.file.size() >= piece.total_bytes) entry.state = Entry::State::kToVerify;
   }
 }
 
-void LibraryFetch::OnConnectionLost() { asked_.clear(); }
+void LibraryFetch::OnConnectionLost() { requested_.clear(); }
 
 }  // namespace stridewire::client

@@ -15,54 +15,62 @@
 
 namespace stridewire::client {
 
-/// Work on a library that waits for a disk, or takes some milliseconds: not for who holds a lock.
+/// Work on a library that accesses the disk or takes milliseconds. It must run without a lock.
 struct LibraryTask {
   std::string hash;
-  std::string folder;  ///< Empty: none
-  std::vector<std::byte>
-      file;  ///< To be checked and kept in the folder; empty: it is looked for there
+  std::string folder;  ///< Folder of the cache. Empty: no cache.
+  /// Bytes to verify and to store in the folder. Empty: open the file in the folder instead.
+  std::vector<std::byte> file;
 };
 
-/// Does it. kNotFound: it is not in the folder, or what is there is not it; kMalformed: the file is none, or another.
-/// That a file cannot be kept is no error. Files are named HASH.swl, written under another name and then renamed.
-[[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Do(const LibraryTask& task);
+/// Runs a task and returns the library. Fails with kNotFound if the folder has no intact file of
+/// that hash, and with kMalformed if `file` is not a library of that hash. A file that cannot be
+/// stored is not an error. Files are named HASH.swl; they are written under another name and
+/// renamed when complete.
+[[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> RunLibraryTask(
+    const LibraryTask& task);
 
-/// Brings libraries from a folder or from the server, piece by piece and one question at a time. Knows no disk and no
-/// socket: others do what it asks for.
+/// Gets libraries from a folder or from the server. It requests one piece at a time. It uses
+/// neither disk nor socket itself: the owner runs its tasks and sends its requests.
 ///
-///   Want -> a task: look in the folder -> there | a question -> a piece -> … -> a task: check and keep -> there | refused
+///   Get -> kToOpen -> kOpening -> kReady                        the folder has the library
+///                            `--> kFetching -> kToVerify -> kVerifying -> kReady
+///                                                                    `--> error
 class LibraryFetch {
  public:
-  /// Small enough that poses do not wait long behind one.
+  /// Small, so that a piece does not delay the poses behind it for long.
   static constexpr std::uint32_t kPieceBytes = 256u << 10;
 
   explicit LibraryFetch(std::string folder) : folder_(std::move(folder)) {}
 
-  /// The library once it is there; until then it is being brought. Errors: why it could not be; asked again it is tried again.
-  [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Want(const std::string& hash);
+  /// Returns the library, or null while it is being fetched. Returns the error if the last attempt
+  /// has failed; the next call starts a new attempt.
+  [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Get(const std::string& hash);
 
+  /// Returns the next task, if any. Report its result with OnTask.
   [[nodiscard]] std::optional<LibraryTask> TakeTask();
   void OnTask(const std::string& hash, Expected<std::shared_ptr<const MotionLibrary>> result);
 
-  /// What to ask the server, if nothing is asked already, of libraries that it gives out now.
-  [[nodiscard]] std::optional<protocol::FetchLibrary> TakeQuestion(
-      const std::function<bool(const std::string& hash)>& may_ask);
+  /// Returns the next request to the server, if any and if none is pending. Requests only libraries
+  /// for which `may_request` returns true. Report the answer with OnPiece.
+  [[nodiscard]] std::optional<protocol::FetchLibrary> TakeRequest(
+      const std::function<bool(const std::string& hash)>& may_request);
   void OnPiece(const protocol::LibraryPiece& piece);
-  /// What was asked is not answered any more.
+  /// The pending request will not be answered.
   void OnConnectionLost();
 
  private:
   struct Entry {
-    enum class State : std::uint8_t { kToLook, kLooking, kFetching, kToCheck, kChecking, kThere };
-    State state = State::kToLook;
-    std::vector<std::byte> file;  // as far as it has come
+    enum class State : std::uint8_t { kToOpen, kOpening, kFetching, kToVerify, kVerifying, kReady };
+    State state = State::kToOpen;
+    std::vector<std::byte> file;  // received so far
     std::shared_ptr<const MotionLibrary> library;
     std::optional<Error> error;
   };
 
   std::string folder_;
   std::map<std::string, Entry> entries_;
-  std::string asked_;  // of which; empty: nothing
+  std::string requested_;  // hash of the pending request; empty: none
   std::uint64_t nonce_ = 0;
 };
 

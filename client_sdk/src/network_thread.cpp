@@ -26,7 +26,7 @@ constexpr std::size_t kReadBytes = std::size_t{256} << 10;
 }  // namespace
 
 struct NetworkThread::Impl {
-  /// One attempt and what becomes of it; handlers keep it alive.
+  /// One attempt to connect, and the connection if it succeeds. Its handlers keep it alive.
   struct Connection {
     explicit Connection(asio::io_context& io, std::uint64_t n)
         : number(n), resolver(io), socket(io), input(kReadBytes) {}
@@ -60,7 +60,8 @@ struct NetworkThread::Impl {
     });
   }
 
-  /// Brings sockets in line with the session. Everything that happens ends here.
+  /// Opens, closes and writes to the socket as the session requires. Every handler ends with this
+  /// call.
   void Step() {
     ConnectionPtr to_start;
     ConnectionPtr to_write;
@@ -92,15 +93,15 @@ struct NetworkThread::Impl {
     changed.notify_all();
     if (to_start) Start(to_start, host, port);
     if (to_write) Write(to_write);
-    if (task) DoTask(*task);
+    if (task) RunTask(*task);
   }
 
-  /// May wait for a disk: without the lock.
-  void DoTask(const LibraryTask& task) {
-    auto done = Do(task);
+  /// Runs without the mutex, because the task may block on disk access.
+  void RunTask(const LibraryTask& task) {
+    auto result = RunLibraryTask(task);
     {
       const std::lock_guard lock(mutex);
-      session.OnLibraryTask(task.hash, std::move(done));
+      session.OnLibraryTask(task.hash, std::move(result));
     }
     asio::post(io, [this] { Step(); });
   }
@@ -128,7 +129,7 @@ struct NetworkThread::Impl {
           if (!IsCurrent(c)) return;
           if (error) {
             return Lost(c, STRIDEWIRE_HOST_NOT_FOUND,
-                        "the host \"" + host + "\" was not found: " + error.message());
+                        "cannot resolve host \"" + host + "\": " + error.message());
           }
           asio::async_connect(c->socket, results,
                               [this, c](const error_code& connect_error, const tcp::endpoint&) {
@@ -174,7 +175,8 @@ struct NetworkThread::Impl {
                       [this, c](const error_code& error, std::size_t) {
                         if (!IsCurrent(c)) return;
                         c->writing = false;
-                        // A read has more to tell: what the server said before it closed.
+                        // Ignored here: the read fails as well, after it has returned the
+                        // last messages of the server.
                         if (error) return;
                         {
                           const std::lock_guard lock(mutex);

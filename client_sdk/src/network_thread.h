@@ -10,23 +10,24 @@
 
 namespace stridewire::client {
 
-/// Carries a Session's bytes over TCP on a thread of its own. Every use of the session is under the
-/// mutex; no system call that may wait is.
+/// Sends and receives the bytes of a Session over TCP on a thread of its own. It holds the mutex
+/// whenever it uses the session, and never during a blocking system call.
 class NetworkThread {
  public:
-  /// All three outlive this. `changed` is notified when the session may have changed.
+  /// All arguments must outlive this object. `changed` is notified when the session may have
+  /// changed.
   NetworkThread(std::mutex& mutex, std::condition_variable& changed, Session& session);
   ~NetworkThread();
   NetworkThread(const NetworkThread&) = delete;
   NetworkThread& operator=(const NetworkThread&) = delete;
 
-  /// Where to connect from the next attempt on. The caller holds the mutex.
+  /// Sets the server for the next attempt to connect. The caller holds the mutex.
   void SetTarget(std::string host, std::uint16_t port);
 
-  /// The session was given something to do. Any thread.
+  /// Makes the thread look at the session soon. Callable from any thread.
   void Wake();
 
-  /// Seconds since this was made, on a clock that never goes back.
+  /// Seconds since the construction, on a clock that never decreases.
   [[nodiscard]] double Now() const;
 
  private:

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 
+#include "base/check.h"
+
 namespace stridewire::client {
 
 PoseHistory::PoseHistory(std::size_t capacity, std::size_t joint_count)
     : joint_count_(joint_count),
       stamps_(capacity),
       roots_m_(capacity),
-      rotations_(capacity * joint_count, kIdentityQuat) {}
+      rotations_(capacity * joint_count, kIdentityQuat) {
+  STRIDEWIRE_CHECK(capacity > 0 && joint_count > 0);
+}
 
 std::size_t PoseHistory::Bytes(std::size_t capacity, std::size_t joint_count) {
   return sizeof(PoseHistory) +
@@ -25,6 +29,7 @@ bool PoseHistory::Push(const PoseStamp& stamp, const Vec3& root_position_m,
     first_ = (first_ + 1) % stamps_.size();
     --size_;
   }
+  STRIDEWIRE_CHECK(size_ < stamps_.size() && rotations.size() == joint_count_);
   const std::size_t slot = Slot(size_++);
   stamps_[slot] = stamp;
   roots_m_[slot] = root_position_m;
@@ -50,14 +55,14 @@ std::optional<std::size_t> PoseHistory::FirstAfterTick(std::uint64_t tick) const
 
 namespace {
 
-/// Cubic Hermite basis at u in [0, 1].
+/// Weights of the cubic Hermite interpolation at u, 0 to 1.
 struct Hermite {
   explicit Hermite(float u)
       : slope_0(u * (1.0f - u) * (1.0f - u)),
         value_1(u * u * (3.0f - 2.0f * u)),
         slope_1(u * u * (u - 1.0f)) {}
   float slope_0;
-  float value_1;  ///< The other end's weight is 1 less this.
+  float value_1;  ///< The weight of the value at 0 is 1 - value_1.
   float slope_1;
 };
 
@@ -88,9 +93,8 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
     return Sampled{i, exact};
   }
 
-  // Slopes at i and j, in units of the interval: towards the neighbours' secant, or that of the
-  // interval itself where there is no neighbour to go by. A missing one is i or j itself, for then
-  // its secant is the interval's.
+  // The slopes at i and j are those of the secants before -> j and i -> after next, scaled to the
+  // interval. Without a neighbour, i or j takes its place, which gives the secant of the interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const std::size_t beyond = j + 1 < size_ && !stamp(j + 1).discontinuity ? j + 1 : j;
   const double length_s = stamp(j).time_s - stamp(i).time_s;

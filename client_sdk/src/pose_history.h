@@ -6,31 +6,23 @@
 #include <span>
 #include <vector>
 
+#include "pose_stamp.h"
 #include "stridewire/base/math.h"
-#include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::client {
 
-/// What is known of one received pose beside its numbers.
-struct PoseStamp {
-  std::uint64_t tick = 0;
-  double time_s = 0.0;         ///< On the server's clock.
-  bool discontinuity = false;  ///< Not to be interpolated from the one before.
-  bool standing = false;
-  protocol::PoseDetail detail = protocol::PoseDetail::kAll;
-};
-
-/// The last poses of one avatar, oldest first: the jitter buffer. A ring that takes its memory when
-/// it is made and none later; a full ring forgets its oldest pose.
+/// Jitter buffer: the last poses of one avatar, the oldest first. It allocates in its constructor
+/// only. A full buffer drops its oldest pose.
 class PoseHistory {
  public:
-  /// `capacity` poses of `joint_count` joints; both > 0.
+  /// Both arguments are above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
-  /// Memory such a history takes.
+  /// Returns the memory of a history in bytes.
   [[nodiscard]] static std::size_t Bytes(std::size_t capacity, std::size_t joint_count);
 
-  /// False, changing nothing, when tick or time are not after the newest one's.
+  /// Adds a pose. Returns false and does nothing unless tick and time exceed those of the newest
+  /// pose.
   bool Push(const PoseStamp& stamp, const Vec3& root_position_m, std::span<const Quat> rotations);
 
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -41,18 +33,19 @@ class PoseHistory {
     return std::span(rotations_).subspan(Slot(i) * joint_count_, joint_count_);
   }
 
-  /// Index of the oldest pose with a tick above `tick`.
+  /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 
-  /// What Sample found.
+  /// How Sample computed a pose.
   struct Sampled {
-    std::size_t index = 0;      ///< The pose at or before the time.
-    bool interpolated = false;  ///< Else it is held as it is.
+    std::size_t index = 0;      ///< The newest pose at or before the time.
+    bool interpolated = false;  ///< False: pose `index` is returned unchanged.
   };
 
-  /// Pose at `time_s`: cubic through the poses around it (C1, and exact at each), rotations in one
-  /// hemisphere and then made unit. Never across a discontinuity, not beyond the newest pose: there
-  /// the last one is held. Empty before the oldest one.
+  /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first
+  /// derivative and exact at received poses. Rotations are interpolated in one hemisphere and
+  /// normalized. After the newest pose, or before a discontinuity, the last pose is returned
+  /// unchanged. Returns an empty optional before the oldest pose.
   [[nodiscard]] std::optional<Sampled> Sample(double time_s, Vec3& root_position_m,
                                               std::span<Quat> rotations) const;
 

@@ -4,35 +4,21 @@
 #include <cstring>
 #include <utility>
 
+#include "base/check.h"
 #include "stridewire/protocol/decode.h"
 
 namespace stridewire::client {
 
 namespace {
 
-/// As many bytes of `text` as fit, not ending inside a UTF-8 character, and a final 0.
-void CopyText(std::string_view text, char* out, std::size_t out_bytes) {
-  std::size_t length = std::min(text.size(), out_bytes - 1);
-  if (length < text.size()) {
-    while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80) --length;
-  }
-  if (length > 0) std::memcpy(out, text.data(), length);  // No text may be no pointer, too.
-  out[length] = '\0';
-}
+constexpr std::size_t kMaxPendingPings = 64;
 
 }  // namespace
 
-Session::Session(const SessionOptions& options)
-    : options_(options),
-      backoff_(options.seed),
-      events_(options.max_events),
-      libraries_(options.library_folder) {
-  pose_budget_.limit_bytes = options.max_pose_bytes;
-}
-
 template <typename Message>
 void Session::Handle(const Message&, double now_s) {
-  BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "the server sent a client's message", now_s);
+  LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent a message that only clients may send",
+                 now_s);
 }
 
 bool Session::ConnectDue(double now_s) const {
@@ -40,6 +26,7 @@ bool Session::ConnectDue(double now_s) const {
 }
 
 void Session::StartConnecting(double now_s) {
+  STRIDEWIRE_CHECK(state_ == State::kWaiting);
   state_ = State::kConnecting;
   deadline_s_ = now_s + options_.connect_timeout_s;
   ++connection_number_;
@@ -57,16 +44,10 @@ void Session::OnConnected(double now_s) {
   protocol::Hello hello;
   hello.client_name = options_.client_name;
   hello.auth_token = options_.auth_token;
-  hello.features =
-      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureQuantised |
-      protocol::kFeatureTerrain | protocol::kFeatureFootprints | protocol::kFeatureWalks |
-      protocol::kFeatureRegions | protocol::kFeatureTakeovers | protocol::kFeatureLayers |
-      protocol::kFeatureRefusals | protocol::kFeaturePlanting | protocol::kFeatureMovementMode |
-      protocol::kFeatureCompact | protocol::kFeatureDetail;
   hello.resume_token = resume_token_;
   hello.last_events_number = resume_token_.empty() ? 0 : last_events_number_;
   if (Status status = encoder_.Encode(hello, output_); !status) {
-    CloseForGood(STRIDEWIRE_INVALID_ARGUMENT, Describe(status.error()));
+    CloseWithError(STRIDEWIRE_INVALID_ARGUMENT, Describe(status.error()));
   }
 }
 
@@ -77,10 +58,11 @@ void Session::OnBytes(std::span<const std::byte> bytes, double now_s) {
   const std::uint64_t connection = connection_number_;
   for (;;) {
     auto frame = reader_->Next(bytes);
-    if (!frame) return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(frame.error()), now_s);
+    if (!frame) return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(frame.error()), now_s);
     if (!*frame) break;
     auto message = protocol::DecodeMessage(**frame);
-    if (!message) return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(message.error()), now_s);
+    if (!message)
+      return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(message.error()), now_s);
     std::visit([&](const auto& m) { Handle(m, now_s); }, *message);
     if (connection != connection_number_ ||
         (state_ != State::kGreeting && state_ != State::kReady)) {
@@ -96,23 +78,24 @@ void Session::OnLost(stridewire_status status, std::string_view text, double now
     output_.clear();
   } else if (state_ == State::kConnecting || state_ == State::kGreeting ||
              state_ == State::kReady) {
-    BreakOff(status, text, now_s);
+    LoseConnection(status, text, now_s);
   }
 }
 
 void Session::AdvanceTime(double now_s) {
   switch (state_) {
     case State::kConnecting:
-      if (now_s >= deadline_s_) BreakOff(STRIDEWIRE_TIMEOUT, "connecting took too long", now_s);
+      if (now_s >= deadline_s_)
+        LoseConnection(STRIDEWIRE_TIMEOUT, "the connection attempt timed out", now_s);
       break;
     case State::kGreeting:
       if (now_s >= deadline_s_) {
-        BreakOff(STRIDEWIRE_TIMEOUT, "the server did not answer the greeting in time", now_s);
+        LoseConnection(STRIDEWIRE_TIMEOUT, "the server did not answer Hello in time", now_s);
       }
       break;
     case State::kReady:
       if (limits_.idle_timeout_s > 0.0 && now_s - heard_s_ > limits_.idle_timeout_s) {
-        BreakOff(STRIDEWIRE_TIMEOUT, "nothing was heard from the server for too long", now_s);
+        LoseConnection(STRIDEWIRE_TIMEOUT, "the server sent nothing for too long", now_s);
       } else if (now_s >= next_ping_s_ && output_.size() < kMaxOutputBytes) {
         SendPing(now_s);
       }
@@ -146,40 +129,41 @@ void Session::OnOutputWritten() {
 }
 
 void Session::SendPing(double now_s) {
-  // Encoding cannot fail: the nonce is any number and time is finite.
+  // Encoding does not fail, because the time is finite.
   (void)encoder_.Encode(protocol::Ping{++ping_nonce_, now_s}, output_);
   double interval_s = options_.ping_interval_s;
   if (limits_.idle_timeout_s > 0.0) interval_s = std::min(interval_s, limits_.idle_timeout_s / 3.0);
   next_ping_s_ = now_s + interval_s;
 }
 
-void Session::BreakOff(stridewire_status status, std::string_view text, double now_s) {
+void Session::LoseConnection(stridewire_status status, std::string_view text, double now_s) {
   last_status_ = status;
   last_text_ = text.empty() ? stridewire_status_text(status) : text;
+  STRIDEWIRE_CHECK(NeedsSocket() && state_ != State::kClosing);
   const bool was_ready = state_ == State::kReady;
   if (was_ready && now_s - ready_s_ >= kStable_s) backoff_.Reset();
   if (!was_ready) ++connect_failures_;
   state_ = State::kWaiting;
   next_attempt_s_ = now_s + backoff_.Next();
   output_.clear();
-  asked_pings_.clear();
+  pending_pings_.clear();
   events_.Push(
       MakeEvent(was_ready ? STRIDEWIRE_EVENT_CONNECTION_LOST : STRIDEWIRE_EVENT_CONNECT_FAILED, 0,
                 status, last_text_));
 }
 
-void Session::CloseForGood(stridewire_status status, std::string_view text) {
+void Session::CloseWithError(stridewire_status status, std::string_view text) {
   last_status_ = status;
   last_text_ = text.empty() ? stridewire_status_text(status) : text;
   if (state_ != State::kReady) ++connect_failures_;
   state_ = State::kClosed;
   FailAll(status, last_text_);
-  ForgetEverything();
+  Reset();
   events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED, 0, status, last_text_));
 }
 
-void Session::ForgetEverything() {
-  ++connection_number_;  // Whatever socket there is, it is no longer ours.
+void Session::Reset() {
+  ++connection_number_;  // An open socket does not belong to the session any more.
   unanswered_.clear();
   worlds_.clear();
   command_count_ = 0;
@@ -191,19 +175,54 @@ void Session::ForgetEverything() {
   last_events_number_ = 0;
   clock_.Reset();
   rtts_s_.clear();
-  asked_pings_.clear();
+  pending_pings_.clear();
   output_.clear();
 }
 
-stridewire_event Session::MakeEvent(stridewire_event_type type, stridewire_world world,
-                                    stridewire_status status, std::string_view text) const {
-  stridewire_event event{};
-  event.type = type;
-  event.world = world;
-  event.status = status;
-  event.group = -1;
-  CopyText(text, event.text, sizeof event.text);
-  return event;
+stridewire_status Session::Open(double now_s) {
+  switch (state_) {
+    case State::kIdle:
+    case State::kClosing:
+    case State::kClosed: break;
+    default: return Refuse(STRIDEWIRE_ALREADY_CONNECTED, "the client is already connected");
+  }
+  Reset();
+  backoff_.Reset();
+  last_status_ = STRIDEWIRE_OK;
+  last_text_.clear();
+  state_ = State::kWaiting;
+  next_attempt_s_ = now_s;
+  return STRIDEWIRE_OK;
+}
+
+void Session::Close(double now_s) {
+  if (state_ == State::kIdle || state_ == State::kClosing) return;
+  const bool was_closed = state_ == State::kClosed;
+  const bool sends_goodbye = state_ == State::kReady;
+  FailAll(STRIDEWIRE_CANCELLED, "the client was disconnected");
+  auto output = std::move(output_);
+  const std::uint64_t connection = connection_number_;
+  Reset();
+  state_ = State::kIdle;
+  if (sends_goodbye) {
+    output_ = std::move(output);
+    if (encoder_.Encode(protocol::Goodbye{}, output_)) {
+      state_ = State::kClosing;
+      connection_number_ = connection;
+      deadline_s_ = now_s + kGoodbye_s;
+    }
+  }
+  if (!was_closed) events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED));
+}
+
+stridewire_status Session::Ping(double now_s) {
+  if (state_ != State::kReady) return Refuse(STRIDEWIRE_NOT_READY, "the client is not connected");
+  if (pending_pings_.size() >= kMaxPendingPings) {
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many pings are unanswered");
+  }
+  SendPing(now_s);
+  pending_pings_.insert(ping_nonce_);
+  return STRIDEWIRE_OK;
 }
 
 }  // namespace stridewire::client

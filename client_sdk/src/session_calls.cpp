@@ -1,17 +1,16 @@
-// The part of a session that its caller calls: what is wanted of the server becomes commands.
+// Functions of a session that the application calls. They check arguments and create commands.
 
 #include <algorithm>
 #include <utility>
 
-#include "session.h"
+#include "session_commands.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::client {
 
 namespace {
 
-constexpr std::size_t kMaxSubscriptions = 256;  // Of one world.
-constexpr std::size_t kMaxAskedPings = 64;
+constexpr std::size_t kMaxSubscriptions = 256;  // Per world.
 
 stridewire_status ToStatus(ErrorCode code) {
   switch (code) {
@@ -21,66 +20,13 @@ stridewire_status ToStatus(ErrorCode code) {
   }
 }
 
-std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain) {
-  if (!terrain) return 0;
-  std::size_t bytes = terrain->boxes.size() * sizeof(protocol::TerrainBoxInfo);
-  if (terrain->height_field) bytes += terrain->height_field->heights_m.size() * sizeof(float);
-  return bytes;
-}
-
 }  // namespace
 
-stridewire_status Session::Open(double now_s) {
-  switch (state_) {
-    case State::kIdle:
-    case State::kClosing:
-    case State::kClosed: break;
-    default: return Refuse(STRIDEWIRE_ALREADY_CONNECTED, "the client is connected already");
-  }
-  ForgetEverything();
-  backoff_.Reset();
-  last_status_ = STRIDEWIRE_OK;
-  last_text_.clear();
-  state_ = State::kWaiting;
-  next_attempt_s_ = now_s;
-  return STRIDEWIRE_OK;
-}
-
-void Session::Close(double now_s) {
-  if (state_ == State::kIdle || state_ == State::kClosing) return;
-  const bool was_closed = state_ == State::kClosed;
-  const bool say_goodbye = state_ == State::kReady;
-  FailAll(STRIDEWIRE_CANCELLED, "the client was disconnected");
-  auto output = std::move(output_);
-  const std::uint64_t connection = connection_number_;
-  ForgetEverything();
-  state_ = State::kIdle;
-  if (say_goodbye) {
-    output_ = std::move(output);
-    if (encoder_.Encode(protocol::Goodbye{}, output_)) {
-      state_ = State::kClosing;
-      connection_number_ = connection;
-      deadline_s_ = now_s + kGoodbye_s;
-    }
-  }
-  if (!was_closed) events_.Push(MakeEvent(STRIDEWIRE_EVENT_CLOSED));
-}
-
-stridewire_status Session::Refuse(stridewire_status status, std::string_view text) {
-  last_status_ = status;
-  last_text_ = text;
-  return status;
-}
-
-bool Session::IsOpen() const {
-  return state_ == State::kWaiting || state_ == State::kConnecting || state_ == State::kGreeting ||
-         state_ == State::kReady;
-}
-
 template <typename Message>
-stridewire_status Session::Enqueue(stridewire_world world, Message message, std::size_t bytes,
-                                   std::uint64_t& command) {
-  // The numbers come when it is sent; the rest is checked now, when the caller can still be told.
+stridewire_status SessionCommands::Enqueue(stridewire_world world, Message message,
+                                           std::size_t bytes, std::uint64_t& command) {
+  // Seq and world are set when the command is sent. All other fields are checked now, so that the
+  // call can report errors.
   message.seq = 1;
   if constexpr (requires { message.world; }) message.world = 1;
   if (Status status = protocol::Check(message); !status) {
@@ -90,12 +36,12 @@ stridewire_status Session::Enqueue(stridewire_world world, Message message, std:
   const auto found = worlds_.find(world);
   if (found == worlds_.end()) return Refuse(STRIDEWIRE_NO_SUCH_WORLD, "no world has this number");
   if (found->second.state == World::State::kRefused || found->second.state == World::State::kLeft) {
-    return Refuse(STRIDEWIRE_NOT_JOINED, "the server refused this world, or it was left");
+    return Refuse(STRIDEWIRE_NOT_JOINED, "the world is not joined");
   }
   bytes += sizeof(Command);
   if (command_count_ >= options_.max_commands ||
       command_bytes_ + bytes > options_.max_command_bytes) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are without an answer");
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are unanswered");
   }
   ++command_count_;
   command_bytes_ += bytes;
@@ -104,18 +50,18 @@ stridewire_status Session::Enqueue(stridewire_world world, Message message, std:
   return STRIDEWIRE_OK;
 }
 
-stridewire_status Session::JoinWorld(std::string_view name, protocol::Role role,
-                                     stridewire_world& world, std::uint64_t& command) {
+stridewire_status SessionCommands::JoinWorld(std::string_view name, protocol::Role role,
+                                             stridewire_world& world, std::uint64_t& command) {
   if (Status status = protocol::Check(protocol::JoinWorld{1, std::string(name), role}); !status) {
     return Refuse(ToStatus(status.error().code), Describe(status.error()));
   }
   if (!IsOpen()) return Refuse(STRIDEWIRE_CLOSED, "the client is not connected");
   for (auto& [handle, other] : worlds_) {
     if (other.name == name && other.state != World::State::kRefused) {
-      return Refuse(STRIDEWIRE_ALREADY_JOINED, "a world of this name is joined already");
+      return Refuse(STRIDEWIRE_ALREADY_JOINED, "a world of this name is already joined");
     }
   }
-  // A refused world makes room for trying again.
+  // A world that the server refused can be joined again.
   std::erase_if(worlds_, [&](const auto& entry) {
     return entry.second.name == name && entry.second.state == World::State::kRefused;
   });
@@ -123,7 +69,7 @@ stridewire_status Session::JoinWorld(std::string_view name, protocol::Role role,
     return Refuse(STRIDEWIRE_LIMIT_REACHED, "too many worlds are joined");
   }
   if (command_count_ >= options_.max_commands) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are without an answer");
+    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many commands are unanswered");
   }
   world = next_world_++;
   command = next_command_++;
@@ -138,7 +84,7 @@ stridewire_status Session::JoinWorld(std::string_view name, protocol::Role role,
   return STRIDEWIRE_OK;
 }
 
-stridewire_status Session::LeaveWorld(stridewire_world world, std::uint64_t& command) {
+stridewire_status SessionCommands::LeaveWorld(stridewire_world world, std::uint64_t& command) {
   if (stridewire_status status = Enqueue(world, protocol::LeaveWorld{}, 0, command);
       status != STRIDEWIRE_OK) {
     return status;
@@ -149,10 +95,10 @@ stridewire_status Session::LeaveWorld(stridewire_world world, std::uint64_t& com
   if (never_sent) {
     const Command leave = std::move(left.unsent.back());
     left.unsent.pop_back();
-    FailUnsent(left, STRIDEWIRE_NOT_JOINED, "the world was left");
+    FailUnsent(left, STRIDEWIRE_NOT_JOINED, "the client left the world");
     if (!left.join_answered) {
       Answer(Command{left.join_command, world, false, 0, {}}, STRIDEWIRE_NOT_JOINED,
-             "the world was left");
+             "the client left the world");
     }
     Answer(leave, STRIDEWIRE_OK);
     worlds_.erase(world);
@@ -162,58 +108,59 @@ stridewire_status Session::LeaveWorld(stridewire_world world, std::uint64_t& com
 }
 
 template <typename Message>
-stridewire_status Session::SendCommand(stridewire_world world, Message message, std::size_t bytes,
-                                       std::uint64_t& command) {
+stridewire_status SessionCommands::SendCommand(stridewire_world world, Message message,
+                                               std::size_t bytes, std::uint64_t& command) {
   const stridewire_status status = Enqueue(world, std::move(message), bytes, command);
   Pump();
   return status;
 }
 
-stridewire_status Session::Spawn(stridewire_world world, protocol::Spawn message,
-                                 std::uint64_t& command) {
+stridewire_status SessionCommands::Spawn(stridewire_world world, protocol::Spawn message,
+                                         std::uint64_t& command) {
   const std::size_t bytes = message.items.size() * sizeof(protocol::SpawnItem);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::Remove(stridewire_world world, protocol::Remove message,
-                                  std::uint64_t& command) {
+stridewire_status SessionCommands::Remove(stridewire_world world, protocol::Remove message,
+                                          std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::Request(stridewire_world world, protocol::Request message,
-                                   std::uint64_t& command) {
+stridewire_status SessionCommands::Request(stridewire_world world, protocol::Request message,
+                                           std::uint64_t& command) {
   const std::size_t bytes = message.items.size() * sizeof(protocol::RequestItem);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::Cancel(stridewire_world world, protocol::CancelQueue message,
-                                  std::uint64_t& command) {
+stridewire_status SessionCommands::Cancel(stridewire_world world, protocol::CancelQueue message,
+                                          std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::SetTerrain(stridewire_world world, protocol::SetTerrain message,
-                                      std::uint64_t& command) {
+stridewire_status SessionCommands::SetTerrain(stridewire_world world, protocol::SetTerrain message,
+                                              std::uint64_t& command) {
   const std::size_t bytes = TerrainBytes(message.terrain);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::SetLayers(stridewire_world world, protocol::SetLayers message,
-                                     std::uint64_t& command) {
+stridewire_status SessionCommands::SetLayers(stridewire_world world, protocol::SetLayers message,
+                                             std::uint64_t& command) {
   const std::size_t bytes =
       message.items.size() * (sizeof(protocol::LayerItem) + protocol::kMaxNameBytes);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::SetPlanting(stridewire_world world, protocol::SetPlanting message,
-                                       std::uint64_t& command) {
+stridewire_status SessionCommands::SetPlanting(stridewire_world world,
+                                               protocol::SetPlanting message,
+                                               std::uint64_t& command) {
   const std::size_t bytes = message.avatars.size() * sizeof(protocol::AvatarId);
   return SendCommand(world, std::move(message), bytes, command);
 }
 
-stridewire_status Session::Observe(stridewire_world world, protocol::Observe message,
-                                   std::uint32_t& subscription, std::uint64_t& command) {
+stridewire_status SessionCommands::Observe(stridewire_world world, protocol::Observe message,
+                                           std::uint32_t& subscription, std::uint64_t& command) {
   if (const auto found = worlds_.find(world);
       found != worlds_.end() && found->second.subscriptions.size() >= kMaxSubscriptions) {
     return Refuse(STRIDEWIRE_LIMIT_REACHED, "too many subscriptions of one world");
@@ -231,8 +178,8 @@ stridewire_status Session::Observe(stridewire_world world, protocol::Observe mes
   return STRIDEWIRE_OK;
 }
 
-stridewire_status Session::MoveRegion(std::uint32_t subscription, protocol::Region region,
-                                      std::uint64_t& command) {
+stridewire_status SessionCommands::MoveRegion(std::uint32_t subscription, protocol::Region region,
+                                              std::uint64_t& command) {
   for (auto& [handle, world] : worlds_) {
     const auto found = world.subscriptions.find(subscription);
     if (found == world.subscriptions.end() || !found->second.message.region) continue;
@@ -246,10 +193,11 @@ stridewire_status Session::MoveRegion(std::uint32_t subscription, protocol::Regi
     Pump();
     return STRIDEWIRE_OK;
   }
-  return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this number");
+  return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no region has this subscription number");
 }
 
-stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64_t& command) {
+stridewire_status SessionCommands::StopObserving(std::uint32_t subscription,
+                                                 std::uint64_t& command) {
   for (auto& [handle, world] : worlds_) {
     const auto found = world.subscriptions.find(subscription);
     if (found == world.subscriptions.end()) continue;
@@ -260,93 +208,12 @@ stridewire_status Session::StopObserving(std::uint32_t subscription, std::uint64
     }
     world.subscriptions.erase(found);
     if (world.subscriptions.empty()) world.view->ClearPoses();
-    if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.evaluated.reset();
+    if (EveryNTicks(world, protocol::PoseMode::kMovement) == 0) world.replicas.reset();
     UpdateFilter(world);
     Pump();
     return STRIDEWIRE_OK;
   }
   return Refuse(STRIDEWIRE_NO_SUCH_SUBSCRIPTION, "no subscription has this number");
-}
-
-stridewire_status Session::Ping(double now_s) {
-  if (state_ != State::kReady) return Refuse(STRIDEWIRE_NOT_READY, "the client is not connected");
-  if (asked_pings_.size() >= kMaxAskedPings) {
-    return Refuse(STRIDEWIRE_COMMANDS_FULL, "too many pings are without an answer");
-  }
-  SendPing(now_s);
-  asked_pings_.insert(ping_nonce_);
-  return STRIDEWIRE_OK;
-}
-
-const WorldView* Session::FindWorld(stridewire_world world) const {
-  const auto found = worlds_.find(world);
-  return found == worlds_.end() ? nullptr : found->second.view.get();
-}
-
-void Session::UpdateFilter(World& world) {
-  std::set<protocol::AvatarId> wanted;
-  for (const auto& [id, subscription] : world.subscriptions) {
-    const auto& avatars = subscription.message.avatars;
-    if (avatars.empty()) return world.view->SetFilter(std::nullopt);
-    wanted.insert(avatars.begin(), avatars.end());
-  }
-  if (wanted.empty()) return world.view->SetFilter(std::nullopt);
-  world.view->SetFilter(std::move(wanted));
-}
-
-std::uint64_t Session::EveryNTicks(const World& world, protocol::PoseMode mode) {
-  const protocol::PoseDetail detail = protocol::DetailOf(mode);
-  // What was asked for as quantised.
-  if (protocol::IsCompact(mode)) mode = protocol::PoseMode::kQuantised;
-  std::uint64_t every = 0;
-  const auto add = [&](protocol::PoseDetail of, std::uint64_t n) {
-    if (of == detail) every = every == 0 ? n : std::min(every, n);
-  };
-  for (const auto& [id, subscription] : world.subscriptions) {
-    const protocol::Observe& asked = subscription.message;
-    if (asked.mode != mode) continue;
-    add(asked.detail, asked.every_n_ticks);
-    if (!asked.region) continue;
-    for (std::size_t i = 0; i < asked.region->ring_details.size(); ++i) {
-      add(asked.region->ring_details[i], asked.region->rings[i].every_n_ticks);
-    }
-  }
-  return every;
-}
-
-Session::World* Session::FindByServerId(protocol::WorldId id, stridewire_world& handle) {
-  for (auto& [number, world] : worlds_) {
-    if (world.server_id == id) {
-      handle = number;
-      return &world;
-    }
-  }
-  return nullptr;
-}
-
-stridewire_statistics Session::Statistics() const {
-  stridewire_statistics s{};
-  s.bytes_received = bytes_received_;
-  s.bytes_sent = bytes_sent_;
-  s.batches_received = counts_.batches;
-  s.poses_received = counts_.poses;
-  s.poses_refused = counts_.refused;
-  s.batches_missing = counts_.missing;
-  s.dropped_batches = dropped_batches_;
-  s.events_received = events_received_;
-  s.events_dropped = events_.dropped();
-  s.commands_sent = commands_sent_;
-  s.commands_resent = commands_resent_;
-  s.commands_waiting = command_count_;
-  s.connects = connects_;
-  s.resumes = resumes_;
-  s.connect_failures = connect_failures_;
-  s.buffered_bytes = pose_budget_.used_bytes + events_.size() * sizeof(stridewire_event) +
-                     command_bytes_ + output_.capacity() +
-                     (reader_ ? reader_->capacity_bytes() : 0);
-  for (const auto& [handle, world] : worlds_) s.buffered_bytes += TerrainBytes(world.terrain);
-  if (!rtts_s_.empty()) s.rtt_s = *std::ranges::min_element(rtts_s_);
-  return s;
 }
 
 }  // namespace stridewire::client

@@ -1,4 +1,4 @@
-// The part of a session that takes the server's messages.
+// Functions of a session that handle the messages of the server.
 
 #include <algorithm>
 #include <cmath>
@@ -42,18 +42,18 @@ static_assert(STRIDEWIRE_EVENT_LEFT - STRIDEWIRE_EVENT_ACCEPTED ==
 
 void Session::Handle(const protocol::Welcome& message, double now_s) {
   if (state_ != State::kGreeting) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a second welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent a second Welcome", now_s);
   }
   if (message.resumed && resume_token_.empty()) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "the server resumed a session that was none", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
+                          "the server resumed a session that does not exist", now_s);
   }
-  if (message.protocol < protocol::kProtocolMin || message.protocol > protocol::kProtocolMax) {
-    return CloseForGood(STRIDEWIRE_VERSION_MISMATCH, "the server speaks another version");
+  if (message.protocol != protocol::kProtocolVersion) {
+    return CloseWithError(STRIDEWIRE_VERSION_MISMATCH, "the server uses another protocol version");
   }
   state_ = State::kReady;
   ready_s_ = now_s;
   ++connects_;
-  features_ = message.features;
   limits_ = message.limits;
   tick_hz_ = message.tick_hz;
   resume_token_ = message.resume_token;
@@ -71,39 +71,39 @@ void Session::Handle(const protocol::Welcome& message, double now_s) {
     for (auto& [handle, world] : worlds_) world.view->Break();
   } else {
     if (had_session_) events_.Push(MakeEvent(STRIDEWIRE_EVENT_SESSION_LOST));
-    StartAnew();
+    RestoreSession();
   }
   had_session_ = true;
   SendPing(now_s);
 }
 
-void Session::StartAnew() {
+void Session::RestoreSession() {
   next_seq_ = 1;
   resend_from_ = 0;
   last_events_number_ = 0;
   clock_.Reset();
 
-  // Observe keeps the number its caller waits for.
-  std::map<protocol::SubscriptionId, Command> observing;
+  // An unanswered Observe is sent again under its command number, because its REPLY is still due.
+  std::map<protocol::SubscriptionId, Command> unanswered_observes;
   for (auto& [seq, command] : std::exchange(unanswered_, {})) {
     if (std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
     if (std::holds_alternative<protocol::LeaveWorld>(command.message) ||
         std::holds_alternative<protocol::StopObserving>(command.message)) {
-      Answer(command, STRIDEWIRE_OK);  // Nothing of the session is left to leave or stop.
+      Answer(command, STRIDEWIRE_OK);  // There is nothing to leave or stop in a new session.
       continue;
     }
     if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
       if (observe->replace) {
-        Answer(command, STRIDEWIRE_OK);  // What is observed anew is there already.
+        Answer(command, STRIDEWIRE_OK);  // Its subscription is restored below.
         continue;
       }
       if (worlds_.at(command.world).subscriptions.contains(observe->subscription)) {
-        observing.emplace(observe->subscription, std::move(command));
+        unanswered_observes.emplace(observe->subscription, std::move(command));
         continue;
       }
     }
-    if (command.own) continue;  // It is given anew below.
-    Answer(command, STRIDEWIRE_SESSION_LOST, "the session was lost before the answer came");
+    if (command.own) continue;  // Created again below.
+    Answer(command, STRIDEWIRE_SESSION_LOST, "the session was lost before the server answered");
   }
 
   for (auto it = worlds_.begin(); it != worlds_.end();) {
@@ -124,33 +124,34 @@ void Session::StartAnew() {
     if (world.state == World::State::kRefused) continue;
     world.state = World::State::kWanted;
     world.server_id = 0;
-    world.told_dropped_batches = 0;
+    world.last_dropped_batches = 0;
     world.view->Clear();
     world.view->Break();
-    world.evaluated.reset();
-    TakeTerrain(handle, std::nullopt);
+    world.replicas.reset();
+    SetTerrainOf(handle, std::nullopt);
 
     std::deque<Command> first;
     for (auto& [id, subscription] : world.subscriptions) {
-      if (subscription.unsent) continue;  // Still waiting in its place.
+      if (subscription.unsent) continue;  // Its Observe is still in `unsent`.
       subscription.unsent = true;
-      if (const auto found = observing.find(id); found != observing.end()) {
-        found->second.message = subscription.message;  // A region may have moved since.
+      if (const auto found = unanswered_observes.find(id); found != unanswered_observes.end()) {
+        found->second.message = subscription.message;  // The region may have moved.
         first.push_back(std::move(found->second));
       } else {
         first.push_back(Command{0, handle, true, 0, subscription.message});
       }
     }
-    // An own command that was still unsent when the session was lost again is among those anew.
+    // Drop the spawns of an earlier lost session; they are created again below.
     std::erase_if(world.unsent, [](const Command& command) {
       return command.own && std::holds_alternative<protocol::Spawn>(command.message);
     });
     if (options_.respawn) {
       protocol::Spawn spawn;
-      const std::size_t most = std::clamp<std::size_t>(limits_.max_items, 1, protocol::kMaxItems);
+      const std::size_t max_items =
+          std::clamp<std::size_t>(limits_.max_items, 1, protocol::kMaxItems);
       for (const auto& [avatar, base] : world.spawned) {
         spawn.items.push_back({avatar, base});
-        if (spawn.items.size() == most) {
+        if (spawn.items.size() == max_items) {
           first.push_back(Command{0, handle, true, 0, std::exchange(spawn, {})});
         }
       }
@@ -165,14 +166,16 @@ void Session::StartAnew() {
 
 void Session::Handle(const protocol::WorldInfo& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent WorldInfo before Welcome",
+                          now_s);
   }
   World* world = nullptr;
   if (message.seq != 0) {
     const auto command = unanswered_.find(message.seq);
     if (command == unanswered_.end()) return;
     if (!std::holds_alternative<protocol::JoinWorld>(command->second.message)) {
-      return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world in answer to another command", now_s);
+      return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
+                            "the server sent WorldInfo for a command that is no JoinWorld", now_s);
     }
     world = &worlds_.at(command->second.world);
   } else {
@@ -189,10 +192,11 @@ void Session::Handle(const protocol::WorldInfo& message, double now_s) {
 
 void Session::Handle(const protocol::Reply& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "an answer before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent a Reply before Welcome",
+                          now_s);
   }
   const auto found = unanswered_.find(message.seq);
-  if (found == unanswered_.end()) return;  // Answered twice, before and after a resume.
+  if (found == unanswered_.end()) return;  // A second Reply, after a resume.
   const Command command = std::move(found->second);
   unanswered_.erase(found);
   World& world = worlds_.at(command.world);
@@ -205,9 +209,10 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   for (const protocol::ReplyItem& item : message.items) {
     const bool chosen = spawn != nullptr && item.index < spawn->items.size() &&
                         spawn->items[item.index].avatar == 0;
-    // What we spawn anew may still be there: the server lost the session, not the world.
-    const bool still_there = command.own && item.code == protocol::StatusCode::kAvatarExists;
-    if ((item.code == protocol::StatusCode::kOk && !chosen) || still_there) continue;
+    // An avatar that the session spawns again may still exist, because the world outlives the
+    // session.
+    const bool exists = command.own && item.code == protocol::StatusCode::kAvatarExists;
+    if ((item.code == protocol::StatusCode::kOk && !chosen) || exists) continue;
     stridewire_event event =
         MakeEvent(STRIDEWIRE_EVENT_ITEM, command.world, ToStatus(item.code), item.text);
     event.command = command.id;
@@ -223,7 +228,7 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
   } else if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
     OnObserveReply(world, *observe, message);
   } else if (std::holds_alternative<protocol::StopObserving>(command.message)) {
-    // Not observing is what was wanted.
+    // The subscription has already ended, which is the requested state.
     if (status == STRIDEWIRE_NO_SUCH_SUBSCRIPTION) status = STRIDEWIRE_OK;
   }
   Answer(command, status, message.text, message.accepted);
@@ -237,7 +242,8 @@ void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now
   }
   const bool joined = reply.code == protocol::StatusCode::kOk;
   if (joined && world.server_id == 0) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a world was joined and not described", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
+                          "the server sent no WorldInfo before its Reply", now_s);
   }
   const Command command{world.join_command, handle, world.join_answered, 0, {}};
   world.join_answered = true;
@@ -252,12 +258,12 @@ void Session::OnJoinReply(World& world, const protocol::Reply& reply, double now
     FailUnsent(world, STRIDEWIRE_NOT_JOINED, reply.text);
     world.subscriptions.clear();
     world.view->Clear();
-    TakeTerrain(handle, std::nullopt);
+    SetTerrainOf(handle, std::nullopt);
   }
 }
 
-void Session::TakeTerrain(stridewire_world handle,
-                          const std::optional<protocol::TerrainInfo>& terrain) {
+void Session::SetTerrainOf(stridewire_world handle,
+                           const std::optional<protocol::TerrainInfo>& terrain) {
   World& world = worlds_.at(handle);
   if (world.terrain == terrain) return;
   world.terrain = terrain;
@@ -266,10 +272,11 @@ void Session::TakeTerrain(stridewire_world handle,
 
 void Session::Handle(const protocol::WorldTerrain& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a ground before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent WorldTerrain before Welcome",
+                          now_s);
   }
   stridewire_world handle = 0;
-  if (FindByServerId(message.world, handle) != nullptr) TakeTerrain(handle, message.terrain);
+  if (FindByServerId(message.world, handle) != nullptr) SetTerrainOf(handle, message.terrain);
 }
 
 void Session::OnSpawnReply(World& world, const protocol::Spawn& spawn,
@@ -302,43 +309,46 @@ void Session::OnObserveReply(World& world, const protocol::Observe& observe,
     UpdateFilter(world);
     return;
   }
-  // Poses that came before, if any, belong to a subscription that has ended; the server cannot tell
-  // it in a batch that others get too.
+  // Earlier poses belong to a subscription that has ended. The server cannot flag the discontinuity
+  // in batches that clients share.
   if (world.subscriptions.size() == 1) world.view->Break();
 }
 
 void Session::Handle(const protocol::PoseBatch& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "poses before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent a PoseBatch before Welcome",
+                          now_s);
   }
   stridewire_world handle = 0;
   World* world = FindByServerId(message.info.world, handle);
   if (world == nullptr || !world->view->has_info() || world->subscriptions.empty()) return;
   clock_.AddSample(now_s, message.info.server_time_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, message.info.mode);
-  if (Status status = world->view->Take(message, every_n_ticks, counts_); !status) {
-    BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
+  if (Status status = world->view->Apply(message, every_n_ticks, counts_); !status) {
+    LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }
 }
 
 void Session::Handle(const protocol::Movements& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "movements before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent Movements before Welcome",
+                          now_s);
   }
   stridewire_world handle = 0;
   World* world = FindByServerId(message.world, handle);
-  if (world == nullptr || world->evaluated == nullptr) return;
+  if (world == nullptr || world->replicas == nullptr) return;
   clock_.AddSample(now_s, message.server_time_s);
   const std::uint64_t every_n_ticks = EveryNTicks(*world, protocol::PoseMode::kMovement);
-  if (Status status = world->view->Take(message, *world->evaluated, every_n_ticks, counts_);
+  if (Status status = world->view->Apply(message, *world->replicas, every_n_ticks, counts_);
       !status) {
-    BreakOff(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
+    LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, Describe(status.error()), now_s);
   }
 }
 
 void Session::Handle(const protocol::LibraryPiece& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a library before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent LibraryPiece before Welcome",
+                          now_s);
   }
   libraries_.OnPiece(message);
   Pump();
@@ -346,10 +356,11 @@ void Session::Handle(const protocol::LibraryPiece& message, double now_s) {
 
 void Session::Handle(const protocol::Events& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "events before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent Events before Welcome",
+                          now_s);
   }
   if (message.number != 0) {
-    if (message.number <= last_events_number_) return;  // Sent again, and heard before.
+    if (message.number <= last_events_number_) return;  // Already received before the resume.
     last_events_number_ = message.number;
   }
   stridewire_world handle = 0;
@@ -401,15 +412,16 @@ void Session::FollowSpawned(World& world, const protocol::Event& event) {
 
 void Session::Handle(const protocol::Lagging& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a report before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent Lagging before Welcome",
+                          now_s);
   }
   stridewire_world handle = 0;
   World* world = FindByServerId(message.world, handle);
   if (world == nullptr) return;
-  if (message.dropped_batches > world->told_dropped_batches) {
-    dropped_batches_ += message.dropped_batches - world->told_dropped_batches;
+  if (message.dropped_batches > world->last_dropped_batches) {
+    dropped_batches_ += message.dropped_batches - world->last_dropped_batches;
   }
-  world->told_dropped_batches = message.dropped_batches;
+  world->last_dropped_batches = message.dropped_batches;
   stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_LAGGING, handle);
   event.dropped_batches = message.dropped_batches;
   event.dropped_events = message.dropped_events;
@@ -429,20 +441,20 @@ void Session::Handle(const protocol::ErrorNotice& message, double now_s) {
   }
   const int hundred = static_cast<int>(status) / 100;
   if (hundred == 1 || hundred == 2 || status == STRIDEWIRE_REPLACED) {
-    return CloseForGood(status, message.text);
+    return CloseWithError(status, message.text);
   }
-  BreakOff(status, message.text, now_s);
+  LoseConnection(status, message.text, now_s);
 }
 
 void Session::Handle(const protocol::Pong& message, double now_s) {
   if (state_ != State::kReady) {
-    return BreakOff(STRIDEWIRE_PROTOCOL_ERROR, "a pong before the welcome", now_s);
+    return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR, "the server sent Pong before Welcome", now_s);
   }
   clock_.AddSample(now_s, message.server_time_s);
   const double rtt_s = std::max(0.0, now_s - message.time_s);
   if (rtts_s_.size() == kMaxRtts) rtts_s_.pop_front();
   rtts_s_.push_back(rtt_s);
-  if (asked_pings_.erase(message.nonce) > 0) {
+  if (pending_pings_.erase(message.nonce) > 0) {
     stridewire_event event = MakeEvent(STRIDEWIRE_EVENT_PONG);
     event.rtt_s = rtt_s;
     event.tick = message.tick;
@@ -455,8 +467,8 @@ void Session::Handle(const protocol::Goodbye& message, double now_s) {
   const stridewire_status status = ToStatus(message.code);
   resume_token_.clear();  // The session has ended.
   const int hundred = static_cast<int>(status) / 100;
-  if (hundred < 3 || status == STRIDEWIRE_REPLACED) return CloseForGood(status, message.text);
-  BreakOff(status, message.text, now_s);
+  if (hundred < 3 || status == STRIDEWIRE_REPLACED) return CloseWithError(status, message.text);
+  LoseConnection(status, message.text, now_s);
 }
 
 }  // namespace stridewire::client

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/check.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::client {
@@ -17,9 +18,9 @@ void WorldView::SetInfo(const protocol::WorldInfo& info) {
   if (!info.rotation_codes.empty()) {
     std::vector<std::int16_t> parents;
     for (const protocol::JointInfo& joint : skeleton_.joints) parents.push_back(joint.parent);
-    // A message that was decoded has codes and parents that make sense.
+    // The decoder has checked the codes and parents, so this does not fail.
     if (auto codecs =
-            protocol::CompactCodecs::Make(info.rotation_codes, parents, info.fewer_joints)) {
+            protocol::CompactCodecs::Make(info.rotation_codes, parents, info.reduced_joints)) {
       codecs_ = *std::move(codecs);
     }
   }
@@ -50,16 +51,18 @@ void WorldView::SetFilter(std::optional<std::set<protocol::AvatarId>> filter) {
 }
 
 WorldView::Tracks::iterator WorldView::Erase(Tracks::iterator track) {
-  budget_.used_bytes -= PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
+  const std::size_t bytes = PoseHistory::Bytes(pose_history_, track->second.history->joint_count());
+  STRIDEWIRE_CHECK(budget_.used_bytes >= bytes);
+  budget_.used_bytes -= bytes;
   return tracks_.erase(track);
 }
 
-Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks,
-                       Counts& counts) {
+Status WorldView::Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks,
+                        Counts& counts) {
   const protocol::PoseBatchInfo& info = batch.info;
   const std::size_t joints = skeleton_.joints.size();
   if (info.joint_count != joints) {
-    return Fail(ErrorCode::kShapeMismatch, "poses have another number of joints than the skeleton",
+    return Fail(ErrorCode::kShapeMismatch, "a batch has another number of joints than the skeleton",
                 info.joint_count);
   }
   ++counts.batches;
@@ -72,14 +75,14 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
   if (shard.epoch != epoch_) {
     shard = Shard{info.tick, 0, epoch_, info.mode};
   } else if (info.tick > shard.tick) {
-    // Of a region nothing comes at ticks at which nobody is due.
+    // Batches of a region have gaps at ticks at which no pose is due.
     if (!info.is_partial && every_n_ticks > 0 && info.tick - shard.tick > every_n_ticks) {
       counts.missing += (info.tick - shard.tick - 1) / every_n_ticks;
     }
     shard.tick = info.tick;
     shard.parts_seen = 0;
   } else if (info.tick < shard.tick) {
-    return Fail(ErrorCode::kMalformed, "the ticks of a shard run backwards");
+    return Fail(ErrorCode::kMalformed, "the ticks of a shard decrease");
   }
   ++shard.parts_seen;
 
@@ -93,7 +96,7 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
     }
     Vec3 root_position_m;
     if (Status status = reader.Decode(root_position_m, scratch_); !status) return status;
-    Track* track = TrackOf(avatar);
+    Track* track = FindOrAddTrack(avatar);
     if (track == nullptr) {
       ++counts.refused;
       continue;
@@ -105,17 +108,18 @@ Status WorldView::Take(const protocol::PoseBatch& batch, std::uint64_t every_n_t
                           .detail = protocol::DetailOf(info.mode)};
     Push(*track, {info.shard, info.mode}, stamp, root_position_m, scratch_, counts);
   }
-  if (shard.parts_seen >= info.parts) Sweep(info);
+  if (shard.parts_seen >= info.parts) MarkMissingAsGone(info);
   return {};
 }
 
-WorldView::Track* WorldView::TrackOf(protocol::AvatarId avatar) {
+WorldView::Track* WorldView::FindOrAddTrack(protocol::AvatarId avatar) {
   auto track = tracks_.find(avatar);
   if (track == tracks_.end()) {
     const std::size_t joints = skeleton_.joints.size();
     const std::size_t bytes = PoseHistory::Bytes(pose_history_, joints);
     if (budget_.used_bytes + bytes > budget_.limit_bytes) return nullptr;
     budget_.used_bytes += bytes;
+    STRIDEWIRE_CHECK(budget_.used_bytes <= budget_.limit_bytes);
     track = tracks_.emplace(avatar, Track{}).first;
     track->second.history = std::make_unique<PoseHistory>(pose_history_, joints);
   }
@@ -129,7 +133,7 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3
     ++counts.poses;
     track.epoch = epoch_;
     track.gone = false;
-  } else if (stamp.tick != track.seen_tick) {  // Equal ticks are a second subscription's.
+  } else if (stamp.tick != track.seen_tick) {  // A second subscription sends equal ticks.
     ++counts.refused;
   }
   track.shard = lane.first;
@@ -137,31 +141,32 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3
   track.seen_tick = stamp.tick;
 }
 
-void WorldView::Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-                     ConstPoseSpan pose) {
-  if (stamp.tick % shown_every_ != 0 || !Wants(avatar)) return;
-  if (Track* track = TrackOf(avatar); track != nullptr) {
+void WorldView::OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+                       ConstPoseSpan pose) {
+  if (stamp.tick % replica_every_n_ticks_ != 0 || !Wants(avatar)) return;
+  if (Track* track = FindOrAddTrack(avatar); track != nullptr) {
     Push(*track, {shard, protocol::PoseMode::kMovement}, stamp, pose.root_position_m,
-         pose.rotations, *shown_counts_);
+         pose.rotations, *replica_counts_);
   } else {
-    ++shown_counts_->refused;
+    ++replica_counts_->refused;
   }
 }
 
-Status WorldView::Take(const protocol::Movements& movements, ReplicaSet& evaluated,
-                       std::uint64_t every_n_ticks, Counts& counts) {
-  if (evaluated.library().skeleton().joints.size() != skeleton_.joints.size()) {
-    return Fail(ErrorCode::kShapeMismatch, "the library has another number of joints than told");
+Status WorldView::Apply(const protocol::Movements& movements, ReplicaSet& replicas,
+                        std::uint64_t every_n_ticks, Counts& counts) {
+  if (replicas.library().skeleton().joints.size() != skeleton_.joints.size()) {
+    return Fail(ErrorCode::kShapeMismatch,
+                "the library has another number of joints than the skeleton");
   }
   ++counts.batches;
-  shown_every_ = std::max<std::uint64_t>(every_n_ticks, 1);
-  shown_counts_ = &counts;
-  const Status status = evaluated.Take(movements, *this);
-  Forget(movements.server_time_s);
+  replica_every_n_ticks_ = std::max<std::uint64_t>(every_n_ticks, 1);
+  replica_counts_ = &counts;
+  const Status status = replicas.Apply(movements, *this);
+  EraseGone(movements.server_time_s);
   return status;
 }
 
-void WorldView::Forget(double time_s) {
+void WorldView::EraseGone(double time_s) {
   for (auto track = tracks_.begin(); track != tracks_.end();) {
     const Track& t = track->second;
     const bool forget = t.gone && t.history->size() > 0 &&
@@ -170,16 +175,16 @@ void WorldView::Forget(double time_s) {
   }
 }
 
-void WorldView::Sweep(const protocol::PoseBatchInfo& info) {
+void WorldView::MarkMissingAsGone(const protocol::PoseBatchInfo& info) {
   if (info.is_partial) {
     std::erase_if(left_,
                   [&](const auto& item) { return item.second + kKeepLeftTicks < info.tick; });
-    return Forget(info.server_time_s);
+    return EraseGone(info.server_time_s);
   }
   for (auto& [avatar, t] : tracks_) {
     if (t.shard == info.shard && t.mode == info.mode && t.seen_tick < info.tick) t.gone = true;
   }
-  Forget(info.server_time_s);
+  EraseGone(info.server_time_s);
 }
 
 void WorldView::Leave(protocol::AvatarId avatar, std::uint64_t tick) {

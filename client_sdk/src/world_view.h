@@ -9,34 +9,34 @@
 #include <string>
 #include <vector>
 
-#include "replica_set.h"
 #include "pose_history.h"
+#include "replica_set.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::client {
 
-/// Memory that all pose histories of a client share.
+/// Memory of all pose histories of a client, in bytes.
 struct PoseBudget {
   std::size_t limit_bytes = 0;
   std::size_t used_bytes = 0;
 };
 
-/// What is seen of a world: its figure, and the poses of its avatars.
+/// The skeleton of a joined world and the received poses of its avatars.
 class WorldView : public PoseSink {
  public:
-  /// Poses of an avatar that is gone can still be sampled for this long.
+  /// Poses of an avatar that is gone can be sampled for this time, in seconds of server time.
   static constexpr double kKeepGone_s = 2.0;
-  /// How long it is remembered that an avatar has left: batches wait for a few ticks at most.
+  /// The view ignores batches from before an avatar left the region for this number of ticks.
   static constexpr std::uint64_t kKeepLeftTicks = 600;
-  /// More shards than this in one world are refused.
+  /// A batch from more shards than this is an error.
   static constexpr std::size_t kMaxShards = 1024;
 
   struct Counts {
     std::uint64_t batches = 0;
     std::uint64_t poses = 0;
-    std::uint64_t refused = 0;  ///< No memory, or not after the newest.
-    std::uint64_t missing = 0;  ///< Batches, by gaps in the ticks.
+    std::uint64_t refused = 0;  ///< Poses without memory, or not newer than the last.
+    std::uint64_t missing = 0;  ///< Missing batches, from gaps in the ticks.
   };
 
   WorldView(std::size_t pose_history, PoseBudget& budget)
@@ -45,43 +45,46 @@ class WorldView : public PoseSink {
   WorldView(const WorldView&) = delete;
   WorldView& operator=(const WorldView&) = delete;
 
-  /// The world was joined, or joined again. Another figure than before clears the poses.
+  /// Sets the description of the world. If the skeleton has changed, all poses are removed.
   void SetInfo(const protocol::WorldInfo& info);
   [[nodiscard]] bool has_info() const { return has_info_; }
   [[nodiscard]] const protocol::SkeletonInfo& skeleton() const { return skeleton_; }
   [[nodiscard]] const std::string& library_hash() const { return library_hash_; }
   [[nodiscard]] const std::vector<std::string>& layers() const { return layers_; }
 
-  /// Forgets figure and poses.
+  /// Removes description and poses.
   void Clear();
   void ClearPoses();
 
-  /// Marks that what comes next does not continue what was there before (a connection resumed, a
-  /// subscription begun), though the server cannot say so in a shared batch.
+  /// Marks the next pose of every avatar as a discontinuity. Call it after a resume and after a new
+  /// subscription, because the server cannot flag those in batches that clients share.
   void Break() { ++epoch_; }
 
-  /// Which avatars' poses to keep; empty: all.
+  /// Stores poses of these avatars only; std::nullopt: of all.
   void SetFilter(std::optional<std::set<protocol::AvatarId>> filter);
 
-  /// Takes in one batch. `every_n_ticks` is the rate asked for, to count gaps. kMalformed and others:
-  /// a pose that is none, or another figure than announced; what came before it is kept.
-  Status Take(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
+  /// Stores the poses of a batch. `every_n_ticks` is the requested interval, which is needed to
+  /// count missing batches; 0: unknown. On error the poses before the invalid one are stored. Fails
+  /// with the errors of PoseBatchReader::Decode, with kShapeMismatch for another number of joints,
+  /// with kLimitExceeded for too many shards, and with kMalformed if the ticks of a shard decrease.
+  Status Apply(const protocol::PoseBatch& batch, std::uint64_t every_n_ticks, Counts& counts);
 
-  /// Poses that are evaluated here, of every `every_n_ticks`th tick: Show and Gone until `tick` is over.
-  Status Take(const protocol::Movements& movements, ReplicaSet& evaluated,
-              std::uint64_t every_n_ticks, Counts& counts);
+  /// Evaluates movement records with `replicas` and stores the poses of ticks that `every_n_ticks`
+  /// divides. Fails with the errors of ReplicaSet::Apply, and with kShapeMismatch.
+  Status Apply(const protocol::Movements& movements, ReplicaSet& replicas,
+               std::uint64_t every_n_ticks, Counts& counts);
 
-  /// The server said that the avatar is gone.
+  /// Marks an avatar as gone.
   void Remove(protocol::AvatarId avatar);
-  /// It has left the region observed at that tick; poses from before it that are still on their way do not
-  /// bring it back.
+  /// Marks an avatar as gone because it left the observed region at `tick`. Batches of earlier
+  /// ticks that arrive later are ignored.
   void Leave(protocol::AvatarId avatar, std::uint64_t tick);
 
-  /// Nullptr if nothing is known of it.
+  /// Returns the poses of an avatar, or null if it is unknown.
   [[nodiscard]] const PoseHistory* Find(protocol::AvatarId avatar) const;
   [[nodiscard]] bool IsGone(protocol::AvatarId avatar) const;
 
-  /// Avatars that are there, in growing order.
+  /// Returns the avatars that are not gone, in ascending order.
   [[nodiscard]] std::vector<protocol::AvatarId> Avatars() const;
 
  private:
@@ -94,7 +97,7 @@ class WorldView : public PoseSink {
     bool gone = false;
   };
   struct Shard {
-    std::uint64_t tick = 0;  ///< Of the batch whose parts are coming in.
+    std::uint64_t tick = 0;  ///< Tick of the last batch.
     std::uint32_t parts_seen = 0;
     std::uint64_t epoch = 0;
     protocol::PoseMode mode = protocol::PoseMode::kFull;
@@ -102,21 +105,21 @@ class WorldView : public PoseSink {
   using Lane = std::pair<std::uint16_t, protocol::PoseMode>;  // shard, mode
   using Tracks = std::map<protocol::AvatarId, Track>;
 
-  void Show(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
-            ConstPoseSpan pose) override;
-  void Gone(protocol::AvatarId avatar) override { Remove(avatar); }
+  void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+              ConstPoseSpan pose) override;
+  void OnGone(protocol::AvatarId avatar) override { Remove(avatar); }
   [[nodiscard]] bool Wants(protocol::AvatarId avatar) const override {
     return !filter_ || filter_->contains(avatar);
   }
-  /// The track to add a pose to; null: there is no memory for it.
-  Track* TrackOf(protocol::AvatarId avatar);
+  /// Finds or creates the track of an avatar. Returns null if there is no memory for it.
+  Track* FindOrAddTrack(protocol::AvatarId avatar);
   void Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
             std::span<const Quat> rotations, Counts& counts);
 
-  /// After the last part of a shard's batch: who was not in it, but in one before, is gone.
-  void Sweep(const protocol::PoseBatchInfo& info);
-  /// Those who are gone for long.
-  void Forget(double time_s);
+  /// After the last part of a batch: avatars of its shard and mode that were not in it are gone.
+  void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
+  /// Erases avatars that have been gone for longer than kKeepGone_s.
+  void EraseGone(double time_s);
   Tracks::iterator Erase(Tracks::iterator track);
 
   std::size_t pose_history_;
@@ -125,16 +128,15 @@ class WorldView : public PoseSink {
   protocol::SkeletonInfo skeleton_;
   std::string library_hash_;
   std::vector<std::string> layers_;
-  protocol::CompactCodecs codecs_;  ///< Of compact poses, if the server tells them
+  protocol::CompactCodecs codecs_;  ///< Codecs of compact poses.
   std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
-  std::map<protocol::AvatarId, std::uint64_t>
-      left_;  // since which tick; forgotten after a while
+  std::map<protocol::AvatarId, std::uint64_t> left_;  // tick at which an avatar left the region
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
-  std::uint64_t shown_every_ = 1;   // while movements are taken in
-  Counts* shown_counts_ = nullptr;  // the same
+  std::uint64_t replica_every_n_ticks_ = 1;  // set while Apply(Movements) runs
+  Counts* replica_counts_ = nullptr;         // set while Apply(Movements) runs
 };
 
 }  // namespace stridewire::client

@@ -13,7 +13,7 @@
 namespace stridewire::protocol {
 namespace {
 
-/// Keeps the first thing found wrong.
+/// Stores the first error.
 class Findings {
  public:
   void Wrong(ErrorCode code, const char* text, const char* field, std::int64_t index = -1) {
@@ -112,7 +112,7 @@ void CheckParameters(Findings& found, const ParameterSet& set, const char* field
       return;
     }
     const unsigned bit = 1u << set.names[p];
-    found.That((seen & bit) == 0, ErrorCode::kMalformed, "parameter stands twice", field, index);
+    found.That((seen & bit) == 0, ErrorCode::kMalformed, "parameter occurs twice", field, index);
     seen |= bit;
     found.Finite(set.values[p], field, index);
   }
@@ -132,8 +132,8 @@ void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t ind
       found.FiniteVector(step->at->position_m, "Request.at_m", index);
       found.Finite(step->at->heading_rad.value_or(0.0), "Request.heading_rad", index);
     }
-    found.That(step->at || !step->exact_only, ErrorCode::kMalformed,
-               "must be met and is not there", "Request.at_m", index);
+    found.That(step->at || !step->exact_only, ErrorCode::kMalformed, "must_be_met without at_m",
+               "Request.at_m", index);
   } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     found.Finite(jump->length_m, "Request.length_m", index);
     found.Finite(jump->height_m, "Request.height_m", index);
@@ -164,8 +164,8 @@ void CheckTerrain(Findings& found, const std::optional<TerrainInfo>& terrain) {
     found.That(is_count(field->rows), ErrorCode::kOutOfRange, "not 2 to 1024", "Terrain.rows",
                field->rows);
     found.That(field->heights_m.size() == std::size_t{field->columns} * field->rows,
-               ErrorCode::kShapeMismatch, "not one height a sample", "Terrain.heights_m",
-               static_cast<std::int64_t>(field->heights_m.size()));
+               ErrorCode::kShapeMismatch, "heights_m does not have columns * rows elements",
+               "Terrain.heights_m", static_cast<std::int64_t>(field->heights_m.size()));
     for (std::size_t h = 0; h < field->heights_m.size(); ++h) {
       found.Finite(field->heights_m[h], "Terrain.heights_m", static_cast<std::int64_t>(h));
     }
@@ -192,7 +192,7 @@ void CheckMovement(Findings& found, const CurrentMovement& m) {
   for (std::size_t k = 0; k < m.keytimes_s.size(); ++k) {
     const double keytime_s = m.keytimes_s[k];
     found.That(std::isfinite(keytime_s) && (k == 0 ? keytime_s == 0.0 : keytime_s >= before_s),
-               ErrorCode::kOutOfRange, "keytimes do not go from 0 upwards",
+               ErrorCode::kOutOfRange, "keytimes do not start at 0 or decrease",
                "AvatarState.movement.keytimes_s", static_cast<std::int64_t>(k));
     before_s = keytime_s;
   }
@@ -213,13 +213,13 @@ void CheckMovement(Findings& found, const CurrentMovement& m) {
     found.That(name < kParameterNames, ErrorCode::kMalformed, "unknown parameter",
                "AvatarState.movement.parameter_names", name);
     if (name >= kParameterNames) return;
-    found.That((seen & (1u << name)) == 0, ErrorCode::kMalformed, "parameter stands twice",
+    found.That((seen & (1u << name)) == 0, ErrorCode::kMalformed, "parameter occurs twice",
                "AvatarState.movement.parameter_names", name);
     seen |= 1u << name;
   }
   found.That(m.sites.empty() || m.sites.size() == m.weights.size() * m.parameter_names.size(),
-             ErrorCode::kShapeMismatch, "not one site a weight", "AvatarState.movement.sites",
-             static_cast<std::int64_t>(m.sites.size()));
+             ErrorCode::kShapeMismatch, "sites does not have one row per weight",
+             "AvatarState.movement.sites", static_cast<std::int64_t>(m.sites.size()));
   for (std::size_t s = 0; s < m.sites.size(); ++s) {
     found.Finite(m.sites[s], "AvatarState.movement.sites", static_cast<std::int64_t>(s));
   }
@@ -242,14 +242,14 @@ void CheckSkeleton(Findings& found, const SkeletonInfo& skeleton) {
     const JointInfo& joint = skeleton.joints[static_cast<std::size_t>(j)];
     found.Name(joint.name, "WorldInfo.joint.name", j);
     found.That(j == 0 ? joint.parent == -1 : joint.parent >= 0 && joint.parent < j,
-               ErrorCode::kOutOfRange, "parent does not come before its child",
+               ErrorCode::kOutOfRange, "parent does not precede its child",
                "WorldInfo.joint.parent", j);
     found.FiniteVector(joint.offset_m, "WorldInfo.joint.offset_m", j);
     names.push_back(joint.name);
   }
   std::sort(names.begin(), names.end());
   found.That(std::adjacent_find(names.begin(), names.end()) == names.end(), ErrorCode::kMalformed,
-             "name stands twice", "WorldInfo.joint.name");
+             "name occurs twice", "WorldInfo.joint.name");
   for (std::size_t e = 0; e < skeleton.end_sites.size(); ++e) {
     const EndSiteInfo& site = skeleton.end_sites[e];
     const auto index = static_cast<std::int64_t>(e);
@@ -336,12 +336,12 @@ namespace {
 
 void CheckRegion(Findings& found, const Observe& m) {
   const Region& region = *m.region;
-  found.That(m.avatars.empty(), ErrorCode::kMalformed, "a region has no list beside it",
+  found.That(m.avatars.empty(), ErrorCode::kMalformed, "a region excludes a list of avatars",
              "Observe.avatars");
   found.Finite(region.centre_m.x, "Region.centre_m");
   found.Finite(region.centre_m.z, "Region.centre_m");
   found.NotNegative(region.radius_m, "Region.radius_m");
-  found.That(region.radius_m != 0.0, ErrorCode::kOutOfRange, "nothing is in it", "Region.radius_m");
+  found.That(region.radius_m != 0.0, ErrorCode::kOutOfRange, "radius is 0", "Region.radius_m");
   if (region.leave_m) found.NotNegative(*region.leave_m, "Region.leave_m");
   found.Count(region.rings.size(), 0, kMaxRateRings, "Region.rings");
   double before_m = 0.0;
@@ -349,18 +349,19 @@ void CheckRegion(Findings& found, const Observe& m) {
     const RateRing& ring = region.rings[i];
     const auto index = static_cast<std::int64_t>(i);
     found.Finite(ring.to_m, "RateRing.to_m", index);
-    found.That(ring.to_m > before_m, ErrorCode::kOutOfRange, "not beyond the ring before it",
-               "RateRing.to_m", index);
+    found.That(ring.to_m > before_m, ErrorCode::kOutOfRange,
+               "not above the radius of the previous ring", "RateRing.to_m", index);
     found.That(ring.every_n_ticks >= 1 && ring.every_n_ticks <= kMaxEveryNTicks,
                ErrorCode::kOutOfRange, "not 1 to 3600 ticks", "RateRing.every_n_ticks", index);
     before_m = ring.to_m;
   }
   const std::vector<PoseDetail>& details = region.ring_details;
   if (details.empty()) return;
-  found.That(details.size() == region.rings.size(), ErrorCode::kMalformed, "not one for each ring",
-             "Region.ring_details", static_cast<std::int64_t>(details.size()));
+  found.That(details.size() == region.rings.size(), ErrorCode::kMalformed,
+             "not one detail per ring", "Region.ring_details",
+             static_cast<std::int64_t>(details.size()));
   found.That(m.mode == PoseMode::kQuantised, ErrorCode::kUnsupported,
-             "only quantised poses have levels of detail", "Region.ring_details");
+             "levels of detail need mode 1 (quantised)", "Region.ring_details");
   for (std::size_t i = 0; i < details.size(); ++i) {
     found.Known(details[i], PoseDetail::kRoot, "Region.ring_details", static_cast<std::int64_t>(i));
   }
@@ -377,12 +378,11 @@ Status Check(const Observe& m) {
   found.Avatars(m.avatars, 0, "Observe.avatars");
   found.That(m.every_n_ticks >= 1 && m.every_n_ticks <= kMaxEveryNTicks, ErrorCode::kOutOfRange,
              "not 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
-  found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed,
-             "only a region takes another one's place", "Observe.replace");
+  found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed, "replace without a region",
+             "Observe.replace");
   found.Known(m.detail, PoseDetail::kRoot, "Observe.detail");
   found.That(m.detail == PoseDetail::kAll || m.mode == PoseMode::kQuantised,
-             ErrorCode::kUnsupported, "only quantised poses have levels of detail",
-             "Observe.detail");
+             ErrorCode::kUnsupported, "levels of detail need mode 1 (quantised)", "Observe.detail");
   if (m.region) CheckRegion(found, m);
   return found.Result();
 }
@@ -440,18 +440,18 @@ Status Check(const WorldInfo& m) {
   }
   if (!m.rotation_codes.empty()) {
     found.That(m.rotation_codes.size() == m.skeleton.joints.size(), ErrorCode::kShapeMismatch,
-               "not one code a joint, or none", "WorldInfo.rotation_codes",
+               "not one code per joint", "WorldInfo.rotation_codes",
                static_cast<std::int64_t>(m.rotation_codes.size()));
   }
   if (const Status status = CheckRotationCodes(m.rotation_codes); !status) {
     const Error& error = status.error();
     found.Wrong(error.code, error.text, "WorldInfo.rotation_codes", error.index);
   }
-  if (!m.fewer_joints.empty()) {
+  if (!m.reduced_joints.empty()) {
     std::vector<std::int16_t> parents;
     for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
-    if (m.rotation_codes.empty()) parents.clear();  // Without codes there is nothing to leave out.
-    if (const Status status = CheckFewerJoints(m.fewer_joints, parents); !status) {
+    if (m.rotation_codes.empty()) parents.clear();  // Without codes there are no reduced joints.
+    if (const Status status = CheckReducedJoints(m.reduced_joints, parents); !status) {
       const Error& error = status.error();
       found.Wrong(error.code, error.text, "WorldInfo.fewer_joints", error.index);
     }
@@ -466,25 +466,26 @@ Status Check(const Reply& m) {
   found.Count(m.items.size(), 0, kMaxItems, "Reply.items");
   for (std::size_t i = 0; i < m.items.size(); ++i) {
     const auto index = static_cast<std::int64_t>(i);
-    found.That(m.items[i].index < kMaxItems, ErrorCode::kOutOfRange, "no command has so many items",
-               "Reply.index", index);
+    found.That(m.items[i].index < kMaxItems, ErrorCode::kOutOfRange,
+               "index exceeds the largest number of items", "Reply.index", index);
     found.Text(m.items[i].text, kMaxReasonBytes, "Reply.item.text", index);
   }
   return found.Result();
 }
 
 std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch) {
-  const auto wide = static_cast<std::size_t>(std::ranges::count_if(
-      batch.flags, [](std::uint8_t flags) { return (flags & kPoseWide) != 0; }));
-  if (wide > batch.avatars.size()) return std::nullopt;
-  const std::size_t wide_bytes = wide * PoseBytes(PoseMode::kQuantised, batch.info.joint_count);
-  const std::size_t compact = batch.avatars.size() - wide;
+  const auto uncompressed = static_cast<std::size_t>(std::ranges::count_if(
+      batch.flags, [](std::uint8_t flags) { return (flags & kPoseUncompressed) != 0; }));
+  if (uncompressed > batch.avatars.size()) return std::nullopt;
+  const std::size_t uncompressed_bytes =
+      uncompressed * PoseBytes(PoseMode::kQuantised, batch.info.joint_count);
+  const std::size_t compact = batch.avatars.size() - uncompressed;
   if (compact == 0) {
-    return batch.poses.size() == wide_bytes ? std::optional<std::size_t>(0) : std::nullopt;
+    return batch.poses.size() == uncompressed_bytes ? std::optional<std::size_t>(0) : std::nullopt;
   }
-  if (batch.poses.size() < wide_bytes) return std::nullopt;
-  const std::size_t bytes = (batch.poses.size() - wide_bytes) / compact;
-  const bool is_whole = bytes * compact + wide_bytes == batch.poses.size();
+  if (batch.poses.size() < uncompressed_bytes) return std::nullopt;
+  const std::size_t bytes = (batch.poses.size() - uncompressed_bytes) / compact;
+  const bool is_whole = bytes * compact + uncompressed_bytes == batch.poses.size();
   return is_whole ? std::optional(bytes) : std::nullopt;
 }
 
@@ -498,18 +499,18 @@ Status Check(const PoseBatch& m) {
   found.Finite(info.server_time_s, "PoseBatch.server_time_s");
   found.Known(info.mode, PoseMode::kCompactRoot, "PoseBatch.mode");
   found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
-             "no pose is sent in this mode", "PoseBatch.mode");
+             "mode 2 (movement) has no poses", "PoseBatch.mode");
   found.That(info.joint_count >= 1 && info.joint_count <= kMaxJoints, ErrorCode::kOutOfRange,
              "not 1 to 256 joints", "PoseBatch.joint_count", info.joint_count);
   found.Avatars(m.avatars, 0, "PoseBatch.avatars");
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
-             "not one flag an avatar", "PoseBatch.flags",
+             "not one flag per avatar", "PoseBatch.flags",
              static_cast<std::int64_t>(m.flags.size()));
   const bool has_all =
       IsCompact(info.mode)
           ? CompactPoseBytes(m).has_value()
           : m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count);
-  found.That(has_all, ErrorCode::kShapeMismatch, "not one pose an avatar", "PoseBatch.poses",
+  found.That(has_all, ErrorCode::kShapeMismatch, "not one pose per avatar", "PoseBatch.poses",
              static_cast<std::int64_t>(m.poses.size()));
   return found.Result();
 }
@@ -566,7 +567,7 @@ Status Check(const AvatarState& m) {
   if (m.movement) CheckMovement(found, *m.movement);
   found.Count(m.queue.size(), 0, kMaxInspectedRequests, "AvatarState.queue");
   found.That(m.queue.size() <= m.queue_size, ErrorCode::kShapeMismatch,
-             "more requests than the queue is long", "AvatarState.queue", m.queue_size);
+             "more requests than queue_size", "AvatarState.queue", m.queue_size);
   for (std::size_t i = 0; i < m.queue.size(); ++i) {
     CheckRequestItem(found, m.queue[i], static_cast<std::int64_t>(i));
   }
@@ -639,19 +640,19 @@ Status Check(const Movements& m) {
   found.Finite(m.server_time_s, "Movements.server_time_s");
   found.Avatars(m.avatars, 0, "Movements.avatars");
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
-             "not one flag an avatar", "Movements.flags",
+             "not one flag per avatar", "Movements.flags",
              static_cast<std::int64_t>(m.flags.size()));
-  found.That(m.ends.size() == m.avatars.size(), ErrorCode::kShapeMismatch, "not one end an avatar",
+  found.That(m.ends.size() == m.avatars.size(), ErrorCode::kShapeMismatch, "not one end per avatar",
              "Movements.ends", static_cast<std::int64_t>(m.ends.size()));
   std::uint32_t before = 0;
   for (std::size_t i = 0; i < m.ends.size(); ++i) {
     found.That(m.ends[i] >= before && m.ends[i] - before <= kMaxRecordBytes, ErrorCode::kOutOfRange,
-               "a record's end lies before it or too far behind", "Movements.ends",
+               "a record has a negative length or exceeds 64 KiB", "Movements.ends",
                static_cast<std::int64_t>(i));
     before = m.ends[i];
   }
   found.That(before == m.records.size(), ErrorCode::kShapeMismatch,
-             "records do not end where the last one does", "Movements.records",
+             "the last end is not the size of records", "Movements.records",
              static_cast<std::int64_t>(m.records.size()));
   return found.Result();
 }
@@ -663,7 +664,7 @@ Status Check(const LibraryPiece& m) {
   found.Count(m.bytes.size(), 0, kMaxPieceBytes, "LibraryPiece.bytes");
   found.That(m.total_bytes <= kMaxLibraryBytes && m.offset <= m.total_bytes &&
                  m.bytes.size() <= m.total_bytes - m.offset,
-             ErrorCode::kOutOfRange, "a piece lies outside of its library", "LibraryPiece.offset",
+             ErrorCode::kOutOfRange, "the piece is not inside the library", "LibraryPiece.offset",
              static_cast<std::int64_t>(m.offset));
   return found.Result();
 }

@@ -5,28 +5,30 @@
 #include <cstring>
 #include <utility>
 
+#include "base/check.h"
 #include "compact_kernel.h"
 #include "smallest_three.h"
-#include "base/check.h"
 #include "stridewire/protocol/limits.h"
 #include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::protocol {
 namespace {
 
-// The sum of the squares of the three smaller components is at most 3/4 and, with the fewest bits, a little more.
-constexpr float kMostThreeSquared = 0.77f;
-// What is told may have a smaller w than what was to be told: by half a step of each component.
-constexpr float kLeastToldW = 0.9f;
+// The squares of the three smaller components sum to at most 3/4, plus the rounding error of 8
+// bits.
+constexpr float kMaxThreeSquaredCompact = 0.77f;
+// The decoded w can be smaller than the encoded one, because each component is rounded by up to
+// half a step.
+constexpr float kLeastDecodedW = 0.9f;
 
 constexpr std::size_t kRootBytes = 12;
 
-// Reads what the kernel's WriteWords wrote.
+// Reads the bits that WriteWords in compact_kernel.cpp has written.
 class BitReader {
  public:
   explicit BitReader(std::span<const std::byte> words) : words_(words) {}
 
-  // Up to 16 bits; there are as many.
+  // Reads up to 16 bits. The caller guarantees that they exist.
   std::uint32_t Take(int bits) {
     if (bits > held_) {
       std::uint16_t word = 0;
@@ -49,7 +51,7 @@ class BitReader {
   int held_ = 0;
 };
 
-bool TakeFree(BitReader& reader, const CompactJoint& joint, Quat& q) {
+bool ReadSmallestThree(BitReader& reader, const CompactJoint& joint, Quat& q) {
   const std::uint32_t largest = reader.Take(2);
   const int zero = 1 << (joint.smallest_three_bits - 1);
   float c[4] = {};
@@ -59,23 +61,23 @@ bool TakeFree(BitReader& reader, const CompactJoint& joint, Quat& q) {
     const auto bits = static_cast<int>(reader.Take(joint.smallest_three_bits));
     is_good &= bits != 0;
     const float value = static_cast<float>(bits - zero) * joint.step[0];
-    c[kStaying[largest][k]] = value;
+    c[kKept[largest][k]] = value;
     squared += value * value;
   }
-  if (!is_good || squared > kMostThreeSquared) return false;
+  if (!is_good || squared > kMaxThreeSquaredCompact) return false;
   c[largest] = std::sqrt(1.0f - squared);
   q = Quat(c[3], c[0], c[1], c[2]);
   return true;
 }
 
-bool TakeRanged(BitReader& reader, const CompactJoint& joint, Quat& q) {
+bool ReadComponents(BitReader& reader, const CompactJoint& joint, Quat& q) {
   float v[3];
   for (std::size_t c = 0; c < 3; ++c) {
     const std::uint32_t bits = joint.bits[c] > 0 ? reader.Take(joint.bits[c]) : 0;
     v[c] = joint.low[c] + static_cast<float>(bits) * joint.step[c];
   }
   const float w_squared = 1.0f - (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-  const float least = kLeastToldW * joint.least_w;
+  const float least = kLeastDecodedW * joint.least_w;
   if (!(w_squared >= least * least)) return false;
   const Quat reference(joint.reference[3], joint.reference[0], joint.reference[1],
                        joint.reference[2]);
@@ -83,7 +85,7 @@ bool TakeRanged(BitReader& reader, const CompactJoint& joint, Quat& q) {
   return true;
 }
 
-// Numbers behind one another in words of 32 bits.
+// Assigns the bits of consecutive numbers to words of 32 bits.
 class WordPlan {
  public:
   void Put(std::size_t row, int bits) {
@@ -98,7 +100,7 @@ class WordPlan {
   }
   [[nodiscard]] std::size_t bits() const { return bits_; }
 
-  // Zeros after the last up to four whole words.
+  // Adds words of zeros up to a multiple of four words.
   std::vector<CompactPart> Finish() {
     if (fill_ > 0) parts_.back().ends_word = true;
     const std::size_t words = (bits_ + 31) / 32;
@@ -112,7 +114,7 @@ class WordPlan {
   std::size_t bits_ = 0;
 };
 
-// Joints as far from the root as each other together: none of them waits for another.
+// Sorts joints by depth. Joints of the same depth do not depend on each other.
 std::vector<std::uint16_t> ByDepth(std::span<const std::int16_t> parents) {
   std::vector<int> depths;
   std::vector<std::uint16_t> order;
@@ -138,51 +140,51 @@ Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
     if (code.smallest_three_bits != 0) {
       if (code.smallest_three_bits < RotationQuantization::kMinFreeBits ||
           code.smallest_three_bits > RotationQuantization::kMaxFreeBits) {
-        return wrong(ErrorCode::kOutOfRange, "not 8 to 15 free bits, or 0", j);
+        return wrong(ErrorCode::kOutOfRange, "free_bits is not 0 and not 8 to 15", j);
       }
     } else if (j == 0) {
-      return wrong(ErrorCode::kMalformed, "the root does not turn every way", j);
+      return wrong(ErrorCode::kMalformed, "free_bits of the root is 0", j);
     }
     const float squared = Dot(code.reference, code.reference);
     if (!(std::abs(squared - 1.0f) <= 1e-5f)) {
       return wrong(ErrorCode::kOutOfRange, "reference is not a unit quaternion", j);
     }
     if (!(code.least_w >= RotationQuantization::kMinLeastW && code.least_w <= 1.0f)) {
-      return wrong(ErrorCode::kOutOfRange, "least w is not 0.3 to 1", j);
+      return wrong(ErrorCode::kOutOfRange, "least_w is not 0.3 to 1", j);
     }
     for (int c = 0; c < 3; ++c) {
       if (!(std::abs(code.low[c]) <= 1.0f)) {
-        return wrong(ErrorCode::kOutOfRange, "component begins outside -1 to 1", j);
+        return wrong(ErrorCode::kOutOfRange, "low is not -1 to 1", j);
       }
       if (!(code.step[c] >= RotationQuantization::kMinStep && code.step[c] <= 2.0f)) {
         return wrong(ErrorCode::kOutOfRange, "step is not 2^-20 to 2", j);
       }
       if (code.bits[static_cast<std::size_t>(c)] > RotationQuantization::kMaxBits) {
-        return wrong(ErrorCode::kOutOfRange, "more than 16 bits", j);
+        return wrong(ErrorCode::kOutOfRange, "a component has more than 16 bits", j);
       }
     }
   }
   return {};
 }
 
-Status CheckFewerJoints(std::span<const std::uint16_t> joints,
-                        std::span<const std::int16_t> parents) {
+Status CheckReducedJoints(std::span<const std::uint16_t> joints,
+                          std::span<const std::int16_t> parents) {
   const auto wrong = [](const char* text, std::size_t index) {
     return Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(index));
   };
   if (joints.size() > parents.size()) {
-    return Fail(ErrorCode::kShapeMismatch, "more joints than there are",
+    return Fail(ErrorCode::kShapeMismatch, "more reduced joints than joints",
                 static_cast<std::int64_t>(joints.size()));
   }
-  if (joints.empty() || joints[0] != 0) return wrong("the root is left out", 0);
+  if (joints.empty() || joints[0] != 0) return wrong("the root is missing", 0);
   for (std::size_t i = 1; i < joints.size(); ++i) {
     if (joints[i] >= parents.size()) return wrong("no such joint", i);
-    if (joints[i] <= joints[i - 1]) return wrong("joints do not grow", i);
-    // Where there are poses at all parents come first (WorldInfo, CompactCodec::Make).
+    if (joints[i] <= joints[i - 1]) return wrong("joints are not ascending", i);
+    // A parent that does not precede its child is reported elsewhere (Check(WorldInfo), Make).
     const std::int16_t parent = parents[joints[i]];
     if (parent < 0 ||
         !std::ranges::binary_search(joints.first(i), static_cast<std::uint16_t>(parent))) {
-      return wrong("a joint without the one it hangs from", i);
+      return wrong("the parent of a joint is missing", i);
     }
   }
   return {};
@@ -190,16 +192,17 @@ Status CheckFewerJoints(std::span<const std::uint16_t> joints,
 
 Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> codes,
                                           std::span<const std::int16_t> parents,
-                                          std::span<const std::uint16_t> told) {
+                                          std::span<const std::uint16_t> included) {
   if (const Status status = CheckRotationCodes(codes); !status) {
     return std::unexpected(status.error());
   }
   if (codes.empty() || codes.size() != parents.size()) {
-    return std::unexpected(Error{ErrorCode::kShapeMismatch, "not one rotation code a joint",
+    return std::unexpected(Error{ErrorCode::kShapeMismatch,
+                                 "the number of rotation codes is not the number of joints",
                                  static_cast<std::int64_t>(codes.size())});
   }
-  if (!told.empty()) {
-    if (const Status status = CheckFewerJoints(told, parents); !status) {
+  if (!included.empty()) {
+    if (const Status status = CheckReducedJoints(included, parents); !status) {
       return std::unexpected(status.error());
     }
   }
@@ -214,24 +217,25 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> 
     joint.parent = parents[j];
     if (j == 0 ? joint.parent != -1
                : joint.parent < 0 || joint.parent >= static_cast<std::int32_t>(j)) {
-      return std::unexpected(Error{ErrorCode::kOutOfRange, "parent is not a joint before it",
+      return std::unexpected(Error{ErrorCode::kOutOfRange, "parent does not precede the joint",
                                    static_cast<std::int64_t>(j)});
     }
     if (joint.parent >= 0)
-      codec.joints_[static_cast<std::size_t>(joint.parent)].bears_others = true;
+      codec.joints_[static_cast<std::size_t>(joint.parent)].has_children = true;
     joint.reference[0] = code.reference.x;
     joint.reference[1] = code.reference.y;
     joint.reference[2] = code.reference.z;
     joint.reference[3] = code.reference.w;
-    joint.is_turned = code.reference != kIdentityQuat;
-    joint.is_left_out =
-        !told.empty() && !std::ranges::binary_search(told, static_cast<std::uint16_t>(j));
-    if (joint.is_left_out) continue;
+    joint.has_reference = code.reference != kIdentityQuat;
+    joint.is_omitted =
+        !included.empty() && !std::ranges::binary_search(included, static_cast<std::uint16_t>(j));
+    if (joint.is_omitted) continue;
     joint.least_w = code.least_w;
     joint.smallest_three_bits = code.smallest_three_bits;
     if (code.smallest_three_bits > 0) {
-      joint.steps[0] = kSqrt2 * static_cast<float>((1 << (code.smallest_three_bits - 1)) - 1);
-      joint.step[0] = 1.0f / joint.steps[0];
+      joint.inverse_step[0] =
+          kSqrt2 * static_cast<float>((1 << (code.smallest_three_bits - 1)) - 1);
+      joint.step[0] = 1.0f / joint.inverse_step[0];
       words.Put(row + 3, 2);
       for (std::size_t c = 0; c < 3; ++c) words.Put(row + c, code.smallest_three_bits);
       continue;
@@ -239,7 +243,7 @@ Expected<CompactCodec> CompactCodec::Make(std::span<const RotationQuantization> 
     for (std::size_t c = 0; c < 3; ++c) {
       joint.low[c] = code.low[static_cast<int>(c)];
       joint.step[c] = code.step[static_cast<int>(c)];
-      joint.steps[c] = 1.0f / joint.step[c];
+      joint.inverse_step[c] = 1.0f / joint.step[c];
       joint.bits[c] = code.bits[c];
       if (code.bits[c] > 0) words.Put(row + c, code.bits[c]);
     }
@@ -290,7 +294,7 @@ void CompactCodec::Encode(Block& block) const {
          block);
 }
 
-void CompactCodec::Encode(const Lanes& poses, Block& block) const {
+void CompactCodec::Encode(const SoaPoses& poses, Block& block) const {
   STRIDEWIRE_CHECK(poses.count <= kBlock);
   block.size_ = poses.count;
   const std::size_t joints = joints_.size();
@@ -298,7 +302,7 @@ void CompactCodec::Encode(const Lanes& poses, Block& block) const {
     block.numbers_.resize(kJointRows + 4 * joints);
     block.errors_.resize(3 * joints);
   }
-  const std::size_t words = (pieces() + kMostBehind) * 4;
+  const std::size_t words = (pieces() + kMaxTrailingPieces) * 4;
   if (block.words_.size() < words) block.words_.resize(words);
   EncodeCompact(
       {joints_, order_, parts_},
@@ -309,11 +313,11 @@ void CompactCodec::Encode(const Lanes& poses, Block& block) const {
 Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m,
                             std::span<Quat> rotations) const {
   if (rotations.size() != joints_.size()) {
-    return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints",
+    return Fail(ErrorCode::kShapeMismatch, "the pose has another number of joints",
                 static_cast<std::int64_t>(rotations.size()));
   }
   if (in.size() != pose_bytes()) {
-    return Fail(ErrorCode::kShapeMismatch, "bytes of a pose have another size",
+    return Fail(ErrorCode::kShapeMismatch, "the input has the wrong size for a pose",
                 static_cast<std::int64_t>(in.size()));
   }
   if (const Status status = DecodeRoot(in.first<kRootBytes>(), root_position_m); !status) {
@@ -322,19 +326,21 @@ Status CompactCodec::Decode(std::span<const std::byte> in, Vec3& root_position_m
   BitReader reader(in.subspan(kRootBytes));
   for (std::size_t j = 0; j < joints_.size(); ++j) {
     const CompactJoint& joint = joints_[j];
-    if (joint.is_left_out) {
+    if (joint.is_omitted) {
       rotations[j] =
           Quat(joint.reference[3], joint.reference[0], joint.reference[1], joint.reference[2]);
       continue;
     }
-    const bool is_good = joint.smallest_three_bits > 0 ? TakeFree(reader, joint, rotations[j])
-                                             : TakeRanged(reader, joint, rotations[j]);
+    const bool is_good = joint.smallest_three_bits > 0
+                             ? ReadSmallestThree(reader, joint, rotations[j])
+                             : ReadComponents(reader, joint, rotations[j]);
     if (!is_good) {
       return Fail(ErrorCode::kMalformed, "rotation has bits that no encoder writes",
                   static_cast<std::int64_t>(j));
     }
   }
-  if (!reader.RestIsZero()) return Fail(ErrorCode::kMalformed, "pose has bits behind its last");
+  if (!reader.RestIsZero())
+    return Fail(ErrorCode::kMalformed, "the unused bits of the last word are not 0");
   return {};
 }
 

@@ -6,13 +6,13 @@ namespace stridewire::protocol {
 
 Expected<CompactCodecs> CompactCodecs::Make(std::span<const RotationQuantization> codes,
                                             std::span<const std::int16_t> parents,
-                                            std::span<const std::uint16_t> fewer_joints) {
-  constexpr std::array<std::uint16_t, 1> kRootAlone{0};
-  const std::array<std::span<const std::uint16_t>, 3> told{{{}, fewer_joints, kRootAlone}};
+                                            std::span<const std::uint16_t> reduced_joints) {
+  constexpr std::array<std::uint16_t, 1> kRootOnly{0};
+  const std::array<std::span<const std::uint16_t>, 3> included{{{}, reduced_joints, kRootOnly}};
   CompactCodecs codecs;
-  for (std::size_t d = 0; d < told.size(); ++d) {
-    if (static_cast<PoseDetail>(d) == PoseDetail::kFewer && fewer_joints.empty()) continue;
-    auto codec = CompactCodec::Make(codes, parents, told[d]);
+  for (std::size_t d = 0; d < included.size(); ++d) {
+    if (static_cast<PoseDetail>(d) == PoseDetail::kReduced && reduced_joints.empty()) continue;
+    auto codec = CompactCodec::Make(codes, parents, included[d]);
     if (!codec) return std::unexpected(codec.error());
     codecs.by_detail_[d] = *std::move(codec);
   }

@@ -8,7 +8,7 @@
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "compact_kernel.cpp"
 #include "hwy/foreach_target.h"
-// Behind foreach_target.h, which includes this file once for each instruction set.
+// Must follow foreach_target.h, which includes this file once per instruction set.
 #include "hwy/highway.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -25,12 +25,12 @@ using V = hn::Vec<D>;
 using VI = hn::Vec<DI>;
 using VU = hn::Vec<DU>;
 
-// Adding it rounds a float to the nearest integer, the even one of two, on every machine; the integer is then in the
-// low bits.
+// Adding this constant rounds a float to the nearest integer, ties to even, on every machine. The
+// low bits of the sum then contain the integer.
 constexpr float kRounder = 12582912.0f;  // 1.5 2^23
 constexpr std::int32_t kRounderBits = 0x4b400000;
 
-// How far from 1 the square of a quaternion's length may be for it to be taken as unit here.
+// Largest deviation from 1 of the squared length of a quaternion that is accepted as unit.
 constexpr float kUnitSquared = 2e-5f;
 
 struct Rotation {
@@ -53,7 +53,7 @@ HWY_INLINE Vector ConjugateTimes(const Rotation& a, const Rotation& b) {
           along(a.z, a.x, a.y, b.z, b.x, b.y)};
 }
 
-// Puts numbers of some bits behind one another, a pose a lane.
+// Concatenates the bits of all numbers of a pose. Each lane holds one pose.
 HWY_INLINE void WriteWords(std::span<const CompactPart> parts, const std::uint32_t* numbers,
                            std::uint32_t* words) {
   const DU du;
@@ -76,7 +76,7 @@ HWY_INLINE void WriteWords(std::span<const CompactPart> parts, const std::uint32
   }
 }
 
-// |value| below 2^22 of a component told in steps, as float and as integer.
+// A component in steps, as float and as integer. |value| is below 2^22.
 struct Steps {
   V number;
   VI integer;
@@ -89,7 +89,8 @@ HWY_INLINE Steps RoundToSteps(V value) {
           hn::Sub(hn::BitCast(di, rounded), hn::Set(di, kRounderBits))};
 }
 
-// Half away from zero, as std::round; exact, since a float times a power of two is.
+// Rounds half away from zero, like std::round. The product is exact because the factor is a power
+// of two.
 HWY_INLINE VI RootSteps(V metres) {
   const D d;
   const V scaled = hn::Mul(metres, hn::Set(d, kRootStepsPerM));
@@ -99,8 +100,9 @@ HWY_INLINE VI RootSteps(V metres) {
   return hn::ConvertTo(DI(), hn::CopySign(hn::Add(whole, up), scaled));
 }
 
-// What is told of each joint is found first and written behind one another then. A joint waits long for its parent's
-// error: those that lie next to each other in the order are worked on together, which a machine does by itself.
+// Computes the numbers of all joints first and concatenates their bits afterwards. A joint needs
+// the error of its parent, which has a long latency. `plan.order` therefore puts joints of equal
+// depth next to each other, so that the processor overlaps their computation.
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
   const D d;
   const DI di;
@@ -110,12 +112,12 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
     auto fits = hn::Eq(one, one);
     for (std::size_t c = 0; c < 3; ++c) {
       const V metres = hn::LoadU(d, work.roots_m + c * kBlock + lane);
-      // False for what is no number as well.
+      // Written this way so that NaN does not fit.
       fits = hn::And(fits, hn::Le(hn::Abs(metres), hn::Set(d, kMaxRootM)));
       hn::StoreU(hn::BitCast(DU(), RootSteps(hn::IfThenElseZero(fits, metres))), DU(),
                  work.numbers + c * kBlock + lane);
     }
-    // Not 0 where a number needs more bits than it has.
+    // Not 0 in lanes where a number needs more bits than its code has.
     VI excess = hn::Zero(di);
     for (const std::size_t j : plan.order) {
       const CompactJoint& joint = plan.joints[j];
@@ -126,15 +128,15 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
       const float* rotation = work.rotations + 4 * j * kBlock + lane;
       Rotation q = {hn::LoadU(d, rotation), hn::LoadU(d, rotation + kBlock),
                     hn::LoadU(d, rotation + 2 * kBlock), hn::LoadU(d, rotation + 3 * kBlock)};
-      // Of a ranged joint no numbers are seen by its w as well.
+      // For other joints the comparison of w with least_w also rejects NaN.
       if (!work.are_unit || joint.smallest_three_bits > 0) {
         const V squared = hn::Add(Sum3(hn::Mul(q.x, q.x), hn::Mul(q.y, q.y), hn::Mul(q.z, q.z)),
                                   hn::Mul(q.w, q.w));
         fits = hn::And(fits, hn::Le(hn::Abs(hn::Sub(squared, one)), hn::Set(d, kUnitSquared)));
       }
-      if (joint.is_left_out) continue;
+      if (joint.is_omitted) continue;
       if (joint.parent >= 0) {
-        // e q, where e = (ex, ey, ez, 1): an angle of a thousandth or two.
+        // q = e q with e = (ex, ey, ez, 1), a rotation by one or two thousandths of a radian.
         const float* error =
             work.errors + static_cast<std::size_t>(joint.parent) * 3 * kBlock + lane;
         const V ex = hn::LoadU(d, error);
@@ -144,20 +146,20 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.x = hn::Add(p.x, hn::Sub(hn::Add(hn::Mul(ex, p.w), hn::Mul(ey, p.z)), hn::Mul(ez, p.y)));
         q.y = hn::Add(p.y, hn::Sub(hn::Add(hn::Mul(ey, p.w), hn::Mul(ez, p.x)), hn::Mul(ex, p.z)));
         q.z = hn::Add(p.z, hn::Sub(hn::Add(hn::Mul(ez, p.w), hn::Mul(ex, p.y)), hn::Mul(ey, p.x)));
-        // Of others w is not told, and what it is used for needs no more than two digits of it.
-        if (joint.smallest_three_bits > 0 || joint.is_turned) {
+        // Other joints do not encode w, and use it where two digits of precision are enough.
+        if (joint.smallest_three_bits > 0 || joint.has_reference) {
           q.w = hn::Sub(p.w, Sum3(hn::Mul(ex, p.x), hn::Mul(ey, p.y), hn::Mul(ez, p.z)));
         }
       }
       float* error = work.errors + j * 3 * kBlock + lane;
-      // From what is told to what is: the vector part of conj(told) q.
+      // The error is the vector part of conj(decoded) q.
       const auto keep_error = [&](Vector e) HWY_ATTR {
         hn::StoreU(e.x, d, error);
         hn::StoreU(e.y, d, error + kBlock);
         hn::StoreU(e.z, d, error + 2 * kBlock);
       };
       if (joint.smallest_three_bits > 0) {
-        // The smallest three, as quantise_kernel.cpp has them with 15 bits.
+        // "Smallest three" as in quantise_kernel.cpp, with a variable number of bits.
         V largest = q.x;
         VI index = hn::Zero(di);
         const auto take = [&](V component, int number) HWY_ATTR {
@@ -179,10 +181,10 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         const auto is_3 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 3)));
         const auto is_0_or_1 = hn::RebindMask(d, hn::Lt(index, hn::Set(di, 2)));
         const int most = (1 << (joint.smallest_three_bits - 1)) - 1;
-        const V to_steps = hn::Set(d, joint.steps[0]);
+        const V to_steps = hn::Set(d, joint.inverse_step[0]);
         const V to_number = hn::Set(d, joint.step[0]);
         keep(3, index);
-        const auto tell = [&](V component, std::size_t c) HWY_ATTR {
+        const auto encode = [&](V component, std::size_t c) HWY_ATTR {
           Steps steps = RoundToSteps(hn::Mul(component, to_steps));
           const V limit = hn::Set(d, static_cast<float>(most));
           steps.number = hn::Max(hn::Min(steps.number, limit), hn::Neg(limit));
@@ -190,18 +192,18 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
           keep(c, hn::Add(steps.integer, hn::Set(di, most + 1)));
           return hn::Mul(steps.number, to_number);
         };
-        const V a = tell(hn::IfThenElse(is_0, q.y, q.x), 0);
-        const V b = tell(hn::IfThenElse(is_0_or_1, q.z, q.y), 1);
-        const V c = tell(hn::IfThenElse(is_3, q.z, q.w), 2);
+        const V a = encode(hn::IfThenElse(is_0, q.y, q.x), 0);
+        const V b = encode(hn::IfThenElse(is_0_or_1, q.z, q.y), 1);
+        const V c = encode(hn::IfThenElse(is_3, q.z, q.w), 2);
         const V left = hn::Sqrt(
             hn::Max(hn::Zero(d), hn::Sub(one, Sum3(hn::Mul(a, a), hn::Mul(b, b), hn::Mul(c, c)))));
-        if (!joint.bears_others) continue;
-        const Rotation told = {
+        if (!joint.has_children) continue;
+        const Rotation decoded = {
             hn::IfThenElse(is_0, left, a), hn::IfThenElse(is_1, left, hn::IfThenElse(is_0, a, b)),
             hn::IfThenElse(is_2, left, hn::IfThenElse(is_3, c, b)), hn::IfThenElse(is_3, left, c)};
-        keep_error(ConjugateTimes(told, q));
+        keep_error(ConjugateTimes(decoded, q));
       } else {
-        if (joint.is_turned) {
+        if (joint.has_reference) {
           const Rotation r = {hn::Set(d, joint.reference[0]), hn::Set(d, joint.reference[1]),
                               hn::Set(d, joint.reference[2]), hn::Set(d, joint.reference[3])};
           const Vector v = ConjugateTimes(r, q);
@@ -215,20 +217,21 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         q.z = hn::Xor(sign, q.z);
         q.w = hn::Abs(q.w);
         fits = hn::And(fits, hn::Ge(q.w, hn::Set(d, joint.least_w)));
-        // What a component is more than what is told of it.
-        const auto tell = [&](V value, std::size_t c) HWY_ATTR {
+        // Stores the encoded component and returns its error.
+        const auto encode = [&](V value, std::size_t c) HWY_ATTR {
           const V steps =
-              hn::Mul(hn::Sub(value, hn::Set(d, joint.low[c])), hn::Set(d, joint.steps[c]));
-          const Steps told = RoundToSteps(steps);
-          excess = hn::Or(excess, hn::ShiftRightSame(told.integer, joint.bits[c]));
-          keep(c, told.integer);
-          return hn::Mul(hn::Sub(steps, told.number), hn::Set(d, joint.step[c]));
+              hn::Mul(hn::Sub(value, hn::Set(d, joint.low[c])), hn::Set(d, joint.inverse_step[c]));
+          const Steps rounded = RoundToSteps(steps);
+          excess = hn::Or(excess, hn::ShiftRightSame(rounded.integer, joint.bits[c]));
+          keep(c, rounded.integer);
+          return hn::Mul(hn::Sub(steps, rounded.number), hn::Set(d, joint.step[c]));
         };
-        const V dx = tell(q.x, 0);
-        const V dy = tell(q.y, 1);
-        const V dz = tell(q.z, 2);
-        if (!joint.bears_others) continue;
-        // With v = (x, y, z), told v - d and so w + v.d / w: w d + v (v.d) / w - v x d, but for what is as small as d d.
+        const V dx = encode(q.x, 0);
+        const V dy = encode(q.y, 1);
+        const V dz = encode(q.z, 2);
+        if (!joint.has_children) continue;
+        // The decoded vector part is v - d, with v = (x, y, z), so the decoded w is w + v.d / w. Up
+        // to terms of second order in d, the error is w d + v (v.d) / w - v x d.
         const V per_w = hn::Div(one, q.w);
         const V along = Sum3(hn::Mul(q.x, dx), hn::Mul(q.y, dy), hn::Mul(q.z, dz));
         const auto component = [&](V u, V v, V w, V du, V dv, V dw) HWY_ATTR {
@@ -241,8 +244,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
     }
     WriteWords(plan.parts, work.numbers + lane, work.words + 4 * lane);
     const auto is_exact = hn::RebindMask(d, hn::Eq(excess, hn::Zero(di)));
-    const VI told = hn::IfThenElseZero(hn::RebindMask(di, hn::And(fits, is_exact)), hn::Set(di, 1));
-    hn::StoreU(hn::BitCast(DU(), told), DU(), work.fits + lane);
+    const VI fit = hn::IfThenElseZero(hn::RebindMask(di, hn::And(fits, is_exact)), hn::Set(di, 1));
+    hn::StoreU(hn::BitCast(DU(), fit), DU(), work.fits + lane);
   }
 }
 

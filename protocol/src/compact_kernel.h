@@ -8,33 +8,34 @@
 
 namespace stridewire::protocol {
 
-/// Rows of a pose's numbers: the root's three, a 0, then four of each joint.
+/// Rows of the numbers of a pose: three for the root, one that is 0, then four per joint.
 inline constexpr std::uint16_t kZeroRow = 3;
 inline constexpr std::size_t kJointRows = 4;
 
-/// How poses are encoded.
+/// The constant inputs of the encoder.
 struct CompactPlan {
   std::span<const CompactJoint> joints;
-  std::span<const std::uint16_t> order;  // Of all joints: each behind its parent.
-  std::span<const CompactPart> parts;    // Of words that come in fours.
+  std::span<const std::uint16_t> order;  // All joints, each after its parent.
+  std::span<const CompactPart> parts;    // Parts of a multiple of four words.
 };
 
-/// A block of CompactCodec::kBlock poses: arrays as in CompactCodec::Block.
+/// A block of CompactCodec::kBlock poses. The arrays are those of CompactCodec::Block.
 struct CompactWork {
-  std::size_t count;       // The first poses; others mean nothing.
-  bool are_unit;           // CompactCodec::Lanes::are_unit
+  std::size_t count;       // Number of valid poses.
+  bool are_unit;           // CompactCodec::SoaPoses::are_unit
   const float* roots_m;    // [x y z][pose]
   const float* rotations;  // [joint][x y z w][pose]
   float* errors;           // [joint][x y z][pose]
   std::uint32_t* numbers;  // [CompactPart::row][pose]
   std::uint32_t* words;    // [word / 4][pose][word % 4]
-  std::uint32_t* fits;     // [pose]: not 0
+  std::uint32_t* fits;     // [pose]: 1 if the pose fits, else 0
 };
 
-/// Vectors of any width (Google Highway) give the same bytes.
+/// Encodes a block. The bytes do not depend on the vector width of the machine (Google Highway).
 void EncodeCompact(const CompactPlan& plan, const CompactWork& work);
 
-/// Copies the words of one pose, four after four, past the caches. `to` is a multiple of 16.
+/// Copies the words of one pose in groups of four with non-temporal stores. `to` is aligned to 16
+/// bytes.
 void StreamWords(const std::uint32_t* words, std::size_t fours, std::byte* to);
 
 }  // namespace stridewire::protocol

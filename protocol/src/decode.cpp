@@ -13,13 +13,14 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "batches are read in place");
 
-// Tables a payload may hold, itself included. A little above the real counts, so that a list one
-// too long is told as such; far above stops the verifier.
+// Largest number of tables in a payload. It exceeds the valid counts a little, so that a list that
+// is slightly too long gets its own error. Beyond it the verifier fails.
 constexpr std::size_t kFewTables = 1024;
 constexpr std::size_t kCrowdTables = kMaxItems + 1024;
 
-/// Copies a message out of verified bytes. Lengths are looked at before anything is copied: a
-/// FlatBuffers message may name the same bytes many times and so be larger than itself.
+/// Copies a message from verified bytes. It checks lengths before it copies, because many
+/// FlatBuffers offsets can refer to the same bytes, so that the decoded message is larger than its
+/// payload.
 class Unpacker {
  public:
   [[nodiscard]] std::optional<Error>& error() { return error_; }
@@ -28,12 +29,12 @@ class Unpacker {
     if (!error_) error_ = stridewire::Error{code, text, index, field};
   }
 
-  /// Number of entries to read: 0 if there is no list, or if it is too long or lies crooked, which
-  /// are errors.
+  /// Returns the number of entries to read. Without a list it is 0. A list that is too long or not
+  /// aligned is an error and also yields 0.
   template <typename T>
   std::size_t Count(const flatbuffers::Vector<T>* list, std::size_t max, const char* field) {
     if (list == nullptr) return 0;
-    // The verifier looks only at where the length stands, which is aligned to 4 bytes.
+    // The verifier checks only the alignment of the length field, which is 4 bytes.
     if (reinterpret_cast<std::uintptr_t>(list->Data()) % alignof(std::remove_pointer_t<T>) != 0) {
       Wrong(ErrorCode::kMalformed, "list is not aligned", field);
       return 0;
@@ -103,7 +104,6 @@ void Unpack(Unpacker& u, const wire::Hello& w, Hello& m) {
   m.protocol_min = w.protocol_min();
   m.protocol_max = w.protocol_max();
   u.Text(w.client_name(), kMaxNameBytes, m.client_name, "Hello.client_name");
-  m.features = w.features();
   u.Text(w.auth_token(), kMaxAuthTokenBytes, m.auth_token, "Hello.auth_token");
   u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Hello.resume_token", m.resume_token);
   m.last_events_number = w.last_events_number();
@@ -162,7 +162,7 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
     case wire::MovementType::Walk: {
       WalkMovement walk;
       if (w.at_m() == nullptr || !w.heading_rad()) {
-        u.Wrong(ErrorCode::kMalformed, "a walk without a goal", type_field,
+        u.Wrong(ErrorCode::kMalformed, "a walk without at_m or heading_rad", type_field,
                 static_cast<std::int64_t>(index));
         break;
       }
@@ -250,7 +250,6 @@ void Unpack(Unpacker& u, const wire::Goodbye& w, Goodbye& m) {
 
 void Unpack(Unpacker& u, const wire::Welcome& w, Welcome& m) {
   m.protocol = w.protocol();
-  m.features = w.features();
   m.session = w.session();
   u.Bytes(w.resume_token(), kMaxResumeTokenBytes, "Welcome.resume_token", m.resume_token);
   m.resumed = w.resumed();
@@ -283,7 +282,7 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
   m.tick = w.tick();
   u.Text(w.library_hash(), kMaxNameBytes, m.library_hash, "WorldInfo.library_hash");
   const auto* skeleton = w.skeleton();
-  if (skeleton == nullptr) return;  // Check tells that there is no joint.
+  if (skeleton == nullptr) return;  // Check reports the missing joints.
   m.skeleton.joints.resize(u.Count(skeleton->joints(), kMaxJoints, "WorldInfo.skeleton.joints"));
   for (std::size_t j = 0; j < m.skeleton.joints.size(); ++j) {
     const auto* from = skeleton->joints()->Get(static_cast<flatbuffers::uoffset_t>(j));
@@ -319,9 +318,9 @@ void Unpack(Unpacker& u, const wire::WorldInfo& w, WorldInfo& m) {
         .smallest_three_bits = from.free_bits(),
         .least_w = from.least_w()};
   }
-  m.fewer_joints.resize(u.Count(w.fewer_joints(), kMaxJoints, "WorldInfo.fewer_joints"));
-  for (std::size_t i = 0; i < m.fewer_joints.size(); ++i) {
-    m.fewer_joints[i] = w.fewer_joints()->Get(static_cast<flatbuffers::uoffset_t>(i));
+  m.reduced_joints.resize(u.Count(w.fewer_joints(), kMaxJoints, "WorldInfo.fewer_joints"));
+  for (std::size_t i = 0; i < m.reduced_joints.size(); ++i) {
+    m.reduced_joints[i] = w.fewer_joints()->Get(static_cast<flatbuffers::uoffset_t>(i));
   }
 }
 
@@ -449,7 +448,7 @@ void Unpack(Unpacker& u, const wire::AvatarState& w, AvatarState& m) {
     Unpack(u, *w.queue()->Get(static_cast<flatbuffers::uoffset_t>(i)), m.queue[i],
            "AvatarState.queue.type", i);
   }
-  m.is_planting_off = w.planting_off();
+  m.planting_enabled = !w.planting_off();
   m.layers.resize(u.Count(w.layers(), kMaxPlayingLayers, "AvatarState.layers"));
   for (std::size_t i = 0; i < m.layers.size(); ++i) {
     const auto* from = w.layers()->Get(static_cast<flatbuffers::uoffset_t>(i));
@@ -498,7 +497,7 @@ void Unpack(Unpacker& u, const wire::SetLayers& w, SetLayers& m) {
     item.avatar = from->avatar();
     u.Text(from->layer(), kMaxNameBytes, item.layer, "SetLayers.layer",
            static_cast<std::int64_t>(i));
-    item.is_off = from->off();
+    item.fade_out = from->off();
     item.weight = from->weight();
     item.blend_s = from->blend_s();
     item.speed = from->speed();
@@ -509,7 +508,7 @@ void Unpack(Unpacker& u, const wire::SetPlanting& w, SetPlanting& m) {
   m.seq = w.seq();
   m.world = w.world();
   u.Avatars(w.avatars(), "SetPlanting.avatars", m.avatars);
-  m.is_off = w.off();
+  m.enabled = !w.off();
 }
 
 void Unpack(Unpacker& u, const wire::WorldTerrain& w, WorldTerrain& m) {
@@ -559,7 +558,7 @@ Expected<Message> Decode(std::span<const std::byte> payload) {
   const auto* bytes = reinterpret_cast<const std::uint8_t*>(payload.data());
   flatbuffers::Verifier verifier(bytes, payload.size(), options);
   if (!verifier.VerifyBuffer<Wire>(nullptr)) {
-    return Fail(ErrorCode::kMalformed, "payload is not a well-formed FlatBuffers message",
+    return Fail(ErrorCode::kMalformed, "the payload is not a valid FlatBuffers message",
                 std::string(MessageTypeName(T::kType)));
   }
   T message;
@@ -574,10 +573,10 @@ Expected<Message> Decode(std::span<const std::byte> payload) {
 
 Expected<Message> DecodeMessage(const FrameView& frame) {
   if (reinterpret_cast<std::uintptr_t>(frame.payload.data()) % kPayloadAlignment != 0) {
-    return Fail(ErrorCode::kInvalidArgument, "payload does not begin on a multiple of 8 bytes");
+    return Fail(ErrorCode::kInvalidArgument, "the payload is not aligned to 8 bytes");
   }
   if (frame.payload.size() > MaxPayloadBytes(frame.type)) {
-    return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
+    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the cap of its type",
                 std::string(MessageTypeName(frame.type)),
                 static_cast<std::int64_t>(frame.payload.size()));
   }

@@ -9,7 +9,7 @@ namespace {
 using flatbuffers::FlatBufferBuilder;
 using flatbuffers::Offset;
 
-// A builder that grew beyond this for one message gives its memory back.
+// A builder with a larger buffer frees it after the message.
 constexpr std::size_t kKeptBuilderBytes = std::size_t{1} << 20;
 
 wire::Vec3 ToWire(const DVec3& v) { return {v.x, v.y, v.z}; }
@@ -21,7 +21,7 @@ Offset<flatbuffers::Vector<std::uint8_t>> Bytes(FlatBufferBuilder& b,
   return b.CreateVector(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
 }
 
-// Left out when empty.
+// Omits an empty text.
 Offset<flatbuffers::String> Text(FlatBufferBuilder& b, const std::string& text) {
   return text.empty() ? Offset<flatbuffers::String>() : b.CreateString(text);
 }
@@ -31,7 +31,7 @@ Offset<wire::Hello> Build(FlatBufferBuilder& b, const Hello& m) {
   const auto auth = Text(b, m.auth_token);
   const auto resume = m.resume_token.empty() ? Offset<flatbuffers::Vector<std::uint8_t>>()
                                              : Bytes(b, m.resume_token);
-  return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, m.features, auth, resume,
+  return wire::CreateHello(b, m.protocol_min, m.protocol_max, name, auth, resume,
                            m.last_events_number);
 }
 
@@ -57,7 +57,7 @@ Offset<wire::Remove> Build(FlatBufferBuilder& b, const Remove& m) {
   return wire::CreateRemove(b, m.seq, m.world, b.CreateVector(m.avatars));
 }
 
-// Every type of movement uses some of the fields. flatbuffers::Optional is std::optional.
+// Each type of movement uses some of the fields. flatbuffers::Optional is std::optional.
 Offset<wire::RequestItem> Build(FlatBufferBuilder& b, const RequestItem& item) {
   auto type = wire::MovementType::Stand;
   auto foot = wire::FootChoice::Auto;
@@ -167,8 +167,8 @@ Offset<wire::Welcome> Build(FlatBufferBuilder& b, const Welcome& m) {
                                             : Bytes(b, m.resume_token);
   const auto name = Text(b, m.server_name);
   const auto version = Text(b, m.server_version);
-  return wire::CreateWelcome(b, m.protocol, m.features, m.session, token, m.resumed, m.last_seq,
-                             m.tick_hz, name, version, limits);
+  return wire::CreateWelcome(b, m.protocol, m.session, token, m.resumed, m.last_seq, m.tick_hz,
+                             name, version, limits);
 }
 
 Offset<wire::Leg> Build(FlatBufferBuilder& b, const LegInfo& leg) {
@@ -209,12 +209,13 @@ Offset<wire::WorldInfo> Build(FlatBufferBuilder& b, const WorldInfo& m) {
   for (const RotationQuantization& code : m.rotation_codes) {
     const Quat& q = code.reference;
     code_list.emplace_back(wire::Rotation(q.x, q.y, q.z, q.w), ToWire(code.low), ToWire(code.step),
-                           code.least_w, code.bits[0], code.bits[1], code.bits[2], code.smallest_three_bits);
+                           code.least_w, code.bits[0], code.bits[1], code.bits[2],
+                           code.smallest_three_bits);
   }
   const auto codes = code_list.empty() ? Offset<flatbuffers::Vector<const wire::RotationCode*>>()
                                        : b.CreateVectorOfStructs(code_list);
-  const auto fewer = m.fewer_joints.empty() ? Offset<flatbuffers::Vector<std::uint16_t>>()
-                                            : b.CreateVector(m.fewer_joints);
+  const auto fewer = m.reduced_joints.empty() ? Offset<flatbuffers::Vector<std::uint16_t>>()
+                                              : b.CreateVector(m.reduced_joints);
   return wire::CreateWorldInfo(b, m.seq, m.world, name, static_cast<wire::Role>(m.role), m.tick,
                                hash, skeleton, layers, codes, fewer);
 }
@@ -223,7 +224,7 @@ Offset<wire::Reply> Build(FlatBufferBuilder& b, const Reply& m) {
   std::vector<Offset<wire::ReplyItem>> items;
   items.reserve(m.items.size());
   for (const ReplyItem& item : m.items) {
-    // Thousands of items are refused for the same reason: say it once.
+    // Thousands of items can have the same text, so equal texts are stored once.
     const auto text =
         item.text.empty() ? Offset<flatbuffers::String>() : b.CreateSharedString(item.text);
     items.push_back(wire::CreateReplyItem(b, item.index, item.avatar, item.request_id,
@@ -323,7 +324,7 @@ Offset<wire::AvatarState> Build(FlatBufferBuilder& b, const AvatarState& m) {
   const wire::Vec3 base = ToWire(m.base.position_m);
   return wire::CreateAvatarState(b, m.nonce, m.world, m.avatar, ToWire(m.code), text, m.tick,
                                  m.server_time_s, &base, m.base.heading_rad, movement, m.queue_size,
-                                 queue_offset, m.is_planting_off, layers_offset);
+                                 queue_offset, !m.planting_enabled, layers_offset);
 }
 
 Offset<wire::Terrain> Build(FlatBufferBuilder& b, const std::optional<TerrainInfo>& terrain) {
@@ -354,15 +355,15 @@ Offset<wire::SetLayers> Build(FlatBufferBuilder& b, const SetLayers& m) {
   std::vector<Offset<wire::LayerItem>> items;
   items.reserve(m.items.size());
   for (const LayerItem& item : m.items) {
-    // A crowd waves by one name.
+    // All avatars of a crowd can play the same layer, so equal names are stored once.
     items.push_back(wire::CreateLayerItem(b, item.avatar, b.CreateSharedString(item.layer),
-                                          item.is_off, item.weight, item.blend_s, item.speed));
+                                          item.fade_out, item.weight, item.blend_s, item.speed));
   }
   return wire::CreateSetLayers(b, m.seq, m.world, b.CreateVector(items));
 }
 
 Offset<wire::SetPlanting> Build(FlatBufferBuilder& b, const SetPlanting& m) {
-  return wire::CreateSetPlanting(b, m.seq, m.world, b.CreateVector(m.avatars), m.is_off);
+  return wire::CreateSetPlanting(b, m.seq, m.world, b.CreateVector(m.avatars), !m.enabled);
 }
 
 Offset<wire::WorldTerrain> Build(FlatBufferBuilder& b, const WorldTerrain& m) {
@@ -376,7 +377,7 @@ Offset<wire::FetchLibrary> Build(FlatBufferBuilder& b, const FetchLibrary& m) {
 Offset<wire::Movements> Build(FlatBufferBuilder& b, const Movements& m) {
   Offset<flatbuffers::Vector<std::uint8_t>> records, flags;
   Offset<flatbuffers::Vector<std::uint32_t>> ends, avatars;
-  if (!m.avatars.empty()) {  // Most steps of a small crowd have none.
+  if (!m.avatars.empty()) {  // Most steps of a small crowd have no changes.
     records = Bytes(b, m.records);
     ends = b.CreateVector(m.ends);
     flags = b.CreateVector(m.flags);

@@ -7,7 +7,7 @@
 namespace stridewire::protocol {
 namespace {
 
-// The wire is little-endian and is read in place.
+// Messages are little-endian and are read in place.
 static_assert(std::endian::native == std::endian::little);
 
 template <typename T>

@@ -7,28 +7,31 @@
 
 namespace stridewire::protocol {
 
-/// Appends header, the finished FlatBuffers message in `builder` and its padding to `frame`.
-/// kLimitExceeded: longer than the type may be; `frame` is left as it was.
+/// Appends a header, the finished FlatBuffers message in `builder` and its padding to `frame`.
+/// Fails with kLimitExceeded if the message exceeds the cap of its type, and then leaves `frame`
+/// unchanged.
 [[nodiscard]] Status AppendFrame(const flatbuffers::FlatBufferBuilder& builder, MessageType type,
                                  const FrameLimits& limits, std::vector<std::byte>& frame);
 
-/// The same in parts, for a message of `size` bytes some of which are not in a builder: BeginFrame appends the header and makes
-/// room for the rest, the caller appends the message, EndFrame its padding.
+/// Same as AppendFrame for a message of `size` bytes that is not completely in a builder.
+/// BeginFrame appends the header and reserves memory, the caller appends the message, and EndFrame
+/// the padding.
 [[nodiscard]] Status BeginFrame(std::size_t size, MessageType type, const FrameLimits& limits,
                                 std::vector<std::byte>& frame);
 void EndFrame(std::size_t size, std::vector<std::byte>& frame);
 
-/// Table, vtable, vector lengths and padding of a batch stay below this.
+/// Upper bound of the bytes of a batch besides its lists: table, vtable, vector lengths and
+/// padding.
 inline constexpr std::size_t kPoseBatchOverheadBytes = 128;
 
-/// The table of a batch whose lists are in `builder` already.
+/// Builds the table of a batch whose lists are already in `builder`.
 [[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
     flatbuffers::FlatBufferBuilder& builder, const PoseBatchInfo& info,
     flatbuffers::Offset<flatbuffers::Vector<std::uint32_t>> avatars,
     flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> flags,
     flatbuffers::Offset<flatbuffers::Vector<std::uint8_t>> poses);
 
-/// The table of a batch; the spans are copied into `builder`.
+/// Copies the lists of a batch into `builder` and builds its table.
 [[nodiscard]] flatbuffers::Offset<wire::PoseBatch> BuildPoseBatch(
     flatbuffers::FlatBufferBuilder& builder, const PoseBatch& batch);
 

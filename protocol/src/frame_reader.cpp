@@ -5,7 +5,7 @@
 namespace stridewire::protocol {
 namespace {
 
-// What a reader keeps for the next frame even if that turns out small.
+// A larger buffer is freed after its frame, because the next frame may be small.
 constexpr std::size_t kKeptBytes = std::size_t{1} << 20;
 constexpr std::size_t kFirstBytes = 4096;
 
@@ -44,7 +44,8 @@ Expected<std::optional<FrameView>> FrameReader::Next(std::span<const std::byte>&
     }
   }
 
-  // Memory follows what arrived, not what was announced: doubled, and never past the frame's end.
+  // The buffer grows with the received bytes, not with the announced length: it doubles, up to the
+  // end of the frame.
   const auto take = [&](std::size_t until) {
     const std::size_t count = std::min(until - buffer_.size(), bytes.size());
     const std::size_t needed = buffer_.size() + count;

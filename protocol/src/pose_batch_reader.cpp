@@ -5,7 +5,7 @@ namespace stridewire::protocol {
 std::span<const std::byte> PoseBatchReader::Next() {
   const PoseBatchInfo& info = batch_.info;
   mode_ = info.mode;
-  if (IsCompact(mode_) && (batch_.flags[index_] & kPoseWide) != 0) {
+  if (IsCompact(mode_) && (batch_.flags[index_] & kPoseUncompressed) != 0) {
     mode_ = PoseMode::kQuantised;
   }
   ++index_;
@@ -18,7 +18,7 @@ std::span<const std::byte> PoseBatchReader::Next() {
 Status PoseBatchReader::Decode(Vec3& root_position_m, std::span<Quat> rotations) const {
   if (!IsCompact(mode_)) return DecodePose(mode_, pose_, root_position_m, rotations);
   if (codec_ == nullptr) {
-    return Fail(ErrorCode::kUnsupported, "compact poses of a world without codes");
+    return Fail(ErrorCode::kUnsupported, "the world has no codec for compact poses");
   }
   return codec_->Decode(pose_, root_position_m, rotations);
 }

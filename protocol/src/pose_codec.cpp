@@ -20,21 +20,21 @@ constexpr int kZero = 16384;
 constexpr std::uint16_t kComponentMask = 0x7fff;
 constexpr std::uint16_t kHighBit = 0x8000;
 
-// The sum of the squares of the three smaller components is at most 3/4 and a little for rounding.
+// The squares of the three smaller components sum to at most 3/4, plus a margin for rounding.
 constexpr float kMaxThreeSquared = 0.7502f;
 
 bool IsFinite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// False for NaN as well. |q|^2 in (1 - t)^2 .. (1 + t)^2.
+// Checks that |q|^2 is within (1 - t)^2 to (1 + t)^2. Rejects NaN.
 bool IsUnit(const Quat& q) {
   const float squared = Dot(q, q);
   return squared >= (1.0f - kUnitTolerance) * (1.0f - kUnitTolerance) &&
          squared <= (1.0f + kUnitTolerance) * (1.0f + kUnitTolerance);
 }
 
-// False for bits that no encoder writes.
+// Returns false for bits that no encoder writes.
 bool DecodeSmallestThree(const std::byte* in, Quat& q) {
   std::array<std::uint16_t, 3> words;
   std::memcpy(words.data(), in, 6);
@@ -47,7 +47,7 @@ bool DecodeSmallestThree(const std::byte* in, Quat& q) {
     const int bits = words[k] & kComponentMask;
     zero |= bits == 0;
     const float value = static_cast<float>(bits - kZero) / (kSqrt2 * kComponentSteps);
-    c[kStaying[largest][k]] = value;
+    c[kKept[largest][k]] = value;
     squared += value * value;
   }
   if (zero || squared > kMaxThreeSquared) return false;
@@ -61,10 +61,10 @@ bool DecodeSmallestThree(const std::byte* in, Quat& q) {
 Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Quat> rotations,
                   std::span<std::byte> out) {
   if (mode != PoseMode::kFull && mode != PoseMode::kQuantised) {
-    return Fail(ErrorCode::kUnsupported, "no pose is sent in this mode");
+    return Fail(ErrorCode::kUnsupported, "poses of this mode have no fixed layout");
   }
   if (out.size() != PoseBytes(mode, rotations.size())) {
-    return Fail(ErrorCode::kShapeMismatch, "space for a pose has another size",
+    return Fail(ErrorCode::kShapeMismatch, "the output has the wrong size for a pose",
                 static_cast<std::int64_t>(out.size()));
   }
   if (!IsFinite(root_position_m)) {
@@ -89,14 +89,14 @@ Status EncodePose(PoseMode mode, const Vec3& root_position_m, std::span<const Qu
     if (std::abs(root_position_m[i]) > kMaxRootM) {
       return Fail(ErrorCode::kOutOfRange, "root is too far from the world's origin", i);
     }
-    // Exact in double: a float times a power of two.
+    // The product is exact in double because the factor is a power of two.
     root[static_cast<std::size_t>(i)] = static_cast<std::int32_t>(
         std::round(static_cast<double>(root_position_m[i]) * kRootStepsPerM));
   }
   std::memcpy(out.data(), root.data(), 12);
   if (rotations.empty()) return {};
-  const std::size_t sound = QuantiseRotations(&rotations[0].x, rotations.size(), out.data() + 12);
-  if (sound < rotations.size()) return not_unit(sound);
+  const std::size_t valid = QuantiseRotations(&rotations[0].x, rotations.size(), out.data() + 12);
+  if (valid < rotations.size()) return not_unit(valid);
   return {};
 }
 
@@ -117,10 +117,10 @@ Status DecodeRoot(std::span<const std::byte, 12> in, Vec3& root_position_m) {
 Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
                   std::span<Quat> rotations) {
   if (mode != PoseMode::kFull && mode != PoseMode::kQuantised) {
-    return Fail(ErrorCode::kUnsupported, "no pose is sent in this mode");
+    return Fail(ErrorCode::kUnsupported, "poses of this mode have no fixed layout");
   }
   if (in.size() != PoseBytes(mode, rotations.size())) {
-    return Fail(ErrorCode::kShapeMismatch, "bytes of a pose have another size",
+    return Fail(ErrorCode::kShapeMismatch, "the input has the wrong size for a pose",
                 static_cast<std::int64_t>(in.size()));
   }
   if (mode == PoseMode::kFull) {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "frame_builder.h"
 #include "base/check.h"
 #include "base/prefetch.h"
+#include "frame_builder.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::protocol {
@@ -21,8 +21,8 @@ Status PoseRows::Begin(const PoseBatchInfo& info, Avatars avatars, const Compact
   begins_.assign(1, 0);
   pose_count_ = 0;
   if (IsCompact(info.mode) && (codec == nullptr || codec->joint_count() != info.joint_count)) {
-    return Fail(ErrorCode::kInvalidArgument, "compact poses without the codec of their joints",
-                "PoseBatch.mode");
+    return Fail(ErrorCode::kInvalidArgument,
+                "a compact mode needs a codec with the same number of joints", "PoseBatch.mode");
   }
   return Check(PoseBatch{info, {}, {}, {}});
 }
@@ -31,8 +31,8 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
                      std::span<const Quat> rotations) {
   AddEncoded(flags, false, {});
   if (rotations.size() != info_.joint_count) {
-    return Fail(ErrorCode::kShapeMismatch, "pose has another number of joints", "PoseBatch.poses",
-                static_cast<std::int64_t>(rotations.size()));
+    return Fail(ErrorCode::kShapeMismatch, "the pose has another number of joints",
+                "PoseBatch.poses", static_cast<std::int64_t>(rotations.size()));
   }
   const std::size_t begin = begins_.back();
   PoseMode mode = info_.mode;
@@ -45,7 +45,7 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
       length = codec_->pose_bytes();
       block_.CopyBytes(0, Room(begin, length));
     } else {
-      flags_.back() |= kPoseWide;
+      flags_.back() |= kPoseUncompressed;
       mode = PoseMode::kQuantised;
     }
   }
@@ -59,11 +59,12 @@ Status PoseRows::Add(std::uint8_t flags, const Vec3& root_position_m,
   return {};
 }
 
-void PoseRows::AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std::byte> pose) {
+void PoseRows::AddEncoded(std::uint8_t flags, bool is_uncompressed,
+                          std::span<const std::byte> pose) {
   STRIDEWIRE_CHECK(size() < avatars_->size());
   const std::size_t begin = begins_.back();
-  if (IsCompact(info_.mode)) flags &= static_cast<std::uint8_t>(~kPoseWide);
-  flags_.push_back(is_wide ? flags | kPoseWide : flags);
+  if (IsCompact(info_.mode)) flags &= static_cast<std::uint8_t>(~kPoseUncompressed);
+  flags_.push_back(is_uncompressed ? flags | kPoseUncompressed : flags);
   begins_.push_back(begin + pose.size());
   if (pose.empty()) return;
   std::ranges::copy(pose, Room(begin, pose.size()).begin());
@@ -72,7 +73,7 @@ void PoseRows::AddEncoded(std::uint8_t flags, bool is_wide, std::span<const std:
 
 std::span<std::byte> PoseRows::Room(std::size_t begin, std::size_t length) {
   if (bytes_.size() < begin + length) {
-    // By an eighth: of many they are megabytes.
+    // Grow by an eighth only, because the poses of a crowd take megabytes.
     const std::size_t room = std::max(begin + length, bytes_.size() + bytes_.size() / 8);
     bytes_.reserve(room);
     bytes_.resize(room);
@@ -89,7 +90,8 @@ void PoseRows::SkipTo(std::size_t row) {
 
 namespace {
 
-// Rows that follow each other are copied at once. The processor fetches ahead within them, not to the next one picked.
+// Copies consecutive rows in one go. The processor prefetches within a run of rows, but not from
+// one run to the next, so this function does.
 void AppendPoses(const PoseRows& rows, std::span<const std::uint32_t> picked,
                  std::vector<std::byte>& frame) {
   constexpr std::size_t kAhead = 4;
@@ -121,8 +123,8 @@ PoseBatchComposer::~PoseBatchComposer() = default;
 PoseBatchComposer::PoseBatchComposer(PoseBatchComposer&&) noexcept = default;
 PoseBatchComposer& PoseBatchComposer::operator=(PoseBatchComposer&&) noexcept = default;
 
-std::size_t PoseBatchComposer::Fitting(const PoseRows& rows,
-                                       std::span<const std::uint32_t> picked) const {
+std::size_t PoseBatchComposer::CountThatFit(const PoseRows& rows,
+                                            std::span<const std::uint32_t> picked) const {
   const std::size_t room = MaxPayloadBytes(MessageType::kPoseBatch, impl_->limits);
   std::size_t used = kPoseBatchOverheadBytes;
   std::size_t poses = 0;
@@ -150,7 +152,8 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
 
   flatbuffers::FlatBufferBuilder& builder = impl_->builder;
   builder.Clear();
-  // The builder only makes room for the poses, at the end of the payload: they are copied once, into the frame.
+  // The builder only reserves space for the poses, at the end of the payload. They are copied once,
+  // directly into the frame.
   std::uint8_t* poses = nullptr;
   const auto poses_offset = builder.CreateUninitializedVector<std::uint8_t>(length, &poses);
   std::uint8_t* flags = nullptr;
@@ -171,7 +174,8 @@ Status PoseBatchComposer::Compose(const PoseRows& rows, std::span<const std::uin
   const Status begun = BeginFrame(size, MessageType::kPoseBatch, impl_->limits, frame);
   if (!begun) return begun;
   const auto* payload = reinterpret_cast<const std::byte*>(builder.GetBufferPointer());
-  // An offset leads back from the end, to the vector's length before its bytes.
+  // The offset counts from the end of the payload to the length of the vector, which precedes its
+  // bytes.
   const std::byte* room = payload + size - poses_offset.o + sizeof(flatbuffers::uoffset_t);
   frame.insert(frame.end(), payload, room);
   AppendPoses(rows, picked, frame);

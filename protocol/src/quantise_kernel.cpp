@@ -9,7 +9,7 @@
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "quantise_kernel.cpp"
 #include "hwy/foreach_target.h"
-// Behind foreach_target.h, which includes this file once for each instruction set.
+// Must follow foreach_target.h, which includes this file once per instruction set.
 #include "hwy/highway.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -32,7 +32,7 @@ std::size_t QuantiseRotations(const float* quaternions, std::size_t count, std::
     const std::size_t left = count - i < width ? count - i : width;
     const float* from = quaternions + 4 * i;
     if (left < width) {
-      // Missing lanes are (1, 1, 1, 1) / 2: of unit length.
+      // Fill unused lanes with the unit quaternion (1, 1, 1, 1) / 2.
       for (std::size_t k = 4 * left; k < 4 * width; ++k) in[k] = 0.5f;
       std::memcpy(in, from, 4 * left * sizeof(float));
       from = in;
@@ -43,7 +43,7 @@ std::size_t QuantiseRotations(const float* quaternions, std::size_t count, std::
         hn::Add(hn::Add(hn::Add(hn::Mul(x, x), hn::Mul(y, y)), hn::Mul(z, z)), hn::Mul(w, w));
     constexpr float kLow = (1.0f - kUnitTolerance) * (1.0f - kUnitTolerance);
     constexpr float kHigh = (1.0f + kUnitTolerance) * (1.0f + kUnitTolerance);
-    // False for what is no number as well.
+    // Written this way so that NaN is rejected.
     const auto is_unit =
         hn::And(hn::Ge(squared, hn::Set(d, kLow)), hn::Le(squared, hn::Set(d, kHigh)));
     if (!hn::AllTrue(d, is_unit)) {
@@ -66,7 +66,7 @@ std::size_t QuantiseRotations(const float* quaternions, std::size_t count, std::
     const auto is_3 = hn::RebindMask(d, hn::Eq(index, hn::Set(di, 3)));
     const auto is_0_or_1 = hn::RebindMask(d, hn::Lt(index, hn::Set(di, 2)));
     const auto steps = [&](hn::Vec<decltype(d)> component) HWY_ATTR {
-      // Never negative, so that cutting off the fraction rounds.
+      // The value is not negative, so truncation rounds down.
       const auto value = hn::ConvertTo(
           di, hn::Add(hn::Mul(component, scale), hn::Set(d, static_cast<float>(kZero) + 0.5f)));
       return hn::Min(hn::Max(value, hn::Set(di, 1)), hn::Set(di, 2 * kZero - 1));

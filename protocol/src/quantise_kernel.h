@@ -4,9 +4,10 @@
 
 namespace stridewire::protocol {
 
-/// Writes `count` quaternions (x y z w, one behind the other) as the "smallest three" of pose_codec.h, 6 bytes each.
-/// Returns the index of the first that is not of unit length within kUnitTolerance, or `count`; from there on what was
-/// written is unspecified. Vectors of any width (Google Highway) give the same bytes.
+/// Encodes `count` quaternions (x, y, z, w each) as "smallest three" (pose_codec.h), 6 bytes per
+/// quaternion. Stops at the first quaternion whose length deviates from 1 by more than
+/// kUnitTolerance and returns its index, or returns `count`. Bytes from that index on are
+/// unspecified. The bytes do not depend on the vector width of the machine (Google Highway).
 [[nodiscard]] std::size_t QuantiseRotations(const float* quaternions, std::size_t count,
                                             std::byte* out);
 

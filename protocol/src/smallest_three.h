@@ -4,9 +4,9 @@
 
 namespace stridewire::protocol {
 
-/// What both codecs of the smallest three components share.
+/// Scales the three smaller components, which are at most 1 / sqrt(2), to the range -1 to 1.
 inline constexpr float kSqrt2 = 1.41421356237309505f;
-/// The components that stay when one is left out.
-inline constexpr std::size_t kStaying[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
+/// kKept[i] are the components that are stored if component i is dropped.
+inline constexpr std::size_t kKept[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
 
 }  // namespace stridewire::protocol

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "sample_messages.h"
 #include "base/check.h"
+#include "sample_messages.h"
 #include "stridewire/protocol/pose_batch_reader.h"
 
 namespace stridewire::protocol {
@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string Wide(std::uint64_t value) { return std::to_string(value); }
+std::string Decimal(std::uint64_t value) { return std::to_string(value); }
 
 template <typename E>
 int Number(E e) {
@@ -34,20 +34,17 @@ std::string Hex(const std::vector<std::byte>& bytes) {
 }
 
 Json Fields(const Hello& m) {
-  return {{"protocol_min", m.protocol_min},
-          {"protocol_max", m.protocol_max},
-          {"client_name", m.client_name},
-          {"features", Wide(m.features)},
-          {"auth_token", m.auth_token},
-          {"resume_token", Hex(m.resume_token)},
-          {"last_events_number", Wide(m.last_events_number)}};
+  return {
+      {"protocol_min", m.protocol_min},      {"protocol_max", m.protocol_max},
+      {"client_name", m.client_name},        {"auth_token", m.auth_token},
+      {"resume_token", Hex(m.resume_token)}, {"last_events_number", Decimal(m.last_events_number)}};
 }
 
 Json Fields(const JoinWorld& m) {
-  return {{"seq", Wide(m.seq)}, {"name", m.name}, {"role", Number(m.role)}};
+  return {{"seq", Decimal(m.seq)}, {"name", m.name}, {"role", Number(m.role)}};
 }
 
-Json Fields(const LeaveWorld& m) { return {{"seq", Wide(m.seq)}, {"world", m.world}}; }
+Json Fields(const LeaveWorld& m) { return {{"seq", Decimal(m.seq)}, {"world", m.world}}; }
 
 Json Fields(const Spawn& m) {
   Json items = Json::array();
@@ -56,16 +53,16 @@ Json Fields(const Spawn& m) {
                      {"position_m", Vector(item.start.position_m)},
                      {"heading_rad", item.start.heading_rad}});
   }
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"items", items}};
 }
 
 Json Fields(const Remove& m) {
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
 }
 
 Json Item(const RequestItem& item) {
   Json json = {{"avatar", item.avatar},
-               {"request_id", Wide(item.request_id)},
+               {"request_id", Decimal(item.request_id)},
                {"type", item.movement.index()},
                {"takeover", Number(item.interrupt)}};
   if (const auto* step = std::get_if<StepMovement>(&item.movement)) {
@@ -104,18 +101,18 @@ Json Items(const std::vector<RequestItem>& items) {
 }
 
 Json Fields(const Request& m) {
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", Items(m.items)}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"items", Items(m.items)}};
 }
 
 Json Fields(const CancelQueue& m) {
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"avatars", m.avatars}};
 }
 
 Json Fields(const Observe& m) {
-  Json json = {
-      {"seq", Wide(m.seq)},          {"world", m.world},     {"subscription", m.subscription},
-      {"mode", Number(m.mode)},      {"avatars", m.avatars}, {"every_n_ticks", m.every_n_ticks},
-      {"with_events", m.with_events}};
+  Json json = {{"seq", Decimal(m.seq)},          {"world", m.world},
+               {"subscription", m.subscription}, {"mode", Number(m.mode)},
+               {"avatars", m.avatars},           {"every_n_ticks", m.every_n_ticks},
+               {"with_events", m.with_events}};
   if (m.detail != PoseDetail::kAll) json["detail"] = Number(m.detail);
   if (!m.region) return json;
   const Region& region = *m.region;
@@ -136,24 +133,23 @@ Json Fields(const Observe& m) {
 }
 
 Json Fields(const StopObserving& m) {
-  return {{"seq", Wide(m.seq)}, {"subscription", m.subscription}};
+  return {{"seq", Decimal(m.seq)}, {"subscription", m.subscription}};
 }
 
-Json Fields(const Ping& m) { return {{"nonce", Wide(m.nonce)}, {"time_s", m.time_s}}; }
+Json Fields(const Ping& m) { return {{"nonce", Decimal(m.nonce)}, {"time_s", m.time_s}}; }
 
 Json Fields(const InspectAvatar& m) {
-  return {{"nonce", Wide(m.nonce)}, {"world", m.world}, {"avatar", m.avatar}};
+  return {{"nonce", Decimal(m.nonce)}, {"world", m.world}, {"avatar", m.avatar}};
 }
 
 Json Fields(const Goodbye& m) { return {{"code", Number(m.code)}, {"text", m.text}}; }
 
 Json Fields(const Welcome& m) {
   return {{"protocol", m.protocol},
-          {"features", Wide(m.features)},
-          {"session", Wide(m.session)},
+          {"session", Decimal(m.session)},
           {"resume_token", Hex(m.resume_token)},
           {"resumed", m.resumed},
-          {"last_seq", Wide(m.last_seq)},
+          {"last_seq", Decimal(m.last_seq)},
           {"tick_hz", m.tick_hz},
           {"server_name", m.server_name},
           {"server_version", m.server_version},
@@ -199,11 +195,11 @@ Json Fields(const WorldInfo& m) {
   }
   Json codes = Json::array();
   for (const RotationQuantization& code : m.rotation_codes) codes.push_back(Fields(code));
-  Json json = {{"seq", Wide(m.seq)},
+  Json json = {{"seq", Decimal(m.seq)},
                {"world", m.world},
                {"name", m.name},
                {"role", Number(m.role)},
-               {"tick", Wide(m.tick)},
+               {"tick", Decimal(m.tick)},
                {"library_hash", m.library_hash},
                {"skeleton",
                 {{"joints", joints},
@@ -212,7 +208,7 @@ Json Fields(const WorldInfo& m) {
                  {"right_leg", Leg(m.skeleton.legs[1])}}},
                {"layers", m.layers},
                {"rotation_codes", codes}};
-  if (!m.fewer_joints.empty()) json["fewer_joints"] = m.fewer_joints;
+  if (!m.reduced_joints.empty()) json["fewer_joints"] = m.reduced_joints;
   return json;
 }
 
@@ -221,11 +217,11 @@ Json Fields(const Reply& m) {
   for (const ReplyItem& item : m.items) {
     items.push_back({{"index", item.index},
                      {"avatar", item.avatar},
-                     {"request_id", Wide(item.request_id)},
+                     {"request_id", Decimal(item.request_id)},
                      {"code", Number(item.code)},
                      {"text", item.text}});
   }
-  return {{"seq", Wide(m.seq)},
+  return {{"seq", Decimal(m.seq)},
           {"code", Number(m.code)},
           {"text", m.text},
           {"accepted", m.accepted},
@@ -251,7 +247,7 @@ Json Fields(const PoseBatch& m) {
                {"shard", m.info.shard},
                {"part", m.info.part},
                {"parts", m.info.parts},
-               {"tick", Wide(m.info.tick)},
+               {"tick", Decimal(m.info.tick)},
                {"server_time_s", m.info.server_time_s},
                {"mode", Number(m.info.mode)},
                {"joint_count", m.info.joint_count},
@@ -273,10 +269,10 @@ Json Fields(const Events& m) {
   for (const Event& event : m.events) {
     events.push_back({{"type", Number(event.type)},
                       {"avatar", event.avatar},
-                      {"request_id", Wide(event.request_id)},
+                      {"request_id", Decimal(event.request_id)},
                       {"kind", Number(event.kind)},
                       {"group", event.group},
-                      {"tick", Wide(event.tick)},
+                      {"tick", Decimal(event.tick)},
                       {"time_s", event.time_s},
                       {"requested", Parameters(event.requested)},
                       {"applied", Parameters(event.applied)},
@@ -290,25 +286,27 @@ Json Fields(const Events& m) {
                       {"code", Number(event.code)},
                       {"reason", event.reason}});
   }
-  return {
-      {"world", m.world}, {"number", Wide(m.number)}, {"tick", Wide(m.tick)}, {"events", events}};
+  return {{"world", m.world},
+          {"number", Decimal(m.number)},
+          {"tick", Decimal(m.tick)},
+          {"events", events}};
 }
 
 Json Fields(const Lagging& m) {
   return {{"world", m.world},
-          {"dropped_batches", Wide(m.dropped_batches)},
-          {"dropped_events", Wide(m.dropped_events)}};
+          {"dropped_batches", Decimal(m.dropped_batches)},
+          {"dropped_events", Decimal(m.dropped_events)}};
 }
 
 Json Fields(const ErrorNotice& m) {
-  return {{"code", Number(m.code)}, {"text", m.text}, {"fatal", m.fatal}, {"seq", Wide(m.seq)}};
+  return {{"code", Number(m.code)}, {"text", m.text}, {"fatal", m.fatal}, {"seq", Decimal(m.seq)}};
 }
 
 Json Fields(const Pong& m) {
-  return {{"nonce", Wide(m.nonce)},
+  return {{"nonce", Decimal(m.nonce)},
           {"time_s", m.time_s},
           {"server_time_s", m.server_time_s},
-          {"tick", Wide(m.tick)}};
+          {"tick", Decimal(m.tick)}};
 }
 
 Json Movement(const CurrentMovement& m) {
@@ -318,7 +316,7 @@ Json Movement(const CurrentMovement& m) {
                         {"position_m", Vector(landing.position_m)},
                         {"heading_rad", landing.heading_rad}});
   }
-  return {{"request_id", Wide(m.request_id)},
+  return {{"request_id", Decimal(m.request_id)},
           {"kind", Number(m.kind)},
           {"group", m.group},
           {"started_s", m.started_s},
@@ -344,19 +342,19 @@ Json Fields(const AvatarState& m) {
                       {"speed", layer.speed},
                       {"ending", layer.is_ending}});
   }
-  return {{"nonce", Wide(m.nonce)},
+  return {{"nonce", Decimal(m.nonce)},
           {"world", m.world},
           {"avatar", m.avatar},
           {"code", Number(m.code)},
           {"text", m.text},
-          {"tick", Wide(m.tick)},
+          {"tick", Decimal(m.tick)},
           {"server_time_s", m.server_time_s},
           {"base_position_m", Vector(m.base.position_m)},
           {"base_heading_rad", m.base.heading_rad},
           {"movement", m.movement ? Movement(*m.movement) : Json(nullptr)},
           {"queue_size", m.queue_size},
           {"queue", Items(m.queue)},
-          {"planting_off", m.is_planting_off},
+          {"planting_off", !m.planting_enabled},
           {"layers", layers}};
 }
 
@@ -381,7 +379,7 @@ Json Terrain(const std::optional<TerrainInfo>& terrain) {
 }
 
 Json Fields(const SetTerrain& m) {
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"terrain", Terrain(m.terrain)}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"terrain", Terrain(m.terrain)}};
 }
 
 Json Fields(const SetLayers& m) {
@@ -389,21 +387,23 @@ Json Fields(const SetLayers& m) {
   for (const LayerItem& item : m.items) {
     items.push_back({{"avatar", item.avatar},
                      {"layer", item.layer},
-                     {"off", item.is_off},
+                     {"off", item.fade_out},
                      {"weight", item.weight},
                      {"blend_s", item.blend_s},
                      {"speed", item.speed}});
   }
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"items", items}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"items", items}};
 }
 
 Json Fields(const SetPlanting& m) {
-  return {{"seq", Wide(m.seq)}, {"world", m.world}, {"avatars", m.avatars}, {"off", m.is_off}};
+  return {{"seq", Decimal(m.seq)}, {"world", m.world}, {"avatars", m.avatars}, {"off", !m.enabled}};
 }
 
 Json Fields(const FetchLibrary& m) {
-  return {
-      {"nonce", Wide(m.nonce)}, {"hash", m.hash}, {"offset", Wide(m.offset)}, {"length", m.length}};
+  return {{"nonce", Decimal(m.nonce)},
+          {"hash", m.hash},
+          {"offset", Decimal(m.offset)},
+          {"length", m.length}};
 }
 
 Json Fields(const Movements& m) {
@@ -412,8 +412,8 @@ Json Fields(const Movements& m) {
           {"part", m.part},
           {"parts", m.parts},
           {"more_steps", m.more_steps},
-          {"step", Wide(m.step)},
-          {"tick", Wide(m.tick)},
+          {"step", Decimal(m.step)},
+          {"tick", Decimal(m.tick)},
           {"server_time_s", m.server_time_s},
           {"states", m.states},
           {"avatars", m.avatars},
@@ -423,12 +423,12 @@ Json Fields(const Movements& m) {
 }
 
 Json Fields(const LibraryPiece& m) {
-  return {{"nonce", Wide(m.nonce)},
+  return {{"nonce", Decimal(m.nonce)},
           {"code", Number(m.code)},
           {"text", m.text},
           {"hash", m.hash},
-          {"total_bytes", Wide(m.total_bytes)},
-          {"offset", Wide(m.offset)},
+          {"total_bytes", Decimal(m.total_bytes)},
+          {"offset", Decimal(m.offset)},
           {"bytes", Hex(m.bytes)}};
 }
 

@@ -6,9 +6,9 @@
 
 namespace stridewire::protocol {
 
-/// A message as JSON, field by field with the names of the schema: what the vectors' descriptions
-/// hold. 64-bit integers are decimal strings (JavaScript numbers end at 2^53), tokens hexadecimal,
-/// enumerators numbers, poses decoded.
+/// Converts a message to the JSON of the test vectors, with the field names of the schema. 64-bit
+/// integers are decimal strings, because JavaScript numbers are exact only up to 2^53. Tokens are
+/// hexadecimal, enumerators are numbers, and poses are decoded.
 [[nodiscard]] nlohmann::ordered_json ToJson(const Message& message);
 
 }  // namespace stridewire::protocol

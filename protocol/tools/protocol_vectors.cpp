@@ -1,4 +1,4 @@
-// Writes the test vectors: one frame a sample message (NAME.bin) and what it says (NAME.json).
+// Writes the test vectors: for each sample message a frame (NAME.bin) and its fields (NAME.json).
 
 #include <filesystem>
 #include <fstream>
@@ -28,9 +28,9 @@ int main(int argc, char** argv) {
     return 0;
   }
   if (argument == "--help") {
-    std::cout << "usage: protocol_vectors DIR\n"
-                 "Writes the wire's test vectors into DIR, which exists.\n"
-                 "example: build/release/bin/protocol_vectors protocol/vectors\n";
+    std::cout << "Usage: protocol_vectors DIR\n"
+                 "Writes the test vectors of the wire protocol to the existing folder DIR.\n"
+                 "Example: build/release/bin/protocol_vectors protocol/vectors\n";
     return argc == 2 ? 0 : 2;
   }
   const std::filesystem::path directory(argument);

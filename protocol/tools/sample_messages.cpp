@@ -34,7 +34,8 @@ SkeletonInfo Skeleton() {
   return skeleton;
 }
 
-// Root and hips turn every way, knees and the left ankle about one axis, the head never.
+// Root and hips use "smallest three"; knees and left ankle rotate about one axis; the head is
+// fixed.
 std::vector<RotationQuantization> RotationCodes() {
   std::vector<RotationQuantization> codes(8);
   codes[0].smallest_three_bits = 11;
@@ -59,19 +60,20 @@ std::vector<RotationQuantization> RotationCodes() {
   return codes;
 }
 
-// Neither feet nor head.
-const std::vector<std::uint16_t> kFewerJoints = {0, 1, 2, 4, 5};
+// All joints except feet and head.
+const std::vector<std::uint16_t> kReducedJoints = {0, 1, 2, 4, 5};
 
-// What those can tell, but for the second avatar, whose left knee turns about another axis.
+// Poses that the codes can represent, except that of the second avatar, whose left knee rotates
+// about another axis.
 struct CompactArrays {
   PoseBatchInfo info{3, 1, 2, 4, 123'456, 2057.6, PoseMode::kCompact, 8};
   std::vector<AvatarId> avatars = {1, 1001, 2001};
-  std::vector<std::uint8_t> flags = {kPoseStanding, kPoseWide, kPoseDiscontinuity};
+  std::vector<std::uint8_t> flags = {kPoseStanding, kPoseUncompressed, kPoseDiscontinuity};
   std::vector<std::byte> poses;
 
   explicit CompactArrays(PoseMode mode) {
     info.mode = mode;
-    if (mode == PoseMode::kCompactRoot) flags[1] = 0;  // The root turns every way.
+    if (mode == PoseMode::kCompactRoot) flags[1] = 0;  // The root always fits.
     const CompactCodec& codec = *SampleCodecs().Find(mode);
     const std::vector<RotationQuantization> codes = RotationCodes();
     CompactCodec::Block block;
@@ -95,7 +97,7 @@ struct CompactArrays {
     }
     codec.Encode(block);
     for (std::size_t a = 0; a < 3; ++a) {
-      STRIDEWIRE_CHECK(block.fits(a) == ((flags[a] & kPoseWide) == 0));
+      STRIDEWIRE_CHECK(block.fits(a) == ((flags[a] & kPoseUncompressed) == 0));
       const std::size_t begin = poses.size();
       if (block.fits(a)) {
         poses.resize(begin + codec.pose_bytes());
@@ -114,7 +116,7 @@ struct CompactArrays {
   [[nodiscard]] PoseBatch view() const { return {info, avatars, flags, poses}; }
 };
 
-/// Arrays of a batch. Rotations go through every index left out and both signs.
+/// Arrays of a batch. The rotations cover every dropped component and both signs.
 struct BatchArrays {
   PoseBatchInfo info;
   std::vector<AvatarId> avatars;
@@ -205,7 +207,7 @@ const CompactCodecs& SampleCodecs() {
   static const CompactCodecs codecs = [] {
     std::vector<std::int16_t> parents;
     for (const JointInfo& joint : Skeleton().joints) parents.push_back(joint.parent);
-    return CompactCodecs::Make(RotationCodes(), parents, kFewerJoints).value();
+    return CompactCodecs::Make(RotationCodes(), parents, kReducedJoints).value();
   }();
   return codecs;
 }
@@ -215,17 +217,15 @@ std::vector<SampleMessage> SampleMessages() {
   static const BatchArrays quantised(PoseMode::kQuantised, 8, 3);
   static const BatchArrays nobody(PoseMode::kQuantised, 31, 0);
   static const CompactArrays compact(PoseMode::kCompact);
-  static const CompactArrays fewer(PoseMode::kCompactFewer);
+  static const CompactArrays fewer(PoseMode::kCompactReduced);
   static const CompactArrays root(PoseMode::kCompactRoot);
 
   std::vector<SampleMessage> samples;
   const auto add = [&](const char* name, Message message) {
     samples.push_back({name, std::move(message)});
   };
-  add("hello",
-      Hello{1, 3, "game-server \xe2\x9c\x93", kFeatureResume | kFeatureQuantised, "", {}, 0});
-  add("hello_resume", Hello{1, 1, "game-server", kFeatureResume | kFeatureEventReplay,
-                            "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
+  add("hello", Hello{1, 3, "game-server \xe2\x9c\x93", "", {}, 0});
+  add("hello_resume", Hello{1, 1, "game-server", "eyJhbGciOiJFZERTQSJ9", Token(32), 512});
   add("join_world", JoinWorld{1, "plaza", Role::kObserver});
   add("leave_world", LeaveWorld{9, 3});
   add("spawn", Spawn{2, 3, {{0, {DVec3(0.0), 0.0}}, {41, {DVec3(1.5, 0.25, -2.0), 1.75}}}});
@@ -259,21 +259,20 @@ std::vector<SampleMessage> SampleMessages() {
   }
   {
     Observe afar{22, 3, 6, PoseMode::kQuantised, {}, 4, false};
-    afar.detail = PoseDetail::kFewer;
+    afar.detail = PoseDetail::kReduced;
     add("observe_fewer", afar);
     afar.seq = 23;
     afar.detail = PoseDetail::kRoot;
     afar.region = Region{{-12.5, 40.0}, 60.0, 4.0, {{8.0, 1}, {20.0, 2}}};
-    afar.region->ring_details = {PoseDetail::kAll, PoseDetail::kFewer};
+    afar.region->ring_details = {PoseDetail::kAll, PoseDetail::kReduced};
     add("observe_ring_details", afar);
   }
   add("stop_observing", StopObserving{10, 2});
   add("ping", Ping{0x0123456789abcdefu, 12.5});
   add("inspect_avatar", InspectAvatar{0x0123456789abcdefu, 3, 41});
   add("goodbye", Goodbye{StatusCode::kShuttingDown, "the server is going down"});
-  add("welcome",
-      Welcome{1, kFeatureResume | kFeatureQuantised, 77, Token(32), true, 3, 60.0, "stridewired",
-              "0.1.0", ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
+  add("welcome", Welcome{1, 77, Token(32), true, 3, 60.0, "stridewired", "0.1.0",
+                         ServerLimits{65536, 1 << 22, 4096, 10'000, 64, 1024, 30.0, 60.0}});
   add("world_info", WorldInfo{1, 3, "plaza", Role::kController, 123'000,
                               "0f1e2d3c4b5a69788796a5b4c3d2e1f0", Skeleton()});
   add("reply_ok", Reply{6, StatusCode::kOk, "", 1, {}});
@@ -332,7 +331,7 @@ std::vector<SampleMessage> SampleMessages() {
     state.queue.clear();
     state.queue_size = 0;
     state.layers.clear();
-    state.is_planting_off = true;
+    state.planting_enabled = false;
     add("avatar_state_unplanted", state);
     add("avatar_state_refused", AvatarState{.nonce = 2,
                                             .world = 3,
@@ -385,8 +384,8 @@ std::vector<SampleMessage> SampleMessages() {
                                 {{41, "wave", false, 0.75, 0.5, 1.25},
                                  {42, "carry"},
                                  {41, "wave", true, 1.0, 0.0, 1.0}}});
-    add("set_planting", SetPlanting{19, 3, {41, 42}, false});
-    add("set_planting_off", SetPlanting{20, 3, {41}, true});
+    add("set_planting", SetPlanting{19, 3, {41, 42}, true});
+    add("set_planting_off", SetPlanting{20, 3, {41}, false});
     add("observe_movements", Observe{21, 3, 4, PoseMode::kMovement, {}, 1, false});
     add("fetch_library",
         FetchLibrary{0x0123456789abcdefu, "0f1e2d3c4b5a69788796a5b4c3d2e1f0", 1 << 20, 1 << 16});
@@ -420,7 +419,7 @@ std::vector<SampleMessage> SampleMessages() {
     with_codes.rotation_codes = RotationCodes();
     add("world_info_compact", with_codes);
     add("pose_batch_compact", compact.view());
-    with_codes.fewer_joints = kFewerJoints;
+    with_codes.reduced_joints = kReducedJoints;
     add("world_info_detail", with_codes);
     add("pose_batch_fewer", fewer.view());
     add("pose_batch_root", root.view());

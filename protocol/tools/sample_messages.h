@@ -9,16 +9,16 @@
 
 namespace stridewire::protocol {
 
-/// A message with every field set to something that is not its default, and variants worth testing.
+/// A message for a test vector. Most fields differ from their defaults.
 struct SampleMessage {
-  std::string name;  ///< File name of its vector, e.g. "request_crowd".
-  Message message;   ///< A PoseBatch borrows arrays that live as long as the program.
+  std::string name;  ///< File name of the vector, for example "request_crowd".
+  Message message;   ///< A PoseBatch borrows arrays with static lifetime.
 };
 
-/// How the rotations of the vectors' world are told: the codes of `world_info_compact`, for `pose_batch_compact`.
+/// Rotation codes of the vector `world_info_compact`. The vector `pose_batch_compact` uses them.
 [[nodiscard]] const CompactCodecs& SampleCodecs();
 
-/// The messages the test vectors are made of; the same every time.
+/// Returns the messages of all test vectors. The result is always the same.
 [[nodiscard]] std::vector<SampleMessage> SampleMessages();
 
 }  // namespace stridewire::protocol

@@ -2,11 +2,11 @@
 #include <cstdio>
 #include <exception>
 
-#include "ops/command_line.h"
-#include "ops/libraries.h"
-#include "ops/logging.h"
-#include "ops/server.h"
-#include "ops/terrains.h"
+#include "app/libraries.h"
+#include "app/server.h"
+#include "app/terrains.h"
+#include "base/command_line.h"
+#include "base/logging.h"
 
 namespace {
 
@@ -37,7 +37,7 @@ int Main(int argc, char** argv) {
   auto viewer = ViewerFiles::Find(command->config.viewer_dir);
   if (!viewer) return PrintError(viewer.error(), kExitBadInput);
   if (command->action == Action::kCheckConfig) {
-    std::puts("the configuration is good");
+    std::puts("the configuration is valid");
     return 0;
   }
 

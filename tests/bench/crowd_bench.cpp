@@ -1,5 +1,6 @@
-// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there are. Beside them the
-// floor of this machine and this run, the plain reference, and sampling every example by itself.
+// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there
+// are. Beside them the floor of this machine and this run, the plain reference, and sampling every
+// example by itself.
 
 #include <benchmark/benchmark.h>
 
@@ -10,13 +11,13 @@
 #include <vector>
 
 #include "bench_libraries.h"
+#include "runtime/library/pose_quantization.h"
+#include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/reference_evaluation.h"
+#include "runtime/weights/correction.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "runtime/avatar/avatar_simulation.h"
-#include "runtime/weights/correction.h"
-#include "runtime/library/pose_quantization.h"
-#include "runtime/pose/reference_evaluation.h"
-#include "runtime/pose/evaluation_batcher.h"
 #include "world/encoded_pose_cache.h"
 
 namespace stridewire {
@@ -89,19 +90,19 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
-// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and not kept.
+// Poses of each tick, evaluated several ticks ahead as in server::EncodedPoseCache, but not stored.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
   // Spread over shards: threads that share nothing but the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
   Steps steps(library, count, plants_feet);
-  const auto turns = static_cast<int>(server::EncodedPoseCache::TurnsOf(steps.walkers().size()));
+  const auto phases = static_cast<int>(server::EncodedPoseCache::PhasesOf(steps.walkers().size()));
   struct Ahead {
     std::uint32_t revision = 0;
     int left = 0;
   };
   std::vector<Ahead> ahead(steps.walkers().size());
   std::vector<const Steps::Walker*> due;
-  SoaPoseEvaluator evaluator(*library, turns);
+  SoaPoseEvaluator evaluator(*library, phases);
   EvaluationBatcher queue;
   std::uint32_t tick = 0;
   for (auto _ : state) {
@@ -114,7 +115,7 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
       due.push_back(&walker);
     }
     for (const Steps::Walker* walker : due) {
-      const int most = turns - static_cast<int>(tick + walker->number) % turns;
+      const int most = phases - static_cast<int>(tick + walker->number) % phases;
       const int wanted = SampleRunCount(*walker->movement, walker->time_s, kTickS, 1, most);
       ahead[walker->number] = {walker->revision, wanted};
       queue.Add({walker->movement, walker->time_s, kTickS}, wanted, walker->number);
@@ -128,7 +129,8 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   Count(state, steps, count);
 }
 
-// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that observers share.
+// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that
+// observers share.
 void WholePose(benchmark::State& state, const Library& library) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, true);
@@ -138,10 +140,10 @@ void WholePose(benchmark::State& state, const Library& library) {
   }
   const auto codecs =
       protocol::CompactCodecs::Make(ChoosePoseQuantization(*library).joints, parents, {}).value();
-  server::EncodedPoseCache ahead(std::make_shared<server::PoseScratch>(library), &codecs);
+  server::EncodedPoseCache cache(std::make_shared<server::PoseScratch>(library), &codecs);
   constexpr auto kMode = protocol::PoseMode::kCompact;
-  ahead.SetModes(std::array{kMode}, 1);
-  std::vector<server::EncodedPoseCache::Place> kept(steps.walkers().size());
+  cache.SetModes(std::array{kMode}, 1);
+  std::vector<server::EncodedPoseCache::Slot> slots(steps.walkers().size());
   std::vector<protocol::AvatarId> numbers(steps.walkers().size());
   std::iota(numbers.begin(), numbers.end(), 1u);
   const auto avatars = std::make_shared<const std::vector<protocol::AvatarId>>(numbers);
@@ -157,20 +159,20 @@ void WholePose(benchmark::State& state, const Library& library) {
   const auto tick = [&]() -> Status {
     ++info.tick;
     steps.Advance();
-    ahead.Begin(info.tick, kTickS, kept.size());
+    cache.BeginStep(info.tick, kTickS, slots.size());
     for (const Steps::Walker& walker : steps.walkers()) {
-      if (ahead.Has(kept[walker.number], walker.revision)) continue;
-      ahead.Want(kept[walker.number], walker.revision, *walker.movement, walker.time_s);
+      if (cache.Contains(slots[walker.number], walker.revision)) continue;
+      cache.Schedule(slots[walker.number], walker.revision, *walker.movement, walker.time_s);
     }
-    ahead.Finish();
+    cache.FinishStep();
     Status status = rows.Begin(info, avatars, codecs.Find(kMode));
-    for (std::size_t i = 0; i < kept.size(); ++i) {
-      const server::EncodedPoseCache::Encoded encoded = ahead.Of(kept[i], kMode);
-      rows.AddEncoded(0, encoded.is_wide, encoded.bytes);
+    for (std::size_t i = 0; i < slots.size(); ++i) {
+      const server::EncodedPoseCache::Encoded encoded = cache.Find(slots[i], kMode);
+      rows.AddEncoded(0, encoded.is_uncompressed, encoded.bytes);
     }
     std::span<const std::uint32_t> left = all;
     while (!left.empty() && status) {
-      const auto part = left.first(composer.Fitting(rows, left));
+      const auto part = left.first(composer.CountThatFit(rows, left));
       frame.clear();
       status = composer.Compose(rows, part, {}, frame);
       left = left.subspan(part.size());
@@ -178,16 +180,17 @@ void WholePose(benchmark::State& state, const Library& library) {
     }
     return status;
   };
-  // Until each has had its turn.
-  for (std::size_t i = 0; i < 2 * server::EncodedPoseCache::kMost; ++i) (void)tick();
+  // Until each walker has been evaluated in its phase.
+  for (std::size_t i = 0; i < 2 * server::EncodedPoseCache::kMaxTicksAhead; ++i) (void)tick();
   for (auto _ : state) {
     if (const Status status = tick(); !status) return state.SkipWithError(status.error().text);
-    if (rows.pose_count() != kept.size()) return state.SkipWithError("poses are missing");
+    if (rows.pose_count() != slots.size()) return state.SkipWithError("poses are missing");
   }
   Count(state, steps, count);
 }
 
-// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty frames.
+// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty
+// frames.
 void MakeSteps(benchmark::State& state, const Library& library) {
   constexpr std::size_t kSteps = 16;
   constexpr int kFrames = 30;
@@ -233,7 +236,8 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   for (std::size_t i = 0; i < count; ++i) y[i] += w * x[i];
 }
 
-// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts them.
+// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts
+// them.
 class LineAligned {
  public:
   explicit LineAligned(std::size_t count) : floats_(count + kLineFloats) {
@@ -250,12 +254,13 @@ class LineAligned {
   float* begin_;
 };
 
-// The floor: the bytes that poses can not do without when as many of a movement's are made at once, each read and given
-// one multiply-add. At 30 cells a second a stretch of eight passes seven grid points, one of sixteen eleven, each with a
-// row of all examples; each pose is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
+// The floor: the bytes that poses can not do without when as many of a movement's are made at once,
+// each read and given one multiply-add. At 30 cells a second a stretch of eight passes seven grid
+// points, one of sixteen eleven, each with a row of all examples; each pose is of four of their
+// sums and, quantised, takes a quarter of a row; plan and difference are read once.
 void Floor(benchmark::State& state, const Library& library) {
   const auto count = static_cast<std::size_t>(state.range(0));
-  const std::size_t poses = server::EncodedPoseCache::TurnsOf(count);
+  const std::size_t poses = server::EncodedPoseCache::PhasesOf(count);
   const std::size_t passed = poses / 2 + 3;
   const MotionGroup& group = library->group(0);
   const auto row = static_cast<std::size_t>(library->layout().row_floats);

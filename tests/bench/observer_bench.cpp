@@ -1,6 +1,6 @@
-// What one more observer of a crowd costs a tick of the server: its session is told of poses that are encoded already,
-// and the system has the bytes. Beside it in the same run the floor: the system is given the same bytes, and nothing else
-// happens.
+// What one more observer of a crowd costs a tick of the server: its session is told of poses that
+// are encoded already, and the system has the bytes. Beside it in the same run the floor: the
+// system is given the same bytes, and nothing else happens.
 //
 //   in_process   the sessions and their queues, above a transport that takes all and keeps nothing
 //   sockets      the same above TCP over loopback
@@ -25,10 +25,10 @@
 #include <string>
 #include <vector>
 
+#include "base/check.h"
 #include "bench_libraries.h"
 #include "net/tcp_transport.h"
 #include "session/session.h"
-#include "base/check.h"
 #include "world/pose_frames.h"
 
 namespace stridewire {
@@ -55,28 +55,27 @@ struct Crowd {
     world->id = 1;
     world->name = "crowd";
     world->library = library;
-    world->codes = server::MakePoseCodes(*library);
+    world->quantizations = server::MakePoseQuantizations(*library);
     std::vector<protocol::AvatarId> numbers(kAvatars);
     std::iota(numbers.begin(), numbers.end(), 1u);
     auto rows = std::make_shared<protocol::PoseRows>();
-    auto places = std::make_shared<server::SpatialGrid>();
+    auto grid = std::make_shared<server::SpatialGrid>();
     const Pose& pose = library->stand_pose();
-    Status status =
-        rows->Begin({.world = world->id,
-                     .tick = 1,
-                     .mode = protocol::PoseMode::kCompact,
-                     .joint_count = static_cast<std::uint16_t>(pose.rotations.size())},
-                    std::make_shared<const std::vector<protocol::AvatarId>>(numbers),
-                    world->codes->codecs.Find(protocol::PoseMode::kCompact));
-    places->Begin(world->interest_cell_m, kAvatars);
+    Status status = rows->Begin({.world = world->id,
+                                 .tick = 1,
+                                 .mode = protocol::PoseMode::kCompact,
+                                 .joint_count = static_cast<std::uint16_t>(pose.rotations.size())},
+                                std::make_shared<const std::vector<protocol::AvatarId>>(numbers),
+                                world->quantizations->codecs.Find(protocol::PoseMode::kCompact));
+    grid->Begin(world->interest_cell_m, kAvatars);
     std::mt19937 random(1);
     for (std::uint32_t row = 0; row < kAvatars; ++row) {
       const Vec3 root_m(Draw(random), pose.root_position_m.y, Draw(random));
       if (status) status = rows->Add(0, root_m, pose.rotations);
-      places->Add(row, root_m.x, root_m.z);
+      grid->Add(row, root_m.x, root_m.z);
     }
     STRIDEWIRE_CHECK(status.has_value());
-    places->Sort();
+    grid->Sort();
     std::vector<std::uint32_t> all(kAvatars);
     std::iota(all.begin(), all.end(), 0u);
     protocol::PoseBatchComposer composer;
@@ -87,7 +86,7 @@ struct Crowd {
                 .avatar_count = kAvatars,
                 .parts = server::ComposeFrames(composer, *rows, all, false, metrics),
                 .rows = rows,
-                .places = places};
+                .grid = grid};
   }
   static float Draw(std::mt19937& random) {
     return kSideM * static_cast<float>(random() % 1'000'000) / 1e6f;
@@ -156,17 +155,15 @@ class Host final : public server::SessionHost {
   server::ThreadMetrics& metrics() override { return metrics_; }
   protocol::Encoder& encoder() override { return encoder_; }
   protocol::PoseBatchComposer& composer() override { return composer_; }
-  void Submit(int /*shard*/, server::WorldCommand&& /*command*/) override {}
-  void Ask(int /*shard*/, server::Inspection&& /*question*/) override {}
-  void Ask(int /*shard*/, server::StatesQuestion&& /*question*/) override {}
-  void JoinWorld(server::SessionId session, protocol::Seq seq, std::string /*name*/) override {
-    sessions_[session - 1]->OnJoined(seq, crowd_.world);
+  void SendToShard(int /*shard*/, server::ShardMessage /*message*/) override {}
+  void SendToServer(server::ServerMessage message) override {
+    if (const auto* join = std::get_if<server::JoinRequest>(&message)) {
+      sessions_[join->session - 1]->OnJoined(join->seq, crowd_.world);
+    }
   }
-  void LeaveWorld(server::WorldId /*world*/) override {}
-  void SetTerrain(server::TerrainChange&& /*change*/) override {}
-  void SessionEnded(server::SessionId /*session*/) override {}
+  void DestroySession(server::SessionId /*session*/) override {}
   void InterestChanged(const std::shared_ptr<server::World>& /*world*/) override {}
-  void RegionMoved(server::WorldId /*world*/) override {}
+  void SelectionChanged(server::WorldId /*world*/) override {}
 
   void Add(std::shared_ptr<server::Connection> connection, protocol::Observe&& observe) {
     const server::SessionId id = sessions_.size() + 1;
@@ -181,12 +178,10 @@ class Host final : public server::SessionHost {
     STRIDEWIRE_CHECK(status.has_value());
     protocol::Hello hello;
     hello.client_name = "bench";
-    hello.features =
-        protocol::kFeatureQuantised | protocol::kFeatureCompact | protocol::kFeatureRegions;
     sessions_.back()->Attach(std::move(connection), hello, false, commands);
   }
 
-  /// As Shard::Receive does.
+  /// Delivers poses as Shard::Deliver does.
   void Tick(const PoseDelivery& delivery) {
     server::SharedPoses poses(delivery, composer_, metrics_);
     for (const auto& session : sessions_) session->OnPoses(poses);
@@ -227,7 +222,7 @@ Wanted Want(const Crowd& crowd, Watch watch, std::mt19937& random,
     region.centre_m = {Crowd::Draw(random), Crowd::Draw(random)};
     region.radius_m = kRegionRadiusM;
     server::RegionMembers members;
-    members.Move(region, crowd.world->interest_cell_m, 1, crowd.delivery.mode);
+    members.Set(region, crowd.world->interest_cell_m, 1, crowd.delivery.mode);
     const auto due = members.Update(crowd.delivery).due;
     rows.assign(due.begin(), due.end());
   }

@@ -108,7 +108,7 @@ int Run(int argc, char** argv) {
       is_again = true;
       again.emplace(PortIn(ready, "http"));
       reader = &*again;
-      const auto back = again->SayHello(~std::uint64_t{0}, welcome->resume_token);
+      const auto back = again->SayHello(welcome->resume_token);
       std::printf("let go by the server; resumed: %s\n", back && back->resumed ? "yes" : "no");
       continue;
     }

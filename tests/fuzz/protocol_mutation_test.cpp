@@ -1,7 +1,7 @@
-// Mutated frames: each is refused with an error or is a message that makes sense, which means that
-// it can be encoded again and comes back the same. Memory stays bounded by the frame's size.
+// Decodes mutated frames. Each is rejected, or is a valid message that survives another round trip.
+// Memory is limited by the size of the frame.
 //
-// STRIDEWIRE_FUZZ_COUNT says how many (5000), STRIDEWIRE_FUZZ_SEED repeats a run.
+// STRIDEWIRE_FUZZ_COUNT sets the number of frames (5000), STRIDEWIRE_FUZZ_SEED repeats a run.
 
 #include <gtest/gtest.h>
 
@@ -31,8 +31,7 @@ std::uint64_t FromEnvironment(const char* name, std::uint64_t otherwise) {
   return text == nullptr ? otherwise : std::strtoull(text, nullptr, 10);
 }
 
-/// What arrives: a peer may say many times over what its frame says once (offsets to the same
-/// table), but no more than this.
+/// Upper limit of the decoded size. A frame can refer to the same bytes many times.
 std::size_t MaxDecodedBytes(std::size_t frame_bytes) { return (1u << 16) + 200 * frame_bytes; }
 
 struct Mutator {
@@ -46,7 +45,7 @@ struct Mutator {
 
   void MutateOnce(Bytes& bytes, const std::vector<Bytes>& others) {
     if (bytes.empty()) return;
-    // Payloads are what is interesting: the header is small and has tests of its own.
+    // Mutate the payload only, because the header has its own tests.
     const bool header = Below(16) == 0 || bytes.size() <= kFrameHeaderBytes;
     const std::size_t begin = header ? 0 : kFrameHeaderBytes;
     const std::size_t at = begin + Below(bytes.size() - begin);
@@ -63,7 +62,7 @@ struct Mutator {
         Store(bytes, word, &value, 4);
         break;
       }
-      case 3: {  // a small change of an offset or length
+      case 3: {  // change an offset or length slightly
         std::uint32_t value = 0;
         if (word + 4 <= bytes.size()) std::memcpy(&value, bytes.data() + word, 4);
         value += static_cast<std::uint32_t>(Below(65)) - 32;
@@ -79,20 +78,20 @@ struct Mutator {
       case 6:
         bytes.insert(bytes.end(), 8 * (1 + Below(64)), static_cast<std::byte>(random()));
         break;
-      case 7: {  // a piece of the same frame elsewhere
+      case 7: {  // copy a piece within the frame
         const std::size_t from = Below(bytes.size());
         const std::size_t size = std::min({Below(64) + 1, bytes.size() - from, bytes.size() - at});
         std::memmove(bytes.data() + at, bytes.data() + from, size);
         break;
       }
-      case 8: {  // a piece of another frame
+      case 8: {  // copy a piece of another frame
         const Bytes& other = others[Below(others.size())];
         const std::size_t from = Below(other.size());
         const std::size_t size = std::min({Below(128) + 1, other.size() - from, bytes.size() - at});
         std::memcpy(bytes.data() + at, other.data() + from, size);
         break;
       }
-      default: {  // the payload of one type under the number of another
+      default: {  // change the message type
         static constexpr std::uint16_t kRanges[][2] = {{1, 12}, {32, 1}, {64, 10}};
         const auto& [first, types] = kRanges[Below(3)];
         const auto type = static_cast<std::uint16_t>(first + Below(types));
@@ -106,7 +105,7 @@ struct Mutator {
     Bytes bytes = frames[Below(frames.size())];
     for (std::size_t i = 1 + Below(6); i > 0; --i) MutateOnce(bytes, frames);
     if (Below(8) != 0 && bytes.size() >= kFrameHeaderBytes) {
-      // Mostly with a length that is right, so that the payload is looked at.
+      // Usually correct the length, so that the payload is decoded.
       bytes.resize((bytes.size() + 7) / 8 * 8);
       const auto payload = static_cast<std::uint32_t>(bytes.size() - kFrameHeaderBytes);
       Store(bytes, 8, &payload, 4);
@@ -158,7 +157,7 @@ void ExpectMeaning(const Message& message, Sender sender) {
   }
 }
 
-TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
+TEST(ProtocolMutation, FramesAreRejectedOrValid) {
   const std::uint64_t count = FromEnvironment("STRIDEWIRE_FUZZ_COUNT", 5000);
   const std::uint64_t seed = FromEnvironment("STRIDEWIRE_FUZZ_SEED", std::random_device{}());
   std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << " STRIDEWIRE_FUZZ_COUNT=" << count << '\n'
@@ -174,7 +173,7 @@ TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
   for (std::uint64_t i = 0; i < count; ++i) {
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", frame " << i);
     const Bytes bytes = mutator.Mutate(frames);
-    // Mostly from whom it could be; a wrong direction is refused at once.
+    // Usually use the correct direction, because the other one is rejected immediately.
     const bool high = bytes.size() > 6 && bytes[6] >= std::byte{33};
     const Sender sender = high != (mutator.Below(16) == 0) ? Sender::kServer : Sender::kClient;
     FrameReader reader(sender);
@@ -182,7 +181,7 @@ TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
     std::span<const std::byte> rest = bytes;
     std::string outcome = "incomplete";
     while (!rest.empty()) {
-      // Pieces of their own, so that a sanitizer sees a read past them.
+      // Separate copies, so that a sanitizer detects reads beyond them.
       const std::size_t size = std::min(rest.size(), 1 + mutator.Below(longest));
       const Bytes piece(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(size));
       rest = rest.subspan(size);
@@ -216,12 +215,12 @@ TEST(ProtocolMutation, EveryFrameIsRefusedOrMakesSense) {
     ++outcomes[outcome];
   }
   for (const auto& [outcome, times] : outcomes) std::cout << outcome << ": " << times << "\n";
-  // Mutations that are all refused, or none, would test nothing.
+  // The test is useful only if some mutations are rejected and some are valid.
   EXPECT_GT(made_sense, 0u);
   EXPECT_GT(outcomes["payload: malformed"], 0u);
 }
 
-TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
+TEST(ProtocolMutation, PosesAreRejectedOrValid) {
   const std::uint64_t count = FromEnvironment("STRIDEWIRE_FUZZ_COUNT", 5000);
   const std::uint64_t seed = FromEnvironment("STRIDEWIRE_FUZZ_SEED", std::random_device{}());
   std::cout << "STRIDEWIRE_FUZZ_SEED=" << seed << '\n' << std::flush;
@@ -240,9 +239,9 @@ TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
   std::cout << "decoded " << decoded << " of " << count << "\n";
   EXPECT_GT(decoded, 0u);
 
-  // Compact ones: a good pose with some bits changed.
+  // Compact poses with some changed bits.
   for (const auto& [name, mode] : {std::pair("pose_batch_compact", PoseMode::kCompact),
-                                   std::pair("pose_batch_fewer", PoseMode::kCompactFewer),
+                                   std::pair("pose_batch_fewer", PoseMode::kCompactReduced),
                                    std::pair("pose_batch_root", PoseMode::kCompactRoot)}) {
     SCOPED_TRACE(name);
     const CompactCodec& codec = *SampleCodecs().Find(mode);
@@ -269,7 +268,7 @@ TEST(ProtocolMutation, RandomPosesAreRefusedOrPoses) {
       block.Clear();
       block.Add(root, rotations);
       codec.Encode(block);
-      if (!block.fits(0)) continue;  // at the very end of a range
+      if (!block.fits(0)) continue;  // at the end of a range
       Bytes again(codec.pose_bytes());
       block.CopyBytes(0, again);
       std::vector<Quat> back(rotations.size());

@@ -2,8 +2,8 @@
 """check_includes.py ROOT: checks which part of the project includes what.
 
   public headers   only the standard library, GLM and other public headers; at most 18 in core
-  rooms            folders of core, in an order: a room includes only itself and the rooms listed
-                   before it
+  rooms            folders of core and server, in an order: a room includes only itself and the
+                   rooms listed before it
   protocol         nothing of core but stridewire/base and base/, nothing of server or client
   client library   never stridewire::offline (its tools may)
 """
@@ -23,6 +23,8 @@ CORE_ROOMS = [
     "offline/base", "offline/capture", "offline/extract", "offline/build", "offline/builtin",
     "offline/choreography",
 ]
+
+SERVER_ROOMS = ["base", "net", "world", "session", "app"]
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]')
 
@@ -93,6 +95,7 @@ def main():
                                 f"{PUBLIC_HEADERS_OF_CORE} are allowed: move some to core/src")
 
     checker.check_rooms("core/src", CORE_ROOMS)
+    checker.check_rooms("server/src", SERVER_ROOMS)
 
     above_core = r"stridewire/(protocol|server)/|stridewire/client|boost/|spdlog/"
     checker.forbid("core", above_core, "core knows no protocol, socket or log")

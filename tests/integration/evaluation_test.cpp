@@ -16,16 +16,16 @@
 #include "random.h"
 #include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/plan/foot_sampler.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
 #include "runtime/pose/reference_evaluation.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
-#include "runtime/avatar/avatar_simulation.h"
-#include "runtime/pose/evaluate_poses.h"
-#include "runtime/pose/plant_feet.h"
-#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
@@ -276,9 +276,9 @@ TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
 }
 
 // All machines produce this hash (decision 0002). If a formula changes intentionally, the hash
-// changes, and the protocol needs a new number for movement mode. Otherwise clients that evaluate
+// changes, and the protocol needs a new version. Otherwise clients that evaluate
 // movements with the old formulas would display other poses than the server (decision 0021).
-TEST(Evaluation, MatchesTheNumberInTheProtocol) {
+TEST(Evaluation, MatchesTheProtocolVersion) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10);
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
@@ -286,7 +286,7 @@ TEST(Evaluation, MatchesTheNumberInTheProtocol) {
     for (const AvatarSimulation& avatar : crowd.avatars()) AppendBytes(avatar, bytes);
   }
   EXPECT_EQ(XXH3_64bits(bytes.data(), bytes.size()), 0x75cf2fbe2c99a5d5u);
-  EXPECT_EQ(protocol::kFeatureMovementMode, 32'768u);
+  EXPECT_EQ(protocol::kProtocolVersion, 1u);
 }
 
 class LibraryEvaluation : public testing::TestWithParam<Source> {

@@ -11,8 +11,8 @@
 #include "stridewire/protocol/frame_reader.h"
 #include "stridewire/protocol/messages.h"
 
-/// A server that does exactly what a test tells it to, over a real socket on 127.0.0.1. Blocking,
-/// without threads of its own; nothing waits longer than kPatience_s.
+/// A scripted server for tests of clients, over a real socket on 127.0.0.1. Its calls block for at
+/// most kPatience_s, and it has no threads.
 namespace stridewire {
 
 class FakeConnection {
@@ -32,11 +32,11 @@ class FakeConnection {
   }
   void SendBytes(std::span<const std::byte> bytes);
 
-  /// The next message that is no Ping (those are counted, and answered unless `mute_pongs`). Empty:
-  /// none came in time, or the client closed.
+  /// Returns the next message that is not a Ping. Pings are counted, and answered unless
+  /// `mute_pongs` is set. Returns nullopt after a timeout or if the client has closed.
   [[nodiscard]] std::optional<protocol::Message> Receive();
 
-  /// The next message, if it is one of these.
+  /// Returns the next message if it has this type, otherwise nullopt.
   template <typename Message>
   [[nodiscard]] std::optional<Message> Expect() {
     auto message = Receive();
@@ -44,7 +44,7 @@ class FakeConnection {
     return std::get<Message>(std::move(*message));
   }
 
-  /// Whether the client closes in time; drops what it still sends.
+  /// Returns true if the client closes in time. Discards messages that it still sends.
   [[nodiscard]] bool WaitForClose();
 
   void Close();
@@ -64,7 +64,7 @@ class FakeServer {
  public:
   static constexpr double kPatience_s = 20.0;
 
-  /// Listens on a port of the system's choice, or on `port`.
+  /// Listens on `port`; 0: the system chooses a port.
   explicit FakeServer(std::uint16_t port = 0);
   ~FakeServer();
   FakeServer(const FakeServer&) = delete;
@@ -72,7 +72,7 @@ class FakeServer {
 
   [[nodiscard]] std::uint16_t port() const { return port_; }
 
-  /// The next client; not open when none came in time.
+  /// Returns the next connection. It is not open if no client connects in time.
   [[nodiscard]] FakeConnection Accept();
 
  private:

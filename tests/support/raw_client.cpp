@@ -56,7 +56,7 @@ RawClient& RawClient::operator=(RawClient&& other) noexcept {
 }
 
 void RawClient::Abort() {
-  // A reset, not an orderly end.
+  // Reset the connection instead of closing it gracefully.
   const linger hard{1, 0};
   setsockopt(socket_, SOL_SOCKET, SO_LINGER, &hard, sizeof(hard));
   close(std::exchange(socket_, -1));
@@ -74,7 +74,7 @@ void RawClient::SendBytes(std::span<const std::byte> bytes) {
   while (!bytes.empty()) {
     const ssize_t sent = send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent < 0 && errno == EINTR) continue;
-    if (sent <= 0) {  // the server has closed; what it said can still be read
+    if (sent <= 0) {  // the server has closed; received data can still be read
       return;
     }
     bytes = bytes.subspan(static_cast<std::size_t>(sent));
@@ -127,11 +127,9 @@ bool RawClient::AwaitClose(std::chrono::milliseconds patience) {
   return is_closed_;
 }
 
-std::optional<protocol::Welcome> RawClient::SayHello(std::uint64_t features,
-                                                     std::vector<std::byte> resume_token,
+std::optional<protocol::Welcome> RawClient::SayHello(std::vector<std::byte> resume_token,
                                                      std::uint64_t last_events_number) {
   Send(protocol::Hello{.client_name = "test",
-                       .features = features,
                        .auth_token = {},
                        .resume_token = std::move(resume_token),
                        .last_events_number = last_events_number});
@@ -171,8 +169,7 @@ std::optional<protocol::Reply> RawClient::Observe(protocol::WorldId world,
   return Await<protocol::Reply>();
 }
 
-std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count,
-                                         double length_m) {
+std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count, double length_m) {
   std::vector<protocol::RequestItem> items;
   for (int i = 1; i <= count; ++i) {
     items.push_back({.avatar = avatar,

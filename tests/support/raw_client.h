@@ -15,14 +15,14 @@
 
 namespace stridewire {
 
-/// A client of blocking calls over a plain socket, for tests of the server: it sends what it is
-/// told, right or wrong, and shows what comes. Every wait ends after `kPatience`.
+/// A client with blocking calls over a plain socket, for tests of the server. It sends valid and
+/// invalid messages and returns the received ones. Every wait is limited to `kPatience`.
 class RawClient {
  public:
   static constexpr std::chrono::seconds kPatience{20};
 
   RawClient() = default;
-  /// Connects; aborts the program if that fails.
+  /// Connects. Aborts the program on failure.
   RawClient(const std::string& host, std::uint16_t port, int receive_buffer_bytes = 0);
   virtual ~RawClient();
   RawClient(RawClient&& other) noexcept;
@@ -36,12 +36,12 @@ class RawClient {
     SendBytes(frame);
   }
 
-  /// The next message, nothing when the server has closed or `patience` is over. A PoseBatch is
-  /// valid until the next call.
+  /// Returns the next message, or nullopt if the server has closed or after `patience`. A PoseBatch
+  /// is valid until the next call.
   [[nodiscard]] virtual std::optional<protocol::Message> Receive(
       std::chrono::milliseconds patience = kPatience);
 
-  /// The next message of a kind; what comes before it goes to `on_other` or is dropped.
+  /// Returns the next message of a type. Messages before it are passed to `on_other` or dropped.
   template <typename Message>
   [[nodiscard]] std::optional<Message> Await(
       const std::function<void(const protocol::Message&)>& on_other = nullptr) {
@@ -52,16 +52,15 @@ class RawClient {
     return std::nullopt;
   }
 
-  /// Reads on until the server closes; false if it does not.
+  /// Reads until the server closes. Returns false if it does not.
   [[nodiscard]] bool AwaitClose(std::chrono::milliseconds patience = kPatience);
 
-  /// As a network that fails: no goodbye.
+  /// Resets the connection, like a failed network.
   virtual void Abort();
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
-  // The usual ways through the protocol, each one command and its answer.
-  std::optional<protocol::Welcome> SayHello(std::uint64_t features = ~std::uint64_t{0},
-                                            std::vector<std::byte> resume_token = {},
+  // Common exchanges: each sends one message and waits for its answer.
+  std::optional<protocol::Welcome> SayHello(std::vector<std::byte> resume_token = {},
                                             std::uint64_t last_events_number = 0);
   std::optional<protocol::WorldInfo> Join(const std::string& world,
                                           protocol::Role role = protocol::Role::kController);
@@ -91,7 +90,7 @@ class RawClient {
   protocol::Seq last_seq_ = 0;
 };
 
-/// A walk of `count` steps of one avatar, request ids from 1 on.
+/// Returns `count` step requests of one avatar, with request ids from 1.
 [[nodiscard]] std::vector<protocol::RequestItem> Steps(protocol::AvatarId avatar, int count,
                                                        double length_m);
 

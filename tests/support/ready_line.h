@@ -5,7 +5,8 @@
 
 namespace stridewire::test {
 
-/// Where a server listens that wrote `line` when it was ready, for "listen" or "http"; 0: it does not say.
+/// Returns the port in the ready line of a server, for the key "listen" or "http". Returns 0 if the
+/// line does not contain it.
 inline std::uint16_t PortIn(const std::string& line, const std::string& key) {
   const std::string before = key + "=127.0.0.1:";
   const std::size_t at = line.find(before);

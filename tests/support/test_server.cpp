@@ -28,7 +28,7 @@ TestServer::TestServer(server::Config config, server::ViewerFiles viewer) {
   server_ =
       std::make_unique<server::Server>(std::move(config), std::move(libraries), std::move(viewer));
   if (const Status status = server_->Start(); !status) {
-    std::fprintf(stderr, "the test's server did not start: %s\n", Describe(status.error()).c_str());
+    std::fprintf(stderr, "cannot start the test server: %s\n", Describe(status.error()).c_str());
     std::abort();
   }
   thread_ = std::thread([this] { was_drained_ = server_->Run(); });

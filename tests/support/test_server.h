@@ -6,15 +6,16 @@
 #include <thread>
 #include <utility>
 
-#include "ops/server.h"
+#include "app/server.h"
 #include "raw_client.h"
 
 namespace stridewire {
 
-/// A configuration for tests: this machine, ports the system chooses.
+/// Returns a configuration for tests: loopback addresses with ports that the system chooses.
 [[nodiscard]] server::Config TestConfig(int shards = 2);
 
-/// A server in this process, on the toy library unless its configuration names another, with real sockets.
+/// A server in this process, with real sockets. It uses the test library "toy" unless the
+/// configuration names another.
 class TestServer {
  public:
   explicit TestServer(server::Config config = TestConfig(), server::ViewerFiles viewer = {});
@@ -23,7 +24,7 @@ class TestServer {
   TestServer& operator=(const TestServer&) = delete;
 
   [[nodiscard]] RawClient Connect(int receive_buffer_bytes = 0) const;
-  /// A session that is in a world. The test fails if it does not come to that, and has a world of number 0.
+  /// Opens a session and joins a world. On failure the test fails and the returned world has id 0.
   [[nodiscard]] std::pair<RawClient, std::optional<protocol::WorldInfo>> Enter(
       const std::string& world, protocol::Role role = protocol::Role::kController) const;
   [[nodiscard]] std::uint16_t port() const { return server_->listen_endpoint().port; }
@@ -31,7 +32,7 @@ class TestServer {
   [[nodiscard]] server::Server& server() { return *server_; }
   [[nodiscard]] server::Metrics& metrics() { return server_->metrics(); }
 
-  /// Drains it and waits for its end. True: it was drained in time.
+  /// Drains the server and waits for its end. Returns true if it was drained in time.
   bool DrainAndJoin();
 
  private:
@@ -40,7 +41,7 @@ class TestServer {
   std::thread thread_;
 };
 
-/// Waits until a condition holds, at most RawClient::kPatience; true if it does.
+/// Waits until `condition` returns true, at most RawClient::kPatience. Returns its last result.
 template <typename Condition>
 bool Eventually(Condition&& condition) {
   const auto until = std::chrono::steady_clock::now() + RawClient::kPatience;

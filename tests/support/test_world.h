@@ -12,20 +12,14 @@
 #include "stridewire/protocol/messages.h"
 #include "stridewire/protocol/pose_rows.h"
 
-/// What a small, made-up server would say, for tests of clients.
-namespace stridewire::toy {
+/// Messages of a small fictitious server and world, for tests of clients.
+namespace stridewire::test_world {
 
 inline constexpr int kJoints = 3;
 inline constexpr double kTickHz = 60.0;
 
 inline protocol::Welcome Welcome(bool resumed = false) {
   protocol::Welcome welcome;
-  welcome.features =
-      protocol::kFeatureResume | protocol::kFeatureEventReplay | protocol::kFeatureWalks |
-      protocol::kFeatureTakeovers | protocol::kFeatureQuantised | protocol::kFeatureTerrain |
-      protocol::kFeatureFootprints | protocol::kFeatureLayers | protocol::kFeatureRefusals |
-      protocol::kFeaturePlanting | protocol::kFeatureMovementMode | protocol::kFeatureCompact |
-      protocol::kFeatureDetail;
   welcome.session = 7;
   welcome.resume_token = std::vector<std::byte>(16, std::byte{0x5a});
   welcome.resumed = resumed;
@@ -39,7 +33,7 @@ inline protocol::Welcome Welcome(bool resumed = false) {
   return welcome;
 }
 
-/// Hips and head turn every way, the spine never.
+/// Hips and head rotate about any axis, the spine does not rotate.
 inline std::vector<RotationQuantization> RotationCodes() {
   std::vector<RotationQuantization> codes(kJoints);
   codes[0].smallest_three_bits = 12;
@@ -47,7 +41,7 @@ inline std::vector<RotationQuantization> RotationCodes() {
   codes[2].smallest_three_bits = 14;
   return codes;
 }
-/// From afar the head's turn is not told.
+/// With reduced joints, the rotation of the head is omitted.
 inline std::vector<std::uint16_t> FewerJoints() { return {0, 1}; }
 inline protocol::CompactCodecs Codecs() {
   return protocol::CompactCodecs::Make(RotationCodes(), std::array<std::int16_t, kJoints>{-1, 0, 1},
@@ -67,7 +61,7 @@ inline protocol::WorldInfo WorldInfo(protocol::Seq seq, protocol::WorldId world,
                           {"head", 1, Vec3(0.0f, 0.4f, 0.0f)}};
   info.skeleton.end_sites = {{2, Vec3(0.0f, 0.1f, 0.0f)}};
   info.rotation_codes = RotationCodes();
-  info.fewer_joints = FewerJoints();
+  info.reduced_joints = FewerJoints();
   return info;
 }
 
@@ -80,7 +74,8 @@ inline protocol::Reply Ok(protocol::Seq seq, std::uint32_t accepted = 1) {
 
 inline double TickTime(std::uint64_t tick) { return static_cast<double>(tick) / kTickHz; }
 
-/// Pose of an avatar that walks along +z at 1.5 m/s and turns its head at 1 rad/s.
+/// Root position of an avatar that walks along +z at 1.5 m/s. RotationsAt turns its head at 1
+/// rad/s.
 inline Vec3 RootAt(double time_s, std::uint32_t avatar = 1) {
   return {static_cast<float>(avatar), 1.0f, static_cast<float>(1.5 * time_s)};
 }
@@ -91,10 +86,10 @@ inline std::vector<Quat> RotationsAt(double time_s) {
 struct AvatarAt {
   std::uint32_t avatar = 1;
   std::uint8_t flags = 0;
-  std::optional<Vec3> root_position_m = {};  ///< Elsewhere than RootAt.
+  std::optional<Vec3> root_position_m = {};  ///< Replaces RootAt.
 };
 
-/// The frame of one batch: those avatars at that tick.
+/// Returns the frame of one batch.
 inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t tick,
                                         const std::vector<AvatarAt>& avatars,
                                         protocol::PoseMode mode = protocol::PoseMode::kFull,
@@ -128,4 +123,4 @@ inline std::vector<std::byte> PoseFrame(protocol::WorldId world, std::uint64_t t
   return frame;
 }
 
-}  // namespace stridewire::toy
+}  // namespace stridewire::test_world

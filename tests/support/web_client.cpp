@@ -18,7 +18,7 @@ WebClient::WebClient(std::uint16_t port, const Options& options) : stream_(conte
     socket.set_option(asio::socket_base::receive_buffer_size(options.receive_buffer_bytes));
   }
   socket.connect({asio::ip::address_v4::loopback(), port});
-  // Asks for compression, as browsers do.
+  // Offers compression, as browsers do.
   websocket::permessage_deflate compression;
   compression.client_enable = true;
   stream_.set_option(compression);
@@ -46,7 +46,7 @@ WebClient::~WebClient() = default;
 void WebClient::SendBytes(std::span<const std::byte> bytes) { SendFragment(bytes, true); }
 
 void WebClient::SendFragment(std::span<const std::byte> bytes, bool is_last) {
-  error_code ignored;  // the server has closed; what it said can still be read
+  error_code ignored;  // the server has closed; received data can still be read
   stream_.write_some(is_last, asio::buffer(bytes.data(), bytes.size()), ignored);
 }
 
@@ -101,7 +101,7 @@ std::optional<protocol::Message> WebClient::Receive(std::chrono::milliseconds pa
     std::fprintf(stderr, "the server sent a message that is not one frame\n");
     std::abort();
   }
-  // A view of frame_, which lies aligned, not of the reader that ends here.
+  // The message must refer to frame_, which is aligned, because this reader is destroyed.
   auto message = protocol::DecodeMessage(**next);
   if (message) return *std::move(message);
   std::fprintf(stderr, "the server sent no message: %s\n", Describe(message.error()).c_str());
@@ -113,7 +113,7 @@ void WebClient::Abort() {
   stream_.next_layer().set_option(asio::socket_base::linger(true, 0), ignored);
   stream_.next_layer().close(ignored);
   context_.restart();
-  context_.run_for(kPatience);  // what was under way ends with an error
+  context_.run_for(kPatience);  // pending operations end with an error
   set_closed();
 }
 

@@ -10,14 +10,14 @@
 
 namespace stridewire {
 
-/// RawClient over a WebSocket (Beast's client): what is sent at once is one binary message, and
-/// what comes has to be one frame a message.
+/// RawClient over a WebSocket, with Beast. Each SendBytes sends one binary message; each received
+/// message must contain one frame.
 class WebClient : public RawClient {
  public:
   struct Options {
     std::string path = "/stream";
     std::string host;    ///< Header Host; empty: the address.
-    std::string origin;  ///< Empty: none, as of a program.
+    std::string origin;  ///< Empty: no header, like a program that is not a browser.
     int receive_buffer_bytes = 0;
   };
 
@@ -25,29 +25,29 @@ class WebClient : public RawClient {
   WebClient(std::uint16_t port, const Options& options);
   ~WebClient() override;
 
-  /// The status the upgrade was answered with: 101 if there is a WebSocket.
+  /// Returns the HTTP status of the upgrade; 101 means success.
   [[nodiscard]] unsigned upgrade_status() const { return upgrade_status_; }
   [[nodiscard]] const std::string& extensions() const { return extensions_; }
 
   void SendBytes(std::span<const std::byte> bytes) override;
   void SendText(const std::string& text);
-  /// A part of a binary message.
+  /// Sends a fragment of a binary message.
   void SendFragment(std::span<const std::byte> bytes, bool is_last);
   void Ping();
-  /// Bytes below the WebSocket's frames.
+  /// Sends bytes without WebSocket framing.
   void SendRaw(std::span<const std::byte> bytes);
 
   [[nodiscard]] std::optional<protocol::Message> Receive(
       std::chrono::milliseconds patience = kPatience) override;
   void Abort() override;
-  /// Closes in an orderly way and waits for the end.
+  /// Closes the WebSocket gracefully and waits for the end.
   void CloseWebSocket();
 
-  /// How the server closed; 0: not at all, or without a word.
+  /// Returns the close code of the server; 0 if it has not closed or sent no code.
   [[nodiscard]] unsigned close_code() const { return stream_.reason().code; }
-  /// Pongs that have come.
+  /// Returns the number of received pongs.
   [[nodiscard]] int pongs() const { return pongs_; }
-  /// The last frame, byte by byte.
+  /// Returns the bytes of the last frame.
   [[nodiscard]] std::span<const std::byte> last_frame() const { return frame_; }
 
  private:

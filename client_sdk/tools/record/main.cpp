@@ -1,4 +1,4 @@
-// stridewire-record: watches one avatar and writes what it saw as BVH.
+// stridewire-record: records the motion of one avatar over the network as BVH.
 
 #include <unistd.h>
 
@@ -27,7 +27,7 @@ int PrintError(const std::string& sentence, int exit_code) {
   return exit_code;
 }
 
-/// HOST:PORT, [ADDRESS]:PORT; false: it is neither.
+/// Parses HOST:PORT or [ADDRESS]:PORT. Returns false if the text is neither.
 bool ParseAddress(const std::string& text, Options& options) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) return false;
@@ -35,7 +35,7 @@ bool ParseAddress(const std::string& text, Options& options) {
   if (host.front() == '[' && host.back() == ']') {
     host = host.substr(1, host.size() - 2);
   } else if (host.find(':') != std::string::npos) {
-    return false;  // An IPv6 address without brackets: where does the port begin?
+    return false;  // An IPv6 address without brackets is ambiguous.
   }
   const char* first = text.data() + colon + 1;
   const char* last = text.data() + text.size();
@@ -48,52 +48,54 @@ bool ParseAddress(const std::string& text, Options& options) {
   return true;
 }
 
-/// Before anything is recorded: can the file be written? Empty: it seems so.
+/// Checks, before recording, whether the file can be written. Returns the problem, or an empty
+/// text.
 std::string OutputError(const std::filesystem::path& path) {
   std::error_code ignored;
   const auto status = std::filesystem::status(path, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    return "is there already and no plain file";
+    return "exists and is not a regular file";
   }
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder, ignored)) return "its folder is not there";
-  if (::access(folder.c_str(), W_OK | X_OK) != 0) return "its folder cannot be written to";
+  if (!std::filesystem::is_directory(folder, ignored)) return "the folder does not exist";
+  if (::access(folder.c_str(), W_OK | X_OK) != 0) return "the folder is not writable";
   return {};
 }
 
 int Run(int argc, char** argv) {
-  CLI::App app{"Watches one avatar over the network and writes what it saw as BVH."};
+  CLI::App app{"Records the motion of one avatar over the network and writes it as BVH."};
   app.name("stridewire-record");
   app.set_version_flag("--version", std::string("stridewire-record ") + kVersion);
   app.footer(
-      "Example: ten seconds of avatar 1 of world \"plaza\", just as the server has them\n"
+      "Example: record ten seconds of avatar 1 of world \"plaza\" without loss\n"
       "  stridewire-record --connect 127.0.0.1:7420 --world plaza --avatar 1 --seconds 10 "
       "--out walk.bvh\n"
-      "Exit code: 0 recorded, 2 bad usage, 1 anything else; when the recording was cut short, "
-      "what\n"
-      "there is has been written.\n");
+      "Exit code: 0 success; 2 invalid options; 1 any other error. If the recording ends early, "
+      "the "
+      "file\n"
+      "contains the frames up to then.\n");
 
   Options options;
   std::string address;
   std::string mode = "full";
   std::string out;
   bool json = false;
-  app.add_option("--connect", address, "The server, HOST:PORT")->required();
+  app.add_option("--connect", address, "Address of the server, HOST:PORT")->required();
   app.add_option("--world", options.world, "Name of the world")->required();
-  app.add_option("--avatar", options.avatar, "Number of the avatar in its world")->required();
-  app.add_option("--seconds", options.seconds, "How long, from its first pose on (up to 3600)")
+  app.add_option("--avatar", options.avatar, "Id of the avatar in its world")->required();
+  app.add_option("--seconds", options.seconds, "Duration from the first pose on (up to 3600)")
       ->required();
-  app.add_option("--out", out, "The BVH file to write")->required();
-  app.add_option("--mode", mode, "How poses travel: full, quantised or movement")
+  app.add_option("--out", out, "BVH file to write")->required();
+  app.add_option("--mode", mode, "How the server sends poses: full, quantised or movement")
       ->capture_default_str();
   app.add_option("--library-folder", options.library_folder,
-                 "Where the libraries that --mode movement fetches are kept");
+                 "Folder that caches the libraries that --mode movement fetches");
   app.add_option("--timeout-s", options.timeout_s,
                  "Longest wait for the server, the avatar and each pose (0.1 to 600)")
       ->capture_default_str();
-  app.add_option("--token", options.token, "Token, where the server asks for one")
+  app.add_option("--token", options.token, "Auth token, if the server requires one")
       ->envname("STRIDEWIRE_TOKEN");
-  app.add_flag("--json", json, "Report as one JSON object on stdout");
+  app.add_flag("--json", json, "Print a report as one JSON object");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {
@@ -105,17 +107,17 @@ int Run(int argc, char** argv) {
   }
 
   if (!ParseAddress(address, options)) {
-    return PrintError("--connect: \"" + address + "\" is not HOST:PORT", kExitBadUsage);
+    return PrintError("--connect: \"" + address + "\": expected HOST:PORT", kExitBadUsage);
   }
   if (options.world.empty() || options.world.size() > STRIDEWIRE_MAX_NAME_BYTES) {
-    return PrintError("--world: a name has 1 to 64 bytes", kExitBadUsage);
+    return PrintError("--world: expected a name of 1 to 64 bytes", kExitBadUsage);
   }
-  if (options.avatar == 0) return PrintError("--avatar: numbers begin at 1", kExitBadUsage);
+  if (options.avatar == 0) return PrintError("--avatar: expected an id above 0", kExitBadUsage);
   if (!(options.seconds > 0.0 && options.seconds <= 3600.0)) {
-    return PrintError("--seconds: is not a number above 0 and up to 3600", kExitBadUsage);
+    return PrintError("--seconds: expected a number above 0 and up to 3600", kExitBadUsage);
   }
   if (!(options.timeout_s >= 0.1 && options.timeout_s <= 600.0)) {
-    return PrintError("--timeout-s: is not a number from 0.1 to 600", kExitBadUsage);
+    return PrintError("--timeout-s: expected a number from 0.1 to 600", kExitBadUsage);
   }
   if (mode == "full") {
     options.mode = STRIDEWIRE_FULL;
@@ -124,7 +126,8 @@ int Run(int argc, char** argv) {
   } else if (mode == "movement") {
     options.mode = STRIDEWIRE_MOVEMENT;
   } else {
-    return PrintError("--mode: \"" + mode + "\" is not full, quantised or movement", kExitBadUsage);
+    return PrintError("--mode: \"" + mode + "\": expected full, quantised or movement",
+                      kExitBadUsage);
   }
   if (const std::string wrong = out.empty() ? "is empty" : OutputError(out); !wrong.empty()) {
     return PrintError("--out: " + out + ": " + wrong, kExitBadUsage);
@@ -137,7 +140,7 @@ int Run(int argc, char** argv) {
   if (terminal) std::fputs("\r\033[K", stderr);
   if (!recording) {
     return PrintError(Describe(recording.error()),
-                    recording.error().code == ErrorCode::kIo ? kExitFailure : kExitBadUsage);
+                      recording.error().code == ErrorCode::kIo ? kExitFailure : kExitBadUsage);
   }
   if (Status written = WriteBvh(recording->skeleton, recording->clip, std::filesystem::path(out));
       !written) {
@@ -168,16 +171,16 @@ int Run(int argc, char** argv) {
     std::printf("%s\n",
                 report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   } else {
-    std::printf("%s: %d frames at %g a second, %d joints, mode %s, from tick %llu\n", out.c_str(),
+    std::printf("%s: %d frames at %g per second, %d joints, mode %s, from tick %llu\n", out.c_str(),
                 frames, recording->clip.fps, recording->clip.joint_count, mode.c_str(),
                 static_cast<unsigned long long>(recording->first_tick));
     if (recording->ticks_missing > 0) {
-      std::printf("%llu ticks did not arrive and were filled in from their neighbours\n",
+      std::printf("%llu ticks did not arrive and were interpolated from their neighbours\n",
                   static_cast<unsigned long long>(recording->ticks_missing));
     }
   }
   if (!recording->cut_short.empty()) {
-    return PrintError("cut short: " + recording->cut_short, kExitFailure);
+    return PrintError("the recording is incomplete: " + recording->cut_short, kExitFailure);
   }
   return 0;
 }

@@ -45,11 +45,11 @@ class Recorder {
 
   Expected<Recording> Run(const std::function<void(double)>& progress) {
     if (Status status = Subscribe(); !status) return std::unexpected(status.error());
-    heard_ = Clock::now();
+    received_ = Clock::now();
     while (!done_ && recording_.cut_short.empty()) {
       if (Status status = HandleEvents(); !status) return std::unexpected(status.error());
       if (Status status = TakePoses(); !status) return std::unexpected(status.error());
-      if (Clock::now() - heard_ > std::chrono::duration<double>(options_.timeout_s)) {
+      if (Clock::now() - received_ > std::chrono::duration<double>(options_.timeout_s)) {
         if (Status status = OnSilence(); !status) return std::unexpected(status.error());
       }
       if (progress && frame_count() > 0) progress(frame_count() / hz_);
@@ -69,7 +69,7 @@ class Recorder {
 
   Status Subscribe() {
     if (!client_.Connect(options_.host, options_.port)) {
-      return Fail(ErrorCode::kInvalidArgument, "is no place to connect to", Where());
+      return Fail(ErrorCode::kInvalidArgument, "invalid address", Where());
     }
     stridewire_observation observation{};
     observation.mode = options_.mode;
@@ -78,7 +78,7 @@ class Recorder {
     observation.avatar_count = 1;
     if (!client_.JoinWorld(options_.world, STRIDEWIRE_OBSERVER, world_) ||
         !client_.Observe(world_, observation)) {
-      return Fail(ErrorCode::kInvalidArgument, "the world or the avatar has no possible name",
+      return Fail(ErrorCode::kInvalidArgument, "invalid world name or avatar id",
                   client_.LastError());
     }
     return {};
@@ -94,13 +94,13 @@ class Recorder {
           if (!was_ready_) return Fail(ErrorCode::kIo, "cannot connect", Where() + ": " + text);
           break;
         case STRIDEWIRE_EVENT_CONNECTED: was_ready_ = true; break;
-        case STRIDEWIRE_EVENT_CLOSED: return End("the server ended the connection: " + text);
+        case STRIDEWIRE_EVENT_CLOSED: return End("the server closed the connection: " + text);
         case STRIDEWIRE_EVENT_REPLY:
           if (event.status != STRIDEWIRE_OK) return End("the server refused: " + text);
           break;
         case STRIDEWIRE_EVENT_SESSION_LOST:
-          // Another life of the server: its ticks and avatars have nothing to do with ours.
-          if (frame_count() > 0) return End("the server was restarted or forgot us");
+          // Ticks and avatars of a new session are unrelated to those of the recording.
+          if (frame_count() > 0) return End("the session was lost");
           break;
         default: break;
       }
@@ -108,7 +108,7 @@ class Recorder {
     return {};
   }
 
-  /// Ends with what there is, or fails if that is nothing.
+  /// Ends the recording early, or fails if nothing was recorded.
   Status End(std::string why) {
     if (frame_count() == 0) return Fail(ErrorCode::kIo, "nothing was recorded", std::move(why));
     recording_.cut_short = std::move(why);
@@ -121,26 +121,26 @@ class Recorder {
     char seconds[32];
     std::snprintf(seconds, sizeof seconds, "%g s", options_.timeout_s);
     if (!was_ready_) return End(Where() + " did not answer within " + seconds);
-    if (frame_count() == 0) return End(avatar + " did not show up within " + seconds);
-    return End("no pose of " + avatar + " came for " + seconds);
+    if (frame_count() == 0) return End(avatar + " sent no pose within " + seconds);
+    return End("no pose of " + avatar + " arrived for " + seconds);
   }
 
   Status Describe() {
     client::Skeleton skeleton;
     if (!client_.GetSkeleton(world_, skeleton)) {
-      return Fail(ErrorCode::kIo, "the server did not describe the figure", Where());
+      return Fail(ErrorCode::kIo, "the server did not send the skeleton", Where());
     }
     recording_.skeleton = ToSkeleton(skeleton);
     recording_.library_hash = skeleton.library_hash;
     recording_.clip.joint_count = recording_.skeleton.joint_count();
     hz_ = skeleton.tick_hz;
-    const double wanted = std::max(1.0, std::round(options_.seconds * hz_));
-    // What is kept has a limit, whatever rate a server claims.
-    if (wanted > kMaxFrames) {
-      return Fail(ErrorCode::kLimitExceeded, "that many frames are too many", "--seconds",
-                  static_cast<std::int64_t>(wanted));
+    const double frames = std::max(1.0, std::round(options_.seconds * hz_));
+    // Limits the memory, because the tick rate comes from the server.
+    if (frames > kMaxFrames) {
+      return Fail(ErrorCode::kLimitExceeded, "too many frames", "--seconds",
+                  static_cast<std::int64_t>(frames));
     }
-    wanted_frames_ = static_cast<int>(wanted);
+    target_frames_ = static_cast<int>(frames);
     return {};
   }
 
@@ -153,10 +153,10 @@ class Recorder {
       } else {
         Fill();
       }
-      if (frame_count() < wanted_frames_) Append();
+      if (frame_count() < target_frames_) Append();
       last_tick_ = pose_.tick;
-      heard_ = Clock::now();
-      if (frame_count() >= wanted_frames_) {
+      received_ = Clock::now();
+      if (frame_count() >= target_frames_) {
         done_ = true;
         break;
       }
@@ -172,14 +172,14 @@ class Recorder {
       clip.rotations.emplace_back(q.w, q.x, q.y, q.z);
   }
 
-  /// Frames for the ticks between the last pose and this one: on a straight line, or, where the
-  /// motion is not continuous, the last pose again.
+  /// Adds frames for the ticks between the last pose and this one. They are interpolated linearly,
+  /// or repeat the last pose before a discontinuity.
   void Fill() {
     Clip& clip = recording_.clip;
     const std::uint64_t ticks = pose_.tick - last_tick_;
     const int from = frame_count() - 1;
     const std::uint64_t filled =
-        std::min(ticks - 1, static_cast<std::uint64_t>(wanted_frames_ - frame_count()));
+        std::min(ticks - 1, static_cast<std::uint64_t>(target_frames_ - frame_count()));
     recording_.ticks_missing += filled;
     if (filled > 0 && recording_.gaps.size() < kMaxGaps) {
       recording_.gaps.push_back({from + 1, static_cast<int>(filled)});
@@ -208,9 +208,9 @@ class Recorder {
   bool was_ready_ = false;
   bool done_ = false;
   double hz_ = 60.0;
-  int wanted_frames_ = 1;
+  int target_frames_ = 1;
   std::uint64_t last_tick_ = UINT64_MAX;
-  Clock::time_point heard_;
+  Clock::time_point received_;
   client::Pose pose_;
   Recording recording_;
 };
@@ -228,7 +228,7 @@ Expected<Recording> Record(const Options& options, const std::function<void(doub
   stridewire_status status = STRIDEWIRE_OK;
   auto client = client::Client::Create(client_options, &status);
   if (!client) {
-    return Fail(ErrorCode::kInvalidArgument, "no client can be made",
+    return Fail(ErrorCode::kInvalidArgument, "cannot create a client",
                 std::string(stridewire_status_text(status)));
   }
   return Recorder(options, std::move(*client)).Run(progress);

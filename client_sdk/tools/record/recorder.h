@@ -13,6 +13,7 @@
 
 namespace stridewire::record {
 
+/// What to record.
 struct Options {
   std::string host;
   std::uint16_t port = 0;
@@ -20,35 +21,35 @@ struct Options {
   std::uint32_t avatar = 0;
   double seconds = 0.0;
   stridewire_pose_mode mode = STRIDEWIRE_FULL;
-  double timeout_s = 10.0;  ///< Longest wait for the connection, the avatar, and the next pose.
+  double timeout_s = 10.0;  ///< Longest wait for connection, avatar and each pose.
   std::string token;
-  std::string library_folder;  ///< Empty: none
+  std::string library_folder;  ///< Cache of libraries for STRIDEWIRE_MOVEMENT. Empty: none.
 };
 
-/// Frames that were not received.
+/// A run of frames that were not received.
 struct Gap {
   int first_frame = 0;
   int frames = 0;
 };
 
+/// A recorded motion.
 struct Recording {
   Skeleton skeleton;
-  Clip clip;  ///< One frame a tick, as received.
+  Clip clip;  ///< One frame per tick.
   std::string library_hash;
   std::uint64_t first_tick = 0;
-  std::uint64_t ticks_missing = 0;  ///< Not received; filled from their neighbours.
-  std::vector<Gap> gaps;            ///< Where those are: the first kMaxGaps.
+  std::uint64_t ticks_missing = 0;  ///< Ticks not received; interpolated from their neighbours.
+  std::vector<Gap> gaps;            ///< Positions of the missing frames: the first kMaxGaps.
   std::uint64_t discontinuities = 0;
   std::uint64_t bytes_received = 0;
-  std::string cut_short;  ///< Why there is less than was asked for; empty: there is not.
+  std::string cut_short;  ///< Why the recording is too short. Empty: it is complete.
 };
 
 inline constexpr std::size_t kMaxGaps = 1000;
 
-/// Watches one avatar for so many seconds of the server's time, counted in ticks from the first pose
-/// received. Always ends: nothing is waited for longer than `timeout_s`. `progress`, if set, is
-/// called with the seconds recorded. kIo: no connection, no such avatar, or other reasons why
-/// nothing was recorded.
+/// Records one avatar for `seconds` of server time, counted in ticks from the first received pose.
+/// Waits for nothing longer than `timeout_s`. Calls `progress`, unless it is empty, with the number
+/// of recorded seconds. Fails with kIo if there is no connection or no such avatar.
 [[nodiscard]] Expected<Recording> Record(const Options& options,
                                          const std::function<void(double)>& progress);
 

@@ -228,8 +228,6 @@ export class App {
       goLive: () => this.playback.goLive(),
       inspected: () => this.inspector.state,
       exactOnly: () => this.commandPanel.exactOnly,
-      reportsLayers: () => this.client.serverHas('planting'),
-      reportsLandings: () => this.client.serverHas('planting'),
       paneAt: (x, y) => this.paneAt(x, y),
       targets: () => this.commands.targets(),
       notify: (text) => this.notify(text),
@@ -428,7 +426,7 @@ export class App {
   private updateStreamCosts(ms: number, avatars: number): void {
     const {poseStream} = this.worldPanes;
     this.viewPanel.setDetailEnabled(
-      poseStream.mode === 'quantised' && this.client.serverHas('detail'));
+      poseStream.mode === 'quantised' && this.client.state === 'ready');
     if (this.streamCosts.measure(ms, poseStream, avatars, this.client.statistics)) {
       this.viewPanel.setCosts(this.streamCosts.costs);
     }
@@ -526,13 +524,13 @@ export class App {
     const avatars = this.commands.targets();
     const pane = this.commandedPane();
     const {client, commandPanel, commands} = this;
-    commandPanel.setFeatures(client.serverHas('footprints'), client.serverHas('walks'),
-      client.serverHas('terrain'), client.serverHas('exactOnly'));
+    const connected = client.state === 'ready';
+    commandPanel.setConnected(connected);
     const state = this.playback.live ? this.inspector.state : null;
     if (state && this.selected && state.avatar === this.selected.avatar) {
       commands.onAvatarState(this.selected.pane.world, state);
     }
-    commandPanel.setPlanting(client.serverHas('planting'), commands.areFeetPlanted());
+    commandPanel.setPlanting(connected, commands.areFeetPlanted());
     commandPanel.setLayers(pane?.world.layers ?? [], (layer) => commands.isLayerPlaying(layer));
     this.footprintTool.update();
     this.walkTool.update();

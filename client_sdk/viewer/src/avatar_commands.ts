@@ -22,8 +22,6 @@ export interface CommandHost {
   notify(text: string): void;
   /** Called after the queues of these avatars have been cleared. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void;
-  /** Whether the server reports the layers that avatars play. */
-  reportsLayers(): boolean;
   /** Shows in the panel that the terrain is none of the sample terrains. */
   resetTerrainChoice(): void;
 }
@@ -146,7 +144,6 @@ export class AvatarCommands {
     if (this.recentToggles > 0) return;
     if (!plantingEnabled) this.unplantedIn(world).add(avatar);
     else this.unplantedAvatars.get(world)?.delete(avatar);
-    if (!this.host.reportsLayers()) return;
     const playing = this.playingLayers.get(world) ?? new Set<string>();
     this.playingLayers.set(world, playing);
     for (const name of world.layers) {

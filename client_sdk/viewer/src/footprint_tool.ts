@@ -15,8 +15,6 @@ export interface FootprintHost {
   live(): boolean;
   /** The last state of the selected avatar that the server reported. */
   inspected(): Inspector['state'];
-  /** Whether the server reports where the feet of the current movement will land. */
-  reportsLandings(): boolean;
   /** The world that receives commands. */
   commandedPane(): WorldPane | null;
   /** The avatars that receive commands. */
@@ -37,17 +35,11 @@ interface Footprint {
 
 /** Radius around an outline's centre within which it can be dragged, in CSS pixels. */
 const grabPx = 18;
-const maxKnownTargets = 64;
 /** How long the nearest reachable footprint of a rejected step is outlined. */
 const nearestShownMs = 8000;
 
 export class FootprintTool {
   private active_ = false;
-  /**
-   * Footprints of steps that this page has requested or seen in a queue, by request id. Needed for
-   * servers that do not report the landings of the current movement.
-   */
-  private readonly knownTargets = new Map<bigint, Footprint>();
   /** The queued step whose outline the user is dragging. */
   private dragged: {
     readonly pane: WorldPane; readonly avatar: number; readonly requestId: bigint;
@@ -84,10 +76,7 @@ export class FootprintTool {
     }
     const avatar = avatars[0]!;
     this.host.goLive();
-    const from = pane.view.locate(avatar);
     const requestId = nextRequestId();
-    this.rememberTarget(
-      requestId, atM, from ? Math.atan2(atM[0] - from.x, atM[2] - from.z) : 0);
     this.nearestReachable = null;
     const exact = this.host.exactOnly();
     if (exact) this.exactRequests.add(requestId);
@@ -112,27 +101,12 @@ export class FootprintTool {
     this.update();
   }
 
-  private rememberTarget(requestId: bigint, atM: Vec3, headingRad: number): void {
-    this.knownTargets.delete(requestId);
-    this.knownTargets.set(requestId, {atM, headingRad});
-    if (this.knownTargets.size <= maxKnownTargets) return;
-    this.knownTargets.delete(this.knownTargets.keys().next().value!);
-  }
-
-  /**
-   * Where the feet of the inspected avatar's current movement will land: as the server plans it, or
-   * as requested if the server does not report plans.
-   */
+  /** Planned landings of the feet in the current movement of the inspected avatar. */
   private upcomingLandings(pane: WorldPane): Footprint[] {
     const selection = this.host.selection();
     const state = selection?.pane === pane && this.host.live() ? this.host.inspected() : null;
     if (!state?.movement || state.avatar !== selection!.avatar) return [];
-    if (this.host.reportsLandings()) {
-      return state.movement.landings.map(
-        ({positionM, headingRad}) => ({atM: positionM, headingRad}));
-    }
-    const target = this.knownTargets.get(state.movement.requestId);
-    return target ? [target] : [];
+    return state.movement.landings.map(({positionM, headingRad}) => ({atM: positionM, headingRad}));
   }
 
   /** Steps with a footprint in the queue of the inspected avatar. */
@@ -155,7 +129,6 @@ export class FootprintTool {
         const at = isDragged ? this.dragged!.atM : atM!;
         const heading = headingRad ?? Math.atan2(at[0] - from[0]!, at[2] - from[1]!);
         from = [at[0], at[2]];
-        if (!isDragged) this.rememberTarget(requestId, at, heading);
         return {atM: at, headingRad: heading};
       });
       if (this.nearestReachable && performance.now() > this.nearestReachable.untilMs) {

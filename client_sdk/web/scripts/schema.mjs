@@ -21,7 +21,8 @@ export function parseSchema(text) {
           return '';
         }
         const fields = body.split(';').map((field) => field.trim()).filter(Boolean).map((field) => {
-          const match = /^(\w+)\s*:\s*(\[\s*\w+\s*\]|\w+)\s*(=\s*[-\w.]+\s*)?$/.exec(field);
+          const match = /^(\w+)\s*:\s*(\[\s*\w+\s*\]|\w+)\s*(=\s*[-\w.]+\s*)?(\(deprecated\)\s*)?$/
+              .exec(field);
           if (!match) throw new Error(`${name}: unsupported field "${field}"`);
           return {name: match[1], type: match[2].replace(/\s/g, '')};
         });

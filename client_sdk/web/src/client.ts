@@ -1,7 +1,7 @@
 import {Session, defaultOptions} from './session';
 import {Status} from './status';
 import type {
-  ClientListeners, ClientOptions, ClientState, Feature, Statistics, WebSocketLike
+  ClientListeners, ClientOptions, ClientState, Statistics, WebSocketLike
 } from './client_types';
 import type {Role, World} from './types';
 
@@ -117,11 +117,6 @@ export class Client {
    */
   close(): void {
     this.session.close(this.nowS());
-  }
-
-  /** True if the client is connected to a server with this feature. */
-  serverHas(feature: Feature): boolean {
-    return this.session.has(feature);
   }
 
   /**

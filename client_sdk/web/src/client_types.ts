@@ -14,24 +14,6 @@ export type ClientState =
     'idle' | 'waiting' | 'connecting' | 'handshake' | 'ready' | 'closing' | 'closed';
 
 /**
- * Optional features of a server.
- * - `inspect`: `World.inspect`.
- * - `terrain`: `World.setTerrain`.
- * - `footprints`: steps to a position.
- * - `walks`: requests of type `walk`.
- * - `interrupts`: `MovementRequest.interrupt`.
- * - `layers`: `World.setLayers`.
- * - `exactOnly`: `MovementRequest.exactOnly`.
- * - `planting`: `World.setPlanting`.
- * - `regions`: `Observation.region`.
- * - `detail`: `Observation.detail`.
- *
- * A command that requires a missing feature fails with the status `unsupported`.
- */
-export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'interrupts' | 'layers' |
-    'exactOnly' | 'planting' | 'regions' | 'detail';
-
-/**
  * The part of the WebSocket interface that the client uses. Browsers and the package `ws` implement
  * it. Listener arguments are `any` because these implementations declare different event types.
  */

@@ -1,7 +1,5 @@
 import {Backoff} from './backoff';
-import type {
-  ClientListeners, ClientOptions, ClientState, Feature, Statistics
-} from './client_types';
+import type {ClientListeners, ClientOptions, ClientState, Statistics} from './client_types';
 import {ClockMap} from './clock_map';
 import {StridewireError} from './error';
 import {Listeners} from './listeners';
@@ -14,10 +12,8 @@ import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureCompact, featureDetail, featureEventReplay, featureFootprints, featureInspect,
-  featureLayers, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
-  featureTakeovers, featureTerrain, featureWalks, maxAuthTokenBytes, maxAvatarNumber, maxBulkBytes,
-  maxControlBytes, maxItems, maxNameBytes, maxReplyMemory, protocolVersion
+  maxAuthTokenBytes, maxAvatarNumber, maxBulkBytes, maxControlBytes, maxItems, maxNameBytes,
+  maxReplyMemory, protocolVersion
 } from './wire/limits';
 import {Malformed} from './wire/malformed';
 import type {
@@ -27,13 +23,6 @@ import type {
 import {checkName, checkText} from './wire/text';
 import {WorldHandle} from './world';
 import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
-
-const featureBits: Record<Feature, bigint> = {
-  inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints,
-  walks: featureWalks, interrupts: featureTakeovers, layers: featureLayers,
-  exactOnly: featureRefusals,
-  planting: featurePlanting, regions: featureRegions, detail: featureDetail | featureCompact,
-};
 
 /** Options of the client that the session uses, with defaults filled in. */
 export type SessionOptions = Required<Omit<ClientOptions, 'url' | 'webSocket' | 'now'>>;
@@ -137,7 +126,6 @@ export class Session {
   private resumeToken: Uint8Array = new Uint8Array(0);
   private nextSeq = 1n;
   private lastEventsNumber = 0n;
-  private features = 0n;
   private limits: ServerLimits | null = null;
   private tickHzNow = 60;
 
@@ -372,9 +360,6 @@ export class Session {
                       `avatar: expected an integer from 1 to ${maxAvatarNumber}, got ${avatar}`);
       }
       if (this.stateNow !== 'ready' || world.serverId === 0) return refuse(Status.not_ready);
-      if ((this.features & featureInspect) === 0n) {
-        return refuse(Status.unsupported, 'The server does not support inspect.');
-      }
       if (this.inspections.size >= maxInspections) return refuse(Status.commands_full);
       const nonce = this.nextNonce++;
       const deadlineS = this.heardS + inspectTimeoutS;
@@ -455,9 +440,6 @@ export class Session {
       protocolMin: protocolVersion,
       protocolMax: protocolVersion,
       clientName: this.options.clientName,
-      features: featureResume | featureEventReplay | featureQuantised | featureInspect |
-          featureTerrain | featureFootprints | featureWalks | featureTakeovers | featureLayers |
-          featureRefusals | featureRegions | featurePlanting | featureCompact | featureDetail,
       authToken: this.options.authToken,
       resumeToken: this.resumeToken,
       lastEventsNumber: this.resumeToken.length === 0 ? 0n : this.lastEventsNumber,
@@ -628,13 +610,6 @@ export class Session {
 
   private sendCommand(command: Command): void {
     const {message, world} = command;
-    if (!this.understands(message)) {
-      if (message.type === 'Observe' && world.subscriptions.delete(message.subscription)) {
-        world.updateFilter();
-      }
-      this.answer(command, Status.unsupported, '');
-      return;
-    }
     message.seq = this.nextSeq;
     if ('world' in message) message.world = world.serverId;
     if (!this.send(message)) {
@@ -652,34 +627,6 @@ export class Session {
       if (wanted !== undefined) wanted.unsent = false;
     }
     this.unanswered.set(this.nextSeq++, command);
-  }
-
-  /** True if the connection is ready and the server has this feature. */
-  has(feature: Feature): boolean {
-    return this.state === 'ready' && this.hasAll(featureBits[feature]);
-  }
-
-  private hasAll(bits: bigint): boolean {
-    return (this.features & bits) === bits;
-  }
-
-  /** True if the server has all features that the message uses. */
-  private understands(message: CommandMessage): boolean {
-    switch (message.type) {
-      case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
-      case 'SetLayers': return (this.features & featureLayers) !== 0n;
-      case 'SetPlanting': return (this.features & featurePlanting) !== 0n;
-      case 'Observe':
-        return (message.region === null || this.hasAll(featureRegions)) &&
-            ((message.detail === 'all' && (message.region?.ringDetails.length ?? 0) === 0) ||
-             this.hasAll(featureBits.detail));
-      case 'Request':
-        return message.items.every((item) => (item.atM === null ||
-            (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
-            (item.interrupt === 'none' || (this.features & featureTakeovers) !== 0n) &&
-            (!item.exactOnly || (this.features & featureRefusals) !== 0n));
-      default: return true;
-    }
   }
 
   /** Returns false and sets `lastError` if the message exceeds the server's limit. */
@@ -775,7 +722,7 @@ export class Session {
       case 'WorldTerrain': return this.onTerrain(message);
       case 'Movements':
       case 'LibraryPiece':
-        throw new Malformed('belongs to a feature that was not requested', message.type);
+        throw new Malformed('was not requested', message.type);
       default: throw new Malformed('may only be sent by clients', message.type);
     }
   }
@@ -791,7 +738,6 @@ export class Session {
     }
     this.readyS = nowS;
     this.limits = message.limits;
-    this.features = message.features;
     this.tickHzNow = message.tickHz;
     this.resumeToken = message.resumeToken;
     this.encoder = new Encoder(message.limits.maxControlBytes || maxControlBytes,

@@ -167,11 +167,11 @@ export interface MovementRequest {
   foot?: Foot | 'auto';
   /**
    * Step: world position where the ball of the foot lands. If present, the step ignores `lengthM`,
-   * `sideM`, `heightM` and `turnRad`. Requires the feature `footprints`.
+   * `sideM`, `heightM` and `turnRad`.
    *
    * Walk: destination on the ground; required. Events of all its steps contain the walk's request
    * id. The walk ends with an event `finished` of kind `stand`, or with `rejected` if the avatar
-   * cannot continue. Requires the feature `walks`.
+   * cannot continue.
    */
   atM?: Vec3;
   /** Step with `atM`: heading of the foot; absent: the server chooses. Walk: final heading;
@@ -180,7 +180,7 @@ export interface MovementRequest {
   /**
    * Step with `atM`: what happens if the position is out of reach when the step is about to start.
    * True: the step is rejected, and the event contains the nearest reachable position. False (the
-   * default): the foot lands at that nearest position. Requires the feature `exactOnly`.
+   * default): the foot lands at that nearest position.
    */
   exactOnly?: boolean;
   /** Walk: positions to pass on the way, at most 64. */
@@ -188,7 +188,7 @@ export interface MovementRequest {
   /** Walk: speed, 0.05 to 5. The avatar walks as close to it as the motion library allows. Absent:
    * a comfortable speed. */
   speedMPerS?: number;
-  /** Default `none`. Other values require the feature `interrupts`. */
+  /** Default `none`. */
   interrupt?: Interrupt;
   /** Step: forward distance between the feet at the end. Jump: forward distance. */
   lengthM?: number;
@@ -340,14 +340,14 @@ export interface Observation {
   /**
    * Observes the avatars inside a region instead of a list; `avatars` must then be empty. Events
    * `entered` and `left` report changes. A session that observes a region of a world cannot have
-   * other subscriptions to that world. Requires the feature `regions`.
+   * other subscriptions to that world.
    */
   region?: Region;
   /** The server sends one pose per this many ticks, 1 to 3600. Default 1. */
   everyNTicks?: number;
   /** Whether to receive the world's events. Default false; controllers always receive them. */
   withEvents?: boolean;
-  /** Default `all`. Other values require mode `quantised` and the feature `detail`. */
+  /** Default `all`. Other values require mode `quantised`. */
   detail?: PoseDetail;
 }
 
@@ -519,7 +519,7 @@ export interface World {
   readonly skeleton: Skeleton | null;
   /** Hash of the world's motion library; empty until the server has sent it. */
   readonly libraryHash: string;
-  /** Names of the motion library's layers, for `setLayers`. Empty without the feature `layers`. */
+  /** Names of the motion library's layers, for `setLayers`. */
   readonly layers: readonly string[];
   readonly recording: Recording;
   /** The ground. Null if it is flat at height 0. A change replaces the object. */
@@ -536,19 +536,19 @@ export interface World {
   cancel(avatars: readonly number[]): Promise<Reply>;
   /** Queues movements. The list may contain several requests per avatar. */
   request(items: readonly MovementRequest[]): Promise<Reply>;
-  /** Replaces the ground of the world for all avatars; null: flat at height 0. Copies the argument.
-   * Requires the feature `terrain`. */
+  /** Replaces the terrain of the world for all avatars; null: flat at height 0. Copies the
+   * argument. */
   setTerrain(terrain: Terrain | null): Promise<Reply>;
-  /** Starts, changes or ends layers, at most four per avatar. Requires the feature `layers`. */
+  /** Starts, changes or ends layers, at most four per avatar. */
   setLayers(items: readonly LayerRequest[]): Promise<Reply>;
   /** Enables or disables foot planting from the next movement on. Planted feet do not slide;
-   * otherwise feet move as in the examples. Initially enabled. Requires the feature `planting`. */
+   * otherwise feet move as in the examples. Initially enabled. */
   setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply>;
   /** Starts to receive poses, and events if requested. At most 256 subscriptions per world. */
   observe(observation: Observation): Subscription;
   /**
    * Returns what an avatar is doing, about one tick later. Rejects with a `StridewireError` if the
-   * avatar does not exist, the client is not connected, the feature `inspect` is missing, the reply
+   * avatar does not exist, the client is not connected, the reply
    * takes longer than 10 s, or 64 calls are waiting already.
    */
   inspect(avatar: number): Promise<AvatarState>;

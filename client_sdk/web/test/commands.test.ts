@@ -64,8 +64,6 @@ test('inspect returns the state of an avatar or rejects', async () => {
   h.lose();
   await assert.rejects(cut, {status: 'connection_lost'});
   await assert.rejects(world.inspect(41), {status: 'not_ready'});
-  const old = new Harness();
-  await assert.rejects(old.joined({features: 7n}).inspect(1), {status: 'unsupported'});
 });
 
 test('terrain is the last one that the server sent', () => {
@@ -131,7 +129,7 @@ test('sends terrain and footprints unchanged', async () => {
   assert.deepEqual(h.sent(), []);
 });
 
-test('sends a walk unchanged, if the server supports walks', async () => {
+test('sends a walk unchanged', async () => {
   const h = new Harness();
   const world = h.joined();
   void world.request([
@@ -152,11 +150,9 @@ test('sends a walk unchanged, if the server supports walks', async () => {
   ]) {
     assert.equal((await world.request([bad as typeof goal])).status, 'invalid_argument');
   }
-  const old = new Harness();
-  assert.equal((await old.joined({features: 127n}).request([goal])).status, 'unsupported');
 });
 
-test('sends interrupts, if the server supports them', async () => {
+test('sends interrupts', async () => {
   const h = new Harness();
   const world = h.joined();
   const step = {avatar: 1, type: 'step', lengthM: 0.5} as const;
@@ -166,11 +162,9 @@ test('sends interrupts, if the server supports them', async () => {
   assert.deepEqual(sent.items.map(({interrupt}) => interrupt), ['now', 'afterMovement', 'none']);
   assert.equal((await world.request([{...step, interrupt: 'soon'} as never])).status,
                'invalid_argument');
-  const old = new Harness().joined({features: 255n});
-  assert.equal((await old.request([{...step, interrupt: 'now'}])).status, 'unsupported');
 });
 
-test('sends exactOnly, if the server supports it', async () => {
+test('sends exactOnly', async () => {
   const h = new Harness();
   const world = h.joined();
   const step = {avatar: 1, type: 'step', atM: [1, 0, 2], exactOnly: true} as const;
@@ -187,14 +181,9 @@ test('sends exactOnly, if the server supports it', async () => {
     assert.equal(reply.status, 'invalid_argument');
     assert.match(reply.text, /exactOnly/);
   }
-  const old = new Harness();
-  const before = old.joined({features: 1023n});
-  assert.equal((await before.request([step])).status, 'unsupported');
-  void before.request([{...step, exactOnly: false}]);
-  assert.deepEqual(summary(old.sent()), ['Request 3']);
 });
 
-test('sends layers, if the server supports them', async () => {
+test('sends layers', async () => {
   const h = new Harness();
   const world = h.joined();
   void world.setLayers(
@@ -210,12 +199,9 @@ test('sends layers, if the server supports them', async () => {
                        {avatar: 1, layer: 'wave', enabled: 0}]) {
     assert.equal((await world.setLayers([wrong as never])).status, 'invalid_argument');
   }
-  const old = new Harness();
-  const before = old.joined({features: 511n});
-  assert.equal((await before.setLayers([{avatar: 1, layer: 'wave'}])).status, 'unsupported');
 });
 
-test('sends foot planting, if the server supports it', async () => {
+test('sends foot planting', async () => {
   const h = new Harness();
   const world = h.joined();
   void world.setPlanting([1, 7], false);
@@ -227,28 +213,18 @@ test('sends foot planting, if the server supports it', async () => {
     const reply = await world.setPlanting(avatars as never, enabled as never);
     assert.equal(reply.status, 'invalid_argument');
   }
-  const old = new Harness();
-  const before = old.joined({features: 2047n});
-  assert.equal((await before.setPlanting([1], true)).status, 'unsupported');
 });
 
-test('sends the detail of an observation, if the server supports it', async () => {
+test('sends the detail of an observation', async () => {
   const h = new Harness();
-  const world = h.joined({features: 16_383n});
+  const world = h.joined();
   void world.observe({mode: 'quantised', detail: 'reduced'});
   assert.deepEqual(h.sent().map((m) => m.type === 'Observe' && m.detail), ['reduced']);
-  for (const features of [8191n, 16_383n - 4096n]) {
-    const old = new Harness();
-    const before = old.joined({features});
-    const {reply} = before.observe({mode: 'quantised', detail: 'root'});
-    assert.equal((await reply).status, 'unsupported');
-    assert.equal(old.sent().length, 0);
-  }
 });
 
 test('sends the detail of each ring of a region', async () => {
   const h = new Harness();
-  h.connect({features: 32_767n});
+  h.connect();
   const world = h.session.joinWorld('plaza', 'observer');
   h.sent();
   h.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
@@ -266,23 +242,4 @@ test('sends the detail of each ring of a region', async () => {
   void observed.moveRegion(region('all'));
   assert.deepEqual(details(), [['root', ['all', 'root']]]);
   assert.match((await observed.moveRegion(region('none' as 'all'))).text, /rings.detail\[0\]/);
-  const old = new Harness();
-  old.connect({features: 32_767n - 8192n});
-  const before = old.session.joinWorld('plaza', 'observer');
-  old.sent();
-  old.receive(server.worldInfo(1n, 3, 'plaza'), server.reply(1n));
-  const {reply} = before.observe({mode: 'quantised', region: region('all')});
-  assert.equal((await reply).status, 'unsupported');
-  assert.equal(old.sent().length, 0);
-});
-
-test('does not send terrain or footprints to a server without them', async () => {
-  const h = new Harness();
-  const world = h.joined({features: 31n});
-  assert.equal((await world.setTerrain(null)).status, 'unsupported');
-  const step = {avatar: 1, type: 'step'} as const;
-  assert.equal((await world.request([step, {...step, atM: [1, 0, 0]}])).status, 'unsupported');
-  assert.deepEqual(h.sent(), []);
-  void world.request([step]);
-  assert.deepEqual(summary(h.sent()), ['Request 3']);
 });

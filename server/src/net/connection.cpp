@@ -31,6 +31,7 @@ Connection::Connection(std::unique_ptr<Transport> transport, const Limits& limit
       traffic_(metrics) {}
 
 void Connection::Start(ConnectionHandler* handler, std::span<const std::byte> received) {
+  STRIDEWIRE_CHECK(handler != nullptr && transport_ != nullptr && !is_reading_);
   handler_ = handler;
   transport_->Prepare(traffic_, limits_.socket_send_buffer_bytes);
   handed_over_.assign(received.begin(), received.end());
@@ -71,23 +72,22 @@ Expected<std::optional<protocol::FrameView>> Connection::NextFrame() {
   return reader_.Next(unread_);
 }
 
-// A message is one frame, no less and no more, however many fragments it comes in.
+// A WebSocket message must contain exactly one frame, in any number of fragments.
 Expected<std::optional<protocol::FrameView>> Connection::NextFrameOfMessages() {
   if (is_text_) {
     close_code_ = CloseCode::kNotBinary;
-    return Fail(ErrorCode::kUnsupported,
-                "a text message, though every message is one frame in binary");
+    return Fail(ErrorCode::kUnsupported, "a WebSocket text message; expected binary messages");
   }
   if (!whole_) {
     auto next = reader_.Next(unread_);
     if (!next) return next;
     whole_ = *next;
     if (!whole_ && is_message_over_) {
-      return Fail(ErrorCode::kMalformed, "a message that ends before its frame does");
+      return Fail(ErrorCode::kMalformed, "a WebSocket message that ends before its frame");
     }
   }
   if (whole_ && !unread_.empty()) {
-    return Fail(ErrorCode::kMalformed, "a message that goes on behind its frame");
+    return Fail(ErrorCode::kMalformed, "a WebSocket message that continues after its frame");
   }
   if (!is_message_over_) return std::nullopt;
   is_message_over_ = false;
@@ -115,6 +115,7 @@ void Connection::Read() {
 }
 
 void Connection::OnReceived(const error_code& error, const Transport::Chunk& chunk) {
+  STRIDEWIRE_CHECK(is_reading_);
   is_reading_ = false;
   if (is_closed_) return;
   if (error) {
@@ -122,7 +123,7 @@ void Connection::OnReceived(const error_code& error, const Transport::Chunk& chu
     return;
   }
   if (is_closing_) {
-    Read();  // whatever still comes is thrown away
+    Read();  // discard further bytes until the peer closes
     return;
   }
   unread_ = chunk.bytes;
@@ -168,15 +169,15 @@ std::size_t Connection::SendMovements(WorldId world, int shard, SharedFrame fram
   return dropped;
 }
 
-std::size_t Connection::SendPoses(const PoseDelivery& delivery) {
+std::size_t Connection::SendPoses(PoseFrames&& batch) {
   if (is_closed_ || is_closing_) return 0;
-  const std::size_t dropped = queue_.PushPoses(delivery);
+  const std::size_t dropped = queue_.PushPoses(std::move(batch));
   ScheduleFlush();
   return dropped;
 }
 
 void Connection::ScheduleFlush() {
-  // Later in the same round, so that what a tick brings goes out in one write.
+  // Flush is posted, so that all frames of a tick are sent in one write.
   if (is_writing_ || is_flush_scheduled_) return;
   is_flush_scheduled_ = true;
   asio::post(transport_->executor(), [self = shared_from_this()] {
@@ -208,6 +209,7 @@ void Connection::Sent() {
 }
 
 void Connection::OnSent(const error_code& error) {
+  STRIDEWIRE_CHECK(is_writing_);
   is_writing_ = false;
   if (is_closed_) return;
   if (error) {
@@ -221,7 +223,7 @@ void Connection::OnSent(const error_code& error) {
 // ---- ending
 
 void Connection::Watch() {
-  // One timer looks after all timeouts; it need not be exact.
+  // One timer checks all timeouts. It does not need to be precise.
   double shortest_s = limits_.write_timeout_s;
   if (limits_.idle_timeout_s > 0.0) shortest_s = std::min(shortest_s, limits_.idle_timeout_s);
   const double interval_s = std::clamp(shortest_s / 8.0, 0.01, 0.5);
@@ -257,7 +259,7 @@ void Connection::CloseGently(CloseCode code) {
   handler_ = nullptr;
   closing_since_ = Clock::now();
   queue_.DropAllPoses();
-  // Bytes that come from now on are only thrown away.
+  // Further received bytes are discarded.
   if (!is_processing_)
     Read();
   else
@@ -266,6 +268,7 @@ void Connection::CloseGently(CloseCode code) {
 }
 
 void Connection::BeginLinger() {
+  STRIDEWIRE_CHECK(is_closing_ && !is_lingering_ && queue_.empty());
   is_lingering_ = true;
   if (!transport_->End(shared_from_this(), close_code_)) Close();
 }

@@ -8,51 +8,57 @@
 #include <span>
 #include <vector>
 
+#include "base/limits.h"
+#include "base/metrics.h"
 #include "net/send_queue.h"
 #include "net/transport.h"
-#include "ops/limits.h"
-#include "ops/metrics.h"
 #include "stridewire/protocol/frame_reader.h"
 #include "stridewire/protocol/messages.h"
 
 namespace stridewire::server {
 
-/// Who a connection tells what happens on it. Called on the connection's thread.
+/// Receives the events of a connection, on the thread of the connection.
 class ConnectionHandler {
  public:
   virtual ~ConnectionHandler() = default;
   virtual void OnMessage(protocol::Message&& message) = 0;
-  /// Bytes that are no message; nothing after them is read.
+  /// The peer sent invalid bytes. The connection does not read anything after them.
   virtual void OnBadFrame(const Error& error) = 0;
-  /// Something was sent: there is room again.
+  /// Frames were sent, so the send queue has room again.
   virtual void OnSent() {}
-  /// Nothing came for idle_timeout_s, or nothing was taken for write_timeout_s.
+  /// No bytes were received for idle_timeout_s.
   virtual void OnIdle() {}
+  /// A pending write made no progress for write_timeout_s.
   virtual void OnStuck() {}
-  /// The connection is gone. Last call.
+  /// The connection is closed. This is the last call.
   virtual void OnClosed() = 0;
 };
 
-/// One connection on one thread: cuts frames out of what comes, sends what waits, and keeps the
-/// time. The same over TCP and WebSocket, whose difference is Transport's.
+/// One client connection: splits received bytes into frames, sends the frames of its SendQueue and
+/// checks timeouts. Transport hides the difference between TCP and WebSocket.
 ///
-/// Lives as long as something is under way on it. Memory is bounded by a read buffer, one frame
-/// and the SendQueue. Not thread-safe.
+///   open ----CloseGently----> closing ----queue sent----> lingering ----peer closed---> closed
+///     |                          |                            |        or kLinger          ^
+///     +--------------------------+------- Close, error -------+----------------------------+
+///
+/// Pending operations keep the connection alive. Memory is bounded by a read buffer, one frame and
+/// the SendQueue. Not thread-safe.
 class Connection : public Transport::User, public std::enable_shared_from_this<Connection> {
  public:
   using Clock = Traffic::Clock;
 
   Connection(std::unique_ptr<Transport> transport, const Limits& limits, ThreadMetrics& metrics);
 
-  /// Begins to read. `handler` is told until it is taken away; `received` came before.
+  /// Starts reading. `handler` must stay valid until it is replaced or the connection is closed.
+  /// `received` contains bytes that were received before, such as the bytes after Hello.
   void Start(ConnectionHandler* handler, std::span<const std::byte> received = {});
   void set_handler(ConnectionHandler* handler) { handler_ = handler; }
 
   void SendControl(SharedFrame frame);
   [[nodiscard]] bool SendEvents(SharedFrame frame);
-  /// Returns how many frames a slow peer lost by it.
-  [[nodiscard]] std::size_t SendPoses(const PoseDelivery& delivery);
-  /// As SendQueue::PushMovements.
+  /// Returns how many waiting frames of older batches were dropped because the peer is slow.
+  [[nodiscard]] std::size_t SendPoses(PoseFrames&& batch);
+  /// Result as for SendQueue::PushMovements.
   [[nodiscard]] std::size_t SendMovements(WorldId world, int shard, SharedFrame frame);
   void DropMovements(WorldId world) { queue_.DropMovements(world); }
   void SendTerrain(WorldId world, SharedFrame frame);
@@ -62,20 +68,21 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   [[nodiscard]] const SendQueue& queue() const { return queue_; }
   [[nodiscard]] TransportKind kind() const { return kind_; }
 
-  /// Stops taking messages until `ResumeReading`; the peer feels it.
+  /// Stops reading until ResumeReading. TCP flow control then slows down the peer.
   void PauseReading() { is_paused_ = true; }
   void ResumeReading();
 
-  /// Sends what waits (poses apart), then says it is the end, and closes when the peer has, at the
-  /// latest after `kLinger`. So a last message arrives: closing with unread bytes would cut it off.
-  /// The handler is not called any more. `code` is for a WebSocket; bad frames have their own.
+  /// Drops waiting poses, sends all other waiting frames and the end of the stream, and closes when
+  /// the peer has closed, at the latest after kLinger. Waiting ensures that the last message
+  /// arrives: closing a socket with unread bytes would discard it. The handler is not called any
+  /// more. A WebSocket sends `code`, unless a bad frame has set another code.
   void CloseGently(CloseCode code = CloseCode::kNormal);
-  /// At once.
+  /// Closes at once.
   void Close();
   [[nodiscard]] bool is_closed() const { return is_closed_; }
 
-  /// Takes the transport out, detached, with what was received behind the last message. Only from
-  /// OnMessage, when nothing was sent. The connection is over.
+  /// Returns the detached transport and closes this connection. `received` gets the bytes after the
+  /// last message. May be called only from OnMessage, if nothing was sent before.
   [[nodiscard]] std::unique_ptr<Transport> Release(std::vector<std::byte>& received);
 
  private:
@@ -95,7 +102,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   void Watch();
   void BeginLinger();
 
-  std::unique_ptr<Transport> transport_;  // none after Release
+  std::unique_ptr<Transport> transport_;  // null after Release
   const TransportKind kind_;
   boost::asio::steady_timer timer_;
   const Limits limits_;
@@ -105,10 +112,11 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   protocol::FrameReader reader_;
   std::vector<std::byte> read_buffer_;
   std::span<const std::byte> unread_;
-  bool is_text_ = false;                      // with messages: the one being received
-  bool is_message_over_ = false;              // the same: its last bytes are in unread_
-  std::optional<protocol::FrameView> whole_;  // the same: all there, but the message goes on
-  std::vector<std::byte> handed_over_;        // bytes that came before Start
+  bool is_text_ = false;          // the current WebSocket message is a text message
+  bool is_message_over_ = false;  // unread_ contains the end of the WebSocket message
+  std::optional<protocol::FrameView>
+      whole_;                           // complete frame, before the end of its WebSocket message
+  std::vector<std::byte> handed_over_;  // the bytes given to Start
   bool is_reading_ = false;
   bool is_processing_ = false;
   bool is_paused_ = false;

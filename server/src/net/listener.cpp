@@ -21,16 +21,16 @@ Status Listener::Open(const Endpoint& endpoint, const char* name) {
   asio::ip::tcp::resolver resolver(context_);
   const auto results = resolver.resolve(endpoint.host, std::to_string(endpoint.port),
                                         asio::ip::tcp::resolver::passive, error);
-  if (error || results.empty()) return fail("the address is not known", error);
+  if (error || results.empty()) return fail("cannot resolve the address", error);
   const asio::ip::tcp::endpoint address = results.begin()->endpoint();
   acceptor_.open(address.protocol(), error);
-  if (error) return fail("no socket to be had", error);
-  // A server that was restarted must not wait for the last connections of the one before.
+  if (error) return fail("cannot create a socket", error);
+  // A restarted server must not wait until connections of the previous process have timed out.
   acceptor_.set_option(asio::socket_base::reuse_address(true), error);
   acceptor_.bind(address, error);
-  if (error) return fail("the address cannot be had", error);
+  if (error) return fail("cannot bind the address", error);
   acceptor_.listen(asio::socket_base::max_listen_connections, error);
-  if (error) return fail("nobody can connect there", error);
+  if (error) return fail("cannot listen on the address", error);
   return {};
 }
 
@@ -52,8 +52,8 @@ void Listener::Accept() {
       Accept();
       return;
     }
-    // Out of descriptors or memory: trying again at once would only spin.
-    spdlog::warn("a connection could not be accepted: {}", error.message());
+    // The process is out of file descriptors or memory. Retrying at once would busy-wait.
+    spdlog::warn("cannot accept a connection: {}; retrying in 100 ms", error.message());
     pause_.expires_after(std::chrono::milliseconds(100));
     pause_.async_wait([this](const error_code& cancelled) {
       if (!cancelled && acceptor_.is_open()) Accept();

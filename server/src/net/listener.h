@@ -5,12 +5,12 @@
 #include <boost/asio/steady_timer.hpp>
 #include <functional>
 
-#include "ops/config.h"
+#include "base/config.h"
 #include "stridewire/base/error.h"
 
 namespace stridewire::server {
 
-/// Accepts TCP connections on one address. One thread's.
+/// Accepts TCP connections on one address. Not thread-safe.
 class Listener {
  public:
   using Socket = boost::asio::ip::tcp::socket;
@@ -18,12 +18,13 @@ class Listener {
 
   explicit Listener(boost::asio::io_context& context);
 
-  /// kIo: the address cannot be had; `name` ("listen") and the address are in `where`.
+  /// Binds the address. On failure returns kIo; `where` contains `name`, such as "listen", and the
+  /// address.
   [[nodiscard]] Status Open(const Endpoint& endpoint, const char* name);
   void Start(OnSocket on_socket);
   void Close();
 
-  /// Where it really listens, with the port the system chose.
+  /// Returns the bound address, with the actual port if the system chose it.
   [[nodiscard]] Endpoint endpoint() const;
 
  private:

@@ -17,14 +17,14 @@ std::string Lower(std::string_view text) {
   return lower;
 }
 
-// Without the port that the scheme has anyway.
+// Removes the default port of the scheme.
 std::string_view WithoutDefaultPort(std::string_view scheme, std::string_view authority) {
   const std::string_view port = scheme == "https" ? ":443" : ":80";
   return authority.ends_with(port) ? authority.substr(0, authority.size() - port.size())
                                    : authority;
 }
 
-// Is it a name that cannot have been made to point somewhere else?
+// True for IP addresses and localhost: names that a page cannot make point to another address.
 bool IsFixedHost(std::string_view authority) {
   std::string_view host = authority;
   if (host.starts_with('[')) {
@@ -50,7 +50,8 @@ bool OriginPolicy::Allows(std::optional<std::string_view> origin, std::string_vi
   const std::string from = Lower(*origin);
   if (std::ranges::find(allowed_, from) != allowed_.end()) return true;
   const auto at = from.find(kSchemeEnd);
-  if (at == std::string::npos) return false;  // "null": a page from nowhere
+  if (at == std::string::npos)
+    return false;  // "null" is sent by pages without an origin, such as local files
   const std::string_view scheme = std::string_view(from).substr(0, at);
   if (scheme != "http" && scheme != "https") return false;
   const std::string_view page =
@@ -58,18 +59,6 @@ bool OriginPolicy::Allows(std::optional<std::string_view> origin, std::string_vi
   const std::string own = Lower(host);
   if (page.empty() || page != WithoutDefaultPort(scheme, own)) return false;
   return !is_loopback_ || IsFixedHost(own);
-}
-
-Status CheckOrigin(std::string_view origin) {
-  const auto at = origin.find(kSchemeEnd);
-  const bool is_good =
-      at != std::string_view::npos && at > 0 && at + kSchemeEnd.size() < origin.size() &&
-      origin.find_first_of("/?#*, \t\"\\", at + kSchemeEnd.size()) == std::string_view::npos &&
-      std::ranges::all_of(origin, [](char c) { return c > ' ' && c < 0x7f; });
-  if (is_good) return {};
-  return Fail(ErrorCode::kInvalidArgument,
-              "expected a page's origin, such as https://example.org or http://localhost:8080, "
-              "without a path");
 }
 
 }  // namespace stridewire::server

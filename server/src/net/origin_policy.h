@@ -5,21 +5,21 @@
 #include <string_view>
 #include <vector>
 
-#include "stridewire/base/error.h"
-
 namespace stridewire::server {
 
-/// Which web pages may open a stream. A browser tells which page does (Origin, RFC 6454) and lets
-/// any page connect to any server, so a server that takes all of them hands its avatars to every
-/// page its user happens to look at.
+/// Decides which web pages may open a stream. Browsers let any page connect to any server, but
+/// they send the origin of the page (header Origin, RFC 6454). A server that accepted every origin
+/// would let every page that its user visits control its avatars.
 ///
-/// Allowed are: no Origin at all, since it is no browser; the server's own pages (Origin's host and
-/// port are those of Host); and those listed. A server that only its own machine reaches takes
-/// Host for its own name only if it is an address or localhost: any other name may have been made
-/// to point there by the page itself (DNS rebinding).
+/// Allowed are requests without Origin, because they do not come from a browser; the server's own
+/// pages, whose Origin has the host and port of the header Host; and the listed origins.
+///
+/// If the server listens on a loopback address, a page counts as the server's own only if Host is
+/// an IP address or localhost. Other names could resolve to this machine because the page's owner
+/// configured its DNS that way (DNS rebinding).
 class OriginPolicy {
  public:
-  /// `is_loopback`: only the own machine reaches the server.
+  /// `is_loopback`: the server listens on a loopback address.
   OriginPolicy(std::vector<std::string> allowed, bool is_loopback);
 
   [[nodiscard]] bool Allows(std::optional<std::string_view> origin, std::string_view host) const;
@@ -28,8 +28,5 @@ class OriginPolicy {
   std::vector<std::string> allowed_;  // lower case
   bool is_loopback_;
 };
-
-/// One that may be listed: scheme://host or scheme://host:port, nothing behind it.
-[[nodiscard]] Status CheckOrigin(std::string_view origin);
 
 }  // namespace stridewire::server

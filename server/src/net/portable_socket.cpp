@@ -2,6 +2,8 @@
 
 #include <unistd.h>
 
+#include "base/check.h"
+
 namespace stridewire::server {
 
 namespace asio = boost::asio;
@@ -13,9 +15,9 @@ PortableSocket::~PortableSocket() {
 
 void PortableSocket::Prepare(Traffic& traffic, std::size_t send_buffer_bytes) {
   traffic_ = &traffic;
-  error_code ignored;  // a socket that fails here fails when it is read, too
+  error_code ignored;  // a socket that fails here also fails on the first read
   socket_->set_option(asio::ip::tcp::no_delay(true), ignored);
-  socket_->non_blocking(true, ignored);  // what is not asynchronous, too
+  socket_->non_blocking(true, ignored);  // for synchronous calls as well
   if (send_buffer_bytes > 0) {
     socket_->set_option(asio::socket_base::send_buffer_size(static_cast<int>(send_buffer_bytes)),
                         ignored);
@@ -35,16 +37,18 @@ void PortableSocket::Close() {
 }
 
 void PortableSocket::Detach() {
+  STRIDEWIRE_CHECK(socket_.has_value() && detached_ < 0);
   error_code ignored;
   detached_ = socket_->release(ignored);
   socket_.reset();
 }
 
 bool PortableSocket::Attach(asio::io_context& context) {
+  STRIDEWIRE_CHECK(!socket_.has_value() && detached_ >= 0);
   socket_.emplace(context);
   error_code error;
   socket_->assign(protocol_, detached_, error);
-  if (error) return false;  // and ours to close
+  if (error) return false;  // the destructor closes the descriptor
   detached_ = -1;
   return true;
 }

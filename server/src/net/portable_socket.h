@@ -11,15 +11,15 @@
 
 namespace stridewire::server {
 
-/// A TCP socket that tells Traffic of every byte and can move to another thread's io_context while
-/// what lies above it, such as a websocket::stream, stays as it is.
+/// A TCP socket that counts every byte in Traffic. It can move to the io_context of another thread
+/// while the object that uses it, such as a websocket::stream, stays unchanged.
 class PortableSocket {
  public:
   using Socket = boost::asio::ip::tcp::socket;
   using executor_type = Socket::executor_type;  // NOLINT(readability-identifier-naming)
 
   explicit PortableSocket(Socket socket) : socket_(std::move(socket)) {
-    boost::system::error_code ignored;  // a socket that fails here fails when it is used, too
+    boost::system::error_code ignored;  // a socket that fails here also fails on first use
     const auto local = socket_->local_endpoint(ignored);
     protocol_ = local.protocol();
   }
@@ -28,7 +28,8 @@ class PortableSocket {
   ~PortableSocket();
 
   void Prepare(Traffic& traffic, std::size_t send_buffer_bytes);
-  /// Writes what the system takes at once; 0: nothing now, or an error that writing again will tell.
+  /// Writes as many bytes as the system accepts without blocking. Returns 0 if it accepts none or
+  /// on an error; the next write reports the error.
   template <typename Buffers>
   [[nodiscard]] std::size_t WriteWhatFits(const Buffers& buffers) {
     boost::system::error_code ignored;
@@ -38,14 +39,14 @@ class PortableSocket {
   }
   [[nodiscard]] bool ShutDownSending();
   void Close();
-  /// Lets go of its io_context, when nothing is under way. Nothing else may be called then but
-  /// Attach, from any thread.
+  /// Leaves its io_context. No operation may be pending. Afterwards only Attach may be called, on
+  /// any thread.
   void Detach();
   [[nodiscard]] bool Attach(boost::asio::io_context& context);
 
   [[nodiscard]] Traffic& traffic() { return *traffic_; }
 
-  // What Asio and Beast call (AsyncReadStream, AsyncWriteStream).
+  // Required by Asio and Beast (AsyncReadStream, AsyncWriteStream).
   // NOLINTBEGIN(readability-identifier-naming)
   [[nodiscard]] executor_type get_executor() { return socket_->get_executor(); }
 
@@ -85,7 +86,7 @@ class PortableSocket {
         token, *socket_);
   }
 
-  // How Beast ends a stream.
+  // Beast calls these to close a stream.
   friend void beast_close_socket(PortableSocket& socket) { socket.Close(); }
   friend void teardown(boost::beast::role_type role, PortableSocket& socket,
                        boost::system::error_code& error) {
@@ -97,7 +98,7 @@ class PortableSocket {
     boost::beast::websocket::async_teardown(role, *socket.socket_, std::forward<Handler>(handler));
   }
 
-  std::optional<Socket> socket_;  // none between Detach and Attach
+  std::optional<Socket> socket_;  // empty between Detach and Attach
   Socket::protocol_type protocol_ = Socket::protocol_type::v4();
   Socket::native_handle_type detached_ = -1;
   Traffic* traffic_ = nullptr;

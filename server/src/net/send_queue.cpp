@@ -3,16 +3,21 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/check.h"
+
 namespace stridewire::server {
 namespace {
 
-constexpr std::size_t kMaxGatheredFrames = 64;  // of either kind; a system call takes 1024 pieces
+// Frames of each kind per write. A system call accepts 1024 buffers (IOV_MAX).
+constexpr std::size_t kMaxGatheredFrames = 64;
 
 }  // namespace
 
 SendQueue::SendQueue(std::size_t control_budget_bytes, int backlog_ticks)
     : control_budget_bytes_(control_budget_bytes),
-      backlog_ticks_(static_cast<std::size_t>(std::max(backlog_ticks, 1))) {}
+      backlog_ticks_(static_cast<std::size_t>(backlog_ticks)) {
+  STRIDEWIRE_CHECK(backlog_ticks >= 1);
+}
 
 void SendQueue::Gathered::clear() {
   frames.clear();
@@ -22,6 +27,7 @@ void SendQueue::Gathered::clear() {
 }
 
 void SendQueue::PushControl(SharedFrame frame) {
+  STRIDEWIRE_CHECK(frame != nullptr);
   control_bytes_ += frame->size();
   control_.push_back(std::move(frame));
 }
@@ -33,35 +39,42 @@ bool SendQueue::PushEvents(SharedFrame frame) {
 }
 
 void SendQueue::PushTerrain(WorldId world, SharedFrame frame) {
-  grounds_.insert_or_assign(world, std::move(frame));
+  STRIDEWIRE_CHECK(frame != nullptr);
+  terrains_.insert_or_assign(world, std::move(frame));
 }
 
-std::size_t SendQueue::PushPoses(const PoseDelivery& delivery) {
-  Lane& lane = lanes_[{delivery.world, delivery.mode, delivery.from_shard}];
+std::size_t SendQueue::PushPoses(PoseFrames&& batch) {
+  STRIDEWIRE_CHECK(!batch.frames.empty());
+  Lane& lane = lanes_[{batch.world, batch.mode, batch.shard}];
   std::size_t dropped = 0;
   while (lane.size() >= backlog_ticks_) {
     dropped += lane.front().left();
     lane.pop_front();
   }
-  lane.push_back({delivery.parts, 0, delivery.avatar_count});
-  waiting_batches_ += delivery.parts.size();
+  STRIDEWIRE_CHECK(dropped <= waiting_batches_);
+  waiting_batches_ += batch.frames.size();
   waiting_batches_ -= dropped;
+  lane.push_back({std::move(batch.frames), 0, batch.avatar_count});
   return dropped;
 }
 
-template <typename IsIt>
-std::size_t SendQueue::EraseMovements(IsIt&& is_it) {
-  return std::erase_if(movements_, [&](const Told& told) {
-    if (!is_it(told)) return false;
-    movement_bytes_ -= told.frame->size();
+template <typename Predicate>
+std::size_t SendQueue::EraseMovements(Predicate&& predicate) {
+  const std::size_t erased = std::erase_if(movements_, [&](const QueuedMovements& queued) {
+    if (!predicate(queued)) return false;
+    STRIDEWIRE_CHECK(queued.frame->size() <= movement_bytes_);
+    movement_bytes_ -= queued.frame->size();
     return true;
   });
+  STRIDEWIRE_CHECK(!movements_.empty() || movement_bytes_ == 0);
+  return erased;
 }
 
 std::size_t SendQueue::PushMovements(WorldId world, int shard, SharedFrame frame) {
   if (movement_bytes_ + frame->size() > control_budget_bytes_) {
-    return 1 + EraseMovements(
-                   [&](const Told& told) { return told.world == world && told.shard == shard; });
+    return 1 + EraseMovements([&](const QueuedMovements& queued) {
+             return queued.world == world && queued.shard == shard;
+           });
   }
   movement_bytes_ += frame->size();
   movements_.push_back({world, shard, std::move(frame)});
@@ -69,13 +82,16 @@ std::size_t SendQueue::PushMovements(WorldId world, int shard, SharedFrame frame
 }
 
 void SendQueue::DropMovements(WorldId world) {
-  EraseMovements([&](const Told& told) { return told.world == world; });
+  EraseMovements([&](const QueuedMovements& queued) { return queued.world == world; });
 }
 
 void SendQueue::DropPoses(WorldId world, protocol::PoseMode mode) {
   std::erase_if(lanes_, [&](const auto& item) {
     if (item.first.world != world || item.first.mode != mode) return false;
-    for (const Batch& batch : item.second) waiting_batches_ -= batch.left();
+    for (const Batch& batch : item.second) {
+      STRIDEWIRE_CHECK(batch.left() > 0 && batch.left() <= waiting_batches_);
+      waiting_batches_ -= batch.left();
+    }
     return true;
   });
 }
@@ -93,20 +109,21 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     out.frames.push_back(std::move(control_.front()));
     control_.pop_front();
   }
-  if (control_.empty() && !grounds_.empty()) {
-    out.bytes += grounds_.begin()->second->size();
-    out.frames.push_back(std::move(grounds_.begin()->second));
-    grounds_.erase(grounds_.begin());
+  if (control_.empty() && !terrains_.empty()) {
+    out.bytes += terrains_.begin()->second->size();
+    out.frames.push_back(std::move(terrains_.begin()->second));
+    terrains_.erase(terrains_.begin());
   }
-  std::size_t told_bytes = 0;
-  for (std::size_t i = 0; !movements_.empty() && told_bytes < max_bytes && i < kMaxGatheredFrames;
+  std::size_t taken_bytes = 0;
+  for (std::size_t i = 0; !movements_.empty() && taken_bytes < max_bytes && i < kMaxGatheredFrames;
        ++i) {
-    told_bytes += movements_.front().frame->size();
+    taken_bytes += movements_.front().frame->size();
     out.frames.push_back(std::move(movements_.front().frame));
     movements_.pop_front();
   }
-  movement_bytes_ -= told_bytes;
-  out.bytes += told_bytes;
+  STRIDEWIRE_CHECK(taken_bytes <= movement_bytes_);
+  movement_bytes_ -= taken_bytes;
+  out.bytes += taken_bytes;
   std::size_t pose_bytes = 0;
   std::size_t pose_frames = 0;
   auto lane = lanes_.upper_bound(last_lane_);
@@ -129,6 +146,8 @@ void SendQueue::Gather(std::size_t max_bytes, Gathered& out) {
     ++lane;
   }
   out.bytes += pose_bytes;
+  STRIDEWIRE_CHECK(!control_.empty() || control_bytes_ == 0);
+  STRIDEWIRE_CHECK(!movements_.empty() || movement_bytes_ == 0);
 }
 
 }  // namespace stridewire::server

@@ -8,51 +8,65 @@
 #include <vector>
 
 #include "net/shared_frame.h"
-#include "world/shard_messages.h"
+#include "stridewire/protocol/messages.h"
 
 namespace stridewire::server {
 
-/// What waits to be sent over one connection: control messages in order, and of poses the latest.
+using protocol::WorldId;
+
+/// The frames of one pose batch: poses of one world, mode, shard and tick.
+struct PoseFrames {
+  WorldId world = 0;
+  protocol::PoseMode mode = protocol::PoseMode::kFull;
+  int shard = 0;
+  std::uint64_t avatar_count = 0;  ///< In all frames together.
+  std::vector<SharedFrame> frames;
+};
+
+/// Messages that wait to be sent over one connection.
 ///
-///   control   [Reply][Events][Pong]…                     a budget of bytes
-///   lane      world 1, quantised, shard 0: [tick 7][tick 8]   a backlog of ticks; a new tick
-///   lane      world 1, quantised, shard 1: [tick 7]           drives out the oldest
+///   control     [Reply][Events][Pong]...                        limited by a budget of bytes
+///   terrain     world 1: [WorldTerrain]                         one frame per world
+///   movements   [world 1, shard 0][world 1, shard 1]...         limited by a second budget
+///   poses       world 1, quantised, shard 0: [tick 7][tick 8]   limited by a number of ticks;
+///               world 1, quantised, shard 1: [tick 7]           a new tick replaces the oldest
 ///
-/// Movements of avatars wait in order, as control does, and in their own budget of the same size; none may be missing, so
-/// beyond it all of a world and shard go.
+/// Control and movement messages keep their order and none may be missing. If the movement budget
+/// is exceeded, the queue drops all movements of the world and shard, and the caller must send new
+/// states.
 ///
-/// Control goes first, then grounds (behind the WorldInfo that they belong to), but every write also
-/// takes poses, so neither starves the other. Memory is bounded: control by its budget (events
-/// beyond it are refused; replies are bounded by whoever stops reading commands), grounds by one a
-/// world and poses by lanes times backlog, both in frames that all observers share.
+/// Every write takes messages of all kinds, in the order of the sketch, so that no kind starves.
+/// Terrain follows control messages, because it belongs to a WorldInfo that is sent as control.
+///
+/// Memory is bounded. Events that exceed the control budget are rejected, and the session limits
+/// replies by pausing to read commands. Frames are shared by all connections that send them.
 class SendQueue {
  public:
+  /// Movements have a budget of `control_budget_bytes` of their own.
   SendQueue(std::size_t control_budget_bytes, int backlog_ticks);
 
-  /// Always taken. The caller keeps an eye on control_bytes().
+  /// Always accepts the frame. The caller is responsible for watching control_bytes().
   void PushControl(SharedFrame frame);
 
-  /// False, and not taken, when it would exceed the control budget.
+  /// Returns false and does not accept the frame if it would exceed the control budget.
   [[nodiscard]] bool PushEvents(SharedFrame frame);
 
-  /// Takes a batch; returns how many frames of older ones it drove out.
-  [[nodiscard]] std::size_t PushPoses(const PoseDelivery& delivery);
+  /// Accepts a batch. Returns how many waiting frames of older batches were dropped for it.
+  [[nodiscard]] std::size_t PushPoses(PoseFrames&& batch);
 
-  /// Takes a world's ground in place of one that still waits: the last is what holds.
+  /// Accepts the terrain of a world. It replaces a waiting frame of the same world.
   void PushTerrain(WorldId world, SharedFrame frame);
-  void DropTerrain(WorldId world) { grounds_.erase(world); }
+  void DropTerrain(WorldId world) { terrains_.erase(world); }
 
-  /// Takes what avatars began. Beyond the budget it is not taken, and what waits of the world and shard is forgotten:
-  /// returns how many frames went, 0: taken.
+  /// Accepts a Movements frame and returns 0. If it would exceed the budget, rejects it, drops the
+  /// waiting movements of this world and shard, and returns how many frames were lost.
   [[nodiscard]] std::size_t PushMovements(WorldId world, int shard, SharedFrame frame);
-  /// Forgets the movements of a world.
   void DropMovements(WorldId world);
 
-  /// Forgets the poses of a world, or of all.
   void DropPoses(WorldId world, protocol::PoseMode mode);
   void DropAllPoses();
 
-  /// What one write takes, in the order to be sent.
+  /// The frames of one write, in the order in which they are sent.
   struct Gathered {
     std::vector<SharedFrame> frames;
     std::size_t bytes = 0;
@@ -61,13 +75,13 @@ class SendQueue {
     void clear();
   };
 
-  /// Moves frames to `out`, which is cleared first: control until `max_bytes`, a ground if no
-  /// control waits any more, then movements until `max_bytes` more, and as much of poses, lane after
-  /// lane; of each at least one frame that waits.
+  /// Clears `out` and moves waiting frames to it: up to `max_bytes` of control messages, one
+  /// terrain if no control message waits, then up to `max_bytes` of movements and up to `max_bytes`
+  /// of poses. At least one waiting frame of each kind is taken, so a large frame cannot block.
   void Gather(std::size_t max_bytes, Gathered& out);
 
   [[nodiscard]] bool empty() const {
-    return control_.empty() && grounds_.empty() && movements_.empty() && waiting_batches_ == 0;
+    return control_.empty() && terrains_.empty() && movements_.empty() && waiting_batches_ == 0;
   }
   [[nodiscard]] bool control_empty() const { return control_.empty(); }
   [[nodiscard]] std::size_t control_bytes() const { return control_bytes_; }
@@ -87,25 +101,26 @@ class SendQueue {
     std::uint64_t avatars = 0;
     [[nodiscard]] std::size_t left() const { return parts.size() - next_part; }
   };
+  /// Waiting batches of one world, mode and shard, oldest first.
   using Lane = std::deque<Batch>;
+  struct QueuedMovements {
+    WorldId world = 0;
+    int shard = 0;
+    SharedFrame frame;
+  };
+  template <typename Predicate>
+  std::size_t EraseMovements(Predicate&& predicate);
 
   std::size_t control_budget_bytes_;
   std::size_t backlog_ticks_;
   std::deque<SharedFrame> control_;
   std::size_t control_bytes_ = 0;
-  std::map<WorldId, SharedFrame> grounds_;
-  struct Told {
-    WorldId world = 0;
-    int shard = 0;
-    SharedFrame frame;
-  };
-  template <typename IsIt>
-  std::size_t EraseMovements(IsIt&& is_it);
-  std::deque<Told> movements_;
+  std::map<WorldId, SharedFrame> terrains_;
+  std::deque<QueuedMovements> movements_;
   std::size_t movement_bytes_ = 0;
   std::map<LaneKey, Lane> lanes_;
-  std::size_t waiting_batches_ = 0;
-  LaneKey last_lane_;  // where the last gathering stopped
+  std::size_t waiting_batches_ = 0;  // frames in all lanes
+  LaneKey last_lane_;                // where the last Gather stopped
 };
 
 }  // namespace stridewire::server

@@ -6,7 +6,7 @@
 
 namespace stridewire::server {
 
-/// One encoded frame: immutable, shared by every connection that sends it.
+/// An encoded frame. It is immutable and shared by all connections that send it.
 using SharedFrame = std::shared_ptr<const std::vector<std::byte>>;
 
 }  // namespace stridewire::server

@@ -11,10 +11,10 @@ namespace {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-// A borrowed buffer sequence: Asio copies the sequence it is given, which for a vector is a heap
-// allocation a write.
+// A buffer sequence that borrows its buffers. Asio copies the sequence that it is given; copying a
+// vector would allocate memory for every write.
 struct BufferList {
-  // Names that Asio asks for.
+  // These names are required by Asio.
   using value_type = asio::const_buffer;             // NOLINT(readability-identifier-naming)
   using const_iterator = const asio::const_buffer*;  // NOLINT(readability-identifier-naming)
   const_iterator first;
@@ -46,14 +46,15 @@ class TcpTransport final : public Transport {
     buffers_.clear();
     for (const SharedFrame& frame : frames) buffers_.emplace_back(frame->data(), frame->size());
     first_buffer_ = 0;
-    // The system mostly has room for all of a tick. To hear of that later would cost a small frame a tenth more.
+    // The system usually has room for all frames of a tick. Waiting for the socket to become
+    // writable first would add 10 % to the cost of a small frame.
     while (first_buffer_ < buffers_.size()) {
       const std::size_t bytes = socket_.WriteWhatFits(unsent());
       if (bytes == 0) {
         Write(std::move(user));
         return false;
       }
-      Took(bytes);
+      Consume(bytes);
     }
     return true;
   }
@@ -70,7 +71,7 @@ class TcpTransport final : public Transport {
     return {buffers_.data() + first_buffer_, buffers_.data() + buffers_.size()};
   }
 
-  void Took(std::size_t bytes) {
+  void Consume(std::size_t bytes) {
     while (bytes > 0) {
       asio::const_buffer& buffer = buffers_[first_buffer_];
       const std::size_t taken = std::min(bytes, buffer.size());
@@ -87,7 +88,7 @@ class TcpTransport final : public Transport {
         user->OnSent(error);
         return;
       }
-      Took(bytes);
+      Consume(bytes);
       if (first_buffer_ < buffers_.size()) {
         Write(std::move(user));
       } else {

@@ -8,7 +8,7 @@
 
 namespace stridewire::server {
 
-/// Frames one behind the other; several go out in one system call.
+/// Sends frames one after the other over plain TCP, several per system call.
 [[nodiscard]] std::unique_ptr<Transport> MakeTcpTransport(boost::asio::ip::tcp::socket socket);
 
 }  // namespace stridewire::server

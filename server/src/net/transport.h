@@ -10,15 +10,15 @@
 #include <span>
 #include <vector>
 
+#include "base/metrics.h"
 #include "net/shared_frame.h"
-#include "ops/metrics.h"
 #include "stridewire/base/error.h"
 
 namespace stridewire::server {
 
 enum class TransportKind : std::uint8_t { kTcp, kWebSocket };
 
-/// Why a WebSocket ends (RFC 6455, Section 7.4.1); plain TCP has no place for it.
+/// Status code of a WebSocket close frame (RFC 6455, Section 7.4.1). Plain TCP does not send it.
 enum class CloseCode : std::uint16_t {
   kNormal = 1000,
   kGoingAway = 1001,
@@ -29,7 +29,7 @@ enum class CloseCode : std::uint16_t {
   kTryAgainLater = 1013,
 };
 
-/// What passes a connection, byte by byte as the system gives and takes it.
+/// Counts the bytes of one connection and records when the last bytes were received and sent.
 class Traffic {
  public:
   using Clock = std::chrono::steady_clock;
@@ -44,7 +44,7 @@ class Traffic {
     metrics_.bytes_sent.Add(bytes);
     last_sent_ = Clock::now();
   }
-  /// Something is about to be sent: from now on the peer may be slow.
+  /// Restarts the write timeout before a write.
   void BeginToSend() { last_sent_ = Clock::now(); }
   void ProtocolError() { metrics_.protocol_errors.Add(); }
 
@@ -57,19 +57,20 @@ class Traffic {
   Clock::time_point last_sent_ = last_received_;
 };
 
-/// How frames of one connection travel: over plain TCP, one behind the other, or each as one binary
-/// message of a WebSocket. One socket, on one thread at a time; at most one Receive and one Send
-/// are under way. Virtual calls are a read or a write, not a frame or a byte.
+/// Carries the frames of one connection: one after the other over plain TCP, or each as a binary
+/// message of a WebSocket. A transport owns one socket and is used by one thread at a time. At most
+/// one Receive and one Send may be pending. There is one virtual call per read or write, not per
+/// frame.
 class Transport {
  public:
-  /// Bytes that came. Where there are messages, all of them are of one.
+  /// Received bytes. Over WebSocket, they belong to one message.
   struct Chunk {
     std::span<const std::byte> bytes;
     bool ends_message = false;
-    bool is_text = false;  ///< The message is no binary one.
+    bool is_text = false;  ///< The message is a text message.
   };
 
-  /// Who is told what came of it. Kept alive as long as something is under way.
+  /// Receives the results of operations. A pending operation keeps its user alive.
   class User {
    public:
     virtual ~User() = default;
@@ -83,27 +84,29 @@ class Transport {
   virtual ~Transport() = default;
 
   [[nodiscard]] virtual TransportKind kind() const = 0;
-  /// Are there messages, each of which is one frame?
+  /// True if the transport has message boundaries; each message must contain one frame.
   [[nodiscard]] bool has_messages() const { return kind() == TransportKind::kWebSocket; }
   [[nodiscard]] virtual boost::asio::any_io_executor executor() = 0;
 
-  /// Before anything is received or sent, and again after a move. `traffic` lives as long as the
-  /// user; a buffer size of 0 is the system's choice.
+  /// Must be called before the first operation and again after Attach. `traffic` must outlive the
+  /// operations. If `send_buffer_bytes` is 0, the system chooses the size.
   virtual void Prepare(Traffic& traffic, std::size_t send_buffer_bytes) = 0;
 
-  /// Receives some bytes into `buffer`, which is the user's.
+  /// Receives some bytes into `buffer`, which the user owns. Calls OnReceived later.
   virtual void Receive(std::shared_ptr<User> user, std::span<std::byte> buffer) = 0;
-  /// Sends all of `frames`, which the user keeps. True: that is done, and nobody is told.
+  /// Sends all `frames`, which the user keeps alive. Returns true if they were sent at once;
+  /// otherwise calls OnSent later.
   [[nodiscard]] virtual bool Send(std::shared_ptr<User> user,
                                   std::span<const SharedFrame> frames) = 0;
 
-  /// Tells the peer that nothing more comes. After the last Send; the user goes on receiving until
-  /// the peer has closed, too. An error: there is nobody to tell.
+  /// Closes the sending direction after the last Send. The user continues to receive until the peer
+  /// has closed, too. Returns false if the socket is already broken.
   [[nodiscard]] virtual bool End(std::shared_ptr<User> user, CloseCode code) = 0;
-  /// At once.
+  /// Closes the socket at once.
   virtual void Close() = 0;
 
-  // Moving to another thread's io_context, when nothing is under way.
+  // Detach and Attach move the transport to the io_context of another thread. No operation may be
+  // pending. Attach returns false if the socket cannot be used any more.
   virtual void Detach() = 0;
   [[nodiscard]] virtual bool Attach(boost::asio::io_context& context) = 0;
 };

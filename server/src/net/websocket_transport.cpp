@@ -21,11 +21,11 @@ class WebSocketTransport final : public Transport {
  public:
   WebSocketTransport(PortableSocket::Socket socket, UpgradeRequest request)
       : stream_(std::move(socket)), request_(std::move(request)) {
-    // Poses do not get smaller by deflating them, and a little message can inflate without bound.
+    // Deflating does not shrink poses, and a small message could inflate without bound.
     websocket::permessage_deflate no_compression;
     no_compression.server_enable = false;
     stream_.set_option(no_compression);
-    // Connection keeps the time.
+    // Connection implements the timeouts.
     stream_.set_option(websocket::stream_base::timeout{websocket::stream_base::none(),
                                                        websocket::stream_base::none(), false});
     stream_.set_option(websocket::stream_base::decorator([](websocket::response_type& response) {
@@ -33,7 +33,7 @@ class WebSocketTransport final : public Transport {
     }));
     stream_.auto_fragment(false);
     stream_.binary(true);
-    // Nothing is gathered here; FrameReader holds every frame to its limit.
+    // No limit is needed here: pieces are not collected, and FrameReader limits every frame.
     stream_.read_message_max(0);
   }
 
@@ -76,7 +76,7 @@ class WebSocketTransport final : public Transport {
   }
 
   bool End(std::shared_ptr<User> user, CloseCode code) override {
-    // Whoever reads on hears of the peer's answer.
+    // The pending Receive reports the answer of the peer.
     stream_.async_close(websocket::close_reason(static_cast<std::uint16_t>(code)),
                         [user = std::move(user)](const error_code&) {});
     return true;
@@ -101,7 +101,7 @@ class WebSocketTransport final : public Transport {
   }
 
   websocket::stream<PortableSocket> stream_;
-  std::optional<UpgradeRequest> request_;  // not answered yet
+  std::optional<UpgradeRequest> request_;  // until it is answered
   std::span<const SharedFrame> unsent_;
 };
 

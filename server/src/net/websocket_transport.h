@@ -11,10 +11,11 @@ namespace stridewire::server {
 
 using UpgradeRequest = boost::beast::http::request<boost::beast::http::string_body>;
 
-/// Each frame as one binary message, uncompressed. The first Receive answers `request`, which must
-/// be an upgrade to WebSocket; its sender has to wait for that before it sends anything.
-/// Pings are answered and fragments put together on the way; a message is received in pieces as
-/// they come, so that its announced length allocates nothing.
+/// Sends each frame as one binary, uncompressed WebSocket message. The first Receive answers
+/// `request`, which must be a WebSocket upgrade; the peer must wait for the answer.
+///
+/// The transport answers pings and joins fragments. It delivers a message in pieces as they
+/// arrive, so that an announced length does not allocate memory.
 [[nodiscard]] std::unique_ptr<Transport> MakeWebSocketTransport(boost::asio::ip::tcp::socket socket,
                                                                 UpgradeRequest request);
 

@@ -11,14 +11,14 @@
 
 namespace stridewire::server {
 
-/// Encodes a message of the server's own making, which cannot be wrong; null if it was all the
-/// same, and then says so.
+/// Encodes a message that the server has created. Encoding fails only because of an error in the
+/// server; then the function logs the error and returns null.
 template <typename Message>
 [[nodiscard]] SharedFrame EncodeFrame(protocol::Encoder& encoder, const Message& message) {
   auto frame = std::make_shared<std::vector<std::byte>>();
   const Status status = encoder.Encode(message, *frame);
   if (status) return frame;
-  spdlog::error("a {} could not be encoded: {}",
+  spdlog::error("cannot encode {}: {}",
                 protocol::MessageTypeName(std::remove_cvref_t<Message>::kType),
                 Describe(status.error()));
   return nullptr;

@@ -5,50 +5,54 @@
 #include <deque>
 #include <utility>
 
+#include "base/check.h"
 #include "net/shared_frame.h"
 
 namespace stridewire::server {
 
-/// The last Events of a session, kept for a client that lost its connection. Bounded in bytes: the
-/// oldest go first.
+/// Stores the last Events messages of a session, for a client that has lost its connection. The
+/// size is limited; the oldest messages are dropped first.
 class EventReplay {
  public:
   explicit EventReplay(std::size_t max_bytes) : max_bytes_(max_bytes) {}
 
-  struct Kept {
-    std::uint64_t number = 0;
-    std::uint64_t events = 0;  ///< How many are in it.
-    bool was_sent = false;     ///< Handed to a connection; it may be lost all the same.
+  struct Stored {
+    std::uint64_t number = 0;       ///< Number of the message, ascending.
+    std::uint64_t event_count = 0;  ///< Events in the message.
+    bool was_sent = false;  ///< Given to a connection, which may have failed before sending.
     SharedFrame frame;
   };
 
-  void Keep(Kept kept) {
-    bytes_ += kept.frame->size();
-    kept_.push_back(std::move(kept));
+  void Add(Stored stored) {
+    STRIDEWIRE_CHECK(stored.frame != nullptr);
+    STRIDEWIRE_CHECK(stored_.empty() || stored_.back().number < stored.number);
+    bytes_ += stored.frame->size();
+    stored_.push_back(std::move(stored));
     while (bytes_ > max_bytes_) {
-      bytes_ -= kept_.front().frame->size();
-      if (!kept_.front().was_sent) forgotten_events_ += kept_.front().events;
-      kept_.pop_front();
+      bytes_ -= stored_.front().frame->size();
+      if (!stored_.front().was_sent) dropped_events_ += stored_.front().event_count;
+      stored_.pop_front();
     }
+    STRIDEWIRE_CHECK(!stored_.empty() || bytes_ == 0);
   }
 
-  /// Calls with a Kept&, in order, for everything after `last_number`.
+  /// Calls `function(Stored&)` for every message after `last_number`, in order.
   template <typename Function>
   void ForEachAfter(std::uint64_t last_number, Function&& function) {
-    for (Kept& kept : kept_) {
-      if (kept.number > last_number) function(kept);
+    for (Stored& stored : stored_) {
+      if (stored.number > last_number) function(stored);
     }
   }
 
-  /// Events that were forgotten before they were sent, since this was last called.
-  [[nodiscard]] std::uint64_t TakeForgotten() { return std::exchange(forgotten_events_, 0); }
+  /// Returns how many events were dropped before they were sent, since the previous call.
+  [[nodiscard]] std::uint64_t TakeDropped() { return std::exchange(dropped_events_, 0); }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
   std::size_t max_bytes_;
-  std::deque<Kept> kept_;
+  std::deque<Stored> stored_;
   std::size_t bytes_ = 0;
-  std::uint64_t forgotten_events_ = 0;
+  std::uint64_t dropped_events_ = 0;
 };
 
 }  // namespace stridewire::server

@@ -3,9 +3,11 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <utility>
 
+#include "base/check.h"
 #include "stridewire/protocol/encoder.h"
 #include "world/convert.h"
 
@@ -13,92 +15,94 @@ namespace stridewire::server {
 
 using protocol::StatusCode;
 
-/// A connection that has not said Hello yet.
-class Gate::Handshake : public ConnectionHandler, public std::enable_shared_from_this<Handshake> {
+/// A connection whose client has not sent Hello yet.
+class Handshakes::Handshake : public ConnectionHandler,
+                              public std::enable_shared_from_this<Handshake> {
  public:
-  Handshake(Gate& gate, std::unique_ptr<Transport> transport, std::string address)
-      : gate_(gate),
-        timer_(gate.context_),
+  Handshake(Handshakes& owner, std::unique_ptr<Transport> transport, std::string address)
+      : owner_(owner),
+        timer_(owner.context_),
         address_(std::move(address)),
-        connection_(std::make_shared<Connection>(std::move(transport), gate.handshake_limits_,
-                                                 gate.metrics_)) {}
+        connection_(std::make_shared<Connection>(std::move(transport), owner.handshake_limits_,
+                                                 owner.metrics_)) {}
   ~Handshake() override { connection_->set_handler(nullptr); }
 
   void Start() {
     timer_.expires_after(std::chrono::duration_cast<std::chrono::nanoseconds>(
-        std::chrono::duration<double>(gate_.limits_.handshake_timeout_s)));
+        std::chrono::duration<double>(owner_.limits_.handshake_timeout_s)));
     timer_.async_wait([weak = weak_from_this()](const boost::system::error_code& error) {
       const auto self = weak.lock();
       if (error || self == nullptr) return;
-      self->gate_.metrics_.Reached(Limit::kHandshakeTimeout);
-      self->Refuse(StatusCode::kTimeout, "no Hello came in time");
+      self->owner_.metrics_.Reached(Limit::kHandshakeTimeout);
+      self->Refuse(StatusCode::kTimeout, "no Hello was received in time (handshake_timeout_s)");
     });
     connection_->Start(this);
   }
 
-  /// Says why, closes gently and is gone.
+  /// Sends a fatal error, closes the connection and removes this handshake.
   void Refuse(StatusCode code, const std::string& text) {
-    spdlog::info("{}: {}", address_, text);
+    spdlog::info("handshake with {} refused: {}", address_, text);
     auto frame = std::make_shared<std::vector<std::byte>>();
     if (protocol::Encoder().Encode(protocol::ErrorNotice{.code = code, .text = text, .fatal = true},
                                    *frame)) {
       connection_->SendControl(std::move(frame));
     }
     connection_->CloseGently(CloseCodeOf(code));
-    gate_.Forget(*this);
+    owner_.Remove(*this);
   }
 
   void OnMessage(protocol::Message&& message) override {
     if (const auto* hello = std::get_if<protocol::Hello>(&message)) {
-      gate_.OnHello(*this, *hello);
+      owner_.OnHello(*this, *hello);
       return;
     }
-    gate_.metrics_.protocol_errors.Add();
-    Refuse(StatusCode::kUnexpectedMessage, "the first message is Hello");
+    owner_.metrics_.protocol_errors.Add();
+    Refuse(StatusCode::kUnexpectedMessage, "the first message must be Hello");
   }
 
   void OnBadFrame(const Error& error) override {
-    gate_.metrics_.protocol_errors.Add();
-    if (error.code == ErrorCode::kLimitExceeded) gate_.metrics_.Reached(Limit::kFrameBytes);
+    owner_.metrics_.protocol_errors.Add();
+    if (error.code == ErrorCode::kLimitExceeded) owner_.metrics_.Reached(Limit::kFrameBytes);
     Refuse(FrameStatusCode(error.code), Describe(error));
   }
 
-  void OnClosed() override { gate_.Forget(*this); }
+  void OnClosed() override { owner_.Remove(*this); }
 
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] Connection& connection() { return *connection_; }
 
  private:
-  Gate& gate_;
+  Handshakes& owner_;
   boost::asio::steady_timer timer_;
   std::string address_;
   std::shared_ptr<Connection> connection_;
 };
 
-Gate::Gate(boost::asio::io_context& context, const Limits& limits, ThreadMetrics& metrics,
-           SessionDirectory& directory, std::function<void(int, Shard::Arrival)> adopt)
+Handshakes::Handshakes(boost::asio::io_context& context, const Limits& limits,
+                       ThreadMetrics& metrics, SessionDirectory& directory, Adopt adopt)
     : context_(context),
       limits_(limits),
       handshake_limits_(limits),
       metrics_(metrics),
       directory_(directory),
       adopt_(std::move(adopt)) {
-  // Nothing larger than a Hello is held for somebody who has not said it.
+  // Before Hello, a client may send no frame that is larger than Hello.
   handshake_limits_.max_control_bytes =
       std::min(limits.max_control_bytes, protocol::kMaxHelloBytes);
   handshake_limits_.max_bulk_bytes = handshake_limits_.max_control_bytes;
-  handshake_limits_.idle_timeout_s = 0.0;  // the handshake has its own
+  handshake_limits_.idle_timeout_s = 0.0;  // handshake_timeout_s applies instead
 }
 
-Gate::~Gate() = default;
+Handshakes::~Handshakes() = default;
 
-void Gate::Accept(std::unique_ptr<Transport> transport, const boost::asio::ip::address& remote) {
+void Handshakes::Accept(std::unique_ptr<Transport> transport,
+                        const boost::asio::ip::address& remote) {
   if (is_closed_) return;
   metrics_.connections_accepted.Add();
   const std::string address = remote.to_string();
   if (handshakes_.size() >= static_cast<std::size_t>(limits_.max_handshakes)) {
     metrics_.Reached(Limit::kHandshakes);
-    return;  // closes it; a word to each would only help a flood
+    return;  // closes the connection without a message, which would only help a flood
   }
   int& count = address_counts_[address];
   if (count >= limits_.max_sessions_per_address) {
@@ -111,14 +115,15 @@ void Gate::Accept(std::unique_ptr<Transport> transport, const boost::asio::ip::a
   handshake->Start();
 }
 
-void Gate::OnHello(Handshake& handshake, const protocol::Hello& hello) {
-  if (hello.protocol_min > protocol::kProtocolMax || hello.protocol_max < protocol::kProtocolMin) {
-    handshake.Refuse(StatusCode::kVersionMismatch,
-                     "this server speaks versions " + std::to_string(protocol::kProtocolMin) +
-                         " to " + std::to_string(protocol::kProtocolMax));
+void Handshakes::OnHello(Handshake& handshake, const protocol::Hello& hello) {
+  if (hello.protocol_min > protocol::kProtocolVersion ||
+      hello.protocol_max < protocol::kProtocolVersion) {
+    handshake.Refuse(StatusCode::kVersionMismatch, "this server supports protocol version " +
+                                                       std::to_string(protocol::kProtocolVersion) +
+                                                       " only");
     return;
   }
-  Shard::Arrival arrival;
+  Arrival arrival;
   int shard = 0;
   const SessionDirectory::Entry* known =
       hello.resume_token.empty() ? nullptr : directory_.Find(hello.resume_token);
@@ -139,22 +144,24 @@ void Gate::OnHello(Handshake& handshake, const protocol::Hello& hello) {
   }
   arrival.hello = hello;
   arrival.transport = handshake.connection().Release(arrival.received);
-  Forget(handshake);
+  Remove(handshake);
   adopt_(shard, std::move(arrival));
 }
 
-void Gate::Forget(Handshake& handshake) {
+void Handshakes::Remove(Handshake& handshake) {
   const auto it = handshakes_.find(&handshake);
   if (it == handshakes_.end()) return;
-  // It may be in the middle of a call from its connection.
-  const std::shared_ptr<Handshake> keep = std::move(it->second);
+  // The caller may be the handshake or its connection, so it is destroyed later.
+  const std::shared_ptr<Handshake> removed = std::move(it->second);
   handshakes_.erase(it);
-  const auto count = address_counts_.find(keep->address());
+  const auto count = address_counts_.find(removed->address());
+  STRIDEWIRE_CHECK(count != address_counts_.end() && count->second > 0);
   if (--count->second == 0) address_counts_.erase(count);
-  boost::asio::post(context_, [keep] {});
+  STRIDEWIRE_CHECK(handshakes_.empty() == address_counts_.empty());
+  boost::asio::post(context_, [removed] {});
 }
 
-void Gate::Close() {
+void Handshakes::Close() {
   is_closed_ = true;
   while (!handshakes_.empty()) {
     handshakes_.begin()->second->Refuse(StatusCode::kShuttingDown, "the server is shutting down");

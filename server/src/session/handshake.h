@@ -8,40 +8,43 @@
 #include <string>
 
 #include "net/connection.h"
+#include "session/arrival.h"
 #include "session/session_directory.h"
-#include "world/shard.h"
 
 namespace stridewire::server {
 
-/// Where clients come in: greets a connection, hears its Hello, finds or makes its session and
-/// hands its transport to the session's shard. One thread's, and not a shard's: a flood of
-/// connections costs no tick.
-class Gate {
+/// Receives Hello on new connections, finds or creates the session, and hands the transport to the
+/// shard of the session. It runs on the main thread, so that a flood of connections does not delay
+/// the ticks of shards. Not thread-safe.
+class Handshakes {
  public:
-  /// Borrows everything. `adopt` takes an arrival to its shard.
-  Gate(boost::asio::io_context& context, const Limits& limits, ThreadMetrics& metrics,
-       SessionDirectory& directory, std::function<void(int, Shard::Arrival)> adopt);
-  ~Gate();
+  using Adopt = std::function<void(int shard, Arrival arrival)>;
 
-  /// `remote`: who it is.
+  /// Borrows all references. `adopt` hands an arrival to its shard.
+  Handshakes(boost::asio::io_context& context, const Limits& limits, ThreadMetrics& metrics,
+             SessionDirectory& directory, Adopt adopt);
+  ~Handshakes();
+
+  /// Starts the handshake of a connection from the address `remote`. Closes the connection if a
+  /// limit is reached.
   void Accept(std::unique_ptr<Transport> transport, const boost::asio::ip::address& remote);
 
-  /// Greets nobody any more.
+  /// Ends all handshakes and accepts no more connections.
   void Close();
 
  private:
   class Handshake;
   void OnHello(Handshake& handshake, const protocol::Hello& hello);
-  void Forget(Handshake& handshake);
+  void Remove(Handshake& handshake);
 
   boost::asio::io_context& context_;
   const Limits limits_;
   Limits handshake_limits_;
   ThreadMetrics& metrics_;
   SessionDirectory& directory_;
-  std::function<void(int, Shard::Arrival)> adopt_;
+  Adopt adopt_;
   std::map<Handshake*, std::shared_ptr<Handshake>> handshakes_;
-  std::map<std::string, int> address_counts_;
+  std::map<std::string, int> address_counts_;  // handshakes per client address
   bool is_closed_ = false;
 };
 

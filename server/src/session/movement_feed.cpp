@@ -4,99 +4,106 @@
 #include <iterator>
 #include <utility>
 
+#include "base/check.h"
+
 namespace stridewire::server {
 
-void MovementFeed::Watch(std::optional<std::vector<AvatarId>> named) {
-  asked_ = 0;
-  if (!named || is_whole_) {
-    is_whole_ = true;
-    named_.clear();
-    forgotten_.clear();
+void MovementFeed::SetAvatars(std::optional<std::vector<AvatarId>> avatars) {
+  pending_nonce_ = 0;
+  if (!avatars || covers_all_) {
+    covers_all_ = true;
+    selected_.clear();
+    deselected_.clear();
     states_of_ = nullptr;
     next_ = 1;
     return;
   }
+  STRIDEWIRE_CHECK(std::ranges::is_sorted(*avatars));
   std::vector<AvatarId> added;
-  std::ranges::set_difference(*named, named_, std::back_inserter(added));
-  // Who came back before the client has heard of it was told of all the time.
+  std::ranges::set_difference(*avatars, selected_, std::back_inserter(added));
   std::vector<AvatarId> removed;
-  std::ranges::set_difference(named_, *named, std::back_inserter(removed));
-  std::vector<AvatarId> either;
-  std::ranges::set_union(forgotten_, removed, std::back_inserter(either));
-  forgotten_.clear();
-  std::ranges::set_difference(either, *named, std::back_inserter(forgotten_));
-  // Those whose states are still to come and are wanted, and the new ones.
-  std::vector<AvatarId> waiting;
+  std::ranges::set_difference(selected_, *avatars, std::back_inserter(removed));
+  std::vector<AvatarId> all_removed;
+  std::ranges::set_union(deselected_, removed, std::back_inserter(all_removed));
+  // An avatar that is selected again before it was reported as gone stays valid for the client.
+  deselected_.clear();
+  std::ranges::set_difference(all_removed, *avatars, std::back_inserter(deselected_));
+  // States are missing for new avatars, and for those that are still selected and not sent yet.
+  std::vector<AvatarId> missing;
   if (next_ != 0 && states_of_ != nullptr) {
-    std::ranges::copy_if(*states_of_, std::back_inserter(waiting), [&](AvatarId number) {
-      return number >= next_ && std::ranges::binary_search(*named, number);
+    std::ranges::copy_if(*states_of_, std::back_inserter(missing), [&](AvatarId id) {
+      return id >= next_ && std::ranges::binary_search(*avatars, id);
     });
   }
   auto states_of = std::make_shared<std::vector<AvatarId>>();
-  std::ranges::set_union(waiting, added, std::back_inserter(*states_of));
+  std::ranges::set_union(missing, added, std::back_inserter(*states_of));
   next_ = states_of->empty() ? 0 : 1;
   states_of_ = std::move(states_of);
-  named_ = *std::move(named);
+  selected_ = *std::move(avatars);
 }
 
-protocol::Movements MovementFeed::Pick(const protocol::Movements& step, std::size_t max_bytes) {
-  protocol::Movements some{.world = step.world,
-                           .shard = step.shard,
-                           .part = step.part,
-                           .parts = step.parts,
-                           .more_steps = step.more_steps,
-                           .step = step.step,
-                           .tick = step.tick,
-                           .server_time_s = step.server_time_s};
-  const auto add = [&](AvatarId number, std::uint8_t flags, std::span<const std::byte> record) {
-    some.avatars.push_back(number);
-    some.flags.push_back(flags);
-    some.records.insert(some.records.end(), record.begin(), record.end());
-    some.ends.push_back(static_cast<std::uint32_t>(some.records.size()));
+protocol::Movements MovementFeed::Select(const protocol::Movements& step, std::size_t max_bytes) {
+  STRIDEWIRE_CHECK(!covers_all_);
+  protocol::Movements result{.world = step.world,
+                             .shard = step.shard,
+                             .part = step.part,
+                             .parts = step.parts,
+                             .more_steps = step.more_steps,
+                             .step = step.step,
+                             .tick = step.tick,
+                             .server_time_s = step.server_time_s};
+  const auto add = [&](AvatarId id, std::uint8_t flags, std::span<const std::byte> record) {
+    result.avatars.push_back(id);
+    result.flags.push_back(flags);
+    result.records.insert(result.records.end(), record.begin(), record.end());
+    result.ends.push_back(static_cast<std::uint32_t>(result.records.size()));
   };
-  // The step itself leaves room, for it fits with all its records.
+  // The complete step fits into a frame. The avatars that are gone may use the rest.
   constexpr std::size_t kAvatarBytes = 9;
   constexpr std::size_t kOverheadBytes = 512;
+  STRIDEWIRE_CHECK(step.avatars.size() <= protocol::kMaxItems);
   const std::size_t used =
       step.records.size() + kAvatarBytes * step.avatars.size() + kOverheadBytes;
   const std::size_t room = std::min(used < max_bytes ? (max_bytes - used) / kAvatarBytes : 0,
                                     protocol::kMaxItems - step.avatars.size());
-  const auto told =
-      forgotten_.begin() + static_cast<std::ptrdiff_t>(std::min(room, forgotten_.size()));
-  std::for_each(forgotten_.begin(), told,
-                [&](AvatarId number) { add(number, protocol::kMovementGone, {}); });
-  forgotten_.erase(forgotten_.begin(), told);
+  const auto reported =
+      deselected_.begin() + static_cast<std::ptrdiff_t>(std::min(room, deselected_.size()));
+  std::for_each(deselected_.begin(), reported,
+                [&](AvatarId id) { add(id, protocol::kMovementGone, {}); });
+  deselected_.erase(deselected_.begin(), reported);
   for (std::size_t i = 0; i < step.avatars.size(); ++i) {
-    if (!std::ranges::binary_search(named_, step.avatars[i])) continue;
+    if (!std::ranges::binary_search(selected_, step.avatars[i])) continue;
     add(step.avatars[i], step.flags[i], step.record(i));
   }
-  return some;
+  return result;
 }
 
-void MovementFeed::Lose() {
+void MovementFeed::SetLost() {
   is_lost_ = true;
-  forgotten_.clear();
+  deselected_.clear();
 }
 
-void MovementFeed::Recover() {
+void MovementFeed::Restart() {
+  STRIDEWIRE_CHECK(is_lost_);
   is_lost_ = false;
-  asked_ = 0;
-  states_of_ = is_whole_ ? nullptr : std::make_shared<const std::vector<AvatarId>>(named_);
-  next_ = is_whole_ || !named_.empty() ? 1 : 0;
+  pending_nonce_ = 0;
+  states_of_ = covers_all_ ? nullptr : std::make_shared<const std::vector<AvatarId>>(selected_);
+  next_ = covers_all_ || !selected_.empty() ? 1 : 0;
 }
 
-void MovementFeed::Ask(std::uint32_t nonce, StatesQuestion& question) {
-  asked_ = nonce;
-  question.world = world_;
-  question.nonce = nonce;
-  question.first = next_;
-  question.named = states_of_;
+void MovementFeed::NextRequest(std::uint32_t nonce, StatesRequest& request) {
+  STRIDEWIRE_CHECK(nonce != 0 && needs_request());
+  pending_nonce_ = nonce;
+  request.world = world_;
+  request.nonce = nonce;
+  request.first = next_;
+  request.avatars = states_of_;
 }
 
-bool MovementFeed::OnStates(const StatesAnswer& answer) {
-  if (asked_ != answer.nonce) return false;
-  asked_ = 0;
-  next_ = answer.next;
+bool MovementFeed::OnStates(const StatesResult& result) {
+  if (pending_nonce_ == 0 || pending_nonce_ != result.nonce) return false;
+  pending_nonce_ = 0;
+  next_ = result.next;
   return true;
 }
 

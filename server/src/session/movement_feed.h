@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -9,44 +10,56 @@
 
 namespace stridewire::server {
 
-/// What a client is told of the movements of the avatars of one world and shard, and how far it has the states that they go
-/// on from.
+/// The movements of the avatars of one world and shard that one client receives in movement mode.
+///
+/// A client needs the state of an avatar before it can use the avatar's movements. The feed
+/// therefore keeps track of the avatars whose states are still missing, and requests them in
+/// portions, one request at a time:
+///
+///   up to date --SetAvatars--> needs states --NextRequest--> request pending --OnStates--+
+///        ^                          ^                                                    |
+///        |                          +----------- if avatars are left --------------------+
+///        +-------------------------------------- otherwise ------------------------------+
+///
+/// If the send queue drops movements, the feed is lost: the client notices the missing step and
+/// discards all avatars. Restart then sends all states again.
 class MovementFeed {
  public:
   explicit MovementFeed(std::shared_ptr<World> world) : world_(std::move(world)) {}
 
-  /// Who it is about from now on: avatars of the shard, growing, or all. Whom it was not about before the client is
-  /// to have the state of. What was once about all stays so: the client tells whom it does not want.
-  void Watch(std::optional<std::vector<AvatarId>> named);
+  /// Selects the avatars (ascending ids), or all avatars of the shard if `avatars` is nullopt. New
+  /// avatars need states. A feed that has covered all avatars stays that way; the client then
+  /// ignores the avatars that it does not need.
+  void SetAvatars(std::optional<std::vector<AvatarId>> avatars);
 
-  /// Every step is told as it is.
-  [[nodiscard]] bool is_whole() const { return is_whole_; }
-  /// What of a step is told otherwise: of whom it is about, and that those are gone it is not about any more; of the latter as many as
-  /// fit into `max_bytes`, the others with the next.
-  [[nodiscard]] protocol::Movements Pick(const protocol::Movements& step, std::size_t max_bytes);
+  /// True if the client receives every step unchanged.
+  [[nodiscard]] bool covers_all() const { return covers_all_; }
+  /// Returns the part of `step` that concerns the selected avatars. Also reports avatars that are
+  /// not selected any more as gone: as many as fit into `max_bytes`, the others with the next step.
+  [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
-  /// Movements were not sent: the client knows of nobody by the gap.
-  void Lose();
+  /// Movements were dropped, so the client has no valid avatars.
+  void SetLost();
   [[nodiscard]] bool is_lost() const { return is_lost_; }
-  /// It goes on, from new states of all.
-  void Recover();
+  /// Continues a lost feed. All avatars need states.
+  void Restart();
 
-  /// The next question for states, if one is due.
-  [[nodiscard]] bool asks() const { return !is_lost_ && next_ != 0 && asked_ == 0; }
-  /// What of `question` is its own. `nonce`: not 0.
-  void Ask(std::uint32_t nonce, StatesQuestion& question);
-  /// False: that was not its last question.
-  [[nodiscard]] bool OnStates(const StatesAnswer& answer);
+  [[nodiscard]] bool needs_request() const {
+    return !is_lost_ && next_ != 0 && pending_nonce_ == 0;
+  }
+  /// Fills in the members of `request` that depend on the feed. `nonce` must not be 0.
+  void NextRequest(std::uint32_t nonce, StatesRequest& request);
+  /// Returns false if `result` does not belong to the pending request.
+  [[nodiscard]] bool OnStates(const StatesResult& result);
 
  private:
   std::shared_ptr<World> world_;
-  bool is_whole_ = false;
-  std::vector<AvatarId> named_;  // growing
-  std::vector<AvatarId>
-      forgotten_;  // growing; the client does not know yet that they are not told of any more
-  std::shared_ptr<const std::vector<AvatarId>> states_of_;  // growing; null: all
-  AvatarId next_ = 0;    // of those, from here on they are still to be told; 0: none
-  std::uint32_t asked_ = 0;  // nonce of the question under way, 0: none
+  bool covers_all_ = false;
+  std::vector<AvatarId> selected_;    // ascending
+  std::vector<AvatarId> deselected_;  // ascending; not yet reported to the client as gone
+  std::shared_ptr<const std::vector<AvatarId>> states_of_;  // ascending; null: all
+  AvatarId next_ = 0;                // first id of states_of_ whose state is missing; 0: none
+  std::uint32_t pending_nonce_ = 0;  // of the pending request; 0: none
   bool is_lost_ = false;
 };
 

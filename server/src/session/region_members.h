@@ -4,91 +4,100 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "world/shard_messages.h"
 
 namespace stridewire::server {
 
-/// Who is in a region that a session observes: who came within its radius and has not gone further than radius and
-/// leave_m since. Worked out shard by shard, each time with poses of a tick.
+/// Tracks which avatars are in the region that a session observes. An avatar enters when it comes
+/// within the radius, and leaves when it is farther than radius + leave_m. Each update concerns the
+/// avatars of one shard.
 ///
-/// Rings may be of different modes (details): then deliveries of each come one after the other, and each has due those
-/// who are in a ring of its mode.
+/// A region has rings with different intervals and possibly different modes. Each mode has its own
+/// deliveries; a delivery is due for the avatars in the rings of its mode:
 ///
-///        centre  compact       8 m   fewer          20 m   root    radius  + leave_m
+///        centre  compact       8 m   reduced         20 m   root    radius  + leave_m
 ///   rows   |------- 3 -- 9 -----|---- 1 -------- 4 --|----- 7 -------|--------|
 ///   due    [3, 9]                [1, 4]               [7]
 ///
-/// Who enters does so with the delivery that has its pose; who leaves, with the first that comes. So nobody is told twice,
-/// and who only crosses a ring neither leaves nor enters.
+/// An avatar enters with the first delivery that contains its pose, and leaves with the first
+/// delivery of any mode. So each change is reported once, and moving from ring to ring is not
+/// reported.
 class RegionMembers {
  public:
-  /// `leave_m` where the region says nothing; beyond its rings poses come every `every_n_ticks` in `mode`.
-  void Move(const protocol::Region& region, double leave_m, std::uint16_t every_n_ticks,
-            protocol::PoseMode mode);
-  /// Puts `function(mode)` in the place of each mode.
+  /// Sets the region. Beyond its rings, poses are due every `every_n_ticks` ticks in `mode`.
+  /// `default_leave_m` applies if the region does not contain a value. Members stay members while
+  /// they are in the new region.
+  void Set(const protocol::Region& region, double default_leave_m, std::uint16_t every_n_ticks,
+           protocol::PoseMode mode);
+  /// Replaces the mode of each ring with `function(mode)`.
   template <typename Function>
-  void ChangeModes(Function&& function) {
+  void MapModes(Function&& function) {
     for (Ring& ring : std::span(rings_).first(ring_count_)) ring.mode = function(ring.mode);
-    SumUp();
+    CombineIntervals();
   }
 
-  /// Those of its rings and beyond, each once.
+  /// Returns the modes of all rings, each once.
   [[nodiscard]] std::vector<protocol::PoseMode> modes() const;
-  /// Of the ticks wanted in a mode those that this divides; 0: no ring is of that mode.
-  [[nodiscard]] std::uint16_t every(protocol::PoseMode mode) const {
-    return every_[static_cast<std::size_t>(mode)];
+  /// Returns the greatest common divisor of the intervals of all rings of this mode, in ticks. 0: no
+  /// ring has this mode.
+  [[nodiscard]] std::uint16_t interval(protocol::PoseMode mode) const {
+    return intervals_[static_cast<std::size_t>(mode)];
   }
-  /// What holds all rings of that mode, of which there is one.
-  [[nodiscard]] RegionFilter reach(protocol::PoseMode mode) const;
+  /// Returns the disc or ring that contains all rings of this mode. At least one must exist.
+  [[nodiscard]] RegionFilter filter(protocol::PoseMode mode) const;
 
-  /// What came of a delivery, which has places and is of one of the modes. Holds until the next call.
+  /// The result of an update, valid until the next call. All ids and rows are ascending.
   struct Change {
-    std::span<const AvatarId> entered;  ///< Growing.
-    std::span<const AvatarId> left;     ///< The same. Also who is not in the world any more.
-    std::span<const std::uint32_t> due;     ///< Rows whose poses are to be sent.
+    std::span<const AvatarId> entered;
+    std::span<const AvatarId> left;      ///< Including avatars that were removed from the world.
+    std::span<const std::uint32_t> due;  ///< Rows whose poses must be sent.
   };
+  /// `delivery` must contain positions, and its mode must be one of modes().
   [[nodiscard]] Change Update(const PoseDelivery& delivery);
-  /// The same of all avatars of a shard, whose poses nobody asks for.
-  [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
-                              const protocol::PoseRows::Avatars& avatars, const SpatialGrid& places) {
-    return Update(from_shard, tick, avatars, places, nullptr, protocol::PoseMode::kMovement);
-  }
-  /// Who of a shard is in it, growing.
-  [[nodiscard]] const std::vector<AvatarId>& inside(int shard) { return lanes_[shard].inside; }
+  /// Updates the members without poses, for movement mode.
+  [[nodiscard]] Change Update(const MovementDelivery& delivery);
+  /// Returns the ascending ids of the members on a shard.
+  [[nodiscard]] const std::vector<AvatarId>& members(int shard) { return shards_[shard].members; }
 
  private:
-  // `rows` null: all have poses.
-  [[nodiscard]] Change Update(int from_shard, std::uint64_t tick,
-                              const protocol::PoseRows::Avatars& avatars, const SpatialGrid& places,
-                              const protocol::PoseRows* rows, protocol::PoseMode mode);
   struct Ring {
-    double to_m = 0.0;
+    double outer_m = 0.0;
     std::uint16_t every_n_ticks = 1;
     protocol::PoseMode mode = protocol::PoseMode::kFull;
   };
-  [[nodiscard]] const Ring& RingAt(double distance_m2) const;
-  void SumUp();
-
-  protocol::GroundPlace centre_m_;
-  double radius_m_ = 0.0;
-  double leave_at_m_ = 0.0;
-  [[nodiscard]] std::span<const Ring> rings() const { return std::span(rings_).first(ring_count_); }
-  std::array<Ring, protocol::kMaxRateRings + 1>
-      rings_;  // growing; the last is what is beyond the others
-  std::size_t ring_count_ = 0;
-  std::array<std::uint16_t, kSentModes.size() + 1> every_{};  // by mode, movement among them
-  struct Lane {
-    std::vector<AvatarId> inside;  // growing
-    protocol::PoseRows::Avatars avatars;
-    std::vector<bool> is_inside;  // by row of those
+  struct ShardMembers {
+    std::vector<AvatarId> members;
+    protocol::PoseRows::Avatars avatars;  // all avatars of the shard
+    std::vector<bool> is_member;          // by row of `avatars`
   };
-  std::map<int, Lane> lanes_;  // by shard
-  // What the last Change is about.
-  std::vector<std::pair<std::uint32_t, double>> near_;  // row, distance squared
+  /// The parts of a delivery that an update needs.
+  struct Snapshot {
+    int from_shard;
+    std::uint64_t tick;
+    const protocol::PoseRows::Avatars& avatars;
+    const SpatialGrid& grid;
+    const protocol::PoseRows* rows;  // null: treat all avatars as if they had poses
+    protocol::PoseMode mode;
+  };
+  [[nodiscard]] Change Update(const Snapshot& snapshot);
+  [[nodiscard]] ShardMembers& MembersOf(const Snapshot& snapshot);
+  [[nodiscard]] const Ring& RingAt(double distance_m2) const;
+  [[nodiscard]] std::span<const Ring> rings() const { return std::span(rings_).first(ring_count_); }
+  void CombineIntervals();
+
+  protocol::GroundPoint centre_m_;
+  double radius_m_ = 0.0;
+  double leave_radius_m_ = 0.0;
+  std::array<Ring, protocol::kMaxRateRings + 1> rings_;  // the last ring is unbounded
+  std::size_t ring_count_ = 0;
+  std::array<std::uint16_t, kSentModes.size() + 1> intervals_{};  // by mode, including kMovement
+  std::map<int, ShardMembers> shards_;
+  // Scratch memory and the data of the last Change.
+  std::vector<std::pair<std::uint32_t, double>> near_;  // row, squared distance
   std::vector<AvatarId> now_;
   std::vector<AvatarId> entered_;
   std::vector<AvatarId> left_;

@@ -10,23 +10,26 @@
 
 namespace stridewire::server {
 
-/// Knows which commands of a session were taken and what was answered, so that a command sent
-/// again is not done again (STATE_MACHINE.md, "Commands").
+/// Stores the replies to the last commands of a session. A client that has lost its connection
+/// sends unanswered commands again. The server then repeats the reply instead of executing the
+/// command a second time (STATE_MACHINE.md, "Commands").
 ///
-/// Bounded: at most `max_count` commands back, and at most `max_bytes` of answers, the last answer
-/// apart; older ones are forgotten, unanswered ones never.
+///   forgotten <- first_seq ... answered or pending ... last_seq -> new
+///
+/// At most `max_count` commands and `max_bytes` of replies are stored; older replies are forgotten.
+/// The last reply and unanswered commands are never forgotten.
 class ReplyCache {
  public:
   enum class Verdict : std::uint8_t {
-    kNew,        ///< The next one: take it.
-    kPending,    ///< Taken, not answered yet: do nothing.
-    kAnswered,   ///< Send the answer again.
-    kForgotten,  ///< Done long ago.
-    kGap,        ///< One before it is missing.
+    kNew,        ///< The next command: execute it.
+    kPending,    ///< Accepted, but not answered yet: ignore it.
+    kAnswered,   ///< Send the stored reply again.
+    kForgotten,  ///< Executed, but its reply is not stored any more.
+    kGap,        ///< A command before this one is missing.
   };
   struct Answer {
-    SharedFrame reply;   ///< Null while pending.
-    WorldId joined = 0;  ///< The world of a JoinWorld, else 0.
+    SharedFrame reply;   ///< Null while the command is pending.
+    WorldId joined = 0;  ///< The world of a successful JoinWorld, otherwise 0.
   };
 
   ReplyCache(std::size_t max_count, std::size_t max_bytes)
@@ -34,24 +37,25 @@ class ReplyCache {
 
   [[nodiscard]] Verdict Classify(protocol::Seq seq) const;
 
-  /// A command judged kNew is taken.
-  void Take(protocol::Seq seq);
+  /// Accepts a command that is kNew. It becomes kPending.
+  void Begin(protocol::Seq seq);
 
-  /// It is answered. Returns how many answers were forgotten for it.
-  std::size_t Remember(protocol::Seq seq, SharedFrame reply, WorldId joined);
+  /// Stores the reply to a command that is kPending. It becomes kAnswered. Returns how many older
+  /// replies were forgotten to make room.
+  std::size_t Store(protocol::Seq seq, SharedFrame reply, WorldId joined);
 
-  /// Of a command judged kAnswered.
+  /// Returns the reply to a command that is kAnswered.
   [[nodiscard]] const Answer& Find(protocol::Seq seq) const;
 
-  [[nodiscard]] protocol::Seq last_seq() const { return first_ + answers_.size() - 1; }
+  [[nodiscard]] protocol::Seq last_seq() const { return first_seq_ + answers_.size() - 1; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
   std::size_t max_count_;
   std::size_t max_bytes_;
-  protocol::Seq first_ = 1;  // seq of answers_[0]
+  protocol::Seq first_seq_ = 1;  // seq of answers_[0]
   std::deque<Answer> answers_;
-  std::size_t bytes_ = 0;
+  std::size_t bytes_ = 0;  // of all stored replies
 };
 
 }  // namespace stridewire::server

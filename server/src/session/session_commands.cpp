@@ -1,15 +1,15 @@
-// The part of a session that does what its client asks of worlds and avatars.
+#include "session/session_commands.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
-#include <string>
-#include <utility>
 
-#include "session/session.h"
+#include "base/check.h"
 #include "world/convert.h"
 
 namespace stridewire::server {
 
+using protocol::PoseMode;
 using protocol::Reply;
 using protocol::ReplyItem;
 using protocol::Seq;
@@ -17,10 +17,13 @@ using protocol::StatusCode;
 
 namespace {
 
-// The items of a command as parts for each shard, whose avatars they are about, numbered as they came.
+constexpr const char* kNotJoinedText = "this session has not joined that world";
+
+// Distributes the items of a command to the shards that own their avatars. Each item keeps its
+// index in the command.
 template <typename Item, typename Part>
-void ShareOut(std::vector<Item>&& items, std::vector<Part>& parts) {
-  // Numbers in a row are shared out evenly.
+void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
+  // Consecutive ids are distributed evenly.
   for (Part& part : parts) part.items.reserve(items.size() / parts.size() + 1);
   const int shard_count = static_cast<int>(parts.size());
   std::uint32_t index = 0;
@@ -30,69 +33,99 @@ void ShareOut(std::vector<Item>&& items, std::vector<Part>& parts) {
   }
 }
 
-// What one of the requests needs and this client has not agreed on; null: nothing.
-const char* FeatureMissing(const std::vector<protocol::RequestItem>& items,
-                           std::uint64_t features) {
-  for (const protocol::RequestItem& item : items) {
-    const auto* step = std::get_if<protocol::StepMovement>(&item.movement);
-    const bool is_walk = std::holds_alternative<protocol::WalkMovement>(item.movement);
-    if (step != nullptr && step->at && (features & protocol::kFeatureFootprints) == 0) {
-      return "footprints";
-    }
-    if (is_walk && (features & protocol::kFeatureWalks) == 0) return "walks";
-    if (item.interrupt != protocol::Interrupt::kNone &&
-        (features & protocol::kFeatureTakeovers) == 0) {
-      return "takeovers";
-    }
-    if (step != nullptr && step->exact_only && (features & protocol::kFeatureRefusals) == 0) {
-      return "refusals";
-    }
-  }
-  return nullptr;
-}
-
-// A refused item takes under 256 bytes of a Reply; with no more items a Reply always fits.
+// A refused item takes less than 256 bytes of a Reply.
 constexpr std::size_t kReplyItemBytes = 256;
-// Heights and boxes of a terrain that count as one item: the largest is then half a burst.
+// Heights and boxes of a terrain that count as one item. The largest terrain then uses half of the
+// default burst.
 constexpr std::size_t kNumbersPerItem = 32;
 
 }  // namespace
 
-std::size_t Session::MaxItems(const Limits& limits) {
+SessionCommands::SessionCommands(SessionContext& context, SessionStream& stream)
+    : context_(context),
+      stream_(stream),
+      replies_(protocol::kReplyCache, context.host.config().limits.reply_cache_bytes),
+      request_tokens_(context.host.config().limits.requests_per_s,
+                      context.host.config().limits.request_burst) {}
+
+std::size_t SessionCommands::MaxItems(const Limits& limits) {
   return std::min(protocol::kMaxItems, limits.max_bulk_bytes / kReplyItemBytes);
 }
 
-bool Session::Affords(Seq seq, std::size_t item_count) {
-  const Limits& limits = host_.config().limits;
-  if (item_count > MaxItems(limits)) {
-    host_.metrics().Reached(Limit::kFrameBytes);
-    Answer(seq, StatusCode::kLimitReached, "more items than one message may have here");
-    return false;
+bool SessionCommands::Begin(Seq seq) {
+  switch (replies_.Classify(seq)) {
+    case ReplyCache::Verdict::kNew: replies_.Begin(seq); return true;
+    case ReplyCache::Verdict::kPending:
+    case ReplyCache::Verdict::kGap: return false;
+    case ReplyCache::Verdict::kAnswered: {
+      const ReplyCache::Answer& answer = replies_.Find(seq);
+      if (const Membership* membership = context_.FindWorld(answer.joined)) {
+        SendWorldInfo(seq, *membership);
+        stream_.SendTerrain(*membership->world, false);
+      }
+      if (context_.connection != nullptr) context_.connection->SendControl(answer.reply);
+      return false;
+    }
+    case ReplyCache::Verdict::kForgotten:
+      context_.Send(
+          Reply{.seq = seq,
+                .code = StatusCode::kForgotten,
+                .text = "the command was executed, but its reply is not stored any more"});
+      return false;
   }
-  request_tokens_.AdvanceTime(host_.clock().ServerTime(Clock::now()));
-  if (request_tokens_.Take(static_cast<double>(item_count))) return true;
-  host_.metrics().Reached(Limit::kRequestsPerSecond);
-  host_.metrics().requests_rejected.Add(item_count);
-  Answer(seq, StatusCode::kLimitReached, "more items a second than a session may send");
   return false;
 }
 
-Session::Membership* Session::Commanding(Seq seq, WorldId world) {
-  const auto it = worlds_.find(world);
-  if (it == worlds_.end()) {
-    Answer(seq, StatusCode::kNotJoined, "this session is not in that world");
+bool SessionCommands::AcceptItems(Seq seq, std::size_t item_count) {
+  ThreadMetrics& metrics = context_.host.metrics();
+  if (item_count > MaxItems(context_.host.config().limits)) {
+    metrics.Reached(Limit::kFrameBytes);
+    Answer(seq, StatusCode::kLimitReached, "too many items in one command");
+    return false;
+  }
+  request_tokens_.AdvanceTime(context_.host.clock().ServerTime(Connection::Clock::now()));
+  if (request_tokens_.Take(static_cast<double>(item_count))) return true;
+  metrics.Reached(Limit::kRequestsPerSecond);
+  metrics.requests_rejected.Add(item_count);
+  Answer(seq, StatusCode::kLimitReached, "too many items per second (requests_per_s)");
+  return false;
+}
+
+Membership* SessionCommands::FindControlled(Seq seq, WorldId world) {
+  Membership* membership = context_.FindWorld(world);
+  if (membership == nullptr) {
+    Answer(seq, StatusCode::kNotJoined, kNotJoinedText);
     return nullptr;
   }
-  if (it->second.role != protocol::Role::kController) {
-    Answer(seq, StatusCode::kNotAllowed, "an observer commands nothing");
+  if (membership->role != protocol::Role::kController) {
+    Answer(seq, StatusCode::kNotAllowed, "an observer may not command avatars");
     return nullptr;
   }
-  return &it->second;
+  return membership;
+}
+
+// ---- pending commands
+
+SessionCommands::Pending& SessionCommands::AddPending(Seq seq, Pending&& pending) {
+  pending_items_ += pending.item_count;
+  const auto [it, is_new] = pending_.emplace(seq, std::move(pending));
+  STRIDEWIRE_CHECK(is_new && it->second.outstanding > 0);
+  return it->second;
+}
+
+SessionCommands::Pending SessionCommands::TakePending(Seq seq) {
+  const auto it = pending_.find(seq);
+  STRIDEWIRE_CHECK(it != pending_.end() && it->second.item_count <= pending_items_);
+  pending_items_ -= it->second.item_count;
+  Pending pending = std::move(it->second);
+  pending_.erase(it);
+  STRIDEWIRE_CHECK(!pending_.empty() || pending_items_ == 0);
+  return pending;
 }
 
 template <typename Part>
-void Session::SubmitParts(Seq seq, const std::shared_ptr<World>& world, std::vector<Part>&& parts,
-                          Pending&& pending) {
+void SessionCommands::SubmitParts(Seq seq, const std::shared_ptr<World>& world,
+                                  std::vector<Part>&& parts, Pending&& pending) {
   const auto is_empty = [](const Part& part) {
     if constexpr (requires { part.items; }) {
       return part.items.empty();
@@ -108,52 +141,180 @@ void Session::SubmitParts(Seq seq, const std::shared_ptr<World>& world, std::vec
     Answer(std::move(pending.reply));
     return;
   }
-  pending_items_ += pending.item_count;
-  pending_.emplace(seq, std::move(pending));
+  AddPending(seq, std::move(pending));
   for (std::size_t shard = 0; shard < parts.size(); ++shard) {
     if (is_empty(parts[shard])) continue;
-    host_.Submit(static_cast<int>(shard), {.world = world,
-                                           .from_shard = host_.shard_index(),
-                                           .session = identity_.id,
+    context_.host.SendToShard(static_cast<int>(shard),
+                              WorldCommand{.world = world,
+                                           .from_shard = context_.host.shard_index(),
+                                           .session = context_.identity.id,
                                            .seq = seq,
                                            .part = std::move(parts[shard])});
   }
 }
 
-void Session::Execute(protocol::Spawn&& command) {
-  const Membership* membership = Commanding(command.seq, command.world);
-  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
+template <typename Part>
+void SessionCommands::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarId>& avatars,
+                                    const Part& empty) {
+  const Membership* membership = FindControlled(seq, world);
+  if (membership == nullptr || !AcceptItems(seq, avatars.size())) return;
+  const int shard_count = context_.host.shard_count();
+  std::vector<Part> parts(static_cast<std::size_t>(shard_count), empty);
+  std::uint32_t index = 0;
+  for (const AvatarId avatar : avatars) {
+    parts[static_cast<std::size_t>(ShardOf(avatar, shard_count))].avatars.push_back(
+        {index++, avatar});
+  }
+  SubmitParts(seq, membership->world, std::move(parts),
+              Pending{.item_count = avatars.size(), .reply = {}});
+}
+
+void SessionCommands::OnResult(CommandResult&& result) {
+  const auto it = pending_.find(result.seq);
+  if (it == pending_.end()) return;
+  Pending& pending = it->second;
+  STRIDEWIRE_CHECK(pending.outstanding > 0);
+  pending.reply.accepted += result.accepted;
+  std::ranges::move(result.items, std::back_inserter(pending.reply.items));
+  if (--pending.outstanding > 0) return;
+  // Shards answer in any order.
+  std::ranges::sort(pending.reply.items, {}, &ReplyItem::index);
+  Answer(TakePending(result.seq).reply);
+}
+
+// ---- worlds
+
+void SessionCommands::Execute(protocol::JoinWorld&& command) {
+  const Limits& limits = context_.host.config().limits;
+  if (context_.worlds.size() >= static_cast<std::size_t>(limits.max_worlds_per_session)) {
+    context_.host.metrics().Reached(Limit::kWorldsPerSession);
+    Answer(command.seq, StatusCode::kLimitReached,
+           "the session has joined too many worlds (max_worlds_per_session)");
+    return;
+  }
+  AddPending(command.seq, Pending{.outstanding = 1, .role = command.role, .reply = {}});
+  context_.host.SendToServer(JoinRequest{.from_shard = context_.host.shard_index(),
+                                         .session = context_.identity.id,
+                                         .seq = command.seq,
+                                         .name = std::move(command.name)});
+}
+
+void SessionCommands::OnJoined(Seq seq, Outcome<std::shared_ptr<World>>&& outcome) {
+  // The command may belong to an ended session with the same id.
+  if (!pending_.contains(seq)) {
+    if (outcome) context_.host.SendToServer(LeaveNotice{(*outcome)->id});
+    return;
+  }
+  const protocol::Role role = TakePending(seq).role;
+  if (!outcome) {
+    Answer(seq, outcome.error().code, std::move(outcome.error().text));
+    return;
+  }
+  const std::shared_ptr<World> world = *std::move(outcome);
+  if (context_.worlds.contains(world->id)) {
+    context_.host.SendToServer(LeaveNotice{world->id});
+    Answer(seq, StatusCode::kAlreadyJoined, "the session has already joined this world");
+    return;
+  }
+  const Limits& limits = context_.host.config().limits;
+  if (context_.worlds.size() >= static_cast<std::size_t>(limits.max_worlds_per_session)) {
+    context_.host.metrics().Reached(Limit::kWorldsPerSession);
+    context_.host.SendToServer(LeaveNotice{world->id});
+    Answer(seq, StatusCode::kLimitReached,
+           "the session has joined too many worlds (max_worlds_per_session)");
+    return;
+  }
+  const Membership& membership =
+      context_.worlds.emplace(world->id, Membership{.world = world, .role = role}).first->second;
+  context_.host.InterestChanged(world);
+  SendWorldInfo(seq, membership);
+  stream_.SendTerrain(*world, false);
+  Answer(Reply{.seq = seq}, world->id);
+}
+
+void SessionCommands::Execute(protocol::LeaveWorld&& command) {
+  if (!context_.worlds.contains(command.world)) {
+    Answer(command.seq, StatusCode::kNotJoined, kNotJoinedText);
+    return;
+  }
+  Leave(command.world);
+  Answer(command.seq, StatusCode::kOk);
+}
+
+void SessionCommands::Leave(WorldId id) {
+  const auto it = context_.worlds.find(id);
+  STRIDEWIRE_CHECK(it != context_.worlds.end());
+  const std::shared_ptr<World> world = it->second.world;
+  const bool is_controller = it->second.role == protocol::Role::kController;
+  context_.worlds.erase(it);
+  stream_.LeaveWorld(id);
+  if (is_controller) {
+    for (int shard = 0; shard < context_.host.shard_count(); ++shard) {
+      context_.host.SendToShard(shard, WorldCommand{.world = world,
+                                                    .from_shard = context_.host.shard_index(),
+                                                    .session = context_.identity.id,
+                                                    .seq = 0,
+                                                    .part = ReleasePart{}});
+    }
+  }
+  context_.host.InterestChanged(world);
+  context_.host.SendToServer(LeaveNotice{id});
+}
+
+void SessionCommands::SendWorldInfo(Seq seq, const Membership& membership) {
+  const World& world = *membership.world;
+  std::vector<std::string> layers;
+  for (const LayerClip& layer : world.library->layers()) layers.emplace_back(layer.name);
+  context_.Send(protocol::WorldInfo{.seq = seq,
+                                    .world = world.id,
+                                    .name = world.name,
+                                    .role = membership.role,
+                                    .tick = context_.host.tick(),
+                                    .library_hash = world.library->hash(),
+                                    .skeleton = ToWire(world.library->skeleton()),
+                                    .layers = std::move(layers),
+                                    .rotation_codes = world.quantizations->joints,
+                                    .reduced_joints = world.quantizations->reduced_joints});
+}
+
+// ---- avatars
+
+void SessionCommands::Execute(protocol::Spawn&& command) {
+  const Membership* membership = FindControlled(command.seq, command.world);
+  if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
   World& world = *membership->world;
-  std::vector<SpawnPart> parts(static_cast<std::size_t>(host_.shard_count()));
+  AvatarBudget& budget = context_.host.avatar_budget();
+  const int shard_count = context_.host.shard_count();
+  std::vector<SpawnPart> parts(static_cast<std::size_t>(shard_count));
   Pending pending{.item_count = command.items.size(), .reply = {}};
   std::uint32_t index = 0;
   for (protocol::SpawnItem& item : command.items) {
-    ReplyItem refused{.index = index, .avatar = item.avatar, .code = StatusCode::kLimitReached};
-    switch (host_.avatar_budget().Reserve(world)) {
+    const auto refuse = [&](const char* text) {
+      pending.reply.items.push_back(
+          {.index = index, .avatar = item.avatar, .code = StatusCode::kLimitReached, .text = text});
+    };
+    switch (budget.Reserve(world)) {
       case AvatarBudget::Verdict::kOk:
         if (item.avatar != 0) {
-          NoteNumber(world, item.avatar);
+          RecordAvatarId(world, item.avatar);
         } else {
-          item.avatar = NextNumber(world);
+          item.avatar = NextAvatarId(world);
         }
         if (item.avatar == 0) {
-          host_.avatar_budget().Release(world);
-          refused.text = "no avatar number is left";
-          pending.reply.items.push_back(std::move(refused));
+          budget.Release(world);
+          refuse("no avatar id is left in this world");
         } else {
-          parts[static_cast<std::size_t>(ShardOf(item.avatar, host_.shard_count()))]
-              .items.push_back({index, item});
+          parts[static_cast<std::size_t>(ShardOf(item.avatar, shard_count))].items.push_back(
+              {index, item});
         }
         break;
       case AvatarBudget::Verdict::kWorldFull:
-        host_.metrics().Reached(Limit::kAvatarsPerWorld);
-        refused.text = "the world has as many avatars as it takes";
-        pending.reply.items.push_back(std::move(refused));
+        context_.host.metrics().Reached(Limit::kAvatarsPerWorld);
+        refuse("too many avatars in this world (max_avatars_per_world)");
         break;
       case AvatarBudget::Verdict::kServerFull:
-        host_.metrics().Reached(Limit::kAvatars);
-        refused.text = "the server has as many avatars as it takes";
-        pending.reply.items.push_back(std::move(refused));
+        context_.host.metrics().Reached(Limit::kAvatars);
+        refuse("too many avatars on this server (max_avatars)");
         break;
     }
     ++index;
@@ -161,175 +322,174 @@ void Session::Execute(protocol::Spawn&& command) {
   SubmitParts(command.seq, membership->world, std::move(parts), std::move(pending));
 }
 
-void Session::Execute(protocol::Request&& command) {
-  const Membership* membership = Commanding(command.seq, command.world);
-  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
-  if (const char* feature = FeatureMissing(command.items, features_)) {
-    Answer(command.seq, StatusCode::kUnsupported,
-           std::string("the feature '") + feature + "' was not agreed on in the handshake");
-    return;
-  }
-  // Movements of one avatar stand beside each other.
+void SessionCommands::Execute(protocol::Request&& command) {
+  const Membership* membership = FindControlled(command.seq, command.world);
+  if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
+  // Count avatars; all requests of an avatar are usually in a row.
   std::size_t avatars = 0;
   for (std::size_t i = 0; i < command.items.size(); ++i) {
     avatars += i == 0 || command.items[i].avatar != command.items[i - 1].avatar;
   }
-  const auto at_once = static_cast<std::size_t>(host_.config().limits.starts_per_tick);
-  const auto over_ticks = static_cast<std::uint32_t>((avatars + at_once - 1) / at_once);
-  std::vector<RequestPart> parts(static_cast<std::size_t>(host_.shard_count()),
+  const auto per_tick = static_cast<std::size_t>(context_.host.config().limits.starts_per_tick);
+  const auto over_ticks = static_cast<std::uint32_t>((avatars + per_tick - 1) / per_tick);
+  std::vector<RequestPart> parts(static_cast<std::size_t>(context_.host.shard_count()),
                                  RequestPart{.items = {}, .over_ticks = over_ticks});
   const std::size_t item_count = command.items.size();
-  ShareOut(std::move(command.items), parts);
+  Distribute(std::move(command.items), parts);
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = item_count, .reply = {}});
 }
 
-void Session::Execute(protocol::SetLayers&& command) {
-  const Membership* membership = Commanding(command.seq, command.world);
-  if (membership == nullptr || !Affords(command.seq, command.items.size())) return;
-  if ((features_ & protocol::kFeatureLayers) == 0) {
-    Answer(command.seq, StatusCode::kUnsupported,
-           "the feature 'layers' was not agreed on in the handshake");
-    return;
-  }
+void SessionCommands::Execute(protocol::SetLayers&& command) {
+  const Membership* membership = FindControlled(command.seq, command.world);
+  if (membership == nullptr || !AcceptItems(command.seq, command.items.size())) return;
   const std::size_t item_count = command.items.size();
-  std::vector<LayerPart> parts(static_cast<std::size_t>(host_.shard_count()));
-  ShareOut(std::move(command.items), parts);
+  std::vector<LayerPart> parts(static_cast<std::size_t>(context_.host.shard_count()));
+  Distribute(std::move(command.items), parts);
   SubmitParts(command.seq, membership->world, std::move(parts),
               Pending{.item_count = item_count, .reply = {}});
 }
 
-void Session::Inspect(const protocol::InspectAvatar& question) {
-  if ((features_ & protocol::kFeatureInspect) == 0) {
-    host_.metrics().protocol_errors.Add();
-    Fail(StatusCode::kUnexpectedMessage, "InspectAvatar needs the feature 'inspect'");
-    return;
-  }
-  const auto refuse = [&](StatusCode code, const char* text) {
-    Send(protocol::AvatarState{.nonce = question.nonce,
-                               .world = question.world,
-                               .avatar = question.avatar,
-                               .code = code,
-                               .text = text});
-  };
-  const auto it = worlds_.find(question.world);
-  if (it == worlds_.end()) {
-    refuse(StatusCode::kNotJoined, "this session is not in that world");
-  } else if (pending_questions_ >= host_.config().limits.max_pending_commands) {
-    host_.metrics().Reached(Limit::kPendingCommands);
-    refuse(StatusCode::kLimitReached, "as many questions wait for their answer as may");
-  } else {
-    ++pending_questions_;
-    host_.Ask(ShardOf(question.avatar, host_.shard_count()), {.world = it->second.world,
-                                                              .from_shard = host_.shard_index(),
-                                                              .session = identity_.id,
-                                                              .nonce = question.nonce,
-                                                              .avatar = question.avatar});
-  }
-}
-
-void Session::OnInspected(const protocol::AvatarState& state) {
-  --pending_questions_;
-  const auto is_walk = [](const protocol::RequestItem& item) {
-    return std::holds_alternative<protocol::WalkMovement>(item.movement);
-  };
-  if ((features_ & protocol::kFeatureWalks) != 0 || std::ranges::none_of(state.queue, is_walk)) {
-    Send(state);
-    return;
-  }
-  protocol::AvatarState without = state;
-  std::erase_if(without.queue, is_walk);
-  Send(without);
-}
-
-template <typename Part>
-void Session::SubmitAvatars(Seq seq, WorldId world, const std::vector<AvatarId>& avatars,
-                            const Part& empty) {
-  const Membership* membership = Commanding(seq, world);
-  if (membership == nullptr || !Affords(seq, avatars.size())) return;
-  std::vector<Part> parts(static_cast<std::size_t>(host_.shard_count()), empty);
-  std::uint32_t index = 0;
-  for (const AvatarId avatar : avatars) {
-    parts[static_cast<std::size_t>(ShardOf(avatar, host_.shard_count()))].avatars.push_back(
-        {index++, avatar});
-  }
-  SubmitParts(seq, membership->world, std::move(parts),
-              Pending{.item_count = avatars.size(), .reply = {}});
-}
-
-void Session::Execute(protocol::Remove&& command) {
+void SessionCommands::Execute(protocol::Remove&& command) {
   SubmitAvatars<RemovePart>(command.seq, command.world, command.avatars);
 }
 
-void Session::Execute(protocol::CancelQueue&& command) {
+void SessionCommands::Execute(protocol::CancelQueue&& command) {
   SubmitAvatars<CancelPart>(command.seq, command.world, command.avatars);
 }
 
-void Session::Execute(protocol::SetPlanting&& command) {
-  if ((features_ & protocol::kFeaturePlanting) == 0) {
-    Answer(command.seq, StatusCode::kUnsupported,
-           "the feature 'planting' was not agreed on in the handshake");
-    return;
-  }
-  SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, !command.is_off});
+void SessionCommands::Execute(protocol::SetPlanting&& command) {
+  SubmitAvatars(command.seq, command.world, command.avatars, PlantingPart{{}, command.enabled});
 }
 
-void Session::Execute(protocol::SetTerrain&& command) {
-  const Membership* membership = Commanding(command.seq, command.world);
+// ---- terrain
+
+void SessionCommands::Execute(protocol::SetTerrain&& command) {
+  const Membership* membership = FindControlled(command.seq, command.world);
   if (membership == nullptr) return;
-  if ((features_ & protocol::kFeatureTerrain) == 0) {
-    Answer(command.seq, StatusCode::kUnsupported,
-           "the feature 'terrain' was not agreed on in the handshake");
-    return;
-  }
-  // What it costs to make and to tell, in items.
+  // The cost of validating and sending a terrain, in items.
   std::size_t numbers = 0;
   if (command.terrain) {
     numbers = command.terrain->boxes.size();
     if (const auto& field = command.terrain->height_field) numbers += field->heights_m.size();
   }
   const std::size_t item_count = 1 + numbers / kNumbersPerItem;
-  if (!Affords(command.seq, item_count)) return;
-  Pending pending{.outstanding = host_.shard_count(), .item_count = item_count, .reply = {}};
+  if (!AcceptItems(command.seq, item_count)) return;
+  Pending pending{
+      .outstanding = context_.host.shard_count(), .item_count = item_count, .reply = {}};
   pending.reply.seq = command.seq;
   pending.reply.accepted = 1;
-  pending_items_ += item_count;
-  pending_.emplace(command.seq, std::move(pending));
-  host_.SetTerrain({.world = membership->world,
-                    .from_shard = host_.shard_index(),
-                    .session = identity_.id,
-                    .seq = command.seq,
-                    .terrain = std::move(command.terrain)});
+  AddPending(command.seq, std::move(pending));
+  context_.host.SendToServer(TerrainChange{.world = membership->world,
+                                           .from_shard = context_.host.shard_index(),
+                                           .session = context_.identity.id,
+                                           .seq = command.seq,
+                                           .terrain = std::move(command.terrain)});
 }
 
-void Session::OnTerrainRefused(Seq seq, Refusal refusal) {
-  const auto it = pending_.find(seq);
-  if (is_ended_ || it == pending_.end()) return;
-  pending_items_ -= it->second.item_count;
-  pending_.erase(it);
+void SessionCommands::OnTerrainRefused(Seq seq, Refusal refusal) {
+  if (!pending_.contains(seq)) return;
+  (void)TakePending(seq);
   Answer(seq, refusal.code, std::move(refusal.text));
-  UpdatePause();
 }
 
-void Session::OnGround(WorldId world, const SharedFrame& frame) {
-  if (connection_ == nullptr || (features_ & protocol::kFeatureTerrain) == 0) return;
-  if (worlds_.contains(world)) connection_->SendTerrain(world, frame);
+// ---- subscriptions
+
+void SessionCommands::Execute(protocol::Observe&& command) {
+  Subscriptions& subscriptions = stream_.subscriptions();
+  const Limits& limits = context_.host.config().limits;
+  const auto refuse = [&](StatusCode code, std::string text) {
+    Answer(command.seq, code, std::move(text));
+  };
+  command.mode = Subscriptions::SentMode(command.mode, command.detail);
+  const Membership* membership = context_.FindWorld(command.world);
+  if (membership == nullptr) return refuse(StatusCode::kNotJoined, kNotJoinedText);
+  if (command.replace) return MoveRegion(command, membership->world);
+  if (subscriptions.Contains(command.subscription)) {
+    return refuse(StatusCode::kSubscriptionExists, "a subscription with this id exists already");
+  }
+  if (subscriptions.size() >= static_cast<std::size_t>(limits.max_subscriptions)) {
+    context_.host.metrics().Reached(Limit::kSubscriptions);
+    return refuse(StatusCode::kLimitReached,
+                  "the session has too many subscriptions (max_subscriptions)");
+  }
+  if (command.region ? subscriptions.ObservesWorld(command.world)
+                     : subscriptions.HasRegion(command.world)) {
+    return refuse(StatusCode::kNotAllowed,
+                  "a subscription with a region must be the only one of its world");
+  }
+  const auto max_selected = static_cast<std::size_t>(limits.max_named_avatars);
+  if (subscriptions.selected_count() + command.avatars.size() > max_selected) {
+    context_.host.metrics().Reached(Limit::kNamedAvatars);
+    return refuse(StatusCode::kLimitReached,
+                  "the subscriptions contain too many avatar ids (max_named_avatars)");
+  }
+  if (!AcceptItems(command.seq, command.avatars.size())) return;
+  std::optional<RegionMembers> region;
+  if (command.region) {
+    region.emplace().Set(*command.region, membership->world->interest_cell_m, command.every_n_ticks,
+                         command.mode);
+  }
+  subscriptions.Add(command.subscription, {.world = command.world,
+                                           .mode = command.mode,
+                                           .every_n_ticks = command.every_n_ticks,
+                                           .with_events = command.with_events,
+                                           .avatars = std::move(command.avatars),
+                                           .region = std::move(region)});
+  context_.host.InterestChanged(membership->world);
+  Answer(command.seq, StatusCode::kOk);
+  if (command.mode == PoseMode::kMovement) stream_.UpdateMovementFeeds(membership->world);
 }
 
-void Session::OnResult(CommandResult&& result) {
-  const auto it = pending_.find(result.seq);
-  if (is_ended_ || it == pending_.end()) return;
-  Pending& pending = it->second;
-  pending.reply.accepted += result.accepted;
-  std::ranges::move(result.items, std::back_inserter(pending.reply.items));
-  if (--pending.outstanding > 0) return;
-  // Shards answer in any order.
-  std::ranges::sort(pending.reply.items, {}, &ReplyItem::index);
-  Reply reply = std::move(pending.reply);
-  pending_items_ -= pending.item_count;
-  pending_.erase(it);
-  Answer(std::move(reply));
-  UpdatePause();
+void SessionCommands::MoveRegion(const protocol::Observe& command,
+                                 const std::shared_ptr<World>& world) {
+  const auto intervals = [&] {
+    std::array<SendInterval, kSentModes.size()> all;
+    for (const PoseMode mode : kSentModes) {
+      all[ModeIndex(mode)] = stream_.IntervalOf(command.world, mode);
+    }
+    return all;
+  };
+  const auto intervals_before = intervals();
+  const bool had_events = stream_.WantsEvents(command.world);
+  if (!stream_.subscriptions().MoveRegion(command.subscription, command, world->interest_cell_m)) {
+    Answer(command.seq, StatusCode::kNoSuchSubscription,
+           "no subscription of this id has a region with the same world and mode");
+    return;
+  }
+  if (intervals() == intervals_before && stream_.WantsEvents(command.world) == had_events) {
+    context_.host.SelectionChanged(command.world);
+  } else {
+    context_.host.InterestChanged(world);
+  }
+  Answer(command.seq, StatusCode::kOk);
+}
+
+void SessionCommands::Execute(protocol::StopObserving&& command) {
+  const auto world = stream_.RemoveSubscription(command.subscription);
+  if (!world) {
+    Answer(command.seq, StatusCode::kNoSuchSubscription, "no subscription has this id");
+    return;
+  }
+  context_.host.InterestChanged(context_.worlds.at(*world).world);
+  Answer(command.seq, StatusCode::kOk);
+}
+
+// ---- replies
+
+void SessionCommands::Answer(Seq seq, StatusCode code, std::string text) {
+  Answer(Reply{.seq = seq, .code = code, .text = std::move(text)});
+}
+
+void SessionCommands::Answer(Reply&& reply, WorldId joined) {
+  STRIDEWIRE_CHECK(!pending_.contains(reply.seq));
+  const SharedFrame frame = EncodeFrame(context_.host.encoder(), reply);
+  STRIDEWIRE_CHECK(frame != nullptr);  // because of MaxItems
+  const std::size_t forgotten = replies_.Store(reply.seq, frame, joined);
+  if (forgotten > 0 && replies_.bytes() > context_.host.config().limits.reply_cache_bytes / 2) {
+    context_.host.metrics().Reached(Limit::kReplyCache, forgotten);
+  }
+  if (context_.connection != nullptr) context_.connection->SendControl(frame);
 }
 
 }  // namespace stridewire::server

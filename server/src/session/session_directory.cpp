@@ -12,11 +12,11 @@ namespace {
 
 constexpr std::size_t kTokenBytes = 32;
 
-// Nobody can guess a token, and no two sessions ever get the same.
+// Tokens and session ids must be unpredictable and unique.
 std::vector<std::byte> RandomBytes(std::size_t count) {
   std::vector<std::byte> bytes(count);
   const ssize_t got = getrandom(bytes.data(), bytes.size(), 0);
-  STRIDEWIRE_CHECK(got == static_cast<ssize_t>(count));  // never short up to 256 bytes
+  STRIDEWIRE_CHECK(got == static_cast<ssize_t>(count));  // getrandom always returns up to 256 bytes
   return bytes;
 }
 
@@ -34,12 +34,12 @@ Outcome<SessionDirectory::Entry> SessionDirectory::Open(const std::string& addre
   if (by_token_.size() >= static_cast<std::size_t>(limits_.max_sessions)) {
     reached = Limit::kSessions;
     return Refuse(protocol::StatusCode::kLimitReached,
-                  "the server has as many sessions as it takes");
+                  "too many sessions on this server (max_sessions)");
   }
   if (CountOf(address) >= limits_.max_sessions_per_address) {
     reached = Limit::kSessionsPerAddress;
     return Refuse(protocol::StatusCode::kLimitReached,
-                  "the server has as many sessions of this address as it takes");
+                  "too many sessions from this address (max_sessions_per_address)");
   }
   Entry entry;
   entry.identity.address = address;
@@ -54,10 +54,12 @@ Outcome<SessionDirectory::Entry> SessionDirectory::Open(const std::string& addre
 
 void SessionDirectory::Insert(const Entry& entry) {
   const std::string key = KeyOf(entry.identity.token);
+  STRIDEWIRE_CHECK(entry.identity.id != 0 && !by_token_.contains(key));
   tokens_[entry.identity.id] = key;
   by_token_[key] = entry;
   ++shard_counts_[static_cast<std::size_t>(entry.shard)];
   ++address_counts_[entry.identity.address];
+  STRIDEWIRE_CHECK(tokens_.size() == by_token_.size());
 }
 
 const SessionDirectory::Entry* SessionDirectory::Find(std::span<const std::byte> token) const {
@@ -69,11 +71,15 @@ void SessionDirectory::Close(SessionId id) {
   const auto token = tokens_.find(id);
   if (token == tokens_.end()) return;
   const auto it = by_token_.find(token->second);
+  STRIDEWIRE_CHECK(it != by_token_.end());
+  STRIDEWIRE_CHECK(shard_counts_[static_cast<std::size_t>(it->second.shard)] > 0);
   --shard_counts_[static_cast<std::size_t>(it->second.shard)];
   const auto address = address_counts_.find(it->second.identity.address);
+  STRIDEWIRE_CHECK(address != address_counts_.end() && address->second > 0);
   if (--address->second == 0) address_counts_.erase(address);
   by_token_.erase(it);
   tokens_.erase(token);
+  STRIDEWIRE_CHECK(tokens_.size() == by_token_.size());
 }
 
 void SessionDirectory::Restore(int shard, const SessionIdentity& identity) {

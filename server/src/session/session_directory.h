@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "ops/limits.h"
-#include "session/refusal.h"
-#include "session/session.h"
+#include "base/limits.h"
+#include "base/refusal.h"
+#include "world/shard_messages.h"
 
 namespace stridewire::server {
 
-/// Which sessions there are and where they live. One thread's.
+/// Lists all sessions and their shards. Owned by the main thread; not thread-safe.
 class SessionDirectory {
  public:
   SessionDirectory(const Limits& limits, int shard_count);
@@ -22,17 +22,17 @@ class SessionDirectory {
     int shard = 0;
   };
 
-  /// A new session on the shard with the fewest. kLimitReached: too many, of all or of that
-  /// address; `reached` says which.
+  /// Creates a session on the shard with the fewest sessions. Fails with kLimitReached if there are
+  /// too many sessions in total or of this address; `reached` returns which limit it was.
   [[nodiscard]] Outcome<Entry> Open(const std::string& address, Limit& reached);
 
-  /// Null when no session has that token.
+  /// Returns null if no session has this token.
   [[nodiscard]] const Entry* Find(std::span<const std::byte> token) const;
 
-  /// It has ended. Unknown ones are ignored.
+  /// Removes a session that has ended. Unknown ids are ignored.
   void Close(SessionId id);
 
-  /// It is there after all; known ones are ignored.
+  /// Adds a session that exists although it was closed. Known ids are ignored.
   void Restore(int shard, const SessionIdentity& identity);
 
   [[nodiscard]] int CountOf(const std::string& address) const;
@@ -43,7 +43,7 @@ class SessionDirectory {
 
   const Limits limits_;
   std::vector<int> shard_counts_;
-  std::map<std::string, Entry> by_token_;  // a token's bytes as a string
+  std::map<std::string, Entry> by_token_;  // the key contains the bytes of the token
   std::map<SessionId, std::string> tokens_;
   std::map<std::string, int> address_counts_;
 };

@@ -1,10 +1,9 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
-#include "ops/config.h"
-#include "ops/metrics.h"
+#include "base/config.h"
+#include "base/metrics.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "world/shard_messages.h"
@@ -13,8 +12,8 @@
 
 namespace stridewire::server {
 
-/// What a session needs of the shard it lives on. All calls come from the shard's thread and
-/// return at once; answers come later.
+/// What a session needs from the shard on which it lives. All functions must be called on the
+/// thread of the shard. They return at once; results arrive later.
 class SessionHost {
  public:
   virtual ~SessionHost() = default;
@@ -30,24 +29,19 @@ class SessionHost {
   [[nodiscard]] virtual protocol::Encoder& encoder() = 0;
   [[nodiscard]] virtual protocol::PoseBatchComposer& composer() = 0;
 
-  /// Passes a command to the shard its avatars live on; Session::OnResult hears of it.
-  virtual void Submit(int shard, WorldCommand&& command) = 0;
-  /// Asks the shard an avatar lives on; Session::OnInspected hears of it.
-  virtual void Ask(int shard, Inspection&& question) = 0;
-  /// Asks a shard for states of its avatars; Session::OnStates hears of it.
-  virtual void Ask(int shard, StatesQuestion&& question) = 0;
-  /// Session::OnJoined hears of it.
-  virtual void JoinWorld(SessionId session, protocol::Seq seq, std::string name) = 0;
-  virtual void LeaveWorld(WorldId world) = 0;
-  /// A ground is made of it; Session::OnResult hears of it from every shard, or once
-  /// Session::OnTerrainRefused.
-  virtual void SetTerrain(TerrainChange&& change) = 0;
-  /// The session is to be destroyed, but not before this returns.
-  virtual void SessionEnded(SessionId session) = 0;
-  /// What a session wants of this world has changed.
+  /// Sends a message to a shard, which may be the own one. The results are passed to
+  /// Session::OnResult (WorldCommand), OnInspected (InspectRequest) or OnStates (StatesRequest).
+  virtual void SendToShard(int shard, ShardMessage message) = 0;
+  /// Sends a message to the main thread. The result of a JoinRequest is passed to
+  /// Session::OnJoined. After a TerrainChange, every shard calls Session::OnResult; if the terrain
+  /// is invalid, Session::OnTerrainRefused is called instead.
+  virtual void SendToServer(ServerMessage message) = 0;
+  /// Destroys an ended session after the current call has returned.
+  virtual void DestroySession(SessionId session) = 0;
+  /// The session needs more or less of this world than before.
   virtual void InterestChanged(const std::shared_ptr<World>& world) = 0;
-  /// Only where its region is has.
-  virtual void RegionMoved(WorldId world) = 0;
+  /// The session has moved its region and needs the same otherwise.
+  virtual void SelectionChanged(WorldId world) = 0;
 };
 
 }  // namespace stridewire::server

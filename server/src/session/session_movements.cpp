@@ -1,18 +1,18 @@
-// The part of a session that tells what avatars begin, and gives out their library, to a client that evaluates the poses itself.
+// The part of SessionStream that sends movements to clients that evaluate poses themselves.
 
 #include <algorithm>
 #include <iterator>
 
-#include "session/encode_frame.h"
-#include "session/session.h"
+#include "base/check.h"
+#include "session/session_stream.h"
 
 namespace stridewire::server {
 
-using protocol::StatusCode;
+using protocol::PoseMode;
 
 namespace {
 
-// States are asked for this much at a time, of each shard.
+// Bytes of states that are requested at a time, per shard.
 constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace
@@ -26,147 +26,103 @@ const std::vector<SharedFrame>& SharedMovements::frames() {
   return frames_;
 }
 
-const SharedFrame& SharedMovements::Empty(std::size_t i, const protocol::Movements& empty) {
-  empty_.resize(delivery_.steps->size());
-  if (empty_[i] == nullptr) empty_[i] = EncodeFrame(encoder_, empty);
-  return empty_[i];
+const SharedFrame& SharedMovements::EmptyFrame(std::size_t i, const protocol::Movements& empty) {
+  STRIDEWIRE_CHECK(empty.avatars.empty() && i < delivery_.steps->size());
+  empty_frames_.resize(delivery_.steps->size());
+  if (empty_frames_[i] == nullptr) empty_frames_[i] = EncodeFrame(encoder_, empty);
+  return empty_frames_[i];
 }
 
-// Others are to be told of, or the client knows of nobody yet.
-void Session::WatchMovements(const std::shared_ptr<World>& world) {
-  const std::span<const AvatarId> named =
-      subscriptions_.Named(world->id, protocol::PoseMode::kMovement);
-  RegionMembers* region = subscriptions_.RegionOf(world->id, protocol::PoseMode::kMovement);
-  for (int shard = 0; shard < host_.shard_count(); ++shard) {
+void SessionStream::UpdateMovementFeeds(const std::shared_ptr<World>& world) {
+  const std::span<const AvatarId> selected =
+      subscriptions_.SelectedAvatars(world->id, PoseMode::kMovement);
+  RegionMembers* region = subscriptions_.FindRegion(world->id, PoseMode::kMovement);
+  const int shard_count = context_.host.shard_count();
+  for (int shard = 0; shard < shard_count; ++shard) {
     MovementFeed& feed = movement_feeds_.try_emplace({world->id, shard}, world).first->second;
     if (region != nullptr) {
-      feed.Watch(region->inside(shard));
+      feed.SetAvatars(region->members(shard));
       continue;
     }
-    if (named.empty()) {
-      feed.Watch(std::nullopt);
+    if (selected.empty()) {
+      feed.SetAvatars(std::nullopt);
       continue;
     }
-    std::vector<AvatarId> there;
-    std::ranges::copy_if(named, std::back_inserter(there), [&](AvatarId number) {
-      return ShardOf(number, host_.shard_count()) == shard;
-    });
-    feed.Watch(std::move(there));
+    std::vector<AvatarId> of_shard;
+    std::ranges::copy_if(selected, std::back_inserter(of_shard),
+                         [&](AvatarId id) { return ShardOf(id, shard_count) == shard; });
+    feed.SetAvatars(std::move(of_shard));
   }
-  AskForStates();
+  RequestStates();
 }
 
-void Session::EndMovements(WorldId world) {
+void SessionStream::EndMovementFeeds(WorldId world) {
   std::erase_if(movement_feeds_, [&](const auto& item) { return item.first.first == world; });
-  if (connection_ != nullptr) connection_->DropMovements(world);
+  if (context_.connection != nullptr) context_.connection->DropMovements(world);
 }
 
-void Session::AskForStates() {
-  if (connection_ == nullptr) return;
-  const std::size_t waiting = connection_->queue().movement_bytes();
-  // States alone never are more than the budget.
-  const std::size_t little = host_.config().limits.control_buffer_bytes / 16;
+void SessionStream::RequestStates() {
+  if (context_.connection == nullptr) return;
+  const std::size_t waiting = context_.connection->queue().movement_bytes();
+  // States must leave most of the budget to movements.
+  const std::size_t max_waiting = context_.host.config().limits.control_buffer_bytes / 16;
   for (auto& [key, feed] : movement_feeds_) {
-    if (feed.is_lost() && waiting == 0) feed.Recover();
-    if (!feed.asks() || waiting > little) continue;
+    if (feed.is_lost() && waiting == 0) feed.Restart();
+    if (!feed.needs_request() || waiting > max_waiting) continue;
     if (++states_nonce_ == 0) ++states_nonce_;
-    StatesQuestion question{.from_shard = host_.shard_index(),
-                            .session = identity_.id,
-                            .enough_bytes = std::min(kStatesBytes, little)};
-    feed.Ask(states_nonce_, question);
-    host_.Ask(key.second, std::move(question));
+    StatesRequest request{.from_shard = context_.host.shard_index(),
+                          .session = context_.identity.id,
+                          .enough_bytes = std::min(kStatesBytes, max_waiting)};
+    feed.NextRequest(states_nonce_, request);
+    context_.host.SendToShard(key.second, std::move(request));
   }
 }
 
-void Session::OnSent() {
-  UpdatePause();
-  AskForStates();
-}
-
-void Session::SendMovements(WorldId world, int shard, MovementFeed& feed,
-                            const SharedFrame& frame) {
-  if (connection_ == nullptr || feed.is_lost() || frame == nullptr) return;
-  const std::size_t dropped = connection_->SendMovements(world, shard, frame);
+void SessionStream::SendMovements(WorldId world, int shard, MovementFeed& feed,
+                                  const SharedFrame& frame) {
+  if (context_.connection == nullptr || feed.is_lost() || frame == nullptr) return;
+  const std::size_t dropped = context_.connection->SendMovements(world, shard, frame);
   if (dropped == 0) return;
-  feed.Lose();
-  worlds_.at(world).dropped_batches += dropped;
-  host_.metrics().batches_dropped.Add(dropped);
-  host_.metrics().Reached(Limit::kObserverBacklog);
+  feed.SetLost();
+  CountDroppedBatches(world, dropped);
 }
 
-void Session::OnMovements(SharedMovements& movements) {
+void SessionStream::OnMovements(SharedMovements& movements) {
   const MovementDelivery& delivery = movements.delivery();
   const auto it = movement_feeds_.find({delivery.world, delivery.from_shard});
   if (it == movement_feeds_.end()) return;
   MovementFeed& feed = it->second;
   for (std::size_t i = 0; i < delivery.steps->size() && !feed.is_lost(); ++i) {
-    if (feed.is_whole()) {
+    if (feed.covers_all()) {
       SendMovements(delivery.world, delivery.from_shard, feed, movements.frames()[i]);
       continue;
     }
-    const protocol::Movements some =
-        feed.Pick((*delivery.steps)[i], host_.config().limits.max_bulk_bytes);
-    SendMovements(
-        delivery.world, delivery.from_shard, feed,
-        some.avatars.empty() ? movements.Empty(i, some) : EncodeFrame(host_.encoder(), some));
+    const protocol::Movements selected =
+        feed.Select((*delivery.steps)[i], context_.host.config().limits.max_bulk_bytes);
+    SendMovements(delivery.world, delivery.from_shard, feed,
+                  selected.avatars.empty() ? movements.EmptyFrame(i, selected)
+                                           : EncodeFrame(context_.host.encoder(), selected));
   }
-  RegionMembers* region = subscriptions_.RegionOf(delivery.world, protocol::PoseMode::kMovement);
-  // No places: the shard has not heard yet that there is a region.
-  if (region != nullptr && delivery.places != nullptr) {
-    const RegionMembers::Change change =
-        region->Update(delivery.from_shard, delivery.tick, delivery.avatars, *delivery.places);
+  RegionMembers* region = subscriptions_.FindRegion(delivery.world, PoseMode::kMovement);
+  // The grid is null if the shard does not know yet that there is a region.
+  if (region != nullptr && delivery.grid != nullptr) {
+    const RegionMembers::Change change = region->Update(delivery);
     if (!change.entered.empty() || !change.left.empty()) {
-      feed.Watch(region->inside(delivery.from_shard));
-      TellRegion(delivery.world, delivery.tick, change);
+      feed.SetAvatars(region->members(delivery.from_shard));
+      SendRegionChange(delivery.world, delivery.tick, change);
     }
   }
-  // Nothing waits to be sent any more, so OnSent did not come: a feed that was lost goes on from here.
-  AskForStates();
+  // If the queue is empty, OnSent is not called any more, so a lost feed is restarted here.
+  RequestStates();
 }
 
-void Session::OnStates(const StatesAnswer& answer) {
-  const auto it = movement_feeds_.find({answer.world, answer.from_shard});
-  if (it == movement_feeds_.end() || !it->second.OnStates(answer)) return;
-  if (answer.frame != nullptr) {
-    SendMovements(answer.world, answer.from_shard, it->second, answer.frame);
+void SessionStream::OnStates(const StatesResult& result) {
+  const auto it = movement_feeds_.find({result.world, result.from_shard});
+  if (it == movement_feeds_.end() || !it->second.OnStates(result)) return;
+  if (result.frame != nullptr) {
+    SendMovements(result.world, result.from_shard, it->second, result.frame);
   }
-  AskForStates();
-}
-
-void Session::Fetch(const protocol::FetchLibrary& question) {
-  if ((features_ & protocol::kFeatureMovementMode) == 0) {
-    host_.metrics().protocol_errors.Add();
-    Fail(StatusCode::kUnexpectedMessage, "FetchLibrary needs the feature 'movement mode'");
-    return;
-  }
-  protocol::LibraryPiece piece{.nonce = question.nonce, .hash = question.hash};
-  const auto it = std::ranges::find_if(worlds_, [&](const auto& item) {
-    return item.second.world->library->hash() == question.hash;
-  });
-  if (it == worlds_.end()) {
-    piece.code = StatusCode::kNotJoined;
-    piece.text = "no world this session is in has that library";
-    Send(piece);
-    return;
-  }
-  const std::span<const std::byte> file = it->second.world->library->bytes();
-  if (question.offset > file.size()) {
-    piece.code = StatusCode::kOutOfRange;
-    piece.text = "the library ends before that";
-    Send(piece);
-    return;
-  }
-  // Beside what a small frame limit leaves for the message itself.
-  constexpr std::size_t kOverheadBytes = 512;
-  const std::size_t most =
-      std::min(protocol::kMaxPieceBytes, host_.config().limits.max_bulk_bytes - kOverheadBytes);
-  const std::span<const std::byte> rest = file.subspan(question.offset);
-  const std::span<const std::byte> part =
-      rest.first(std::min({rest.size(), most, std::size_t{question.length}}));
-  piece.total_bytes = file.size();
-  piece.offset = question.offset;
-  piece.bytes.assign(part.begin(), part.end());
-  Send(piece);
+  RequestStates();
 }
 
 }  // namespace stridewire::server

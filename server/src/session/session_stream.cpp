@@ -1,10 +1,10 @@
-// The part of a session that tells its client of poses and events.
+// Poses, events and terrain; see session_movements.cpp for movements.
+#include "session/session_stream.h"
 
 #include <algorithm>
 #include <utility>
 
-#include "session/encode_frame.h"
-#include "session/session.h"
+#include "base/check.h"
 #include "world/pose_frames.h"
 
 namespace stridewire::server {
@@ -13,7 +13,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// An event takes under 512 bytes of a frame, so this many stay below the smallest frame limit.
+// An event takes less than 512 bytes, so this many fit into a frame with the smallest limit.
 constexpr std::size_t kEventsPerFrame = 100;
 
 template <typename Function>
@@ -32,48 +32,17 @@ void ForEachEventFrame(const EventDelivery& delivery, Function&& function) {
 
 }  // namespace
 
-const std::vector<SharedFrame>& SharedEvents::frames() {
-  if (frames_.empty()) {
-    ForEachEventFrame(delivery_, [this](protocol::Events&& message) {
-      if (auto frame = EncodeFrame(encoder_, message)) frames_.push_back(std::move(frame));
-    });
-  }
-  return frames_;
-}
-
-bool Session::WantsEvents(WorldId world) const {
-  // Without a connection they are only of use to be sent again later.
-  if (connection_ == nullptr && (features_ & protocol::kFeatureEventReplay) == 0) return false;
-  const auto it = worlds_.find(world);
-  if (it == worlds_.end()) return false;
-  if (it->second.role == protocol::Role::kController) return true;
-  return subscriptions_.WithEvents(world);
-}
-
-PoseInterest::Every Session::EveryOf(WorldId world, PoseMode mode) const {
-  return connection_ == nullptr ? PoseInterest::Every{} : subscriptions_.EveryOf(world, mode);
-}
-
-std::span<const AvatarId> Session::Named(WorldId world, PoseMode mode) const {
-  return connection_ == nullptr ? std::span<const AvatarId>()
-                                : subscriptions_.Named(world, mode);
-}
-
-std::optional<RegionFilter> Session::ReachOf(WorldId world, PoseMode mode) const {
-  return connection_ == nullptr ? std::nullopt : subscriptions_.ReachOf(world, mode);
-}
-
 PoseDelivery SharedPoses::Compose(std::span<const std::uint32_t> rows, bool is_partial) {
-  PoseDelivery some{.world = delivery_.world,
-                    .mode = delivery_.mode,
-                    .from_shard = delivery_.from_shard,
-                    .tick = delivery_.tick,
-                    .avatar_count = static_cast<std::uint32_t>(rows.size()),
-                    .parts = ComposeFrames(composer_, *delivery_.rows, rows, is_partial, metrics_),
-                    .rows = nullptr,
-                    .places = nullptr};
-  metrics_.batches_composed.Add(some.parts.size());
-  return some;
+  PoseDelivery batch{.world = delivery_.world,
+                     .mode = delivery_.mode,
+                     .from_shard = delivery_.from_shard,
+                     .tick = delivery_.tick,
+                     .avatar_count = static_cast<std::uint32_t>(rows.size()),
+                     .parts = ComposeFrames(composer_, *delivery_.rows, rows, is_partial, metrics_),
+                     .rows = nullptr,
+                     .grid = nullptr};
+  metrics_.batches_composed.Add(batch.parts.size());
+  return batch;
 }
 
 const PoseDelivery& SharedPoses::ComposeShared(std::span<const std::uint32_t> rows) {
@@ -83,96 +52,198 @@ const PoseDelivery& SharedPoses::ComposeShared(std::span<const std::uint32_t> ro
   return it->second;
 }
 
-void Session::OnPoses(SharedPoses& poses) {
-  if (connection_ == nullptr) return;
+SessionStream::SessionStream(SessionContext& context)
+    : context_(context), event_replay_(context.host.config().limits.event_replay_bytes) {}
+
+// ---- what the session needs
+
+bool SessionStream::WantsEvents(WorldId world) const {
+  const Membership* membership = context_.FindWorld(world);
+  if (membership == nullptr) return false;
+  return membership->role == protocol::Role::kController || subscriptions_.WantsEvents(world);
+}
+
+SendInterval SessionStream::IntervalOf(WorldId world, PoseMode mode) const {
+  return context_.connection == nullptr ? SendInterval{} : subscriptions_.IntervalOf(world, mode);
+}
+
+std::span<const AvatarId> SessionStream::SelectedAvatars(WorldId world, PoseMode mode) const {
+  return context_.connection == nullptr ? std::span<const AvatarId>()
+                                        : subscriptions_.SelectedAvatars(world, mode);
+}
+
+std::optional<RegionFilter> SessionStream::FilterOf(WorldId world, PoseMode mode) const {
+  return context_.connection == nullptr ? std::nullopt : subscriptions_.FilterOf(world, mode);
+}
+
+// ---- begin and end
+
+void SessionStream::Resume(std::uint64_t last_events_number) {
+  STRIDEWIRE_CHECK(context_.connection != nullptr);
+  subscriptions_.RepeatEmptyBatches();
+  // Events may have been lost with the previous connection, so they are sent again.
+  event_replay_.ForEachAfter(last_events_number, [this](EventReplay::Stored& stored) {
+    stored.was_sent = context_.connection->SendEvents(stored.frame);
+    if (!stored.was_sent) context_.host.metrics().events_dropped.Add(stored.event_count);
+  });
+  for (auto& [id, membership] : context_.worlds) {
+    membership.reported_drops = 0;
+    SendLagging(membership);
+  }
+  movement_feeds_.clear();
+  for (auto& [id, membership] : context_.worlds) {
+    context_.host.InterestChanged(membership.world);
+    if (subscriptions_.Observes(id, PoseMode::kMovement)) UpdateMovementFeeds(membership.world);
+  }
+}
+
+void SessionStream::LeaveWorld(WorldId world) {
+  subscriptions_.RemoveWorld(world);
+  EndMovementFeeds(world);
+  if (context_.connection == nullptr) return;
+  for (const PoseMode mode : kSentModes) context_.connection->DropPoses(world, mode);
+  context_.connection->DropTerrain(world);
+}
+
+std::optional<WorldId> SessionStream::RemoveSubscription(protocol::SubscriptionId id) {
+  const auto removed = subscriptions_.Remove(id);
+  if (!removed) return std::nullopt;
+  const WorldId world = removed->world;
+  if (removed->mode == PoseMode::kMovement) {
+    if (subscriptions_.Observes(world, PoseMode::kMovement)) {
+      UpdateMovementFeeds(context_.worlds.at(world).world);
+    } else {
+      EndMovementFeeds(world);
+    }
+  } else if (context_.connection != nullptr) {
+    for (const PoseMode mode : kSentModes) {
+      if (!subscriptions_.Observes(world, mode)) context_.connection->DropPoses(world, mode);
+    }
+  }
+  return world;
+}
+
+// ---- poses
+
+void SessionStream::OnPoses(SharedPoses& poses) {
+  if (context_.connection == nullptr) return;
   const PoseDelivery& delivery = poses.delivery();
   switch (subscriptions_.ShareOf(delivery)) {
     case Subscriptions::Share::kNone: return;
-    case Subscriptions::Share::kWhole:
-      // None: the shard has not heard yet that a whole batch is wanted.
+    case Subscriptions::Share::kAll:
+      // Empty if the shard does not know yet that complete batches are needed.
       if (!delivery.parts.empty()) SendPoses(delivery);
       return;
-    case Subscriptions::Share::kSome:
-      if (const auto picked = subscriptions_.Pick(delivery)) {
-        SendPoses(poses.Compose(*picked, false));
+    case Subscriptions::Share::kSubset:
+      if (const auto rows = subscriptions_.PickRows(delivery)) {
+        SendPoses(poses.Compose(*rows, false));
       }
       return;
     case Subscriptions::Share::kRegion:
-      if (delivery.places == nullptr) return;  // the same
+      // Null if the shard does not know yet that there is a region.
+      if (delivery.grid == nullptr) return;
       const RegionMembers::Change change = subscriptions_.UpdateRegion(delivery);
-      TellRegion(delivery.world, delivery.tick, change);
+      SendRegionChange(delivery.world, delivery.tick, change);
       if (!change.due.empty()) SendPoses(poses.ComposeShared(change.due));
       return;
   }
 }
 
-void Session::TellRegion(WorldId world, std::uint64_t tick, const RegionMembers::Change& change) {
+void SessionStream::SendPoses(const PoseDelivery& delivery) {
+  CountDroppedBatches(delivery.world,
+                      context_.connection->SendPoses({.world = delivery.world,
+                                                      .mode = delivery.mode,
+                                                      .shard = delivery.from_shard,
+                                                      .avatar_count = delivery.avatar_count,
+                                                      .frames = delivery.parts}));
+}
+
+void SessionStream::CountDroppedBatches(WorldId world, std::uint64_t batches) {
+  if (batches == 0) return;
+  context_.worlds.at(world).dropped_batches += batches;
+  context_.host.metrics().batches_dropped.Add(batches);
+  context_.host.metrics().Reached(Limit::kObserverBacklog);
+}
+
+// ---- events
+
+void SessionStream::OnEvents(const EventDelivery& delivery) {
+  if (!WantsEvents(delivery.world)) return;
+  std::uint64_t dropped = 0;
+  ForEachEventFrame(delivery,
+                    [&](protocol::Events&& message) { dropped += SendEvents(std::move(message)); });
+  CountDroppedEvents(delivery.world, dropped);
+}
+
+void SessionStream::SendRegionChange(WorldId world, std::uint64_t tick,
+                                     const RegionMembers::Change& change) {
   const std::size_t count = change.left.size() + change.entered.size();
   if (count == 0) return;
   std::vector<protocol::Event> events;
   events.reserve(count);
   const auto add = [&](protocol::EventType type, std::span<const AvatarId> avatars) {
     for (const AvatarId avatar : avatars) {
-      events.push_back(
-          {.type = type, .avatar = avatar, .tick = tick, .time_s = host_.clock().TickTime(tick)});
+      events.push_back({.type = type,
+                        .avatar = avatar,
+                        .tick = tick,
+                        .time_s = context_.host.clock().TickTime(tick)});
     }
   };
   add(protocol::EventType::kLeft, change.left);
   add(protocol::EventType::kEntered, change.entered);
-  const EventDelivery own{world, tick,
-                          std::make_shared<const std::vector<protocol::Event>>(std::move(events))};
+  const EventDelivery delivery{
+      world, tick, std::make_shared<const std::vector<protocol::Event>>(std::move(events))};
   std::uint64_t dropped = 0;
-  ForEachEventFrame(
-      own, [&](protocol::Events&& message) { dropped += SendNumbered(std::move(message)); });
-  CountDropped(world, dropped);
+  ForEachEventFrame(delivery,
+                    [&](protocol::Events&& message) { dropped += SendEvents(std::move(message)); });
+  CountDroppedEvents(world, dropped);
 }
 
-void Session::SendPoses(const PoseDelivery& delivery) {
-  const std::size_t dropped = connection_->SendPoses(delivery);
-  if (dropped == 0) return;
-  worlds_.at(delivery.world).dropped_batches += dropped;
-  host_.metrics().batches_dropped.Add(dropped);
-  host_.metrics().Reached(Limit::kObserverBacklog);
-}
-
-void Session::OnEvents(SharedEvents& events) {
-  const EventDelivery& delivery = events.delivery();
-  if (is_ended_ || !WantsEvents(delivery.world)) return;
-  std::uint64_t dropped = 0;
-  if ((features_ & protocol::kFeatureEventReplay) == 0) {
-    bool is_full = false;
-    for (const SharedFrame& frame : events.frames()) {
-      is_full |= !connection_->SendEvents(frame);
-    }
-    if (is_full) dropped = delivery.events->size();
-  } else {
-    ForEachEventFrame(
-        delivery, [&](protocol::Events&& message) { dropped += SendNumbered(std::move(message)); });
-  }
-  CountDropped(delivery.world, dropped);
-}
-
-std::uint64_t Session::SendNumbered(protocol::Events&& message) {
-  const bool is_replayed = (features_ & protocol::kFeatureEventReplay) != 0;
-  message.number = is_replayed ? ++events_number_ : 0;
-  const SharedFrame frame = EncodeFrame(host_.encoder(), message);
+std::uint64_t SessionStream::SendEvents(protocol::Events&& message) {
+  message.number = ++events_number_;
+  const SharedFrame frame = EncodeFrame(context_.host.encoder(), message);
   if (frame == nullptr) return 0;
-  const bool was_sent = connection_ != nullptr && connection_->SendEvents(frame);
-  // What a full connection did not take is lost: sent later it would be out of order.
-  if (connection_ != nullptr && !was_sent) return message.events.size();
-  if (!is_replayed) return 0;
-  event_replay_.Keep({message.number, message.events.size(), was_sent, frame});
-  const std::uint64_t forgotten = event_replay_.TakeForgotten();
-  if (forgotten > 0) host_.metrics().Reached(Limit::kEventReplay);
-  return forgotten;
+  const bool was_sent = context_.connection != nullptr && context_.connection->SendEvents(frame);
+  // If the send queue is full, the message is dropped. Sent later, it would be out of order.
+  if (context_.connection != nullptr && !was_sent) return message.events.size();
+  event_replay_.Add({message.number, message.events.size(), was_sent, frame});
+  const std::uint64_t dropped = event_replay_.TakeDropped();
+  if (dropped > 0) context_.host.metrics().Reached(Limit::kEventReplay);
+  return dropped;
 }
 
-void Session::CountDropped(WorldId world, std::uint64_t events) {
+void SessionStream::CountDroppedEvents(WorldId world, std::uint64_t events) {
   if (events == 0) return;
-  if (connection_ != nullptr) host_.metrics().Reached(Limit::kControlBuffer);
-  // Forgotten ones may have been of another of its worlds; their sum is what counts.
-  worlds_.at(world).dropped_events += events;
-  host_.metrics().events_dropped.Add(events);
+  if (context_.connection != nullptr) context_.host.metrics().Reached(Limit::kControlBuffer);
+  // Dropped stored events may belong to another world of this session. Only the sum matters.
+  context_.worlds.at(world).dropped_events += events;
+  context_.host.metrics().events_dropped.Add(events);
+}
+
+void SessionStream::SendLagging(Membership& membership) {
+  const std::uint64_t dropped = membership.dropped_batches + membership.dropped_events;
+  STRIDEWIRE_CHECK(membership.reported_drops <= dropped);
+  if (context_.connection == nullptr || dropped == membership.reported_drops) return;
+  membership.reported_drops = dropped;
+  context_.Send(protocol::Lagging{.world = membership.world->id,
+                                  .dropped_batches = membership.dropped_batches,
+                                  .dropped_events = membership.dropped_events});
+}
+
+// ---- terrain
+
+void SessionStream::OnTerrain(WorldId world, const SharedFrame& frame) {
+  if (context_.connection == nullptr) return;
+  if (context_.worlds.contains(world)) context_.connection->SendTerrain(world, frame);
+}
+
+void SessionStream::SendTerrain(const World& world, bool even_if_flat) {
+  if (context_.connection == nullptr) return;
+  if (const auto terrain = world.terrain.Get()) {
+    context_.connection->SendTerrain(world.id, terrain->frame);
+  } else if (even_if_flat) {
+    context_.Send(protocol::WorldTerrain{.world = world.id, .terrain = {}});
+  }
 }
 
 }  // namespace stridewire::server

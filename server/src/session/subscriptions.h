@@ -13,104 +13,100 @@
 
 namespace stridewire::server {
 
-/// What a session watches, by the numbers its client chose.
+/// The subscriptions of a session, by the ids that its client has chosen.
 ///
-/// Subscriptions of one world and mode share batches. If one of them is about all avatars, the session gets
-/// whole batches, otherwise such as hold exactly those that any of them names. A region is the only one of its world, and
-/// about as many modes as its rings have details.
+/// Subscriptions to the same world and mode share batches. If one of them covers all avatars, the
+/// session receives complete batches; otherwise it receives batches of exactly the avatars that any
+/// of them selects. A subscription with a region must be the only one of its world. It uses as many
+/// modes as its rings have levels of detail.
 class Subscriptions {
  public:
   struct Subscription {
     WorldId world = 0;
-    protocol::PoseMode mode = protocol::PoseMode::kFull;  ///< Of a region: beyond its rings.
+    protocol::PoseMode mode = protocol::PoseMode::kFull;  ///< With a region: beyond its rings.
     std::uint16_t every_n_ticks = 1;
     bool with_events = false;
-    std::vector<AvatarId> avatars;  ///< Empty: all, or those of the region.
+    std::vector<AvatarId> avatars;  ///< Empty: all avatars, or those of the region.
     std::optional<RegionMembers> region;
   };
-  enum class Share : std::uint8_t { kNone, kWhole, kSome, kRegion };
+  /// The part of a delivery that the session sends to its client.
+  enum class Share : std::uint8_t { kNone, kAll, kSubset, kRegion };
 
-  /// Whether quantised poses, those subscribed to already as well, are sent as compact ones, and of those some with
-  /// less detail.
-  void SetCompact(bool is_compact, bool has_detail);
-  /// The mode in which what is asked for is sent: that of everything here. Detail that was not agreed on is all.
-  [[nodiscard]] protocol::PoseMode SentMode(protocol::PoseMode asked,
-                                            protocol::PoseDetail detail) const;
-
-  /// Whether poses are sent in any detail asked for.
-  [[nodiscard]] bool has_detail() const { return is_compact_ && has_detail_; }
+  /// Returns the mode in which poses are sent if a client requests `mode` and `detail`. All other
+  /// functions use sent modes.
+  [[nodiscard]] static protocol::PoseMode SentMode(protocol::PoseMode mode,
+                                                   protocol::PoseDetail detail);
 
   [[nodiscard]] bool Contains(protocol::SubscriptionId id) const { return all_.contains(id); }
   [[nodiscard]] std::size_t size() const { return all_.size(); }
-  /// Sum over all of how many avatars each names.
-  [[nodiscard]] std::size_t named_count() const { return named_count_; }
+  /// Returns the sum of the numbers of avatars that the subscriptions select.
+  [[nodiscard]] std::size_t selected_count() const { return selected_count_; }
 
+  /// `id` must be new.
   void Add(protocol::SubscriptionId id, Subscription&& subscription);
-  /// Returns what it was; empty: there is none of that number.
+  /// Returns the removed subscription, or nullopt if `id` does not exist.
   std::optional<Subscription> Remove(protocol::SubscriptionId id);
   void RemoveWorld(WorldId world);
-  /// The client may have missed what it was sent: what is empty is told anew.
-  void TellAnew();
+  /// The client may have missed messages: empty batches are sent again, even if nothing changed.
+  void RepeatEmptyBatches();
 
-  [[nodiscard]] bool WithEvents(WorldId world) const;
-  /// Some subscription is about that world, or some region.
-  [[nodiscard]] bool WatchesWorld(WorldId world) const;
+  [[nodiscard]] bool WantsEvents(WorldId world) const;
+  /// True if there is a subscription or a region for this world.
+  [[nodiscard]] bool ObservesWorld(WorldId world) const;
   [[nodiscard]] bool HasRegion(WorldId world) const;
   [[nodiscard]] std::size_t region_count() const;
-  /// Gives a region another place; the members stay as long as that one has them. False: `id` is no region of that
-  /// world and, beyond its rings, mode.
+  /// Replaces the region of a subscription. Members stay members while they are in the new region.
+  /// Returns false if `id` has no region, or has another world or another mode beyond its rings.
   [[nodiscard]] bool MoveRegion(protocol::SubscriptionId id, const protocol::Observe& moved,
-                                double leave_m);
+                                double default_leave_m);
 
-  /// Some subscription is about these poses.
-  [[nodiscard]] bool Watches(WorldId world, protocol::PoseMode mode) const {
-    return watches_.contains({world, mode});
+  /// True if any subscription needs these poses.
+  [[nodiscard]] bool Observes(WorldId world, protocol::PoseMode mode) const {
+    return channels_.contains({world, mode});
   }
-  /// How often, as whole batches or as others.
-  [[nodiscard]] PoseInterest::Every EveryOf(WorldId world, protocol::PoseMode mode) const;
-  /// Avatars whose poses suffice, growing. Empty: whole batches are wanted, or nothing is.
-  [[nodiscard]] std::span<const AvatarId> Named(WorldId world, protocol::PoseMode mode) const;
-
-  /// What the region of that world reaches in that mode; empty: there is none.
-  [[nodiscard]] std::optional<RegionFilter> ReachOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] SendInterval IntervalOf(WorldId world, protocol::PoseMode mode) const;
+  /// Returns the ascending ids of the selected avatars. Empty if complete batches are needed, or if
+  /// no poses are needed.
+  [[nodiscard]] std::span<const AvatarId> SelectedAvatars(WorldId world,
+                                                          protocol::PoseMode mode) const;
+  /// Returns the rings of this mode of the region of this world, or nullopt if there are none.
+  [[nodiscard]] std::optional<RegionFilter> FilterOf(WorldId world, protocol::PoseMode mode) const;
 
   [[nodiscard]] Share ShareOf(const PoseDelivery& delivery) const;
-  /// The rows of a delivery that Share::kSome is about; without value: none has a pose and the client knows
-  /// already. They hold until the next call of anything here.
-  [[nodiscard]] std::optional<std::span<const std::uint32_t>> Pick(const PoseDelivery& delivery);
-  /// The region of that world with a ring of that mode; null: there is none.
-  [[nodiscard]] RegionMembers* RegionOf(WorldId world, protocol::PoseMode mode);
-  /// The same of Share::kRegion. The delivery has places.
+  /// Returns the rows of a delivery with Share::kSubset, valid until the next call of any function.
+  /// Returns nullopt if none has a pose and the previous batch was empty as well.
+  [[nodiscard]] std::optional<std::span<const std::uint32_t>> PickRows(
+      const PoseDelivery& delivery);
+  /// Returns the region of this world if it has a ring of this mode, otherwise null.
+  [[nodiscard]] RegionMembers* FindRegion(WorldId world, protocol::PoseMode mode);
+  /// Updates the region for a delivery with Share::kRegion. The delivery must contain positions.
   [[nodiscard]] RegionMembers::Change UpdateRegion(const PoseDelivery& delivery);
 
  private:
   using Key = std::pair<WorldId, protocol::PoseMode>;
-  /// What is sent of one shard.
-  struct Lane {
-    protocol::PoseRows::Avatars avatars;  // for which `rows` holds
+  /// The selected rows of one shard.
+  struct ShardRows {
+    protocol::PoseRows::Avatars avatars;  // for which `rows` is valid
     std::vector<std::uint32_t> rows;
-    bool is_empty_told = false;
+    bool was_empty = false;  // the last batch contained no poses
   };
-  /// The subscriptions of one world and mode together.
-  struct Watch {
-    PoseInterest::Every every;
-    std::vector<AvatarId> named;  // growing; empty: all
-    std::map<int, Lane> lanes;
+  /// All subscriptions of one world and mode together.
+  struct Channel {
+    SendInterval interval;
+    std::vector<AvatarId> selected;  // ascending; empty: all
+    std::map<int, ShardRows> shards;
   };
 
-  [[nodiscard]] const RegionMembers* FindRegion(const Key& key) const;
   [[nodiscard]] static std::vector<protocol::PoseMode> ModesOf(const Subscription& subscription);
-  /// How often it wants those poses; 0: it does not.
-  [[nodiscard]] static std::uint16_t EveryOf(const Subscription& subscription, const Key& key);
-  void SumUp(const Key& key);
-  void SumUpAll(const Subscription& subscription);
-  void CountNamed();
+  /// Returns the interval in ticks at which a subscription needs these poses; 0: never.
+  [[nodiscard]] static std::uint16_t IntervalOf(const Subscription& subscription, const Key& key);
+  void UpdateChannel(const Key& key);
+  void UpdateChannels(const Subscription& subscription);
+  void UpdateSelectedCount();
 
-  bool is_compact_ = false;
-  bool has_detail_ = false;
   std::map<protocol::SubscriptionId, Subscription> all_;
-  std::map<Key, Watch> watches_;
-  std::size_t named_count_ = 0;
+  std::map<Key, Channel> channels_;
+  std::size_t selected_count_ = 0;
 };
 
 }  // namespace stridewire::server

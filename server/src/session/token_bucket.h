@@ -4,7 +4,8 @@
 
 namespace stridewire::server {
 
-/// Lets through `rate_per_s` of something on average and `burst` at once. Time is an argument.
+/// Rate limiter: allows `rate_per_s` tokens per second on average and `burst` tokens at once. Time
+/// is an argument, in seconds.
 class TokenBucket {
  public:
   TokenBucket(double rate_per_s, double burst)
@@ -15,7 +16,7 @@ class TokenBucket {
     last_s_ = std::max(last_s_, now_s);
   }
 
-  /// Takes `count`, or nothing when there are fewer.
+  /// Takes `count` tokens. If fewer are available, takes none and returns false.
   [[nodiscard]] bool Take(double count) {
     if (tokens_ < count) return false;
     tokens_ -= count;

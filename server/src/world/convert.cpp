@@ -40,7 +40,7 @@ protocol::EventType TypeToWire(AvatarEventType type) {
   return protocol::EventType::kIdle;
 }
 
-// Both sides number these alike; a change of either must be seen here.
+// The conversions below cast these enums, so both sides must have the same values.
 static_assert(static_cast<int>(MovementKind::kStepLeft) ==
               static_cast<int>(protocol::MovementKind::kStepLeft));
 static_assert(static_cast<int>(MovementKind::kStand) ==

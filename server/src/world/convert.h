@@ -7,29 +7,30 @@
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/terrain.h"
 
-/// Between the runtime's values and the wire's, which know nothing of each other.
+/// Conversions between the types of the runtime and those of the protocol, which do not include
+/// each other.
 namespace stridewire::server {
 
 [[nodiscard]] protocol::SkeletonInfo ToWire(const Skeleton& skeleton);
 [[nodiscard]] protocol::Placement ToWire(const BaseFrame& base);
 [[nodiscard]] BaseFrame FromWire(const protocol::Placement& placement);
 [[nodiscard]] MovementRequest FromWire(const protocol::RequestItem& item);
-/// Without avatar number.
+/// The caller sets `avatar`.
 [[nodiscard]] protocol::RequestItem ToWire(const MovementRequest& request);
 
 [[nodiscard]] protocol::TerrainInfo ToWire(const TerrainData& terrain);
 [[nodiscard]] TerrainData FromWire(protocol::TerrainInfo&& terrain);
 
-/// Without avatar, tick and time, which the runtime's event does not have.
+/// The caller sets `avatar`, `tick` and `time_s`, which the runtime's event does not contain.
 [[nodiscard]] protocol::Event ToWire(const AvatarEvent& event, const MotionLibrary& library);
 
-/// What an error of the runtime is called on the wire.
+/// Returns the status code that clients receive for an error of the runtime.
 [[nodiscard]] protocol::StatusCode ToStatusCode(ErrorCode code);
 
-/// What a frame's error is called on the wire.
+/// Returns the status code that clients receive for an invalid frame.
 [[nodiscard]] protocol::StatusCode FrameStatusCode(ErrorCode code);
 
-/// How a WebSocket ends after an Error of that code.
+/// Returns the WebSocket close code that follows a fatal error.
 [[nodiscard]] CloseCode CloseCodeOf(protocol::StatusCode code);
 
 }  // namespace stridewire::server

@@ -9,209 +9,258 @@
 #include <vector>
 
 #include "base/prefetch.h"
-#include "stridewire/protocol/compact_codecs.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluation_batcher.h"
+#include "stridewire/protocol/compact_codecs.h"
 
 namespace stridewire::server {
 
-/// What poses of a library are evaluated and encoded in. One serves all worlds of a thread.
+/// Scratch memory for evaluating and encoding the poses of one library. All caches of a thread that
+/// use this library share it.
 struct PoseScratch {
   explicit PoseScratch(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  SoaPoseEvaluator evaluator;  ///< Of EncodedPoseCache::kMost
-  EvaluationBatcher queue;
-  SoaPose taken;
+  SoaPoseEvaluator evaluator;  ///< For up to EncodedPoseCache::kMaxTicksAhead poses.
+  EvaluationBatcher batcher;
+  SoaPose stored;  ///< Poses given to EncodedPoseCache::Store.
   Pose pose;
-  static constexpr std::size_t kModes = 4;
-  std::array<protocol::CompactCodec::Block, kModes> blocks;
+  static constexpr std::size_t kMaxModes = 4;
+  std::array<protocol::CompactCodec::Block, kMaxModes> blocks;
 };
 
-/// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
-/// is made of is brought into the cache, blended and unpacked once in kMost ticks; in each tick its turn is other
-/// avatars'. Who is sent elsewhere meanwhile is evaluated anew, and less far ahead the next time. One a world and shard;
-/// not thread-safe.
+/// Evaluates and encodes the poses of a world's avatars for several ticks at once. A movement is
+/// fixed when it starts, so its future poses can be computed early. The evaluator then loads and
+/// blends the data of a movement once per up to 16 poses instead of once per pose. One cache per
+/// world and shard; not thread-safe.
 ///
-///   ahead.Begin(step, step_s, avatars);
-///   for each avatar: ahead.Ask(place, avatar)
-///   ahead.Finish();
-///   for each avatar: … ahead.Of(place, mode) …
+///   cache.BeginStep(step, step_s, avatar_count);
+///   for each avatar: cache.Request(slot, avatar);
+///   cache.FinishStep();
+///   for each avatar: cache.Find(slot, mode);
 ///
-/// What is kept of a tick lies together, in the order of places:
+/// Each avatar owns a slot. The states of a slot:
 ///
-///   tick 16   [ avatar 0: pose in each mode ][ avatar 1 ] …   one plane for each of kMost ticks,
-///   tick 17   [ avatar 0 ][ avatar 1 ] …                      used again and again
-///   …
-///   standing  [ avatar 0 ][ avatar 1 ] …                      of who stands, for all ticks
+///                 Schedule                FinishStep
+///       +-------> scheduled --------------------------> timed <-------+
+///       |             ^                                 |   |         |
+///     empty           +------------- Schedule ----------+   | Store   | Store
+///       |             |                                     | (const) | (one step)
+///       |             | Schedule                            v         |
+///       +--------> constant <-------------------------------+         |
+///   Store (const)     |                                               |
+///                     +-----------------------------------------------+
 ///
-/// It is more than caches hold: each avatar has cache lines of its own, which are written whole and past the caches, and
-/// are asked for before they are read.
+/// Release (the avatar was removed) and Forget (SetModes, or the crowd became large) lead from
+/// empty, timed and constant to empty. Neither may happen while a slot is scheduled. An avatar with
+/// animation layers stores a pose in every step, also directly after empty.
+///
+///   empty       The slot contains no pose.
+///   scheduled   FinishStep will evaluate the poses of a movement. Until then, the movement must
+///               exist and must not change.
+///   timed       The slot contains `count` poses, for steps first_step, first_step + steps_apart...
+///               If the avatar's revision has changed, or no pose is left for the current step,
+///               Contains returns false and the slot must be scheduled or stored again.
+///   constant    The slot contains one pose for all steps, because the avatar stands still.
+///
+/// Backoff: if an avatar is interrupted before all its poses were used, the number of poses that
+/// the next FinishStep evaluates for it is halved (down to 1/8). It doubles again each time all
+/// poses were used.
+///
+/// Phases: FinishStep spreads the evaluation over several steps. Slots form groups of 8, and the
+/// groups take turns. A slot that is scheduled outside the turn of its group gets only as many
+/// poses as steps remain until that turn.
+///
+/// Memory layout: the poses of one step are stored together, in the order of slots, in one plane.
+/// The planes form a ring.
+///
+///   plane 0   [ slot 0: pose in each mode ][ slot 1 ] ...    steps 0, 16, 32, ...
+///   plane 1   [ slot 0 ][ slot 1 ] ...                       steps 1, 17, 33, ...
+///   ...
+///   constant  [ slot 0 ][ slot 1 ] ...                       constant poses
+///
+/// The planes are larger than the processor caches. Poses are therefore aligned to cache lines,
+/// written with non-temporal stores, and prefetched before they are read.
 class EncodedPoseCache {
  public:
-  static constexpr std::size_t kMost = 16;
-  /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would not fill the lanes.
-  [[nodiscard]] static constexpr std::size_t TurnsOf(std::size_t shown) {
-    return shown < 2048 || shown > kMany ? kMost / 2 : kMost;
+  static constexpr std::size_t kMaxTicksAhead = 16;
+  /// With more avatars than this, the ring has only kMaxTicksAhead / 2 planes, to save memory.
+  static constexpr std::size_t kLargeCrowd = 32'768;
+  /// Returns the number of phases for `avatar_count` avatars. A small crowd has fewer phases,
+  /// because otherwise the avatars of one phase would not fill the SIMD lanes.
+  [[nodiscard]] static constexpr std::size_t PhasesOf(std::size_t avatar_count) {
+    return avatar_count < 2048 || avatar_count > kLargeCrowd ? kMaxTicksAhead / 2 : kMaxTicksAhead;
   }
-  /// Of more avatars there are planes of kMost / 2 ticks only, for their memory.
-  static constexpr std::size_t kMany = 32'768;
 
-  /// Where an avatar's poses are kept. Given back when the avatar goes, before EncodedPoseCache does.
-  class Place {
+  /// Owns the poses of one avatar in the cache. The destructor releases them, so a slot must be
+  /// destroyed before the cache.
+  class Slot {
    public:
-    Place() = default;
-    ~Place() {
-      if (of_ != nullptr) of_->free_.push_back(index_);
+    Slot() = default;
+    ~Slot() {
+      if (cache_ != nullptr) cache_->Release(index_);
     }
-    Place(Place&& other) noexcept : of_(std::exchange(other.of_, nullptr)), index_(other.index_) {}
-    Place& operator=(Place&& other) noexcept {
-      std::swap(of_, other.of_);
+    Slot(Slot&& other) noexcept
+        : cache_(std::exchange(other.cache_, nullptr)), index_(other.index_) {}
+    Slot& operator=(Slot&& other) noexcept {
+      std::swap(cache_, other.cache_);
       std::swap(index_, other.index_);
       return *this;
     }
 
    private:
     friend class EncodedPoseCache;
-    EncodedPoseCache* of_ = nullptr;
+    EncodedPoseCache* cache_ = nullptr;  // null until the first Schedule or Store
     std::uint32_t index_ = 0;
   };
 
-  /// `codecs` may be null: of a world without compact poses only roots are kept, as without modes. They outlive it.
+  /// Borrows `codecs`. If it is null, or if SetModes sets no mode, the cache stores only the
+  /// positions of roots.
   EncodedPoseCache(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
   EncodedPoseCache(const EncodedPoseCache&) = delete;
   EncodedPoseCache& operator=(const EncodedPoseCache&) = delete;
 
-  /// In which modes poses are told, and every how many ticks. What was kept for others is nothing any more.
-  void SetModes(std::span<const protocol::PoseMode> compact_modes, int ticks_apart);
+  /// Sets the compact modes in which poses are encoded. Poses are needed every `steps_apart` steps.
+  /// If either changes, all slots become empty. Not between BeginStep and FinishStep.
+  void SetModes(std::span<const protocol::PoseMode> compact_modes, int steps_apart);
 
-  /// The step that poses are asked for from now on, how long steps are, and how many avatars are shown in this one: those
-  /// that have their poses among them.
-  void Begin(std::uint64_t step, double step_s, std::size_t shown);
+  /// Selects the step whose poses the following calls concern. `step_s` is the length of a step,
+  /// `avatar_count` the number of avatars whose poses are used in this step.
+  void BeginStep(std::uint64_t step, double step_s, std::size_t avatar_count);
 
-  /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is until then.
-  void Ask(Place& place, AvatarSimulation& avatar);
+  /// Makes sure that FinishStep provides the avatar's pose of this step. The avatar must not change
+  /// until then.
+  void Request(Slot& slot, AvatarSimulation& avatar);
 
-  // What Ask does, for who has no avatar.
-  /// Poses of this step are there already.
-  [[nodiscard]] bool Has(const Place& place, std::uint64_t revision) const {
-    if (place.of_ == nullptr) return false;
-    const Kept& kept = kept_[place.index_];
-    return kept.revision == static_cast<std::uint32_t>(revision) && kept.layout == layout_ &&
-           (kept.stays || PoseOf(kept) < kept.count);
+  // Request consists of the following three functions.
+
+  /// True if the slot contains the pose of this step.
+  [[nodiscard]] bool Contains(const Slot& slot, std::uint64_t revision) const {
+    if (slot.cache_ == nullptr) return false;
+    const SlotState& state = slots_[slot.index_];
+    if (state.revision != static_cast<std::uint32_t>(revision)) return false;
+    return state.kind == SlotState::kConstant ||
+           (state.kind == SlotState::kTimed && PoseIndex(state) < state.count);
   }
-  /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where it is until Finish.
-  void Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s);
-  /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at any more.
-  void Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays);
+  /// Schedules the evaluation of a movement that is at `time_s`, for this step and some of the
+  /// following. The movement must exist until FinishStep.
+  void Schedule(Slot& slot, std::uint64_t revision, const Movement& movement, double time_s);
+  /// Encodes a copy of `pose` and stores it for this step or, if `is_constant`, for all steps.
+  void Store(Slot& slot, std::uint64_t revision, ConstPoseSpan pose, bool is_constant);
 
-  /// Now they are there.
-  void Finish();
+  /// Evaluates and encodes everything that was scheduled.
+  void FinishStep();
 
   struct Encoded {
-    std::span<const std::byte> bytes;  ///< Empty: the pose can not be told
-    bool is_wide = false;              ///< As in kQuantised (kPoseWide)
+    std::span<const std::byte> bytes;  ///< Empty if the pose cannot be encoded in any format.
+    bool is_uncompressed = false;      ///< In the format of kQuantised (kPoseUncompressed).
   };
-  /// This step's, of who has it. `mode` is one of SetModes.
-  [[nodiscard]] Encoded Of(const Place& place, protocol::PoseMode mode) const;
-  /// As it is told; of a pose that can not be, beyond where any can.
-  [[nodiscard]] Vec3 RootOf(const Place& place) const;
+  /// Returns the pose of this step, which the slot must contain. `mode` must be one of SetModes.
+  [[nodiscard]] Encoded Find(const Slot& slot, protocol::PoseMode mode) const;
+  /// Returns the root position of this step with the precision of the encoded pose. If the pose
+  /// cannot be encoded, returns a position that is out of the range of all others.
+  [[nodiscard]] Vec3 FindRoot(const Slot& slot) const;
 
   [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }
 
  private:
   static constexpr std::size_t kLanes = SoaPose::kLanes;
-  static constexpr std::size_t kStanding = kMost;  // plane
-  // Places that lie together have their turns together.
-  static constexpr std::uint32_t kPlacesOfATurn = 8;
+  static constexpr std::size_t kConstantPlane = kMaxTicksAhead;
+  // Slots of one group, which are evaluated in the same phase.
+  static constexpr std::uint32_t kSlotsPerGroup = 8;
+  static constexpr unsigned kMaxBackoff = 3;
+  static constexpr std::uint32_t kNoSlot = ~0u;
   struct alignas(kCacheLineBytes) Line {
-    std::byte of[kCacheLineBytes];
+    std::byte bytes[kCacheLineBytes];
   };
   struct Mode {
     protocol::PoseMode mode;
     const protocol::CompactCodec* codec;
-    std::size_t at;      // in the bytes of a pose
-    std::size_t pieces;  // CompactCodec::Block::StreamBytes
+    std::size_t offset;  // in the bytes of a pose
+    std::size_t pieces;  // argument of CompactCodec::Block::StreamBytes
   };
-  // What every tick asks of the poses of one place.
-  struct Kept {
-    std::uint64_t first_step = 0;  // of the world
-    std::uint32_t revision = 0;      // they follow from, the low bits
-    std::uint16_t layout = 0;      // 0: nothing is kept
-    std::uint8_t count = 0;
-    std::uint8_t first_plane : 4 = 0;
-    std::uint8_t stays : 1 = 0;
-    std::uint8_t is_any_other : 1 = 0;  // than the mode's own bytes: see Others
-    std::uint8_t cuts : 2 = 0;  // kMost >> cuts are made at once: more whenever some were in vain
+  // State of one slot; read in every tick.
+  struct SlotState {
+    enum Kind : std::uint8_t { kEmpty, kScheduled, kTimed, kConstant };
+    std::uint64_t first_step = 0;  // of the poses, if timed
+    std::uint32_t revision = 0;    // low bits of the avatar's revision
+    std::uint8_t count = 0;        // poses: 0 if empty or scheduled, 1 if constant
+    std::uint8_t first_plane = 0;
+    Kind kind = kEmpty;
+    std::uint8_t has_overflow : 1 = 0;  // see Overflow
+    std::uint8_t backoff : 2 = 0;       // at most kMaxTicksAhead >> backoff poses are evaluated
   };
-  static_assert(sizeof(Kept) == 16 && kMost <= 16);
-  // Of a place some of whose poses are wide or can not be told.
-  struct Others {
-    std::array<std::uint8_t, kMost> flags{};  // [pose]: bit m: wide in mode m; m + 4: there is none
-    std::vector<std::byte> wide;              // by pose and mode
+  static_assert(sizeof(SlotState) == 16);
+  // Poses of a slot that a mode cannot represent. They are stored uncompressed, if possible.
+  struct Overflow {
+    // By pose. Bit m: uncompressed in mode m; bit m + kMaxModes: not encodable in mode m.
+    std::array<std::uint8_t, kMaxTicksAhead> flags{};
+    std::vector<std::byte> bytes;  // uncompressed poses, by pose and mode
   };
-  struct Wanted {
-    std::uint32_t place;
+  struct Scheduled {
+    std::uint32_t slot;
     int count;
-    SampleRun stretch;
-    bool is_its_turn;
+    SampleRun run;
+    bool is_in_phase;
   };
 
-  // Which of those kept is of this step; more than there are if none.
-  [[nodiscard]] std::size_t PoseOf(const Kept& kept) const {
-    if (kept.stays) return 0;
-    const std::uint64_t steps = step_ - kept.first_step;
-    const auto apart = static_cast<std::uint64_t>(ticks_apart_);
-    return apart == 1 ? steps : steps % apart == 0 ? steps / apart : kMost;
+  // Index of the pose of the current step. At least `count` if there is none.
+  [[nodiscard]] std::size_t PoseIndex(const SlotState& state) const {
+    if (state.kind == SlotState::kConstant) return 0;
+    const std::uint64_t steps = step_ - state.first_step;
+    const auto apart = static_cast<std::uint64_t>(steps_apart_);
+    return apart == 1 ? steps : steps % apart == 0 ? steps / apart : kMaxTicksAhead;
   }
-  [[nodiscard]] std::size_t PlaneOf(const Kept& kept, std::size_t pose) const {
-    return kept.stays ? kStanding : (kept.first_plane + pose) % ring_;
+  [[nodiscard]] std::size_t PlaneOf(const SlotState& state, std::size_t pose) const {
+    return state.kind == SlotState::kConstant ? kConstantPlane
+                                              : (state.first_plane + pose) % ring_size_;
   }
-  [[nodiscard]] const std::byte* BytesIn(std::size_t plane, std::size_t place) const {
-    return reinterpret_cast<const std::byte*>(planes_[plane].data()) + place * pose_bytes_;
+  [[nodiscard]] const std::byte* BytesIn(std::size_t plane, std::size_t slot) const {
+    return reinterpret_cast<const std::byte*>(planes_[plane].data()) + slot * pose_bytes_;
   }
-  [[nodiscard]] const std::byte* BytesOf(std::uint32_t place, std::size_t pose) const {
-    return BytesIn(PlaneOf(kept_[place], pose), place);
+  [[nodiscard]] const std::byte* BytesOf(std::uint32_t slot, std::size_t pose) const {
+    return BytesIn(PlaneOf(slots_[slot], pose), slot);
   }
-  [[nodiscard]] std::byte* BytesOf(std::uint32_t place, std::size_t pose) {
-    return const_cast<std::byte*>(std::as_const(*this).BytesOf(place, pose));
+  [[nodiscard]] std::byte* BytesOf(std::uint32_t slot, std::size_t pose) {
+    return const_cast<std::byte*>(std::as_const(*this).BytesOf(slot, pose));
   }
-  // Nothing of what was kept is any more.
+  // Makes all slots empty.
   void Forget();
-  // Room for all places in the planes that are used, no more.
-  void SizePlanes();
-  void MakePlace(Place& place);
-  [[nodiscard]] std::uint8_t CutsAfter(const Kept& kept, std::uint64_t revision) const;
-  void Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays);
-  void KeepTaken();
-  // Encodes poses side by side and keeps them; of kNobody nothing is kept.
-  static constexpr std::uint32_t kNobody = ~0u;
-  void Keep(const SoaPose& lanes, std::span<const std::uint32_t> places, std::size_t pose);
-  void KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place, std::size_t pose,
-                std::size_t mode);
-  [[nodiscard]] Encoded OtherOf(std::uint32_t place, std::size_t pose, std::size_t mode) const;
+  // Allocates room for all slots in the planes that are in use.
+  void ResizePlanes();
+  void Allocate(Slot& slot);
+  void Release(std::uint32_t slot);
+  [[nodiscard]] std::uint8_t NextBackoff(const SlotState& state, std::uint64_t revision) const;
+  // Transition to timed or constant.
+  void Fill(std::uint32_t slot, std::uint64_t revision, std::size_t count, SlotState::Kind kind);
+  void EncodeStored();
+  // Encodes the poses in `lanes` and writes them as pose number `pose` of `slots`. Lanes whose slot
+  // is kNoSlot are skipped.
+  void Encode(const SoaPose& lanes, std::span<const std::uint32_t> slots, std::size_t pose);
+  void EncodeOverflow(ConstPoseSpan pose, std::uint32_t slot, std::size_t pose_index,
+                      std::size_t mode);
+  [[nodiscard]] Encoded FindOverflow(std::uint32_t slot, std::size_t pose, std::size_t mode) const;
 
   std::shared_ptr<PoseScratch> scratch_;
   const protocol::CompactCodecs* codecs_;
   std::vector<Mode> modes_;
-  std::size_t pose_bytes_;  // of a pose in all modes: whole lines, or a root
-  std::size_t wide_bytes_;
-  int ticks_apart_ = 1;
-  std::size_t ring_ = kMost;  // planes that ticks take turns in
-  std::uint16_t layout_ = 1;
+  std::size_t pose_bytes_;  // in all modes: whole cache lines, or a root
+  std::size_t uncompressed_bytes_;
+  int steps_apart_ = 1;
+  std::size_t ring_size_ = kMaxTicksAhead;  // planes in use, except kConstantPlane
   std::uint64_t step_ = 0;
-  std::uint8_t plane_ = 0;  // of this step
+  std::uint8_t plane_ = 0;  // of the current step
   double step_s_ = 0.0;
-  std::size_t shown_ = 0;
+  std::size_t avatar_count_ = 0;
 
-  std::vector<Kept> kept_;                            // [place]
-  std::array<std::vector<Line>, kMost + 1> planes_;   // [place]: pose_bytes_ each
-  std::unordered_map<std::uint32_t, Others> others_;  // by place
-  std::vector<std::uint32_t> free_;                   // places of nobody
+  std::vector<SlotState> slots_;
+  std::array<std::vector<Line>, kMaxTicksAhead + 1> planes_;  // pose_bytes_ per slot
+  std::unordered_map<std::uint32_t, Overflow> overflow_;      // by slot
+  std::vector<std::uint32_t> free_;                           // slots without an avatar
 
-  std::vector<Wanted> wanted_;
-  std::array<std::uint32_t, kLanes> taken_for_{};
-  std::size_t taken_count_ = 0;
+  std::vector<Scheduled> scheduled_;
+  std::array<std::uint32_t, kLanes> stored_slots_{};  // by lane of PoseScratch::stored
+  std::size_t stored_count_ = 0;
 };
 
 }  // namespace stridewire::server

@@ -3,29 +3,31 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <iterator>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "world/world.h"
 
 namespace stridewire::server {
 
-/// Collects avatar numbers of many lists, each once. Most are small and lie close together.
+/// Union of many lists of avatar ids. Optimized for small, dense ids.
 class IdSet {
  public:
-  void Add(std::span<const AvatarId> numbers) {
-    for (const AvatarId number : numbers) {
-      if (number >= kSmall) {
-        large_.push_back(number);
+  void Add(std::span<const AvatarId> ids) {
+    for (const AvatarId id : ids) {
+      if (id >= kSmallIds) {
+        large_.push_back(id);
         continue;
       }
-      const std::size_t word = number / 64;
+      const std::size_t word = id / 64;
       if (word >= bits_.size()) bits_.resize(word + 1);
-      bits_[word] |= std::uint64_t{1} << number % 64;
+      bits_[word] |= std::uint64_t{1} << id % 64;
     }
   }
 
-  /// All of them, growing; then there are none.
+  /// Returns all ids in ascending order and clears the set.
   [[nodiscard]] std::vector<AvatarId> Take() {
     std::vector<AvatarId> all;
     for (std::size_t word = 0; word < bits_.size(); ++word) {
@@ -42,7 +44,7 @@ class IdSet {
   }
 
  private:
-  static constexpr AvatarId kSmall = 1u << 20;  // 128 KB of bits
+  static constexpr AvatarId kSmallIds = 1u << 20;  // at most 128 KB of bits
   std::vector<std::uint64_t> bits_;
   std::vector<AvatarId> large_;
 };

@@ -7,7 +7,8 @@
 namespace stridewire::server {
 namespace {
 
-protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar, const AvatarEvent& started,
+protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar,
+                                            const AvatarEvent& started,
                                             std::size_t max_site_bytes) {
   const protocol::Event event = ToWire(started, avatar.library());
   protocol::CurrentMovement current{.request_id = event.request_id,
@@ -28,14 +29,14 @@ protocol::CurrentMovement CurrentMovementOf(const AvatarSimulation& avatar, cons
   current.weights.assign(movement->weights.begin(),
                          movement->weights.begin() + static_cast<std::ptrdiff_t>(weight_count));
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    const FootTrajectory& track = movement->feet.foot(foot);
-    if (!movement->feet.is_active || track.land_s == FootTrajectory::kNever ||
-        avatar.movement_time_s() >= track.land_s) {
+    const FootTrajectory& trajectory = movement->feet.foot(foot);
+    if (!movement->feet.is_active || trajectory.land_s == FootTrajectory::kNever ||
+        avatar.movement_time_s() >= trajectory.land_s) {
       continue;
     }
     current.landings.push_back(
         {foot == Foot::kLeft ? protocol::FootSide::kLeft : protocol::FootSide::kRight,
-         track.to.position_m, track.to.heading_rad});
+         trajectory.to.position_m, trajectory.to.heading_rad});
   }
   const MotionGroup& group = avatar.library().group(movement->group);
   const std::size_t parameter_count = std::min(group.parameters.size(), protocol::kMaxParameters);
@@ -60,7 +61,7 @@ protocol::AvatarState Inspect(const AvatarSimulation& avatar, std::size_t max_si
   if (const AvatarEvent* started = avatar.started()) {
     state.movement = CurrentMovementOf(avatar, *started, max_site_bytes);
   }
-  state.is_planting_off = !avatar.foot_planting();
+  state.planting_enabled = avatar.foot_planting();
   for (const LayerStack::Playing& playing : avatar.layers().playing()) {
     state.layers.push_back(
         {.layer =

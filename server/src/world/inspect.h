@@ -1,14 +1,17 @@
 #pragma once
 
+#include <cstddef>
+
 #include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire::server {
 
-/// What an avatar is doing, as AvatarState tells it: base frame, movement under way, queue. Without
-/// nonce, world, avatar number and the times, which the runtime's avatar does not know;
-/// `movement->started_s` is avatar time. Examples' sites are left out where they would take more
-/// than `max_site_bytes`.
-[[nodiscard]] protocol::AvatarState Inspect(const AvatarSimulation& avatar, std::size_t max_site_bytes);
+/// Describes an avatar for InspectAvatar: its base frame, its movement and its queue. The caller
+/// fills in nonce, world, avatar id, tick and times, and adds the avatar's offset to
+/// `movement->started_s`, which is in avatar time. Parameters of examples are omitted if they take
+/// more than `max_site_bytes`.
+[[nodiscard]] protocol::AvatarState Inspect(const AvatarSimulation& avatar,
+                                            std::size_t max_site_bytes);
 
 }  // namespace stridewire::server

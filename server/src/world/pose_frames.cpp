@@ -20,13 +20,13 @@ std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
     return SharedFrame(std::move(frame));
   };
   std::vector<std::span<const std::uint32_t>> parts;
-  std::size_t fitting = composer.Fitting(rows, picked);
+  std::size_t fitting = composer.CountThatFit(rows, picked);
   if (fitting == picked.size()) return {compose(picked, 0, 1)};
   while (!picked.empty() && parts.size() < protocol::kMaxBatchParts) {
-    STRIDEWIRE_CHECK(fitting > 0);  // the smallest frame limit holds several of kMaxJoints
+    STRIDEWIRE_CHECK(fitting > 0);  // any frame limit has room for poses of kMaxJoints
     parts.push_back(picked.first(fitting));
     picked = picked.subspan(fitting);
-    fitting = composer.Fitting(rows, picked);
+    fitting = composer.CountThatFit(rows, picked);
   }
   metrics.pose_errors.Add(picked.size());
   std::vector<SharedFrame> frames;
@@ -38,23 +38,24 @@ std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
 
 protocol::PoseRows& RowsPool::Take() {
   taken_ = nullptr;
-  for (std::shared_ptr<Slot>& slot : kept_) {
-    if (slot == nullptr) slot = std::make_shared<Slot>();
-    if (!slot->is_shared.load(std::memory_order_acquire)) {
-      taken_ = slot;
+  for (std::shared_ptr<Item>& item : items_) {
+    if (item == nullptr) item = std::make_shared<Item>();
+    if (!item->is_shared.load(std::memory_order_acquire)) {
+      taken_ = item;
       break;
     }
   }
-  if (taken_ == nullptr) taken_ = std::make_shared<Slot>();
+  if (taken_ == nullptr) taken_ = std::make_shared<Item>();
   return taken_->rows;
 }
 
 std::shared_ptr<const protocol::PoseRows> RowsPool::Share() {
   STRIDEWIRE_CHECK(taken_ != nullptr);
+  STRIDEWIRE_CHECK(!taken_->is_shared.load(std::memory_order_relaxed));
   taken_->is_shared.store(true, std::memory_order_relaxed);
   const protocol::PoseRows* rows = &taken_->rows;
-  return {rows, [slot = std::exchange(taken_, nullptr)](const protocol::PoseRows*) {
-            slot->is_shared.store(false, std::memory_order_release);
+  return {rows, [item = std::exchange(taken_, nullptr)](const protocol::PoseRows*) {
+            item->is_shared.store(false, std::memory_order_release);
           }};
 }
 

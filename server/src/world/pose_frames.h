@@ -7,36 +7,40 @@
 #include <span>
 #include <vector>
 
+#include "base/metrics.h"
 #include "net/shared_frame.h"
-#include "ops/metrics.h"
 #include "stridewire/protocol/pose_rows.h"
 
 namespace stridewire::server {
 
-/// Frames with the picked rows (indices, growing), in as many parts as it takes; one if there are none. Poses that
-/// fit in no part, which needs a frame limit far below the default, are counted. `is_partial` as in PoseBatchInfo.
+/// Composes a pose batch of the rows `picked`, which are ascending indices. Returns one frame, or
+/// several if the batch exceeds the frame limit; an empty batch is one frame. With a frame limit
+/// far below the default, some poses may not fit into the maximum number of frames. They are
+/// omitted and counted in `metrics`. `is_partial`: see protocol::PoseBatchInfo.
 [[nodiscard]] std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
                                                      const protocol::PoseRows& rows,
                                                      std::span<const std::uint32_t> picked,
                                                      bool is_partial, ThreadMetrics& metrics);
 
-/// Rows that other threads read, filled again when they have done so. One thread takes and shares.
+/// Reuses the memory of PoseRows that other threads read. One thread takes and shares rows.
 class RowsPool {
  public:
-  /// Rows to be filled; they are its caller's until the next call.
+  /// Returns rows to fill. They belong to the caller until the next call.
   [[nodiscard]] protocol::PoseRows& Take();
-  /// The rows last taken, from now on as they are.
+  /// Returns the rows of the last Take as read-only. When the last reader has released them, Take
+  /// reuses them.
   [[nodiscard]] std::shared_ptr<const protocol::PoseRows> Share();
 
  private:
-  /// Ticks whose rows are read at the same time by shards that keep up. Beyond, they are made anew.
-  static constexpr std::size_t kKept = 3;
-  struct Slot {
+  /// Number of ticks whose rows can be in use at the same time. If shards fall behind further, Take
+  /// allocates.
+  static constexpr std::size_t kPooled = 3;
+  struct Item {
     protocol::PoseRows rows;
     std::atomic<bool> is_shared{false};
   };
-  std::array<std::shared_ptr<Slot>, kKept> kept_;
-  std::shared_ptr<Slot> taken_;
+  std::array<std::shared_ptr<Item>, kPooled> items_;
+  std::shared_ptr<Item> taken_;
 };
 
 }  // namespace stridewire::server

@@ -7,16 +7,17 @@
 
 namespace stridewire::server {
 
-std::shared_ptr<const PoseCodes> MakePoseCodes(const MotionLibrary& library) {
+std::shared_ptr<const PoseQuantizations> MakePoseQuantizations(const MotionLibrary& library) {
   std::vector<RotationQuantization> joints = ChoosePoseQuantization(library).joints;
   std::vector<std::int16_t> parents;
   for (const Joint& joint : library.skeleton().joints) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));
   }
-  std::vector<std::uint16_t> fewer = ChooseFewerJoints(library);
-  auto codecs = protocol::CompactCodecs::Make(joints, parents, fewer);
-  STRIDEWIRE_CHECK(codecs.has_value());  // what is chosen is within what can be told
-  return std::make_shared<const PoseCodes>(std::move(joints), std::move(fewer), *std::move(codecs));
+  std::vector<std::uint16_t> reduced = ChooseFewerJoints(library);
+  auto codecs = protocol::CompactCodecs::Make(joints, parents, reduced);
+  STRIDEWIRE_CHECK(codecs.has_value());  // the chosen quantizations are always valid
+  return std::make_shared<const PoseQuantizations>(std::move(joints), std::move(reduced),
+                                                   *std::move(codecs));
 }
 
 }  // namespace stridewire::server

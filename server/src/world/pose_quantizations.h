@@ -10,14 +10,15 @@
 
 namespace stridewire::server {
 
-/// How the compact poses of a library's worlds are told.
-struct PoseCodes {
+/// The compact pose formats of a library: how each joint is quantized, and the codecs for it.
+struct PoseQuantizations {
   std::vector<RotationQuantization> joints;
-  std::vector<std::uint16_t> fewer_joints;  ///< Told at protocol::PoseDetail::kFewer.
+  std::vector<std::uint16_t> reduced_joints;  ///< Joints of protocol::PoseDetail::kReduced.
   protocol::CompactCodecs codecs;
 };
 
-/// Milliseconds: once a library.
-[[nodiscard]] std::shared_ptr<const PoseCodes> MakePoseCodes(const MotionLibrary& library);
+/// Chooses the formats for a library. Takes some milliseconds; called once per library.
+[[nodiscard]] std::shared_ptr<const PoseQuantizations> MakePoseQuantizations(
+    const MotionLibrary& library);
 
 }  // namespace stridewire::server

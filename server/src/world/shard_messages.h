@@ -1,22 +1,36 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
+#include "base/refusal.h"
 #include "net/shared_frame.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/protocol/pose_rows.h"
 #include "world/spatial_grid.h"
 #include "world/world.h"
 
-/// What shards send each other. Values only; the receiver owns what it gets.
+/// All messages between the threads of the server: from shard to shard (ShardMessage), and between
+/// the shards and the main thread (ServerMessage, ShardMessage). They are values; the receiver owns
+/// what it gets. Shard::Post and ServerThread::Post are the only ways to send them.
+///
+///   session's shard                      avatars' shard               main thread
+///     | WorldCommand, InspectRequest,          |                           |
+///     | StatesRequest, Interest -------------> |                           |
+///     | <--- ShardOutbox, once per tick ------ |                           |
+///     |                                        |                           |
+///     | JoinRequest, LeaveNotice, TerrainChange, SessionEnded -----------> |
+///     | <----- JoinResult, TerrainRefusal, WorldCommand (TerrainPart) ---- |
 namespace stridewire::server {
 
-/// Items of a command with their position in it.
+/// The part of a command that concerns the avatars of one shard. `index` is the position of an item
+/// in the client's command.
 struct SpawnPart {
   struct Item {
     std::uint32_t index = 0;
@@ -30,7 +44,7 @@ struct RequestPart {
     protocol::RequestItem request;
   };
   std::vector<Item> items;
-  std::uint32_t over_ticks = 1;  ///< What begins from a stand is spread over, by StartTickOf.
+  std::uint32_t over_ticks = 1;  ///< Number of ticks over which starts are spread (StartTickOf).
 };
 struct LayerPart {
   struct Item {
@@ -53,120 +67,113 @@ struct PlantingPart {
   std::vector<AvatarRef> avatars;
   bool enabled = true;
 };
-/// Removes what a session spawned: it has ended, or left the world.
+/// Removes the avatars that a session spawned, because it has ended or has left the world.
 struct ReleasePart {};
 
-/// Another ground for all avatars, on all shards from the same tick on.
+/// Sets the terrain of all avatars. All shards apply it at the same tick.
 struct TerrainPart {
-  std::shared_ptr<const WorldTerrain> ground;
+  std::shared_ptr<const WorldTerrain> terrain;
   std::uint64_t tick = 0;
 };
 
-/// What a shard has to do for a session at its next tick.
+/// A command that a shard executes at its next tick.
 struct WorldCommand {
   std::shared_ptr<World> world;
-  int from_shard = 0;  ///< The session's shard.
+  int from_shard = 0;  ///< The shard of the session.
   SessionId session = 0;
-  protocol::Seq seq = 0;  ///< 0: no answer is wanted.
+  protocol::Seq seq = 0;  ///< 0: the session does not expect a result.
   std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, TerrainPart, LayerPart,
                PlantingPart>
       part;
 };
 
-/// A SetTerrain that is on its way to be made a ground of.
-struct TerrainChange {
-  std::shared_ptr<World> world;
-  int from_shard = 0;  ///< The session's shard.
-  SessionId session = 0;
-  protocol::Seq seq = 0;
-  std::optional<protocol::TerrainInfo> terrain;
-};
-
-/// What came of it on one shard.
+/// The result of a WorldCommand on one shard.
 struct CommandResult {
   SessionId session = 0;
   protocol::Seq seq = 0;
   std::uint32_t accepted = 0;
-  std::vector<protocol::ReplyItem> items;  ///< As in Reply, of this shard's items.
+  std::vector<protocol::ReplyItem> items;  ///< As in Reply, for the items of this shard.
 };
 
-/// A session's question what an avatar is doing, answered after the next tick.
-struct Inspection {
+/// Asks for the state of one avatar after the next tick (protocol message InspectAvatar).
+struct InspectRequest {
   std::shared_ptr<World> world;
-  int from_shard = 0;  ///< The session's shard.
+  int from_shard = 0;  ///< The shard of the session.
   SessionId session = 0;
   std::uint64_t nonce = 0;
   AvatarId avatar = 0;
 };
-struct InspectionResult {
+struct InspectResult {
   SessionId session = 0;
   protocol::AvatarState state;
 };
 
-/// A session's question for the states of avatars it is to be told the movements of: some, from a number on, after the
-/// next tick.
-struct StatesQuestion {
+/// Asks for the states of avatars after the next tick, for a client that will receive their
+/// movements. A shard answers with as many states as fit; the session then asks for the rest.
+struct StatesRequest {
   std::shared_ptr<World> world;
-  int from_shard = 0;  ///< The session's shard.
+  int from_shard = 0;  ///< The shard of the session.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarId first = 0;
-  std::size_t enough_bytes = 0;                            ///< Of states; the last may go beyond.
-  std::shared_ptr<const std::vector<AvatarId>> named;  ///< Whose, growing; null: all.
+  AvatarId first = 0;            ///< Smallest id to send.
+  std::size_t enough_bytes = 0;  ///< The shard stops after the state that exceeds this size.
+  std::shared_ptr<const std::vector<AvatarId>> avatars;  ///< Ascending ids; null: all avatars.
 };
-struct StatesAnswer {
+struct StatesResult {
   WorldId world = 0;
-  int from_shard = 0;  ///< The avatars'.
+  int from_shard = 0;  ///< The shard of the avatars.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarId next = 0;  ///< Where to go on; 0: these were all.
-  SharedFrame frame;      ///< Null: none.
+  AvatarId next = 0;  ///< `first` of the next request; 0: no avatars are left.
+  SharedFrame frame;  ///< Null if there are no states.
 };
 
-/// Modes in which poses are sent, in the order of their numbers.
+/// The modes in which poses are sent, in the order of their values.
 inline constexpr std::array kSentModes{
     protocol::PoseMode::kFull, protocol::PoseMode::kQuantised, protocol::PoseMode::kCompact,
-    protocol::PoseMode::kCompactFewer, protocol::PoseMode::kCompactRoot};
-/// A mode's place among them.
+    protocol::PoseMode::kCompactReduced, protocol::PoseMode::kCompactRoot};
+/// Returns the index of `mode` in kSentModes.
 [[nodiscard]] constexpr std::size_t ModeIndex(protocol::PoseMode mode) {
   return static_cast<std::size_t>(mode) - (mode > protocol::PoseMode::kMovement ? 1 : 0);
 }
 
-/// A circle or ring on the ground whose avatars are of interest.
+/// A disc or ring on the ground. The avatars inside are of interest in one mode.
 struct RegionFilter {
   double x = 0.0;
   double z = 0.0;
-  double reach_m = 0.0;
-  double beyond_m = 0.0;  ///< Nearer than this or just as far they are not, unless it is 0.
-  /// Others of its session's are of other modes. Its deliveries come even with nobody's pose: who was in one of those may
-  /// have left, which only places tell.
+  double outer_m = 0.0;
+  double inner_m = 0.0;  ///< Avatars at this distance or nearer are excluded, unless it is 0.
+  /// Other rings of the same region use other modes. Deliveries are then needed even if no avatar
+  /// is in this ring, because the positions tell which avatars have left the region.
   bool is_one_of_several = false;
   bool operator==(const RegionFilter&) const = default;
 };
 
-/// What the sessions of a shard want of the poses of a world in one mode.
+/// How often poses are sent, in ticks: in every tick that the interval divides. 0: never.
+struct SendInterval {
+  std::uint16_t all = 0;     ///< For sessions that observe all avatars.
+  std::uint16_t subset = 0;  ///< For sessions that observe selected avatars or a region.
+  bool operator==(const SendInterval&) const = default;
+};
+
+/// The poses of a world that the sessions of one shard need in one mode.
 struct PoseInterest {
-  /// Of the ticks wanted those that this divides, 0: none.
-  struct Every {
-    std::uint16_t whole = 0;  ///< By sessions that want all avatars.
-    std::uint16_t some = 0;   ///< By sessions that name theirs or have a region.
-    bool operator==(const Every&) const = default;
-  };
-  Every every;
-  /// Avatars named by any session, growing; null: none. Of who wants all there are none in it.
-  std::shared_ptr<const std::vector<AvatarId>> named;
-  /// Regions that any session observes; null: none.
+  SendInterval interval;
+  /// Ascending ids of the avatars that sessions have selected; null: none. Sessions that observe
+  /// all avatars do not contribute.
+  std::shared_ptr<const std::vector<AvatarId>> avatars;
+  /// Regions that sessions observe; null: none.
   std::shared_ptr<const std::vector<RegionFilter>> regions;
 };
 
-/// What the sessions of a shard want of a world; replaces what that shard said before.
+/// What the sessions of one shard need from a world. Replaces the previous Interest of this shard.
 struct Interest {
   std::shared_ptr<World> world;
-  int shard = 0;  ///< Whose.
+  int shard = 0;  ///< The shard of the sessions.
   std::array<PoseInterest, kSentModes.size()> poses;
   bool events = false;
   bool movements = false;
-  bool movement_places = false;  ///< Some of them are about regions.
+  bool movement_regions = false;  ///< Some sessions observe the movements in a region.
 };
 
 /// Poses of one world, shard, mode and tick.
@@ -176,22 +183,24 @@ struct PoseDelivery {
   int from_shard = 0;
   std::uint64_t tick = 0;
   std::uint32_t avatar_count = 0;  ///< In `parts`.
-  std::vector<SharedFrame> parts;  ///< A whole batch; none if nobody wants one.
-  /// What batches with some of them are made of: at least those that are named or in a region.
+  std::vector<SharedFrame> parts;  ///< A batch of all avatars; empty if no session observes all.
+  /// The encoded poses from which sessions compose smaller batches. Contains at least the poses of
+  /// selected avatars and regions.
   std::shared_ptr<const protocol::PoseRows> rows;
-  /// Where all of them are; null: nobody has a region.
-  std::shared_ptr<const SpatialGrid> places;
+  /// Positions of all avatars; null if no session observes a region.
+  std::shared_ptr<const SpatialGrid> grid;
 };
 
-/// What the avatars of one world and shard began in a tick, step by step.
+/// Movements that started in one world, shard and tick. A late tick contains several steps.
 struct MovementDelivery {
   WorldId world = 0;
   int from_shard = 0;
   std::uint64_t tick = 0;
   std::shared_ptr<const std::vector<protocol::Movements>> steps;
-  /// Whose, and where they are after it; null: nobody has a region.
+  /// The avatars of the shard and their positions after the tick; null if no session observes a
+  /// region.
   protocol::PoseRows::Avatars avatars;
-  std::shared_ptr<const SpatialGrid> places;
+  std::shared_ptr<const SpatialGrid> grid;
 };
 
 /// Events of one world, shard and tick.
@@ -201,19 +210,66 @@ struct EventDelivery {
   std::shared_ptr<const std::vector<protocol::Event>> events;
 };
 
-/// All that one shard has for another after a tick; one post.
+/// Everything that one shard sends to another after a tick.
 struct ShardOutbox {
   std::vector<CommandResult> results;
   std::vector<EventDelivery> events;
   std::vector<PoseDelivery> poses;
-  std::vector<InspectionResult> inspections;
+  std::vector<InspectResult> inspections;
   std::vector<MovementDelivery> movements;
-  std::vector<StatesAnswer> states;  ///< After the movements of the same tick.
-
-  [[nodiscard]] bool empty() const {
-    return results.empty() && events.empty() && poses.empty() && inspections.empty() &&
-           movements.empty() && states.empty();
-  }
+  std::vector<StatesResult> states;  ///< Delivered after the movements of the same tick.
 };
+
+/// Asks the main thread for a world, which it creates if necessary.
+struct JoinRequest {
+  int from_shard = 0;
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  std::string name;
+};
+struct JoinResult {
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  Outcome<std::shared_ptr<World>> world;
+};
+/// A session has left a world.
+struct LeaveNotice {
+  WorldId world = 0;
+};
+
+/// Asks the main thread to validate and encode a terrain. On success, it sends a TerrainPart to all
+/// shards; otherwise it sends a TerrainRefusal to `from_shard`.
+struct TerrainChange {
+  std::shared_ptr<World> world;
+  int from_shard = 0;
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  std::optional<protocol::TerrainInfo> terrain;  ///< nullopt: flat ground.
+};
+struct TerrainRefusal {
+  SessionId session = 0;
+  protocol::Seq seq = 0;
+  Refusal refusal;
+};
+
+/// Identifies a session and its client. Fixed for the whole life of the session.
+struct SessionIdentity {
+  SessionId id = 0;
+  std::vector<std::byte> token;  ///< Secret with which a client resumes the session.
+  std::string address;
+};
+struct SessionEnded {
+  SessionId session = 0;
+};
+/// A session exists again that had ended while its client was reconnecting.
+struct SessionRestored {
+  int shard = 0;
+  SessionIdentity identity;
+};
+
+using ShardMessage = std::variant<WorldCommand, InspectRequest, StatesRequest, Interest,
+                                  ShardOutbox, JoinResult, TerrainRefusal>;
+using ServerMessage =
+    std::variant<JoinRequest, LeaveNotice, TerrainChange, SessionEnded, SessionRestored>;
 
 }  // namespace stridewire::server

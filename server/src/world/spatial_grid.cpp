@@ -4,9 +4,12 @@
 #include <cmath>
 #include <tuple>
 
+#include "base/check.h"
+
 namespace stridewire::server {
 
 void SpatialGrid::Begin(double cell_m, std::size_t count) {
+  STRIDEWIRE_CHECK(cell_m > 0.0);
   cells_per_m_ = 1.0 / cell_m;
   entries_.clear();
   entries_.reserve(count);
@@ -23,10 +26,11 @@ void SpatialGrid::Sort() {
 }
 
 std::int64_t SpatialGrid::CellOf(double metres) const {
-  // Regions may lie anywhere, avatars within some hundred kilometres.
-  constexpr double kFarthest = 1e9;
+  // The centre of a region can be anywhere. The limit keeps the conversion in range; avatars are
+  // within some hundred kilometres of the origin.
+  constexpr double kMaxCell = 1e9;
   return static_cast<std::int64_t>(
-      std::floor(std::clamp(metres * cells_per_m_, -kFarthest, kFarthest)));
+      std::floor(std::clamp(metres * cells_per_m_, -kMaxCell, kMaxCell)));
 }
 
 std::size_t SpatialGrid::LowerBound(std::int64_t column, std::int64_t cell) const {

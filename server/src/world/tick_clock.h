@@ -6,8 +6,8 @@
 
 namespace stridewire::server {
 
-/// Tick numbers as the steady clock has them: tick n is due n / tick_hz seconds after the epoch,
-/// which all shards share. A value; any thread.
+/// Converts between tick numbers and the steady clock. Tick n is due n / tick_hz seconds after the
+/// epoch, which all shards share. A value type; it can be copied and used by any thread.
 class TickClock {
  public:
   using Clock = std::chrono::steady_clock;
@@ -15,14 +15,14 @@ class TickClock {
   TickClock(Clock::time_point epoch, double tick_hz) : epoch_(epoch), tick_hz_(tick_hz) {}
 
   [[nodiscard]] Clock::time_point Due(std::uint64_t tick) const {
-    // Whole seconds apart, so that years of ticks lose nothing to rounding.
+    // Whole seconds are added separately, so that the rounding error stays small after years.
     const double seconds = static_cast<double>(tick) / tick_hz_;
     const double whole = std::floor(seconds);
     return epoch_ + std::chrono::seconds(static_cast<std::int64_t>(whole)) +
            std::chrono::nanoseconds(static_cast<std::int64_t>(std::ceil((seconds - whole) * 1e9)));
   }
 
-  /// The last tick that is due at `now`.
+  /// Returns the last tick that is due at `now`.
   [[nodiscard]] std::uint64_t TickAt(Clock::time_point now) const {
     if (now <= epoch_) return 0;
     auto tick = static_cast<std::uint64_t>(ServerTime(now) * tick_hz_);
@@ -31,7 +31,7 @@ class TickClock {
     return tick;
   }
 
-  /// Seconds since the epoch: the server's clock on the wire.
+  /// Returns the seconds since the epoch. Clients receive this value as the server's time.
   [[nodiscard]] double ServerTime(Clock::time_point now) const {
     return std::chrono::duration<double>(now - epoch_).count();
   }

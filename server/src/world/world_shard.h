@@ -5,99 +5,110 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <span>
 #include <vector>
 
-#include "ops/metrics.h"
+#include "base/metrics.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "runtime/avatar/avatar_simulation.h"
-#include "world/shard_messages.h"
-#include "world/pose_frames.h"
 #include "world/encoded_pose_cache.h"
+#include "world/pose_frames.h"
+#include "world/shard_messages.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
+#include "world/world_interest.h"
 
 namespace stridewire::server {
 
-/// Poses further from the origin than this cannot be sent quantised; spawning refuses them.
+/// Spawning rejects positions farther than this from the origin along any axis, in metres.
+/// Quantised poses cannot represent positions that are much farther away.
 inline constexpr double kMaxSpawnM = 100'000.0;
 inline constexpr double kMaxSpawnHeadingRad = 10'000.0;
 
-/// The avatars of one world that live on one shard. Knows no socket and no thread: time is an
-/// argument, and what it makes is taken from it.
+/// Parameters of a WorldShard. Borrows `budget` and `metrics`.
+struct WorldShardDef {
+  std::shared_ptr<World> world;
+  int shard = 0;
+  int shard_count = 1;
+  int max_queue = 256;                                   ///< Waiting requests per avatar.
+  std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;  ///< Payload of a Movements message.
+  const TickClock& clock;                                ///< Copied.
+  AvatarBudget& budget;
+  ThreadMetrics& metrics;
+  /// Scratch memory of the world's library and of this thread. If null, the WorldShard allocates
+  /// its own.
+  std::shared_ptr<PoseScratch> scratch;
+};
+
+/// The avatars of one world on one shard. It has no sockets and no threads; time is an argument,
+/// and the caller fetches results. Not thread-safe.
 ///
-/// An avatar takes about 8 KB and its queue (docs/SERVER.md, "Memory").
+/// An avatar takes about 8 KB plus its queue (docs/SERVER.md, "Memory").
 class WorldShard {
  public:
-  /// Borrows budget and metrics. `scratch` is of the world's library and this thread's; null: one of its own.
-  WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
-             const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
-             std::size_t max_bulk_bytes = protocol::kMaxBulkBytes,
-             std::shared_ptr<PoseScratch> scratch = nullptr);
+  explicit WorldShard(WorldShardDef def);
   ~WorldShard();
   WorldShard(const WorldShard&) = delete;
   WorldShard& operator=(const WorldShard&) = delete;
 
-  /// Does a command at the beginning of `tick`.
+  /// Executes a command at the beginning of `tick`.
   [[nodiscard]] CommandResult Execute(const WorldCommand& command, std::uint64_t tick);
 
-  /// Goes on to `tick` in `steps` steps of one tick each. An avatar's time is counted in steps, so
-  /// its poses do not depend on when ticks came.
+  /// Advances all avatars by `steps` steps of one tick each; the last step ends at `tick`. The time
+  /// of an avatar is counted in steps, so its poses do not depend on delayed ticks.
   void Advance(std::uint64_t tick, int steps);
 
   void SetInterest(const Interest& interest);
-  [[nodiscard]] bool WantsEvents(int shard) const;
-  [[nodiscard]] bool WantsMovements(int shard) const;
-  /// Whether a shard wants whole batches of `tick`, and whether it wants poses of avatars it names.
-  struct Wish {
-    bool whole = false;
-    bool some = false;
-  };
-  [[nodiscard]] Wish WishOf(int shard, protocol::PoseMode mode, std::uint64_t tick) const;
+  [[nodiscard]] const WorldInterest& interest() const { return interest_; }
 
-  /// Events since this was last called, null if there were none.
+  /// Returns the events since the previous call, or null if there were none.
   [[nodiscard]] std::shared_ptr<const std::vector<protocol::Event>> TakeEvents();
 
-  /// The poses of `tick`: of all avatars and with a whole batch, or of those that are named. False when
-  /// nobody would miss it: no poses, and none in the delivery before.
-  [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
+  /// Encodes the poses of `tick` in `mode`: of all avatars, with a complete batch, if `all` is
+  /// true; otherwise of selected avatars and regions. Returns false if nobody needs the delivery,
+  /// because it has no poses and the previous one had none either.
+  [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool all,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
-  /// What avatars began since this was last called, up to `tick`. False: nobody would miss it.
+  /// Moves the movements that started since the previous call to `delivery`. Returns false if there
+  /// is nothing to deliver.
   [[nodiscard]] bool TakeMovements(std::uint64_t tick, MovementDelivery& delivery);
 
-  /// The states of avatars after the last tick, of one at least and until there are `enough_bytes`.
-  [[nodiscard]] StatesAnswer States(const StatesQuestion& question,
-                                    protocol::Encoder& encoder) const;
+  /// Encodes the states of avatars after the last tick: at least one, and then until
+  /// `request.enough_bytes` is exceeded.
+  [[nodiscard]] StatesResult States(const StatesRequest& request, protocol::Encoder& encoder) const;
 
-  /// What an avatar is doing after `tick`, the answer to InspectAvatar.
+  /// Describes an avatar after `tick`, for InspectAvatar. Parameters of examples are omitted if
+  /// they take more than `max_site_bytes`.
   [[nodiscard]] protocol::AvatarState Inspect(AvatarId avatar, std::uint64_t tick,
                                               std::size_t max_site_bytes) const;
 
   [[nodiscard]] std::size_t avatar_count() const { return avatars_.size(); }
   [[nodiscard]] const World& world() const { return *world_; }
-  /// The ground its avatars are on, null: flat at 0.
+  /// Returns the terrain that the avatars currently use. Null: flat ground at height 0.
   [[nodiscard]] std::shared_ptr<const Terrain> terrain() const {
-    return ground_ == nullptr ? nullptr : ground_->terrain;
+    return terrain_ == nullptr ? nullptr : terrain_->terrain;
   }
-  [[nodiscard]] bool HasInterest() const;
 
  private:
   struct Entry {
     AvatarSimulation avatar;
     SessionId owner = 0;
     std::uint64_t spawn_tick = 0;
-    EncodedPoseCache::Place ahead;
+    EncodedPoseCache::Slot poses;
   };
-  // What Encode reads of who is quiet.
+  // Prefetches the members that Encode reads of an avatar without events.
   static void Prefetch(const Entry& entry) {
     entry.avatar.PrefetchTickState();
-    PrefetchBytes(&entry.spawn_tick, sizeof(entry.spawn_tick) + sizeof(entry.ahead));
+    PrefetchBytes(&entry.spawn_tick, sizeof(entry.spawn_tick) + sizeof(entry.poses));
   }
-  struct InOrder {
-    AvatarId number;
+  struct OrderedAvatar {
+    AvatarId id;
     Entry* entry;
   };
+
+  // world_shard.cpp: commands and ticks.
   void Spawn(const WorldCommand& command, const SpawnPart& part, std::uint64_t tick,
              CommandResult& result);
   void Request(const RequestPart& part, std::uint64_t tick, CommandResult& result);
@@ -106,64 +117,69 @@ class WorldShard {
   void SetPlanting(const PlantingPart& part, CommandResult& result);
   void Cancel(const CancelPart& part, CommandResult& result);
   void Release(SessionId session, std::uint64_t tick);
-  void ChangeTerrain(std::uint64_t tick);
+  void ApplyTerrain(std::uint64_t tick);
   void AdvanceAvatars(std::uint64_t tick, int steps);
-  std::span<const InOrder> AvatarsInOrder();
-  std::span<const std::uint32_t> NamedRows(protocol::PoseMode mode);
-  bool HasRegions(protocol::PoseMode mode) const;
-  bool HasRegionsOfSeveral(protocol::PoseMode mode) const;
-  void KeepPoses(std::span<const std::uint32_t> rows);
-  void ShowPoses(std::span<const std::uint32_t> rows);
-  std::shared_ptr<const SpatialGrid> PlacesAt(std::uint64_t tick);
-  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const SpatialGrid& places);
-  void TellMovements();
+  // All avatars in the order of their ids.
+  std::span<const OrderedAvatar> OrderedAvatars();
+  void RecordMovements();
+  void RecordRemoval(AvatarId avatar);
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
-  void Gone(AvatarId avatar);
   protocol::Event& AddEvent(protocol::EventType type, AvatarId avatar, std::uint64_t tick);
 
+  // world_shard_poses.cpp: poses.
+  std::span<const std::uint32_t> SelectedRows(protocol::PoseMode mode);
+  std::span<const std::uint32_t> SelectedAndRegionRows(protocol::PoseMode mode,
+                                                       const SpatialGrid& grid);
+  // Encodes the poses of these rows into the cache.
+  void CachePoses(std::span<const std::uint32_t> rows);
+  // Evaluates the poses of these rows in their avatars.
+  void EvaluatePoses(std::span<const std::uint32_t> rows);
+  std::shared_ptr<const SpatialGrid> GridAt(std::uint64_t tick);
+
   std::shared_ptr<World> world_;
-  int shard_;
-  int max_queue_;
-  TickClock clock_;
+  const int shard_;
+  const int max_queue_;
+  const std::size_t max_bulk_bytes_;
+  const TickClock clock_;
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
-  EncodedPoseCache ahead_;                       // before the avatars, whose places are in it
-  std::map<AvatarId, Entry> avatars_;  // in order, so that batches and events are
-  // The same for who goes through all of them, made anew when there are others.
-  std::vector<InOrder> in_order_;
+  EncodedPoseCache cache_;             // must outlive avatars_, which own its slots
+  std::map<AvatarId, Entry> avatars_;  // ordered, so that batches and events are ordered
+
+  // Arrays of all avatars in the order of avatars_. Rows are indices of these arrays. They are
+  // rebuilt by OrderedAvatars after avatars were added or removed.
+  bool is_order_valid_ = false;
+  std::vector<OrderedAvatar> ordered_;
   std::vector<AvatarSimulation*> advancing_;
-  std::vector<std::uint32_t>
-      eventful_;  // rows to which something may have happened in the last step
-  protocol::PoseRows::Avatars numbers_;
+  protocol::PoseRows::Avatars ids_;
   std::vector<std::uint32_t> all_rows_;
-  bool is_order_known_ = false;
-  std::vector<Interest> interests_;  // by shard
-  // By mode: rows of avatars that are named by any shard, worked out when they or the order change.
-  std::array<std::vector<std::uint32_t>, kSentModes.size()> named_rows_;
-  bool are_named_rows_known_ = false;
-  std::vector<std::uint32_t> near_rows_;  // those last asked for, by any mode
-  std::vector<std::uint8_t> is_near_;     // by row, all 0 between
-  std::shared_ptr<const SpatialGrid> places_;  // of places_tick_
-  std::uint64_t places_tick_ = 0;
-  std::uint16_t max_every_ = 1;
-  bool events_wanted_ = false;
+
+  std::vector<std::uint32_t> eventful_;  // rows that may have events after the last step
   std::vector<protocol::Event> events_;
-  bool movements_wanted_ = false;
-  bool movement_places_wanted_ = false;
+  std::uint64_t step_ = 0;                       // steps since this object was created
+  std::uint64_t tick_ = 0;                       // of the current or last Advance
+  std::uint16_t steps_left_ = 0;                 // of the current Advance
+  std::shared_ptr<const WorldTerrain> terrain_;  // null: flat ground
+  std::deque<TerrainPart> next_terrains_;        // ordered by tick
+
+  // Movements.
   bool last_step_had_avatars_ = false;
-  std::uint64_t step_ = 0;  // of its avatars
-  std::uint64_t tick_ = 0;  // to which they go on
-  std::uint16_t more_steps_ = 0;
-  std::size_t max_bulk_bytes_;
-  std::vector<AvatarId> gone_;              // since the last step
-  std::vector<protocol::Movements> movements_;  // of steps not taken yet
-  std::shared_ptr<const WorldTerrain> ground_;        // null: flat
-  std::deque<TerrainPart> grounds_;              // from later ticks on
-  std::vector<AvatarSimulation*> shown_;                  // scratch
-  // By mode.
-  std::array<bool, kSentModes.size()> last_had_poses_{};
-  std::array<RowsPool, kSentModes.size()> rows_;
+  std::vector<AvatarId> removed_;               // since the last step
+  std::vector<protocol::Movements> movements_;  // since the last TakeMovements
+
+  // Poses.
+  WorldInterest interest_;
+  bool are_selected_rows_valid_ = false;
+  std::array<std::vector<std::uint32_t>, kSentModes.size()> selected_rows_;  // by mode
+  std::array<bool, kSentModes.size()> last_had_poses_{};                     // by mode
+  std::array<RowsPool, kSentModes.size()> rows_;                             // by mode
+  std::shared_ptr<const SpatialGrid> grid_;                                  // at grid_tick_
+  std::uint64_t grid_tick_ = 0;
+  // Scratch memory.
+  std::vector<std::uint32_t> picked_rows_;
+  std::vector<std::uint8_t> is_picked_;  // by row; all 0 between calls
+  std::vector<AvatarSimulation*> evaluated_;
 };
 
 }  // namespace stridewire::server

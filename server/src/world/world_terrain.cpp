@@ -6,9 +6,8 @@
 
 namespace stridewire::server {
 
-Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(protocol::WorldId world,
-                                                   std::shared_ptr<const Terrain> terrain,
-                                                   protocol::Encoder& encoder) {
+Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(
+    protocol::WorldId world, std::shared_ptr<const Terrain> terrain, protocol::Encoder& encoder) {
   protocol::WorldTerrain message{.world = world, .terrain = {}};
   if (terrain != nullptr) message.terrain = ToWire(terrain->data());
   auto frame = std::make_shared<std::vector<std::byte>>();

@@ -12,34 +12,34 @@
 
 namespace stridewire::server {
 
-/// The ground of a world: what its avatars walk on, and the Ground that tells of it, encoded
-/// once and shared by all who hear it. Immutable.
+/// The terrain of a world and its WorldTerrain message, which is encoded once and shared by all
+/// sessions. Immutable.
 struct WorldTerrain {
-  std::shared_ptr<const Terrain> terrain;  ///< Null: flat at 0.
+  std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground at height 0.
   SharedFrame frame;
 };
 
-/// kLimitExceeded: its frame is larger than the encoder's limits allow.
+/// Fails with kLimitExceeded if the message exceeds the limits of the encoder.
 [[nodiscard]] Expected<std::shared_ptr<const WorldTerrain>> MakeWorldTerrain(
     protocol::WorldId world, std::shared_ptr<const Terrain> terrain, protocol::Encoder& encoder);
 
-/// Where threads leave each other a world's ground. Locked only when a world changes hands or
-/// somebody joins, never in a tick.
+/// The current terrain of a world, for all threads. Its lock is used when the terrain is set or a
+/// client joins, never in a tick.
 class TerrainSlot {
  public:
-  /// Null: flat, and never was otherwise.
+  /// Returns null if the terrain was never set and is flat.
   [[nodiscard]] std::shared_ptr<const WorldTerrain> Get() const {
     const std::scoped_lock lock(mutex_);
-    return ground_;
+    return terrain_;
   }
-  void Set(std::shared_ptr<const WorldTerrain> ground) {
+  void Set(std::shared_ptr<const WorldTerrain> terrain) {
     const std::scoped_lock lock(mutex_);
-    ground_ = std::move(ground);
+    terrain_ = std::move(terrain);
   }
 
  private:
   mutable std::mutex mutex_;
-  std::shared_ptr<const WorldTerrain> ground_;
+  std::shared_ptr<const WorldTerrain> terrain_;
 };
 
 }  // namespace stridewire::server

@@ -1,4 +1,5 @@
-// The client library, stridewire-record and the sample against the real server, process by process.
+// Tests the client library, stridewire-record and the sample with stridewired as separate
+// processes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -45,7 +46,7 @@ bool Eventually(const std::function<bool()>& holds) {
   return true;
 }
 
-/// stridewired as a process of its own.
+/// Runs stridewired as a process.
 class Daemon {
  public:
   explicit Daemon(std::uint16_t port = 0)
@@ -54,7 +55,7 @@ class Daemon {
         port_(test::PortIn(process_.ReadLineThatBegins("ready ").value_or(""), "listen")) {}
   [[nodiscard]] std::uint16_t port() const { return port_; }
   [[nodiscard]] std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
-  /// Its ticks of that time are missed.
+  /// Stops the process for a while, so that it misses ticks.
   void Pause(std::chrono::milliseconds time) {
     process_.Signal(SIGSTOP);
     std::this_thread::sleep_for(time);
@@ -101,14 +102,14 @@ class User {
     std::vector<stridewire_spawn> spawns;
     for (std::uint32_t a = 1; a <= count; ++a) spawns.push_back({a, {1.0 * a, 0.0, 0.0}, 0.0});
     EXPECT_TRUE(client.Spawn(world, spawns));
-    const auto reply = Next(STRIDEWIRE_EVENT_REPLY);  // Of joining, then of this.
+    const auto reply = Next(STRIDEWIRE_EVENT_REPLY);  // the first is of JoinWorld
     const auto second = Next(STRIDEWIRE_EVENT_REPLY);
     ASSERT_TRUE(reply && second);
     EXPECT_EQ(second->status, STRIDEWIRE_OK);
     EXPECT_EQ(second->accepted, count);
   }
 
-  /// Every pose of an avatar over so many ticks, from its first on.
+  /// Receives `count` consecutive poses of an avatar.
   std::vector<client::Pose> Collect(std::uint32_t avatar, std::size_t count) {
     std::vector<client::Pose> poses;
     std::uint64_t after = UINT64_MAX;
@@ -134,7 +135,7 @@ Options LongHistory() {
   return options;
 }
 
-TEST(ClientAndServer, AStepAskedForComesBackAsAWalkingAvatar) {
+TEST(ClientAndServer, ARequestedStepIsExecuted) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
@@ -167,7 +168,7 @@ class ClientRegion : public testing::TestWithParam<stridewire_pose_mode> {};
 INSTANTIATE_TEST_SUITE_P(Modes, ClientRegion,
                          testing::Values(STRIDEWIRE_QUANTISED, STRIDEWIRE_MOVEMENT));
 
-TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
+TEST_P(ClientRegion, ReceivesTheAvatarsInside) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
@@ -195,13 +196,13 @@ TEST_P(ClientRegion, ShowsWhoIsInItAndMoves) {
   EXPECT_EQ(server.Terminate(), 0);
 }
 
-TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
+TEST(ClientAndServer, RingsHaveDetails) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
   user.Spawn(30);  // at x = 1 to 30 m
   const stridewire_rate_ring rings[] = {{10.5, 1}, {20.5, 2}};
-  stridewire_pose_detail details[] = {STRIDEWIRE_DETAIL_ALL, STRIDEWIRE_DETAIL_FEWER};
+  stridewire_pose_detail details[] = {STRIDEWIRE_DETAIL_ALL, STRIDEWIRE_DETAIL_REDUCED};
   stridewire_region region{0.0, 0.0, 100.0, -1.0, rings, 2, details};
   stridewire_observation observation{};
   observation.mode = STRIDEWIRE_FULL;
@@ -213,17 +214,17 @@ TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
   details[1] = static_cast<stridewire_pose_detail>(3);
   EXPECT_EQ(user.client.ObserveRegion(user.world, observation, region).status(),
             STRIDEWIRE_INVALID_ARGUMENT);
-  details[1] = STRIDEWIRE_DETAIL_FEWER;
+  details[1] = STRIDEWIRE_DETAIL_REDUCED;
   std::uint32_t subscription = 0;
   ASSERT_TRUE(user.client.ObserveRegion(user.world, observation, region, &subscription));
-  // Avatars up to `all` and up to `fewer` are shown so, the others by their root.
+  // Avatars up to `all` have all joints, up to `fewer` reduced joints, and others the root only.
   const auto shows = [&](std::uint32_t all, std::uint32_t fewer) {
     return Eventually([&] {
       for (std::uint32_t avatar = 1; avatar <= 30; ++avatar) {
         client::Pose pose;
         if (!user.client.LatestPose(user.world, avatar, pose) || pose.missing()) return false;
         const int detail = avatar <= all     ? STRIDEWIRE_DETAIL_ALL
-                           : avatar <= fewer ? STRIDEWIRE_DETAIL_FEWER
+                           : avatar <= fewer ? STRIDEWIRE_DETAIL_REDUCED
                                              : STRIDEWIRE_DETAIL_ROOT;
         if (pose.detail != detail) return false;
       }
@@ -241,7 +242,7 @@ TEST(ClientAndServer, RingsOfARegionHaveEachADetail) {
   EXPECT_EQ(server.Terminate(), 0);
 }
 
-TEST(ClientAndServer, AllObserversSeeTheSameAndQuantisedStaysWithinItsError) {
+TEST(ClientAndServer, ObserversReceiveEqualPosesWithinTheQuantisationError) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
@@ -297,7 +298,7 @@ TEST(ClientAndServer, AllObserversSeeTheSameAndQuantisedStaysWithinItsError) {
   EXPECT_LE(worst_m, 0.5 / protocol::kRootStepsPerM + 1e-6);
 }
 
-// Joints of a walk that turn while it is watched.
+// Counts the joints that rotate during the recording.
 std::size_t MovingJoints(const std::vector<client::Pose>& poses) {
   std::size_t moving = 0;
   for (std::size_t j = 0; j < poses.front().rotations.size(); ++j) {
@@ -308,7 +309,7 @@ std::size_t MovingJoints(const std::vector<client::Pose>& poses) {
   return moving;
 }
 
-TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
+TEST(ClientAndServer, PosesHaveTheRequestedDetail) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   User user(server.port());
@@ -318,7 +319,7 @@ TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
   User root(server.port(), STRIDEWIRE_OBSERVER, LongHistory());
   const std::array<std::pair<User*, stridewire_pose_detail>, 3> observers = {
       {{&all, STRIDEWIRE_DETAIL_ALL},
-       {&fewer, STRIDEWIRE_DETAIL_FEWER},
+       {&fewer, STRIDEWIRE_DETAIL_REDUCED},
        {&root, STRIDEWIRE_DETAIL_ROOT}}};
   for (const auto& [observer, detail] : observers) {
     ASSERT_TRUE(observer->client.Observe(
@@ -334,10 +335,10 @@ TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
     for (const client::Pose& pose : poses[i]) ASSERT_EQ(pose.detail, observers[i].second);
   }
   EXPECT_GT(MovingJoints(poses[0]), MovingJoints(poses[1]));
-  EXPECT_GT(MovingJoints(poses[1]), 8u);  // Two legs, the spine, two arms.
+  EXPECT_GT(MovingJoints(poses[1]), 8u);  // legs, spine and arms
   EXPECT_EQ(MovingJoints(poses[2]), 1u);
 
-  // However little of it is told, a figure is where it is and turned as it is.
+  // The root is equal in all details.
   std::size_t compared = 0;
   for (std::size_t i = 1; i < 3; ++i) {
     for (const client::Pose& pose : poses[i]) {
@@ -355,11 +356,11 @@ TEST(ClientAndServer, PosesComeInTheDetailThatWasAskedFor) {
   EXPECT_GT(compared, 100u);
 }
 
-TEST(ClientAndServer, RenderedPosesAreInterpolatedAllTheWay) {
+TEST(ClientAndServer, PosesAtRenderTimeAreInterpolated) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   Options options;
-  options.render_delay_s = 0.5;  // Machines that run tests are busy; nothing here is about speed.
+  options.render_delay_s = 0.5;  // test machines are busy
   User user(server.port(), STRIDEWIRE_CONTROLLER, options);
   user.Spawn(1);
   ASSERT_TRUE(user.client.Observe(user.world, STRIDEWIRE_QUANTISED));
@@ -381,7 +382,7 @@ TEST(ClientAndServer, RenderedPosesAreInterpolatedAllTheWay) {
   EXPECT_GT(interpolated, 20);
 }
 
-TEST(ClientAndServer, AServerKilledAndRestartedIsFoundAgain) {
+TEST(ClientAndServer, ReconnectsAfterTheServerWasKilled) {
   std::optional<Daemon> server(std::in_place);
   const std::uint16_t port = server->port();
   ASSERT_NE(port, 0);
@@ -398,12 +399,12 @@ TEST(ClientAndServer, AServerKilledAndRestartedIsFoundAgain) {
   server->KillHard();
   server.reset();
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_CONNECTION_LOST));
-  // Asked for while there is no server: it waits.
+  // A request without a connection waits.
   ASSERT_TRUE(user.client.Request(user.world, {client::Step(2, 9, 0.5)}));
   server.emplace(port);
   ASSERT_EQ(server->port(), port);
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_SESSION_LOST));
-  // Avatars live on different shards: their events come in any order.
+  // The avatars are on different shards, so that their events arrive in any order.
   std::optional<stridewire_event> spawned;
   std::optional<stridewire_event> started;
   ASSERT_TRUE(Eventually([&] {
@@ -425,7 +426,7 @@ TEST(ClientAndServer, AServerKilledAndRestartedIsFoundAgain) {
   EXPECT_EQ(user.client.Statistics().resumes, 0u);
 }
 
-TEST(ClientAndServer, AServerThatIsShutDownAndStartedAgainIsFoundAgain) {
+TEST(ClientAndServer, ReconnectsAfterTheServerWasRestarted) {
   std::optional<Daemon> server(std::in_place);
   const std::uint16_t port = server->port();
   ASSERT_NE(port, 0);
@@ -450,7 +451,7 @@ std::vector<std::string> RecordArguments(const std::string& address, const std::
           "--seconds", "2",     "--out",   out,     "--timeout-s", "60"};
 }
 
-TEST(Record, WritesWhatTheServerShows) {
+TEST(Record, WritesTheReceivedPoses) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   const ScratchFolder folder;
@@ -467,12 +468,12 @@ TEST(Record, WritesWhatTheServerShows) {
   const json report = json::parse(result.out);
   EXPECT_EQ(report["frames"], 120);
   EXPECT_EQ(report["fps"], 60.0);
-  EXPECT_LT(report["ticks_missing"], 60);  // Ticks that a busy machine missed.
+  EXPECT_LT(report["ticks_missing"], 60);  // a busy machine misses ticks
   EXPECT_TRUE(report["cut_short"].is_null());
   const auto capture = ReadBvh(folder.File("walk.bvh"), {});
   ASSERT_TRUE(capture) << Describe(capture.error());
   ASSERT_EQ(capture->clip.frame_count(), 120);
-  // The file against what another observer received.
+  // Compare the file with the poses of another observer.
   const std::uint64_t first_tick = report["first_tick"];
   client::Pose pose;
   int compared = 0;
@@ -495,7 +496,7 @@ TEST(Record, WritesWhatTheServerShows) {
   EXPECT_GT(compared, 60);
 }
 
-TEST(Record, GoesOnWherePosesAreMissing) {
+TEST(Record, InterpolatesMissingPoses) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   const ScratchFolder folder;
@@ -512,15 +513,15 @@ TEST(Record, GoesOnWherePosesAreMissing) {
   EXPECT_EQ(record.Wait(), 0);
   const json report = json::parse(*line);
   EXPECT_EQ(report["frames"], 360);
-  EXPECT_GT(report["ticks_missing"], 30);  // Never sent by the server, and filled.
+  EXPECT_GT(report["ticks_missing"], 30);  // missed by the server
   ASSERT_FALSE(report["gaps"].empty());
-  EXPECT_GT(report["gaps"][0][0], 0);  // The first frame is always one received.
+  EXPECT_GT(report["gaps"][0][0], 0);  // the first frame is a received one
   const auto capture = ReadBvh(folder.File("slow.bvh"), {});
   ASSERT_TRUE(capture) << Describe(capture.error());
   EXPECT_EQ(capture->clip.frame_count(), 360);
 }
 
-TEST(Record, ServerThatDiesCutsItShort) {
+TEST(Record, WritesAPartialFileIfTheServerStops) {
   Daemon server;
   ASSERT_NE(server.port(), 0);
   const ScratchFolder folder;
@@ -538,7 +539,7 @@ TEST(Record, ServerThatDiesCutsItShort) {
   EXPECT_GT(capture->clip.frame_count(), 5);
 }
 
-TEST(Record, AnswersBadUsageWithTwoAndASentence) {
+TEST(Record, ExitsWithTwoOnInvalidOptions) {
   const ScratchFolder folder;
   const std::string out = folder.File("a.bvh");
   const auto expect = [&](std::size_t index, const std::string& value, const std::string& named) {
@@ -580,7 +581,7 @@ TEST(Record, AnswersBadUsageWithTwoAndASentence) {
   EXPECT_THAT(RecordTool({"--version"}).out, HasSubstr(kVersion));
 }
 
-TEST(Record, FailsClearlyWithoutServerOrAvatar) {
+TEST(Record, ReportsAMissingServerOrAvatar) {
   const ScratchFolder folder;
   const std::string out = folder.File("a.bvh");
   std::string address;
@@ -593,7 +594,7 @@ TEST(Record, FailsClearlyWithoutServerOrAvatar) {
     arguments[11] = "1";
     const auto nobody = RecordTool(arguments);
     EXPECT_EQ(nobody.exit_code, 1);
-    EXPECT_THAT(nobody.err, HasSubstr("avatar 77 of world \"plaza\" did not show up"));
+    EXPECT_THAT(nobody.err, HasSubstr("avatar 77 of world \"plaza\" sent no pose within"));
   }
   const auto refused = RecordTool(RecordArguments(address, out));
   EXPECT_EQ(refused.exit_code, 1);
@@ -603,7 +604,7 @@ TEST(Record, FailsClearlyWithoutServerOrAvatar) {
 }
 
 #ifdef STRIDEWIRE_WALK_SAMPLE
-TEST(Sample, WalksOnAfterTheServerWasRestarted) {
+TEST(Sample, ContinuesAfterAServerRestart) {
   std::optional<Daemon> server(std::in_place);
   const std::uint16_t port = server->port();
   ASSERT_NE(port, 0);
@@ -621,14 +622,14 @@ TEST(Sample, WalksOnAfterTheServerWasRestarted) {
   ASSERT_TRUE(walks_to(1.0));
   server->KillHard();
   server.reset();
-  ASSERT_TRUE(sample.ReadLineThatBegins("event 2"));  // Connection lost.
+  ASSERT_TRUE(sample.ReadLineThatBegins("event 2"));  // CONNECTION_LOST
   server.emplace(port);
-  ASSERT_TRUE(sample.ReadLineThatBegins("event 3"));  // Session lost.
+  ASSERT_TRUE(sample.ReadLineThatBegins("event 3"));  // SESSION_LOST
   EXPECT_TRUE(walks_to(3.0));
 }
 #endif
 
-TEST(ClientAndServer, AGroundIsSetAndSeenByEverybody) {
+TEST(ClientAndServer, TerrainIsSetForAllClients) {
   Daemon daemon;
   User builder(daemon.port());
   User watcher(daemon.port(), STRIDEWIRE_OBSERVER);
@@ -667,15 +668,15 @@ TEST(ClientAndServer, AGroundIsSetAndSeenByEverybody) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
-TEST(ClientAndServer, AStepLandsOnTheGroundThatIsThere) {
+TEST(ClientAndServer, AStepLandsOnTheTerrain) {
   Daemon daemon;
   User user(daemon.port());
-  user.Spawn(2);  // The second hears of the ground, too, though it does nothing.
+  user.Spawn(2);  // the second one does nothing
   client::Terrain terrain;
   terrain.boxes = {{{-5.0, 0.25}, {5.0, 5.0}, 0.1}};
   ASSERT_TRUE(user.client.SetTerrain(user.world, terrain));
   ASSERT_TRUE(user.Next(STRIDEWIRE_EVENT_REPLY));
-  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // It holds from a tick on.
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // until the terrain applies
   ASSERT_TRUE(user.client.Request(user.world, {client::Step(1, 7, 0.5)}));
   const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
   ASSERT_TRUE(strike);
@@ -684,7 +685,7 @@ TEST(ClientAndServer, AStepLandsOnTheGroundThatIsThere) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
-TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
+TEST(ClientAndServer, ALayerMovesTheArmAndNotTheLegs) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
@@ -713,7 +714,7 @@ TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
   };
   ASSERT_TRUE(until([&] { return sample(before); }));
   ASSERT_TRUE(user.client.SetLayers(
-      user.world, {client::LayerOn(1, "wave", 1.0, 0.1), client::LayerOn(1, "dance")}));
+      user.world, {client::StartLayer(1, "wave", 1.0, 0.1), client::StartLayer(1, "dance")}));
   const auto refused = user.Next(STRIDEWIRE_EVENT_ITEM);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->item_index, 1u);
@@ -729,7 +730,7 @@ TEST(ClientAndServer, AnArmWavesAndLegsStandAsTheyStood) {
   for (const char* name : {"Hips", "LeftUpLeg", "RightLeg", "LeftFoot"}) {
     EXPECT_FALSE(turned(name)) << name;
   }
-  ASSERT_TRUE(user.client.SetLayers(user.world, {client::LayerOff(1, "wave", 0.1)}));
+  ASSERT_TRUE(user.client.SetLayers(user.world, {client::FadeOutLayer(1, "wave", 0.1)}));
   EXPECT_TRUE(until([&] { return sample(pose) && !turned("RightArm"); }));
   EXPECT_EQ(daemon.Terminate(), 0);
 }
@@ -738,7 +739,7 @@ TEST(ClientAndServer, AWalkArrives) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
-  ASSERT_TRUE(user.client.Request(user.world, {client::WalkTo(1, 7, 1.2, 0.0, 0.8, 0.5)}));
+  ASSERT_TRUE(user.client.Request(user.world, {client::WalkTo(1, 7, {1.2, 0.0, 0.8}, 0.5)}));
   auto finished = user.Next(STRIDEWIRE_EVENT_FINISHED);
   int steps = 0;
   for (; finished && finished->kind != STRIDEWIRE_KIND_STAND; ++steps) {
@@ -753,12 +754,12 @@ TEST(ClientAndServer, AWalkArrives) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
-TEST(ClientAndServer, AStepGoesToItsFootprint) {
+TEST(ClientAndServer, AStepLandsOnItsFootprint) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
   ASSERT_TRUE(user.client.Request(
-      user.world, {client::StepTo(1, 7, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT)}));
+      user.world, {client::StepTo(1, 7, {1.1, 0.0, 0.45}, 0.0, STRIDEWIRE_FOOT_LEFT)}));
   const auto strike = user.Next(STRIDEWIRE_EVENT_FOOT_STRIKE);
   ASSERT_TRUE(strike);
   EXPECT_EQ(strike->foot, STRIDEWIRE_FOOT_LEFT);
@@ -767,7 +768,7 @@ TEST(ClientAndServer, AStepGoesToItsFootprint) {
   EXPECT_EQ(daemon.Terminate(), 0);
 }
 
-TEST(ClientAndServer, AStepOutOfReachIsRejectedIfItMustBeMet) {
+TEST(ClientAndServer, AnExactStepOutOfReachIsRejected) {
   Daemon daemon;
   User user(daemon.port());
   user.Spawn(1);
@@ -775,8 +776,8 @@ TEST(ClientAndServer, AStepOutOfReachIsRejectedIfItMustBeMet) {
             STRIDEWIRE_INVALID_ARGUMENT);
   ASSERT_TRUE(user.client.Request(
       user.world,
-      {client::ExactOnly(client::StepTo(1, 7, 1.1, 0.0, 5.0, 0.0, STRIDEWIRE_FOOT_LEFT)),
-       client::ExactOnly(client::StepTo(1, 8, 1.1, 0.0, 0.45, 0.0, STRIDEWIRE_FOOT_LEFT))}));
+      {client::ExactOnly(client::StepTo(1, 7, {1.1, 0.0, 5.0}, 0.0, STRIDEWIRE_FOOT_LEFT)),
+       client::ExactOnly(client::StepTo(1, 8, {1.1, 0.0, 0.45}, 0.0, STRIDEWIRE_FOOT_LEFT))}));
   const auto rejected = user.Next(STRIDEWIRE_EVENT_REJECTED);
   ASSERT_TRUE(rejected);
   EXPECT_EQ(rejected->request_id, 7u);

@@ -6,7 +6,7 @@ cd "$1"
 failed=0
 complain() { echo "FAILED: $*" >&2; failed=1; }
 
-for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/load/largest_crowd.sh; do
+for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/bench/largest_crowd.sh; do
   [[ -x $script ]] || complain "$script is not executable"
   bash -n "$script" || complain "$script does not parse"
   help=$("$script" --help) || complain "$script --help ended with $?"
@@ -28,9 +28,9 @@ refuses() {
 refuses tests/run.sh --preset
 refuses tests/run.sh --preset fast
 refuses tests/run.sh --jobs many
-refuses tests/load/largest_crowd.sh --from
-refuses tests/load/largest_crowd.sh --from many
-refuses tests/load/largest_crowd.sh --from 9 --to 3
+refuses tests/bench/largest_crowd.sh --from
+refuses tests/bench/largest_crowd.sh --from many
+refuses tests/bench/largest_crowd.sh --from 9 --to 3
 refuses deploy/demo.sh --seconds
 refuses deploy/demo.sh --seconds soon
 refuses deploy/demo.sh --library

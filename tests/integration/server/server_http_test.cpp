@@ -1,4 +1,4 @@
-// What the HTTP port serves besides streams: the viewer's files, info.json.
+// The HTTP server: viewer files, info.json and library pages.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,16 +25,16 @@ namespace http = boost::beast::http;
 using server::ViewerFiles;
 using testing::HasSubstr;
 
-// One connection, one request after the other.
+// A connection that sends one request after the other.
 class HttpClient {
  public:
   explicit HttpClient(std::uint16_t port) : socket_(context_) {
     socket_.connect({asio::ip::address_v4::loopback(), port});
   }
 
-  http::response<http::string_body> Ask(const std::string& target,
-                                        http::verb method = http::verb::get,
-                                        const std::string& if_none_match = "") {
+  http::response<http::string_body> Request(const std::string& target,
+                                            http::verb method = http::verb::get,
+                                            const std::string& if_none_match = "") {
     http::request<http::empty_body> request(method, target, 11);
     request.set(http::field::host, "localhost");
     if (!if_none_match.empty()) request.set(http::field::if_none_match, if_none_match);
@@ -75,14 +75,14 @@ class ServerHttp : public testing::Test {
   fs::path root = fs::path(folder.path()) / "viewer";
 };
 
-TEST_F(ServerHttp, ServesTheViewersFiles) {
+TEST_F(ServerHttp, ServesViewerFiles) {
   auto viewer = ViewerFiles::Read(root.string());
   ASSERT_TRUE(viewer) << Describe(viewer.error());
   EXPECT_EQ(viewer->count(), 4u);
   TestServer server(TestConfig(), *std::move(viewer));
   HttpClient client(server.http_port());
 
-  const auto page = client.Ask("/");
+  const auto page = client.Request("/");
   EXPECT_EQ(page.result_int(), 200u);
   EXPECT_EQ(page.body(), "<!doctype html><title>viewer</title>");
   EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
@@ -93,47 +93,47 @@ TEST_F(ServerHttp, ServesTheViewersFiles) {
   EXPECT_THAT(policy, testing::Not(HasSubstr("unsafe")));
   EXPECT_EQ(page["X-Content-Type-Options"], "nosniff");
   EXPECT_EQ(page["Referrer-Policy"], "no-referrer");
-  EXPECT_EQ(client.Ask("/index.html?x=1").body(), page.body());
+  EXPECT_EQ(client.Request("/index.html?x=1").body(), page.body());
 
-  const auto script = client.Ask("/assets/viewer-0123.js");
+  const auto script = client.Request("/assets/viewer-0123.js");
   EXPECT_EQ(script.body().size(), 300'000u);
   EXPECT_EQ(script[http::field::content_type], "text/javascript; charset=utf-8");
   EXPECT_EQ(script[http::field::cache_control], "public, max-age=31536000, immutable");
   EXPECT_EQ(script["X-Content-Type-Options"], "nosniff");
-  EXPECT_EQ(client.Ask("/assets/viewer-4567.css")[http::field::content_type],
+  EXPECT_EQ(client.Request("/assets/viewer-4567.css")[http::field::content_type],
             "text/css; charset=utf-8");
-  EXPECT_EQ(client.Ask("/robots.txt")[http::field::cache_control], "no-cache");
-  EXPECT_EQ(client.Ask("/", http::verb::post).result_int(), 405u);
+  EXPECT_EQ(client.Request("/robots.txt")[http::field::cache_control], "no-cache");
+  EXPECT_EQ(client.Request("/", http::verb::post).result_int(), 405u);
 }
 
-TEST_F(ServerHttp, SendsAFileOnceToWhoKeepsIt) {
+TEST_F(ServerHttp, SupportsEntityTags) {
   TestServer server(TestConfig(), ViewerFiles::Read(root.string()).value());
   HttpClient client(server.http_port());
-  const auto first = client.Ask("/");
+  const auto first = client.Request("/");
   const std::string tag(first[http::field::etag]);
   ASSERT_GE(tag.size(), 10u);
   for (const std::string& known : {tag, "W/" + tag, "\"other\", " + tag, std::string("*")}) {
-    const auto again = client.Ask("/", http::verb::get, known);
+    const auto again = client.Request("/", http::verb::get, known);
     EXPECT_EQ(again.result_int(), 304u) << known;
     EXPECT_EQ(again.body(), "");
     EXPECT_EQ(again[http::field::etag], tag);
     EXPECT_EQ(again[http::field::cache_control], "no-cache");
   }
-  EXPECT_EQ(client.Ask("/", http::verb::get, "\"other\"").body(), first.body());
-  // The connection is as good as before, and other files have other tags.
-  EXPECT_NE(client.Ask("/robots.txt")[http::field::etag], tag);
+  EXPECT_EQ(client.Request("/", http::verb::get, "\"other\"").body(), first.body());
+  // The connection can still be used, and other files have other tags.
+  EXPECT_NE(client.Request("/robots.txt")[http::field::etag], tag);
 
-  const auto head = client.Ask("/assets/viewer-0123.js", http::verb::head);
+  const auto head = client.Request("/assets/viewer-0123.js", http::verb::head);
   EXPECT_EQ(head.result_int(), 200u);
   EXPECT_EQ(head[http::field::content_length], "300000");
   EXPECT_EQ(head.body(), "");
-  EXPECT_EQ(client.Ask("/healthz").body(), "ok\n");
+  EXPECT_EQ(client.Request("/healthz").body(), "ok\n");
 }
 
-TEST_F(ServerHttp, ServesNothingElse) {
+TEST_F(ServerHttp, ServesNoOtherFiles) {
   TestServer server(TestConfig(), ViewerFiles::Read(root.string()).value());
   HttpClient client(server.http_port());
-  // One that comes into being later is not there either.
+  // Files that are created later are not served either.
   Write(root / "late.txt", "secret");
   for (const char* path : {"/../outside.txt",
                            "/assets/../../outside.txt",
@@ -155,46 +155,46 @@ TEST_F(ServerHttp, ServesNothingElse) {
                            "/stream/",
                            "index.html",
                            "http://localhost/index.html"}) {
-    const auto answer = client.Ask(path);
+    const auto answer = client.Request(path);
     EXPECT_EQ(answer.result_int(), 404u) << path;
     EXPECT_THAT(answer.body(), testing::Not(HasSubstr("secret"))) << path;
   }
 }
 
-TEST_F(ServerHttp, SaysWhatIsWrongWithAFolder) {
-  const auto says = [](const std::string& path, const std::string& what, ErrorCode code) {
+TEST_F(ServerHttp, ReportsInvalidViewerFolders) {
+  const auto expect_error = [](const std::string& path, const std::string& what, ErrorCode code) {
     const auto viewer = ViewerFiles::Find(path);
     ASSERT_FALSE(viewer) << path;
     EXPECT_EQ(viewer.error().code, code);
     EXPECT_THAT(Describe(viewer.error()),
                 testing::AllOf(HasSubstr("viewer_dir: "), HasSubstr(what)));
   };
-  says((fs::path(folder.path()) / "none").string(), "no index.html", ErrorCode::kNotFound);
-  says((root / "index.html").string(), "no index.html", ErrorCode::kNotFound);
+  expect_error((fs::path(folder.path()) / "none").string(), "no index.html", ErrorCode::kNotFound);
+  expect_error((root / "index.html").string(), "no index.html", ErrorCode::kNotFound);
   Write(root / "a name.js", "");
-  says(root.string(), "a name.js", ErrorCode::kInvalidArgument);
+  expect_error(root.string(), "a name.js", ErrorCode::kInvalidArgument);
   fs::remove(root / "a name.js");
   for (std::size_t i = 0; i < ViewerFiles::kMaxFiles; ++i) {
     Write(root / "many" / (std::to_string(i) + ".txt"), "");
   }
-  says(root.string(), "more files", ErrorCode::kLimitExceeded);
+  expect_error(root.string(), "too many files", ErrorCode::kLimitExceeded);
   fs::remove_all(root / "many");
   Write(root / "huge.bin", "");
   fs::resize_file(root / "huge.bin", ViewerFiles::kMaxBytes);
-  says(root.string(), "more bytes", ErrorCode::kLimitExceeded);
+  expect_error(root.string(), "too many bytes", ErrorCode::kLimitExceeded);
 }
 
-TEST_F(ServerHttp, WithoutAViewerSaysHowToBuildIt) {
+TEST_F(ServerHttp, ExplainsHowToBuildTheViewer) {
   TestServer server;
   HttpClient client(server.http_port());
-  const auto page = client.Ask("/");
+  const auto page = client.Request("/");
   EXPECT_EQ(page.result_int(), 200u);
   EXPECT_EQ(page[http::field::content_type], "text/html; charset=utf-8");
   EXPECT_THAT(page.body(), HasSubstr("STRIDEWIRE_BUILD_VIEWER=ON"));
-  EXPECT_EQ(client.Ask("/index.html").result_int(), 404u);
+  EXPECT_EQ(client.Request("/index.html").result_int(), 404u);
 }
 
-TEST_F(ServerHttp, TellsWhatThereIs) {
+TEST_F(ServerHttp, ListsWorldsInInfoJson) {
   server::Config config = TestConfig();
   config.worlds["hall"] = {};
   config.worlds["plaza"] = {};
@@ -206,7 +206,7 @@ TEST_F(ServerHttp, TellsWhatThereIs) {
   ASSERT_TRUE(plaza && own);
   ASSERT_TRUE(controller.Spawn(plaza->world, {{}, {}, {}}));
   HttpClient client(server.http_port());
-  const auto answer = client.Ask("/info.json");
+  const auto answer = client.Request("/info.json");
   EXPECT_EQ(answer[http::field::content_type], "application/json");
   EXPECT_EQ(answer[http::field::cache_control], "no-store");
   const auto info = nlohmann::json::parse(answer.body());
@@ -221,19 +221,19 @@ TEST_F(ServerHttp, TellsWhatThereIs) {
     {"name": "plaza", "library": "toy", "avatars": 3}])"));
 }
 
-TEST_F(ServerHttp, TellsWhoWantsNoWebSocketWhatIsThere) {
+TEST_F(ServerHttp, RequiresAnUpgradeForStream) {
   TestServer server;
   HttpClient client(server.http_port());
-  const auto answer = client.Ask("/stream");
+  const auto answer = client.Request("/stream");
   EXPECT_EQ(answer.result_int(), 426u);
   EXPECT_EQ(answer[http::field::upgrade], "websocket");
 }
 
-// What the animator's page asks.
+// The JSON pages that the library page of the viewer requests.
 class ServerLibraries : public testing::Test {
  protected:
   nlohmann::json Get(const std::string& target) {
-    const auto response = client.Ask(target);
+    const auto response = client.Request(target);
     EXPECT_EQ(response.result_int(), 200u) << target << ": " << response.body();
     return nlohmann::json::parse(response.body(), nullptr, false);
   }
@@ -244,7 +244,7 @@ class ServerLibraries : public testing::Test {
   std::string folder = "/libraries/" + list[0]["hash"].get<std::string>();
 };
 
-TEST_F(ServerLibraries, TellWhatTheySpan) {
+TEST_F(ServerLibraries, DescribeTheirGroups) {
   ASSERT_EQ(list.size(), 1u);
   EXPECT_EQ(list[0]["name"], "toy");
   const nlohmann::json skeleton = Get(folder + "/skeleton.json");
@@ -262,7 +262,7 @@ TEST_F(ServerLibraries, TellWhatTheySpan) {
   }
 }
 
-TEST_F(ServerLibraries, SynthesizeWhatIsAskedFor) {
+TEST_F(ServerLibraries, SynthesizeRequestedMovements) {
   const std::size_t joints = Get(folder + "/skeleton.json")["names"].size();
   const nlohmann::json step = Get(folder + "/0/step.json?p=-0.31,0.62");
   const std::size_t frames = step["times_s"].size();
@@ -276,12 +276,12 @@ TEST_F(ServerLibraries, SynthesizeWhatIsAskedFor) {
   EXPECT_EQ(plain["iterations"], 0);
   EXPECT_EQ(plain["error_m"], plain["uncorrected_error_m"]);
   EXPECT_EQ(plain["error_m"], step["uncorrected_error_m"]);
-  // Far outside: as near as a request would get.
+  // Parameters far out of range are clamped as in a request.
   const nlohmann::json far = Get(folder + "/0/step.json?p=-0.31,3");
   EXPECT_TRUE(far["extrapolated"].get<bool>());
   EXPECT_LT(far["applied"][1].get<double>(), 0.9);
   EXPECT_EQ(far["requested"][1], 3.0);
-  // An example is the step of its own parameters.
+  // An example is the step with the parameters of the example.
   const nlohmann::json sites = Get(folder + "/0/sites.json")["sites"];
   const nlohmann::json example = Get(folder + "/0/example.json?index=7");
   EXPECT_EQ(example["applied"], sites[7]["p"]);
@@ -306,47 +306,47 @@ TEST_F(ServerLibraries, MapErrorsOverASlice) {
     EXPECT_LE(corrected["errors_mm"][i].get<double>(), plain["errors_mm"][i].get<double>() + 1e-4);
   }
   EXPECT_GT(inside, 24 * 24 / 2);
-  EXPECT_LT(inside, 24 * 24);  // the corner that no example is near
+  EXPECT_LT(inside, 24 * 24);  // one corner has no example nearby
   EXPECT_NEAR(plain["largest_m"].get<double>() * 1e3, largest_mm, 1e-4);
   EXPECT_LT(corrected["largest_m"].get<double>(), plain["largest_m"].get<double>() / 10);
 }
 
-TEST_F(ServerLibraries, RefuseWhatMakesNoSense) {
+TEST_F(ServerLibraries, RejectInvalidQueries) {
   for (const auto& [page, status, why] :
-       {std::tuple("/0/step.json", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=1", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=1,2,3", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=1,", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=nan,1", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=inf,1", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=1e300,1", 400u, "p: a number for each parameter"),
-        std::tuple("/0/step.json?p=0,0&correction=2", 400u, "correction: 0 or 1"),
+       {std::tuple("/0/step.json", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=1", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=1,2,3", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=1,", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=nan,1", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=inf,1", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=1e300,1", 400u, "p: expected one number per parameter"),
+        std::tuple("/0/step.json?p=0,0&correction=2", 400u, "correction: expected 0 or 1"),
         std::tuple("/0/example.json?index=-1", 400u, "index: "),
         std::tuple("/0/example.json?index=9999999999", 400u, "index: "),
         std::tuple("/0/errors.json?x=0&y=2&p=0,0&cells=8", 400u, "y: "),
-        std::tuple("/0/errors.json?x=0&y=1&p=0,0&cells=65", 400u, "cells: a number from 2 to 64"),
-        std::tuple("/0/errors.json?x=0&y=1&p=0,0", 400u, "cells: a number from 2 to 64"),
+        std::tuple("/0/errors.json?x=0&y=1&p=0,0&cells=65", 400u, "cells: expected 2 to 64"),
+        std::tuple("/0/errors.json?x=0&y=1&p=0,0", 400u, "cells: expected 2 to 64"),
         std::tuple("/0/other.json", 404u, "no such page"),
         std::tuple("/99/sites.json", 404u, "no such page or group"),
         std::tuple("/-1/sites.json", 404u, "no such page or group"),
         std::tuple("/", 404u, "no such"), std::tuple("", 404u, "no such")}) {
-    const auto response = client.Ask(folder + page);
+    const auto response = client.Request(folder + page);
     EXPECT_EQ(response.result_int(), status) << page;
     EXPECT_THAT(response.body(), HasSubstr(why)) << page;
   }
-  EXPECT_EQ(client.Ask("/libraries/00/0/sites.json").result_int(), 404u);
-  EXPECT_EQ(client.Ask("/libraries").result_int(), 404u);
-  EXPECT_EQ(client.Ask("/libraries.json", http::verb::post).result_int(), 405u);
+  EXPECT_EQ(client.Request("/libraries/00/0/sites.json").result_int(), 404u);
+  EXPECT_EQ(client.Request("/libraries").result_int(), 404u);
+  EXPECT_EQ(client.Request("/libraries.json", http::verb::post).result_int(), 405u);
 }
 
-TEST_F(ServerLibraries, AnswerABoundedNumberAtOnce) {
+TEST_F(ServerLibraries, LimitTheNumberOfWaitingRequests) {
   const std::string target = folder + "/0/errors.json?x=0&y=1&p=0,0&cells=64";
   std::atomic<int> answered = 0;
   std::atomic<int> refused = 0;
   std::vector<std::jthread> visitors;
   for (int i = 0; i < 48; ++i) {
     visitors.emplace_back([&] {
-      const auto status = HttpClient(server.http_port()).Ask(target).result_int();
+      const auto status = HttpClient(server.http_port()).Request(target).result_int();
       if (status == 200) ++answered;
       if (status == 503) ++refused;
     });

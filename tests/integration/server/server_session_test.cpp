@@ -1,4 +1,4 @@
-// Sessions over real sockets: greeting, commands, coming back.
+// Sessions over real sockets: handshake, commands, resuming.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ std::vector<std::byte> Encoded(const protocol::Message& message) {
   return frame;
 }
 
-TEST(ServerSession, WelcomesAHello) {
+TEST(ServerSession, AnswersHelloWithWelcome) {
   TestServer server;
   RawClient client = server.Connect();
   const auto welcome = client.SayHello();
@@ -40,17 +40,8 @@ TEST(ServerSession, WelcomesAHello) {
   EXPECT_FALSE(welcome->resumed);
   EXPECT_EQ(welcome->last_seq, 0u);
   EXPECT_EQ(welcome->tick_hz, 60.0);
-  EXPECT_EQ(welcome->features, server::kServerFeatures);
   EXPECT_EQ(welcome->limits.max_queue, 256u);
   EXPECT_EQ(welcome->limits.max_items, protocol::kMaxItems);
-}
-
-TEST(ServerSession, GivesOnlyFeaturesBothHave) {
-  TestServer server;
-  RawClient client = server.Connect();
-  const auto welcome = client.SayHello(protocol::kFeatureQuantised | 1ull << 63);
-  ASSERT_TRUE(welcome);
-  EXPECT_EQ(welcome->features, protocol::kFeatureQuantised);
 }
 
 struct BadGreeting {
@@ -77,17 +68,17 @@ std::vector<BadGreeting> BadGreetings() {
       {"unknown type", changed(6, 200), StatusCode::kUnsupported},
       {"a server's message", changed(6, 64), StatusCode::kMalformed},
       {"flags", changed(12, 1), StatusCode::kMalformed},
-      {"a length beyond its cap", changed(10, 0x7f), StatusCode::kLimitReached},
+      {"a length beyond its limit", changed(10, 0x7f), StatusCode::kLimitReached},
       {"garbage", garbage, StatusCode::kMalformed},
-      {"a payload of no message", torn, StatusCode::kMalformed},
+      {"an invalid payload", torn, StatusCode::kMalformed},
       {"not a Hello", Encoded(protocol::Ping{.nonce = 1}), StatusCode::kUnexpectedMessage},
-      {"a version of tomorrow",
+      {"an unsupported protocol version",
        Encoded(protocol::Hello{.protocol_min = 7, .protocol_max = 9, .client_name = "test"}),
        StatusCode::kVersionMismatch},
   };
 }
 
-TEST(ServerSession, RefusesBadGreetingsAndSaysWhy) {
+TEST(ServerSession, RejectsInvalidHandshakesWithAReason) {
   TestServer server;
   for (const BadGreeting& greeting : BadGreetings()) {
     SCOPED_TRACE(greeting.name);
@@ -100,15 +91,15 @@ TEST(ServerSession, RefusesBadGreetingsAndSaysWhy) {
     EXPECT_FALSE(notice->text.empty());
     EXPECT_TRUE(client.AwaitClose());
   }
-  // And it goes on serving.
+  // The server still accepts other clients.
   RawClient client = server.Connect();
   EXPECT_TRUE(client.SayHello());
 }
 
-TEST(ServerSession, HoldsNothingLargeForAPeerWithoutHello) {
+TEST(ServerSession, RejectsLargeFramesBeforeHello) {
   TestServer server;
   RawClient client = server.Connect();
-  // A Request may be 16 MiB later; before Hello its header alone ends the connection.
+  // A Request may have 16 MiB, but before Hello its header alone closes the connection.
   std::vector<std::byte> frame =
       Encoded(protocol::Request{.seq = 1, .world = 1, .items = Steps(1, 2000, 0.5)});
   frame.resize(64);
@@ -119,7 +110,7 @@ TEST(ServerSession, HoldsNothingLargeForAPeerWithoutHello) {
   EXPECT_EQ(server.metrics().Sum(Limit::kFrameBytes), 1u);
 }
 
-TEST(ServerSession, GivesUpAGreetingThatDoesNotCome) {
+TEST(ServerSession, ClosesAHandshakeAfterItsTimeout) {
   server::Config config = TestConfig();
   config.limits.handshake_timeout_s = 0.1;
   TestServer server(config);
@@ -131,7 +122,7 @@ TEST(ServerSession, GivesUpAGreetingThatDoesNotCome) {
   EXPECT_EQ(server.metrics().Sum(Limit::kHandshakeTimeout), 1u);
 }
 
-TEST(ServerSession, ClosesASilentConnection) {
+TEST(ServerSession, ClosesAnIdleConnection) {
   server::Config config = TestConfig();
   config.limits.idle_timeout_s = 0.2;
   TestServer server(config);
@@ -155,7 +146,7 @@ TEST(ServerSession, AnswersPing) {
   EXPECT_GT(pong->server_time_s, 0.0);
 }
 
-TEST(ServerSession, AnswersWhatAnAvatarIsDoing) {
+TEST(ServerSession, AnswersInspectAvatar) {
   TestServer server(TestConfig(3));
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -180,7 +171,7 @@ TEST(ServerSession, AnswersWhatAnAvatarIsDoing) {
   EXPECT_EQ(ask(world->world, 99, 9)->code, StatusCode::kNoSuchAvatar);
   EXPECT_EQ(ask(world->world + 1, 2, 10)->code, StatusCode::kNotJoined);
 
-  // Many at once: each is answered, those beyond the limit with a refusal.
+  // Many requests at once: each gets an answer, and those beyond the limit are refused.
   constexpr std::uint64_t kQuestions = 1000;
   for (std::uint64_t i = 1; i <= kQuestions; ++i) {
     client.Send(protocol::InspectAvatar{i, world->world, 2});
@@ -193,17 +184,9 @@ TEST(ServerSession, AnswersWhatAnAvatarIsDoing) {
     refused += state->code == StatusCode::kLimitReached ? 1 : 0;
   }
   EXPECT_LT(refused, kQuestions);
-
-  // Only those who said that they know the message may send it.
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  old.Send(protocol::InspectAvatar{1, 1, 1});
-  const auto notice = old.Await<ErrorNotice>();
-  ASSERT_TRUE(notice);
-  EXPECT_EQ(notice->code, StatusCode::kUnexpectedMessage);
 }
 
-TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
+TEST(ServerSession, WalksAnAvatarAndSendsItsEvents) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -234,9 +217,9 @@ TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
          std::ranges::count(types, EventType::kFinished) < 3) {
     auto message = client.Receive();
     ASSERT_TRUE(message);
-    if (const auto* told = std::get_if<protocol::Events>(&*message)) {
-      EXPECT_EQ(told->world, world->world);
-      for (const protocol::Event& event : told->events) {
+    if (const auto* message_events = std::get_if<protocol::Events>(&*message)) {
+      EXPECT_EQ(message_events->world, world->world);
+      for (const protocol::Event& event : message_events->events) {
         EXPECT_EQ(event.avatar, 7u);
         types.push_back(event.type);
         events.push_back(event);
@@ -250,9 +233,9 @@ TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
     }
   }
   EXPECT_GT(batches, 10u);
-  // Two steps asked for and the avatar's own closing step.
+  // Two requested steps and the step with which the avatar comes to a stand.
   std::erase_if(types, [](EventType type) { return type == EventType::kFootStrike; });
-  // The avatar may have said that it is idle before the request came.
+  // The avatar may have been idle before the request arrived.
   std::erase(types, EventType::kIdle);
   std::erase(types, EventType::kSpawned);
   EXPECT_THAT(types, ElementsAre(EventType::kAccepted, EventType::kAccepted, EventType::kStarted,
@@ -267,8 +250,8 @@ TEST(ServerSession, WalksAnAvatarAndTellsWhatHappens) {
   EXPECT_TRUE(std::ranges::is_sorted(events, {}, &protocol::Event::tick));
 }
 
-// What a game server hears of requests inside and beyond what the examples span.
-TEST(ServerSession, TellsTheGroupAndWhetherItExtrapolates) {
+// Events of requests within and beyond the range of the examples.
+TEST(ServerSession, ReportsGroupAndExtrapolation) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -276,7 +259,7 @@ TEST(ServerSession, TellsTheGroupAndWhetherItExtrapolates) {
   ASSERT_TRUE(world);
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   ASSERT_EQ(client.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
-  // The first may start before the reply comes; the others do later.
+  // The first movement may start before the reply; the others start later.
   std::vector<protocol::RequestItem> items = Steps(1, 3, 0.3);
   std::get<protocol::StepMovement>(items[2].movement).length_m = 5.0;
   ASSERT_EQ(client.Request(world->world, items)->accepted, 3u);
@@ -285,9 +268,9 @@ TEST(ServerSession, TellsTheGroupAndWhetherItExtrapolates) {
   while (!started.contains(2) || !started.contains(3)) {
     auto message = client.Receive();
     ASSERT_TRUE(message);
-    const auto* told = std::get_if<protocol::Events>(&*message);
-    if (told == nullptr) continue;
-    for (const protocol::Event& event : told->events) {
+    const auto* message_events = std::get_if<protocol::Events>(&*message);
+    if (message_events == nullptr) continue;
+    for (const protocol::Event& event : message_events->events) {
       if (event.type == EventType::kStarted) started.emplace(event.request_id, event);
     }
   }
@@ -303,11 +286,12 @@ TEST(ServerSession, TellsTheGroupAndWhetherItExtrapolates) {
   EXPECT_TRUE(beyond.clamped);
   ASSERT_EQ(beyond.requested.count, 2);
   EXPECT_NEAR(beyond.requested.values[1], 5.0, 1e-9);
-  EXPECT_GT(beyond.applied.values[1], 0.5);  // the toy library steps 0.6 m, grown by 10 %
+  EXPECT_GT(beyond.applied.values[1],
+            0.5);  // the test library has steps of 0.6 m; the hull is extended by 10 %
   EXPECT_LT(beyond.applied.values[1], 0.66);
 }
 
-TEST(ServerSession, ChoosesAvatarNumbersNobodyHas) {
+TEST(ServerSession, ChoosesUnusedAvatarIds) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -324,7 +308,7 @@ TEST(ServerSession, ChoosesAvatarNumbersNobodyHas) {
   EXPECT_EQ(reply->items[3].code, StatusCode::kAvatarExists);
 }
 
-TEST(ServerSession, RefusesItemsOneByOne) {
+TEST(ServerSession, RejectsItemsIndividually) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -351,7 +335,7 @@ TEST(ServerSession, RefusesItemsOneByOne) {
   EXPECT_EQ(requested->items[1].code, StatusCode::kOutOfRange);
 }
 
-TEST(ServerSession, CancelsAndRemoves) {
+TEST(ServerSession, CancelsQueuesAndRemovesAvatars) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -373,7 +357,7 @@ TEST(ServerSession, CancelsAndRemoves) {
   EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 0; }));
 }
 
-TEST(ServerSession, RefusesCommandsThatDoNotFitItsState) {
+TEST(ServerSession, RejectsCommandsThatAreInvalidInItsState) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -401,7 +385,7 @@ TEST(ServerSession, RefusesCommandsThatDoNotFitItsState) {
             StatusCode::kSubscriptionExists);
 }
 
-TEST(ServerSession, ASecondHelloEndsTheConnection) {
+TEST(ServerSession, ClosesTheConnectionOnASecondHello) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -412,7 +396,7 @@ TEST(ServerSession, ASecondHelloEndsTheConnection) {
   EXPECT_TRUE(client.AwaitClose());
 }
 
-TEST(ServerSession, DoesACommandOnceHoweverOftenItComes) {
+TEST(ServerSession, ExecutesARepeatedCommandOnce) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -434,7 +418,7 @@ TEST(ServerSession, DoesACommandOnceHoweverOftenItComes) {
   EXPECT_EQ(notice->seq, spawn.seq + 2);
 }
 
-TEST(ServerSession, GoesOnAfterALostConnection) {
+TEST(ServerSession, ResumesAfterALostConnection) {
   TestServer server;
   RawClient client = server.Connect();
   const auto welcome = client.SayHello();
@@ -447,7 +431,7 @@ TEST(ServerSession, GoesOnAfterALostConnection) {
   ASSERT_TRUE(client.Await<protocol::PoseBatch>([&](const protocol::Message& message) {
     if (const auto* events = std::get_if<protocol::Events>(&message)) last_number = events->number;
   }));
-  // This one's answer is lost: the connection breaks right behind it.
+  // The connection is lost directly after this command, and so is the reply.
   const protocol::Request request{
       .seq = client.NextSeq(), .world = world->world, .items = Steps(1, 3, 0.4)};
   client.Send(request);
@@ -458,7 +442,7 @@ TEST(ServerSession, GoesOnAfterALostConnection) {
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
 
   RawClient again = server.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token, last_number);
+  const auto back = again.SayHello(welcome->resume_token, last_number);
   ASSERT_TRUE(back);
   EXPECT_TRUE(back->resumed);
   EXPECT_EQ(back->session, welcome->session);
@@ -469,7 +453,7 @@ TEST(ServerSession, GoesOnAfterALostConnection) {
   EXPECT_EQ(info->seq, 0u);
   EXPECT_EQ(info->world, world->world);
 
-  // The command sent again is answered, and was done once.
+  // The repeated command is answered, and it was executed once.
   again.Send(request);
   std::set<std::uint64_t> numbers;
   std::size_t accepted = 0;
@@ -496,13 +480,13 @@ TEST(ServerSession, GoesOnAfterALostConnection) {
   EXPECT_EQ(*numbers.begin(), last_number + 1);
 }
 
-TEST(ServerSession, MovesToANewConnectionWhileTheOldOneIsHalfOpen) {
+TEST(ServerSession, ReplacesAHalfOpenConnection) {
   TestServer server;
   RawClient old = server.Connect();
   const auto welcome = old.SayHello();
   ASSERT_TRUE(welcome);
   RawClient fresh = server.Connect();
-  const auto back = fresh.SayHello(~0ull, welcome->resume_token);
+  const auto back = fresh.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_TRUE(back->resumed);
   const auto notice = old.Await<ErrorNotice>();
@@ -513,7 +497,7 @@ TEST(ServerSession, MovesToANewConnectionWhileTheOldOneIsHalfOpen) {
   EXPECT_TRUE(fresh.Await<protocol::Pong>());
 }
 
-TEST(ServerSession, EndsWhenItsClientDoesNotComeBack) {
+TEST(ServerSession, EndsAfterTheResumeWindow) {
   server::Config config = TestConfig();
   config.limits.resume_window_s = 0.05;
   config.worlds["kept"] = {.library = "", .persistent = true};
@@ -527,19 +511,19 @@ TEST(ServerSession, EndsWhenItsClientDoesNotComeBack) {
   ASSERT_EQ(client.Spawn(passing->world, {{}, {}, {}})->accepted, 3u);
   ASSERT_EQ(client.Spawn(kept->world, {{}, {}})->accepted, 2u);
   client.Abort();
-  // Its avatars go with it, but not those of a persistent world.
+  // Its avatars are removed, except in a persistent world.
   ASSERT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 2; }));
   ASSERT_TRUE(
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_ended) == 1; }));
   RawClient again = server.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  const auto back = again.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_FALSE(back->resumed);
   EXPECT_NE(back->session, welcome->session);
   EXPECT_EQ(back->last_seq, 0u);
 }
 
-TEST(ServerSession, EndsWithGoodbye) {
+TEST(ServerSession, EndsAfterGoodbye) {
   TestServer server;
   RawClient client = server.Connect();
   ASSERT_TRUE(client.SayHello());
@@ -553,7 +537,7 @@ TEST(ServerSession, EndsWithGoodbye) {
   EXPECT_TRUE(Eventually([&] { return server.metrics().Sum(&ThreadMetrics::avatars) == 0; }));
 }
 
-TEST(ServerSession, StartsAnewAfterARestart) {
+TEST(ServerSession, StartsANewSessionAfterARestart) {
   auto server = std::make_unique<TestServer>();
   RawClient client = server->Connect();
   const auto welcome = client.SayHello();
@@ -567,10 +551,10 @@ TEST(ServerSession, StartsAnewAfterARestart) {
   EXPECT_TRUE(client.AwaitClose());
   server = nullptr;
 
-  // On the same port at once, though connections of the one before still linger.
+  // The server can use the same port at once, although old connections are still closing.
   TestServer restarted(config);
   RawClient again = restarted.Connect();
-  const auto back = again.SayHello(~0ull, welcome->resume_token);
+  const auto back = again.SayHello(welcome->resume_token);
   ASSERT_TRUE(back);
   EXPECT_FALSE(back->resumed);
   EXPECT_TRUE(again.Join("w"));
@@ -590,7 +574,7 @@ TEST(ServerSession, SurvivesMutatedFrames) {
   };
   for (int round = 0; round < 200; ++round) {
     RawClient client = server.Connect();
-    ASSERT_TRUE(client.SayHello(0));
+    ASSERT_TRUE(client.SayHello());
     for (const std::vector<std::byte>& frame : frames) {
       std::vector<std::byte> mutated = frame;
       const unsigned flips = random() % 3;
@@ -612,7 +596,7 @@ protocol::TerrainInfo Slab(double height_m) {
   return info;
 }
 
-TEST(ServerSession, TellsEverybodyInAWorldOfItsGround) {
+TEST(ServerSession, SendsTheTerrainToAllSessionsOfAWorld) {
   server::Config config = TestConfig();
   config.shards = 3;
   TestServer server(config);
@@ -630,17 +614,14 @@ TEST(ServerSession, TellsEverybodyInAWorldOfItsGround) {
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->code, StatusCode::kOk) << reply->text;
   EXPECT_EQ(reply->accepted, 1u);
-  const protocol::WorldTerrain told{world->world, Slab(0.5)};
-  EXPECT_EQ(observer.Await<protocol::WorldTerrain>(), told);
+  const protocol::WorldTerrain terrain{world->world, Slab(0.5)};
+  EXPECT_EQ(observer.Await<protocol::WorldTerrain>(), terrain);
 
-  // Who comes later hears of it, too; who does not know of grounds does not.
+  // A client that joins later receives the terrain, too.
   RawClient late = server.Connect();
   ASSERT_TRUE(late.SayHello());
   ASSERT_TRUE(late.Join("hall"));
-  EXPECT_EQ(late.Await<protocol::WorldTerrain>(), told);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(old.Join("hall"));
+  EXPECT_EQ(late.Await<protocol::WorldTerrain>(), terrain);
 
   const auto refused = set(Slab(20'000.0));
   ASSERT_TRUE(refused);
@@ -654,17 +635,9 @@ TEST(ServerSession, TellsEverybodyInAWorldOfItsGround) {
   const auto not_allowed = observer.Await<Reply>();
   ASSERT_TRUE(not_allowed);
   EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
-  old.Send(protocol::SetTerrain{.seq = old.NextSeq(), .world = world->world});
-  bool was_told = false;
-  const auto unsupported = old.Await<Reply>([&](const protocol::Message& message) {
-    was_told |= std::holds_alternative<protocol::WorldTerrain>(message);
-  });
-  ASSERT_TRUE(unsupported);
-  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
-  EXPECT_FALSE(was_told);
 }
 
-TEST(ServerSession, AResumedSessionHearsOfTheGroundThatIs) {
+TEST(ServerSession, SendsTheCurrentTerrainWhenResumed) {
   TestServer server;
   RawClient other = server.Connect();
   ASSERT_TRUE(other.SayHello());
@@ -679,27 +652,14 @@ TEST(ServerSession, AResumedSessionHearsOfTheGroundThatIs) {
         protocol::SetTerrain{.seq = other.NextSeq(), .world = world->world, .terrain = terrain});
     ASSERT_TRUE(other.Await<Reply>());
     client = server.Connect();
-    const auto back = client.SayHello(~0ull, welcome->resume_token);
+    const auto back = client.SayHello(welcome->resume_token);
     ASSERT_TRUE(back && back->resumed);
     EXPECT_EQ(client.Await<protocol::WorldTerrain>(),
               (protocol::WorldTerrain{world->world, terrain}));
   }
 }
 
-// What a client of before terrain, footprints and walks is answered when it asks for the movement.
-std::optional<StatusCode> WhatOldClientsHear(
-    TestServer& server, const decltype(protocol::RequestItem::movement)& movement,
-    protocol::Interrupt interrupt = protocol::Interrupt::kNone) {
-  RawClient old = server.Connect();
-  if (!old.SayHello(protocol::kFeatureQuantised)) return {};
-  const auto world = old.Join("hall");
-  if (!world) return {};
-  const auto reply = old.Request(world->world, {{1, 9, movement, interrupt}});
-  if (!reply) return {};
-  return reply->code;
-}
-
-// Somebody who commands one avatar.
+// A session that controls one avatar.
 class ServerSessionOfOne : public testing::Test {
  protected:
   void SetUp() override {
@@ -715,7 +675,7 @@ class ServerSessionOfOne : public testing::Test {
   protocol::WorldId world_ = 0;
 };
 
-TEST_F(ServerSessionOfOne, WalksForWhoKnowsOfThem) {
+TEST_F(ServerSessionOfOne, AcceptsWalksOnlyWithTheirFeature) {
   protocol::WalkMovement walk{DVec3(0.5, 0.0, 2.0), 1.0, {DVec3(0.0, 0.0, 1.0)}, 1.0};
   const auto reply = client_.Request(world_, {{1, 7, walk}});
   ASSERT_TRUE(reply);
@@ -725,10 +685,9 @@ TEST_F(ServerSessionOfOne, WalksForWhoKnowsOfThem) {
   ASSERT_TRUE(too_fast);
   ASSERT_EQ(too_fast->items.size(), 1u);
   EXPECT_EQ(too_fast->items[0].code, StatusCode::kOutOfRange);
-  EXPECT_EQ(WhatOldClientsHear(server_, walk), StatusCode::kUnsupported);
 }
 
-TEST_F(ServerSessionOfOne, RequestsTakeOver) {
+TEST_F(ServerSessionOfOne, InterruptsMovements) {
   ASSERT_TRUE(client_.Request(
       world_, {{1, 7, protocol::StandMovement{100.0}}, {1, 8, protocol::StandMovement{1.0}}}));
   const protocol::RequestItem now{1, 9, protocol::StepMovement{.length_m = 0.3},
@@ -736,7 +695,7 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
   const auto reply = client_.Request(world_, {now});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->accepted, 1u);
-  // Had it not, the first stand would go on for a minute and a half.
+  // Without the interrupt, the first stand would last for 90 s.
   std::vector<protocol::RequestId> finished;
   while (finished.size() < 2) {
     const auto events = client_.Await<protocol::Events>();
@@ -748,12 +707,9 @@ TEST_F(ServerSessionOfOne, RequestsTakeOver) {
     }
   }
   EXPECT_EQ(finished, (std::vector<protocol::RequestId>{7, 9}));
-  EXPECT_EQ(WhatOldClientsHear(server_, protocol::StepMovement{}, protocol::Interrupt::kNow),
-            StatusCode::kUnsupported);
-  EXPECT_NE(WhatOldClientsHear(server_, protocol::StepMovement{}), StatusCode::kUnsupported);
 }
 
-TEST_F(ServerSessionOfOne, FootprintsThatMustBeMetAreMetOrRejected) {
+TEST_F(ServerSessionOfOne, ReachesOrRejectsExactFootprints) {
   protocol::StepMovement far{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0},
                              .exact_only = true};
   protocol::StepMovement near = far;
@@ -779,27 +735,9 @@ TEST_F(ServerSessionOfOne, FootprintsThatMustBeMetAreMetOrRejected) {
   EXPECT_LT(rejected.position_m.z, 2.0);
   EXPECT_EQ(heard[3].request_id, 8u);
   EXPECT_NEAR(heard[2].position_m.z, 0.45, 1e-3);
-
-  EXPECT_EQ(WhatOldClientsHear(server_, far), StatusCode::kUnsupported);
 }
 
-TEST_F(ServerSessionOfOne, RefusalsAreAFeatureOfTheirOwn) {
-  RawClient before = server_.Connect();
-  ASSERT_TRUE(before.SayHello(protocol::kFeatureFootprints));
-  const auto world = before.Join("hall");
-  ASSERT_TRUE(world);
-  protocol::StepMovement step{.at = protocol::Footprint{DVec3(0.1, 0.0, 5.0), 0.0}};
-  const auto taken = before.Request(world->world, {{1, 9, step}});
-  ASSERT_TRUE(taken);
-  EXPECT_EQ(taken->accepted, 1u);
-  step.exact_only = true;
-  const auto refused = before.Request(world->world, {{1, 10, step}});
-  ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->code, StatusCode::kUnsupported);
-  EXPECT_NE(refused->text.find("refusals"), std::string::npos) << refused->text;
-}
-
-TEST(ServerSession, LayersForWhoKnowsOfThem) {
+TEST(ServerSession, AcceptsLayersOnlyWithTheirFeature) {
   server::Config config = TestConfig();
   config.shards = 3;
   config.library = "builtin";
@@ -836,7 +774,7 @@ TEST(ServerSession, LayersForWhoKnowsOfThem) {
                                                                {4, StatusCode::kOutOfRange},
                                                                {5, StatusCode::kOutOfRange}}));
 
-  // Who walks tells where its foot is about to stand, and what it plays.
+  // The state contains the next landing of each foot and the active layers.
   const protocol::WalkMovement walk{DVec3(0.0, 0.0, 3.0), 0.0, {}, std::nullopt};
   EXPECT_EQ(client.Request(world->world, {{3, 7, walk}})->accepted, 1u);
   const auto inspect = [&](protocol::AvatarId avatar) {
@@ -864,17 +802,9 @@ TEST(ServerSession, LayersForWhoKnowsOfThem) {
   const auto not_allowed = set(observer, world->world, {{1, "wave"}});
   ASSERT_TRUE(not_allowed);
   EXPECT_EQ(not_allowed->code, StatusCode::kNotAllowed);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  const auto old_world = old.Join("hall");
-  ASSERT_TRUE(old_world);
-  EXPECT_TRUE(old_world->layers.empty());
-  const auto unsupported = set(old, world->world, {{1, "wave"}});
-  ASSERT_TRUE(unsupported);
-  EXPECT_EQ(unsupported->code, StatusCode::kUnsupported);
 }
 
-TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
+TEST(ServerSession, SetsPlanting) {
   server::Config config = TestConfig();
   config.shards = 3;
   config.library = "builtin";
@@ -884,27 +814,27 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
   const auto world = client.Join("hall");
   ASSERT_TRUE(world);
   ASSERT_TRUE(client.Spawn(world->world, {{1, {}}, {2, {}}, {3, {}}}));
-  const auto set = [&](RawClient& who, std::vector<protocol::AvatarId> avatars, bool is_off) {
+  const auto set = [&](RawClient& who, std::vector<protocol::AvatarId> avatars, bool enabled) {
     who.Send(protocol::SetPlanting{
-        .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .is_off = is_off});
+        .seq = who.NextSeq(), .world = world->world, .avatars = avatars, .enabled = enabled});
     return who.Await<Reply>();
   };
-  const auto is_off = [&](protocol::AvatarId avatar) {
+  const auto is_enabled = [&](protocol::AvatarId avatar) {
     client.Send(protocol::InspectAvatar{.nonce = avatar, .world = world->world, .avatar = avatar});
     const auto state = client.Await<protocol::AvatarState>();
     EXPECT_TRUE(state && state->code == StatusCode::kOk);
-    return state->is_planting_off;
+    return state->planting_enabled;
   };
-  const auto reply = set(client, {1, 9, 3}, true);
+  const auto reply = set(client, {1, 9, 3}, false);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->code, StatusCode::kOk);
   EXPECT_EQ(reply->accepted, 2u);
   ASSERT_EQ(reply->items.size(), 1u);
   EXPECT_EQ(reply->items[0].index, 1u);
   EXPECT_EQ(reply->items[0].code, StatusCode::kNoSuchAvatar);
-  EXPECT_TRUE(is_off(1));
-  EXPECT_FALSE(is_off(2));
-  EXPECT_TRUE(is_off(3));
+  EXPECT_FALSE(is_enabled(1));
+  EXPECT_TRUE(is_enabled(2));
+  EXPECT_FALSE(is_enabled(3));
 
   const protocol::StepMovement must{.foot = protocol::FootChoice::kLeft,
                                     .at = protocol::Footprint{DVec3(0.1, 0.0, 0.3), 0.0},
@@ -914,17 +844,13 @@ TEST(ServerSession, PlantingIsSwitchedForWhoKnowsOfIt) {
   EXPECT_EQ(sliding->accepted, 1u);
   ASSERT_EQ(sliding->items.size(), 1u);
   EXPECT_EQ(sliding->items[0].code, StatusCode::kNoMovement);
-  ASSERT_TRUE(set(client, {1}, false));
-  EXPECT_FALSE(is_off(1));
+  ASSERT_TRUE(set(client, {1}, true));
+  EXPECT_TRUE(is_enabled(1));
   EXPECT_EQ(client.Request(world->world, {{1, 9, must}})->accepted, 1u);
 
   RawClient observer = server.Connect();
   ASSERT_TRUE(observer.SayHello() && observer.Join("hall", protocol::Role::kObserver));
-  EXPECT_EQ(set(observer, {1}, true)->code, StatusCode::kNotAllowed);
-  RawClient old = server.Connect();
-  ASSERT_TRUE(old.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(old.Join("hall"));
-  EXPECT_EQ(set(old, {1}, true)->code, StatusCode::kUnsupported);
+  EXPECT_EQ(set(observer, {1}, false)->code, StatusCode::kNotAllowed);
 }
 
 TEST_F(ServerSessionOfOne, StepsToAFootprint) {
@@ -933,7 +859,6 @@ TEST_F(ServerSessionOfOne, StepsToAFootprint) {
   const auto reply = client_.Request(world_, {{1, 7, step}});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->accepted, 1u) << (reply->items.empty() ? "" : reply->items[0].text);
-  EXPECT_EQ(WhatOldClientsHear(server_, step), StatusCode::kUnsupported);
 }
 
 }  // namespace

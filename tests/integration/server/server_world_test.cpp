@@ -1,5 +1,5 @@
-// Worlds over real sockets: poses, events, limits, slow readers, and the same bytes whatever the
-// number of shards.
+// Worlds over real sockets: poses, events, limits, slow readers, and identical bytes for any number
+// of shards.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -11,11 +11,12 @@
 #include <set>
 
 #include "counted_memory.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
-#include "runtime/avatar/avatar_simulation.h"
-#include "test_server.h"
 #include "test_library.h"
+#include "test_server.h"
 
 namespace stridewire {
 namespace {
@@ -38,7 +39,7 @@ double ResidentMiB() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / (1 << 20);
 }
 
-// ---- the same bytes everywhere
+// ---- identical bytes
 
 std::vector<protocol::RequestItem> Choreography(AvatarId avatar) {
   using namespace protocol;
@@ -58,7 +59,7 @@ protocol::Placement Start(AvatarId avatar) {
   return {{3.0 * avatar, 0.0, -1.0 * avatar}, 0.3 * avatar};
 }
 
-// One avatar a metre.
+// Avatars stand in a row, 1 m apart.
 std::vector<protocol::SpawnItem> OnALine(AvatarId count) {
   std::vector<protocol::SpawnItem> items;
   for (AvatarId avatar = 1; avatar <= count; ++avatar) {
@@ -67,21 +68,17 @@ std::vector<protocol::SpawnItem> OnALine(AvatarId count) {
   return items;
 }
 
-// Pose bytes by avatar and number of ticks since its first movement began.
+// Encoded poses by avatar and by ticks since its first movement started.
 using PoseStreams = std::map<AvatarId, std::map<std::uint64_t, std::vector<std::byte>>>;
 
-// Of before compact poses.
-constexpr std::uint64_t kWithoutCompact = ~protocol::kFeatureCompact;
-
-PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
-                         std::uint64_t features = kWithoutCompact) {
+PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode) {
   server::Config config = TestConfig(shards);
-  config.max_catch_up_ticks = 1000;  // a busy machine may be late, but loses no time
+  config.max_catch_up_ticks = 1000;  // late ticks must not lose time
   config.limits.observer_backlog_ticks = 1000;
   TestServer server(config);
   RawClient client = server.Connect();
   PoseStreams streams;
-  if (!client.SayHello(features)) return streams;
+  if (!client.SayHello()) return streams;
   const auto world = client.Join("stage");
   std::vector<protocol::SpawnItem> spawns;
   std::vector<protocol::RequestItem> requests;
@@ -105,7 +102,7 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
         if (event.type == EventType::kStarted && event.request_id == 1) {
           started[event.avatar] = event.tick;
         }
-        // Those who were idle before they were asked said so, too.
+        // Avatars that were idle before their request have an idle event as well.
         if (event.type == EventType::kIdle && started.contains(event.avatar)) ++idle;
       }
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
@@ -125,7 +122,7 @@ PoseStreams PlayOnServer(int shards, int avatars, PoseMode mode,
   return streams;
 }
 
-// The same, without a server.
+// Returns the same poses without a server.
 PoseStreams PlayAlone(int avatars, PoseMode mode, const PoseStreams& like) {
   PoseStreams streams;
   for (int i = 1; i <= avatars; ++i) {
@@ -159,7 +156,7 @@ void ExpectSameWhereBothHave(const PoseStreams& a, const PoseStreams& b) {
     std::size_t common = 0;
     for (const auto& [tick, pose] : poses) {
       const auto other = b.at(avatar).find(tick);
-      if (other == b.at(avatar).end()) continue;  // a tick a busy machine missed
+      if (other == b.at(avatar).end()) continue;  // the server missed this tick
       ++common;
       ASSERT_EQ(pose, other->second) << "avatar " << avatar << ", tick " << tick;
     }
@@ -167,7 +164,7 @@ void ExpectSameWhereBothHave(const PoseStreams& a, const PoseStreams& b) {
   }
 }
 
-TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
+TEST(ServerWorld, SpreadsTheStartsOfALargeCommand) {
   server::Config config = TestConfig(2);
   config.limits.starts_per_tick = 16;
   TestServer server(config);
@@ -188,16 +185,15 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
     const auto reply = client.Request(world->world, items);
     return reply ? reply->accepted : 0;
   };
-  EXPECT_EQ(ask(16, 5), 80u);  // several movements of one are one start
+  EXPECT_EQ(ask(16, 5), 80u);  // several movements of one avatar count as one start
   EXPECT_EQ(held(), 0u);
   EXPECT_EQ(ask(48, 1), 48u);
   std::uint64_t expected = 0;
-  for (AvatarId avatar = 1; avatar <= 48; ++avatar)
-    expected += server::StartTickOf(avatar, 3) > 0;
+  for (AvatarId avatar = 1; avatar <= 48; ++avatar) expected += server::StartTickOf(avatar, 3) > 0;
   EXPECT_EQ(held(), expected);
 }
 
-TEST(ServerWorld, MakesACrowdOverSomeTicks) {
+TEST(ServerWorld, SpreadsSpawnsOverTicks) {
   constexpr AvatarId kCrowd = 60;
   server::Config config = TestConfig(2);
   config.limits.spawns_per_tick = 4;
@@ -205,12 +201,11 @@ TEST(ServerWorld, MakesACrowdOverSomeTicks) {
   auto [crowd, world] = server.Enter("crowd");
   auto [other, same_world] = server.Enter("other");
   std::vector<protocol::SpawnItem> spawns;
-  for (AvatarId avatar = 1; avatar <= kCrowd; ++avatar)
-    spawns.push_back({avatar, Start(avatar)});
-  spawns.push_back({7, Start(7)});  // lives already
+  for (AvatarId avatar = 1; avatar <= kCrowd; ++avatar) spawns.push_back({avatar, Start(avatar)});
+  spawns.push_back({7, Start(7)});  // exists already
   const protocol::Seq spawn_seq = crowd.NextSeq();
   crowd.Send(protocol::Spawn{.seq = spawn_seq, .world = world->world, .items = spawns});
-  // What is sent behind it is done behind it.
+  // Later commands of the session are executed after the spawn.
   const protocol::Seq ask_seq = crowd.NextSeq();
   crowd.Send(protocol::Request{
       .seq = ask_seq,
@@ -225,7 +220,7 @@ TEST(ServerWorld, MakesACrowdOverSomeTicks) {
     ASSERT_TRUE(message);
     if (const auto* reply = std::get_if<Reply>(&*message)) replies.push_back(*reply);
   }
-  // The shard of the avatar asked may be done a tick before the other one.
+  // The shards may finish at different ticks.
   if (replies[0].seq == ask_seq) std::swap(replies[0], replies[1]);
   EXPECT_EQ(replies[0].seq, spawn_seq);
   EXPECT_EQ(replies[0].accepted, kCrowd);
@@ -236,39 +231,35 @@ TEST(ServerWorld, MakesACrowdOverSomeTicks) {
   }
   EXPECT_EQ(replies[1].seq, ask_seq);
   EXPECT_EQ(replies[1].accepted, 1u);
-  // All but those of each shard's first tick, which the other client may have had a share of.
+  // In the first tick of each shard, the other client may have used a part of the limit.
   EXPECT_GE(server.metrics().Sum(Limit::kSpawnsPerTick), kCrowd + 1 - 2 * 4);
   EXPECT_LE(server.metrics().Sum(Limit::kSpawnsPerTick), kCrowd + 1 - 2 * 2);
 }
 
-TEST(ServerWorld, GivesTheSameBytesWithAnyNumberOfShards) {
+TEST(ServerWorld, ProducesIdenticalBytesForAnyNumberOfShards) {
   constexpr int kAvatars = 6;
   const PoseStreams one = PlayOnServer(1, kAvatars, PoseMode::kFull);
   ASSERT_EQ(one.size(), static_cast<std::size_t>(kAvatars));
-  // And they are the library's own.
+  // The bytes are also identical to those without a server.
   ExpectSameWhereBothHave(one, PlayAlone(kAvatars, PoseMode::kFull, one));
   for (const int shards : {2, 4}) {
     SCOPED_TRACE(shards);
     ExpectSameWhereBothHave(one, PlayOnServer(shards, kAvatars, PoseMode::kFull));
   }
-  const PoseStreams quantised = PlayOnServer(4, kAvatars, PoseMode::kQuantised);
-  ExpectSameWhereBothHave(quantised, PlayAlone(kAvatars, PoseMode::kQuantised, quantised));
-  // Compact ones are encoded beside others, who they are by chance of the shards.
-  const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised, ~0ull);
-  ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised, ~0ull));
+  // Compact poses are encoded in batches with other avatars, which depend on the shards.
+  const PoseStreams compact = PlayOnServer(1, kAvatars, PoseMode::kQuantised);
+  ExpectSameWhereBothHave(compact, PlayOnServer(4, kAvatars, PoseMode::kQuantised));
 }
 
-// Nobody is sent what another asked for, and what nobody asks for is not made.
-TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
+// Each session receives only the detail that it requested, and other details are not encoded.
+TEST(ServerWorld, SendsPosesInTheRequestedDetail) {
   using protocol::PoseDetail;
   TestServer server(TestConfig(2));
   RawClient client = server.Connect();
-  RawClient old = server.Connect();
-  ASSERT_TRUE(client.SayHello() && old.SayHello(~protocol::kFeatureDetail));
+  RawClient other = server.Connect();
+  ASSERT_TRUE(client.SayHello() && other.SayHello());
   const auto world = client.Join("w");
-  const auto old_world = old.Join("w", protocol::Role::kObserver);
-  ASSERT_TRUE(world && old_world);
-  EXPECT_TRUE(old_world->fewer_joints.empty());
+  ASSERT_TRUE(world && other.Join("w", protocol::Role::kObserver));
   const auto observe = [&](RawClient& who, PoseDetail detail, std::uint16_t every_n_ticks = 1) {
     who.Send(protocol::Observe{.seq = who.NextSeq(),
                                .world = world->world,
@@ -280,17 +271,16 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
                                .detail = detail});
     return who.Await<protocol::Reply>()->code;
   };
-  EXPECT_EQ(observe(old, PoseDetail::kFewer), StatusCode::kUnsupported);
-  EXPECT_EQ(observe(old, PoseDetail::kAll), StatusCode::kOk);
+  EXPECT_EQ(observe(other, PoseDetail::kAll), StatusCode::kOk);
 
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
   const auto codecs =
-      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->fewer_joints).value();
+      protocol::CompactCodecs::Make(world->rotation_codes, parents, world->reduced_joints).value();
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   ASSERT_TRUE(client.Request(world->world, Steps(1, 40, 0.6)));
-  constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot};
-  // Those of the root come half as often.
+  constexpr std::array kDetails{PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kRoot};
+  // Root poses are sent half as often.
   for (const PoseDetail detail : kDetails) {
     ASSERT_EQ(observe(client, detail, detail == PoseDetail::kRoot ? 2 : 1), StatusCode::kOk);
   }
@@ -301,7 +291,7 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
     const auto batch = client.Await<protocol::PoseBatch>();
     ASSERT_TRUE(batch);
     const PoseMode mode = batch->info.mode;
-    if (batch->avatars.empty()) continue;  // of the shard that has nobody
+    if (batch->avatars.empty()) continue;  // from a shard without avatars
     ASSERT_NE(codecs.Find(mode), nullptr);
     EXPECT_EQ(mode == PoseMode::kCompactRoot ? batch->info.tick % 2 : 0, 0u);
     protocol::PoseBatchReader reader(*batch, codecs.Find(mode));
@@ -313,49 +303,46 @@ TEST(ServerWorld, PosesAreToldInTheDetailAskedFor) {
     ++counts[mode];
   }
   EXPECT_EQ(bytes[PoseMode::kCompactRoot], 18u);
-  // Toys hardly have what could be left out.
-  EXPECT_LE(bytes[PoseMode::kCompactFewer], bytes[PoseMode::kCompact]);
+  // The test skeleton has hardly any joints that could be omitted.
+  EXPECT_LE(bytes[PoseMode::kCompactReduced], bytes[PoseMode::kCompact]);
   int compared = 0;
   for (const auto& [tick, modes] : seen) {
     if (modes.size() < 3) continue;
     ++compared;
     for (std::size_t j = 0; j < parents.size(); ++j) {
-      const bool is_told =
-          std::ranges::binary_search(world->fewer_joints, static_cast<std::uint16_t>(j));
+      const bool is_included =
+          std::ranges::binary_search(world->reduced_joints, static_cast<std::uint16_t>(j));
       const Quat& reference = world->rotation_codes[j].reference;
       const Quat& all = modes.at(PoseMode::kCompact)[j];
-      EXPECT_EQ(modes.at(PoseMode::kCompactFewer)[j], is_told ? all : reference) << j;
+      EXPECT_EQ(modes.at(PoseMode::kCompactReduced)[j], is_included ? all : reference) << j;
       EXPECT_EQ(modes.at(PoseMode::kCompactRoot)[j], j == 0 ? all : reference) << j;
     }
   }
   EXPECT_GT(compared, 10);
 }
 
-// What each of two observers of one avatar shows at the same ticks.
-TEST(ServerWorld, QuantisedPosesAreCompactForWhoAgreedOnThem) {
+// Compares the poses that two observers of one avatar receive in the same ticks.
+TEST(ServerWorld, SendsQuantisedPosesInCompactMode) {
   TestServer server(TestConfig(1));
-  RawClient with = server.Connect();
-  RawClient without = server.Connect();
-  const auto welcome = with.SayHello();
-  ASSERT_TRUE(welcome && without.SayHello(kWithoutCompact));
-  const auto world = with.Join("w");
-  const auto old_world = without.Join("w", protocol::Role::kObserver);
-  ASSERT_TRUE(world && old_world);
-  EXPECT_TRUE(old_world->rotation_codes.empty());
+  RawClient quantised = server.Connect();
+  RawClient full = server.Connect();
+  ASSERT_TRUE(quantised.SayHello() && full.SayHello());
+  const auto world = quantised.Join("w");
+  ASSERT_TRUE(world && full.Join("w", protocol::Role::kObserver));
   ASSERT_EQ(world->rotation_codes.size(), world->skeleton.joints.size());
   std::vector<std::int16_t> parents;
   for (const protocol::JointInfo& joint : world->skeleton.joints) parents.push_back(joint.parent);
   const auto codec = protocol::CompactCodec::Make(world->rotation_codes, parents).value();
   ASSERT_LT(codec.pose_bytes(), protocol::PoseBytes(PoseMode::kQuantised, parents.size()));
 
-  ASSERT_TRUE(with.Spawn(world->world, {{.avatar = 1}}));
-  ASSERT_TRUE(with.Request(world->world, Steps(1, 20, 0.6)));
-  ASSERT_EQ(with.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
-  ASSERT_EQ(without.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  ASSERT_TRUE(quantised.Spawn(world->world, {{.avatar = 1}}));
+  ASSERT_TRUE(quantised.Request(world->world, Steps(1, 20, 0.6)));
+  ASSERT_EQ(quantised.Observe(world->world, 1, PoseMode::kQuantised)->code, StatusCode::kOk);
+  ASSERT_EQ(full.Observe(world->world, 1, PoseMode::kFull)->code, StatusCode::kOk);
   std::map<std::uint64_t, std::vector<Quat>> seen;
   std::size_t bytes = 0;
   while (seen.size() < 30) {
-    const auto batch = with.Await<protocol::PoseBatch>();
+    const auto batch = quantised.Await<protocol::PoseBatch>();
     ASSERT_TRUE(batch);
     ASSERT_EQ(batch->info.mode, PoseMode::kCompact);
     ASSERT_THAT(batch->avatars, ElementsAre(1u));
@@ -369,32 +356,24 @@ TEST(ServerWorld, QuantisedPosesAreCompactForWhoAgreedOnThem) {
   EXPECT_LE(bytes, 30 * codec.pose_bytes() + 200);
   int compared = 0;
   while (compared < 5) {
-    const auto batch = without.Await<protocol::PoseBatch>();
+    const auto batch = full.Await<protocol::PoseBatch>();
     ASSERT_TRUE(batch);
-    ASSERT_EQ(batch->info.mode, PoseMode::kQuantised);
+    ASSERT_EQ(batch->info.mode, PoseMode::kFull);
     if (!seen.contains(batch->info.tick)) continue;
     ++compared;
     Vec3 root;
     std::vector<Quat> rotations(parents.size());
-    ASSERT_TRUE(protocol::DecodePose(PoseMode::kQuantised, batch->pose(0), root, rotations));
+    ASSERT_TRUE(protocol::DecodePose(PoseMode::kFull, batch->pose(0), root, rotations));
     for (std::size_t j = 0; j < parents.size(); ++j) {
-      // Each joint makes up for those above it: by up to two of the 0.23 degrees that one may be off.
+      // Each joint compensates the errors of its ancestors: up to two errors of 0.23 degrees.
       EXPECT_LE(AngleBetween(rotations[j], seen[batch->info.tick][j]), 0.009) << j;
     }
   }
-  // A client that comes back as one of before does not get what it did not agree on.
-  with.Abort();
-  with = server.Connect();
-  const auto back = with.SayHello(kWithoutCompact, welcome->resume_token);
-  ASSERT_TRUE(back && back->resumed);
-  const auto batch = with.Await<protocol::PoseBatch>();
-  ASSERT_TRUE(batch);
-  EXPECT_EQ(batch->info.mode, PoseMode::kQuantised);
 }
 
-// ---- watching
+// ---- subscriptions
 
-TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
+TEST(ServerWorld, SendsPosesAsSubscribed) {
   TestServer server;
   auto [controller, world] = server.Enter("w");
   ASSERT_TRUE(controller.Spawn(world->world, {{.avatar = 1}, {.avatar = 2}, {.avatar = 3}}));
@@ -402,14 +381,14 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
   RawClient watcher = server.Enter("w", protocol::Role::kObserver).first;
   ASSERT_EQ(watcher.Observe(world->world, 1, PoseMode::kQuantised, false, 4)->code,
             StatusCode::kOk);
-  // A second one of the same mode gets no copy: 6 and 4 are both served by one stream.
+  // A second subscription of the same mode adds no copies: one stream serves intervals 6 and 4.
   ASSERT_EQ(watcher.Observe(world->world, 2, PoseMode::kQuantised, false, 6)->code,
             StatusCode::kOk);
   std::map<std::pair<std::uint64_t, int>, int> seen;
   for (int i = 0; i < 40; ++i) {
     const auto message = watcher.Receive();
     ASSERT_TRUE(message);
-    // An observer that did not ask for events hears of none.
+    // An observer that did not request events receives none.
     ASSERT_FALSE(std::holds_alternative<protocol::Events>(*message));
     const auto* batch = std::get_if<protocol::PoseBatch>(&*message);
     if (batch == nullptr) continue;
@@ -421,7 +400,7 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
       EXPECT_EQ(avatar % 2, batch->info.shard);
     }
   }
-  // Nothing is encoded for nobody: after the last subscription ends poses cease.
+  // After the last subscription has ended, no poses are encoded.
   watcher.Send(protocol::StopObserving{.seq = watcher.NextSeq(), .subscription = 1});
   ASSERT_TRUE(watcher.Await<Reply>());
   watcher.Send(protocol::StopObserving{.seq = watcher.NextSeq(), .subscription = 2});
@@ -433,7 +412,7 @@ TEST(ServerWorld, SendsWhatASubscriptionAsksFor) {
   }));
 }
 
-TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
+TEST(ServerWorld, FlagsDiscontinuities) {
   TestServer server(TestConfig(1));
   auto [client, world] = server.Enter("w");
   ASSERT_TRUE(client.Observe(world->world, 1, PoseMode::kFull));
@@ -447,7 +426,7 @@ TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
   ASSERT_TRUE(batch);
   EXPECT_EQ(batch->flags[0] & protocol::kPoseDiscontinuity, 0);
 
-  // The last avatar's end shows as one empty batch.
+  // The removal of the last avatar causes one empty batch.
   client.Send(protocol::Remove{.seq = client.NextSeq(), .world = world->world, .avatars = {1}});
   do {
     batch = client.Await<protocol::PoseBatch>();
@@ -455,9 +434,9 @@ TEST(ServerWorld, FlagsWhereNoClientMayInterpolate) {
   } while (!batch->avatars.empty());
 }
 
-// A session that names avatars gets exactly those, whichever shard they live on, for as long as none of its
-// subscriptions is about all.
-TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
+// A session that selects avatars receives exactly these from all shards, unless one of its
+// subscriptions covers all avatars.
+TEST(ServerWorld, SendsOnlySelectedAvatars) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
   std::vector<protocol::SpawnItem> items;
@@ -475,7 +454,7 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
     const auto reply = client.Await<Reply>();
     return reply ? reply->code : StatusCode::kInternal;
   };
-  // Batches come until each shard's says this.
+  // Receives batches until the last batch of each shard contains exactly these avatars.
   const auto shows = [&](std::vector<AvatarId> even, std::vector<AvatarId> odd) {
     for (int i = 0; i < 200; ++i) {
       const auto batch = client.Await<protocol::PoseBatch>();
@@ -490,7 +469,7 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   ASSERT_EQ(observe(2, {6, 7, 2}), StatusCode::kOk);
   EXPECT_TRUE(shows({2, 4, 6}, {7}));
   EXPECT_GT(server.metrics().Sum(&ThreadMetrics::batches_composed), 0u);
-  // One that is spawned later, and one that goes.
+  // One avatar is spawned later, another is removed.
   ASSERT_EQ(controller.Spawn(world->world, {{.avatar = 99, .start = {}}})->accepted, 1u);
   EXPECT_TRUE(shows({2, 4, 6}, {7, 99}));
   controller.Send(
@@ -499,7 +478,7 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   client.Send(protocol::StopObserving{.seq = client.NextSeq(), .subscription = 1});
   ASSERT_EQ(client.Await<Reply>()->code, StatusCode::kOk);
   EXPECT_TRUE(shows({2, 6}, {}));
-  // One that is about all.
+  // A subscription to all avatars.
   ASSERT_EQ(observe(3, {}), StatusCode::kOk);
   EXPECT_TRUE(shows({2, 6, 8, 10, 12, 14, 16, 18, 20}, {1, 3, 5, 9, 11, 13, 15, 17, 19}));
   client.Send(protocol::StopObserving{.seq = client.NextSeq(), .subscription = 3});
@@ -507,8 +486,8 @@ TEST(ServerWorld, SendsWhoNamesAvatarsThoseAndNoOthers) {
   EXPECT_TRUE(shows({2, 6}, {}));
 }
 
-// A player walks along a crowd that stands on a line, one avatar a metre.
-TEST(ServerWorld, ShowsARegionThatMoves) {
+// A region moves along a row of avatars that stand 1 m apart.
+TEST(ServerWorld, TracksAMovingRegion) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
   ASSERT_EQ(controller.Spawn(world->world, OnALine(60))->accepted, 60u);
@@ -555,7 +534,7 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
       take(*message);
     }
     EXPECT_EQ(inside, expected);
-    // Poses of all of them go on.
+    // All avatars inside receive poses in later ticks.
     seen.clear();
     for (int i = 0; i < 300 && seen.size() < expected.size(); ++i) {
       const auto message = player.Receive();
@@ -568,31 +547,22 @@ TEST(ServerWorld, ShowsARegionThatMoves) {
   ASSERT_EQ(observe(20.0, false), StatusCode::kOk);
   EXPECT_TRUE(shows(15, 25));
   EXPECT_EQ(observe(20.0, false), StatusCode::kSubscriptionExists);
-  // Those behind stay for another 3 m.
+  // Avatars behind the region stay members for another 3 m.
   ASSERT_EQ(observe(23.0, true), StatusCode::kOk);
   EXPECT_TRUE(shows(15, 28));
   ASSERT_EQ(observe(40.0, true), StatusCode::kOk);
   EXPECT_TRUE(shows(35, 45));
   EXPECT_NE(server.metrics().Text().find("stridewire_regions 1\n"), std::string::npos);
-  // Who is taken out of the world leaves as well.
+  // An avatar that is removed from the world leaves the region.
   controller.Send(
       protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {45, 44}});
   EXPECT_TRUE(shows(35, 43));
-  // A region is alone in its world.
+  // A region must be the only subscription of its world.
   player.Send(protocol::Observe{.seq = player.NextSeq(), .world = world->world, .subscription = 2});
   EXPECT_EQ(player.Await<Reply>(take)->code, StatusCode::kNotAllowed);
-
-  // Who did not agree on the feature has none.
-  RawClient other = server.Connect();
-  ASSERT_TRUE(other.SayHello(protocol::kFeatureQuantised));
-  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
-  protocol::Observe without{.seq = other.NextSeq(), .world = world->world, .subscription = 1};
-  without.region = protocol::Region{{0.0, 0.0}, 1.0, {}, {}, {}};
-  other.Send(without);
-  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
 }
 
-/// What an observer of a region hears.
+/// The poses that an observer of a region receives.
 struct Heard {
   std::map<AvatarId, PoseMode> mode;  // of the last pose
   std::map<AvatarId, std::set<std::uint64_t>> ticks;
@@ -608,15 +578,16 @@ struct Heard {
       EXPECT_TRUE(batch->info.is_partial);
       for (const AvatarId avatar : batch->avatars) {
         mode[avatar] = batch->info.mode;
-        // One pose a tick, whatever the number of details.
+        // One pose per tick, for any number of levels of detail.
         EXPECT_TRUE(ticks[avatar].insert(batch->info.tick).second) << avatar;
       }
     }
   }
 };
 
-// A crowd on a line, one avatar a metre: near ones with all joints every tick, then fewer, then the root alone.
-TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
+// Avatars in a row, 1 m apart: near ones with all joints in every tick, then reduced joints, then
+// the root only.
+TEST(ServerWorld, SendsEachRingInItsDetailAndInterval) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
   ASSERT_EQ(controller.Spawn(world->world, OnALine(60))->accepted, 60u);
@@ -629,7 +600,7 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
                           .every_n_ticks = 4,
                           .detail = protocol::PoseDetail::kRoot};
   asked.region = protocol::Region{{0.0, 0.0}, 40.5, 3.0, {{10.5, 1}, {20.5, 2}}, {}};
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
   const auto observe = [&] {
     asked.seq = player.NextSeq();
     player.Send(asked);
@@ -651,15 +622,15 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   ASSERT_EQ(observe(), StatusCode::kOk);
   hear(100);
   heard.ticks.clear();
-  hear(200);  // two shards: 3.5 batches a tick
+  hear(200);  // two shards: 3.5 batches per tick
   shows(1, 10, PoseMode::kCompact);
-  shows(11, 20, PoseMode::kCompactFewer);
+  shows(11, 20, PoseMode::kCompactReduced);
   shows(21, 40, PoseMode::kCompactRoot);
   EXPECT_EQ(heard.mode.size(), 40u);
   for (const auto& [avatar, ticks] : heard.ticks) {
     const std::uint64_t every = avatar <= 10 ? 1 : avatar <= 20 ? 2 : 4;
     for (const std::uint64_t tick : ticks) EXPECT_EQ(tick % every, 0u) << avatar;
-    // A busy machine may miss ticks, of all avatars of a shard alike.
+    // The server may miss ticks, but always for all avatars of a shard.
     const auto due = std::ranges::count_if(heard.ticks[2 - avatar % 2],
                                            [&](std::uint64_t tick) { return tick % every == 0; });
     EXPECT_GE(due, 3) << avatar;
@@ -667,15 +638,15 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   }
   EXPECT_EQ(heard.entered.size(), 40u);
 
-  // Moved 5 m, and nobody beyond the edges: who is in another ring now neither enters nor leaves.
+  // The region moves by 5 m. Avatars that are in another ring now neither enter nor leave.
   asked.region->centre_m.x = 5.0;
   asked.replace = true;
   ASSERT_EQ(observe(), StatusCode::kOk);
   hear(100);
   shows(1, 15, PoseMode::kCompact);
-  shows(16, 25, PoseMode::kCompactFewer);
+  shows(16, 25, PoseMode::kCompactReduced);
   shows(26, 45, PoseMode::kCompactRoot);
-  // And with the Observe's detail everywhere.
+  // Without details of rings, the detail of the subscription applies everywhere.
   asked.region->ring_details.clear();
   ASSERT_EQ(observe(), StatusCode::kOk);
   hear(100);
@@ -684,23 +655,14 @@ TEST(ServerWorld, SendsEachRingOfARegionInItsDetailAndAtItsRate) {
   for (const auto& [avatar, times] : heard.entered) EXPECT_EQ(times, 1) << avatar;
   EXPECT_TRUE(heard.left.empty());
 
-  // A region is found by the detail beyond its rings.
-  asked.detail = protocol::PoseDetail::kFewer;
+  // Moving a region requires the same detail beyond its rings.
+  asked.detail = protocol::PoseDetail::kReduced;
   EXPECT_EQ(observe(), StatusCode::kNoSuchSubscription);
-  // Without the feature rings have none.
-  RawClient other = server.Connect();
-  ASSERT_TRUE(other.SayHello(~protocol::kFeatureDetail));
-  ASSERT_TRUE(other.Join("w", protocol::Role::kObserver));
-  asked.seq = other.NextSeq();
-  asked.replace = false;
-  asked.detail = protocol::PoseDetail::kAll;
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kRoot};
-  other.Send(asked);
-  EXPECT_EQ(other.Await<Reply>()->code, StatusCode::kUnsupported);
 }
 
-// It walks out of a ring into another and on to where its pose is told once a minute; then it is taken away.
-TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
+// An avatar walks from ring to ring, to one whose poses are sent once per minute. Then it is
+// removed.
+TEST(ServerWorld, ReportsLeavingFromARingWithALongInterval) {
   TestServer server(TestConfig(2));
   auto [controller, world] = server.Enter("w");
   ASSERT_EQ(
@@ -716,7 +678,7 @@ TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
                           .every_n_ticks = 3600,
                           .detail = protocol::PoseDetail::kRoot};
   asked.region = protocol::Region{{0.0, 0.0}, 40.0, 3.0, {{2.0, 1}, {2.3, 1}}, {}};
-  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kFewer};
+  asked.region->ring_details = {protocol::PoseDetail::kAll, protocol::PoseDetail::kReduced};
   player.Send(asked);
   ASSERT_EQ(player.Await<Reply>(take)->code, StatusCode::kOk);
   const auto hear_until = [&](auto&& condition) {
@@ -741,16 +703,16 @@ TEST(ServerWorld, TellsWhoLeavesFromARingThatIsSeldomSent) {
       protocol::Remove{.seq = controller.NextSeq(), .world = world->world, .avatars = {7}});
   EXPECT_TRUE(hear_until([&] { return heard.left[7] == 1; }));
   EXPECT_EQ(heard.entered[7], 1);
-  EXPECT_EQ(heard.mode[7], PoseMode::kCompactFewer);
+  EXPECT_EQ(heard.mode[7], PoseMode::kCompactReduced);
 }
 
-TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {
+TEST(ServerWorld, SendsEventsToSubscribersAndControllers) {
   TestServer server;
   RawClient controller = server.Connect();
   RawClient other = server.Connect();
   RawClient watcher = server.Connect();
   ASSERT_TRUE(controller.SayHello());
-  ASSERT_TRUE(other.SayHello(0));  // without replay: shared, unnumbered
+  ASSERT_TRUE(other.SayHello());
   ASSERT_TRUE(watcher.SayHello());
   const auto world = controller.Join("w");
   ASSERT_TRUE(world);
@@ -761,14 +723,14 @@ TEST(ServerWorld, TellsEventsToThoseWhoAskAndToControllers) {
   for (RawClient* client : {&other, &watcher}) {
     const auto events = client->Await<protocol::Events>();
     ASSERT_TRUE(events);
-    EXPECT_EQ(events->number, client == &other ? 0u : 1u);
+    EXPECT_EQ(events->number, 1u);
     EXPECT_EQ(events->events[0].type, EventType::kSpawned);
     EXPECT_EQ(events->events[0].avatar, 4u);
     EXPECT_EQ(events->events[0].base, (protocol::Placement{{1, 2, 3}, 4}));
   }
 }
 
-TEST(ServerWorld, ComesIntoBeingWhenJoinedAndEndsWhenLeft) {
+TEST(ServerWorld, IsCreatedWhenJoinedAndRemovedWhenLeft) {
   server::Config config = TestConfig();
   config.open_worlds = false;
   config.worlds["known"] = {};
@@ -787,7 +749,7 @@ TEST(ServerWorld, ComesIntoBeingWhenJoinedAndEndsWhenLeft) {
   ASSERT_TRUE(client.Await<Reply>());
   EXPECT_TRUE(Eventually(
       [&] { return server.metrics().Text().find("stridewire_worlds 0\n") != std::string::npos; }));
-  // Joined again it is another one.
+  // Joining again creates another world.
   const auto again = client.Join("known");
   ASSERT_TRUE(again);
   EXPECT_NE(again->world, world->world);
@@ -795,7 +757,7 @@ TEST(ServerWorld, ComesIntoBeingWhenJoinedAndEndsWhenLeft) {
 
 // ---- limits
 
-TEST(ServerLimits, EachIsKeptAndCounted) {
+TEST(ServerLimits, AreEnforcedAndCounted) {
   server::Config config = TestConfig(2);
   config.limits.max_worlds = 2;
   config.limits.max_worlds_per_session = 2;
@@ -823,7 +785,7 @@ TEST(ServerLimits, EachIsKeptAndCounted) {
   ASSERT_TRUE(spawned);
   EXPECT_EQ(spawned->accepted, 1u);
   EXPECT_EQ(reached(Limit::kAvatars), 1u);
-  // What is removed makes room.
+  // Removing an avatar makes room for another.
   client.Send(protocol::Remove{.seq = client.NextSeq(), .world = a->world, .avatars = {1, 2}});
   ASSERT_TRUE(client.Await<Reply>());
   EXPECT_EQ(client.Spawn(b->world, {{}, {}})->accepted, 2u);
@@ -858,7 +820,7 @@ TEST(ServerLimits, EachIsKeptAndCounted) {
   EXPECT_EQ(reached(Limit::kSessionsPerAddress), 1u);
 }
 
-TEST(ServerLimits, SessionsOfAll) {
+TEST(ServerLimits, LimitTheNumberOfSessions) {
   server::Config config = TestConfig();
   config.limits.max_sessions = 1;
   TestServer server(config);
@@ -870,7 +832,7 @@ TEST(ServerLimits, SessionsOfAll) {
   ASSERT_TRUE(notice);
   EXPECT_EQ(notice->code, StatusCode::kLimitReached);
   EXPECT_EQ(server.metrics().Sum(Limit::kSessions), 1u);
-  // One that ends makes room.
+  // A session that ends makes room for another.
   first.Send(protocol::Goodbye{});
   ASSERT_TRUE(first.AwaitClose());
   EXPECT_TRUE(Eventually([&] {
@@ -881,7 +843,7 @@ TEST(ServerLimits, SessionsOfAll) {
   }));
 }
 
-TEST(ServerLimits, Handshakes) {
+TEST(ServerLimits, LimitTheNumberOfHandshakes) {
   server::Config config = TestConfig();
   config.limits.max_handshakes = 2;
   TestServer server(config);
@@ -892,7 +854,7 @@ TEST(ServerLimits, Handshakes) {
   EXPECT_EQ(server.metrics().Sum(Limit::kHandshakes), 1u);
 }
 
-TEST(ServerLimits, ItemsASecond) {
+TEST(ServerLimits, LimitItemsPerSecond) {
   server::Config config = TestConfig();
   config.limits.requests_per_s = 1;
   config.limits.request_burst = 10;
@@ -907,7 +869,7 @@ TEST(ServerLimits, ItemsASecond) {
   EXPECT_EQ(server.metrics().Sum(Limit::kRequestsPerSecond), 1u);
 }
 
-TEST(ServerLimits, MessagesASecondSlowAClientDownButAllAreAnswered) {
+TEST(ServerLimits, MessagesPerSecondDelayAClientWithoutLosingMessages) {
   server::Config config = TestConfig();
   config.limits.messages_per_s = 100;
   TestServer server(config);
@@ -923,7 +885,7 @@ TEST(ServerLimits, MessagesASecondSlowAClientDownButAllAreAnswered) {
   EXPECT_GT(server.metrics().Sum(Limit::kMessagesPerSecond), 0u);
 }
 
-TEST(ServerLimits, PendingCommandsWaitForTheirTurn) {
+TEST(ServerLimits, PendingCommandsDelayFurtherCommands) {
   server::Config config = TestConfig();
   config.limits.max_pending_commands = 4;
   TestServer server(config);
@@ -944,15 +906,15 @@ TEST(ServerLimits, PendingCommandsWaitForTheirTurn) {
 
 // ---- memory
 
-TEST(ServerMemory, AnAvatarCostsWhatTheServersPageSays) {
-  const auto library = server::LoadLibrary("builtin");
+TEST(ServerMemory, MatchesTheDocumentedSizeOfAnAvatar) {
+  const auto library = OpenLibrary("builtin");
   ASSERT_TRUE(library);
   auto world = std::make_shared<server::World>();
   world->library = *library;
   server::AvatarBudget budget(10'000, 10'000);
   ThreadMetrics metrics;
   const server::TickClock clock(server::TickClock::Clock::time_point{}, 60.0);
-  server::WorldShard shard(world, 0, 1, 256, clock, budget, metrics);
+  server::WorldShard shard({.world = world, .clock = clock, .budget = budget, .metrics = metrics});
   constexpr std::size_t kAvatars = 1000;
   const std::size_t before = counted_memory::LiveBytes();
   server::SpawnPart spawn;
@@ -975,9 +937,9 @@ TEST(ServerMemory, AnAvatarCostsWhatTheServersPageSays) {
 
 // ---- slow readers
 
-TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
+TEST(ServerSlowReader, DoesNotIncreaseMemoryOrDelayOthers) {
   server::Config config = TestConfig(2);
-  config.tick_hz = 240.0;  // the same load in a quarter of the time
+  config.tick_hz = 240.0;  // a higher rate makes the test shorter
   config.limits.socket_send_buffer_bytes = 64 << 10;
   TestServer server(config);
   auto [controller, world] = server.Enter("w");
@@ -998,7 +960,7 @@ TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
   ASSERT_TRUE(good.Observe(world->world, 1, PoseMode::kQuantised));
   ASSERT_TRUE(stuck.Observe(world->world, 1, PoseMode::kFull, true));
 
-  // The good one reads while the other one does not; then both views of memory, early and late.
+  // One observer reads and the other does not. Memory is measured early and late.
   const auto read_until_dropped = [&](std::uint64_t dropped) {
     std::uint64_t last_tick = 0;
     while (server.metrics().Sum(&ThreadMetrics::batches_dropped) < dropped) {
@@ -1024,26 +986,26 @@ TEST(ServerSlowReader, NeitherGrowsNorSlowsTheServer) {
       1e3 *
           std::max(server.metrics().shard(0).tick.max_s(), server.metrics().shard(1).tick.max_s()),
       static_cast<unsigned long long>(server.metrics().Sum(&ThreadMetrics::ticks_missed)));
-  // 800 full batches of 100 avatars would be 10 MB; events are bounded by the control buffer.
+  // 800 full batches of 100 avatars have 10 MB. Events are limited by control_buffer_bytes.
   EXPECT_LT(late_bytes, early_bytes + config.limits.control_buffer_bytes + (std::size_t{1} << 20));
   EXPECT_GT(late_tick, early_tick);
 
-  // When it reads again it hears what it lost, and then the present, not the past.
-  std::uint64_t told = 0;
+  // When it reads again, it receives the number of lost batches and current poses.
+  std::uint64_t dropped = 0;
   std::uint64_t newest = 0;
-  while (told == 0 || newest < late_tick) {
+  while (dropped == 0 || newest < late_tick) {
     const auto message = stuck.Receive();
     ASSERT_TRUE(message);
     if (const auto* lagging = std::get_if<protocol::Lagging>(&*message)) {
-      told = lagging->dropped_batches;
+      dropped = lagging->dropped_batches;
     } else if (const auto* batch = std::get_if<protocol::PoseBatch>(&*message)) {
       newest = std::max(newest, batch->info.tick);
     }
   }
-  EXPECT_GT(told, 0u);
+  EXPECT_GT(dropped, 0u);
 }
 
-TEST(ServerSlowReader, IsDisconnectedWhenItTakesNothingForTooLong) {
+TEST(ServerSlowReader, IsDisconnectedAfterTheWriteTimeout) {
   server::Config config = TestConfig(1);
   config.limits.write_timeout_s = 0.2;
   config.limits.socket_send_buffer_bytes = 4096;
@@ -1059,7 +1021,7 @@ TEST(ServerSlowReader, IsDisconnectedWhenItTakesNothingForTooLong) {
       Eventually([&] { return server.metrics().Sum(&ThreadMetrics::sessions_detached) == 1; }));
 }
 
-TEST(ServerSlowReader, CommandsWaitWhileAnswersAreNotRead) {
+TEST(ServerSlowReader, DelaysItsOwnCommandsWhileRepliesAreUnread) {
   server::Config config = TestConfig(1);
   config.limits.control_buffer_bytes = 64 << 10;
   config.limits.socket_send_buffer_bytes = 4096;
@@ -1068,7 +1030,7 @@ TEST(ServerSlowReader, CommandsWaitWhileAnswersAreNotRead) {
   RawClient client = server.Connect(4096);
   ASSERT_TRUE(client.SayHello());
   const std::size_t before = counted_memory::LiveBytes();
-  // Pongs pile up until the server reads no more; the last pings stay in the sockets' buffers.
+  // Pongs accumulate until the server pauses reading. The last pings stay in socket buffers.
   constexpr int kPings = 100'000;
   std::thread sender([&] {
     for (int i = 1; i <= kPings; ++i) {
@@ -1088,7 +1050,7 @@ TEST(ServerSlowReader, CommandsWaitWhileAnswersAreNotRead) {
   sender.join();
 }
 
-TEST(ServerDrain, EndsThoughAClientDoesNotRead) {
+TEST(ServerDrain, EndsEvenIfAClientDoesNotRead) {
   server::Config config = TestConfig(2);
   config.drain_timeout_s = 0.3;
   TestServer server(config);
@@ -1101,13 +1063,13 @@ TEST(ServerDrain, EndsThoughAClientDoesNotRead) {
   EXPECT_TRUE(server.DrainAndJoin());
 }
 
-TEST(ServerDrain, AnswersWhatItHasTakenOn) {
+TEST(ServerDrain, AnswersPendingCommands) {
   TestServer server;
   auto [client, world] = server.Enter("w");
   ASSERT_TRUE(client.Spawn(world->world, {{.avatar = 1}}));
   client.Send(
       protocol::Request{.seq = client.NextSeq(), .world = world->world, .items = Steps(1, 4, 0.5)});
-  // Taken on, though not done before the next tick.
+  // The command is accepted, but it is executed in the next tick.
   const auto received = [&] { return server.metrics().Sum(&ThreadMetrics::messages_received); };
   ASSERT_TRUE(Eventually([&] { return received() >= 4; }));
   server.server().Drain();

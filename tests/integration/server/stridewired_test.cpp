@@ -1,4 +1,4 @@
-// The program itself: options, exit codes, signals, HTTP.
+// The program stridewired: options, exit codes, signals and HTTP.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -59,7 +59,7 @@ class Program {
     close(errors_[0]);
   }
 
-  /// What comes up to the end of a line, or the end.
+  /// Returns the next line of the output, without the line break.
   std::string ReadLine() {
     std::string line;
     char c = 0;
@@ -69,7 +69,8 @@ class Program {
   }
   void Signal(int signal) const { kill(pid_, signal); }
 
-  /// Exit code, or minus the signal it died of.
+  /// Waits for the end of the program. Returns the exit code, or the negative number of the signal
+  /// that killed it.
   int Wait() {
     int status = 0;
     waitpid(std::exchange(pid_, -1), &status, 0);
@@ -97,7 +98,7 @@ class Program {
   pid_t pid_ = -1;
 };
 
-// One request, the whole answer.
+// Sends one request and returns the complete response.
 std::string Http(std::uint16_t port, const std::string& request) {
   const int file = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -124,7 +125,7 @@ std::string Get(std::uint16_t port, const std::string& path) {
 const std::vector<std::string> kAnyPorts = {"--listen",    "127.0.0.1:0", "--http",
                                             "127.0.0.1:0", "--shards",    "2"};
 
-TEST(Stridewired, SaysWhenItIsReadyAndDrainsOnSigterm) {
+TEST(Stridewired, PrintsReadyLineAndDrainsOnSignal) {
   for (const int signal : {SIGTERM, SIGINT}) {
     Program program(kAnyPorts);
     const std::string ready = program.ReadLine();
@@ -146,19 +147,19 @@ TEST(Stridewired, SaysWhenItIsReadyAndDrainsOnSigterm) {
   }
 }
 
-TEST(Stridewired, EndsAtOnceOnTheSecondSignal) {
+TEST(Stridewired, StopsAtOnceOnTheSecondSignal) {
   std::vector<std::string> arguments = kAnyPorts;
   arguments.insert(arguments.end(), {"--drain-timeout-s", "600", "--write-timeout-s", "600"});
   Program program(arguments);
   const std::string ready = program.ReadLine();
-  // A client that reads nothing keeps the first one waiting: its connection lingers.
+  // A client that does not close its connection delays the end after the first signal.
   RawClient client("127.0.0.1", PortIn(ready, "listen"));
   ASSERT_TRUE(client.SayHello());
   program.Signal(SIGTERM);
   ASSERT_TRUE(client.Await<protocol::ErrorNotice>());
   program.Signal(SIGTERM);
   EXPECT_EQ(program.Wait(), 1) << program.errors;
-  EXPECT_THAT(program.errors, HasSubstr("ending at once"));
+  EXPECT_THAT(program.errors, HasSubstr("stopping at once"));
 }
 
 TEST(Stridewired, ServesHealthAndMetrics) {
@@ -181,7 +182,7 @@ TEST(Stridewired, ServesHealthAndMetrics) {
   const std::string huge = "GET / HTTP/1.1\r\nX: " + std::string(64 << 10, 'x');
   EXPECT_THAT(Http(port, huge), testing::Not(StartsWith("HTTP/1.1 200")));
   EXPECT_THAT(Get(port, "/healthz"), StartsWith("HTTP/1.1 200"));
-  // Ticks take processor time, also with nobody there.
+  // Ticks take CPU time even without clients.
   const auto cpu_of_first = [&] {
     const std::string text = Get(port, "/metrics");
     const std::string name = "stridewire_shard_cpu_seconds_total{shard=\"0\"} ";
@@ -197,31 +198,31 @@ TEST(Stridewired, ServesHealthAndMetrics) {
   }
 }
 
-TEST(Stridewired, SaysWhatIsWrongAndExitsWith2) {
+TEST(Stridewired, ReportsInvalidInputAndExitsWith2) {
   struct Case {
     std::vector<std::string> arguments;
-    const char* says;
+    const char* message;
   };
   const Case cases[] = {
       {{"--no-such"}, "--no-such"},
       {{"--tick-hz", "fast"}, "--tick-hz fast: expected a number"},
       {{"--listen", "0.0.0.0:7420"}, "allow_insecure"},
-      {{"--config", "/no/such.toml"}, "/no/such.toml: cannot be opened"},
+      {{"--config", "/no/such.toml"}, "/no/such.toml: cannot open the configuration file"},
       {{"--library", "/no/such.swl"}, "/no/such.swl"},
       {{"--library", "/no/such.swl", "--check-config"}, "/no/such.swl"},
       {{"--library", "/etc/passwd"}, "/etc/passwd"},
   };
   for (const Case& bad : cases) {
-    SCOPED_TRACE(bad.says);
+    SCOPED_TRACE(bad.message);
     Program program(bad.arguments);
     EXPECT_EQ(program.Wait(), 2);
-    EXPECT_THAT(program.errors, AllOf(StartsWith("stridewired: "), HasSubstr(bad.says)));
+    EXPECT_THAT(program.errors, AllOf(StartsWith("stridewired: "), HasSubstr(bad.message)));
     EXPECT_EQ(std::ranges::count(program.errors, '\n'), 1) << program.errors;
     EXPECT_THAT(program.output, IsEmpty());
   }
 }
 
-TEST(Stridewired, AnAddressInUseIsAFailure) {
+TEST(Stridewired, FailsIfAnAddressIsInUse) {
   Program first(kAnyPorts);
   const std::uint16_t port = PortIn(first.ReadLine(), "listen");
   Program second({"--listen", "127.0.0.1:" + std::to_string(port), "--http", "127.0.0.1:0"});

@@ -1,5 +1,5 @@
-// What a watcher receives over the network is what synthesis gives without one: stridewired,
-// stridewire-record and a game server on real sockets, against offline/synthesis.h.
+// Compares poses received over the network with offline synthesis (offline/synthesis.h). Uses
+// stridewired, stridewire-record and a game server with real sockets.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ namespace {
 constexpr double kFps = 60.0;
 constexpr double kDegrees = 180.0 / M_PI;
 
-// A walk, a stop, a jump and a start.
+// Walking, stopping, jumping and starting again.
 std::vector<MovementRequest> Choreography() {
   return {
       {1, StepRequest{.length_m = 0.5}}, {2, StepRequest{.length_m = 0.7}},
@@ -72,8 +72,8 @@ struct Seen {
   std::vector<bool> received;  // By frame; the others were missed and filled in.
 };
 
-// Where in what was received the choreography begins: the shift at which it fits best. Empty where the
-// recording is shorter than it.
+// Returns the frame of the recording at which the choreography starts: the shift with the best
+// match. Empty if the recording is shorter than the choreography.
 std::optional<int> ShiftOf(const Seen& seen, const Clip& truth) {
   double best_rad = std::numeric_limits<double>::infinity();
   std::optional<int> best;
@@ -92,9 +92,9 @@ std::optional<int> ShiftOf(const Seen& seen, const Clip& truth) {
   return best;
 }
 
-// Records one avatar of its own through the choreography. On a busy machine the server misses ticks, whose
-// poses nobody receives. Empty where the walk began first, or less than nine frames in ten are left to
-// compare.
+// Records one avatar that executes the choreography. On a busy machine the server misses ticks.
+// Returns an empty result if the recording started too late, or if less than 90 % of the frames
+// were received.
 std::optional<Seen> RecordOnce(RawClient& game, std::uint16_t port, protocol::WorldId world,
                                protocol::AvatarId avatar, const Clip& truth, double lead_s) {
   EXPECT_TRUE(game.Spawn(world, {{.avatar = avatar}}));
@@ -134,7 +134,7 @@ test::ChildProcess StartServer(int shards) {
 
 class RecordTest : public testing::TestWithParam<int> {};
 
-TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
+TEST_P(RecordTest, EqualsOfflineSynthesis) {
   const auto library = OpenLibrary("builtin").value();
   const auto truth = Synthesize(library, {}, Choreography(), kFps);
   ASSERT_TRUE(truth.has_value()) << Describe(truth.error());
@@ -180,9 +180,9 @@ TEST_P(RecordTest, ReceivesWhatSynthesisGives) {
   EXPECT_LE(largest_m, 0.001f);
 }
 
-// Poses evaluated by the recorder are those the server sends another; the library comes over the connection first, and
-// out of its folder the second time.
-TEST(RecordMovements, AreTheFullPosesBitByBit) {
+// Poses that the recorder evaluates equal the full poses that the server sends. The recorder
+// fetches the library from the server first, and reads it from its folder the second time.
+TEST(RecordMovements, EqualFullPosesBitForBit) {
   test::ChildProcess server = StartServer(2);
   const std::uint16_t port =
       test::PortIn(server.ReadLineThatBegins("ready ").value_or(""), "listen");
@@ -239,10 +239,10 @@ TEST(RecordMovements, AreTheFullPosesBitByBit) {
     std::printf("%d frames compared; %d KB sent as poses, %d KB as movements\n", compared,
                 sent["bytes_received"].get<int>() / 1000, told["bytes_received"].get<int>() / 1000);
     EXPECT_GT(compared, 100);
-    // The same bytes are written the same way, but for whole turns of the angles before them.
+    // Equal poses can differ by whole turns in the Euler angles of BVH.
     EXPECT_LE(largest_rad, 1e-6);
     EXPECT_EQ(largest_m, 0.0f);
-    // What is fetched is 4 MB.
+    // The library has 4 MB.
     const auto bytes = told["bytes_received"].get<int>();
     EXPECT_EQ(bytes > 1'000'000, round != 1) << bytes;
   }

@@ -8,7 +8,7 @@
 namespace stridewire::client {
 namespace {
 
-TEST(Backoff, DoublesUpToItsLimitWithinTheJitter) {
+TEST(Backoff, DoublesUpToItsLimit) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     Backoff backoff(seed);
     double longest_s = Backoff::kFirst_s;
@@ -22,14 +22,14 @@ TEST(Backoff, DoublesUpToItsLimitWithinTheJitter) {
   }
 }
 
-TEST(Backoff, StartsAfreshAfterASuccess) {
+TEST(Backoff, StartsAgainAfterReset) {
   Backoff backoff(3);
   for (int attempt = 0; attempt < 10; ++attempt) (void)backoff.Next();
   backoff.Reset();
   EXPECT_LE(backoff.Next(), Backoff::kFirst_s);
 }
 
-TEST(Backoff, ClientsOfOneServerSpreadOut) {
+TEST(Backoff, SpreadsClientsWithDifferentSeeds) {
   std::set<double> waits_s;
   for (std::uint64_t seed = 1; seed <= 50; ++seed) waits_s.insert(Backoff(seed).Next());
   EXPECT_GT(*waits_s.rbegin() - *waits_s.begin(), 0.3 * Backoff::kFirst_s);

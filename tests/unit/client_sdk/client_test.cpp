@@ -1,4 +1,4 @@
-// The C ABI and its C++ wrapper over real sockets, against a server that follows a script.
+// Tests the C API and its C++ wrapper over real sockets with a scripted server.
 #include "stridewire/client.hpp"
 
 #include <gmock/gmock.h>
@@ -35,7 +35,7 @@ class ClientTest : public testing::Test {
     const auto hello = connection.Expect<protocol::Hello>();
     EXPECT_TRUE(hello);
     if (hello) hello_ = *hello;
-    connection.Send(toy::Welcome(resumed));
+    connection.Send(test_world::Welcome(resumed));
     return connection;
   }
 
@@ -46,17 +46,17 @@ class ClientTest : public testing::Test {
   void LetIn() {
     const auto join = connection_.Expect<protocol::JoinWorld>();
     ASSERT_TRUE(join);
-    connection_.Send(toy::WorldInfo(join->seq, 5, "plaza"));
-    connection_.Send(toy::Ok(join->seq));
+    connection_.Send(test_world::WorldInfo(join->seq, 5, "plaza"));
+    connection_.Send(test_world::Ok(join->seq));
   }
   void Observe(stridewire_pose_mode mode = STRIDEWIRE_FULL) {
     ASSERT_TRUE(client_->Observe(world_, mode));
     const auto observe = connection_.Expect<protocol::Observe>();
     ASSERT_TRUE(observe);
-    connection_.Send(toy::Ok(observe->seq));
+    connection_.Send(test_world::Ok(observe->seq));
   }
 
-  /// The next event of that type; others before it are dropped.
+  /// Returns the next event of a type and drops the events before it.
   std::optional<stridewire_event> Next(stridewire_event_type type) {
     const auto until =
         std::chrono::steady_clock::now() + std::chrono::duration<double>(kPatience_s);
@@ -87,7 +87,7 @@ class ClientTest : public testing::Test {
   stridewire_world world_ = 0;
 };
 
-TEST_F(ClientTest, ConnectsJoinsAndDescribesTheFigure) {
+TEST_F(ClientTest, ConnectsJoinsAndGetsTheSkeleton) {
   Options options;
   options.client_name = "unit test";
   options.auth_token = "sesame";
@@ -105,11 +105,11 @@ TEST_F(ClientTest, ConnectsJoinsAndDescribesTheFigure) {
   EXPECT_FLOAT_EQ(skeleton.joints[2].offset_m[1], 0.4f);
   ASSERT_EQ(skeleton.end_sites.size(), 1u);
   EXPECT_EQ(skeleton.end_sites[0].joint, 2u);
-  EXPECT_EQ(skeleton.tick_hz, toy::kTickHz);
+  EXPECT_EQ(skeleton.tick_hz, test_world::kTickHz);
   EXPECT_STREQ(skeleton.library_hash, "0123456789abcdef");
 }
 
-TEST_F(ClientTest, CarriesACrowdInOneCommand) {
+TEST_F(ClientTest, SendsACrowdInOneCommand) {
   Start();
   Join();
   std::vector<stridewire_spawn> spawns;
@@ -145,23 +145,23 @@ TEST_F(ClientTest, CarriesACrowdInOneCommand) {
   const auto cancel = connection_.Expect<protocol::CancelQueue>();
   ASSERT_TRUE(cancel);
   EXPECT_EQ(cancel->avatars, (std::vector<std::uint32_t>{4, 5}));
-  for (const bool is_off : {true, false}) {
+  for (const bool enabled : {false, true}) {
     const auto planting = connection_.Expect<protocol::SetPlanting>();
     ASSERT_TRUE(planting);
-    EXPECT_EQ(planting->is_off, is_off);
-    EXPECT_EQ(planting->avatars.size(), is_off ? 2u : 1u);
+    EXPECT_EQ(planting->enabled, enabled);
+    EXPECT_EQ(planting->avatars.size(), enabled ? 1u : 2u);
   }
   const auto remove = connection_.Expect<protocol::Remove>();
   ASSERT_TRUE(remove);
   EXPECT_EQ(remove->avatars, (std::vector<std::uint32_t>{6}));
 }
 
-TEST_F(ClientTest, GivesRawAndInterpolatedPoses) {
+TEST_F(ClientTest, ReturnsRawAndInterpolatedPoses) {
   Start();
   Join();
   Observe();
   for (std::uint64_t tick = 100; tick < 120; ++tick) {
-    connection_.SendBytes(toy::PoseFrame(5, tick, {{1}, {9}}));
+    connection_.SendBytes(test_world::PoseFrame(5, tick, {{1}, {9}}));
   }
   client::Pose pose;
   ASSERT_TRUE(Eventually([&] {
@@ -170,10 +170,10 @@ TEST_F(ClientTest, GivesRawAndInterpolatedPoses) {
   }));
   EXPECT_EQ(client_->ListAvatars(world_), (std::vector<std::uint32_t>{1, 9}));
   EXPECT_EQ(pose.kind, STRIDEWIRE_POSE_RAW);
-  EXPECT_EQ(pose.root_position_m[2], toy::RootAt(toy::TickTime(119)).z);
-  EXPECT_EQ(pose.rotations[2].y, toy::RotationsAt(toy::TickTime(119))[2].y);
+  EXPECT_EQ(pose.root_position_m[2], test_world::RootAt(test_world::TickTime(119)).z);
+  EXPECT_EQ(pose.rotations[2].y, test_world::RotationsAt(test_world::TickTime(119))[2].y);
 
-  // Every one that arrived, one after the other.
+  // Read every received pose in order.
   std::uint64_t after = UINT64_MAX;
   for (std::uint64_t tick = 100; tick < 120; ++tick) {
     ASSERT_TRUE(client_->NextPose(world_, 1, after, pose));
@@ -184,21 +184,23 @@ TEST_F(ClientTest, GivesRawAndInterpolatedPoses) {
   ASSERT_TRUE(client_->NextPose(world_, 1, after, pose));
   EXPECT_TRUE(pose.missing());
 
-  const double between_s = toy::TickTime(110) + 0.4 / toy::kTickHz;
+  const double between_s = test_world::TickTime(110) + 0.4 / test_world::kTickHz;
   ASSERT_TRUE(client_->SamplePose(world_, 1, between_s, pose));
   EXPECT_EQ(pose.kind, STRIDEWIRE_POSE_INTERPOLATED);
-  EXPECT_NEAR(pose.root_position_m[2], toy::RootAt(between_s).z, 1e-5);
-  EXPECT_NEAR(pose.rotations[2].y, toy::RotationsAt(between_s)[2].y, 1e-5);
-  ASSERT_TRUE(client_->SamplePose(world_, 1, toy::TickTime(119) + 0.5, pose));
+  EXPECT_NEAR(pose.root_position_m[2], test_world::RootAt(between_s).z, 1e-5);
+  EXPECT_NEAR(pose.rotations[2].y, test_world::RotationsAt(between_s)[2].y, 1e-5);
+  ASSERT_TRUE(client_->SamplePose(world_, 1, test_world::TickTime(119) + 0.5, pose));
   EXPECT_EQ(pose.kind, STRIDEWIRE_POSE_HELD);
   EXPECT_NEAR(pose.held_s, 0.5, 1e-9);
-  ASSERT_TRUE(client_->SamplePose(world_, 1, toy::TickTime(99), pose));
+  ASSERT_TRUE(client_->SamplePose(world_, 1, test_world::TickTime(99), pose));
   EXPECT_TRUE(pose.missing());
   ASSERT_TRUE(client_->SamplePose(world_, 55, between_s, pose));
   EXPECT_TRUE(pose.missing());
   EXPECT_EQ(client_->SamplePose(77, 1, between_s, pose).status(), STRIDEWIRE_NO_SUCH_WORLD);
   float small[4];
-  EXPECT_EQ(stridewire_client_sample_pose(client_->get(), world_, 1, between_s, &pose, small, 1),
+  pose.rotations_xyzw = small;
+  pose.joint_capacity = 1;
+  EXPECT_EQ(stridewire_client_sample_pose(client_->get(), world_, 1, between_s, &pose),
             STRIDEWIRE_BUFFER_TOO_SMALL);
   EXPECT_EQ(pose.joint_count, 3u);
 
@@ -208,37 +210,39 @@ TEST_F(ClientTest, GivesRawAndInterpolatedPoses) {
   EXPECT_LT(*render_s, *now_s + 1.0);
 }
 
-TEST_F(ClientTest, QuantisedPosesStayWithinTheirError) {
+TEST_F(ClientTest, QuantisedPosesAreWithinTheirError) {
   Start();
   Join();
   Observe(STRIDEWIRE_QUANTISED);
-  connection_.SendBytes(toy::PoseFrame(5, 33, {{1}}, protocol::PoseMode::kQuantised));
+  connection_.SendBytes(test_world::PoseFrame(5, 33, {{1}}, protocol::PoseMode::kQuantised));
   client::Pose pose;
   ASSERT_TRUE(Eventually([&] {
     (void)client_->LatestPose(world_, 1, pose);
     return pose.tick == 33;
   }));
-  EXPECT_NEAR(pose.root_position_m[2], toy::RootAt(toy::TickTime(33)).z, 1.0 / 32768.0);
+  EXPECT_NEAR(pose.root_position_m[2], test_world::RootAt(test_world::TickTime(33)).z,
+              1.0 / 32768.0);
   const auto& q = pose.rotations[2];
-  EXPECT_LT(AngleBetween(Quat(q.w, q.x, q.y, q.z), toy::RotationsAt(toy::TickTime(33))[2]),
-            protocol::kMaxQuantisedAngleRad * 1.5);
+  EXPECT_LT(
+      AngleBetween(Quat(q.w, q.x, q.y, q.z), test_world::RotationsAt(test_world::TickTime(33))[2]),
+      protocol::kMaxQuantisedAngleRad * 1.5);
 }
 
-TEST_F(ClientTest, ComesBackResumesAndSendsAgainWhatWasNotAnswered) {
+TEST_F(ClientTest, ResumesAndResendsUnansweredCommands) {
   Start();
   Join();
   std::uint64_t command = 0;
   ASSERT_TRUE(client_->Request(world_, {client::Step(1, 42, 0.6)}, &command));
   const auto first = connection_.Expect<protocol::Request>();
   ASSERT_TRUE(first);
-  connection_.Close();  // Before the answer.
+  connection_.Close();  // before the Reply
   connection_ = Greet(true);
-  EXPECT_EQ(hello_.resume_token, toy::Welcome().resume_token);
-  connection_.Send(toy::WorldInfo(0, 5, "plaza"));
+  EXPECT_EQ(hello_.resume_token, test_world::Welcome().resume_token);
+  connection_.Send(test_world::WorldInfo(0, 5, "plaza"));
   const auto again = connection_.Expect<protocol::Request>();
   ASSERT_TRUE(again);
   EXPECT_EQ(*again, *first);
-  connection_.Send(toy::Ok(again->seq));
+  connection_.Send(test_world::Ok(again->seq));
   const auto connected = Next(STRIDEWIRE_EVENT_CONNECTION_LOST);
   ASSERT_TRUE(connected);
   const auto reply = Next(STRIDEWIRE_EVENT_REPLY);
@@ -248,18 +252,18 @@ TEST_F(ClientTest, ComesBackResumesAndSendsAgainWhatWasNotAnswered) {
   EXPECT_EQ(client_->Statistics().resumes, 1u);
 }
 
-TEST_F(ClientTest, SurvivesAConnectionThatBreaksInsideAFrame) {
+TEST_F(ClientTest, SurvivesAConnectionLossInsideAFrame) {
   Start();
   Join();
   Observe();
-  const auto frame = toy::PoseFrame(5, 10, {{1}});
+  const auto frame = test_world::PoseFrame(5, 10, {{1}});
   connection_.SendBytes(frame);
-  const auto half = toy::PoseFrame(5, 11, {{1}});
+  const auto half = test_world::PoseFrame(5, 11, {{1}});
   connection_.SendBytes(std::span(half).first(half.size() / 2));
   connection_.Close();
   connection_ = Greet(true);
-  connection_.Send(toy::WorldInfo(0, 5, "plaza"));
-  connection_.SendBytes(toy::PoseFrame(5, 40, {{1}}));
+  connection_.Send(test_world::WorldInfo(0, 5, "plaza"));
+  connection_.SendBytes(test_world::PoseFrame(5, 40, {{1}}));
   client::Pose pose;
   ASSERT_TRUE(Eventually([&] {
     (void)client_->LatestPose(world_, 1, pose);
@@ -267,10 +271,10 @@ TEST_F(ClientTest, SurvivesAConnectionThatBreaksInsideAFrame) {
   }));
   EXPECT_EQ(pose.discontinuity, 1);
   ASSERT_TRUE(client_->NextPose(world_, 1, 10, pose));
-  EXPECT_EQ(pose.tick, 40u);  // Of the half one nothing was seen.
+  EXPECT_EQ(pose.tick, 40u);  // the incomplete frame was ignored
 }
 
-TEST_F(ClientTest, GarbageFromTheServerEndsInAnotherAttempt) {
+TEST_F(ClientTest, ReconnectsAfterInvalidBytes) {
   Start();
   connection_.SendBytes(std::vector<std::byte>(1000, std::byte{0xa5}));
   EXPECT_TRUE(connection_.WaitForClose());
@@ -283,7 +287,7 @@ TEST_F(ClientTest, GarbageFromTheServerEndsInAnotherAttempt) {
   EXPECT_TRUE(Next(STRIDEWIRE_EVENT_WORLD_JOINED));
 }
 
-TEST_F(ClientTest, AServerThatDiesAndComesBackWithoutMemoryIsJoinedAgain) {
+TEST_F(ClientTest, JoinsAgainAfterTheServerLostTheSession) {
   Options options;
   options.respawn = 1;
   Start(options);
@@ -291,7 +295,7 @@ TEST_F(ClientTest, AServerThatDiesAndComesBackWithoutMemoryIsJoinedAgain) {
   ASSERT_TRUE(client_->Spawn(world_, {{3, {1.0, 0.0, 2.0}, 0.5}}));
   const auto spawn = connection_.Expect<protocol::Spawn>();
   ASSERT_TRUE(spawn);
-  protocol::Reply reply = toy::Ok(spawn->seq);
+  protocol::Reply reply = test_world::Ok(spawn->seq);
   reply.items = {{0, 3, 0, protocol::StatusCode::kOk, ""}};
   connection_.Send(reply);
   Observe();
@@ -307,7 +311,7 @@ TEST_F(ClientTest, AServerThatDiesAndComesBackWithoutMemoryIsJoinedAgain) {
   EXPECT_TRUE(Next(STRIDEWIRE_EVENT_WORLD_JOINED));
 }
 
-TEST_F(ClientTest, ACallerWhoNeverPollsCostsNoMoreThanTheLimit) {
+TEST_F(ClientTest, LimitsEventsThatAreNotPolled) {
   Options options;
   options.max_events = 100;
   Start(options);
@@ -326,10 +330,10 @@ TEST_F(ClientTest, ACallerWhoNeverPollsCostsNoMoreThanTheLimit) {
   EXPECT_EQ(polled, 100);
 }
 
-TEST_F(ClientTest, KeepsTryingUntilSomebodyListens) {
+TEST_F(ClientTest, RetriesUntilAServerListens) {
   std::uint16_t port = 0;
   {
-    const FakeServer gone;  // A port that nobody listens on.
+    const FakeServer gone;  // provides an unused port
     port = gone.port();
   }
   client_.emplace(Client::Create().value());
@@ -343,11 +347,11 @@ TEST_F(ClientTest, KeepsTryingUntilSomebodyListens) {
   ASSERT_EQ(back.port(), port);
   FakeConnection connection = back.Accept();
   ASSERT_TRUE(connection.Expect<protocol::Hello>());
-  connection.Send(toy::Welcome());
+  connection.Send(test_world::Welcome());
   EXPECT_TRUE(Next(STRIDEWIRE_EVENT_CONNECTED));
 }
 
-TEST_F(ClientTest, SaysGoodbyeWhenDestroyed) {
+TEST_F(ClientTest, SendsGoodbyeWhenDestroyed) {
   Start();
   Join();
   ASSERT_TRUE(Next(STRIDEWIRE_EVENT_WORLD_JOINED));
@@ -355,7 +359,7 @@ TEST_F(ClientTest, SaysGoodbyeWhenDestroyed) {
   EXPECT_TRUE(connection_.Expect<protocol::Goodbye>());
 }
 
-TEST_F(ClientTest, DisconnectsAndConnectsAgainAsAnother) {
+TEST_F(ClientTest, StartsANewSessionAfterDisconnect) {
   Start();
   Join();
   ASSERT_TRUE(client_->Disconnect());
@@ -367,19 +371,19 @@ TEST_F(ClientTest, DisconnectsAndConnectsAgainAsAnother) {
   EXPECT_EQ(client_->Spawn(world_, {{1, {}, 0.0}}).status(), STRIDEWIRE_NO_SUCH_WORLD);
 }
 
-TEST_F(ClientTest, PingTellsTheRoundTrip) {
+TEST_F(ClientTest, PingMeasuresTheRoundTrip) {
   Start();
   ASSERT_TRUE(Next(STRIDEWIRE_EVENT_CONNECTED));
   ASSERT_TRUE(client_->Ping());
   ASSERT_TRUE(client_->JoinWorld("plaza", STRIDEWIRE_OBSERVER, world_));
-  ASSERT_TRUE(connection_.Expect<protocol::JoinWorld>());  // Pongs go out meanwhile.
+  ASSERT_TRUE(connection_.Expect<protocol::JoinWorld>());  // sends Pongs meanwhile
   const auto pong = Next(STRIDEWIRE_EVENT_PONG);
   ASSERT_TRUE(pong);
   EXPECT_GT(pong->rtt_s, 0.0);
   EXPECT_GT(client_->Statistics().rtt_s, 0.0);
 }
 
-TEST_F(ClientTest, ManyThreadsMayUseOneClient) {
+TEST_F(ClientTest, IsThreadSafe) {
   Start();
   Join();
   Observe();
@@ -399,7 +403,7 @@ TEST_F(ClientTest, ManyThreadsMayUseOneClient) {
     });
   }
   for (std::uint64_t tick = 1; tick <= 300; ++tick) {
-    connection_.SendBytes(toy::PoseFrame(5, tick, {{1}}));
+    connection_.SendBytes(test_world::PoseFrame(5, tick, {{1}}));
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   client::Pose pose;
@@ -412,7 +416,7 @@ TEST_F(ClientTest, ManyThreadsMayUseOneClient) {
   EXPECT_LE(client_->Statistics().commands_waiting, 4096u);
 }
 
-TEST(ClientOptions, AreCheckedOneByOne) {
+TEST(ClientOptions, AreChecked) {
   const auto status = [](const std::function<void(Options&)>& change) {
     Options options;
     change(options);
@@ -438,7 +442,7 @@ TEST(ClientOptions, AreCheckedOneByOne) {
             STRIDEWIRE_INVALID_ARGUMENT);
 }
 
-TEST(ClientArguments, NullAndNonsenseAreAnswered) {
+TEST(ClientArguments, RejectNullAndInvalidValues) {
   stridewire_world world = 0;
   size_t count = 0;
   EXPECT_EQ(stridewire_client_create(nullptr, nullptr), STRIDEWIRE_INVALID_ARGUMENT);
@@ -472,11 +476,11 @@ TEST(ClientArguments, NullAndNonsenseAreAnswered) {
   observation.avatar_count = 3;
   EXPECT_EQ(stridewire_client_observe(client, 1, &observation, nullptr, nullptr),
             STRIDEWIRE_INVALID_ARGUMENT);
-  stridewire_pose pose;
-  EXPECT_EQ(stridewire_client_sample_pose(client, 1, 1, std::nan(""), &pose, nullptr, 0),
+  stridewire_pose pose{};
+  EXPECT_EQ(stridewire_client_sample_pose(client, 1, 1, std::nan(""), &pose),
             STRIDEWIRE_OUT_OF_RANGE);
-  EXPECT_EQ(stridewire_client_latest_pose(client, 1, 1, &pose, nullptr, 5),
-            STRIDEWIRE_INVALID_ARGUMENT);
+  pose.joint_capacity = 5;
+  EXPECT_EQ(stridewire_client_latest_pose(client, 1, 1, &pose), STRIDEWIRE_INVALID_ARGUMENT);
   EXPECT_EQ(stridewire_client_wait_event(client, -1.0), STRIDEWIRE_INVALID_ARGUMENT);
   EXPECT_EQ(stridewire_client_wait_event(client, 0.0), STRIDEWIRE_TIMEOUT);
   double time_s = 0.0;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kTick_s = 1.0 / 60.0;
 
-TEST(ClockMap, CountsTheSmallestDelayAsNone) {
+TEST(ClockMap, SubtractsTheSmallestDelay) {
   // The server's clock is 100 s behind; delays are 20 ms plus an exponential jitter of 15 ms.
   const std::uint64_t seed = 11;
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -21,16 +21,17 @@ TEST(ClockMap, CountsTheSmallestDelayAsNone) {
   double arrival_s = 0.0;
   for (int tick = 0; tick < 60 * 60; ++tick) {
     const double server_s = tick * kTick_s;
-    arrival_s = std::max(arrival_s, server_s + 100.0 + 0.02 + jitter_s(random));  // TCP keeps order
+    arrival_s =
+        std::max(arrival_s, server_s + 100.0 + 0.02 + jitter_s(random));  // TCP preserves the order
     clock.AddSample(arrival_s, server_s);
     if (tick > 120) {
       worst_s = std::max(worst_s, std::abs(clock.ServerTime(arrival_s) - (arrival_s - 100.02)));
     }
   }
-  EXPECT_LT(worst_s, 0.003);  // A fifth of the jitter's mean.
+  EXPECT_LT(worst_s, 0.003);  // a fifth of the mean jitter
 }
 
-TEST(ClockMap, NeverRunsBackwardsOrJumpsOnOneClock) {
+TEST(ClockMap, NeverDecreasesOrJumps) {
   const std::uint64_t seed = 5;
   SCOPED_TRACE(testing::Message() << "seed " << seed);
   std::mt19937_64 random(seed);
@@ -41,7 +42,7 @@ TEST(ClockMap, NeverRunsBackwardsOrJumpsOnOneClock) {
   double arrival_s = 0.0;
   for (int tick = 0; tick < 3600; ++tick) {
     const double server_s = tick * kTick_s;
-    // The way becomes 80 ms longer half-way.
+    // The delay increases by 80 ms in the middle.
     arrival_s = std::max(arrival_s, server_s + (tick < 1800 ? 0.0 : 0.08) + jitter_s(random));
     clock.AddSample(arrival_s, server_s);
     const double now_s = clock.ServerTime(arrival_s);
@@ -55,7 +56,7 @@ TEST(ClockMap, NeverRunsBackwardsOrJumpsOnOneClock) {
   }
 }
 
-TEST(ClockMap, FollowsAClockThatRunsFaster) {
+TEST(ClockMap, FollowsAFasterClock) {
   ClockMap clock;
   for (int tick = 0; tick < 6000; ++tick) {
     const double local_s = tick * kTick_s;
@@ -65,17 +66,17 @@ TEST(ClockMap, FollowsAClockThatRunsFaster) {
   EXPECT_NEAR(clock.ServerTime(local_s), 1.0002 * local_s, 0.002);
 }
 
-TEST(ClockMap, TakesAnotherClockAtOnce) {
+TEST(ClockMap, JumpsToAnotherClock) {
   ClockMap clock;
   for (int tick = 0; tick < 60; ++tick) clock.AddSample(tick * kTick_s, tick * kTick_s);
   clock.AddSample(2.0, 502.0);
   EXPECT_NEAR(clock.ServerTime(2.0), 502.0, 1e-9);
 }
 
-TEST(ClockMap, LeavesALoneLateMessageToTheWindow) {
+TEST(ClockMap, IgnoresASingleLateMessage) {
   ClockMap clock;
   for (int tick = 0; tick < 120; ++tick) clock.AddSample(tick * kTick_s, tick * kTick_s);
-  clock.AddSample(3.0, 2.0);  // One second late.
+  clock.AddSample(3.0, 2.0);  // one second late
   EXPECT_NEAR(clock.ServerTime(3.0), 3.0, 1e-9);
 }
 

@@ -13,7 +13,7 @@ stridewire_event Numbered(std::uint64_t number) {
   return event;
 }
 
-TEST(EventQueue, GivesEventsInOrder) {
+TEST(EventQueue, PreservesTheOrder) {
   EventQueue queue(16);
   for (std::uint64_t n = 1; n <= 5; ++n) queue.Push(Numbered(n));
   std::vector<stridewire_event> out(3);
@@ -25,7 +25,7 @@ TEST(EventQueue, GivesEventsInOrder) {
   EXPECT_EQ(queue.Take(out), 0u);
 }
 
-TEST(EventQueue, DropsTheOldestWhenFullAndSaysSo) {
+TEST(EventQueue, DropsTheOldestEventsAndReportsTheirNumber) {
   EventQueue queue(16);
   for (std::uint64_t n = 1; n <= 100; ++n) queue.Push(Numbered(n));
   EXPECT_EQ(queue.size(), 16u);

@@ -17,7 +17,7 @@ Vec3 RootAt(double t) {
 }
 Rotations RotationsAt(double t) { return {YawRotation(0.8 * t), YawRotation(std::sin(3.0 * t))}; }
 
-/// One pose every `every_s`, ticks from 1.
+/// Fills a history with one pose per `every_s`, starting at tick 1.
 PoseHistory Moving(std::size_t capacity, int poses, double every_s = 1.0 / 60.0) {
   PoseHistory history(capacity, kJoints);
   for (int i = 0; i < poses; ++i) {
@@ -27,7 +27,7 @@ PoseHistory Moving(std::size_t capacity, int poses, double every_s = 1.0 / 60.0)
   return history;
 }
 
-TEST(PoseHistory, GivesReceivedPosesExactly) {
+TEST(PoseHistory, ReturnsReceivedPosesExactly) {
   const PoseHistory history = Moving(16, 10);
   for (std::size_t i = 0; i < history.size(); ++i) {
     Vec3 root_m;
@@ -55,13 +55,13 @@ TEST(PoseHistory, InterpolatesCloseToTheMotion) {
       worst_rad = std::max(worst_rad, AngleBetween(rotations[j], RotationsAt(t)[j]));
     }
   }
-  // Cubic: of the order of h^4 f'''' / 384 plus float32's grain; linear would be off by h^2 f'' / 8
-  // = 1.4e-4 m and 3e-4 rad.
+  // The cubic error is of the order of h^4 f'''' / 384 plus float32 rounding. A linear
+  // interpolation would have an error of h^2 f'' / 8, which is 1.4e-4 m and 3e-4 rad.
   EXPECT_LT(worst_m, 5e-6);
   EXPECT_LT(worst_rad, 1e-3 / 10.0);
 }
 
-TEST(PoseHistory, KeepsItsSpeedAtReceivedPoses) {
+TEST(PoseHistory, HasContinuousVelocity) {
   const PoseHistory history = Moving(64, 20, 0.1);
   const double e = 1e-3;
   for (std::size_t i = 2; i + 2 < history.size(); ++i) {
@@ -73,13 +73,13 @@ TEST(PoseHistory, KeepsItsSpeedAtReceivedPoses) {
     ASSERT_TRUE(history.Sample(t - e, before_m, rotations));
     ASSERT_TRUE(history.Sample(t, at_m, rotations));
     ASSERT_TRUE(history.Sample(t + e, after_m, rotations));
-    // C1: the two one-sided speeds differ by no more than acceleration * e.
+    // The one-sided speeds differ by at most acceleration * e.
     EXPECT_LT(glm::length((after_m - at_m) - (at_m - before_m)) / e, 0.1f) << i;
   }
 }
 
-TEST(PoseHistory, GoesTheShortWayRound) {
-  // The same rotation may be sent as q or -q.
+TEST(PoseHistory, InterpolatesAlongTheShorterArc) {
+  // q and -q are the same rotation.
   PoseHistory history(8, kJoints);
   for (int i = 0; i < 4; ++i) {
     Rotations r = RotationsAt(i * 0.1);
@@ -111,7 +111,7 @@ TEST(PoseHistory, NeverInterpolatesAcrossADiscontinuity) {
     Rotations rotations;
     const auto sampled = history.Sample(t, root_m, rotations);
     ASSERT_TRUE(sampled);
-    // Nothing between, and neither side's slope reaches across.
+    // There is no interpolation, and slopes use poses of one side only.
     const bool first = t < history.stamp(4).time_s;
     ASSERT_EQ(root_m, first ? here_m : there_m) << t;
     ASSERT_LT(AngleBetween(rotations[0], first ? still[0] : turned[0]), 1e-3) << t;
@@ -124,7 +124,7 @@ TEST(PoseHistory, NeverInterpolatesAcrossADiscontinuity) {
   }
 }
 
-TEST(PoseHistory, HoldsTheNewestAndKnowsNothingBeforeTheOldest) {
+TEST(PoseHistory, HoldsTheNewestPoseAndIsEmptyBeforeTheOldest) {
   const PoseHistory history = Moving(16, 10);
   Vec3 root_m;
   Rotations rotations;
@@ -137,7 +137,7 @@ TEST(PoseHistory, HoldsTheNewestAndKnowsNothingBeforeTheOldest) {
   EXPECT_FALSE(PoseHistory(4, kJoints).Sample(0.0, root_m, rotations));
 }
 
-TEST(PoseHistory, ForgetsTheOldestWhenFull) {
+TEST(PoseHistory, DropsTheOldestPoseWhenFull) {
   const PoseHistory history = Moving(8, 100);
   ASSERT_EQ(history.size(), 8u);
   EXPECT_EQ(history.stamp(0).tick, 93u);
@@ -148,7 +148,7 @@ TEST(PoseHistory, ForgetsTheOldestWhenFull) {
   EXPECT_EQ(history.FirstAfterTick(100), std::nullopt);
 }
 
-TEST(PoseHistory, RefusesWhatIsNotNewer) {
+TEST(PoseHistory, RejectsPosesThatAreNotNewer) {
   PoseHistory history = Moving(8, 4);
   const auto newest = history.stamp(3);
   EXPECT_FALSE(history.Push(newest, Vec3(9.0f), RotationsAt(0.0)));
@@ -157,7 +157,7 @@ TEST(PoseHistory, RefusesWhatIsNotNewer) {
   EXPECT_EQ(history.size(), 4u);
 }
 
-TEST(PoseHistory, SamplesAreUnitAndFiniteForAnyOrderOfArrivals) {
+TEST(PoseHistory, SamplesAreFiniteUnitQuaternions) {
   const std::uint64_t seed = 20;
   SCOPED_TRACE(testing::Message() << "seed " << seed);
   std::mt19937_64 random(seed);

@@ -18,25 +18,24 @@ using protocol::Movements;
 
 constexpr double kTickS = 1.0 / 60.0;
 
-struct Screen : PoseSink {
-  void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
-            ConstPoseSpan pose) override {
-    Pose& kept = shown[avatar];
+struct CollectingSink : PoseSink {
+  void OnPose(AvatarId avatar, std::uint16_t, const PoseStamp& stamp, ConstPoseSpan pose) override {
+    Pose& kept = poses[avatar];
     kept.root_position_m = pose.root_position_m;
     kept.rotations.assign(pose.rotations.begin(), pose.rotations.end());
     stamps[avatar] = stamp;
     gone.erase(avatar);
   }
-  void Gone(AvatarId avatar) override { gone.insert(avatar); }
+  void OnGone(AvatarId avatar) override { gone.insert(avatar); }
   [[nodiscard]] bool Wants(AvatarId avatar) const override { return avatar != unwanted; }
 
-  std::map<AvatarId, Pose> shown;
+  std::map<AvatarId, Pose> poses;
   std::map<AvatarId, PoseStamp> stamps;
   std::set<AvatarId> gone;
   AvatarId unwanted = 0;
 };
 
-// A shard of avatars that always walk, and what it would send.
+// Simulates a shard of walking avatars and produces its messages.
 class Server {
  public:
   explicit Server(AvatarId count) {
@@ -80,18 +79,18 @@ class Server {
     message.ends.push_back(static_cast<std::uint32_t>(message.records.size()));
   }
 
-  // How many of those on the screen are what they should be.
-  int Same(const Screen& screen) const {
+  // Counts the current poses in the sink, and expects them to be equal.
+  int CountEqualPoses(const CollectingSink& sink) const {
     int same = 0;
     for (const auto& [number, avatar] : avatars_) {
-      const auto shown = screen.shown.find(number);
-      if (shown == screen.shown.end() || screen.gone.contains(number)) continue;
-      if (screen.stamps.at(number).tick != 1000 + step_) continue;
+      const auto poses = sink.poses.find(number);
+      if (poses == sink.poses.end() || sink.gone.contains(number)) continue;
+      if (sink.stamps.at(number).tick != 1000 + step_) continue;
       const ConstPoseSpan pose = avatar.pose();
-      EXPECT_EQ(std::memcmp(shown->second.rotations.data(), pose.rotations.data(),
+      EXPECT_EQ(std::memcmp(poses->second.rotations.data(), pose.rotations.data(),
                             pose.rotations.size_bytes()),
                 0);
-      EXPECT_EQ(shown->second.root_position_m, pose.root_position_m);
+      EXPECT_EQ(poses->second.root_position_m, pose.root_position_m);
       ++same;
     }
     return same;
@@ -105,90 +104,90 @@ class Server {
   std::uint64_t step_ = 0;
 };
 
-TEST(ReplicaSet, ShowsFromTheStatesOn) {
+TEST(ReplicaSet, EvaluatesAvatarsAfterTheirStates) {
   Server server(5);
-  Screen screen;
-  ReplicaSet view(server.library(), kTickS, 100);
+  CollectingSink sink;
+  ReplicaSet replicas(server.library(), kTickS, 100);
   for (int i = 0; i < 30; ++i) (void)server.Step();
-  ASSERT_TRUE(view.Take(server.Step(), screen));
-  EXPECT_EQ(view.avatar_count(), 0u);
-  ASSERT_TRUE(view.Take(server.States(), screen));
-  EXPECT_EQ(server.Same(screen), 5);
-  EXPECT_TRUE(screen.stamps[1].discontinuity);
+  ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+  EXPECT_EQ(replicas.avatar_count(), 0u);
+  ASSERT_TRUE(replicas.Apply(server.States(), sink));
+  EXPECT_EQ(server.CountEqualPoses(sink), 5);
+  EXPECT_TRUE(sink.stamps[1].discontinuity);
   for (int i = 0; i < 200; ++i) {
-    ASSERT_TRUE(view.Take(server.Step(), screen));
-    ASSERT_EQ(server.Same(screen), 5);
+    ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+    ASSERT_EQ(server.CountEqualPoses(sink), 5);
   }
-  EXPECT_FALSE(screen.stamps[1].discontinuity);
+  EXPECT_FALSE(sink.stamps[1].discontinuity);
 }
 
-TEST(ReplicaSet, StepsOfOneTickAreShownOnceAndPartsWaitForEachOther) {
+TEST(ReplicaSet, EmitsPosesAfterTheLastStepAndPart) {
   Server server(5);
-  Screen screen;
-  ReplicaSet view(server.library(), kTickS, 100);
-  ASSERT_TRUE(view.Take(server.Step(), screen));  // all are new: states
-  ASSERT_EQ(server.Same(screen), 5);
-  const std::uint64_t before = screen.stamps[1].tick;
-  ASSERT_TRUE(view.Take(server.Step(1), screen));
-  EXPECT_EQ(screen.stamps[1].tick, before);
+  CollectingSink sink;
+  ReplicaSet replicas(server.library(), kTickS, 100);
+  ASSERT_TRUE(replicas.Apply(server.Step(), sink));  // contains states, because all avatars are new
+  ASSERT_EQ(server.CountEqualPoses(sink), 5);
+  const std::uint64_t before = sink.stamps[1].tick;
+  ASSERT_TRUE(replicas.Apply(server.Step(1), sink));
+  EXPECT_EQ(sink.stamps[1].tick, before);
   Movements first = server.Step();
   Movements second = server.Empty();
   first.parts = second.parts = 2;
   second.part = 1;
-  ASSERT_TRUE(view.Take(first, screen));
-  EXPECT_EQ(screen.stamps[1].tick, before);
-  ASSERT_TRUE(view.Take(second, screen));
-  EXPECT_EQ(server.Same(screen), 5);
+  ASSERT_TRUE(replicas.Apply(first, sink));
+  EXPECT_EQ(sink.stamps[1].tick, before);
+  ASSERT_TRUE(replicas.Apply(second, sink));
+  EXPECT_EQ(server.CountEqualPoses(sink), 5);
 }
 
-TEST(ReplicaSet, KnowsNobodyBehindAGapUntilStatesCome) {
+TEST(ReplicaSet, ForgetsAvatarsAfterAGapUntilTheirStates) {
   Server server(5);
-  Screen screen;
-  ReplicaSet view(server.library(), kTickS, 100);
-  ASSERT_TRUE(view.Take(server.Step(), screen));
-  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Take(server.Step(), screen));
+  CollectingSink sink;
+  ReplicaSet replicas(server.library(), kTickS, 100);
+  ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(replicas.Apply(server.Step(), sink));
   (void)server.Step();
-  ASSERT_TRUE(view.Take(server.Step(), screen));
-  EXPECT_EQ(view.avatar_count(), 0u);
-  EXPECT_EQ(screen.gone.size(), 5u);
-  for (int i = 0; i < 20; ++i) ASSERT_TRUE(view.Take(server.Step(), screen));
-  EXPECT_EQ(server.Same(screen), 0);
-  ASSERT_TRUE(view.Take(server.States(), screen));
+  ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+  EXPECT_EQ(replicas.avatar_count(), 0u);
+  EXPECT_EQ(sink.gone.size(), 5u);
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+  EXPECT_EQ(server.CountEqualPoses(sink), 0);
+  ASSERT_TRUE(replicas.Apply(server.States(), sink));
   for (int i = 0; i < 50; ++i) {
-    ASSERT_TRUE(view.Take(server.Step(), screen));
-    ASSERT_EQ(server.Same(screen), 5);
+    ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+    ASSERT_EQ(server.CountEqualPoses(sink), 5);
   }
-  // A part that is missing is a gap, too.
+  // A missing part is a gap as well.
   Movements half = server.Step();
   half.parts = 2;
   half.part = 1;
-  ASSERT_TRUE(view.Take(half, screen));
-  EXPECT_EQ(view.avatar_count(), 0u);
+  ASSERT_TRUE(replicas.Apply(half, sink));
+  EXPECT_EQ(replicas.avatar_count(), 0u);
 }
 
-TEST(ReplicaSet, LeavesOutWhoIsGoneNotWantedOrOneTooMany) {
+TEST(ReplicaSet, IgnoresGoneUnwantedAndExcessAvatars) {
   Server server(5);
-  Screen screen;
-  screen.unwanted = 2;
-  ReplicaSet view(server.library(), kTickS, 3);
-  ASSERT_TRUE(view.Take(server.Step(), screen));
-  EXPECT_EQ(view.avatar_count(), 3u);  // 1, 3, 4
+  CollectingSink sink;
+  sink.unwanted = 2;
+  ReplicaSet replicas(server.library(), kTickS, 3);
+  ASSERT_TRUE(replicas.Apply(server.Step(), sink));
+  EXPECT_EQ(replicas.avatar_count(), 3u);  // avatars 1, 3 and 4
   Movements message = server.Step();
   Server::Add(message, 3, protocol::kMovementGone);
   Server::Add(message, 5, protocol::kMovementGone);
-  ASSERT_TRUE(view.Take(message, screen));
-  EXPECT_EQ(view.avatar_count(), 2u);
-  EXPECT_EQ(screen.gone, std::set<AvatarId>{3});
+  ASSERT_TRUE(replicas.Apply(message, sink));
+  EXPECT_EQ(replicas.avatar_count(), 2u);
+  EXPECT_EQ(sink.gone, std::set<AvatarId>{3});
 }
 
-TEST(ReplicaSet, ARecordThatIsNoneIsRefused) {
+TEST(ReplicaSet, RejectsAnInvalidRecord) {
   Server server(2);
-  Screen screen;
-  ReplicaSet view(server.library(), kTickS, 100);
+  CollectingSink sink;
+  ReplicaSet replicas(server.library(), kTickS, 100);
   Movements message = server.Step();
   message.records.pop_back();
   --message.ends.back();
-  const Status status = view.Take(message, screen);
+  const Status status = replicas.Apply(message, sink);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
 }

@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-TEST(Status, EachCodeOfTheProtocolIsOneOfTheAbiByTheSameName) {
+TEST(Status, ProtocolCodesHaveTheSameNamesInC) {
   int known = 0;
   for (int code = 0; code < 1000; ++code) {
     const auto name = protocol::StatusCodeName(static_cast<protocol::StatusCode>(code));
@@ -21,7 +21,7 @@ TEST(Status, EachCodeOfTheProtocolIsOneOfTheAbiByTheSameName) {
   EXPECT_GE(known, 26);
 }
 
-TEST(Status, EachCodeHasANameAndASentenceOfItsOwn) {
+TEST(Status, CodesHaveUniqueNamesAndTexts) {
   std::set<std::string> names;
   std::set<std::string> texts;
   int known = 0;
@@ -35,7 +35,7 @@ TEST(Status, EachCodeHasANameAndASentenceOfItsOwn) {
     EXPECT_TRUE(texts.insert(text).second) << text;
     EXPECT_EQ(text.back(), '.') << name;
     EXPECT_EQ(name.find_first_not_of("abcdefghijklmnopqrstuvwxyz_"), std::string::npos) << name;
-    // Only codes of this library's own stand in the upper half of a hundred.
+    // Codes x50 to x99 belong to this library only.
     const bool from_protocol =
         protocol::StatusCodeName(static_cast<protocol::StatusCode>(code)) != "unknown";
     EXPECT_EQ(from_protocol, code % 100 < 50) << name;
@@ -43,7 +43,7 @@ TEST(Status, EachCodeHasANameAndASentenceOfItsOwn) {
   EXPECT_EQ(known, 38);
 }
 
-TEST(Status, AnUnknownCodeIsExplainedByItsHundred) {
+TEST(Status, UnknownCodesAreDescribedByTheirHundreds) {
   for (const int code : {149, 249, 349, 449}) {
     const auto status = static_cast<stridewire_status>(code);
     EXPECT_STREQ(stridewire_status_name(status), "unknown");

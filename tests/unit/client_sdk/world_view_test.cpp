@@ -10,15 +10,16 @@ namespace {
 
 class WorldViewTest : public testing::Test {
  protected:
-  WorldViewTest() { view_.SetInfo(toy::WorldInfo(1, 1, "plaza")); }
+  WorldViewTest() { view_.SetInfo(test_world::WorldInfo(1, 1, "plaza")); }
 
-  Status Take(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars,
+  Status Take(std::uint64_t tick, const std::vector<test_world::AvatarAt>& avatars,
               std::uint16_t shard = 0, protocol::PoseMode mode = protocol::PoseMode::kFull,
               bool is_partial = false) {
-    const auto frame = toy::PoseFrame(1, tick, avatars, mode, shard, toy::kJoints, is_partial);
+    const auto frame =
+        test_world::PoseFrame(1, tick, avatars, mode, shard, test_world::kJoints, is_partial);
     const auto message =
         protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
-    return view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
+    return view_.Apply(std::get<protocol::PoseBatch>(message.value()), 1, counts_);
   }
 
   PoseBudget budget_{std::size_t{1} << 20, 0};
@@ -26,19 +27,19 @@ class WorldViewTest : public testing::Test {
   WorldView view_{8, budget_};
 };
 
-TEST_F(WorldViewTest, KnowsWhoIsThere) {
+TEST_F(WorldViewTest, ListsAvatars) {
   ASSERT_TRUE(Take(1, {{3}, {1}, {2}}));
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 2, 3}));
   ASSERT_TRUE(Take(2, {{3}, {1}}));
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1, 3}));
   EXPECT_TRUE(view_.IsGone(2));
-  EXPECT_NE(view_.Find(2), nullptr);  // It can still be shown at a time when it was there.
+  EXPECT_NE(view_.Find(2), nullptr);  // can still be sampled at earlier times
   view_.Remove(1);
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{3}));
 }
 
-// Subscriptions of different modes may name different avatars.
-TEST_F(WorldViewTest, AvatarsOfOneModeAreNotMissedInAnother) {
+// Subscriptions of different modes can have different avatars.
+TEST_F(WorldViewTest, ModesAreIndependent) {
   constexpr auto kQuantised = protocol::PoseMode::kQuantised;
   for (std::uint64_t tick = 1; tick <= 3; ++tick) {
     ASSERT_TRUE(Take(tick, {{1}}));
@@ -50,9 +51,9 @@ TEST_F(WorldViewTest, AvatarsOfOneModeAreNotMissedInAnother) {
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{1}));
 }
 
-// Of a region absence says nothing, leaving does; and a batch on its way then brings nobody back.
-TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
-  const auto partial = [&](std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars) {
+// Absence from a batch of a region means nothing. After `left`, earlier batches are ignored.
+TEST_F(WorldViewTest, AvatarsOfARegionStayUntilTheyLeave) {
+  const auto partial = [&](std::uint64_t tick, const std::vector<test_world::AvatarAt>& avatars) {
     return Take(tick, avatars, 0, protocol::PoseMode::kFull, true);
   };
   const auto avatars = [&] { return view_.Avatars(); };
@@ -61,7 +62,7 @@ TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
   EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 2, 3}));
   EXPECT_EQ(counts_.missing, 0u);
   view_.Leave(2, 8);
-  view_.Leave(4, 8);  // whose poses were still on their way
+  view_.Leave(4, 8);  // its poses arrive later
   EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 3}));
   ASSERT_TRUE(partial(7, {{2}, {3}, {4}}));
   EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 3}));
@@ -69,15 +70,16 @@ TEST_F(WorldViewTest, ARegionsAvatarsAreThereUntilTheyLeave) {
   EXPECT_EQ(avatars(), (std::vector<std::uint32_t>{1, 2, 3, 4}));
 }
 
-// Rings of a region are of several modes; who crosses one goes on in another.
-TEST_F(WorldViewTest, WhoCrossesARingOfARegionGoesOnInAnotherDetail) {
-  constexpr auto kFewer = protocol::PoseMode::kCompactFewer;
+// Rings can have different modes. An avatar that crosses a ring continues in another mode.
+TEST_F(WorldViewTest, AnAvatarContinuesInAnotherDetailAfterARing) {
+  constexpr auto kReduced = protocol::PoseMode::kCompactReduced;
   constexpr auto kRoot = protocol::PoseMode::kCompactRoot;
   for (std::uint64_t tick = 60; tick <= 63; ++tick) {
     const bool has_crossed = tick >= 62;
-    ASSERT_TRUE(Take(
-        tick, has_crossed ? std::vector<toy::AvatarAt>{{1}, {2}} : std::vector<toy::AvatarAt>{{1}},
-        0, kFewer, true));
+    ASSERT_TRUE(Take(tick,
+                     has_crossed ? std::vector<test_world::AvatarAt>{{1}, {2}}
+                                 : std::vector<test_world::AvatarAt>{{1}},
+                     0, kReduced, true));
     if (!has_crossed) {
       ASSERT_TRUE(Take(tick, {{2}}, 0, kRoot, true));
     }
@@ -86,13 +88,13 @@ TEST_F(WorldViewTest, WhoCrossesARingOfARegionGoesOnInAnotherDetail) {
   const PoseHistory& history = *view_.Find(2);
   ASSERT_EQ(history.size(), 4u);
   EXPECT_EQ(history.stamp(1).detail, protocol::PoseDetail::kRoot);
-  EXPECT_EQ(history.stamp(2).detail, protocol::PoseDetail::kFewer);
+  EXPECT_EQ(history.stamp(2).detail, protocol::PoseDetail::kReduced);
   EXPECT_FALSE(history.stamp(2).discontinuity);
   EXPECT_EQ(counts_.missing, 0u);
   EXPECT_EQ(counts_.refused, 0u);
 }
 
-TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {
+TEST_F(WorldViewTest, AnAvatarContinuesOnAnotherShard) {
   ASSERT_TRUE(Take(1, {{1}}, 0));
   ASSERT_TRUE(Take(1, {}, 1));
   ASSERT_TRUE(Take(2, {}, 0));
@@ -102,20 +104,21 @@ TEST_F(WorldViewTest, AnAvatarThatMovesToAnotherShardGoesOn) {
   EXPECT_FALSE(view_.Find(1)->stamp(1).discontinuity);
 }
 
-TEST_F(WorldViewTest, ForgetsWhoHasBeenGoneForLongAndGivesTheMemoryBack) {
+TEST_F(WorldViewTest, ErasesAvatarsThatAreGoneForLong) {
   ASSERT_TRUE(Take(1, {{1}, {2}}));
   const std::size_t two = budget_.used_bytes;
   std::uint64_t tick = 2;
-  for (; toy::TickTime(tick) < 1.0 + WorldView::kKeepGone_s; ++tick) ASSERT_TRUE(Take(tick, {{1}}));
+  for (; test_world::TickTime(tick) < 1.0 + WorldView::kKeepGone_s; ++tick)
+    ASSERT_TRUE(Take(tick, {{1}}));
   EXPECT_EQ(view_.Find(2), nullptr);
   EXPECT_EQ(budget_.used_bytes, two / 2);
   view_.Clear();
   EXPECT_EQ(budget_.used_bytes, 0u);
 }
 
-TEST_F(WorldViewTest, StaysWithinItsMemory) {
-  budget_.limit_bytes = 5 * PoseHistory::Bytes(8, toy::kJoints);
-  std::vector<toy::AvatarAt> crowd;
+TEST_F(WorldViewTest, RespectsTheMemoryLimit) {
+  budget_.limit_bytes = 5 * PoseHistory::Bytes(8, test_world::kJoints);
+  std::vector<test_world::AvatarAt> crowd;
   for (std::uint32_t a = 1; a <= 20; ++a) crowd.push_back({a});
   ASSERT_TRUE(Take(1, crowd));
   ASSERT_TRUE(Take(2, crowd));
@@ -132,21 +135,21 @@ TEST_F(WorldViewTest, CountsMissingTicks) {
   EXPECT_EQ(counts_.missing, 3u);
 }
 
-TEST_F(WorldViewTest, ABreakMarksTheNextPoseOfEachAvatar) {
+TEST_F(WorldViewTest, BreakMarksTheNextPoseOfEachAvatar) {
   ASSERT_TRUE(Take(1, {{1}}));
   ASSERT_TRUE(Take(2, {{1}}));
   view_.Break();
   ASSERT_TRUE(Take(9, {{1}}));
   ASSERT_TRUE(Take(10, {{1}}));
   const PoseHistory& history = *view_.Find(1);
-  EXPECT_TRUE(history.stamp(0).discontinuity);  // The first of all.
+  EXPECT_TRUE(history.stamp(0).discontinuity);  // the first pose
   EXPECT_FALSE(history.stamp(1).discontinuity);
   EXPECT_TRUE(history.stamp(2).discontinuity);
   EXPECT_FALSE(history.stamp(3).discontinuity);
-  EXPECT_EQ(counts_.missing, 0u);  // Nobody promised those ticks.
+  EXPECT_EQ(counts_.missing, 0u);  // these ticks were not expected
 }
 
-TEST_F(WorldViewTest, TheServersFlagMarksToo) {
+TEST_F(WorldViewTest, KeepsTheDiscontinuityFlag) {
   ASSERT_TRUE(Take(1, {{1}}));
   ASSERT_TRUE(Take(2, {{1, protocol::kPoseDiscontinuity}}));
   ASSERT_TRUE(Take(3, {{1, protocol::kPoseStanding}}));
@@ -155,7 +158,7 @@ TEST_F(WorldViewTest, TheServersFlagMarksToo) {
   EXPECT_TRUE(view_.Find(1)->stamp(2).standing);
 }
 
-TEST_F(WorldViewTest, KeepsOnlyWhoIsWanted) {
+TEST_F(WorldViewTest, StoresPosesOfFilteredAvatarsOnly) {
   ASSERT_TRUE(Take(1, {{1}, {2}, {3}}));
   view_.SetFilter(std::set<std::uint32_t>{2});
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2}));
@@ -169,17 +172,17 @@ protocol::Message Decoded(const std::vector<std::byte>& frame) {
       .value();
 }
 
-TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
-  const protocol::CompactCodecs codecs = toy::Codecs();
+TEST_F(WorldViewTest, CompactPosesEqualFullPoses) {
+  const protocol::CompactCodecs codecs = test_world::Codecs();
   protocol::PoseRows rows;
   protocol::PoseBatchInfo info{.world = 1, .tick = 1, .mode = protocol::PoseMode::kCompact};
-  info.joint_count = toy::kJoints;
+  info.joint_count = test_world::kJoints;
   const std::vector<std::uint32_t> avatars = {1, 2, 3};
   ASSERT_TRUE(rows.Begin(info, std::make_shared<const std::vector<std::uint32_t>>(avatars),
                          codecs.Find(info.mode)));
-  std::vector<Quat> pose = toy::RotationsAt(0.75);
+  std::vector<Quat> pose = test_world::RotationsAt(0.75);
   ASSERT_TRUE(rows.Add(0, Vec3(1.0f), pose));
-  pose[1] = YawRotation(1.0);  // a spine that turns after all: told the wide way
+  pose[1] = YawRotation(1.0);  // outside the range of the codes: sent uncompressed
   ASSERT_TRUE(rows.Add(0, Vec3(2.0f), pose));
   pose[1] = kIdentityQuat;
   ASSERT_TRUE(rows.Add(0, Vec3(3.0f), pose));
@@ -189,7 +192,7 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
   const protocol::Message message = Decoded(frame);
   const auto& batch = std::get<protocol::PoseBatch>(message);
   view_.SetFilter(std::set<std::uint32_t>{2, 3});
-  ASSERT_TRUE(view_.Take(batch, 1, counts_));
+  ASSERT_TRUE(view_.Apply(batch, 1, counts_));
   EXPECT_EQ(view_.Avatars(), (std::vector<std::uint32_t>{2, 3}));
   for (const std::uint32_t avatar : {2u, 3u}) {
     const PoseHistory& history = *view_.Find(avatar);
@@ -198,28 +201,29 @@ TEST_F(WorldViewTest, CompactPosesAreThoseOfTheOthers) {
               1e-3);
     EXPECT_LT(AngleBetween(history.rotations(0)[2], YawRotation(0.75)), 2e-3);
   }
-  // Of a world whose codes were not told they mean nothing.
-  protocol::WorldInfo uncoded = toy::WorldInfo(1, 1, "plaza");
+  // Compact poses of a world without codes are an error.
+  protocol::WorldInfo uncoded = test_world::WorldInfo(1, 1, "plaza");
   uncoded.rotation_codes.clear();
-  uncoded.fewer_joints.clear();
+  uncoded.reduced_joints.clear();
   view_.SetInfo(uncoded);
-  const Status status = view_.Take(batch, 1, counts_);
+  const Status status = view_.Apply(batch, 1, counts_);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().code, ErrorCode::kUnsupported);
 }
 
-TEST_F(WorldViewTest, WhatADetailLeavesOutIsTheReference) {
+TEST_F(WorldViewTest, OmittedJointsHaveTheirReferences) {
   using protocol::PoseDetail;
   std::uint64_t tick = 60;
-  for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kRoot}) {
+  for (const PoseDetail detail : {PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kRoot}) {
     ++tick;
-    const auto frame = toy::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail));
+    const auto frame = test_world::PoseFrame(1, tick, {{1}}, protocol::CompactMode(detail));
     const protocol::Message message = Decoded(frame);  // borrows the frame
-    ASSERT_TRUE(view_.Take(std::get<protocol::PoseBatch>(message), 1, counts_));
+    ASSERT_TRUE(view_.Apply(std::get<protocol::PoseBatch>(message), 1, counts_));
     const PoseHistory& history = *view_.Find(1);
     const std::size_t newest = history.size() - 1;
     EXPECT_EQ(history.stamp(newest).detail, detail);
-    EXPECT_NEAR(history.root_position_m(newest).z, toy::RootAt(toy::TickTime(tick)).z, 1e-3);
+    EXPECT_NEAR(history.root_position_m(newest).z, test_world::RootAt(test_world::TickTime(tick)).z,
+                1e-3);
     const double turned = AngleBetween(history.rotations(newest)[2], kIdentityQuat);
     if (detail == PoseDetail::kAll) {
       EXPECT_GT(turned, 0.5);
@@ -229,11 +233,11 @@ TEST_F(WorldViewTest, WhatADetailLeavesOutIsTheReference) {
   }
 }
 
-TEST_F(WorldViewTest, RefusesAnotherFigureAndTicksThatRunBackwards) {
-  const auto frame = toy::PoseFrame(1, 1, {{1}}, protocol::PoseMode::kFull, 0, 5);
+TEST_F(WorldViewTest, RejectsAnotherSkeletonAndDecreasingTicks) {
+  const auto frame = test_world::PoseFrame(1, 1, {{1}}, protocol::PoseMode::kFull, 0, 5);
   const auto message =
       protocol::DecodeMessage(protocol::ParseFrame(frame, protocol::Sender::kServer).value());
-  EXPECT_FALSE(view_.Take(std::get<protocol::PoseBatch>(message.value()), 1, counts_));
+  EXPECT_FALSE(view_.Apply(std::get<protocol::PoseBatch>(message.value()), 1, counts_));
   ASSERT_TRUE(Take(5, {{1}}));
   EXPECT_FALSE(Take(4, {{1}}));
 }

@@ -47,44 +47,43 @@ TEST(FailIf, CountsErrors) {
   EXPECT_FALSE(Fails("errors>2"));
 }
 
-TEST(FailIf, FailsOnWhatWasNotMeasured) {
+TEST(FailIf, FailsIfTheNumberWasNotMeasured) {
   EXPECT_TRUE(Fails("step_latency_ms.p99>1000000"));
   const Expected<FailIf> fail_if = FailIf::Parse("step_latency_ms.p99>1000000");
   EXPECT_EQ(fail_if->Explain(SomeReport()), "step_latency_ms.p99>1000000: it was not measured");
 }
 
-TEST(FailIf, ExplainsItself) {
+TEST(FailIf, ExplainsTheFailure) {
   const Expected<FailIf> fail_if = FailIf::Parse(" tick_ms.p99 > 1 ");
   ASSERT_TRUE(fail_if.has_value());
   EXPECT_EQ(fail_if->Explain(SomeReport()), "tick_ms.p99 > 1: it is 2");
 }
 
-TEST(FailIf, KnowsEveryNumberOfTheReport) {
+TEST(FailIf, AcceptsEveryNumberOfTheReport) {
   for (const std::string& name : ReportNumberNames()) {
     EXPECT_TRUE(FailIf::Parse(name + ">0").has_value()) << name;
   }
 }
 
-TEST(FailIf, TellsWhatIsWrongWithItsText) {
+TEST(FailIf, ReportsSyntaxErrors) {
   const auto error = [](const std::string& text) {
     const Expected<FailIf> fail_if = FailIf::Parse(text);
     return fail_if ? std::string("no error") : Describe(fail_if.error());
   };
-  const std::string comparison = ": needs a comparison, such as ticks_missed>0";
+  const std::string comparison = ": expected a comparison, for example ticks_missed>0";
   EXPECT_EQ(error(""), "--fail-if ''" + comparison);
   EXPECT_EQ(error("ticks_missed"), "--fail-if 'ticks_missed'" + comparison);
   EXPECT_EQ(error("ticks_missed=3"),
-            "--fail-if 'ticks_missed=3': has no such comparison; there are > >= < <= == !=");
+            "--fail-if 'ticks_missed=3': unknown comparison; expected > >= < <= == or !=");
   EXPECT_EQ(error("ticks_missed!3"),
-            "--fail-if 'ticks_missed!3': has no such comparison; there are > >= < <= == !=");
+            "--fail-if 'ticks_missed!3': unknown comparison; expected > >= < <= == or !=");
   for (const char* number : {"", " ", "x", "1x", "1 2", "nan", "inf", "1e999", ">1"}) {
     const std::string text = std::string("ticks_missed>") + number;
-    EXPECT_EQ(error(text), "--fail-if '" + text + "': has no number after its comparison");
+    EXPECT_EQ(error(text), "--fail-if '" + text + "': expected a number after the comparison");
   }
   for (const char* name : {"", "tick", "tick_ms", "mode", "requests", "tick_ms.p98", "."}) {
-    EXPECT_TRUE(
-        error(std::string(name) + ">0")
-            .starts_with("--fail-if '" + std::string(name) + ">0': names no number of the report"))
+    EXPECT_TRUE(error(std::string(name) + ">0")
+                    .starts_with("--fail-if '" + std::string(name) + ">0': unknown name"))
         << error(std::string(name) + ">0");
   }
   EXPECT_EQ(error(std::string(129, 'a')),

@@ -19,7 +19,7 @@ TEST(LatencyHistogram, IsEmptyAtFirst) {
   EXPECT_EQ(times.max_ms(), 0.0);
 }
 
-TEST(LatencyHistogram, KeepsSingleMicrosecondsApartUpTo255) {
+TEST(LatencyHistogram, HasOneBinPerMicrosecondUpTo255) {
   LatencyHistogram times;
   for (int us = 0; us < 256; ++us) times.RecordNs(us * kUs);
   for (int us = 0; us < 256; ++us) {
@@ -35,22 +35,22 @@ TEST(LatencyHistogram, RoundsNanosecondsUp) {
   EXPECT_EQ(times.max_ms(), 0.002);
 }
 
-TEST(LatencyHistogram, TakesNegativeTimesForNone) {
+TEST(LatencyHistogram, CountsNegativeTimesAsZero) {
   LatencyHistogram times;
   times.RecordNs(-5);
   EXPECT_EQ(times.count(), 1u);
   EXPECT_EQ(times.max_ms(), 0.0);
 }
 
-TEST(LatencyHistogram, EndsAtItsLargestTime) {
+TEST(LatencyHistogram, ClampsToItsLargestTime) {
   LatencyHistogram times;
   times.RecordNs(std::numeric_limits<std::int64_t>::max());
   EXPECT_EQ(times.max_ms(), 1e-3 * static_cast<double>(LatencyHistogram::kMaxUs));
   EXPECT_EQ(times.QuantileMs(1.0), times.max_ms());
 }
 
-// The stated precision, against sorted values, over twelve orders of magnitude.
-TEST(LatencyHistogram, IsNeverBelowAndAtMostOne128thAboveTheTrueQuantile) {
+// Compares quantiles with those of sorted values over twelve orders of magnitude.
+TEST(LatencyHistogram, RoundsQuantilesUpByAtMostOne128th) {
   const std::uint64_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937_64 random(seed);
@@ -73,7 +73,7 @@ TEST(LatencyHistogram, IsNeverBelowAndAtMostOne128thAboveTheTrueQuantile) {
   EXPECT_NEAR(times.max_ms(), 1e-3 * static_cast<double>(all_us.back()), 1e-9);
 }
 
-TEST(LatencyHistogram, MergesAsIfAllWereRecordedInOne) {
+TEST(LatencyHistogram, MergesLikeASingleHistogram) {
   LatencyHistogram all;
   LatencyHistogram even;
   LatencyHistogram odd;

@@ -12,7 +12,7 @@ double OnlyTimeMs(const LatencyProbes& probes) {
   return probes.times().max_ms();
 }
 
-TEST(LatencyProbes, MeasureFromThePlanToThePoseAfterTheEvent) {
+TEST(LatencyProbes, MeasureUntilThePoseAfterTheEvent) {
   LatencyProbes probes(2);
   probes.Schedule(1, 7, 100 * kMs, 105 * kMs);
   probes.Started(1, 7, 50);
@@ -25,7 +25,7 @@ TEST(LatencyProbes, MeasureFromThePlanToThePoseAfterTheEvent) {
   EXPECT_EQ(probes.open_count(), 0u);
 }
 
-TEST(LatencyProbes, MeasureToThePoseThatCameBeforeTheEvent) {
+TEST(LatencyProbes, MeasureUntilAPoseThatArrivedBeforeTheEvent) {
   LatencyProbes probes(1);
   probes.Schedule(0, 7, 0, 0);
   probes.Pose(0, 50, 20 * kMs, true);
@@ -34,7 +34,7 @@ TEST(LatencyProbes, MeasureToThePoseThatCameBeforeTheEvent) {
   EXPECT_EQ(OnlyTimeMs(probes), 20.0);
 }
 
-TEST(LatencyProbes, LeaveOutPosesOfAnEarlierMovement) {
+TEST(LatencyProbes, IgnorePosesOfAnEarlierMovement) {
   LatencyProbes probes(1);
   probes.Schedule(0, 7, 0, 0);
   probes.Pose(0, 40, 10 * kMs, true);
@@ -62,7 +62,7 @@ TEST(LatencyProbes, IgnoreOtherRequestsAndAvatars) {
   EXPECT_EQ(probes.open_count(), 1u);
 }
 
-TEST(LatencyProbes, CountAStepThatNeverMovesWithTheTimeItWaited) {
+TEST(LatencyProbes, CountAnInvisibleStepWithItsWaitingTime) {
   LatencyProbes probes(3);
   probes.Schedule(0, 7, 0, 0);
   probes.Schedule(0, 8, 900 * kMs, 1000 * kMs);  // The next one is due, the last is not to be seen.
@@ -72,7 +72,7 @@ TEST(LatencyProbes, CountAStepThatNeverMovesWithTheTimeItWaited) {
   EXPECT_EQ(probes.open_count(), 0u);
 }
 
-TEST(LatencyProbes, DoNotCountWhatIsRejectedOrAbandoned) {
+TEST(LatencyProbes, IgnoreRejectedAndAbandonedSteps) {
   LatencyProbes probes(2);
   probes.Schedule(0, 7, 0, 0);
   probes.Schedule(1, 8, 0, 0);

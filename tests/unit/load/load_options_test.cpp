@@ -19,14 +19,14 @@ Expected<LoadCommandLine> Read(const Arguments& arguments) {
 const Arguments kEnough = {"--connect", "127.0.0.1:7420", "--avatars", "10", "--observers",
                            "2",         "--seconds",      "1.5"};
 
-/// What is always needed, and this.
+/// Parses the required options and these.
 Arguments With(const Arguments& more) {
   Arguments all = kEnough;
   all.insert(all.end(), more.begin(), more.end());
   return all;
 }
 
-/// What is always needed, with one value changed.
+/// The required options with one value changed.
 Arguments Changed(const std::string& option, const std::string& value) {
   Arguments all = kEnough;
   *(std::find(all.begin(), all.end(), option) + 1) = value;
@@ -38,7 +38,7 @@ std::string ErrorOf(const Arguments& arguments) {
   return line ? "no error" : Describe(line.error());
 }
 
-TEST(LoadOptions, NeedLittle) {
+TEST(LoadOptions, HaveDefaults) {
   const Expected<LoadCommandLine> line = Read(kEnough);
   ASSERT_TRUE(line.has_value()) << Describe(line.error());
   const LoadOptions& options = line->options;
@@ -54,7 +54,7 @@ TEST(LoadOptions, NeedLittle) {
   EXPECT_FALSE(options.json);
 }
 
-TEST(LoadOptions, TakeEverything) {
+TEST(LoadOptions, ParseAllOptions) {
   const Expected<LoadCommandLine> line = Read(With({"--http",
                                                     "[::1]:80",
                                                     "--worlds",
@@ -101,13 +101,13 @@ TEST(LoadOptions, TakeEverything) {
   EXPECT_EQ(options.fail_ifs[1].name(), "errors");
 }
 
-TEST(LoadOptions, MayLeaveTheMetricsAlone) {
+TEST(LoadOptions, CanDisableTheMetrics) {
   const Expected<LoadCommandLine> line = Read(With({"--http", "none", "--wander"}));
   ASSERT_TRUE(line.has_value()) << Describe(line.error());
   EXPECT_FALSE(line->options.http.has_value());
 }
 
-TEST(LoadOptions, GiveHelpWithExamplesAndVersion) {
+TEST(LoadOptions, PrintHelpAndVersion) {
   const Expected<LoadCommandLine> help = Read({"--help"});
   ASSERT_TRUE(help.has_value());
   EXPECT_NE(help->text.find("stridewire-load --connect 127.0.0.1:7420"), std::string::npos);
@@ -116,11 +116,11 @@ TEST(LoadOptions, GiveHelpWithExamplesAndVersion) {
   EXPECT_TRUE(version->text.starts_with("stridewire-load ")) << version->text;
 }
 
-TEST(LoadOptions, NameTheOptionThatIsWrong) {
+TEST(LoadOptions, NameTheInvalidOption) {
   EXPECT_EQ(ErrorOf({}), "--connect is required: see --help");
   EXPECT_NE(ErrorOf(With({"--speed", "3"})).find("--speed"), std::string::npos);
   EXPECT_NE(ErrorOf(Changed("--avatars", "many")).find("--avatars"), std::string::npos);
-  const std::string range = ": is out of its range (see --help)";
+  const std::string range = ": is out of range (see --help)";
   EXPECT_EQ(ErrorOf(Changed("--avatars", "0")), "--avatars 0" + range);
   EXPECT_EQ(ErrorOf(Changed("--avatars", "100001")), "--avatars 100001" + range);
   EXPECT_EQ(ErrorOf(Changed("--observers", "-1")), "--observers -1" + range);
@@ -130,48 +130,48 @@ TEST(LoadOptions, NameTheOptionThatIsWrong) {
   EXPECT_EQ(ErrorOf(Changed("--seconds", "nan")), "--seconds nan" + range);
   EXPECT_EQ(ErrorOf(With({"--worlds", "0"})), "--worlds 0" + range);
   EXPECT_EQ(ErrorOf(With({"--worlds", "1001"})), "--worlds 1001" + range);
-  EXPECT_EQ(ErrorOf(With({"--worlds", "11"})), "--worlds 11: leaves worlds without an avatar");
+  EXPECT_EQ(ErrorOf(With({"--worlds", "11"})), "--worlds 11: exceeds the number of avatars");
   EXPECT_EQ(ErrorOf(With({"--churn", "-0.5"})), "--churn -0.5" + range);
   EXPECT_EQ(ErrorOf(With({"--churn", "1001"})), "--churn 1001" + range);
   EXPECT_EQ(ErrorOf(With({"--threads", "0"})), "--threads 0" + range);
   EXPECT_EQ(ErrorOf(With({"--threads", "65"})), "--threads 65" + range);
   EXPECT_EQ(ErrorOf(With({"--verify-one-in", "0"})), "--verify-one-in 0" + range);
-  EXPECT_EQ(ErrorOf(With({"--mode", "raw"})), "--mode raw: is not full, quantised or movement");
-  EXPECT_EQ(ErrorOf(With({"--detail", "1"})), "--detail 1: is not all, fewer or root");
+  EXPECT_EQ(ErrorOf(With({"--mode", "raw"})), "--mode raw: expected full, quantised or movement");
+  EXPECT_EQ(ErrorOf(With({"--detail", "1"})), "--detail 1: expected all, reduced or root");
   EXPECT_EQ(ErrorOf(With({"--detail", "root", "--mode", "full"})),
-            "--detail root: goes with --mode quantised");
-  EXPECT_EQ(ErrorOf(With({"--observe", "none"})), "--observe none: is neither all nor one");
+            "--detail root: needs --mode quantised");
+  EXPECT_EQ(ErrorOf(With({"--observe", "none"})), "--observe none: expected all or one");
   EXPECT_EQ(ErrorOf(With({"--wander", "--choreography", "c.json"})),
-            "--wander: excludes --choreography");
+            "--wander: cannot be used with --choreography");
   EXPECT_NE(ErrorOf(With({"--seed", "x"})).find("--seed"), std::string::npos);
   EXPECT_TRUE(ErrorOf(With({"--fail-if", "tick>0"})).starts_with("--fail-if 'tick>0': "));
 
   EXPECT_EQ(ErrorOf(With({"--partial-observers", "-1"})), "--partial-observers -1" + range);
   EXPECT_EQ(ErrorOf(With({"--partial-avatars", "0"})), "--partial-avatars 0" + range);
   EXPECT_EQ(ErrorOf(With({"--partial-observers", "1", "--partial-avatars", "11"})),
-            "--partial-avatars 11: is more than there are");
+            "--partial-avatars 11: exceeds the number of avatars");
 
   Arguments alone = Changed("--observers", "0");
   alone.insert(alone.end(), {"--churn", "1"});
-  EXPECT_EQ(ErrorOf(alone), "--churn 1: has no observers to drop and bring back");
+  EXPECT_EQ(ErrorOf(alone), "--churn 1: needs at least one observer");
 }
 
-TEST(LoadOptions, TellAnAddressThatIsNone) {
+TEST(LoadOptions, RejectInvalidAddresses) {
   for (const char* address : {"localhost", ":7420", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:65536",
                               "127.0.0.1:-1", "127.0.0.1:80x", "::1:7420", "[]:7420"}) {
     EXPECT_EQ(ErrorOf(Changed("--connect", address)),
               "--connect " + std::string(address) +
-                  ": is not HOST:PORT, such as 127.0.0.1:7420 or [::1]:7420");
+                  ": expected HOST:PORT, for example 127.0.0.1:7420 or [::1]:7420");
   }
-  EXPECT_TRUE(ErrorOf(With({"--http", "x"})).starts_with("--http x: is not HOST:PORT"));
+  EXPECT_TRUE(ErrorOf(With({"--http", "x"})).starts_with("--http x: expected HOST:PORT"));
 }
 
-TEST(LoadOptions, TakeSoManyThresholdsAndNoMore) {
+TEST(LoadOptions, LimitTheNumberOfConditions) {
   Arguments many = kEnough;
   for (int i = 0; i < kMaxFailIfs; ++i) many.insert(many.end(), {"--fail-if", "errors>0"});
   EXPECT_EQ(ErrorOf(many), "no error");
   many.insert(many.end(), {"--fail-if", "errors>0"});
-  EXPECT_EQ(ErrorOf(many), "--fail-if: may be given 32 times");
+  EXPECT_EQ(ErrorOf(many), "--fail-if: can be used at most 32 times");
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 namespace stridewire::load {
 namespace {
 
-TEST(LoadReport, HasTheKeysOthersRelyOn) {
+TEST(LoadReport, HasTheDocumentedKeys) {
   LoadReport report;
   report.avatars = 3;
   report.observers = 2;
@@ -41,7 +41,7 @@ TEST(LoadReport, HasTheKeysOthersRelyOn) {
   EXPECT_EQ(json["errors"], nlohmann::json::array({"one"}));
 }
 
-TEST(LoadReport, SaysNullWhereNothingWasMeasured) {
+TEST(LoadReport, IsNullForMissingMeasurements) {
   const auto json = nlohmann::json::parse(ToJson(LoadReport{}));
   EXPECT_TRUE(json["tick_ms"]["p99"].is_null());
   EXPECT_TRUE(json["ticks_missed"].is_null());
@@ -50,7 +50,7 @@ TEST(LoadReport, SaysNullWhereNothingWasMeasured) {
   EXPECT_EQ(ReportNumber(LoadReport{}, "ticks_missed"), std::nullopt);
 }
 
-TEST(LoadReport, IsOneLineOfJsonWhateverAnErrorQuotes) {
+TEST(LoadReport, IsOneLineOfValidJsonForAnyErrorText) {
   LoadReport report;
   report.errors = {"a\nb \xff"};
   const std::string text = ToJson(report);

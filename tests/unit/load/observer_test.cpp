@@ -1,4 +1,4 @@
-// What an observer counts and complains about, told by a server that does what the test says.
+// Tests what an observer counts and which errors it reports, with a scripted server.
 #include "observer.h"
 
 #include <gmock/gmock.h>
@@ -46,29 +46,30 @@ class ObserverTest : public ::testing::Test {
   }
   ~ObserverTest() override { Join(); }
 
-  /// Everything up to the reply to Observe.
+  /// Runs the session up to the Reply to Observe.
   void Greet() {
     connection_ = server_.Accept();
     ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
-    connection_.Send(toy::Welcome());
+    connection_.Send(test_world::Welcome());
     const auto join = connection_.Expect<protocol::JoinWorld>();
     ASSERT_TRUE(join.has_value());
     EXPECT_EQ(join->name, "load-0");
     EXPECT_EQ(join->role, protocol::Role::kObserver);
-    connection_.Send(toy::WorldInfo(join->seq, kWorld, join->name));
-    connection_.Send(toy::Ok(join->seq));
+    connection_.Send(test_world::WorldInfo(join->seq, kWorld, join->name));
+    connection_.Send(test_world::Ok(join->seq));
     const auto observe = connection_.Expect<protocol::Observe>();
     ASSERT_TRUE(observe.has_value());
     EXPECT_EQ(observe->world, kWorld);
     EXPECT_EQ(observe->mode, protocol::PoseMode::kFull);
-    connection_.Send(toy::Ok(observe->seq));
+    connection_.Send(test_world::Ok(observe->seq));
   }
 
-  void SendTick(std::uint64_t tick, const std::vector<toy::AvatarAt>& avatars = {{1}, {2}, {3}}) {
-    connection_.SendBytes(toy::PoseFrame(kWorld, tick, avatars));
+  void SendTick(std::uint64_t tick,
+                const std::vector<test_world::AvatarAt>& avatars = {{1}, {2}, {3}}) {
+    connection_.SendBytes(test_world::PoseFrame(kWorld, tick, avatars));
   }
 
-  /// A message more, and waits until the observer has handled it, and so all before it.
+  /// Sends one more message and waits until the observer has handled it and all messages before it.
   void Sync() {
     synced_dropped_ += 1;
     protocol::Lagging lagging;
@@ -85,14 +86,14 @@ class ObserverTest : public ::testing::Test {
     }
   }
 
-  /// Is away by its own doing and greeted again.
+  /// Drops the connection and completes the handshake of the next one.
   void ComeBack() {
     Sync();
     OnThread([&] { observer_.Drop(0.0); });
     EXPECT_TRUE(connection_.WaitForClose());
     OnThread([&] { observer_.Poll(NowNs() + kSecondNs); });
     Greet();
-    synced_dropped_ = 1;  // A new connection counts anew; the total goes on.
+    synced_dropped_ = 1;  // The count of a new connection starts at 0; the total continues.
   }
 
   template <typename F>
@@ -105,7 +106,7 @@ class ObserverTest : public ::testing::Test {
     done.get_future().wait();
   }
 
-  /// Ends the observer; from here on its counts may be read.
+  /// Stops the observer. Its counters can be read afterwards.
   ObserverCounts Join() {
     if (thread_.joinable()) {
       context_.io.stop();
@@ -131,7 +132,7 @@ TEST_F(ObserverTest, CountsThePosesOfTheWindow) {
   std::size_t bytes = 0;
   for (std::uint64_t tick = kFirstTick - 2; tick <= kLastTick + 2; ++tick) {
     SendTick(tick, {{1}, {2, protocol::kPoseStanding}, {3}});
-    bytes = toy::PoseFrame(kWorld, tick, {{1}, {2}, {3}}).size();
+    bytes = test_world::PoseFrame(kWorld, tick, {{1}, {2}, {3}}).size();
   }
   Sync();
   EXPECT_TRUE(observer_.sees_all());
@@ -146,8 +147,8 @@ TEST_F(ObserverTest, CountsThePosesOfTheWindow) {
   EXPECT_THAT(run_.errors.Texts(), IsEmpty());
 }
 
-// Each names others, spread over the crowd, and of every world it watches some.
-TEST(PartialObserver, WatchesAsManyAsItIsTold) {
+// The observers select different avatars, distributed over the crowd and all worlds.
+TEST(PartialObserver, ObservesTheRequestedNumberOfAvatars) {
   LoadOptions options = Options();
   options.avatars = 10;
   options.worlds = 2;
@@ -166,21 +167,21 @@ TEST(PartialObserver, WatchesAsManyAsItIsTold) {
     std::thread thread([&] { context.io.run(); });
     FakeConnection connection = server.Accept();
     EXPECT_TRUE(connection.Expect<protocol::Hello>().has_value());
-    connection.Send(toy::Welcome());
+    connection.Send(test_world::Welcome());
     std::vector<std::vector<protocol::AvatarId>> named;
     for (protocol::WorldId world = 1; world <= 2; ++world) {
       const auto join = connection.Expect<protocol::JoinWorld>();
       ASSERT_TRUE(join.has_value());
-      connection.Send(toy::WorldInfo(join->seq, world, join->name));
-      connection.Send(toy::Ok(join->seq));
+      connection.Send(test_world::WorldInfo(join->seq, world, join->name));
+      connection.Send(test_world::Ok(join->seq));
     }
     for (int world = 0; world < 2; ++world) {
       const auto observe = connection.Expect<protocol::Observe>();
       ASSERT_TRUE(observe.has_value());
       named.push_back(observe->avatars);
-      connection.Send(toy::Ok(observe->seq));
+      connection.Send(test_world::Ok(observe->seq));
     }
-    // The crowd in order of worlds: 1 3 5 7 9, 2 4 6 8 10. The second begins one further.
+    // The crowd in order of worlds is 1 3 5 7 9, 2 4 6 8 10. The second observer starts one later.
     if (which == 0) {
       EXPECT_THAT(named, ElementsAre(ElementsAre(1, 5), ElementsAre(2, 6)));
     } else {
@@ -191,7 +192,7 @@ TEST(PartialObserver, WatchesAsManyAsItIsTold) {
   }
 }
 
-TEST_F(ObserverTest, SeesNotAllWhileOneIsMissing) {
+TEST_F(ObserverTest, WaitsForEveryAvatar) {
   Greet();
   SendTick(kFirstTick, {{1}, {3}});
   Sync();
@@ -199,7 +200,7 @@ TEST_F(ObserverTest, SeesNotAllWhileOneIsMissing) {
   EXPECT_FALSE(observer_.saw_last_tick());
 }
 
-TEST_F(ObserverTest, LeavesOutAvatarsThatAreNotOurs) {
+TEST_F(ObserverTest, IgnoresForeignAvatars) {
   Greet();
   SendTick(kFirstTick, {{1}, {2}, {3}, {4}, {1000}});
   Sync();
@@ -207,7 +208,7 @@ TEST_F(ObserverTest, LeavesOutAvatarsThatAreNotOurs) {
   EXPECT_THAT(run_.errors.Texts(), IsEmpty());
 }
 
-TEST_F(ObserverTest, ComplainsAboutABatchThatIsNotNewer) {
+TEST_F(ObserverTest, ReportsABatchThatIsNotNewer) {
   Greet();
   SendTick(kFirstTick);
   SendTick(kFirstTick);
@@ -218,28 +219,28 @@ TEST_F(ObserverTest, ComplainsAboutABatchThatIsNotNewer) {
   EXPECT_EQ(counts.poses_invalid, 2u);
   EXPECT_TRUE(run_.failed);
   EXPECT_THAT(run_.errors.Texts(),
-              ElementsAre(HasSubstr("load-0 at tick 100: a batch that is not newer"),
-                          HasSubstr("load-0 at tick 99: a batch that is not newer")));
+              ElementsAre(HasSubstr("load-0 at tick 100: the tick of a batch does not increase"),
+                          HasSubstr("load-0 at tick 99: the tick of a batch does not increase")));
 }
 
-TEST_F(ObserverTest, ComplainsAboutAnAvatarThatComesTwice) {
+TEST_F(ObserverTest, ReportsAnAvatarThatAppearsTwice) {
   Greet();
   SendTick(kFirstTick, {{1}, {2}, {1}});
   connection_.SendBytes(
-      toy::PoseFrame(kWorld, kFirstTick, {{2}}, protocol::PoseMode::kFull, /*shard=*/1));
+      test_world::PoseFrame(kWorld, kFirstTick, {{2}}, protocol::PoseMode::kFull, /*shard=*/1));
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 2u);
   EXPECT_EQ(counts.poses_invalid, 2u);
-  EXPECT_THAT(run_.errors.Texts(),
-              ElementsAre(HasSubstr("avatar 1 came twice"), HasSubstr("avatar 2 came twice")));
+  EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("avatar 1 appeared twice"),
+                                               HasSubstr("avatar 2 appeared twice")));
 }
 
-TEST_F(ObserverTest, ComplainsAboutAnAvatarThatLeapsUnlessItIsFlagged) {
+TEST_F(ObserverTest, ReportsAnUnflaggedDiscontinuity) {
   Greet();
-  // The toy avatars walk at 1.5 m/s: 200 m in 133 s, which is all right; 1 m is not in one tick.
+  // The test avatars walk at 1.5 m/s. They need 133 s for 200 m, but cannot move 1 m in one tick.
   const auto frame_at = [](std::uint64_t tick, float x_m, std::uint8_t flags) {
-    return toy::PoseFrame(kWorld, tick, {{1, flags, Vec3(x_m, 1.0f, 0.0f)}});
+    return test_world::PoseFrame(kWorld, tick, {{1, flags, Vec3(x_m, 1.0f, 0.0f)}});
   };
   connection_.SendBytes(frame_at(100, 0.0f, 0));
   connection_.SendBytes(frame_at(101, 0.2f, 0));
@@ -253,10 +254,10 @@ TEST_F(ObserverTest, ComplainsAboutAnAvatarThatLeapsUnlessItIsFlagged) {
   EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("at tick 103: avatar 1 moved 1.0")));
 }
 
-TEST_F(ObserverTest, ComplainsAboutAPoseThatDoesNotDecode) {
+TEST_F(ObserverTest, ReportsAnInvalidPose) {
   Greet();
-  std::vector<std::byte> frame = toy::PoseFrame(kWorld, kFirstTick, {{1}});
-  // Every 1.0f becomes 2.0f: then no joint's quaternion is a unit one.
+  std::vector<std::byte> frame = test_world::PoseFrame(kWorld, kFirstTick, {{1}});
+  // Replaces every 1.0f by 2.0f, so that no quaternion is a unit quaternion.
   constexpr std::array kOne = {std::byte{0}, std::byte{0}, std::byte{0x80}, std::byte{0x3f}};
   constexpr std::array kTwo = {std::byte{0}, std::byte{0}, std::byte{0}, std::byte{0x40}};
   int changed = 0;
@@ -271,18 +272,19 @@ TEST_F(ObserverTest, ComplainsAboutAPoseThatDoesNotDecode) {
   EXPECT_THAT(run_.errors.Texts(), ElementsAre(HasSubstr("at tick 100: avatar 1: ")));
 }
 
-TEST_F(ObserverTest, ComplainsAboutAnotherModeOrSkeleton) {
+TEST_F(ObserverTest, ReportsAnotherModeOrSkeleton) {
   Greet();
-  connection_.SendBytes(toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kQuantised));
   connection_.SendBytes(
-      toy::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kFull, 0, toy::kJoints + 1));
+      test_world::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kQuantised));
+  connection_.SendBytes(test_world::PoseFrame(kWorld, kFirstTick, {{1}}, protocol::PoseMode::kFull,
+                                              0, test_world::kJoints + 1));
   Sync();
   const ObserverCounts counts = Join();
   EXPECT_EQ(counts.poses_received, 0u);
   EXPECT_EQ(counts.poses_invalid, 2u);
 }
 
-TEST_F(ObserverTest, AddsUpWhatTheServerSaysItDropped) {
+TEST_F(ObserverTest, SumsTheBatchesThatTheServerDropped) {
   Greet();
   for (const std::uint64_t dropped : {5u, 5u, 12u}) {
     protocol::Lagging lagging;
@@ -295,10 +297,10 @@ TEST_F(ObserverTest, AddsUpWhatTheServerSaysItDropped) {
   EXPECT_EQ(Join().batches_dropped, 20u);
 }
 
-TEST_F(ObserverTest, TellsThatItMayNotJoin) {
+TEST_F(ObserverTest, ReportsARefusedJoin) {
   connection_ = server_.Accept();
   ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());
-  connection_.Send(toy::Welcome());
+  connection_.Send(test_world::Welcome());
   const auto join = connection_.Expect<protocol::JoinWorld>();
   ASSERT_TRUE(join.has_value());
   protocol::Reply reply;
@@ -309,10 +311,10 @@ TEST_F(ObserverTest, TellsThatItMayNotJoin) {
   while (!run_.failed) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   Join();
   EXPECT_THAT(run_.errors.Texts(),
-              ElementsAre(HasSubstr("would not let it join: no_such_world there is none")));
+              ElementsAre(HasSubstr("refused to let it join: no_such_world there is none")));
 }
 
-TEST_F(ObserverTest, ExpectsNothingWhileItIsAwayByOurOwnDoing) {
+TEST_F(ObserverTest, ExcusesPosesWhileItIsDropped) {
   Greet();
   SendTick(100);
   SendTick(101);
@@ -328,8 +330,8 @@ TEST_F(ObserverTest, ExpectsNothingWhileItIsAwayByOurOwnDoing) {
   EXPECT_FALSE(run_.failed);
 }
 
-// As in mode movement: states may be told after what changed in their tick.
-TEST_F(ObserverTest, ExpectsNobodyBeforeTheirStatesWhenItComesBack) {
+// In mode movement, the states of a tick can arrive after its changes.
+TEST_F(ObserverTest, ExcusesPosesUntilTheFirstStateAfterAReconnect) {
   Greet();
   SendTick(100);
   ComeBack();
@@ -343,7 +345,7 @@ TEST_F(ObserverTest, ExpectsNobodyBeforeTheirStatesWhenItComesBack) {
   EXPECT_EQ(counts.poses_invalid, 0u);
 }
 
-TEST_F(ObserverTest, ExpectsAllAMomentAfterItCameBack) {
+TEST_F(ObserverTest, ExpectsAllPosesOneSecondAfterAReconnect) {
   run_.window.Set(kFirstTick, kFirstTick + 1000);
   Greet();
   SendTick(100);
@@ -351,17 +353,17 @@ TEST_F(ObserverTest, ExpectsAllAMomentAfterItCameBack) {
   SendTick(111, {{1}, {2}});
   Sync();
   const ObserverCounts counts = Join();
-  const auto moment = static_cast<std::uint64_t>(Observer::kBackS * run_.tick_hz);
+  const auto moment = static_cast<std::uint64_t>(Observer::kReconnectS * run_.tick_hz);
   EXPECT_EQ(counts.poses_excused, 10 * 3 + moment);  // 101 to 110, and as much for the third
 }
 
-TEST_F(ObserverTest, TellsALostConnectionOnce) {
+TEST_F(ObserverTest, ReportsALostConnectionOnce) {
   Greet();
   SendTick(100);
   Sync();
   connection_.Close();
   while (!run_.failed) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  // It comes back and is closed again before it is greeted: no news.
+  // A failed attempt to reconnect is not reported.
   OnThread([&] { observer_.Poll(NowNs() + 10 * kSecondNs); });
   connection_ = server_.Accept();
   ASSERT_TRUE(connection_.Expect<protocol::Hello>().has_value());

@@ -9,7 +9,7 @@
 namespace stridewire::load {
 namespace {
 
-/// A page as the server writes it; `bins` are cumulative.
+/// Formats a page like the server does. `bins` are cumulative.
 std::string Page(int below_1ms, int below_2ms, int all, double max_s, double recent_s, int missed) {
   const auto line = [](const std::string& name, double value) {
     return name + " " + std::to_string(value) + "\n";
@@ -33,7 +33,7 @@ ServerMetrics Parsed(const std::string& page) {
   return metrics.value_or(ServerMetrics{});
 }
 
-TEST(ServerMetrics, AreReadFromPrometheusText) {
+TEST(ServerMetrics, ParsePrometheusText) {
   const ServerMetrics metrics = Parsed(Page(50, 90, 100, 0.03, 0.02, 4));
   EXPECT_EQ(metrics.tick_bins,
             (std::map<double, double>{{0.001, 50.0}, {0.002, 90.0}, {INFINITY, 100.0}}));
@@ -43,7 +43,7 @@ TEST(ServerMetrics, AreReadFromPrometheusText) {
   EXPECT_EQ(metrics.avatars, 7.0);
 }
 
-TEST(ServerMetrics, AddSamplesOfSeveralShards) {
+TEST(ServerMetrics, SumSamplesOfAllShards) {
   std::string page = Page(50, 90, 100, 0.03, 0.02, 4);
   page +=
       "stridewire_ticks_missed_total{shard=\"1\"} 5\n"
@@ -55,7 +55,7 @@ TEST(ServerMetrics, AddSamplesOfSeveralShards) {
   EXPECT_EQ(metrics.tick_bins.at(0.001), 58.0);
 }
 
-TEST(ServerMetrics, TellALineThatCannotBeRead) {
+TEST(ServerMetrics, ReportAnInvalidLine) {
   for (const char* line :
        {"x", "x ", "{a=\"b\"} 1", "x{a=\"b\" 1", "x 1.5.2", "x one",
         "stridewire_tick_seconds_bucket{le=\"a\"} 1", "stridewire_tick_seconds_bucket 1"}) {
@@ -66,7 +66,7 @@ TEST(ServerMetrics, TellALineThatCannotBeRead) {
   }
 }
 
-TEST(ServerMetrics, NameAMetricThatIsNotThere) {
+TEST(ServerMetrics, ReportAMissingMetric) {
   const std::string page = Page(50, 90, 100, 0.03, 0.02, 4);
   for (const std::string name :
        {"stridewire_avatars", "stridewire_ticks_missed_total", "stridewire_tick_seconds_max",
@@ -113,18 +113,18 @@ TEST(ServerMetrics, SurviveMutatedPages) {
   EXPECT_GT(refused_count, 0);
 }
 
-TEST(TicksBetweenScrapes, CountOnlyWhatCameAfterTheFirst) {
+TEST(TicksBetweenScrapes, CountTicksAfterTheFirstRead) {
   const ServerMetrics before = Parsed(Page(1000, 1000, 1000, 0.03, 0.03, 4));
   const ServerMetrics after = Parsed(Page(1040, 1100, 1100, 0.03, 0.0018, 4));
   const Quantiles ticks = TicksBetween(before, after);
-  // 40 of the 100 below 1 ms, 60 from 1 to 2 ms: the 50th is a sixth of the way into the second.
+  // 40 ticks take less than 1 ms and 60 take 1 to 2 ms, so the 50th is a sixth into the second bin.
   EXPECT_NEAR(ticks.p50, 1.0 + 10.0 / 60.0, 1e-9);
   EXPECT_NEAR(ticks.p99, 1.8, 1e-9);  // 1.983 by interpolation, but none took longer than 1.8.
   EXPECT_NEAR(ticks.max, 1.8, 1e-9);
 }
 
-TEST(TicksBetweenScrapes, TakeALargestTimeThatGrew) {
-  // Somebody else read the page a moment ago, so the recent maximum is theirs.
+TEST(TicksBetweenScrapes, TakeANewMaximum) {
+  // Another program has read the page, which has reset the recent maximum.
   const ServerMetrics before = Parsed(Page(0, 0, 0, 0.001, 0.001, 0));
   const ServerMetrics after = Parsed(Page(10, 10, 11, 0.25, 0.0005, 0));
   const Quantiles ticks = TicksBetween(before, after);
@@ -132,7 +132,7 @@ TEST(TicksBetweenScrapes, TakeALargestTimeThatGrew) {
   EXPECT_EQ(ticks.p99, 250.0);  // In the last bin, which has no upper bound.
 }
 
-TEST(TicksBetweenScrapes, AreZeroWhenThereWereNone) {
+TEST(TicksBetweenScrapes, AreZeroWithoutTicks) {
   const ServerMetrics both = Parsed(Page(5, 5, 5, 0.001, 0.0, 0));
   const Quantiles ticks = TicksBetween(both, both);
   EXPECT_EQ(ticks.p50, 0.0);

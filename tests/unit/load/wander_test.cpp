@@ -15,26 +15,26 @@ TEST(Wanderer, IsTheSameForTheSameSeedAndAvatar) {
   Wanderer other(5, 4);
   bool differs = false;
   for (int i = 0; i < 20; ++i) {
-    const Outing outing = one.Next(true);
-    const Outing again = same.Next(true);
-    EXPECT_EQ(outing.movements, again.movements);
-    EXPECT_EQ(outing.period_s, again.period_s);
-    differs = differs || outing.movements != other.Next(true).movements;
+    const WanderPlan plan = one.Next(true);
+    const WanderPlan again = same.Next(true);
+    EXPECT_EQ(plan.movements, again.movements);
+    EXPECT_EQ(plan.period_s, again.period_s);
+    differs = differs || plan.movements != other.Next(true).movements;
   }
   EXPECT_TRUE(differs);
 }
 
-TEST(Wanderer, BeginsEveryOutingWithAMovementAndDoesAllKinds) {
+TEST(Wanderer, StartsEveryPlanWithAMovementAndUsesAllKinds) {
   std::set<std::size_t> kinds;
   for (std::uint32_t avatar = 1; avatar <= 100; ++avatar) {
     Wanderer wanderer(1, avatar);
     for (int i = 0; i < 10; ++i) {
-      const Outing outing = wanderer.Next(true);
-      ASSERT_FALSE(outing.movements.empty());
-      EXPECT_LE(outing.movements.size(), 17u);
-      EXPECT_FALSE(std::holds_alternative<protocol::StandMovement>(outing.movements.front()));
-      EXPECT_GT(outing.period_s, 0.6 * static_cast<double>(outing.movements.size()));
-      for (const Movement& movement : outing.movements) {
+      const WanderPlan plan = wanderer.Next(true);
+      ASSERT_FALSE(plan.movements.empty());
+      EXPECT_LE(plan.movements.size(), 17u);
+      EXPECT_FALSE(std::holds_alternative<protocol::StandMovement>(plan.movements.front()));
+      EXPECT_GT(plan.period_s, 0.6 * static_cast<double>(plan.movements.size()));
+      for (const Movement& movement : plan.movements) {
         kinds.insert(movement.index());
         if (const auto* step = std::get_if<protocol::StepMovement>(&movement)) {
           EXPECT_GE(step->length_m, 0.4);
@@ -47,7 +47,7 @@ TEST(Wanderer, BeginsEveryOutingWithAMovementAndDoesAllKinds) {
   EXPECT_EQ(kinds.size(), 3u);
 }
 
-TEST(Wanderer, DoesNotJumpWhereItMayNot) {
+TEST(Wanderer, DoesNotJumpIfDisabled) {
   for (std::uint32_t avatar = 1; avatar <= 100; ++avatar) {
     Wanderer wanderer(1, avatar);
     for (const Movement& movement : wanderer.Next(false).movements) {
@@ -68,7 +68,7 @@ TEST(SmallRandom, StaysInItsRange) {
   EXPECT_EQ(seen, (std::set<int>{2, 3, 4, 5}));
 }
 
-TEST(Layout, PutsEachAvatarIntoOneWorld) {
+TEST(Layout, AssignsEachAvatarToOneWorld) {
   for (const int worlds : {1, 2, 3, 7}) {
     for (const int avatars : {7, 8, 20, 21}) {
       const Layout layout{avatars, worlds};

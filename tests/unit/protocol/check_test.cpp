@@ -11,7 +11,7 @@ namespace {
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-Hello GoodHello() { return {1, 1, "client", 0, "", {}, 0}; }
+Hello GoodHello() { return {1, 1, "client", "", {}, 0}; }
 JoinWorld GoodJoin() { return {1, "plaza", Role::kController}; }
 Spawn GoodSpawn() { return {1, 2, {{0, {}}, {3, {}}}}; }
 Request GoodRequest() {
@@ -50,7 +50,7 @@ Events GoodEvents() {
   return events;
 }
 
-/// `spoil` makes a good message bad: encoding refuses it, naming the field, and writes nothing.
+/// Expects that the encoder rejects a message after `spoil`, names the field and writes nothing.
 template <typename T>
 void Refused(T message, const std::function<void(T&)>& spoil, ErrorCode code,
              std::string_view field, std::int64_t index = -1) {
@@ -69,7 +69,7 @@ void Refused(T message, const std::function<void(T&)>& spoil, ErrorCode code,
   EXPECT_EQ(frame, std::vector<std::byte>(5, std::byte{7}));
 }
 
-/// Every double a field may not hold.
+/// Tests all doubles that a field must not contain.
 template <typename T>
 void RefusedWhenNotFinite(const T& good, const std::function<double&(T&)>& field_of,
                           std::string_view field, std::int64_t index = -1) {
@@ -78,7 +78,7 @@ void RefusedWhenNotFinite(const T& good, const std::function<double&(T&)>& field
   }
 }
 
-/// Every text a field may not hold.
+/// Tests all texts that a field must not contain.
 template <typename T>
 void RefusedTexts(const T& good, const std::function<std::string&(T&)>& field_of,
                   std::size_t max_bytes, bool may_be_empty, std::string_view field,
@@ -90,14 +90,14 @@ void RefusedTexts(const T& good, const std::function<std::string&(T&)>& field_of
   refused("tab\t", ErrorCode::kMalformed);
   refused(std::string("a\0b", 3), ErrorCode::kMalformed);
   refused("\x7f", ErrorCode::kMalformed);
-  refused("\xc2\x85", ErrorCode::kMalformed);  // a C1 control
+  refused("\xc2\x85", ErrorCode::kMalformed);  // C1 control character
   refused("\xff", ErrorCode::kMalformed);
-  refused("\x80", ErrorCode::kMalformed);              // a lone continuation
-  refused("\xc3", ErrorCode::kMalformed);              // cut short
+  refused("\x80", ErrorCode::kMalformed);              // continuation byte without a start
+  refused("\xc3", ErrorCode::kMalformed);              // incomplete
   refused("\xc0\xaf", ErrorCode::kMalformed);          // overlong
   refused("\xe0\x9f\x80", ErrorCode::kMalformed);      // overlong
   refused("\xf0\x8f\x80\x80", ErrorCode::kMalformed);  // overlong
-  refused("\xed\xa0\x80", ErrorCode::kMalformed);      // a surrogate
+  refused("\xed\xa0\x80", ErrorCode::kMalformed);      // surrogate
   refused("\xf4\x90\x80\x80", ErrorCode::kMalformed);  // past U+10FFFF
   refused("\xf5\x80\x80\x80", ErrorCode::kMalformed);
   if (!may_be_empty) refused("", ErrorCode::kMalformed);
@@ -395,19 +395,19 @@ TEST(Check, WorldInfo) {
       with_codes, [](W& m) { m.rotation_codes.resize(kMaxJoints + 1); }, ErrorCode::kShapeMismatch,
       "WorldInfo.rotation_codes");
   W with_fewer = with_codes;
-  with_fewer.fewer_joints = {0, 1};
+  with_fewer.reduced_joints = {0, 1};
   EXPECT_TRUE(Check(with_fewer));
   Refused<W>(
       with_fewer, [](W& m) { m.rotation_codes.clear(); }, ErrorCode::kShapeMismatch,
       "WorldInfo.fewer_joints");
   Refused<W>(
-      with_fewer, [](W& m) { m.fewer_joints.resize(m.skeleton.joints.size() + 1); },
+      with_fewer, [](W& m) { m.reduced_joints.resize(m.skeleton.joints.size() + 1); },
       ErrorCode::kShapeMismatch, "WorldInfo.fewer_joints");
   const auto last = static_cast<std::uint16_t>(good.skeleton.joints.size());
   for (const std::vector<std::uint16_t>& wrong :
        {std::vector<std::uint16_t>{1}, {0, 0}, {0, last}, {0, 1, 1}}) {
     Refused<W>(
-        with_fewer, [&](W& m) { m.fewer_joints = wrong; }, ErrorCode::kMalformed,
+        with_fewer, [&](W& m) { m.reduced_joints = wrong; }, ErrorCode::kMalformed,
         "WorldInfo.fewer_joints");
   }
 }
@@ -468,9 +468,9 @@ TEST(Check, PoseBatch) {
       good, [](B& m) { m.info.mode = PoseMode::kFull; }, ErrorCode::kShapeMismatch,
       "PoseBatch.poses");
 
-  // The second is wide: the first may have any length.
-  static const std::vector<std::uint8_t> one_wide = {kPoseStanding, kPoseWide};
-  static const std::vector<std::uint8_t> all_wide = {kPoseWide, kPoseWide};
+  // The second pose is uncompressed; the first can have any length.
+  static const std::vector<std::uint8_t> one_wide = {kPoseStanding, kPoseUncompressed};
+  static const std::vector<std::uint8_t> all_wide = {kPoseUncompressed, kPoseUncompressed};
   const std::size_t wide = PoseBytes(PoseMode::kQuantised, 3);
   const auto compact = [&](const std::vector<std::uint8_t>& of, std::size_t bytes) {
     return B{
@@ -520,7 +520,7 @@ TEST(Check, AvatarState) {
       1);
 }
 
-TEST(Check, WhatMustBeMetIsThere) {
+TEST(Check, ExactOnlyNeedsAFootprint) {
   Request message{1, 1, {{1, 1, StepMovement{.at = Footprint{}, .exact_only = true}}}};
   EXPECT_TRUE(Check(message).has_value());
   std::get<StepMovement>(message.items[0].movement).at.reset();
@@ -528,7 +528,7 @@ TEST(Check, WhatMustBeMetIsThere) {
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
   EXPECT_EQ(status.error().where, "Request.at_m");
-  EXPECT_STREQ(status.error().text, "must be met and is not there");
+  EXPECT_STREQ(status.error().text, "must_be_met without at_m");
 }
 
 TEST(Check, Footprints) {
@@ -614,7 +614,7 @@ TEST(Check, Movements) {
       kRange, "Movements.ends", 2);
 }
 
-TEST(Check, PiecesOfLibraries) {
+TEST(Check, LibraryPieces) {
   using F = FetchLibrary;
   const F asked{1, "0f1e", 0, 1};
   constexpr auto kRange = ErrorCode::kOutOfRange;
@@ -818,7 +818,7 @@ TEST(Check, Events) {
   parameters(&Event::applied, "Event.applied");
 }
 
-TEST(Encoder, RefusesAPayloadOverItsCapAndWritesNothing) {
+TEST(Encoder, RejectsAPayloadOverItsCap) {
   Encoder encoder({256, 1024});
   std::vector<std::byte> frame;
   Request request{1, 1, {{1, 1, StepMovement{}}}};
@@ -832,7 +832,7 @@ TEST(Encoder, RefusesAPayloadOverItsCapAndWritesNothing) {
   EXPECT_EQ(frame, before);
 }
 
-TEST(Encoder, ACrowdOfTheLargestSizeFits) {
+TEST(Encoder, EncodesTheLargestCrowd) {
   Request request{1, 1, {}};
   Spawn spawn{2, 1, {}};
   Reply reply{2, StatusCode::kOk, "", 65'536, {}};

@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::array<std::int16_t, 3> kParents = {-1, 0, 1};
 
-// A root, a joint that turns about three axes and one that turns about one: 2 + 36 + 30 + 13 bits.
+// A root, a joint with three axes and one with a single axis: 2 + 36 + 30 + 13 bits.
 std::vector<RotationQuantization> Codes() {
   std::vector<RotationQuantization> codes(3);
   codes[0].smallest_three_bits = 12;
@@ -52,11 +52,11 @@ std::vector<std::byte> BytesOf(const CompactCodec& codec, const Vec3& root,
   return bytes;
 }
 
-TEST(CompactCodec, BytesAreThoseOfTheStandard) {
+TEST(CompactCodec, MatchesTheStandard) {
   const CompactCodec codec = Codec();
   EXPECT_EQ(codec.joint_count(), 3u);
   ASSERT_EQ(codec.pose_bytes(), 12u + 12u);
-  // Exact in their codes, so that no joint has anything to make up for.
+  // The rotations are exact in their codes, so that no joint has to correct an error.
   const Quat bent = Quat(std::sqrt(0.984375f), 0.125f, 0.0f, 0.0f);
   const Quat turned = Codes()[1].reference * Quat(std::sqrt(0.6875f), 0.25f, -0.5f, 0.0f);
   const auto bytes = BytesOf(codec, Vec3(1.0f, -0.5f, 0.00002f), {Quat(0, 0, -1, 0), turned, bent});
@@ -66,15 +66,15 @@ TEST(CompactCodec, BytesAreThoseOfTheStandard) {
   std::memcpy(root.data(), bytes.data(), 12);
   std::memcpy(words.data(), bytes.data() + 12, 12);
   EXPECT_EQ(root, (std::array<std::int32_t, 3>{16384, -8192, 0}));
-  // Root: y (1) is left out; x, z, w are 0, which is 2048.
+  // Root: y (index 1) is dropped; x, z and w are 0, which is stored as 2048.
   EXPECT_EQ(words[0], 1u | 2048u << 2 | 2048u << 14 | (2048u & 63u) << 26);
-  // The rest of w, then 0.25, -0.5 and 0 from -0.5 on in steps of 2^-10: 768, 0, 512.
+  // The remaining bits of w, then 0.25, -0.5 and 0 in steps of 2^-10 from -0.5: 768, 0, 512.
   EXPECT_EQ(words[1], 2048u >> 6 | 768u << 6 | 0u << 16 | (512u & 63u) << 26);
-  // The rest of that, then 0.125 from -0.25 on in steps of 2^-13: 3072.
+  // The remaining bits, then 0.125 in steps of 2^-13 from -0.25: 3072.
   EXPECT_EQ(words[2], 512u >> 6 | 3072u << 4);
 }
 
-TEST(CompactCodec, GivesBackWhatItWasGiven) {
+TEST(CompactCodec, DecodesWhatItEncodes) {
   const CompactCodec codec = Codec();
   const auto bytes = BytesOf(codec, Vec3(1.0f, 2.0f, 3.0f), SomePose());
   ASSERT_EQ(bytes.size(), codec.pose_bytes());
@@ -89,9 +89,9 @@ TEST(CompactCodec, GivesBackWhatItWasGiven) {
   }
 }
 
-TEST(CompactCodec, AJointMakesUpForTheErrorsOfThoseAbove) {
+TEST(CompactCodec, JointsCorrectErrorsOfTheirAncestors) {
   std::vector<RotationQuantization> codes = Codes();
-  codes[0].smallest_three_bits = RotationQuantization::kMinFreeBits;  // 19 thousandths of a radian
+  codes[0].smallest_three_bits = RotationQuantization::kMinFreeBits;  // errors of 0.019 rad
   codes[1].bits = {16, 16, 16};
   codes[1].step = Vec3(1.0f / 65536.0f);
   const CompactCodec codec = CompactCodec::Make(codes, kParents).value();
@@ -115,14 +115,14 @@ TEST(CompactCodec, AJointMakesUpForTheErrorsOfThoseAbove) {
   EXPECT_GT(largest_root, 0.005) << "seed " << seed;
 }
 
-// Errors are found to first order, of joints told as they are without the change of their own w: both show when a joint
-// told badly is turned far.
-TEST(CompactCodec, AJointMakesUpForThoseTurnedFar) {
+// The encoder computes errors to first order, which matters if a coarsely quantized joint is turned
+// far.
+TEST(CompactCodec, JointsCorrectErrorsOfFarTurnedAncestors) {
   for (const Quat& reference : {kIdentityQuat, YawRotation(1.0)}) {
     std::vector<RotationQuantization> codes(4);
     codes[0].smallest_three_bits = 8;
     for (std::size_t j = 1; j < 4; ++j) {
-      const auto bits = static_cast<std::uint8_t>(j < 3 ? 8 : 16);  // 4 thousandths of v
+      const auto bits = static_cast<std::uint8_t>(j < 3 ? 8 : 16);  // errors of 0.004 in v
       codes[j].reference = reference;
       codes[j].low = Vec3(-0.8f);
       codes[j].step = Vec3(1.6f / static_cast<float>(1 << bits));
@@ -155,7 +155,7 @@ TEST(CompactCodec, AJointMakesUpForThoseTurnedFar) {
   }
 }
 
-TEST(CompactCodec, WhatItCannotTellDoesNotFit) {
+TEST(CompactCodec, PosesOutsideTheCodesDoNotFit) {
   const CompactCodec codec = Codec();
   const auto fits = [&](const Vec3& root, const std::vector<Quat>& pose) {
     return !BytesOf(codec, root, pose).empty();
@@ -176,17 +176,17 @@ TEST(CompactCodec, WhatItCannotTellDoesNotFit) {
     }
   }
   std::vector<Quat> pose = SomePose();
-  pose[0] = Quat(0, 1, 0, 0);  // the root turns every way
+  pose[0] = Quat(0, 1, 0, 0);  // the root has no range
   EXPECT_TRUE(fits(Vec3(0.0f), pose));
   pose[1] = YawRotation(0.5 + 1.3);  // y = sin 0.65 = 0.61
   EXPECT_FALSE(fits(Vec3(0.0f), pose));
   pose = SomePose();
-  pose[2] = YawRotation(0.02);  // about an axis that it is not told about
+  pose[2] = YawRotation(0.02);  // about an axis without bits
   EXPECT_FALSE(fits(Vec3(0.0f), pose));
 }
 
-// Who says that rotations are unit is not asked for their lengths, and told nothing of what is no number for all that.
-TEST(CompactCodec, WhatIsSaidToBeUnitIsTheSameBytesAndNoNumbersDoNotFit) {
+// With are_unit, lengths are not checked, but NaN is still detected.
+TEST(CompactCodec, UnitPosesAreEncodedEquallyAndNaNDoesNotFit) {
   const CompactCodec codec = Codec();
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const float infinity = std::numeric_limits<float>::infinity();
@@ -218,7 +218,7 @@ TEST(CompactCodec, WhatIsSaidToBeUnitIsTheSameBytesAndNoNumbersDoNotFit) {
   }
 }
 
-TEST(CompactCodec, PosesOfABlockDoNotMind) {
+TEST(CompactCodec, PosesOfABlockAreIndependent) {
   const CompactCodec codec = Codec();
   CompactCodec::Block block;
   for (std::size_t i = 0; i < CompactCodec::kBlock; ++i) {
@@ -240,7 +240,7 @@ TEST(CompactCodec, PosesOfABlockDoNotMind) {
   }
 }
 
-TEST(CompactCodec, StreamsWhatItCopies) {
+TEST(CompactCodec, StreamBytesEqualsCopyBytes) {
   const CompactCodec codec = Codec();
   ASSERT_EQ(codec.pieces(), 2u);
   CompactCodec::Block block;
@@ -253,7 +253,7 @@ TEST(CompactCodec, StreamsWhatItCopies) {
     block.CopyBytes(i, copied);
     alignas(64) std::array<std::byte, 128> streamed;
     streamed.fill(std::byte{0xaa});
-    const std::size_t pieces = codec.pieces() + CompactCodec::kMostBehind;
+    const std::size_t pieces = codec.pieces() + CompactCodec::kMaxTrailingPieces;
     block.StreamBytes(i, pieces, streamed.data());
     EXPECT_TRUE(std::ranges::equal(std::span(streamed).first(24), copied)) << i;
     const auto behind = std::span(streamed).subspan(pieces * CompactCodec::kPieceBytes);
@@ -261,7 +261,7 @@ TEST(CompactCodec, StreamsWhatItCopies) {
   }
 }
 
-TEST(CompactCodec, DecodeRefusesBitsNoEncoderWrites) {
+TEST(CompactCodec, DecodeRejectsBitsThatNoEncoderWrites) {
   const CompactCodec codec = Codec();
   const auto good = BytesOf(codec, Vec3(0.0f), SomePose());
   ASSERT_FALSE(good.empty());
@@ -281,10 +281,11 @@ TEST(CompactCodec, DecodeRefusesBitsNoEncoderWrites) {
     return decode(bytes);
   };
   EXPECT_EQ(with_word(1, 0x8000'0000).error().code, ErrorCode::kOutOfRange);
-  EXPECT_EQ(with_word(3, 0).error().code, ErrorCode::kMalformed);            // no component is 0
-  EXPECT_EQ(with_word(3, 0xffff'fffc).error().code, ErrorCode::kMalformed);  // a root too long
-  EXPECT_EQ(with_word(5, 0x8000'0000).error().code, ErrorCode::kMalformed);  // behind the last bit
-  // -0.5, -0.5 and 0 leave 0.71 for w, where 0.9 is the least.
+  EXPECT_EQ(with_word(3, 0).error().code, ErrorCode::kMalformed);  // a component is 0
+  EXPECT_EQ(with_word(3, 0xffff'fffc).error().code,
+            ErrorCode::kMalformed);  // the squares of the root sum to more than 1
+  EXPECT_EQ(with_word(5, 0x8000'0000).error().code, ErrorCode::kMalformed);  // after the last bit
+  // -0.5, -0.5 and 0 yield w = 0.71, below the limit of 0.9.
   auto codes = Codes();
   codes[1].least_w = 0.9f;
   const CompactCodec strict = CompactCodec::Make(codes, kParents).value();
@@ -296,7 +297,7 @@ TEST(CompactCodec, DecodeRefusesBitsNoEncoderWrites) {
   EXPECT_EQ(strict.Decode(bytes, root, back).error().code, ErrorCode::kMalformed);
 }
 
-TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
+TEST(CompactCodec, MakeRejectsInvalidCodes) {
   const auto code = [](const std::vector<RotationQuantization>& codes) {
     const auto codec = CompactCodec::Make(codes, kParents);
     return codec ? ErrorCode::kIo : codec.error().code;
@@ -308,9 +309,11 @@ TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
     return code(codes);
   };
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(with([](RotationQuantization& c) { c.smallest_three_bits = 0; }, 0), ErrorCode::kMalformed);
+  EXPECT_EQ(with([](RotationQuantization& c) { c.smallest_three_bits = 0; }, 0),
+            ErrorCode::kMalformed);
   for (const std::uint8_t bits : {1, 7, 16, 255}) {
-    EXPECT_EQ(with([&](RotationQuantization& c) { c.smallest_three_bits = bits; }), ErrorCode::kOutOfRange);
+    EXPECT_EQ(with([&](RotationQuantization& c) { c.smallest_three_bits = bits; }),
+              ErrorCode::kOutOfRange);
   }
   EXPECT_EQ(with([](RotationQuantization& c) { c.bits[2] = 17; }), ErrorCode::kOutOfRange);
   for (const float bad : {nan, -2.0f, 0.0f}) {
@@ -333,13 +336,13 @@ TEST(CompactCodec, MakeRefusesWhatIsNoCode) {
   };
   EXPECT_EQ(told({0, 1}), ErrorCode::kIo);
   EXPECT_EQ(told({1}), ErrorCode::kMalformed);
-  EXPECT_EQ(told({0, 2}), ErrorCode::kMalformed);  // without the one it hangs from
+  EXPECT_EQ(told({0, 2}), ErrorCode::kMalformed);  // without its parent
   EXPECT_EQ(told({0, 1, 3}), ErrorCode::kMalformed);
   EXPECT_EQ(told({0, 0}), ErrorCode::kMalformed);
   EXPECT_EQ(told({0, 1, 2, 3}), ErrorCode::kShapeMismatch);
 }
 
-TEST(CompactCodec, WhatIsLeftOutIsTheReferenceHoweverItIsTurned) {
+TEST(CompactCodec, OmittedJointsAreDecodedToTheirReference) {
   const CompactCodec all = Codec();
   const CompactCodec fewer =
       CompactCodec::Make(Codes(), kParents, std::array<std::uint16_t, 2>{0, 1}).value();
@@ -355,7 +358,7 @@ TEST(CompactCodec, WhatIsLeftOutIsTheReferenceHoweverItIsTurned) {
   std::vector<Quat> back_whole(3);
   Vec3 root_m;
   ASSERT_TRUE(all.Decode(whole, root_m, back_whole));
-  pose[2] = YawRotation(3.0);  // in no range
+  pose[2] = YawRotation(3.0);  // outside every range
   EXPECT_TRUE(BytesOf(all, Vec3(1.0f), pose).empty());
   ASSERT_TRUE(fewer.Decode(BytesOf(fewer, Vec3(1.0f), pose), root_m, back));
   EXPECT_EQ(back[0], back_whole[0]);
@@ -367,7 +370,7 @@ TEST(CompactCodec, WhatIsLeftOutIsTheReferenceHoweverItIsTurned) {
   EXPECT_EQ(back[0], back_whole[0]);
   EXPECT_EQ(back[1], Codes()[1].reference);
   EXPECT_EQ(back[2], Codes()[2].reference);
-  // What is no rotation is not told, even where it would be left out.
+  // An invalid rotation does not fit, even if its joint is omitted.
   pose[2] = Quat(0.0f, 0.0f, 0.0f, 0.0f);
   EXPECT_TRUE(BytesOf(root, Vec3(1.0f), pose).empty());
 }

@@ -14,7 +14,7 @@ struct Taken {
   bool operator==(const Taken&) const = default;
 };
 
-/// Sample frames a server sends, and the stream they make.
+/// Sample frames of a server, and the stream that contains them.
 struct Stream {
   std::vector<Taken> frames;
   std::vector<std::byte> bytes;
@@ -63,7 +63,7 @@ TEST(FrameReader, ReadsAStreamByteByByte) {
   FrameReader reader(Sender::kServer);
   std::vector<Taken> taken;
   for (std::size_t i = 0; i < stream.bytes.size(); ++i) {
-    // A copy of its own, so that a read past the byte given shows under a sanitizer.
+    // A separate copy of each byte, so that a sanitizer detects reads beyond it.
     const std::vector<std::byte> one(1, stream.bytes[i]);
     TakeAll(reader, one, taken);
   }
@@ -101,7 +101,7 @@ TEST(FrameReader, ReadsUnalignedInput) {
   EXPECT_EQ(taken, stream.frames);
 }
 
-TEST(FrameReader, AnErrorStays) {
+TEST(FrameReader, RepeatsAnError) {
   FrameReader reader(Sender::kClient);
   auto bad = HeaderOf(MessageType::kPing, 16);
   bad[0] = std::byte{0};
@@ -119,7 +119,7 @@ TEST(FrameReader, AnErrorStays) {
   }
 }
 
-TEST(FrameReader, RefusesWhatThePeerMayNotSend) {
+TEST(FrameReader, RejectsTypesThatThePeerMustNotSend) {
   FrameReader reader(Sender::kClient);
   const auto welcome = EncodeOrFail(Pong{1, 2.0, 3.0, 4});
   std::span<const std::byte> bytes = welcome;
@@ -128,7 +128,7 @@ TEST(FrameReader, RefusesWhatThePeerMayNotSend) {
   EXPECT_EQ(next.error().where, "frame.type");
 }
 
-TEST(FrameReader, AnAnnouncedLengthAllocatesNothing) {
+TEST(FrameReader, DoesNotAllocateForAHeader) {
   FrameReader reader(Sender::kClient);
   const auto header = HeaderOf(MessageType::kRequest, kMaxBulkBytes);
   std::span<const std::byte> bytes = header;
@@ -138,7 +138,7 @@ TEST(FrameReader, AnAnnouncedLengthAllocatesNothing) {
   EXPECT_LE(reader.capacity_bytes(), 4096u);
 }
 
-TEST(FrameReader, MemoryFollowsWhatArrivesAndEndsAtOneFrame) {
+TEST(FrameReader, MemoryGrowsWithReceivedBytes) {
   FrameReader reader(Sender::kClient);
   const auto header = HeaderOf(MessageType::kRequest, kMaxBulkBytes);
   std::span<const std::byte> bytes = header;
@@ -155,14 +155,14 @@ TEST(FrameReader, MemoryFollowsWhatArrivesAndEndsAtOneFrame) {
     if (*next) break;
   }
   EXPECT_EQ(arrived, kFrameHeaderBytes + kMaxBulkBytes);
-  // The next frame gives a large one's memory back.
+  // The buffer of a large frame is freed with the next frame.
   const auto ping = EncodeOrFail(Ping{1, 2.0});
   bytes = std::span<const std::byte>(ping).first(20);
   ASSERT_TRUE(reader.Next(bytes));
   EXPECT_LE(reader.capacity_bytes(), 4096u);
 }
 
-TEST(FrameReader, LimitsMayChangeBetweenFrames) {
+TEST(FrameReader, LimitsCanChangeBetweenFrames) {
   FrameReader reader(Sender::kClient, {64, 64});
   auto hello = EncodeOrFail(Ping{1, 2.0});
   std::span<const std::byte> bytes = hello;

@@ -21,7 +21,7 @@ ErrorCode CodeOf(const HeaderBytes& bytes, Sender sender, const FrameLimits& lim
   return header ? ErrorCode::kIo : header.error().code;
 }
 
-TEST(Frame, HeaderIsSixteenStatedBytes) {
+TEST(Frame, HeaderMatchesTheStandard) {
   const HeaderBytes bytes = Header(MessageType::kPoseBatch, 0x00123458);
   const std::array<int, 16> stated = {0x53, 0x57, 0x50, 0x1a, 1, 0, 67, 0,
                                       0x58, 0x34, 0x12, 0x00, 0, 0, 0,  0};
@@ -30,14 +30,14 @@ TEST(Frame, HeaderIsSixteenStatedBytes) {
   }
 }
 
-TEST(Frame, HeaderComesBack) {
+TEST(Frame, HeaderRoundTrips) {
   const auto header = ReadFrameHeader(Header(MessageType::kSpawn, 4096), Sender::kClient);
   ASSERT_TRUE(header);
   EXPECT_EQ(header->type, MessageType::kSpawn);
   EXPECT_EQ(header->payload_bytes, 4096u);
 }
 
-TEST(Frame, EveryByteOfTheMagicCounts) {
+TEST(Frame, ChecksEveryByteOfTheMagic) {
   for (std::size_t i = 0; i < 4; ++i) {
     HeaderBytes bytes = Header(MessageType::kPing, 8);
     bytes[i] ^= std::byte{1};
@@ -45,7 +45,7 @@ TEST(Frame, EveryByteOfTheMagicCounts) {
   }
 }
 
-TEST(Frame, AnotherVersionIsRefused) {
+TEST(Frame, RejectsAnotherVersion) {
   for (std::size_t i = 4; i < 6; ++i) {
     HeaderBytes bytes = Header(MessageType::kPing, 8);
     bytes[i] ^= std::byte{2};
@@ -53,7 +53,7 @@ TEST(Frame, AnotherVersionIsRefused) {
   }
 }
 
-TEST(Frame, UnknownTypeIsRefused) {
+TEST(Frame, RejectsAnUnknownType) {
   for (const int type : {0, 16, 31, 33, 63, 76, 0x100 + 10, 65535}) {
     const auto bytes = Header(static_cast<MessageType>(type), 8);
     EXPECT_EQ(CodeOf(bytes, Sender::kClient), ErrorCode::kUnsupported) << type;
@@ -61,7 +61,7 @@ TEST(Frame, UnknownTypeIsRefused) {
   }
 }
 
-TEST(Frame, TypeThatGoesTheOtherWayIsRefused) {
+TEST(Frame, RejectsTypesOfTheOtherDirection) {
   int known = 0;
   for (int i = 0; i < 256; ++i) {
     const auto type = static_cast<MessageType>(i);
@@ -87,13 +87,13 @@ TEST(Frame, FlagsMustBeZero) {
   }
 }
 
-TEST(Frame, LengthIsAMultipleOfEightAboveZero) {
+TEST(Frame, LengthMustBeAMultipleOfEight) {
   for (const std::uint32_t length : {0u, 1u, 4u, 7u, 9u, 12u, 1001u}) {
     EXPECT_EQ(CodeOf(Header(MessageType::kPing, length), Sender::kClient), ErrorCode::kMalformed);
   }
 }
 
-TEST(Frame, LengthStopsAtTheCapOfItsType) {
+TEST(Frame, LengthIsLimitedByItsType) {
   const auto takes = [](MessageType type, std::size_t cap, const FrameLimits& limits = {}) {
     const auto bytes = static_cast<std::uint32_t>(cap);
     EXPECT_TRUE(ReadFrameHeader(Header(type, bytes), SenderOf(type), limits));
@@ -107,12 +107,12 @@ TEST(Frame, LengthStopsAtTheCapOfItsType) {
   takes(MessageType::kPoseBatch, 16 << 20);
   takes(MessageType::kPing, 256, {256, 4096});
   takes(MessageType::kRequest, 4096, {256, 4096});
-  // Limits are never raised above the standard's.
+  // Limits cannot exceed those of the standard.
   takes(MessageType::kPing, 1 << 20, {1u << 30, 1u << 30});
   takes(MessageType::kEvents, 16 << 20, {1u << 30, 1u << 30});
 }
 
-TEST(Frame, ParseWantsExactlyOneAlignedFrame) {
+TEST(Frame, ParseFrameNeedsOneAlignedFrame) {
   auto frame = EncodeOrFail(Ping{1, 2.0});
   ASSERT_TRUE(ParseFrame(frame, Sender::kClient));
   const std::span<const std::byte> bytes = frame;

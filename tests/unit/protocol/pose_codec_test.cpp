@@ -23,7 +23,8 @@ Quat RandomRotation(std::mt19937& random) {
               static_cast<float>(z / l));
 }
 
-/// Angle between two rotations from the vector part of a^-1 b, exact for small angles, in double.
+/// Returns the angle between two rotations, from the vector part of a^-1 b, which is precise for
+/// small angles.
 double Angle(const Quat& a, const Quat& b) {
   const DQuat difference = glm::conjugate(glm::normalize(DQuat(a))) * glm::normalize(DQuat(b));
   const double v = std::sqrt(difference.x * difference.x + difference.y * difference.y +
@@ -42,13 +43,13 @@ Quat Through(const Quat& q) {
   return back;
 }
 
-TEST(PoseCodec, StatesItsSizes) {
+TEST(PoseCodec, HasTheDocumentedSizes) {
   EXPECT_EQ(PoseBytes(PoseMode::kFull, 31), 508u);
   EXPECT_EQ(PoseBytes(PoseMode::kQuantised, 31), 198u);
   EXPECT_EQ(PoseBytes(PoseMode::kMovement, 31), 0u);
 }
 
-TEST(PoseCodec, FullGivesBackTheSameBits) {
+TEST(PoseCodec, FullPosesAreLossless) {
   std::mt19937 random(1);
   std::vector<Quat> rotations(31);
   for (Quat& q : rotations) q = RandomRotation(random);
@@ -58,14 +59,14 @@ TEST(PoseCodec, FullGivesBackTheSameBits) {
   Vec3 root_back;
   std::vector<Quat> back(31);
   ASSERT_TRUE(DecodePose(PoseMode::kFull, bytes, root_back, back));
-  // Bytes, since a zero may have a sign.
+  // Compare bytes, because a zero can have a sign.
   EXPECT_TRUE(std::ranges::equal(std::as_bytes(std::span(&root, 1)),
                                  std::as_bytes(std::span(&root_back, 1))));
   EXPECT_TRUE(
       std::ranges::equal(std::as_bytes(std::span(rotations)), std::as_bytes(std::span(back))));
 }
 
-TEST(PoseCodec, QuantisedRotationStaysWithinItsStatedError) {
+TEST(PoseCodec, QuantisedRotationsAreWithinTheirError) {
   const unsigned seed = std::random_device{}();
   std::mt19937 random(seed);
   double largest = 0.0;
@@ -75,13 +76,14 @@ TEST(PoseCodec, QuantisedRotationStaysWithinItsStatedError) {
     largest = std::max(largest, angle);
     ASSERT_LE(angle, kMaxQuantisedAngleRad) << "seed " << seed;
   }
-  // The bound is no idle one: random rotations come to more than half of it.
+  // The bound is tight: random rotations reach more than half of it.
   EXPECT_GT(largest, 0.5 * kMaxQuantisedAngleRad) << "seed " << seed;
   RecordProperty("largest_angle_rad", std::to_string(largest));
 }
 
-TEST(PoseCodec, QuantisedRotationHoldsWhereAllComponentsAreEqual) {
-  // Near (+-0.5)^4 the component left out is known worst; walk around each such corner.
+TEST(PoseCodec, QuantisedRotationsAreWithinTheirErrorForEqualComponents) {
+  // The error of the dropped component is largest near (+-0.5)^4, so test around each of these
+  // points.
   std::mt19937 random(2);
   std::uniform_real_distribution<float> nudge(-4e-5f, 4e-5f);
   for (int signs = 0; signs < 16; ++signs) {
@@ -94,7 +96,7 @@ TEST(PoseCodec, QuantisedRotationHoldsWhereAllComponentsAreEqual) {
   }
 }
 
-TEST(PoseCodec, QuantisedRotationIsUnit) {
+TEST(PoseCodec, QuantisedRotationsAreUnit) {
   std::mt19937 random(3);
   for (int i = 0; i < 10'000; ++i) {
     const Quat q = Through(RandomRotation(random));
@@ -109,7 +111,7 @@ TEST(PoseCodec, IdentityAndHalfTurnsAreExact) {
   }
 }
 
-TEST(PoseCodec, OppositeQuaternionsGiveTheSameBytes) {
+TEST(PoseCodec, OppositeQuaternionsHaveTheSameBytes) {
   std::mt19937 random(4);
   for (int i = 0; i < 10'000; ++i) {
     const Quat q = RandomRotation(random);
@@ -121,8 +123,8 @@ TEST(PoseCodec, OppositeQuaternionsGiveTheSameBytes) {
   }
 }
 
-TEST(PoseCodec, BytesAreThoseOfTheStandard) {
-  // Left out: y (index 1), negative, so all are negated.
+TEST(PoseCodec, MatchesTheStandard) {
+  // y (index 1) is dropped. It is negative, so all components are negated.
   const Quat q(0.5f, 0.5f, -0.70710677f, 0.0f);  // w, x, y, z
   std::array<std::byte, 18> bytes;
   ASSERT_TRUE(EncodePose(PoseMode::kQuantised, Vec3(1.0f, -0.5f, 0.00002f), {&q, 1}, bytes));
@@ -137,7 +139,7 @@ TEST(PoseCodec, BytesAreThoseOfTheStandard) {
   EXPECT_EQ(words[2], minus_half);
 }
 
-TEST(PoseCodec, LargestOfEqualsIsTheLowestIndex) {
+TEST(PoseCodec, DropsTheLowestIndexOfEqualComponents) {
   const Quat q(0.5f, 0.5f, 0.5f, 0.5f);
   std::array<std::byte, 18> bytes;
   ASSERT_TRUE(EncodePose(PoseMode::kQuantised, Vec3(0.0f), {&q, 1}, bytes));
@@ -145,7 +147,7 @@ TEST(PoseCodec, LargestOfEqualsIsTheLowestIndex) {
   EXPECT_EQ(std::to_integer<int>(bytes[15]) & 0x80, 0);
 }
 
-TEST(PoseCodec, QuantisedRootStaysWithinItsStatedError) {
+TEST(PoseCodec, QuantisedRootsAreWithinTheirError) {
   const unsigned seed = std::random_device{}();
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> near(-256.0f, 256.0f);
@@ -171,7 +173,7 @@ TEST(PoseCodec, QuantisedRootStaysWithinItsStatedError) {
   }
 }
 
-TEST(PoseCodec, EncodeRefusesWhatIsNoPose) {
+TEST(PoseCodec, EncodeRejectsInvalidPoses) {
   const auto code = [](PoseMode mode, const Vec3& root, const Quat& q, std::size_t bytes) {
     std::vector<std::byte> out(bytes);
     const Status status = EncodePose(mode, root, {&q, 1}, out);
@@ -196,7 +198,7 @@ TEST(PoseCodec, EncodeRefusesWhatIsNoPose) {
             ErrorCode::kOutOfRange);
 }
 
-TEST(PoseCodec, LengthWithinToleranceIsTaken) {
+TEST(PoseCodec, AcceptsLengthsWithinTheTolerance) {
   for (const float length : {0.9991f, 1.0009f}) {
     const Quat q = kIdentityQuat * length;
     std::array<std::byte, 28> full;
@@ -209,7 +211,7 @@ TEST(PoseCodec, LengthWithinToleranceIsTaken) {
   }
 }
 
-TEST(PoseCodec, FullDecodeRefusesWhatIsNoPose) {
+TEST(PoseCodec, DecodeRejectsInvalidFullPoses) {
   std::array<float, 7> numbers = {0, 0, 0, 0, 0, 0, 1};
   const auto decode = [&] {
     Vec3 root;
@@ -232,7 +234,7 @@ TEST(PoseCodec, FullDecodeRefusesWhatIsNoPose) {
   EXPECT_EQ(decode().error().code, ErrorCode::kOutOfRange);
 }
 
-TEST(PoseCodec, QuantisedDecodeRefusesBitsNoEncoderWrites) {
+TEST(PoseCodec, DecodeRejectsBitsThatNoEncoderWrites) {
   const Quat q = kIdentityQuat;
   std::array<std::byte, 18> good;
   ASSERT_TRUE(EncodePose(PoseMode::kQuantised, Vec3(0.0f), {&q, 1}, good));

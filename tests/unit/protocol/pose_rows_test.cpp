@@ -21,7 +21,7 @@ PoseBatchInfo Info(PoseMode mode) { return {5, 1, 0, 1, 99, 1.5, mode, kJoints};
 
 Vec3 RootOf(AvatarId avatar) { return {0.25f * static_cast<float>(avatar), 1.0f, 0.0f}; }
 
-/// Avatars 10, 20, 30, ..., flagged by their row.
+/// Rows of avatars 10, 20, 30, ... with their row number as flags.
 void Fill(PoseRows& rows, PoseMode mode, std::size_t count) {
   std::vector<AvatarId> avatars(count);
   for (std::size_t i = 0; i < count; ++i) avatars[i] = static_cast<AvatarId>(10 * (i + 1));
@@ -32,7 +32,7 @@ void Fill(PoseRows& rows, PoseMode mode, std::size_t count) {
   }
 }
 
-/// What a batch decodes to, whose bytes it keeps.
+/// A decoded batch and the frame that it borrows.
 struct Decoded {
   Decoded(PoseBatchComposer& composer, const PoseRows& rows,
           const std::vector<std::uint32_t>& picked) {
@@ -45,11 +45,11 @@ struct Decoded {
   PoseBatch batch;
 };
 
-TEST(PoseBatchComposer, MakesOfAllRowsTheBytesOfTheGeneralEncoder) {
+TEST(PoseBatchComposer, EqualsTheEncoder) {
   for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
     PoseRows rows;
     PoseBatchComposer composer;
-    for (const std::size_t count : {20u, 7u}) {  // the second with the first one's memory
+    for (const std::size_t count : {20u, 7u}) {  // the second round reuses the memory
       Fill(rows, mode, count);
       std::vector<std::uint32_t> all(count);
       std::iota(all.begin(), all.end(), 0u);
@@ -61,7 +61,7 @@ TEST(PoseBatchComposer, MakesOfAllRowsTheBytesOfTheGeneralEncoder) {
   }
 }
 
-TEST(PoseBatchComposer, HoldsExactlyTheRowsPicked) {
+TEST(PoseBatchComposer, ContainsThePickedRows) {
   for (const PoseMode mode : {PoseMode::kFull, PoseMode::kQuantised}) {
     PoseRows rows;
     Fill(rows, mode, 40);
@@ -81,11 +81,10 @@ TEST(PoseBatchComposer, HoldsExactlyTheRowsPicked) {
   }
 }
 
-TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
+TEST(PoseBatchComposer, OmitsEmptyRows) {
   PoseRows rows;
-  ASSERT_TRUE(rows.Begin(
-      Info(PoseMode::kQuantised),
-      std::make_shared<const std::vector<AvatarId>>(std::vector<AvatarId>{1, 2, 3, 4, 5})));
+  ASSERT_TRUE(rows.Begin(Info(PoseMode::kQuantised), std::make_shared<const std::vector<AvatarId>>(
+                                                         std::vector<AvatarId>{1, 2, 3, 4, 5})));
   const std::vector<Quat> rotations(kJoints, kIdentityQuat);
   rows.SkipTo(1);
   ASSERT_TRUE(rows.Add(7, RootOf(2), rotations));
@@ -103,7 +102,7 @@ TEST(PoseBatchComposer, LeavesOutRowsWithoutAPose) {
   EXPECT_THAT(Decoded(composer, rows, {0, 3}).batch.avatars, ElementsAre());
 }
 
-// A root and a joint that turns about y by up to half a radian.
+// A root and a joint that rotates about y by up to 0.5 rad.
 CompactCodec SmallCodec() {
   std::vector<RotationQuantization> codes(2);
   codes[0].smallest_three_bits = 12;
@@ -114,7 +113,7 @@ CompactCodec SmallCodec() {
   return CompactCodec::Make(codes, std::array<std::int16_t, 2>{-1, 0}).value();
 }
 
-TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
+TEST(PoseRows, CompactPosesAreUncompressedIfNecessary) {
   const CompactCodec codec = SmallCodec();
   const PoseBatchInfo info{5, 1, 0, 1, 99, 1.5, PoseMode::kCompact, 2};
   std::vector<AvatarId> avatars(100);
@@ -125,7 +124,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
   const auto turn = [](AvatarId a) { return a % 5 == 0 ? 2.0 : 0.02 * (a % 20); };
   PoseRows rows;
   PoseBatchComposer composer;
-  for (int round = 0; round < 2; ++round) {  // the second with the first one's memory
+  for (int round = 0; round < 2; ++round) {  // the second round reuses the memory
     ASSERT_TRUE(rows.Begin(info, numbers, &codec));
     std::vector<std::uint32_t> picked;
     for (const AvatarId a : avatars) {
@@ -135,7 +134,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
         continue;
       }
       const Vec3 root(is_bad(a) ? std::numeric_limits<float>::quiet_NaN() : 0.5f, 0.0f, 0.0f);
-      // The caller's flags do not say how a pose is told.
+      // The flag uncompressed from the caller is ignored.
       const Status status = rows.Add(a % 8, root, std::array{YawRotation(a), YawRotation(turn(a))});
       ASSERT_EQ(status.has_value(), !is_bad(a)) << a;
     }
@@ -151,7 +150,7 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
       const AvatarId a = row + 1;
       ASSERT_EQ(rows.has_pose(row), has_pose(a)) << a;
       if (!has_pose(a)) continue;
-      const int wide = a % 5 == 0 ? kPoseWide : 0;
+      const int wide = a % 5 == 0 ? kPoseUncompressed : 0;
       ASSERT_EQ(decoded.batch.avatars[i], a);
       ASSERT_EQ(decoded.batch.flags[i++], (a % 4) | wide);
       ASSERT_EQ(reader.Next().size(), wide != 0 ? 24u : codec.pose_bytes());
@@ -173,15 +172,15 @@ TEST(PoseRows, CompactPosesAreWideWhereTheyHaveToBe) {
             ErrorCode::kInvalidArgument);
 }
 
-TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
+TEST(PoseBatchComposer, RejectsMoreRowsThanFit) {
   PoseRows rows;
   Fill(rows, PoseMode::kFull, 100);
   const FrameLimits limits{1 << 20, 4096};
   PoseBatchComposer composer(limits);
   std::vector<std::uint32_t> picked(100);
   std::iota(picked.begin(), picked.end(), 0u);
-  const std::size_t fitting = composer.Fitting(rows, picked);
-  // All but what the batch says of itself and less than one more avatar takes.
+  const std::size_t fitting = composer.CountThatFit(rows, picked);
+  // The frame is full except for its header and less than one avatar.
   const std::size_t avatar_bytes = PoseBytes(PoseMode::kFull, kJoints) + sizeof(AvatarId) + 1;
   EXPECT_GT((fitting + 1) * avatar_bytes + 128, 4096u);
   std::vector<std::byte> frame;
@@ -198,8 +197,8 @@ TEST(PoseBatchComposer, TakesNoMoreThanAFrameHolds) {
   EXPECT_FALSE(composer.Compose(rows, std::span(picked).first(1), {.part = 4, .parts = 4}, frame));
 }
 
-TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
-  // 4 KiB frames, filled to the last avatar.
+TEST(PoseBatchComposer, ComposesAllRowsThatFit) {
+  // Frames of 4 KiB that are filled completely.
   PoseBatchComposer composer({4096, 4096});
   std::vector<AvatarId> avatars(500);
   std::iota(avatars.begin(), avatars.end(), 1u);
@@ -212,7 +211,7 @@ TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
       ASSERT_TRUE(rows.Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, numbers));
       const std::vector<Quat> rotations(joints, kIdentityQuat);
       while (rows.size() < avatars.size()) ASSERT_TRUE(rows.Add(0, Vec3(0.0f), rotations));
-      const std::size_t fitting = composer.Fitting(rows, all);
+      const std::size_t fitting = composer.CountThatFit(rows, all);
       ASSERT_GT(fitting, 0u);
       ASSERT_LT(fitting, all.size());
       std::vector<std::byte> frame;
@@ -221,7 +220,7 @@ TEST(PoseBatchComposer, WhatFitsIsComposedWhateverTheJoints) {
   }
 }
 
-TEST(PoseRows, AreOfABatchThatCanBe) {
+TEST(PoseRows, BeginRejectsInvalidBatches) {
   const auto none = std::make_shared<const std::vector<AvatarId>>();
   const auto begin = [&](PoseMode mode, std::uint16_t joints) {
     return PoseRows().Begin({5, 1, 0, 1, 99, 1.5, mode, joints}, none).error().code;

@@ -11,7 +11,7 @@
 
 namespace stridewire::protocol {
 
-/// Client messages have the low numbers; Goodbye goes both ways.
+/// Returns the side that sends a type. Client messages have low numbers; Goodbye is sent by both.
 inline Sender SenderOf(MessageType type) {
   return type <= MessageType::kGoodbye ? Sender::kClient : Sender::kServer;
 }

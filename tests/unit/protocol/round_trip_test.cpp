@@ -6,7 +6,7 @@
 namespace stridewire::protocol {
 namespace {
 
-TEST(Messages, EachComesBackAsItWasSent) {
+TEST(Messages, RoundTrip) {
   for (const SampleMessage& sample : SampleMessages()) {
     SCOPED_TRACE(sample.name);
     const auto frame = EncodeOrFail(sample.message);
@@ -17,13 +17,13 @@ TEST(Messages, EachComesBackAsItWasSent) {
   }
 }
 
-TEST(Messages, EveryTypeHasASample) {
+TEST(Messages, HaveASampleOfEveryType) {
   std::set<std::size_t> alternatives;
   for (const SampleMessage& sample : SampleMessages()) alternatives.insert(sample.message.index());
   EXPECT_EQ(alternatives.size(), std::variant_size_v<Message>);
 }
 
-TEST(Messages, FramesFollowOneAnotherInOneBuffer) {
+TEST(Messages, AreAppendedToOneBuffer) {
   Encoder encoder;
   std::vector<std::byte> frames;
   std::size_t bytes = 0;
@@ -38,7 +38,7 @@ TEST(Messages, FramesFollowOneAnotherInOneBuffer) {
   }
 }
 
-TEST(Messages, PoseBatchBorrowsTheFrame) {
+TEST(Messages, APoseBatchBorrowsItsFrame) {
   for (const SampleMessage& sample : SampleMessages()) {
     const auto* batch = std::get_if<PoseBatch>(&sample.message);
     if (batch == nullptr || batch->avatars.empty()) continue;

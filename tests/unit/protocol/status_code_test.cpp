@@ -7,7 +7,7 @@
 namespace stridewire::protocol {
 namespace {
 
-TEST(StatusCode, NamesAreUniqueAndInTheirRanges) {
+TEST(StatusCode, HasUniqueNames) {
   std::set<std::string_view> names;
   int known = 0;
   for (int number = 0; number < 1000; ++number) {

@@ -27,7 +27,7 @@ std::set<std::string> Names() {
   return names;
 }
 
-TEST(Vectors, DecodeToWhatIsWrittenBesideThem) {
+TEST(Vectors, DecodeToTheirJson) {
   const auto names = Names();
   ASSERT_FALSE(names.empty());
   for (const std::string& name : names) {
@@ -43,7 +43,7 @@ TEST(Vectors, DecodeToWhatIsWrittenBesideThem) {
   }
 }
 
-TEST(Vectors, AreThoseOfTheSampleMessages) {
+TEST(Vectors, EqualTheSampleMessages) {
   std::set<std::string> samples;
   for (const SampleMessage& sample : SampleMessages()) {
     SCOPED_TRACE(sample.name);

@@ -1,4 +1,4 @@
-#include "ops/command_line.h"
+#include "base/command_line.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -42,7 +42,7 @@ class TemporaryFile {
   char path_[32] = "/tmp/stridewire_XXXXXX";
 };
 
-TEST(CommandLine, OptionBeatsEnvironmentBeatsFileBeatsDefault) {
+TEST(CommandLine, OptionOverridesEnvironmentFileAndDefault) {
   const TemporaryFile file("tick_hz = 10\nshards = 3\n[limits]\nmax_queue = 7\nmax_worlds = 5");
   const Variables variables = {{"STRIDEWIRE_TICK_HZ", "20"}, {"STRIDEWIRE_MAX_QUEUE", "8"}};
   const auto read =
@@ -62,7 +62,7 @@ TEST(CommandLine, EveryKeyIsAnOptionAndAVariable) {
   for (const ConfigKey& key : ConfigKeys()) {
     SCOPED_TRACE(key.name);
     const std::string value = key.get(defaults);
-    if (key.name == "data_dir" || key.name == "viewer_dir") continue;  // its default is empty
+    if (key.name == "data_dir" || key.name == "viewer_dir") continue;  // the default is empty
     const std::string option = key.option() + "=" + value;
     EXPECT_TRUE(value.empty() || Read({option.c_str()}));
     EXPECT_TRUE(Read({}, {{key.environment(), value}}));
@@ -77,7 +77,7 @@ TEST(CommandLine, EveryKeyIsAnOptionAndAVariable) {
   }
 }
 
-TEST(CommandLine, AFlagNeedsNoValue) {
+TEST(CommandLine, FlagsNeedNoValue) {
   const auto read = Read({"--allow-insecure", "--listen", "0.0.0.0:1"});
   ASSERT_TRUE(read) << Describe(read.error());
   EXPECT_TRUE(read->config.allow_insecure);
@@ -86,7 +86,7 @@ TEST(CommandLine, AFlagNeedsNoValue) {
   EXPECT_FALSE(off->config.open_worlds);
 }
 
-TEST(CommandLine, HelpAndVersion) {
+TEST(CommandLine, PrintsHelpAndVersion) {
   const auto help = Read({"--help"});
   ASSERT_TRUE(help);
   EXPECT_EQ(help->action, Action::kPrintText);
@@ -99,7 +99,7 @@ TEST(CommandLine, HelpAndVersion) {
   EXPECT_EQ(Read({"--check-config"})->action, Action::kCheckConfig);
 }
 
-TEST(CommandLine, RefusesWhatItDoesNotKnow) {
+TEST(CommandLine, RejectsUnknownArguments) {
   for (const std::vector<const char*>& arguments : std::vector<std::vector<const char*>>{
            {"--no-such-option"}, {"surplus"}, {"--tick-hz"}, {"--config"}}) {
     const auto read = Read(arguments);
@@ -108,10 +108,11 @@ TEST(CommandLine, RefusesWhatItDoesNotKnow) {
   }
 }
 
-TEST(CommandLine, FileErrorsNameTheFile) {
+TEST(CommandLine, FileErrorsContainTheFileName) {
   const auto missing = Read({"--config", "/no/such/file.toml"});
   ASSERT_FALSE(missing);
-  EXPECT_THAT(Describe(missing.error()), HasSubstr("/no/such/file.toml: cannot be opened"));
+  EXPECT_THAT(Describe(missing.error()),
+              HasSubstr("/no/such/file.toml: cannot open the configuration file"));
   const auto directory = Read({"--config", "/tmp"});
   ASSERT_FALSE(directory);
   EXPECT_THAT(Describe(directory.error()), HasSubstr("/tmp"));

@@ -1,4 +1,4 @@
-#include "ops/config.h"
+#include "base/config.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(Config, DefaultsAreThoseOfTheCommandsPage) {
+TEST(Config, HasDocumentedDefaults) {
   const Config config;
   EXPECT_EQ(ToText(config.listen), "127.0.0.1:7420");
   EXPECT_EQ(ToText(config.http), "127.0.0.1:7421");
@@ -21,7 +21,7 @@ TEST(Config, DefaultsAreThoseOfTheCommandsPage) {
   EXPECT_TRUE(CheckConfig(config));
 }
 
-TEST(Config, EveryKeyTakesItsOwnDefault) {
+TEST(Config, EveryKeyAcceptsItsDefault) {
   const Config defaults;
   std::set<std::string> names;
   for (const ConfigKey& key : ConfigKeys()) {
@@ -33,18 +33,18 @@ TEST(Config, EveryKeyTakesItsOwnDefault) {
   }
 }
 
-TEST(Config, EveryKeyRefusesNonsenseAndKeepsItsValue) {
+TEST(Config, EveryKeyRejectsInvalidValuesAndKeepsItsValue) {
   const Config defaults;
   for (const ConfigKey& key : ConfigKeys()) {
     if (key.name == "data_dir" || key.name == "library" || key.name == "viewer_dir") {
-      continue;  // any text may be a path
+      continue;  // any text is a valid path
     }
-    for (const char* nonsense : {"", "many", "1e", "-", "0x10", "nan", "inf", "-1",
-                                 "99999999999999", "1 ", " 1", "true1", "127.0.0.1", "[::1:80"}) {
-      if (key.is_list && std::string_view(nonsense).empty()) continue;  // an empty list
-      SCOPED_TRACE(key.name + " = '" + nonsense + "'");
+    for (const char* invalid : {"", "many", "1e", "-", "0x10", "nan", "inf", "-1", "99999999999999",
+                                "1 ", " 1", "true1", "127.0.0.1", "[::1:80"}) {
+      if (key.is_list && std::string_view(invalid).empty()) continue;  // an empty list
+      SCOPED_TRACE(key.name + " = '" + invalid + "'");
       Config config;
-      const Status status = key.set(config, nonsense);
+      const Status status = key.set(config, invalid);
       ASSERT_FALSE(status);
       EXPECT_NE(status.error().text, std::string());
       EXPECT_EQ(key.get(config), key.get(defaults));
@@ -52,11 +52,11 @@ TEST(Config, EveryKeyRefusesNonsenseAndKeepsItsValue) {
   }
 }
 
-TEST(Config, EveryNumberHasBothEndsOfItsRange) {
+TEST(Config, EveryNumberAcceptsBothEndsOfItsRange) {
   for (const ConfigKey& key : ConfigKeys()) {
     if (key.is_text || key.is_flag || key.is_list) continue;
     SCOPED_TRACE(key.name);
-    // "… (MIN to MAX)" is what --help says; hold it to that.
+    // The help text ends with "(MIN to MAX)".
     const auto open = key.help.rfind('(');
     const auto middle = key.help.rfind(" to ");
     ASSERT_NE(open, std::string::npos);
@@ -71,7 +71,7 @@ TEST(Config, EveryNumberHasBothEndsOfItsRange) {
   }
 }
 
-TEST(Config, PrintsWhatItReads) {
+TEST(Config, PrintedTextIsReadBackUnchanged) {
   Config config;
   config.listen = {"::1", 9};
   config.library = "a \"strange\" \\ name\n";
@@ -99,42 +99,42 @@ TEST(Config, PrintsWhatItReads) {
   EXPECT_EQ(read.limits.idle_timeout_s, 0.0);
 }
 
-TEST(Config, FileErrorsNameFileLineAndKey) {
+TEST(Config, FileErrorsContainFileLineAndKey) {
   struct Case {
     const char* text;
     const char* where;
     const char* what;
   };
   const Case cases[] = {
-      {"\nlissten = \"x:1\"", "f.toml:2: lissten", "no such key"},
+      {"\nlissten = \"x:1\"", "f.toml:2: lissten", "unknown key"},
       {"listen = 7420", "f.toml:1: listen", "in quotes"},
       {"listen = \"localhost\"", "f.toml:1: listen", "HOST:PORT"},
       {"listen = \"h:70000\"", "f.toml:1: listen", "0 to 65535"},
       {"tick_hz = \"60\"", "f.toml:1: tick_hz", "expected a number"},
-      {"tick_hz = 0", "f.toml:1: tick_hz", "outside its range"},
-      {"tick_hz = nan", "f.toml:1: tick_hz", "outside its range"},
-      {"shards = 1.5", "f.toml:1: shards", "whole number"},
-      {"allowed_origins = \"https://a.example\"", "f.toml:1: allowed_origins", "in brackets"},
-      {"allowed_origins = [1]", "f.toml:1: allowed_origins", "in brackets"},
-      {"allowed_origins = [\"\"]", "f.toml:1: allowed_origins", "in brackets"},
-      {"allowed_origins = [\"*\"]", "f.toml:1: allowed_origins", "a page's origin"},
+      {"tick_hz = 0", "f.toml:1: tick_hz = 0 (expected 1 to 1000)", "out of range"},
+      {"tick_hz = nan", "f.toml:1: tick_hz", "out of range"},
+      {"shards = 1.5", "f.toml:1: shards", "integer"},
+      {"allowed_origins = \"https://a.example\"", "f.toml:1: allowed_origins", "list of strings"},
+      {"allowed_origins = [1]", "f.toml:1: allowed_origins", "list of strings"},
+      {"allowed_origins = [\"\"]", "f.toml:1: allowed_origins", "list of strings"},
+      {"allowed_origins = [\"*\"]", "f.toml:1: allowed_origins", "origin of a page"},
       {"allowed_origins = [\"https://a.example/\"]", "f.toml:1: allowed_origins", "without a path"},
-      {"allowed_origins = [\"a.example\"]", "f.toml:1: allowed_origins", "a page's origin"},
+      {"allowed_origins = [\"a.example\"]", "f.toml:1: allowed_origins", "origin of a page"},
       {"allow_insecure = 1", "f.toml:1: allow_insecure", "true or false"},
       {"log_level = \"loud\"", "f.toml:1: log_level", "warning"},
       {"limits = 3", "f.toml:1: limits", "section"},
-      {"[limits]\n\nmax_session = 3", "f.toml:3: limits.max_session", "no such key"},
-      {"[limits]\nmax_sessions = 0", "f.toml:2: limits.max_sessions", "outside its range"},
-      {"max_sessions = 3", "f.toml:1: max_sessions", "no such key"},
+      {"[limits]\n\nmax_session = 3", "f.toml:3: limits.max_session", "unknown key"},
+      {"[limits]\nmax_sessions = 0", "f.toml:2: limits.max_sessions", "out of range"},
+      {"max_sessions = 3", "f.toml:1: max_sessions", "unknown key"},
       {"[worlds]\nhall = 1", "f.toml:2: worlds.hall", "section"},
-      {"[worlds.\"../x\"]\nlibrary = \"a\"", "worlds.../x", "a world's name"},
+      {"[worlds.\"../x\"]\nlibrary = \"a\"", "worlds.../x", "a world name"},
       {"[worlds.hall]\nlibrary = 1", "f.toml:2: worlds.hall.library", "in quotes"},
       {"[worlds.hall]\nlibrary = \"\"", "f.toml:2: worlds.hall.library", "in quotes"},
       {"[worlds.hall]\nterrain = true", "f.toml:2: worlds.hall.terrain", "in quotes"},
       {"[worlds.hall]\npersistent = \"yes\"", "f.toml:2: worlds.hall.persistent", "true or false"},
-      {"[worlds.hall]\nbig = true", "f.toml:2: worlds.hall.big", "no such key"},
-      {"tick_hz = = 3", "f.toml:1", "not TOML"},
-      {"a\xff = 3", "f.toml:1", "not TOML"},
+      {"[worlds.hall]\nbig = true", "f.toml:2: worlds.hall.big", "unknown key"},
+      {"tick_hz = = 3", "f.toml:1", "invalid TOML"},
+      {"a\xff = 3", "f.toml:1", "invalid TOML"},
   };
   for (const Case& bad : cases) {
     SCOPED_TRACE(bad.text);
@@ -146,13 +146,13 @@ TEST(Config, FileErrorsNameFileLineAndKey) {
   }
 }
 
-TEST(Config, AFileWithAnErrorChangesNothing) {
+TEST(Config, KeepsItsValuesIfAFileHasAnError) {
   Config config;
   EXPECT_FALSE(ReadConfigText("tick_hz = 30\nshards = \"x\"", "f", config));
   EXPECT_EQ(config.tick_hz, 60.0);
 }
 
-TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTo) {
+TEST(Config, RequiresAllowInsecureForPublicAddresses) {
   for (const char* address : {"0.0.0.0:7420", "192.168.1.2:7420", "[::]:7420", "example.org:1",
                               "127.0.0.1.example.org:1"}) {
     SCOPED_TRACE(address);
@@ -177,7 +177,7 @@ TEST(Config, RefusesToListenBeyondThisMachineUnlessToldTo) {
   EXPECT_TRUE(CheckConfig(config));
 }
 
-TEST(Config, KnowsWorldNames) {
+TEST(Config, ChecksWorldNames) {
   for (const char* name : {"a", "load-0", "A.b_c", "0"}) EXPECT_TRUE(IsWorldName(name)) << name;
   for (const char* name : {"", ".", "..", ".hidden", "a/b", "a b", "a\n", "\xc3\xa9"}) {
     EXPECT_FALSE(IsWorldName(name)) << name;
@@ -186,7 +186,7 @@ TEST(Config, KnowsWorldNames) {
   EXPECT_FALSE(IsWorldName(std::string(65, 'x')));
 }
 
-TEST(Config, ReadsAddresses) {
+TEST(Config, ParsesEndpoints) {
   EXPECT_EQ(*ParseEndpoint("[::1]:80"), (Endpoint{"::1", 80}));
   EXPECT_EQ(ToText(*ParseEndpoint("[::1]:80")), "[::1]:80");
   EXPECT_EQ(*ParseEndpoint("host.name:0"), (Endpoint{"host.name", 0}));

@@ -1,4 +1,4 @@
-#include "ops/metrics.h"
+#include "base/metrics.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ TEST(Metrics, SumsOverThreads) {
   Metrics metrics(2);
   metrics.shard(0).ticks.Add(3);
   metrics.shard(1).ticks.Add(4);
-  metrics.ops().http_requests.Add();
+  metrics.main().http_requests.Add();
   metrics.shard(1).avatars.Set(7);
   metrics.shard(0).Reached(Limit::kQueue, 2);
   metrics.set_world_count(5);
@@ -41,21 +41,21 @@ TEST(Metrics, HistogramsAreCumulativeAndHaveMaxima) {
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_count 4\n"));
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_max 5\n"));
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_max_since_scrape 5\n"));
-  // The next scrape sees only what came since.
+  // The next scrape reports only values that were observed after the previous one.
   metrics.shard(0).tick.Observe(0.25);
   text = metrics.Text();
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_max 5\n"));
   EXPECT_THAT(text, HasSubstr("stridewire_tick_seconds_max_since_scrape 0.25\n"));
 }
 
-TEST(Metrics, ProcessorTimeIsToldOfEachShard) {
+TEST(Metrics, ReportsCpuTimePerShard) {
   Metrics metrics(2);
   metrics.shard(1).cpu_ns.Set(1'500'000'000);
   EXPECT_THAT(metrics.Text(), HasSubstr("stridewire_shard_cpu_seconds_total{shard=\"0\"} 0\n"
                                         "stridewire_shard_cpu_seconds_total{shard=\"1\"} 1.5\n"));
 }
 
-TEST(Metrics, EveryLimitHasANameOfItsOwn) {
+TEST(Metrics, LimitNamesAreUnique) {
   const std::set<std::string_view> names(kLimitNames.begin(), kLimitNames.end());
   EXPECT_EQ(names.size(), kLimitNames.size());
   EXPECT_FALSE(names.contains(""));

@@ -1,4 +1,4 @@
-// Who is in a region, against a search without grid or memory of its own.
+// Compares RegionMembers with a brute-force search.
 #include "session/region_members.h"
 
 #include <gmock/gmock.h>
@@ -17,56 +17,55 @@ namespace {
 using protocol::PoseMode;
 using testing::ElementsAre;
 
-/// Avatars at places; of those in `without` the shard made no pose.
-PoseDelivery DeliveryAt(const std::map<AvatarId, std::pair<float, float>>& at,
-                        std::uint64_t tick, int shard = 0,
-                        const std::set<AvatarId>& without = {}, double cell_m = 8.0) {
+/// A delivery of avatars at given positions. Avatars in `without` have no pose.
+PoseDelivery DeliveryAt(const std::map<AvatarId, std::pair<float, float>>& at, std::uint64_t tick,
+                        int shard = 0, const std::set<AvatarId>& without = {},
+                        double cell_m = 8.0) {
   auto rows = std::make_shared<protocol::PoseRows>();
-  auto places = std::make_shared<SpatialGrid>();
+  auto grid = std::make_shared<SpatialGrid>();
   std::vector<AvatarId> numbers;
-  for (const auto& [number, place] : at) numbers.push_back(number);
+  for (const auto& [id, position] : at) numbers.push_back(id);
   EXPECT_TRUE(rows->Begin({1, 0, 0, 1, tick, 0.0, protocol::PoseMode::kFull, 1},
                           std::make_shared<const std::vector<AvatarId>>(numbers)));
-  places->Begin(cell_m, numbers.size());
+  grid->Begin(cell_m, numbers.size());
   for (std::size_t row = 0; row < numbers.size(); ++row) {
     const auto& [x, z] = at.at(numbers[row]);
-    places->Add(static_cast<std::uint32_t>(row), x, z);
+    grid->Add(static_cast<std::uint32_t>(row), x, z);
     if (without.contains(numbers[row])) continue;
     rows->SkipTo(row);
     EXPECT_TRUE(rows->Add(0, Vec3(x, 0.0f, z), std::array{kIdentityQuat}));
   }
   rows->SkipTo(numbers.size());
-  places->Sort();
+  grid->Sort();
   return {.world = 1,
           .from_shard = shard,
           .tick = tick,
           .parts = {},
           .rows = std::move(rows),
-          .places = std::move(places)};
+          .grid = std::move(grid)};
 }
 
-std::vector<AvatarId> NumbersOfRows(const PoseDelivery& delivery,
-                                        std::span<const std::uint32_t> rows) {
+std::vector<AvatarId> IdsOfRows(const PoseDelivery& delivery, std::span<const std::uint32_t> rows) {
   std::vector<AvatarId> numbers;
   for (const std::uint32_t row : rows) numbers.push_back((*delivery.rows->avatars())[row]);
   return numbers;
 }
 
-TEST(SpatialGrid, FindsAllNearAPlaceHoweverLargeTheCells) {
+TEST(SpatialGrid, FindsAllNearAPointWithAnyCellSize) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << "\n";
   Random random(seed);
   for (const double cell_m : {1.0, 8.0, 1000.0}) {
-    SpatialGrid places;
-    places.Begin(cell_m, 300);
+    SpatialGrid grid;
+    grid.Begin(cell_m, 300);
     std::vector<std::pair<float, float>> at;
     for (std::uint32_t row = 0; row < 300; ++row) {
       const double scale = row % 10 == 0 ? 100'000.0 : 40.0;
       at.emplace_back(static_cast<float>(random.Draw(-scale, scale)),
                       static_cast<float>(random.Draw(-scale, scale)));
-      places.Add(row, at.back().first, at.back().second);
+      grid.Add(row, at.back().first, at.back().second);
     }
-    places.Sort();
+    grid.Sort();
     for (int i = 0; i < 200; ++i) {
       const double x = random.Draw(-60.0, 60.0);
       const double z = random.Draw(-60.0, 60.0);
@@ -78,27 +77,26 @@ TEST(SpatialGrid, FindsAllNearAPlaceHoweverLargeTheCells) {
         }
       }
       std::multiset<std::uint32_t> found;
-      places.ForEachNear(x, z, reach_m,
-                         [&](std::uint32_t row, float, float) { found.insert(row); });
+      grid.ForEachNear(x, z, reach_m, [&](std::uint32_t row, float, float) { found.insert(row); });
       ASSERT_EQ(std::vector(found.begin(), found.end()),
                 std::vector(expected.begin(), expected.end()));
     }
-    int nobody = 0;
-    places.ForEachNear(1e300, -1e300, 10.0, [&](std::uint32_t, float, float) { ++nobody; });
-    EXPECT_EQ(nobody, 0);
+    int found = 0;
+    grid.ForEachNear(1e300, -1e300, 10.0, [&](std::uint32_t, float, float) { ++found; });
+    EXPECT_EQ(found, 0);
   }
 }
 
-// Avatars walk, come and go on two shards while the region moves and changes.
-TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
+// Avatars walk, appear and disappear on two shards while the region moves and changes.
+TEST(RegionMembers, MatchABruteForceSearch) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << "\n";
   Random random(seed);
   RegionMembers members;
   protocol::Region region{{0.0, 0.0}, 20.0, 5.0, {{10.0, 1}, {18.0, 3}}};
   constexpr std::uint16_t kEvery = 4;
-  members.Move(region, 8.0, kEvery, PoseMode::kFull);
-  EXPECT_EQ(members.every(PoseMode::kFull), 1);
+  members.Set(region, 8.0, kEvery, PoseMode::kFull);
+  EXPECT_EQ(members.interval(PoseMode::kFull), 1);
   std::map<AvatarId, std::pair<float, float>> at[2];
   std::set<AvatarId> inside;
   std::size_t entered_count = 0;
@@ -109,7 +107,7 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
       region.centre_m.z += random.Draw(-4.0, 4.0);
       region.radius_m = random.Draw(12.0, 25.0);
       region.leave_m = tick % 14 == 0 ? std::nullopt : std::optional(random.Draw(0.0, 10.0));
-      members.Move(region, 8.0, kEvery, PoseMode::kFull);
+      members.Set(region, 8.0, kEvery, PoseMode::kFull);
     }
     const double leave_at_m = region.radius_m + region.leave_m.value_or(8.0);
     for (int shard = 0; shard < 2; ++shard) {
@@ -153,7 +151,7 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
       }
       ASSERT_TRUE(std::ranges::equal(change.entered, entered)) << tick;
       ASSERT_TRUE(std::ranges::equal(change.left, left)) << tick;
-      ASSERT_EQ(NumbersOfRows(delivery, change.due), due) << tick;
+      ASSERT_EQ(IdsOfRows(delivery, change.due), due) << tick;
       entered_count += entered.size();
       left_count += left.size();
     }
@@ -162,27 +160,27 @@ TEST(RegionMembers, AreThoseABruteForceSearchFinds) {
   EXPECT_GT(left_count, 50u);
 }
 
-// The same of rings that have a detail each: a delivery of each a tick, and in it poses of those alone whom the region
-// asks for in that detail.
-TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
+// As above, with rings of different detail. Each mode has its own deliveries, which contain only
+// the poses that the filter of this mode selects.
+TEST(RegionMembers, AreDueInTheModeOfTheirRing) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << "\n";
   Random random(seed);
   RegionMembers members;
   protocol::Region region{{0.0, 0.0}, 24.0, 5.0, {{6.0, 2}, {12.0, 3}, {18.0, 6}}, {}};
   using protocol::PoseDetail;
-  region.ring_details = {PoseDetail::kAll, PoseDetail::kFewer, PoseDetail::kAll};
-  members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
+  region.ring_details = {PoseDetail::kAll, PoseDetail::kReduced, PoseDetail::kAll};
+  members.Set(region, 8.0, 4, PoseMode::kCompactRoot);
   EXPECT_THAT(members.modes(),
-              testing::UnorderedElementsAre(PoseMode::kCompact, PoseMode::kCompactFewer,
+              testing::UnorderedElementsAre(PoseMode::kCompact, PoseMode::kCompactReduced,
                                             PoseMode::kCompactRoot));
-  EXPECT_EQ(members.every(PoseMode::kCompact), 2);
-  EXPECT_EQ(members.every(PoseMode::kCompactFewer), 3);
-  EXPECT_EQ(members.every(PoseMode::kCompactRoot), 4);
-  EXPECT_EQ(members.every(PoseMode::kQuantised), 0);
-  EXPECT_EQ(members.reach(PoseMode::kCompact), (RegionFilter{0.0, 0.0, 18.0, 0.0, true}));
-  EXPECT_EQ(members.reach(PoseMode::kCompactFewer), (RegionFilter{0.0, 0.0, 12.0, 6.0, true}));
-  EXPECT_EQ(members.reach(PoseMode::kCompactRoot), (RegionFilter{0.0, 0.0, 29.0, 18.0, true}));
+  EXPECT_EQ(members.interval(PoseMode::kCompact), 2);
+  EXPECT_EQ(members.interval(PoseMode::kCompactReduced), 3);
+  EXPECT_EQ(members.interval(PoseMode::kCompactRoot), 4);
+  EXPECT_EQ(members.interval(PoseMode::kQuantised), 0);
+  EXPECT_EQ(members.filter(PoseMode::kCompact), (RegionFilter{0.0, 0.0, 18.0, 0.0, true}));
+  EXPECT_EQ(members.filter(PoseMode::kCompactReduced), (RegionFilter{0.0, 0.0, 12.0, 6.0, true}));
+  EXPECT_EQ(members.filter(PoseMode::kCompactRoot), (RegionFilter{0.0, 0.0, 29.0, 18.0, true}));
 
   std::map<AvatarId, std::pair<float, float>> at;
   std::set<AvatarId> inside;
@@ -204,21 +202,21 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
     }
     if (tick % 50 == 0) {
       region.centre_m.x += random.Draw(-4.0, 4.0);
-      members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
+      members.Set(region, 8.0, 4, PoseMode::kCompactRoot);
     }
     const auto distance_of = [&](AvatarId number) {
       return std::hypot(at.at(number).first - region.centre_m.x,
                         at.at(number).second - region.centre_m.z);
     };
     for (const PoseMode mode :
-         {PoseMode::kCompact, PoseMode::kCompactFewer, PoseMode::kCompactRoot}) {
-      if (tick % members.every(mode) != 0) continue;
-      const RegionFilter reach = members.reach(mode);
+         {PoseMode::kCompact, PoseMode::kCompactReduced, PoseMode::kCompactRoot}) {
+      if (tick % members.interval(mode) != 0) continue;
+      const RegionFilter filter = members.filter(mode);
       std::set<AvatarId> without;
-      for (const auto& [number, place] : at) {
-        const double distance_m = distance_of(number);
-        if (distance_m > reach.reach_m || (reach.beyond_m > 0.0 && distance_m <= reach.beyond_m)) {
-          without.insert(number);
+      for (const auto& [id, position] : at) {
+        const double distance_m = distance_of(id);
+        if (distance_m > filter.outer_m || (filter.inner_m > 0.0 && distance_m <= filter.inner_m)) {
+          without.insert(id);
         }
       }
       PoseDelivery delivery = DeliveryAt(at, tick, 0, without);
@@ -231,7 +229,7 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
         const bool was = inside.contains(number);
         const double distance_m = at.contains(number) ? distance_of(number) : 1e9;
         const auto [every, of] = distance_m <= 6.0    ? std::pair(2u, PoseMode::kCompact)
-                                 : distance_m <= 12.0 ? std::pair(3u, PoseMode::kCompactFewer)
+                                 : distance_m <= 12.0 ? std::pair(3u, PoseMode::kCompactReduced)
                                  : distance_m <= 18.0 ? std::pair(6u, PoseMode::kCompact)
                                                       : std::pair(4u, PoseMode::kCompactRoot);
         if (was && distance_m > 29.0) left.push_back(number);
@@ -252,32 +250,32 @@ TEST(RegionMembers, AreSentInTheDetailOfTheirRing) {
       left_count += static_cast<int>(left.size());
       ASSERT_TRUE(std::ranges::equal(change.entered, entered)) << tick;
       ASSERT_TRUE(std::ranges::equal(change.left, left)) << tick;
-      ASSERT_EQ(NumbersOfRows(delivery, change.due), due) << tick;
+      ASSERT_EQ(IdsOfRows(delivery, change.due), due) << tick;
     }
   }
   EXPECT_GT(crossed, 50);
   EXPECT_GT(left_count, 50);
 }
 
-// Details that a session has no more are all one mode.
-TEST(RegionMembers, OfOneModeHaveTheWholeReach) {
+// If levels of detail are not available any more, all rings have the same mode.
+TEST(RegionMembers, OfOneModeHaveOneFilterForTheRegion) {
   RegionMembers members;
   protocol::Region region{{1.0, 2.0}, 20.0, 5.0, {{6.0, 2}}, {}};
-  members.Move(region, 8.0, 4, PoseMode::kCompact);
-  const RegionFilter whole{1.0, 2.0, 25.0, 0.0, false};
-  EXPECT_EQ(members.reach(PoseMode::kCompact), whole);
+  members.Set(region, 8.0, 4, PoseMode::kCompact);
+  const RegionFilter region_filter{1.0, 2.0, 25.0, 0.0, false};
+  EXPECT_EQ(members.filter(PoseMode::kCompact), region_filter);
   region.ring_details = {protocol::PoseDetail::kAll};
-  members.Move(region, 8.0, 4, PoseMode::kCompactRoot);
-  EXPECT_NE(members.reach(PoseMode::kCompactRoot), whole);
-  members.ChangeModes([](PoseMode) { return PoseMode::kQuantised; });
+  members.Set(region, 8.0, 4, PoseMode::kCompactRoot);
+  EXPECT_NE(members.filter(PoseMode::kCompactRoot), region_filter);
+  members.MapModes([](PoseMode) { return PoseMode::kQuantised; });
   EXPECT_THAT(members.modes(), ElementsAre(PoseMode::kQuantised));
-  EXPECT_EQ(members.every(PoseMode::kQuantised), 2);
-  EXPECT_EQ(members.reach(PoseMode::kQuantised), whole);
+  EXPECT_EQ(members.interval(PoseMode::kQuantised), 2);
+  EXPECT_EQ(members.filter(PoseMode::kQuantised), region_filter);
 }
 
 TEST(RegionMembers, EnterWithTheirFirstPose) {
   RegionMembers members;
-  members.Move({{0.0, 0.0}, 10.0, 0.0, {}, {}}, 8.0, 1, PoseMode::kFull);
+  members.Set({{0.0, 0.0}, 10.0, 0.0, {}, {}}, 8.0, 1, PoseMode::kFull);
   const std::map<AvatarId, std::pair<float, float>> at{{4, {1.0f, 1.0f}}, {5, {2.0f, 0.0f}}};
   PoseDelivery delivery = DeliveryAt(at, 1, 0, {5});
   RegionMembers::Change change = members.Update(delivery);
@@ -285,8 +283,8 @@ TEST(RegionMembers, EnterWithTheirFirstPose) {
   delivery = DeliveryAt(at, 2, 0, {4});
   change = members.Update(delivery);
   EXPECT_THAT(std::vector(change.entered.begin(), change.entered.end()), ElementsAre(5));
-  EXPECT_TRUE(change.left.empty());  // 4 is there, though there is no pose of it
-  EXPECT_THAT(NumbersOfRows(delivery, change.due), ElementsAre(5));
+  EXPECT_TRUE(change.left.empty());  // 4 is still inside, although it has no pose in this delivery
+  EXPECT_THAT(IdsOfRows(delivery, change.due), ElementsAre(5));
 }
 
 }  // namespace

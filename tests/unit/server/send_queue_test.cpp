@@ -15,14 +15,20 @@ SharedFrame Frame(std::size_t bytes, int mark = 0) {
   return std::make_shared<const std::vector<std::byte>>(bytes, static_cast<std::byte>(mark));
 }
 
-PoseDelivery Batch(std::uint64_t tick, int shard = 0, WorldId world = 1, int parts = 1,
-                   std::size_t bytes = 100, PoseMode mode = PoseMode::kFull) {
-  PoseDelivery delivery{
-      .world = world, .mode = mode, .from_shard = shard, .tick = tick, .avatar_count = 5};
-  for (int i = 0; i < parts; ++i) {
-    delivery.parts.push_back(Frame(bytes, static_cast<int>(tick)));
-  }
-  return delivery;
+struct BatchDef {
+  int shard = 0;
+  WorldId world = 1;
+  int parts = 1;
+  std::size_t bytes = 100;
+  PoseMode mode = PoseMode::kFull;
+};
+
+// A batch of five avatars. Each byte of its frames is the number of the tick.
+PoseFrames Batch(int tick, const BatchDef& def = {}) {
+  PoseFrames batch{
+      .world = def.world, .mode = def.mode, .shard = def.shard, .avatar_count = 5, .frames = {}};
+  for (int i = 0; i < def.parts; ++i) batch.frames.push_back(Frame(def.bytes, tick));
+  return batch;
 }
 
 std::vector<int> Marks(const SendQueue::Gathered& gathered) {
@@ -46,18 +52,19 @@ TEST(SendQueue, SendsControlInOrderAndBeforePoses) {
   EXPECT_EQ(queue.control_bytes(), 0u);
 }
 
-TEST(SendQueue, OfAGroundTheLastIsSentAndBehindControl) {
+TEST(SendQueue, SendsTheLatestTerrainAfterControl) {
   SendQueue queue(1000, 4);
   queue.PushTerrain(1, Frame(5000, 10));
   queue.PushTerrain(2, Frame(10, 20));
   queue.PushTerrain(1, Frame(5000, 11));
   queue.PushTerrain(3, Frame(10, 30));
   queue.DropTerrain(3);
-  EXPECT_EQ(queue.control_bytes(), 0u) << "events have their budget to themselves";
+  EXPECT_EQ(queue.control_bytes(), 0u) << "terrain does not use the budget of events";
   EXPECT_EQ(queue.PushPoses(Batch(50)), 0u);
   for (int i = 1; i <= 3; ++i) queue.PushControl(Frame(10, i));
   SendQueue::Gathered out;
-  queue.Gather(20, out);  // The third does not fit: what it tells may be what a ground is about.
+  queue.Gather(20,
+               out);  // The third message does not fit. It could be the WorldInfo of the terrain.
   EXPECT_THAT(Marks(out), ElementsAre(1, 2, 50));
   queue.Gather(1 << 20, out);
   EXPECT_THAT(Marks(out), ElementsAre(3, 11));
@@ -67,11 +74,11 @@ TEST(SendQueue, OfAGroundTheLastIsSentAndBehindControl) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(SendQueue, ASlowObserverKeepsTheLatestTicks) {
+TEST(SendQueue, KeepsTheLatestTicksForASlowObserver) {
   SendQueue queue(1000, 3);
   std::size_t dropped = 0;
   for (int tick = 1; tick <= 100; ++tick) {
-    dropped += queue.PushPoses(Batch(static_cast<std::uint64_t>(tick)));
+    dropped += queue.PushPoses(Batch(tick));
     EXPECT_LE(queue.waiting_batches(), 3u);
   }
   EXPECT_EQ(dropped, 97u);
@@ -80,11 +87,11 @@ TEST(SendQueue, ASlowObserverKeepsTheLatestTicks) {
   EXPECT_THAT(Marks(out), ElementsAre(98, 99, 100));
 }
 
-TEST(SendQueue, CountsThePartsOfABatchThatWereNotSentYet) {
+TEST(SendQueue, CountsUnsentPartsOfADroppedBatch) {
   SendQueue queue(1000, 1);
-  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1, 4, 100)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, {.parts = 4})), 0u);
   SendQueue::Gathered out;
-  queue.Gather(150, out);  // two parts: the second crosses the mark
+  queue.Gather(150, out);  // two parts: the second one exceeds max_bytes
   EXPECT_EQ(out.frames.size(), 2u);
   EXPECT_EQ(out.poses, 0u);
   EXPECT_EQ(queue.PushPoses(Batch(2)), 2u);
@@ -92,14 +99,14 @@ TEST(SendQueue, CountsThePartsOfABatchThatWereNotSentYet) {
   EXPECT_THAT(Marks(out), ElementsAre(2));
 }
 
-TEST(SendQueue, OneWorldDoesNotDriveOutAnother) {
+TEST(SendQueue, DropsOnlyBatchesOfTheSameWorldShardAndMode) {
   SendQueue queue(1000, 2);
-  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1)), 0u);
-  EXPECT_EQ(queue.PushPoses(Batch(1, 1, 1)), 0u);
-  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 2)), 0u);
-  EXPECT_EQ(queue.PushPoses(Batch(1, 0, 1, 1, 100, PoseMode::kQuantised)), 0u);
-  EXPECT_EQ(queue.PushPoses(Batch(2, 0, 1)), 0u);
-  EXPECT_EQ(queue.PushPoses(Batch(3, 0, 1)), 1u);
+  EXPECT_EQ(queue.PushPoses(Batch(1)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, {.shard = 1})), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, {.world = 2})), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(1, {.mode = PoseMode::kQuantised})), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(2)), 0u);
+  EXPECT_EQ(queue.PushPoses(Batch(3)), 1u);
   EXPECT_EQ(queue.waiting_batches(), 5u);
   queue.DropPoses(1, PoseMode::kFull);
   EXPECT_EQ(queue.waiting_batches(), 2u);
@@ -107,14 +114,14 @@ TEST(SendQueue, OneWorldDoesNotDriveOutAnother) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(SendQueue, EveryLaneGetsItsTurn) {
+TEST(SendQueue, TakesBatchesFromAllShardsInTurn) {
   SendQueue queue(1000, 8);
   for (int shard = 0; shard < 4; ++shard) {
     for (int i = 0; i < 8; ++i) {
-      EXPECT_EQ(queue.PushPoses(Batch(static_cast<std::uint64_t>(10 * shard + i), shard)), 0u);
+      EXPECT_EQ(queue.PushPoses(Batch(10 * shard + i, {.shard = shard})), 0u);
     }
   }
-  // Room for one batch a time: four turns take one of each lane, each its oldest.
+  // Each call has room for one batch. Four calls take the oldest batch of each shard.
   std::set<int> first;
   SendQueue::Gathered out;
   for (int turn = 0; turn < 4; ++turn) {
@@ -136,7 +143,7 @@ TEST(SendQueue, NeitherControlNorPosesStarve) {
   EXPECT_FALSE(queue.empty());
 }
 
-TEST(SendQueue, RefusesEventsBeyondTheBudgetButNeverReplies) {
+TEST(SendQueue, RejectsEventsBeyondTheBudgetButNotReplies) {
   SendQueue queue(1000, 4);
   EXPECT_TRUE(queue.PushEvents(Frame(600)));
   EXPECT_FALSE(queue.PushEvents(Frame(401)));
@@ -146,14 +153,14 @@ TEST(SendQueue, RefusesEventsBeyondTheBudgetButNeverReplies) {
   EXPECT_FALSE(queue.PushEvents(Frame(1)));
 }
 
-TEST(SendQueue, MovementsGoInOrderOrAllOfAShardAreForgotten) {
+TEST(SendQueue, SendsMovementsInOrderOrDropsAllOfAShard) {
   SendQueue queue(100, 4);
-  queue.PushControl(Frame(90, 1));  // its budget is another
+  queue.PushControl(Frame(90, 1));  // does not use the budget of movements
   EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 10)), 0u);
   EXPECT_EQ(queue.PushMovements(1, 1, Frame(30, 20)), 0u);
   EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 11)), 0u);
   EXPECT_EQ(queue.movement_bytes(), 90u);
-  // One too many: it and the two before it of the same shard.
+  // This frame exceeds the budget. It is lost with the two waiting frames of the same shard.
   EXPECT_EQ(queue.PushMovements(1, 0, Frame(30, 12)), 3u);
   EXPECT_EQ(queue.movement_bytes(), 30u);
   EXPECT_EQ(queue.PushMovements(2, 0, Frame(30, 30)), 0u);
@@ -173,11 +180,11 @@ TEST(SendQueue, MovementsGoInOrderOrAllOfAShardAreForgotten) {
   EXPECT_EQ(queue.movement_bytes(), 0u);
 }
 
-TEST(SendQueue, SharesFrames) {
-  const PoseDelivery batch = Batch(1);
+TEST(SendQueue, SharesFramesBetweenConnections) {
+  const PoseFrames batch = Batch(1);
   SendQueue a(1000, 4);
   SendQueue b(1000, 4);
-  EXPECT_EQ(a.PushPoses(batch) + b.PushPoses(batch), 0u);
+  EXPECT_EQ(a.PushPoses(PoseFrames(batch)) + b.PushPoses(PoseFrames(batch)), 0u);
   SendQueue::Gathered out_a;
   SendQueue::Gathered out_b;
   a.Gather(1000, out_a);

@@ -1,4 +1,4 @@
-// The small parts of a session: what was answered, what may be sent again, how much is afforded.
+// Small parts of a session: reply cache, event replay, rate limit, session directory.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,108 +11,106 @@ namespace stridewire::server {
 namespace {
 
 using testing::ElementsAre;
-using Known = ReplyCache::Verdict;
 
 SharedFrame FrameOf(std::size_t bytes) {
   return std::make_shared<const std::vector<std::byte>>(bytes);
 }
 
-TEST(ReplyCache, TakesCommandsInOrderAndOnce) {
-  ReplyCache memory(10, 1000);
-  EXPECT_EQ(memory.last_seq(), 0u);
-  EXPECT_EQ(memory.Classify(1), Known::kNew);
-  EXPECT_EQ(memory.Classify(2), Known::kGap);
-  memory.Take(1);
-  EXPECT_EQ(memory.last_seq(), 1u);
-  EXPECT_EQ(memory.Classify(1), Known::kPending);
-  EXPECT_EQ(memory.Classify(2), Known::kNew);
-  memory.Take(2);
+TEST(ReplyCache, AcceptsEachCommandOnceAndInOrder) {
+  ReplyCache cache(10, 1000);
+  EXPECT_EQ(cache.last_seq(), 0u);
+  EXPECT_EQ(cache.Classify(1), ReplyCache::Verdict::kNew);
+  EXPECT_EQ(cache.Classify(2), ReplyCache::Verdict::kGap);
+  cache.Begin(1);
+  EXPECT_EQ(cache.last_seq(), 1u);
+  EXPECT_EQ(cache.Classify(1), ReplyCache::Verdict::kPending);
+  EXPECT_EQ(cache.Classify(2), ReplyCache::Verdict::kNew);
+  cache.Begin(2);
   const SharedFrame second = FrameOf(10);
-  EXPECT_EQ(memory.Remember(2, second, 5), 0u);  // answers may come in any order
-  EXPECT_EQ(memory.Classify(1), Known::kPending);
-  EXPECT_EQ(memory.Classify(2), Known::kAnswered);
-  EXPECT_EQ(memory.Find(2).reply, second);
-  EXPECT_EQ(memory.Find(2).joined, 5u);
+  EXPECT_EQ(cache.Store(2, second, 5), 0u);  // commands may be answered in any order
+  EXPECT_EQ(cache.Classify(1), ReplyCache::Verdict::kPending);
+  EXPECT_EQ(cache.Classify(2), ReplyCache::Verdict::kAnswered);
+  EXPECT_EQ(cache.Find(2).reply, second);
+  EXPECT_EQ(cache.Find(2).joined, 5u);
 }
 
-TEST(ReplyCache, ForgetsTheOldestBeyondItsCount) {
-  ReplyCache memory(3, 1000);
+TEST(ReplyCache, ForgetsTheOldestReplyBeyondMaxCount) {
+  ReplyCache cache(3, 1000);
   for (protocol::Seq seq = 1; seq <= 5; ++seq) {
-    memory.Take(seq);
-    memory.Remember(seq, FrameOf(1), 0);
+    cache.Begin(seq);
+    cache.Store(seq, FrameOf(1), 0);
   }
-  EXPECT_EQ(memory.Classify(1), Known::kForgotten);
-  EXPECT_EQ(memory.Classify(2), Known::kForgotten);
-  EXPECT_EQ(memory.Classify(3), Known::kAnswered);
-  EXPECT_EQ(memory.Classify(6), Known::kNew);
+  EXPECT_EQ(cache.Classify(1), ReplyCache::Verdict::kForgotten);
+  EXPECT_EQ(cache.Classify(2), ReplyCache::Verdict::kForgotten);
+  EXPECT_EQ(cache.Classify(3), ReplyCache::Verdict::kAnswered);
+  EXPECT_EQ(cache.Classify(6), ReplyCache::Verdict::kNew);
 }
 
-TEST(ReplyCache, ForgetsTheOldestBeyondItsBytesButKeepsTheLast) {
-  ReplyCache memory(100, 1000);
+TEST(ReplyCache, ForgetsTheOldestReplyBeyondMaxBytesButKeepsTheLast) {
+  ReplyCache cache(100, 1000);
   for (protocol::Seq seq = 1; seq <= 50; ++seq) {
-    memory.Take(seq);
-    memory.Remember(seq, FrameOf(300), 0);
-    EXPECT_LE(memory.bytes(), 1000u);
+    cache.Begin(seq);
+    cache.Store(seq, FrameOf(300), 0);
+    EXPECT_LE(cache.bytes(), 1000u);
   }
-  memory.Take(51);
-  memory.Remember(51, FrameOf(5000), 0);
-  EXPECT_EQ(memory.Classify(51), Known::kAnswered);
-  EXPECT_EQ(memory.Classify(50), Known::kForgotten);
+  cache.Begin(51);
+  cache.Store(51, FrameOf(5000), 0);
+  EXPECT_EQ(cache.Classify(51), ReplyCache::Verdict::kAnswered);
+  EXPECT_EQ(cache.Classify(50), ReplyCache::Verdict::kForgotten);
 }
 
-TEST(ReplyCache, NeverForgetsWhatIsNotAnswered) {
-  ReplyCache memory(2, 10);
-  memory.Take(1);
+TEST(ReplyCache, NeverForgetsPendingCommands) {
+  ReplyCache cache(2, 10);
+  cache.Begin(1);
   for (protocol::Seq seq = 2; seq <= 9; ++seq) {
-    memory.Take(seq);
-    EXPECT_EQ(memory.Remember(seq, FrameOf(100), 0), 0u);
+    cache.Begin(seq);
+    EXPECT_EQ(cache.Store(seq, FrameOf(100), 0), 0u);
   }
-  EXPECT_EQ(memory.Classify(1), Known::kPending);
-  EXPECT_EQ(memory.Remember(1, FrameOf(100), 0), 8u);
-  EXPECT_EQ(memory.Classify(9), Known::kAnswered);
+  EXPECT_EQ(cache.Classify(1), ReplyCache::Verdict::kPending);
+  EXPECT_EQ(cache.Store(1, FrameOf(100), 0), 8u);
+  EXPECT_EQ(cache.Classify(9), ReplyCache::Verdict::kAnswered);
 }
 
-TEST(EventReplay, GivesBackWhatCameAfterANumber) {
+TEST(EventReplay, ReturnsMessagesAfterANumber) {
   EventReplay replay(1000);
-  for (std::uint64_t number = 1; number <= 4; ++number)
-    replay.Keep({number, 2, true, FrameOf(100)});
+  for (std::uint64_t number = 1; number <= 4; ++number) replay.Add({number, 2, true, FrameOf(100)});
   std::vector<std::uint64_t> numbers;
-  replay.ForEachAfter(2, [&](EventReplay::Kept& kept) { numbers.push_back(kept.number); });
+  replay.ForEachAfter(2, [&](EventReplay::Stored& stored) { numbers.push_back(stored.number); });
   EXPECT_THAT(numbers, ElementsAre(3u, 4u));
-  EXPECT_EQ(replay.TakeForgotten(), 0u);
+  EXPECT_EQ(replay.TakeDropped(), 0u);
 }
 
-TEST(EventReplay, IsBoundedAndCountsOnlyWhatNobodyGot) {
+TEST(EventReplay, IsBoundedAndCountsDroppedUnsentEvents) {
   EventReplay replay(250);
-  replay.Keep({1, 7, true, FrameOf(100)});
-  replay.Keep({2, 5, false, FrameOf(100)});
-  replay.Keep({3, 3, false, FrameOf(100)});
-  EXPECT_EQ(replay.TakeForgotten(), 0u);  // 1 had been sent
-  replay.Keep({4, 1, false, FrameOf(100)});
-  EXPECT_EQ(replay.TakeForgotten(), 5u);
-  EXPECT_EQ(replay.TakeForgotten(), 0u);
+  replay.Add({1, 7, true, FrameOf(100)});
+  replay.Add({2, 5, false, FrameOf(100)});
+  replay.Add({3, 3, false, FrameOf(100)});
+  EXPECT_EQ(replay.TakeDropped(), 0u);  // message 1 was sent
+  replay.Add({4, 1, false, FrameOf(100)});
+  EXPECT_EQ(replay.TakeDropped(), 5u);
+  EXPECT_EQ(replay.TakeDropped(), 0u);
   EXPECT_LE(replay.bytes(), 250u);
   EventReplay none(0);
-  none.Keep({1, 2, false, FrameOf(8)});
-  EXPECT_EQ(none.TakeForgotten(), 2u);
+  none.Add({1, 2, false, FrameOf(8)});
+  EXPECT_EQ(none.TakeDropped(), 2u);
   EXPECT_EQ(none.bytes(), 0u);
 }
 
-TEST(TokenBucket, LetsThroughRateAndBurst) {
+TEST(TokenBucket, LimitsRateAndBurst) {
   TokenBucket bucket(10.0, 5.0);
   EXPECT_TRUE(bucket.Take(5.0));
   EXPECT_FALSE(bucket.Take(1.0));
   bucket.AdvanceTime(0.25);
   EXPECT_TRUE(bucket.Take(2.0));
-  EXPECT_FALSE(bucket.Take(1.0));  // half a one is left
-  bucket.AdvanceTime(0.20);        // time does not go back
+  EXPECT_FALSE(bucket.Take(1.0));  // half a token is left
+  bucket.AdvanceTime(0.20);        // an earlier time has no effect
   EXPECT_FALSE(bucket.Take(1.0));
   bucket.AdvanceTime(100.0);
   EXPECT_FALSE(bucket.Take(5.5));
   EXPECT_TRUE(bucket.Take(5.0));
 }
 
-TEST(SessionDirectory, SpreadsSessionsAndFindsThemByToken) {
+TEST(SessionDirectory, DistributesSessionsAndFindsThemByToken) {
   SessionDirectory directory(Limits(), 3);
   Limit reached{};
   std::vector<SessionDirectory::Entry> entries;
@@ -139,7 +137,7 @@ TEST(SessionDirectory, SpreadsSessionsAndFindsThemByToken) {
   EXPECT_NE(directory.Find(entries[0].identity.token), nullptr);
 }
 
-TEST(SessionDirectory, KeepsItsLimits) {
+TEST(SessionDirectory, EnforcesLimits) {
   Limits limits;
   limits.max_sessions = 3;
   limits.max_sessions_per_address = 2;

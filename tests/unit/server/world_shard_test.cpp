@@ -8,10 +8,11 @@
 #include <cmath>
 #include <map>
 
+#include "app/world_directory.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/decode.h"
 #include "test_library.h"
-#include "world/world_directory.h"
+#include "world/command_inbox.h"
 
 namespace stridewire::server {
 namespace {
@@ -25,7 +26,13 @@ const TickClock kClock(TickClock::Clock::time_point{}, 60.0);
 
 struct Bench {
   explicit Bench(int shard_count = 1, int max_queue = 8)
-      : world(MakeWorld()), shard(world, 0, shard_count, max_queue, kClock, budget, metrics) {}
+      : world(MakeWorld()),
+        shard({.world = world,
+               .shard_count = shard_count,
+               .max_queue = max_queue,
+               .clock = kClock,
+               .budget = budget,
+               .metrics = metrics}) {}
 
   static std::shared_ptr<World> MakeWorld() {
     auto world = std::make_shared<World>();
@@ -45,10 +52,10 @@ struct Bench {
     return shard.Execute({.world = world, .session = session, .seq = 1, .part = std::move(part)},
                          ++tick);
   }
-  CommandResult Spawn(const std::vector<AvatarId>& numbers, SessionId session = 1) {
+  CommandResult Spawn(const std::vector<AvatarId>& ids, SessionId session = 1) {
     SpawnPart part;
-    for (const AvatarId number : numbers) {
-      part.items.push_back({static_cast<std::uint32_t>(part.items.size()), {.avatar = number}});
+    for (const AvatarId id : ids) {
+      part.items.push_back({static_cast<std::uint32_t>(part.items.size()), {.avatar = id}});
     }
     return Do(std::move(part), session);
   }
@@ -62,12 +69,12 @@ struct Bench {
     }
     return Do(std::move(part));
   }
-  void Watch(std::uint16_t every_full, std::uint16_t every_quantised = 0, bool events = true) {
+  void Observe(std::uint16_t full_interval, std::uint16_t quantised_interval = 0) {
     shard.SetInterest({.world = world,
                        .shard = 0,
-                       .poses = {{{.every = {.whole = every_full}, .named = {}},
-                                  {.every = {.whole = every_quantised}, .named = {}}}},
-                       .events = events});
+                       .poses = {{{.interval = {.all = full_interval}, .avatars = {}},
+                                  {.interval = {.all = quantised_interval}, .avatars = {}}}},
+                       .events = true});
   }
   std::vector<protocol::Event> Events() {
     const auto events = shard.TakeEvents();
@@ -81,7 +88,7 @@ struct Bench {
   std::uint64_t tick = 0;
 };
 
-// A frame on a multiple of 8 bytes, with what it says.
+// A decoded frame. The copy is aligned to 8 bytes, as the decoder requires.
 struct Decoded {
   explicit Decoded(const SharedFrame& frame) : bytes(*frame) {
     const auto view = protocol::ParseFrame(bytes, protocol::Sender::kServer);
@@ -94,12 +101,12 @@ struct Decoded {
   protocol::PoseBatch batch;
 };
 
-TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
+TEST(WorldShard, InspectsAnAvatar) {
   Bench bench;
   bench.Spawn({1});
-  constexpr std::size_t kPlenty = 100'000;
+  constexpr std::size_t kMaxSiteBytes = 100'000;
   bench.shard.Advance(++bench.tick, 1);
-  const protocol::AvatarState standing = bench.shard.Inspect(1, bench.tick, kPlenty);
+  const protocol::AvatarState standing = bench.shard.Inspect(1, bench.tick, kMaxSiteBytes);
   EXPECT_EQ(standing.code, StatusCode::kOk);
   EXPECT_EQ(standing.world, 3u);
   EXPECT_FALSE(standing.movement);
@@ -109,7 +116,7 @@ TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
   bench.shard.Advance(bench.tick, 1);
   const double started_s = kClock.TickTime(bench.tick) - kClock.tick_s();
   for (int i = 0; i < 5; ++i) bench.shard.Advance(++bench.tick, 1);
-  const protocol::AvatarState walking = bench.shard.Inspect(1, bench.tick, kPlenty);
+  const protocol::AvatarState walking = bench.shard.Inspect(1, bench.tick, kMaxSiteBytes);
   EXPECT_EQ(walking.tick, bench.tick);
   EXPECT_EQ(walking.queue_size, 2u);
   ASSERT_EQ(walking.queue.size(), 2u);
@@ -123,8 +130,8 @@ TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
   EXPECT_GT(movement.generic_time, 0.0);
   EXPECT_LT(movement.generic_time, static_cast<double>(movement.keytimes_s.size() - 1));
   EXPECT_LT(walking.server_time_s, movement.started_s + movement.keytimes_s.back());
-  // Weights at the applied parameters: sum 1, and the examples' sites come back as those parameters
-  // (true of the cardinal basis without pseudoexamples).
+  // The weights have the sum 1, and the weighted mean of the examples equals the applied
+  // parameters. This holds for a cardinal basis without pseudoexamples.
   const std::size_t d = movement.parameter_names.size();
   ASSERT_EQ(movement.applied.count, d);
   ASSERT_EQ(movement.sites.size(), movement.weights.size() * d);
@@ -143,13 +150,13 @@ TEST(WorldShard, TellsWhatAnAvatarIsDoing) {
   }
 
   EXPECT_TRUE(bench.shard.Inspect(1, bench.tick, 10).movement->sites.empty());
-  const protocol::AvatarState nobody = bench.shard.Inspect(9, bench.tick, kPlenty);
-  EXPECT_EQ(nobody.code, StatusCode::kNoSuchAvatar);
-  EXPECT_EQ(nobody.avatar, 9u);
+  const protocol::AvatarState missing = bench.shard.Inspect(9, bench.tick, kMaxSiteBytes);
+  EXPECT_EQ(missing.code, StatusCode::kNoSuchAvatar);
+  EXPECT_EQ(missing.avatar, 9u);
 }
 
-// Layers begin and end at the tick that a command comes to, as they would for an avatar alone.
-TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
+// Layers start and end at the tick of their command, as for a single avatar.
+TEST(WorldShard, PlaysLayersLikeASingleAvatar) {
   const auto library = OpenLibrary("builtin").value();
   const auto world = std::make_shared<World>();
   world->id = 3;
@@ -159,8 +166,13 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
   for (const int shard_count : {1, 2}) {
     std::vector<std::unique_ptr<WorldShard>> shards;
     for (int s = 0; s < shard_count; ++s) {
-      shards.push_back(
-          std::make_unique<WorldShard>(world, s, shard_count, 8, kClock, budget, metrics));
+      shards.push_back(std::make_unique<WorldShard>(WorldShardDef{.world = world,
+                                                                  .shard = s,
+                                                                  .shard_count = shard_count,
+                                                                  .max_queue = 8,
+                                                                  .clock = kClock,
+                                                                  .budget = budget,
+                                                                  .metrics = metrics}));
     }
     const auto execute = [&]<typename Part>(AvatarId avatar, std::uint64_t tick, Part part) {
       const int s = ShardOf(avatar, shard_count);
@@ -209,11 +221,11 @@ TEST(WorldShard, PlaysLayersAsAnAvatarAloneDoes) {
   }
 }
 
-TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
+TEST(WorldShard, CatchesUpOnMissedTicks) {
   Bench punctual;
   Bench late;
   for (Bench* bench : {&punctual, &late}) {
-    bench->Watch(1);
+    bench->Observe(1);
     bench->Spawn({1});
     bench->Walk(1, 3);
   }
@@ -225,16 +237,16 @@ TEST(WorldShard, MissedTicksMoveAvatarsAsFarAsTicksThatCame) {
   ASSERT_TRUE(punctual.shard.Encode(PoseMode::kFull, 100, true, composer, a));
   ASSERT_TRUE(late.shard.Encode(PoseMode::kFull, 100, true, composer, b));
   EXPECT_EQ(*a.parts[0], *b.parts[0]);
-  // Events say when they happened, not when the tick came.
+  // Events have the tick at which they happened, not the late one.
   const auto punctual_events = punctual.Events();
   const auto late_events = late.Events();
   EXPECT_GT(punctual_events.size(), 5u);
   EXPECT_EQ(punctual_events, late_events);
 }
 
-TEST(WorldShard, EventsCarryTheServersTime) {
+TEST(WorldShard, EventsHaveTheTimeOfTheirTick) {
   Bench bench;
-  bench.Watch(0);
+  bench.Observe(0);
   bench.Spawn({1});
   bench.Walk(1, 1);
   for (std::uint64_t tick = 1000; tick < 1200; ++tick) {
@@ -248,9 +260,9 @@ TEST(WorldShard, EventsCarryTheServersTime) {
   }
 }
 
-TEST(WorldShard, ListsAvatarsInOrderAndFlagsTheNewOnes) {
+TEST(WorldShard, OrdersAvatarsAndFlagsNewOnes) {
   Bench bench;
-  bench.Watch(1);
+  bench.Observe(1);
   bench.Spawn({9, 2, 5});
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
@@ -263,9 +275,9 @@ TEST(WorldShard, ListsAvatarsInOrderAndFlagsTheNewOnes) {
   EXPECT_THAT(decoded.batch.flags, testing::Each(3));
 }
 
-TEST(WorldShard, KeepsTheFlagUntilTheRarestObserverHasSeenIt) {
+TEST(WorldShard, FlagsNewAvatarsForTheLongestInterval) {
   Bench bench;
-  bench.Watch(1, 5);
+  bench.Observe(1, 5);
   bench.Spawn({1});
   const std::uint64_t spawned = bench.tick;
   protocol::PoseBatchComposer composer;
@@ -279,14 +291,14 @@ TEST(WorldShard, KeepsTheFlagUntilTheRarestObserverHasSeenIt) {
   EXPECT_EQ(flagged, 5);
 }
 
-TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
+TEST(WorldShard, SplitsABatchThatExceedsAFrame) {
   Bench bench;
-  bench.Watch(1);
-  std::vector<AvatarId> numbers(90);
-  for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<AvatarId>(i + 1);
-  bench.Spawn(numbers);
+  bench.Observe(1);
+  std::vector<AvatarId> ids(90);
+  for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = static_cast<AvatarId>(i + 1);
+  bench.Spawn(ids);
   bench.shard.Advance(bench.tick, 1);
-  protocol::PoseBatchComposer composer({1 << 20, 4096});  // 31 of these avatars a frame
+  protocol::PoseBatchComposer composer({1 << 20, 4096});  // 31 of these avatars per frame
   PoseDelivery delivery;
   ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, true, composer, delivery));
   ASSERT_GT(delivery.parts.size(), 2u);
@@ -298,12 +310,12 @@ TEST(WorldShard, SplitsABatchThatDoesNotFitAFrame) {
     EXPECT_EQ(decoded.batch.info.parts, delivery.parts.size());
     std::ranges::copy(decoded.batch.avatars, std::back_inserter(seen));
   }
-  EXPECT_EQ(seen, numbers);
+  EXPECT_EQ(seen, ids);
 }
 
-TEST(WorldShard, SaysOnceThatItIsEmpty) {
+TEST(WorldShard, DeliversOneEmptyBatch) {
   Bench bench;
-  bench.Watch(1);
+  bench.Observe(1);
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 1, true, composer, delivery));
@@ -316,54 +328,54 @@ TEST(WorldShard, SaysOnceThatItIsEmpty) {
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, 4, true, composer, delivery));
 }
 
-TEST(WorldShard, EncodesOfARingThoseInItAndTellsPlacesWhenNobodyIs) {
+TEST(WorldShard, EncodesAvatarsOfARingAndDeliversPositionsIfItIsEmpty) {
   Bench bench;
   Interest interest{.world = bench.world, .shard = 0, .poses = {}};
   PoseInterest& full = interest.poses[ModeIndex(PoseMode::kFull)];
-  full.every.some = 1;
-  const auto ring = [&](double reach_m, double beyond_m, bool is_one_of_several) {
+  full.interval.subset = 1;
+  const auto observe_ring = [&](double outer_m, double inner_m, bool is_one_of_several) {
     full.regions = std::make_shared<const std::vector<RegionFilter>>(
-        1, RegionFilter{0.0, 0.0, reach_m, beyond_m, is_one_of_several});
+        1, RegionFilter{0.0, 0.0, outer_m, inner_m, is_one_of_several});
     bench.shard.SetInterest(interest);
   };
   SpawnPart part;
-  for (AvatarId number = 1; number <= 9; ++number) {
-    part.items.push_back({number, {.avatar = number, .start = {{1.0 * number, 0.0, 0.0}, 0.0}}});
+  for (AvatarId id = 1; id <= 9; ++id) {
+    part.items.push_back({id, {.avatar = id, .start = {{1.0 * id, 0.0, 0.0}, 0.0}}});
   }
   bench.Do(std::move(part));
   bench.shard.Advance(++bench.tick, 1);
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
   const auto encoded = [&] {
-    std::vector<AvatarId> numbers;
+    std::vector<AvatarId> ids;
     for (std::size_t row = 0; row < delivery.rows->size(); ++row) {
-      if (delivery.rows->has_pose(row)) numbers.push_back((*delivery.rows->avatars())[row]);
+      if (delivery.rows->has_pose(row)) ids.push_back((*delivery.rows->avatars())[row]);
     }
-    return numbers;
+    return ids;
   };
-  ring(6.5, 3.5, true);
+  observe_ring(6.5, 3.5, true);
   ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
   EXPECT_THAT(encoded(), ElementsAre(4u, 5u, 6u));
-  ring(6.5, 0.0, true);
+  observe_ring(6.5, 0.0, true);
   ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
   EXPECT_THAT(encoded(), ElementsAre(1u, 2u, 3u, 4u, 5u, 6u));
-  ring(60.0, 50.0, true);
+  observe_ring(60.0, 50.0, true);
   for (int i = 0; i < 3; ++i) {
     ASSERT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
     EXPECT_TRUE(encoded().empty());
-    EXPECT_NE(delivery.places, nullptr);
+    EXPECT_NE(delivery.grid, nullptr);
   }
-  // Of a region of one detail no more than once.
-  ring(0.1, 0.0, false);
+  // If all rings have the same mode, one empty delivery is enough.
+  observe_ring(0.1, 0.0, false);
   EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, bench.tick, false, composer, delivery));
 }
 
-TEST(WorldShard, ReleasesWhatASessionSpawnedUnlessTheWorldIsPersistent) {
+TEST(WorldShard, RemovesAvatarsOfAnEndedSessionUnlessTheWorldIsPersistent) {
   for (const bool persistent : {false, true}) {
     Bench bench;
     bench.world->persistent = persistent;
-    bench.Watch(0);
+    bench.Observe(0);
     bench.Spawn({1, 2}, 10);
     bench.Spawn({3}, 20);
     bench.Do(ReleasePart{}, 10);
@@ -375,7 +387,7 @@ TEST(WorldShard, ReleasesWhatASessionSpawnedUnlessTheWorldIsPersistent) {
   }
 }
 
-TEST(WorldShard, RefusedSpawnsCostNoPlace) {
+TEST(WorldShard, RefusedSpawnsReleaseTheirBudget) {
   Bench bench;
   bench.Spawn({1});
   const CommandResult result = bench.Spawn({1, 2});
@@ -384,16 +396,16 @@ TEST(WorldShard, RefusedSpawnsCostNoPlace) {
   EXPECT_EQ(bench.budget.total(), 2);
 }
 
-TEST(WorldShard, KeepsNoEventsForNobody) {
+TEST(WorldShard, StoresNoEventsWithoutObservers) {
   Bench bench;
   bench.Spawn({1});
   bench.Walk(1, 1);
   bench.shard.Advance(1, 1);
   EXPECT_EQ(bench.shard.TakeEvents(), nullptr);
-  EXPECT_FALSE(bench.shard.HasInterest());
+  EXPECT_TRUE(bench.shard.interest().empty());
 }
 
-TEST(WorldShard, BoundsAnAvatarsQueue) {
+TEST(WorldShard, LimitsTheQueueOfAnAvatar) {
   Bench bench(1, 4);
   bench.Spawn({1});
   const CommandResult result = bench.Walk(1, 10);
@@ -404,9 +416,9 @@ TEST(WorldShard, BoundsAnAvatarsQueue) {
   EXPECT_EQ(bench.metrics.requests_rejected.value(), 6u);
 }
 
-// Bytes of all poses by avatar and tick of a crowd that begins over some ticks.
-std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_count,
-                                                                          bool is_reversed) {
+// Returns the encoded poses of a crowd by avatar and tick. The crowd starts over several ticks.
+std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayDelayedCrowd(int shard_count,
+                                                                         bool is_reversed) {
   constexpr AvatarId kAvatars = 40;
   constexpr std::uint32_t kOverTicks = 3;
   AvatarBudget budget(100, 100);
@@ -414,7 +426,13 @@ std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_
   const auto world = Bench::MakeWorld();
   std::map<AvatarId, std::vector<std::vector<std::byte>>> poses;
   for (int s = 0; s < shard_count; ++s) {
-    WorldShard shard(world, s, shard_count, 8, kClock, budget, metrics);
+    WorldShard shard({.world = world,
+                      .shard = s,
+                      .shard_count = shard_count,
+                      .max_queue = 8,
+                      .clock = kClock,
+                      .budget = budget,
+                      .metrics = metrics});
     SpawnPart spawn;
     RequestPart request{.items = {}, .over_ticks = kOverTicks};
     for (AvatarId avatar = 1; avatar <= kAvatars; ++avatar) {
@@ -445,25 +463,25 @@ std::map<AvatarId, std::vector<std::vector<std::byte>>> PlayHeldCrowd(int shard_
   return poses;
 }
 
-TEST(WorldShard, AHeldCrowdBeginsAlikeOnAnyShardsAndInAnyOrder) {
-  const auto one = PlayHeldCrowd(1, false);
-  std::map<std::size_t, int> begun;  // by tick
+TEST(WorldShard, DelayedStartsDependOnlyOnAvatarIds) {
+  const auto one = PlayDelayedCrowd(1, false);
+  std::map<std::size_t, int> starts;  // by tick
   for (const auto& [avatar, poses] : one) {
     std::size_t tick = 0;
     while (poses[tick + 1] == poses[0]) ++tick;
     EXPECT_EQ(tick, StartTickOf(avatar, 3)) << avatar;
-    ++begun[tick];
+    ++starts[tick];
   }
-  ASSERT_EQ(begun.size(), 3u);
-  for (const auto& [tick, count] : begun) EXPECT_LE(count, 20) << tick;
+  ASSERT_EQ(starts.size(), 3u);
+  for (const auto& [tick, count] : starts) EXPECT_LE(count, 20) << tick;
   for (const int shard_count : {1, 2, 4}) {
     for (const bool is_reversed : {false, true}) {
-      EXPECT_TRUE(PlayHeldCrowd(shard_count, is_reversed) == one) << shard_count << is_reversed;
+      EXPECT_TRUE(PlayDelayedCrowd(shard_count, is_reversed) == one) << shard_count << is_reversed;
     }
   }
 }
 
-TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
+TEST(World, SpreadsStartsEvenlyOnEveryShard) {
   constexpr std::uint32_t kOverTicks = 40;
   for (const int shard_count : {1, 2, 4, 8}) {
     std::map<std::pair<int, std::uint32_t>, int> starts;
@@ -480,33 +498,33 @@ TEST(World, StartsAreSpreadEvenlyOnEveryShard) {
   for (AvatarId avatar = 1; avatar <= 1000; ++avatar) EXPECT_EQ(StartTickOf(avatar, 1), 0u);
 }
 
-TEST(WorldShard, AnswersOnlyTicksItsObserversWant) {
+TEST(WorldInterest, ReportsDemandOnlyInDueTicks) {
   Bench bench(2);
   bench.shard.SetInterest({.world = bench.world,
                            .shard = 1,
-                           .poses = {{{}, {.every = {.whole = 3, .some = 2}, .named = {}}}}});
-  const auto wish = [&](int shard, PoseMode mode, std::uint64_t tick) {
-    const WorldShard::Wish wished = bench.shard.WishOf(shard, mode, tick);
-    return std::pair(wished.whole, wished.some);
+                           .poses = {{{}, {.interval = {.all = 3, .subset = 2}, .avatars = {}}}}});
+  const auto demand_of = [&](int shard, PoseMode mode, std::uint64_t tick) {
+    const auto demand = bench.shard.interest().DemandOf(shard, mode, tick);
+    return std::pair(demand.all, demand.subset);
   };
-  EXPECT_EQ(wish(1, PoseMode::kQuantised, 6), std::pair(true, true));
-  EXPECT_EQ(wish(1, PoseMode::kQuantised, 9), std::pair(true, false));
-  EXPECT_EQ(wish(1, PoseMode::kQuantised, 8), std::pair(false, true));
-  EXPECT_EQ(wish(1, PoseMode::kQuantised, 7), std::pair(false, false));
-  EXPECT_EQ(wish(1, PoseMode::kFull, 6), std::pair(false, false));
-  EXPECT_EQ(wish(0, PoseMode::kQuantised, 6), std::pair(false, false));
+  EXPECT_EQ(demand_of(1, PoseMode::kQuantised, 6), std::pair(true, true));
+  EXPECT_EQ(demand_of(1, PoseMode::kQuantised, 9), std::pair(true, false));
+  EXPECT_EQ(demand_of(1, PoseMode::kQuantised, 8), std::pair(false, true));
+  EXPECT_EQ(demand_of(1, PoseMode::kQuantised, 7), std::pair(false, false));
+  EXPECT_EQ(demand_of(1, PoseMode::kFull, 6), std::pair(false, false));
+  EXPECT_EQ(demand_of(0, PoseMode::kQuantised, 6), std::pair(false, false));
 }
 
-TEST(WorldShard, EncodesNobodyThatIsNotWanted) {
+TEST(WorldShard, EncodesOnlySelectedAvatars) {
   Bench bench(2);
   protocol::PoseBatchComposer composer;
   PoseDelivery delivery;
-  const auto name = [&](int shard, std::vector<AvatarId> named) {
+  const auto select = [&](int shard, std::vector<AvatarId> ids) {
     bench.shard.SetInterest(
         {.world = bench.world,
          .shard = shard,
-         .poses = {{{.every = {.some = 1},
-                     .named = std::make_shared<const std::vector<AvatarId>>(named)},
+         .poses = {{{.interval = {.subset = 1},
+                     .avatars = std::make_shared<const std::vector<AvatarId>>(ids)},
                     {}}}});
   };
   const auto encoded = [&] {
@@ -519,40 +537,40 @@ TEST(WorldShard, EncodesNobodyThatIsNotWanted) {
     return avatars;
   };
   bench.Spawn({1, 2, 3, 4, 5});
-  name(0, {2, 4, 77});
-  name(1, {4, 5});
+  select(0, {2, 4, 77});
+  select(1, {4, 5});
   EXPECT_THAT(encoded(), ElementsAre(2, 4, 5));
   EXPECT_EQ(bench.metrics.poses_encoded.value(), 3u);
   bench.Spawn({77});
   bench.Do(RemovePart{{{0, 4}}});
   EXPECT_THAT(encoded(), ElementsAre(2, 5, 77));
-  name(0, {});
+  select(0, {});
   EXPECT_THAT(encoded(), ElementsAre(5));
-  name(1, {});
-  // Once more for who had some of them, then nothing.
+  select(1, {});
+  // One delivery without poses tells observers about the change.
   EXPECT_THAT(encoded(), ElementsAre());
   EXPECT_FALSE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, false, composer, delivery));
   EXPECT_TRUE(bench.shard.Encode(PoseMode::kFull, ++bench.tick, true, composer, delivery));
   EXPECT_THAT(Decoded(delivery.parts.at(0)).batch.avatars, ElementsAre(1, 2, 3, 5, 77));
 }
 
-TEST(World, NumbersNeverMeet) {
+TEST(World, AvatarIdsAreNeverReused) {
   World world;
-  EXPECT_EQ(NextNumber(world), 1u);
-  NoteNumber(world, 10);
-  NoteNumber(world, 4);
-  EXPECT_EQ(NextNumber(world), 11u);
-  NoteNumber(world, ~AvatarId{0});
-  EXPECT_EQ(NextNumber(world), 0u);
+  EXPECT_EQ(NextAvatarId(world), 1u);
+  RecordAvatarId(world, 10);
+  RecordAvatarId(world, 4);
+  EXPECT_EQ(NextAvatarId(world), 11u);
+  RecordAvatarId(world, ~AvatarId{0});
+  EXPECT_EQ(NextAvatarId(world), 0u);
 }
 
-TEST(TickClock, TicksAreDueWhenTheClockSaysSo) {
+TEST(TickClock, ConvertsBetweenTicksAndTimes) {
   using std::chrono::nanoseconds;
   for (const double hz : {1.0, 29.97, 60.0, 1000.0}) {
     const auto epoch = TickClock::Clock::time_point(nanoseconds(123'456'789));
     const TickClock clock(epoch, hz);
     EXPECT_EQ(clock.TickAt(epoch - std::chrono::hours(1)), 0u);
-    // Years of them, without drift.
+    // There is no drift after years.
     for (const std::uint64_t tick : {1ull, 2ull, 59ull, 1'000'003ull, 5'000'000'000ull}) {
       EXPECT_EQ(clock.TickAt(clock.Due(tick)), tick);
       EXPECT_EQ(clock.TickAt(clock.Due(tick) - nanoseconds(1)), tick - 1);
@@ -561,22 +579,22 @@ TEST(TickClock, TicksAreDueWhenTheClockSaysSo) {
   }
 }
 
-std::shared_ptr<const WorldTerrain> MakeWorldTerrain(double height_m) {
+std::shared_ptr<const WorldTerrain> TerrainOfHeight(double height_m) {
   const auto terrain = Terrain::Make({{}, {{{0, 0}, {1, 1}, height_m}}});
   EXPECT_TRUE(terrain);
   protocol::Encoder encoder;
-  const auto ground = server::MakeWorldTerrain(3, *terrain, encoder);
-  EXPECT_TRUE(ground);
-  return *ground;
+  const auto world_terrain = MakeWorldTerrain(3, *terrain, encoder);
+  EXPECT_TRUE(world_terrain);
+  return *world_terrain;
 }
 
-TEST(WorldShard, ChangesTheGroundAtItsTick) {
+TEST(WorldShard, AppliesATerrainAtItsTick) {
   Bench bench;
   bench.Spawn({1});
   EXPECT_EQ(bench.shard.terrain(), nullptr);
   bench.tick = 100;
-  bench.Do(TerrainPart{MakeWorldTerrain(0.25), 103});
-  bench.Do(TerrainPart{MakeWorldTerrain(0.5), 105});
+  bench.Do(TerrainPart{TerrainOfHeight(0.25), 103});
+  bench.Do(TerrainPart{TerrainOfHeight(0.5), 105});
   const auto height = [&] {
     const auto terrain = bench.shard.terrain();
     return terrain == nullptr ? 0.0 : terrain->HeightAt(0.5, 0.5);
@@ -585,39 +603,40 @@ TEST(WorldShard, ChangesTheGroundAtItsTick) {
   EXPECT_EQ(height(), 0.0);
   bench.shard.Advance(103, 1);
   EXPECT_EQ(height(), 0.25);
-  bench.shard.Advance(110, 7);  // A late tick, made up for.
+  bench.shard.Advance(110, 7);  // a late tick
   EXPECT_EQ(height(), 0.5);
 }
 
-TEST(WorldShard, MadeLateItHasTheGroundOfItsWorld) {
+TEST(WorldShard, StartsWithTheTerrainOfItsWorld) {
   Bench bench;
-  bench.world->ground.Set(MakeWorldTerrain(0.125));
-  const WorldShard late(bench.world, 0, 1, 8, kClock, bench.budget, bench.metrics);
+  bench.world->terrain.Set(TerrainOfHeight(0.125));
+  const WorldShard late(
+      {.world = bench.world, .clock = kClock, .budget = bench.budget, .metrics = bench.metrics});
   ASSERT_NE(late.terrain(), nullptr);
   EXPECT_EQ(late.terrain()->HeightAt(0.5, 0.5), 0.125);
 }
 
-TEST(WorldDirectory, GivesAWorldItsGround) {
+TEST(WorldDirectory, SetsTheTerrainOfAWorld) {
   Config config;
   config.library = "toy";
   config.worlds["hall"] = {.library = "", .terrain = "hall.json", .persistent = false};
   Libraries libraries;
   libraries.Add("toy", MakeTestLibrary());
   Terrains terrains;
-  terrains.Add("hall.json", MakeWorldTerrain(0.5)->terrain);
+  terrains.Add("hall.json", TerrainOfHeight(0.5)->terrain);
   WorldDirectory directory(config, libraries, terrains);
   const auto hall = directory.Join("hall");
   ASSERT_TRUE(hall);
-  ASSERT_NE((*hall)->ground.Get(), nullptr);
-  EXPECT_EQ((*hall)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.5);
+  ASSERT_NE((*hall)->terrain.Get(), nullptr);
+  EXPECT_EQ((*hall)->terrain.Get()->terrain->HeightAt(0.5, 0.5), 0.5);
   const auto other = directory.Join("other");
   ASSERT_TRUE(other);
-  EXPECT_EQ((*other)->ground.Get(), nullptr);
+  EXPECT_EQ((*other)->terrain.Get(), nullptr);
 
   protocol::TerrainInfo info;
   info.boxes = {{{0, 0}, {1, 1}, 0.75}};
   ASSERT_TRUE(directory.SetTerrain(**other, info));
-  EXPECT_EQ((*other)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.75);
+  EXPECT_EQ((*other)->terrain.Get()->terrain->HeightAt(0.5, 0.5), 0.75);
   info.boxes[0].height_m = 1e5;
   const auto refused = directory.SetTerrain(**other, info);
   ASSERT_FALSE(refused);
@@ -625,12 +644,12 @@ TEST(WorldDirectory, GivesAWorldItsGround) {
   EXPECT_THAT(refused.error().text, testing::HasSubstr("boxes[0].height_m"));
   info.boxes.assign(kMaxTerrainBoxesPerCell + 1, {{0, 0}, {1, 1}, 0.5});
   EXPECT_EQ(directory.SetTerrain(**other, info).error().code, StatusCode::kLimitReached);
-  EXPECT_EQ((*other)->ground.Get()->terrain->HeightAt(0.5, 0.5), 0.75) << "as it was";
+  EXPECT_EQ((*other)->terrain.Get()->terrain->HeightAt(0.5, 0.5), 0.75) << "unchanged";
   ASSERT_TRUE(directory.SetTerrain(**hall, std::nullopt));
-  EXPECT_EQ((*hall)->ground.Get()->terrain, nullptr);
+  EXPECT_EQ((*hall)->terrain.Get()->terrain, nullptr);
 }
 
-TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
+TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   Config config;
   config.library = "toy";
   config.limits.max_worlds = 2;
@@ -651,16 +670,63 @@ TEST(WorldDirectory, CountsMembersAndEndsEmptyWorlds) {
   EXPECT_EQ(directory.Join("no/name").error().code, StatusCode::kInvalidArgument);
   EXPECT_TRUE(directory.DropEmpty().empty());
   directory.Leave((*hall)->id);
-  EXPECT_TRUE(directory.DropEmpty().empty());  // one is still in it
+  EXPECT_TRUE(directory.DropEmpty().empty());  // one member is left
   directory.Leave((*hall)->id);
   (*hall)->avatar_count = 1;
-  EXPECT_TRUE(directory.DropEmpty().empty());  // nobody is, but an avatar lives
+  EXPECT_TRUE(directory.DropEmpty().empty());  // there is no member, but an avatar
   (*hall)->avatar_count = 0;
   EXPECT_THAT(directory.DropEmpty(), ElementsAre((*hall)->id));
   EXPECT_TRUE(directory.Join("third"));
 }
 
-TEST(AvatarBudget, KeepsBothLimits) {
+// Executes nothing and counts spawned avatars per session.
+struct FakeExecutor {
+  CommandResult operator()(const WorldCommand& command) {
+    CommandResult result{.session = command.session, .seq = command.seq};
+    if (const auto* spawn = std::get_if<SpawnPart>(&command.part)) {
+      result.accepted = static_cast<std::uint32_t>(spawn->items.size());
+      spawned[command.session] += spawn->items.size();
+    } else {
+      executed.push_back(command.seq);
+    }
+    return result;
+  }
+  std::map<SessionId, std::size_t> spawned;
+  std::vector<protocol::Seq> executed;
+};
+
+TEST(CommandInbox, SharesSpawnsAmongSessionsAndKeepsTheOrderOfEach) {
+  CommandInbox inbox(10);
+  const auto push = [&](SessionId session, protocol::Seq seq, std::size_t spawns) {
+    WorldCommand command{.world = nullptr, .session = session, .seq = seq, .part = RemovePart{}};
+    if (spawns > 0) command.part = SpawnPart{std::vector<SpawnPart::Item>(spawns)};
+    inbox.Push(std::move(command));
+  };
+  push(1, 1, 12);
+  push(2, 1, 3);
+  push(1, 2, 0);
+  push(2, 2, 0);
+  FakeExecutor executor;
+  std::map<SessionId, std::uint32_t> accepted;
+  const auto run = [&] {
+    return inbox.Run([&](const WorldCommand& command) { return executor(command); },
+                     [&](int, CommandResult&& result) {
+                       if (result.seq == 1) accepted[result.session] = result.accepted;
+                     });
+  };
+  EXPECT_EQ(run(), 7u);  // each session may spawn 5
+  EXPECT_EQ(executor.spawned[1], 5u);
+  EXPECT_EQ(executor.spawned[2], 3u);
+  EXPECT_EQ(executor.executed.size(), 1u) << "command 2 of session 1 waits for its spawns";
+  EXPECT_FALSE(accepted.contains(1));
+  EXPECT_EQ(accepted[2], 3u);
+  EXPECT_EQ(run(), 0u);
+  EXPECT_EQ(executor.spawned[1], 12u);
+  EXPECT_EQ(executor.executed.size(), 2u);
+  EXPECT_EQ(accepted[1], 12u) << "one result for all parts";
+}
+
+TEST(AvatarBudget, EnforcesBothLimits) {
   AvatarBudget budget(2, 3);
   World a;
   World b;

@@ -1,9 +1,10 @@
 #ifndef STRIDEWIRE_CLIENT_H
 #define STRIDEWIRE_CLIENT_H
 
-/// Stridewire's client: commands avatars, hears what became of it, and gives poses to show.
+/// Client library of Stridewire. A client connects to a server, commands avatars, receives events
+/// and poses, and interpolates poses for display.
 ///
-/// This C99 header is the only ABI; `stridewire/client.hpp` is a thin C++17 wrapper around it.
+/// This C99 header is the only stable ABI. `stridewire/client.hpp` wraps it for C++17.
 ///
 ///   stridewire_client_options options;
 ///   stridewire_client_options_init(&options, sizeof options);
@@ -12,29 +13,31 @@
 ///   stridewire_client_connect(client, "127.0.0.1", 7420);
 ///   stridewire_world world;
 ///   stridewire_client_join_world(client, "plaza", STRIDEWIRE_CONTROLLER, &world, NULL);
-///   for (;;) { poll events; request steps; sample poses at the render time }
+///   for (;;) { poll events; request movements; sample poses at the render time }
 ///   stridewire_client_destroy(client);
 ///
-/// Threads. A client has one network thread of its own. It never calls you: you poll. Every function
-/// may be called from any thread; calls on one client take turns on a lock that is never held across
-/// a system call that waits. stridewire_client_destroy is the last call on its client.
+/// Threads. Each client has one network thread. The library never calls back: the application
+/// polls. Every function may be called from any thread. Calls on the same client are serialized by
+/// a mutex, which is never held during a blocking system call. stridewire_client_destroy must be
+/// the last call on a client.
 ///
-/// Memory. Whatever you pass is copied before the call returns; whatever you get is written into
-/// memory of yours, whose size stands at each function. Handles are opaque; NULL is answered with
+/// Memory. The library copies all arguments before a call returns. It writes results into buffers
+/// of the caller, whose sizes are stated at each function. Handles are opaque. A NULL handle yields
 /// STRIDEWIRE_INVALID_ARGUMENT.
 ///
-/// Connection. The client connects, and connects again, by itself: 0.1 s after a failure, doubled
-/// up to 5 s, each shortened at random by up to half; forever, until the server refuses it for good
-/// or you disconnect. Commands given meanwhile wait. Worlds, subscriptions and commands without an
-/// answer survive:
-///   - the server still held the session: commands without an answer are sent again under their old
-///     numbers and done once (STRIDEWIRE_EVENT_CONNECTED with `resumed`);
-///   - it did not (restarted, or away for too long): STRIDEWIRE_EVENT_SESSION_LOST. The client
-///     joins and observes again, and with `respawn` puts the avatars it had spawned where they last
-///     were; commands that had been sent and not answered end with STRIDEWIRE_SESSION_LOST.
+/// Connection. The client connects, and reconnects, in the background. The first retry follows a
+/// failure after 0.1 s. The delay doubles with each failure, up to 5 s, and is shortened by a
+/// random amount of up to half. The client retries until it is disconnected or the server refuses
+/// it permanently. Commands are queued while there is no connection. After a reconnect:
+///   - If the server still has the session, it resumes (STRIDEWIRE_EVENT_CONNECTED with `resumed`).
+///     The client sends unanswered commands again, and the server executes each of them once.
+///   - Otherwise the session is lost (STRIDEWIRE_EVENT_SESSION_LOST), for example because the
+///     server restarted. The client joins its worlds and observes again. With `respawn` it also
+///     spawns its avatars again, each at its last known base frame. Commands that were sent but not
+///     answered end with STRIDEWIRE_SESSION_LOST.
 ///
-/// Units: metres, seconds, radians. Right-handed, +Y up, heading 0 looks along +Z, turning left is
-/// positive. Quaternions are unit, x, y, z, w.
+/// Units are metres, seconds and radians. Axes are right-handed with +Y up. Heading 0 faces +Z, and
+/// a positive heading turns to the left. Quaternions are unit quaternions stored as x, y, z, w.
 
 #include <stddef.h>
 #include <stdint.h>
@@ -43,24 +46,34 @@
 extern "C" {
 #endif
 
-/// Grows when a struct of this header changes; options carry it, and create compares it.
-#define STRIDEWIRE_ABI_VERSION 2
+/// Version of the struct layouts in this header. stridewire_client_create rejects other versions.
+#define STRIDEWIRE_ABI_VERSION 3
 
-#define STRIDEWIRE_MAX_NAME_BYTES 64  /* names of worlds, clients and joints, without the final 0 */
-#define STRIDEWIRE_MAX_TEXT_BYTES 160 /* texts in events, final 0 included; longer ones are cut */
-#define STRIDEWIRE_MAX_ITEMS 65536    /* spawns, avatars or movements in one call */
+/// Longest name of a world, client, layer or joint, in bytes without the terminating 0.
+#define STRIDEWIRE_MAX_NAME_BYTES 64
+/// Size of the text in an event, including the terminating 0. Longer texts are truncated.
+#define STRIDEWIRE_MAX_TEXT_BYTES 160
+/// Maximum number of spawns, avatars or movements per call.
+#define STRIDEWIRE_MAX_ITEMS 65536
+/// Maximum number of joints of a skeleton.
 #define STRIDEWIRE_MAX_JOINTS 256
-#define STRIDEWIRE_MAX_TERRAIN_COLUMNS 1024 /* of a height field; rows as well */
+/// Maximum number of columns, and of rows, of a height field.
+#define STRIDEWIRE_MAX_TERRAIN_COLUMNS 1024
+/// Maximum number of boxes of a terrain.
 #define STRIDEWIRE_MAX_TERRAIN_BOXES 65536
+/// Maximum number of parameters of a movement.
 #define STRIDEWIRE_MAX_PARAMETERS 7
+/// Maximum number of waypoints of a walk.
+#define STRIDEWIRE_MAX_WAYPOINTS 64
+/// Maximum number of rings of a region.
+#define STRIDEWIRE_MAX_RATE_RINGS 4
 
-/// What came of a call or a command, in ranges by who can act: 1xx the caller, 2xx whoever made the
-/// data, 3xx the network, 4xx the server's operator. x00 to x49 come from the server too (they are
-/// the protocol's codes), x50 to x99 only from this library. Append only: treat a code you do not
-/// know by its hundred.
+/// Result of a call or command. The hundreds tell who can act: 1xx the caller, 2xx the author of
+/// the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also occur in the
+/// protocol, codes x50 to x99 only in this library. Future versions may add codes, so handle an
+/// unknown code by its hundreds.
 ///
-/// Here and below an enumerator _MAX only keeps the type wide, so that any number can be passed and is
-/// checked.
+/// The _MAX enumerator of this and other enums only fixes the size of the type. It is not a value.
 typedef enum stridewire_status {
   STRIDEWIRE_OK = 0,
 
@@ -107,342 +120,400 @@ typedef enum stridewire_status {
   STRIDEWIRE_STATUS_MAX = 0x7fffffff
 } stridewire_status;
 
-/// Stable lower-case name, e.g. "no_such_avatar"; "unknown" for a code this library does not know.
+/// Returns a stable lower-case name such as "no_such_avatar", or "unknown" for an unknown code.
 const char* stridewire_status_name(stridewire_status status);
 
-/// One sentence for a person; for an unknown code one by its hundred. Never NULL.
+/// Returns a sentence that describes a code, or the hundreds of an unknown code. Never NULL.
 const char* stridewire_status_text(stridewire_status status);
 
-/// Version of the library, e.g. "0.1.0".
+/// Returns the version of the library, for example "0.1.0".
 const char* stridewire_version(void);
 
 // ---------------------------------------------------------------------------------- the client
 
+/// A connection to one server, with its worlds, queues and received poses.
 typedef struct stridewire_client stridewire_client;
 
-/// A world you joined, numbered by this library from 1; the number stays over reconnects.
+/// Number of a joined world, from 1. The library assigns it, and it stays valid across reconnects.
 typedef uint32_t stridewire_world;
 
+/// Settings of a client. Call stridewire_client_options_init to fill in the defaults.
 typedef struct stridewire_client_options {
-  size_t struct_bytes;    ///< sizeof(stridewire_client_options); set by _init.
-  uint32_t abi_version;   ///< STRIDEWIRE_ABI_VERSION; set by _init.
-  uint32_t max_events;    ///< Events waiting to be polled, 16 to 2^24; then the oldest goes. 65536.
-  uint32_t max_commands;  ///< Commands without an answer, 1 to 2^20; then COMMANDS_FULL. 4096.
-  uint32_t pose_history;  ///< Poses kept per avatar, 2 to 4096. 32.
-  size_t max_command_bytes;  ///< Memory of those commands, at least 64 KiB. 64 MiB.
-  size_t
-      max_pose_bytes;  ///< Memory of all pose histories, at least 64 KiB; avatars that do not fit
-                       ///< are left out and counted. 256 MiB.
-  double render_delay_s;     ///< How far shown poses are behind the newest, 0 to 10. 0.1.
-  double connect_timeout_s;  ///< For TCP, and again for the handshake, 0.01 to 600. 5.
-  double ping_interval_s;    ///< 0.01 to 600; at most a third of the server's idle limit. 1.
-  uint64_t seed;             ///< Of the back-off's jitter; 0: from the machine.
-  const char* client_name;   ///< For the server's log, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
-  const char* auth_token;    ///< NULL or at most 4096 bytes.
-  uint8_t respawn;  ///< 1: after a lost session spawn the avatars this client had spawned again, at
-                    ///< the last base frame it heard of. 0.
-  const char*
-      library_folder;  ///< Where libraries fetched for STRIDEWIRE_MOVEMENT are kept for the next
-                       ///< time, made if it is not there; NULL: nowhere. At most 4096 bytes.
+  size_t struct_bytes;   ///< sizeof(stridewire_client_options); set by _init.
+  uint32_t abi_version;  ///< STRIDEWIRE_ABI_VERSION; set by _init.
+  /// Capacity of the event queue, 16 to 2^24. A full queue drops its oldest event. Default 65536.
+  uint32_t max_events;
+  /// Maximum number of unanswered commands, 1 to 2^20. Further commands fail with COMMANDS_FULL.
+  /// Default 4096.
+  uint32_t max_commands;
+  /// Poses stored per avatar, 2 to 4096. Default 32.
+  uint32_t pose_history;
+  /// Memory for unanswered commands in bytes, at least 64 KiB. Default 64 MiB.
+  size_t max_command_bytes;
+  /// Memory for all pose histories in bytes, at least 64 KiB. Poses of avatars that do not fit are
+  /// dropped and counted in `poses_refused`. Default 256 MiB.
+  size_t max_pose_bytes;
+  /// Delay of the render time behind the server time in seconds, 0 to 10. Default 0.1.
+  double render_delay_s;
+  /// Timeout for the TCP connection and for the handshake, each in seconds, 0.01 to 600. Default 5.
+  double connect_timeout_s;
+  /// Interval of pings in seconds, 0.01 to 600. The client shortens it to a third of the server's
+  /// idle timeout. Default 1.
+  double ping_interval_s;
+  /// Seed for the random part of reconnect delays. 0 takes a random seed. Default 0.
+  uint64_t seed;
+  /// Name in the server's log, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
+  const char* client_name;
+  /// Secret that the server may require, at most 4096 bytes, or NULL.
+  const char* auth_token;
+  /// 1: after a lost session, spawn the avatars of this client again, each at its last known base
+  /// frame. Default 0.
+  uint8_t respawn;
+  /// Folder that caches motion libraries fetched for STRIDEWIRE_MOVEMENT, at most 4096 bytes. The
+  /// client creates it if necessary. NULL (the default) disables the cache.
+  const char* library_folder;
 } stridewire_client_options;
 
-/// Writes the defaults. `struct_bytes` is sizeof(stridewire_client_options).
+/// Writes the default options. `struct_bytes` is sizeof(stridewire_client_options).
 void stridewire_client_options_init(stridewire_client_options* options, size_t struct_bytes);
 
-/// Makes a client that is not connected, and starts its thread. `options` may be NULL.
-/// INVALID_ARGUMENT, OUT_OF_RANGE (an option), VERSION_MISMATCH (another header), OUT_OF_MEMORY.
+/// Creates a client and starts its network thread. The client does not connect yet. `options` may
+/// be NULL for the defaults. Fails with OUT_OF_RANGE if an option is out of range, with
+/// VERSION_MISMATCH if header and library differ, and with INVALID_ARGUMENT or OUT_OF_MEMORY.
 stridewire_status stridewire_client_create(const stridewire_client_options* options,
                                            stridewire_client** client);
 
-/// Says goodbye if connected (waits at most 1 s for it to go out) and frees the client. NULL is fine.
+/// Disconnects and frees the client. A connected client waits up to 1 s until its Goodbye message
+/// is sent. `client` may be NULL.
 void stridewire_client_destroy(stridewire_client* client);
 
-/// Begins to connect and returns at once. `host` is a name or address of at most 255 bytes.
-/// INVALID_ARGUMENT, ALREADY_CONNECTED (call disconnect first).
+/// Starts to connect and returns at once. `host` is a name or an IP address of at most 255 bytes.
+/// Fails with INVALID_ARGUMENT, or with ALREADY_CONNECTED until stridewire_client_disconnect is
+/// called.
 stridewire_status stridewire_client_connect(stridewire_client* client, const char* host,
                                             uint16_t port);
 
-/// Ends the session and returns at once: the server forgets it, its avatars live on. Commands
-/// without an answer end with STRIDEWIRE_CANCELLED. Worlds and poses are forgotten.
+/// Ends the session and returns at once. The server removes the avatars that this session spawned,
+/// except in persistent worlds. Unanswered commands end with STRIDEWIRE_CANCELLED. The client
+/// discards its worlds and poses.
 stridewire_status stridewire_client_disconnect(stridewire_client* client);
 
+/// State of the connection.
 typedef enum stridewire_client_state {
-  STRIDEWIRE_STATE_IDLE = 0,        ///< Never connected, or disconnected by you.
-  STRIDEWIRE_STATE_CONNECTING = 1,  ///< Connecting, or waiting to try again.
-  STRIDEWIRE_STATE_READY = 2,       ///< The server has welcomed this client.
-  STRIDEWIRE_STATE_CLOSED = 3       ///< The server refused for good; connect again if it may help.
+  STRIDEWIRE_STATE_IDLE = 0,        ///< Never connected, or disconnected by the application.
+  STRIDEWIRE_STATE_CONNECTING = 1,  ///< Connecting, or waiting for the next attempt.
+  STRIDEWIRE_STATE_READY = 2,       ///< The handshake is complete.
+  STRIDEWIRE_STATE_CLOSED = 3       ///< The server refused the client permanently.
 } stridewire_client_state;
 
+/// Returns the state of the connection. A NULL client is idle.
 stridewire_client_state stridewire_client_get_state(stridewire_client* client);
 
-/// Why the last connection attempt or connection failed; STRIDEWIRE_OK if none did. `text` gets at
-/// most `text_bytes` bytes, cut, always ended by 0; it may be NULL when `text_bytes` is 0.
+/// Returns the status of the last failed call, connection or attempt to connect, or STRIDEWIRE_OK
+/// if there was none. Writes a description to `text`, truncated to `text_bytes` bytes including the
+/// terminating 0. `text` may be NULL if `text_bytes` is 0.
 stridewire_status stridewire_client_last_error(stridewire_client* client, char* text,
                                                size_t text_bytes);
 
 // ------------------------------------------------------------------------------------ commands
 //
-// A command is given to the network thread and returns at once. `command`, which may be NULL, gets
-// its number; STRIDEWIRE_EVENT_REPLY carries the same number when the answer is there. Bad arguments
-// are told at once and nothing is sent. All: INVALID_ARGUMENT, OUT_OF_RANGE, COMMANDS_FULL, CLOSED
-// (not connected and not about to), NO_SUCH_WORLD (not a number that join_world gave), NOT_JOINED
-// (the server refused, or it was left).
+// A command is checked, queued for the network thread and assigned a number, which is stored in
+// `command` unless that is NULL. The call returns at once. When the server has answered, the event
+// STRIDEWIRE_EVENT_REPLY reports the result with the same number. If the checks fail, the call
+// fails and nothing is sent.
+//
+// All commands can fail with INVALID_ARGUMENT, OUT_OF_RANGE, COMMANDS_FULL, CLOSED (the client is
+// idle or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the
+// world, or the client left it).
 
+/// What a client may do in a world.
 typedef enum stridewire_role {
-  STRIDEWIRE_CONTROLLER = 0,  ///< May command avatars; hears all events of the world.
-  STRIDEWIRE_OBSERVER = 1,    ///< Only watches.
+  STRIDEWIRE_CONTROLLER = 0,  ///< Commands avatars and receives all events of the world.
+  STRIDEWIRE_OBSERVER = 1,    ///< Observes only.
   STRIDEWIRE_ROLE_MAX = 0x7fffffff
 } stridewire_role;
 
-/// `world` gets the number to use at once; commands to it wait until the server has let us in.
-/// ALREADY_JOINED: that name is joined already. At most 256 worlds at a time: LIMIT_REACHED.
+/// Joins a world. `world` receives a number that further calls may use at once: the client holds
+/// back their commands until the server has accepted the join. Fails with ALREADY_JOINED if this
+/// name is joined, and with LIMIT_REACHED beyond 256 worlds.
 stridewire_status stridewire_client_join_world(stridewire_client* client, const char* name,
                                                stridewire_role role, stridewire_world* world,
                                                uint64_t* command);
 
+/// Leaves a world. Its number becomes invalid.
 stridewire_status stridewire_client_leave_world(stridewire_client* client, stridewire_world world,
                                                 uint64_t* command);
 
+/// An avatar to spawn.
 typedef struct stridewire_spawn {
-  uint32_t avatar;  ///< Its number in the world; 0: the server chooses, EVENT_ITEM tells.
-  double position_m[3];
-  double heading_rad;
+  /// Id of the avatar in its world. 0: the server chooses an id and reports it in an ITEM event.
+  uint32_t avatar;
+  double position_m[3];  ///< Position of the base frame.
+  double heading_rad;    ///< Heading of the base frame.
 } stridewire_spawn;
 
-/// `count` is 1 to STRIDEWIRE_MAX_ITEMS, as everywhere below.
+/// Spawns `count` avatars, 1 to STRIDEWIRE_MAX_ITEMS.
 stridewire_status stridewire_client_spawn(stridewire_client* client, stridewire_world world,
                                           const stridewire_spawn* spawns, size_t count,
                                           uint64_t* command);
 
+/// Removes `count` avatars, 1 to STRIDEWIRE_MAX_ITEMS.
 stridewire_status stridewire_client_remove(stridewire_client* client, stridewire_world world,
                                            const uint32_t* avatars, size_t count,
                                            uint64_t* command);
 
+/// Type of a requested movement.
 typedef enum stridewire_movement_type {
-  STRIDEWIRE_STEP = 0,
-  STRIDEWIRE_JUMP = 1,
-  STRIDEWIRE_STAND = 2,
-  STRIDEWIRE_WALK = 3,  ///< To a place, in as many steps as it takes.
+  STRIDEWIRE_STEP = 0,   ///< One step with given parameters or to a given footprint.
+  STRIDEWIRE_JUMP = 1,   ///< One jump with both feet.
+  STRIDEWIRE_STAND = 2,  ///< Stand for a given time.
+  STRIDEWIRE_WALK = 3,   ///< As many steps as needed to reach a position and heading.
   STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
 } stridewire_movement_type;
 
+/// A foot of an avatar.
 typedef enum stridewire_foot {
-  STRIDEWIRE_FOOT_AUTO = 0,  ///< The other foot than last time.
+  STRIDEWIRE_FOOT_AUTO = 0,  ///< In requests: the foot that did not move last.
   STRIDEWIRE_FOOT_LEFT = 1,
   STRIDEWIRE_FOOT_RIGHT = 2,
   STRIDEWIRE_FOOT_MAX = 0x7fffffff
 } stridewire_foot;
 
-/// When a movement begins, and what becomes of those before it.
+/// When a requested movement begins, and whether it replaces queued movements.
 typedef enum stridewire_interrupt {
-  STRIDEWIRE_QUEUED = 0,          ///< After all that is queued.
-  STRIDEWIRE_AFTER_MOVEMENT = 1,  ///< After the movement under way; the queue is dropped.
-  STRIDEWIRE_NOW = 2,             ///< As soon as feet allow; the queue is dropped.
-  STRIDEWIRE_TAKEOVER_MAX = 0x7fffffff
+  STRIDEWIRE_QUEUED = 0,          ///< After all queued movements.
+  STRIDEWIRE_AFTER_MOVEMENT = 1,  ///< After the current movement. The queue is dropped.
+  STRIDEWIRE_NOW = 2,             ///< As soon as the feet allow. The queue is dropped.
+  STRIDEWIRE_INTERRUPT_MAX = 0x7fffffff
 } stridewire_interrupt;
 
+/// A requested movement. A movement type ignores the fields of other types.
 typedef struct stridewire_movement {
-  uint32_t avatar;      ///< Not 0.
-  uint64_t request_id;  ///< Yours, not 0; comes back in events.
+  uint32_t avatar;      ///< Id of the avatar, not 0.
+  uint64_t request_id;  ///< Chosen by the application, not 0. Events repeat it.
   stridewire_movement_type type;
-  stridewire_foot foot;  ///< Step.
-  double length_m;       ///< Step: forward distance between the feet at its end. Jump.
-  double side_m;         ///< Step, if has_side: sideways, towards the moving foot's own side.
-  double height_m;       ///< Step, jump.
-  double turn_rad;       ///< Step, jump.
-  double seconds;        ///< Stand.
-  uint8_t has_side;      ///< 0: the server takes a natural one.
-  uint8_t has_at;       ///< Step: 1: it lands at `at_m` instead of a length, side, height and turn.
-  uint8_t has_heading;  ///< Step, if has_at: 0: the server chooses.
-  double at_m[3];       ///< Where the ball of the foot lands, in the world. Walk: where it ends.
-  double heading_rad;   ///< Where the foot looks. Walk: the heading at its end.
-  const double* waypoints_m;  ///< Walk: x, y, z of each place to pass, 3 * waypoint_count numbers.
-  size_t waypoint_count;      ///< At most STRIDEWIRE_MAX_WAYPOINTS.
-  uint8_t has_speed;          ///< Walk: 0: as is comfortable.
-  double speed_m_s;  ///< Walk, if has_speed: 0.05 to 5, as near as the library's steps come.
+  stridewire_foot foot;  ///< Step: the moving foot.
+  /// Step: forward distance between the feet at its end. Jump: distance.
+  double length_m;
+  /// Step, if `has_side`: sideways distance between the feet, positive towards the moving foot's
+  /// side.
+  double side_m;
+  double height_m;   ///< Step, jump: height difference between start and end.
+  double turn_rad;   ///< Step, jump: change of heading.
+  double seconds;    ///< Stand: duration.
+  uint8_t has_side;  ///< Step: 0 leaves the sideways distance to the server.
+  uint8_t has_at;    ///< Step: 1 places the foot at `at_m` and ignores length, side, height, turn.
+  uint8_t has_heading;  ///< Step with `has_at`: 0 leaves the heading of the foot to the server.
+  /// Step with `has_at`: world position of the ball of the foot. Walk: its destination.
+  double at_m[3];
+  /// Step with `has_at` and `has_heading`: heading of the foot. Walk: heading at the destination.
+  double heading_rad;
+  /// Walk: x, y, z of each waypoint, 3 * waypoint_count numbers.
+  const double* waypoints_m;
+  size_t waypoint_count;  ///< Walk: at most STRIDEWIRE_MAX_WAYPOINTS.
+  uint8_t has_speed;      ///< Walk: 0 leaves the speed to the server.
+  /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows.
+  double speed_m_s;
   stridewire_interrupt interrupt;
-  uint8_t
-      exact_only;  ///< Step, only if has_at: 1: when it cannot land there it is REJECTED, not done elsewhere.
+  /// Step with `has_at`: 1 rejects the step if `at_m` is out of reach; 0 steps to the nearest point
+  /// in reach instead.
+  uint8_t exact_only;
 } stridewire_movement;
 
-#define STRIDEWIRE_MAX_WAYPOINTS 64
-
-/// Queues movements; an avatar may stand in the list several times, and does them in order. The REPLY
-/// is UNSUPPORTED when one of them has `has_at` and the server knows no footprints, or is a walk and it
-/// knows no walks, or takes over and it knows no takeovers, or must be met and it knows no refusals. A walk's steps come
-/// in events with its request_id; then FINISHED of kind STAND says it has arrived, REJECTED why it goes no further.
+/// Requests movements. An avatar may appear several times and executes its movements in order.
+/// Steps of a walk appear in events with the request id of the walk. A walk ends with FINISHED of
+/// kind STAND when the avatar has arrived, or with REJECTED if it cannot continue.
 stridewire_status stridewire_client_request(stridewire_client* client, stridewire_world world,
                                             const stridewire_movement* movements, size_t count,
                                             uint64_t* command);
 
-/// Drops what these avatars have not started yet.
+/// Drops all requested movements of these avatars that have not started.
 stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire_world world,
                                            const uint32_t* avatars, size_t count,
                                            uint64_t* command);
 
-/// Heights at the corners of a grid, bilinear between them.
+/// Heights on a regular grid, interpolated bilinearly. The height outside the grid is 0.
 typedef struct stridewire_height_field {
-  double origin_m[2];      ///< x and z of the first.
-  double cell_m;           ///< From one to the next, 0.01 to 1000.
-  uint32_t columns;        ///< Along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
-  uint32_t rows;           ///< Along z, the same.
-  const float* heights_m;  ///< columns * rows numbers, row by row, x fastest.
+  double origin_m[2];      ///< x and z of the first sample.
+  double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
+  uint32_t columns;        ///< Samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
+  uint32_t rows;           ///< Samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
+  const float* heights_m;  ///< columns * rows heights, row by row along x.
 } stridewire_height_field;
 
-/// A block with upright sides and a flat top.
+/// A block with vertical sides and a flat top.
 typedef struct stridewire_terrain_box {
-  double min_m[2];  ///< x and z.
-  double max_m[2];
-  double height_m;
+  double min_m[2];  ///< Smallest x and z.
+  double max_m[2];  ///< Largest x and z.
+  double height_m;  ///< y of the top.
 } stridewire_terrain_box;
 
-/// Gives a world another ground, for all its avatars: the highest of the height field (0 beside it)
-/// and the boxes there. `height_field` may be NULL, `box_count` 0; neither: flat at 0. The REPLY is
-/// OUT_OF_RANGE or LIMIT_REACHED when the server takes no such ground, UNSUPPORTED when it knows none.
-stridewire_status stridewire_client_set_terrain(stridewire_client* client, stridewire_world world,
-                                                const stridewire_height_field* height_field,
-                                                const stridewire_terrain_box* boxes,
-                                                size_t box_count, uint64_t* command);
+/// Terrain of a world. Its height at a point is the maximum of the height field and of all boxes
+/// there. Without height field and boxes the terrain is flat at y = 0.
+typedef struct stridewire_terrain_def {
+  const stridewire_height_field* height_field;  ///< NULL: no height field.
+  const stridewire_terrain_box* boxes;          ///< May be NULL if `box_count` is 0.
+  size_t box_count;                             ///< At most STRIDEWIRE_MAX_TERRAIN_BOXES.
+} stridewire_terrain_def;
 
-/// A clip of the library over what an avatar does (waving, carrying); legs do what they do without.
-/// stridewire_client_list_layers tells which there are.
+/// Replaces the terrain of a world for all its avatars. The server replies OUT_OF_RANGE or
+/// LIMIT_REACHED if it cannot use the terrain.
+stridewire_status stridewire_client_set_terrain(stridewire_client* client, stridewire_world world,
+                                                const stridewire_terrain_def* terrain,
+                                                uint64_t* command);
+
+/// Starts, changes or ends a layer: a clip of the library that plays over the current movement, for
+/// example waving or carrying. Layers do not change the legs. See stridewire_client_list_layers.
 typedef struct stridewire_layer {
-  uint32_t avatar;   ///< Not 0.
-  const char* name;  ///< 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
-  uint8_t off;       ///< 1: eases it out and ends it; weight and speed then mean nothing.
-  double weight;     ///< Above 0, up to 1.
-  double blend_s;    ///< How long weight and speed take to get there, 0 to 10.
-  double speed;      ///< 0.1 to 4; 1: as recorded.
+  uint32_t avatar;   ///< Id of the avatar, not 0.
+  const char* name;  ///< Name of the layer, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
+  uint8_t fade_out;  ///< 1: fade the layer out and end it. `weight` and `speed` are then ignored.
+  double weight;     ///< Above 0, at most 1.
+  double blend_s;    ///< Time until weight and speed reach their new values, 0 to 10.
+  double speed;      ///< Playback speed, 0.1 to 4. 1 plays as recorded.
 } stridewire_layer;
 
-/// Starts and ends layers; at most four at a time for an avatar. The REPLY is UNSUPPORTED when the
-/// server knows none; an ITEM is NO_MOVEMENT when the library has no such layer.
+/// Starts, changes and ends layers. An avatar plays at most 4 layers. An ITEM event reports
+/// NO_MOVEMENT if the library has no layer of that name.
 stridewire_status stridewire_client_set_layers(stridewire_client* client, stridewire_world world,
                                                const stridewire_layer* layers, size_t count,
                                                uint64_t* command);
 
-/// Feet stand still where they land (1, as at first) or are where the examples have them (0): of each avatar from the
-/// next movement on that it begins. What must be met is refused while they are not planted. The REPLY is UNSUPPORTED
-/// when the server knows no such command; an ITEM is NO_MOVEMENT when the library's legs can not be planted.
+/// Foot planting of a group of avatars.
+typedef struct stridewire_planting {
+  const uint32_t* avatars;  ///< Ids of the avatars.
+  size_t avatar_count;      ///< 1 to STRIDEWIRE_MAX_ITEMS.
+  /// 1: feet stand still where they land (the state after a spawn). 0: feet move as in the
+  /// examples.
+  uint8_t enabled;
+} stridewire_planting;
+
+/// Enables or disables foot planting from the next movement of each avatar on. Without planting,
+/// the server rejects steps with `exact_only`. An ITEM event reports NO_MOVEMENT if the skeleton
+/// does not support planting.
 stridewire_status stridewire_client_set_planting(stridewire_client* client, stridewire_world world,
-                                                 const uint32_t* avatars, size_t count, uint8_t on,
+                                                 const stridewire_planting* planting,
                                                  uint64_t* command);
 
+/// How the server sends poses.
 typedef enum stridewire_pose_mode {
-  STRIDEWIRE_FULL = 0,  ///< float32: as the server has them.
-  /// No joint or end site is off by more than 1 mm (0.00016 rad a joint from servers of before compact poses).
+  STRIDEWIRE_FULL = 0,  ///< As float32, without loss.
+  /// Compressed. The error of each joint and end site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
-  /// What avatars begin instead of their poses, which are evaluated here: those of STRIDEWIRE_FULL, bit by
-  /// bit, at some 150 bytes a step. The world's library is fetched first, if it is not in library_folder; the Observe and what
-  /// is asked of that world behind it wait meanwhile. UNSUPPORTED, MALFORMED: the server has not this mode, or no such library.
-  /// An avatar takes a microsecond a tick and up to 16 KiB, at most max_pose_bytes in all; others are left out.
+  /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
+  /// equal those of STRIDEWIRE_FULL bit for bit. The client fetches the world's library first,
+  /// unless it is in `library_folder`, and holds back this and later commands to the world
+  /// meanwhile. The reply is UNSUPPORTED or MALFORMED if the client cannot use the library. An
+  /// avatar costs about 1 us per tick and up to 16 KiB. The client ignores avatars beyond
+  /// `max_pose_bytes` / 16 KiB.
   STRIDEWIRE_MOVEMENT = 2,
   STRIDEWIRE_POSE_MODE_MAX = 0x7fffffff
 } stridewire_pose_mode;
 
-/// How much of a pose is told, of QUANTISED ones. The joints that are not told come back as the references of the
-/// server's codes: about as the library's figures mostly hold them.
+/// Which joints STRIDEWIRE_QUANTISED poses contain. Omitted joints have their reference rotations,
+/// which are typical rotations in the library.
 typedef enum stridewire_pose_detail {
   STRIDEWIRE_DETAIL_ALL = 0,
-  /// Without those that move nothing by more than 0.12 m: hands, toes, the head; for who is seen from afar.
-  STRIDEWIRE_DETAIL_FEWER = 1,
-  STRIDEWIRE_DETAIL_ROOT = 2,  ///< Where the figure is and how it is turned, 18 bytes.
+  /// Omits hands, toes, head and other joints whose omission moves no point by more than 0.12 m.
+  STRIDEWIRE_DETAIL_REDUCED = 1,
+  STRIDEWIRE_DETAIL_ROOT = 2,  ///< Position and rotation of the root only, 18 bytes per pose.
   STRIDEWIRE_POSE_DETAIL_MAX = 0x7fffffff
 } stridewire_pose_detail;
 
+/// Within `to_m` of a region's centre, the server sends poses every `every_n_ticks` ticks.
+typedef struct stridewire_rate_ring {
+  double to_m;             ///< Outer radius. Above 0, and above that of the previous ring.
+  uint16_t every_n_ticks;  ///< 1 to 3600.
+} stridewire_rate_ring;
+
+/// A circle on the ground. An avatar enters the region when its root comes within the radius.
+typedef struct stridewire_region {
+  double x, z;      ///< Centre in metres.
+  double radius_m;  ///< Above 0.
+  /// An avatar leaves at a distance of `radius_m` + `leave_m`. Negative: the server chooses.
+  double leave_m;
+  /// Rings from the inside out. Beyond them, the rate and detail of the observation apply.
+  const stridewire_rate_ring* rings;
+  size_t ring_count;  ///< At most STRIDEWIRE_MAX_RATE_RINGS.
+  /// Detail of each ring, or NULL for the detail of the observation. Requires STRIDEWIRE_QUANTISED.
+  const stridewire_pose_detail* ring_details;
+} stridewire_region;
+
+/// Which poses and events a client receives from a world.
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
-  uint16_t every_n_ticks;   ///< 1 to 3600
-  uint8_t with_events;      ///< 1: events of the world, too (controllers get them anyway).
-  const uint32_t* avatars;  ///< NULL: all. Poses of others are not kept.
-  size_t avatar_count;
-  /// INVALID_ARGUMENT beside another mode than QUANTISED; UNSUPPORTED, in the command's REPLY: a server without them.
-  stridewire_pose_detail detail;
+  uint16_t every_n_ticks;         ///< Interval of poses in ticks, 1 to 3600.
+  uint8_t with_events;            ///< 1: also receive the world's events. Controllers always do.
+  const uint32_t* avatars;        ///< Avatars to observe. NULL: all.
+  size_t avatar_count;            ///< 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
+  stridewire_pose_detail detail;  ///< Not 0 only with STRIDEWIRE_QUANTISED.
+  /// Observes the avatars inside a region. NULL: none. `avatars` must then be NULL. The events
+  /// ENTERED and LEFT report changes. A region must be the only observation of its world
+  /// (NOT_ALLOWED).
+  const stridewire_region* region;
 } stridewire_observation;
 
-/// `subscription` gets the number for stridewire_client_stop_observing. Observing one world twice is
-/// possible; of one tick and avatar the pose that came first is kept.
+/// Observes a world. `subscription`, unless NULL, receives the number of the observation. If
+/// several observations include an avatar, the client stores the first pose it receives for each
+/// tick.
 stridewire_status stridewire_client_observe(stridewire_client* client, stridewire_world world,
                                             const stridewire_observation* observation,
                                             uint32_t* subscription, uint64_t* command);
 
-#define STRIDEWIRE_MAX_RATE_RINGS 4
-
-/// Within `to_m` of a region's centre poses come every so many ticks.
-typedef struct stridewire_rate_ring {
-  double to_m;             ///< Above 0 and above that of the ring before.
-  uint16_t every_n_ticks;  ///< 1 to 3600
-} stridewire_rate_ring;
-
-/// A circle on the ground. Avatars whose root comes within its radius enter.
-typedef struct stridewire_region {
-  double x, z;      ///< Its centre, in metres.
-  double radius_m;  ///< Above 0.
-  double
-      leave_m;  ///< Who is inside leaves when further than radius and this; negative: the server chooses.
-  const stridewire_rate_ring*
-      rings;          ///< From the inner one on; beyond them the observation's rate and detail.
-  size_t ring_count;  ///< At most STRIDEWIRE_MAX_RATE_RINGS.
-  /// In which detail poses come within each ring, `ring_count` of them; NULL: the observation's, as beyond them. Of
-  /// QUANTISED poses only, and of servers as stridewire_observation.detail.
-  const stridewire_pose_detail* ring_details;
-} stridewire_region;
-
-/// As stridewire_client_observe, of who is in a region: `observation->avatars` is NULL. Who comes and goes is told
-/// by events. A region is all that a client observes of a world (NOT_ALLOWED). UNSUPPORTED, in the command's
-/// reply: an older server.
-stridewire_status stridewire_client_observe_region(stridewire_client* client,
-                                                   stridewire_world world,
-                                                   const stridewire_observation* observation,
-                                                   const stridewire_region* region,
-                                                   uint32_t* subscription, uint64_t* command);
-
-/// Puts another region in the place of the one that a subscription observes, as a player walks. Who is in both
-/// neither leaves nor enters.
+/// Moves the region of an observation, for example when the player walks. Avatars inside both
+/// regions neither leave nor enter.
 stridewire_status stridewire_client_move_region(stridewire_client* client, uint32_t subscription,
                                                 const stridewire_region* region, uint64_t* command);
 
+/// Ends an observation.
 stridewire_status stridewire_client_stop_observing(stridewire_client* client, uint32_t subscription,
                                                    uint64_t* command);
 
-/// Sends a ping now; STRIDEWIRE_EVENT_PONG tells the round trip. NOT_READY when not connected.
+/// Sends a ping. STRIDEWIRE_EVENT_PONG reports the round-trip time. Fails with NOT_READY without a
+/// connection.
 stridewire_status stridewire_client_ping(stridewire_client* client);
 
 // -------------------------------------------------------------------------------------- events
 
+/// Type of an event. The comments list the fields of stridewire_event that the type uses.
 typedef enum stridewire_event_type {
-  // This connection.
+  // About the connection.
   STRIDEWIRE_EVENT_CONNECTED = 0,        ///< resumed
-  STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< status, text; another attempt follows
-  STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< status, text; attempts follow
-  STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server knows nothing of us any more.
-  STRIDEWIRE_EVENT_CLOSED = 4,           ///< status, text; no attempt follows
-  STRIDEWIRE_EVENT_WORLD_JOINED = 5,  ///< world; its skeleton is there. Again after SESSION_LOST.
-  STRIDEWIRE_EVENT_REPLY = 6,         ///< command, status, accepted, text
-  STRIDEWIRE_EVENT_ITEM =
-      7,  ///< command, item_index, avatar, request_id, status, text: an item that
-          ///< was refused, or the number the server chose; before its REPLY
-  STRIDEWIRE_EVENT_LAGGING = 8,  ///< dropped_batches, dropped_events: we read too slowly
-  STRIDEWIRE_EVENT_NOTICE = 9,   ///< status, text: something the server has to say
-  STRIDEWIRE_EVENT_PONG = 10,    ///< rtt_s
-  STRIDEWIRE_EVENT_TERRAIN =
-      11,  ///< world: it has another ground, see stridewire_client_get_terrain
+  STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< status, text. The client tries again.
+  STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< status, text. The client reconnects.
+  STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server has no session of this client any more.
+  STRIDEWIRE_EVENT_CLOSED = 4,           ///< status, text. The client does not try again.
+  /// world. The skeleton is available. Repeated after SESSION_LOST.
+  STRIDEWIRE_EVENT_WORLD_JOINED = 5,
+  STRIDEWIRE_EVENT_REPLY = 6,  ///< command, status, accepted, text
+  /// command, item_index, avatar, request_id, status, text. Reports an item that the server
+  /// refused, or the avatar id that it chose. Precedes the REPLY.
+  STRIDEWIRE_EVENT_ITEM = 7,
+  /// dropped_batches, dropped_events. This client reads too slowly.
+  STRIDEWIRE_EVENT_LAGGING = 8,
+  STRIDEWIRE_EVENT_NOTICE = 9,  ///< status, text. A message of the server that ends nothing.
+  STRIDEWIRE_EVENT_PONG = 10,   ///< rtt_s, tick, time_s
+  /// world. Its terrain has changed; see stridewire_client_get_terrain.
+  STRIDEWIRE_EVENT_TERRAIN = 11,
 
-  // A world: world, avatar, tick, time_s.
-  STRIDEWIRE_EVENT_ACCEPTED = 32,     ///< request_id was queued
-  STRIDEWIRE_EVENT_STARTED = 33,      ///< request_id, kind, group, requested, applied, flags
-  STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< foot, position_m
-  STRIDEWIRE_EVENT_FINISHED = 35,     ///< request_id, base: the new base frame
-  STRIDEWIRE_EVENT_IDLE = 36,         ///< standing with nothing queued; base
-  STRIDEWIRE_EVENT_REJECTED =
-      37,  ///< request_id turned out impossible: status, text; when it must be met and
-           ///< is out of reach also foot, kind, position_m: the nearest in reach
+  // About an avatar. All of these also use world, avatar, tick and time_s.
+  STRIDEWIRE_EVENT_ACCEPTED = 32,  ///< request_id. The request was queued.
+  /// request_id, kind, group, requested, applied, extrapolated, clamped. A movement has started.
+  STRIDEWIRE_EVENT_STARTED = 33,
+  STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< foot, position_m. A foot has landed.
+  /// request_id, kind, base, cut_short. A movement has ended. `base` is the new base frame.
+  STRIDEWIRE_EVENT_FINISHED = 35,
+  STRIDEWIRE_EVENT_IDLE = 36,  ///< base. The avatar stands and its queue is empty.
+  /// request_id, status, text. A queued request turned out to be impossible. If `exact_only` was
+  /// the reason, also foot, kind and position_m, the nearest point in reach.
+  STRIDEWIRE_EVENT_REJECTED = 37,
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
   STRIDEWIRE_EVENT_REMOVED = 39,
-  STRIDEWIRE_EVENT_ENTERED = 40,  ///< the region observed, see stridewire_client_observe_region
-  STRIDEWIRE_EVENT_LEFT = 41      ///< that region, or the world
+  STRIDEWIRE_EVENT_ENTERED = 40,  ///< The avatar has entered the observed region.
+  STRIDEWIRE_EVENT_LEFT = 41      ///< The avatar has left the observed region or the world.
 } stridewire_event_type;
 
+/// Kind of a movement that an avatar executes.
 typedef enum stridewire_movement_kind {
   STRIDEWIRE_KIND_STEP_LEFT = 0,
   STRIDEWIRE_KIND_STEP_RIGHT = 1,
@@ -450,196 +521,224 @@ typedef enum stridewire_movement_kind {
   STRIDEWIRE_KIND_STAND = 3
 } stridewire_movement_kind;
 
-/// Names: 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m, 4 end_y_m, 5 end_z_m, 6 turn_rad,
-/// 7 length_m, 8 height_m (moving foot minus fixed foot, in the base frame).
+/// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m,
+/// 4 end_y_m, 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m. Names 0 to 5 are the position of the
+/// moving foot relative to the fixed foot, before and after a step.
 typedef struct stridewire_parameters {
   double values[STRIDEWIRE_MAX_PARAMETERS];
   uint8_t names[STRIDEWIRE_MAX_PARAMETERS];
-  uint8_t count;
+  uint8_t count;  ///< Number of valid entries in `values` and `names`.
 } stridewire_parameters;
 
-/// Fields that a type does not name are zero.
+/// An event. Fields that its type does not use are 0.
 typedef struct stridewire_event {
   stridewire_event_type type;
   stridewire_status status;
-  uint64_t command;
-  uint64_t request_id;  ///< 0: the avatar's own doing.
+  uint64_t command;     ///< Number of the command that caused the event.
+  uint64_t request_id;  ///< 0 for a movement that the server inserted.
   uint64_t tick;
-  double time_s;  ///< On the server's clock, as poses have it.
+  double time_s;  ///< Server time of the tick.
   stridewire_world world;
   uint32_t avatar;
-  uint32_t item_index;
-  uint32_t accepted;  ///< How many items of the command were done.
+  uint32_t item_index;  ///< Index in the array that was passed to the command.
+  uint32_t accepted;    ///< Number of items that the server executed.
   stridewire_movement_kind kind;
   stridewire_foot foot;
-  int32_t group;  ///< -1: none.
-  uint8_t resumed;
-  uint8_t extrapolated;
-  uint8_t clamped;
-  uint8_t cut_short;  ///< FINISHED: another movement took over before its end.
+  int32_t group;         ///< Index of the motion group in the library, or -1.
+  uint8_t resumed;       ///< 1: the session survived the reconnect.
+  uint8_t extrapolated;  ///< 1: `applied` lies outside the range of the examples.
+  uint8_t clamped;       ///< 1: `applied` differs from `requested`, which is out of reach.
+  uint8_t cut_short;     ///< 1: another request interrupted the movement.
   double position_m[3];
   double base_position_m[3];
   double base_heading_rad;
-  stridewire_parameters requested;
-  stridewire_parameters applied;
-  double rtt_s;
-  uint64_t dropped_batches;
-  uint64_t dropped_events;
-  uint64_t events_dropped_before;  ///< Events lost before this one, for `max_events` were waiting.
+  stridewire_parameters requested;  ///< Parameters as requested.
+  stridewire_parameters applied;    ///< Parameters of the synthesized movement.
+  double rtt_s;                     ///< Round-trip time of a ping.
+  uint64_t dropped_batches;         ///< Pose batches that the server has dropped since the join.
+  uint64_t dropped_events;          ///< Event messages that the server has dropped since the join.
+  uint64_t events_dropped_before;  ///< Events that the full queue dropped directly before this one.
   char text[STRIDEWIRE_MAX_TEXT_BYTES];
 } stridewire_event;
 
-/// Takes the oldest events, at most `capacity` of them. `events` holds `capacity` of them; `count`
-/// gets how many were written, 0 when there is none.
+/// Moves up to `capacity` of the oldest events from the queue to `events`. `count` receives the
+/// number of events written, which is 0 if the queue is empty.
 stridewire_status stridewire_client_poll_events(stridewire_client* client, stridewire_event* events,
                                                 size_t capacity, size_t* count);
 
-/// Waits until an event is there, or for `timeout_s` (0 to 3600). Returns STRIDEWIRE_TIMEOUT then.
+/// Waits until the event queue is not empty. Returns STRIDEWIRE_TIMEOUT after `timeout_s` (0 to
+/// 3600).
 stridewire_status stridewire_client_wait_event(stridewire_client* client, double timeout_s);
 
 // --------------------------------------------------------------------------------------- poses
 
+/// A joint of a skeleton.
 typedef struct stridewire_joint {
   char name[STRIDEWIRE_MAX_NAME_BYTES + 1];
-  int32_t parent;  ///< Smaller than its own index; -1 for the root, which comes first.
-  float offset_m[3];
+  int32_t parent;  ///< Index of the parent, below the joint's own index. -1 for the root, joint 0.
+  float offset_m[3];  ///< Position relative to the parent.
 } stridewire_joint;
 
+/// The end of a chain of joints, for example a fingertip.
 typedef struct stridewire_end_site {
-  uint32_t joint;
-  float offset_m[3];
+  uint32_t joint;     ///< Index of the last joint of the chain.
+  float offset_m[3];  ///< Position relative to that joint.
 } stridewire_end_site;
 
+/// Joints of a leg. An index is -1 if the library does not define the joint.
 typedef struct stridewire_leg {
-  int32_t hip;  ///< Joints; -1: not known.
+  int32_t hip;
   int32_t knee;
   int32_t ankle;
   int32_t ball;
-  float ball_offset_m[3];
-  float toe_tip_offset_m[3];
+  float ball_offset_m[3];     ///< Bottom of the ball of the foot, relative to `ball`.
+  float toe_tip_offset_m[3];  ///< Tip of the toes, relative to `ball`.
 } stridewire_leg;
 
+/// Skeleton of all avatars of a world.
 typedef struct stridewire_skeleton {
   uint32_t joint_count;
   uint32_t end_site_count;
-  stridewire_leg legs[2];  ///< Left, right.
-  double tick_hz;
+  stridewire_leg legs[2];  ///< Left leg, right leg.
+  double tick_hz;          ///< Ticks per second of the server.
+  /// Hash of the motion library in hexadecimal digits.
   char library_hash[STRIDEWIRE_MAX_NAME_BYTES + 1];
 } stridewire_skeleton;
 
-/// Describes the figure of a world. Writes at most `joint_capacity` joints and `end_site_capacity`
-/// end sites (either array may be NULL with capacity 0); BUFFER_TOO_SMALL when there are more, with
-/// the counts in `skeleton`. NOT_READY until STRIDEWIRE_EVENT_WORLD_JOINED.
+/// Arrays that receive the parts of a skeleton. An array may be NULL if its capacity is 0.
+typedef struct stridewire_skeleton_buffers {
+  stridewire_joint* joints;
+  size_t joint_capacity;
+  stridewire_end_site* end_sites;
+  size_t end_site_capacity;
+} stridewire_skeleton_buffers;
+
+/// Gets the skeleton of a world. `buffers` may be NULL. Returns BUFFER_TOO_SMALL if an array is too
+/// small; `skeleton` then has the required counts. Returns NOT_READY before the event WORLD_JOINED.
 stridewire_status stridewire_client_get_skeleton(stridewire_client* client, stridewire_world world,
                                                  stridewire_skeleton* skeleton,
-                                                 stridewire_joint* joints, size_t joint_capacity,
-                                                 stridewire_end_site* end_sites,
-                                                 size_t end_site_capacity);
+                                                 const stridewire_skeleton_buffers* buffers);
 
-/// One of the layers of a world's library, for stridewire_client_set_layers.
+/// Name of a layer, for stridewire_client_set_layers.
 typedef struct stridewire_layer_name {
   char name[STRIDEWIRE_MAX_NAME_BYTES + 1];
 } stridewire_layer_name;
 
-/// The layers of a world's library; none where the server knows no layers. Writes at most `capacity` names
-/// (`names` may be NULL with capacity 0); `count` gets how many there are, at most 64. BUFFER_TOO_SMALL when there are
-/// more. NOT_READY until STRIDEWIRE_EVENT_WORLD_JOINED.
+/// Lists the layers of a world's library. Writes up to `capacity` names; `count` receives the
+/// total, at most 64. `names` may be NULL if `capacity` is 0. Returns BUFFER_TOO_SMALL if the total
+/// exceeds `capacity`, and NOT_READY before the event WORLD_JOINED.
 stridewire_status stridewire_client_list_layers(stridewire_client* client, stridewire_world world,
                                                 stridewire_layer_name* names, size_t capacity,
                                                 size_t* count);
 
+/// Size of a world's terrain.
 typedef struct stridewire_terrain {
-  double origin_m[2];
-  double cell_m;
-  uint32_t columns;  ///< 0: there is no height field.
-  uint32_t rows;
+  double origin_m[2];  ///< x and z of the first height sample.
+  double cell_m;       ///< Distance between neighbouring samples.
+  uint32_t columns;    ///< Samples along x. 0: the terrain has no height field.
+  uint32_t rows;       ///< Samples along z.
   uint32_t box_count;
 } stridewire_terrain;
 
-/// The ground of a world, flat until STRIDEWIRE_EVENT_TERRAIN. Writes at most `height_capacity`
-/// heights (of columns * rows, row by row) and `box_capacity` boxes; either array may be NULL with
-/// capacity 0. BUFFER_TOO_SMALL when there are more, with the counts in `terrain`.
-stridewire_status stridewire_client_get_terrain(stridewire_client* client, stridewire_world world,
-                                                stridewire_terrain* terrain, float* heights_m,
-                                                size_t height_capacity,
-                                                stridewire_terrain_box* boxes, size_t box_capacity);
+/// Arrays that receive the parts of a terrain. An array may be NULL if its capacity is 0.
+typedef struct stridewire_terrain_buffers {
+  float* heights_m;  ///< Receives columns * rows heights, row by row along x.
+  size_t height_capacity;
+  stridewire_terrain_box* boxes;
+  size_t box_capacity;
+} stridewire_terrain_buffers;
 
-/// Avatars whose poses arrive, in growing order. Writes at most `capacity` numbers; `count` gets how
-/// many there are. BUFFER_TOO_SMALL when there are more (`avatars` may be NULL with capacity 0).
+/// Gets the terrain of a world. It is flat until the event TERRAIN. `buffers` may be NULL. Returns
+/// BUFFER_TOO_SMALL if an array is too small; `terrain` then has the required counts.
+stridewire_status stridewire_client_get_terrain(stridewire_client* client, stridewire_world world,
+                                                stridewire_terrain* terrain,
+                                                const stridewire_terrain_buffers* buffers);
+
+/// Lists the avatars whose poses arrive, in ascending order of their ids. Writes up to `capacity`
+/// ids; `count` receives the total. `avatars` may be NULL if `capacity` is 0. Returns
+/// BUFFER_TOO_SMALL if the total exceeds `capacity`.
 stridewire_status stridewire_client_list_avatars(stridewire_client* client, stridewire_world world,
                                                  uint32_t* avatars, size_t capacity, size_t* count);
 
-/// Time now on the server's clock as poses arrive: the smallest delay of the last seconds is counted
-/// as none. NOT_READY until the first pose or pong.
+/// Estimates the current server time minus the smallest network delay of the last seconds. Fails
+/// with NOT_READY before the first pose or pong.
 stridewire_status stridewire_client_server_time(stridewire_client* client, double* time_s);
 
-/// The time to show poses at: server time minus `render_delay_s`. Moves evenly, never back but when
-/// the clock itself was set anew (a new session, a jump of more than 0.25 s).
+/// Gets the time at which to sample poses: the server time minus `render_delay_s`. It advances
+/// evenly and moves backwards only in a new session or when the server's clock jumps by more than
+/// 0.25 s.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
+/// How a pose was obtained.
 typedef enum stridewire_pose_kind {
-  STRIDEWIRE_POSE_MISSING = 0,       ///< Nothing known for that time; no other field is set.
-  STRIDEWIRE_POSE_INTERPOLATED = 1,  ///< Between two received poses, or exactly one.
-  STRIDEWIRE_POSE_HELD = 2,          ///< The last pose before that time, nothing to go on to: none
-                                     ///< came since, or the next one is not continuous with it.
-  STRIDEWIRE_POSE_RAW = 3            ///< As received.
+  STRIDEWIRE_POSE_MISSING = 0,       ///< No pose is known for that time. Other fields are 0.
+  STRIDEWIRE_POSE_INTERPOLATED = 1,  ///< Interpolated between two received poses, or exactly one.
+  /// The last received pose before that time. The next one has not arrived, or follows a
+  /// discontinuity.
+  STRIDEWIRE_POSE_HELD = 2,
+  STRIDEWIRE_POSE_RAW = 3  ///< A received pose, unchanged.
 } stridewire_pose_kind;
 
+/// A pose. The caller sets `rotations_xyzw` and `joint_capacity` before a call; the call writes all
+/// other fields.
 typedef struct stridewire_pose {
   stridewire_pose_kind kind;
   uint32_t joint_count;
-  uint64_t tick;  ///< Of the received pose at or before the time.
-  double time_s;  ///< On the server's clock: of this pose.
-  double held_s;  ///< HELD: how long after its last received pose.
+  uint64_t tick;  ///< Tick of the last received pose at or before `time_s`.
+  double time_s;  ///< Server time of this pose.
+  double held_s;  ///< HELD: seconds since the last received pose.
   float root_position_m[3];
-  uint8_t discontinuity;  ///< RAW: not to be interpolated from the pose before.
-  uint8_t standing;       ///< Standing, nothing queued.
-  uint8_t detail;         ///< stridewire_pose_detail it was sent with.
+  uint8_t discontinuity;  ///< RAW: 1 if the pose must not be interpolated from the previous one.
+  uint8_t standing;       ///< 1: the avatar stands and its queue is empty.
+  uint8_t detail;         ///< stridewire_pose_detail of the received pose.
+  /// Set by the caller. Receives 4 numbers per joint. The root's rotation is relative to the world,
+  /// all others are relative to the parent joint. May be NULL if `joint_capacity` is 0.
+  float* rotations_xyzw;
+  size_t joint_capacity;  ///< Set by the caller: number of joints that `rotations_xyzw` can hold.
 } stridewire_pose;
 
-/// Pose of an avatar at a time of the server's clock. `rotations_xyzw` gets 4 numbers a joint, the
-/// root's in the world, the others relative to their parent; it holds `joint_capacity` joints.
-/// An avatar that is not there is no error: STRIDEWIRE_POSE_MISSING. BUFFER_TOO_SMALL.
+/// Samples the pose of an avatar at a server time. The result for an unknown avatar is
+/// STRIDEWIRE_POSE_MISSING, not an error. Returns BUFFER_TOO_SMALL if `joint_capacity` is too
+/// small; `joint_count` then has the required capacity.
 stridewire_status stridewire_client_sample_pose(stridewire_client* client, stridewire_world world,
                                                 uint32_t avatar, double time_s,
-                                                stridewire_pose* pose, float* rotations_xyzw,
-                                                size_t joint_capacity);
+                                                stridewire_pose* pose);
 
-/// The newest pose received.
+/// Gets the newest received pose of an avatar. Errors are those of stridewire_client_sample_pose.
 stridewire_status stridewire_client_latest_pose(stridewire_client* client, stridewire_world world,
-                                                uint32_t avatar, stridewire_pose* pose,
-                                                float* rotations_xyzw, size_t joint_capacity);
+                                                uint32_t avatar, stridewire_pose* pose);
 
-/// The oldest pose kept whose tick is greater than `after_tick` (UINT64_MAX: the oldest kept). Polled
-/// more often than `pose_history` ticks this gives every pose that arrived.
+/// Gets the oldest stored pose whose tick is above `after_tick`, or the oldest stored pose if
+/// `after_tick` is UINT64_MAX. An application that calls it more often than every `pose_history`
+/// ticks gets every received pose. Errors are those of stridewire_client_sample_pose.
 stridewire_status stridewire_client_next_pose(stridewire_client* client, stridewire_world world,
                                               uint32_t avatar, uint64_t after_tick,
-                                              stridewire_pose* pose, float* rotations_xyzw,
-                                              size_t joint_capacity);
+                                              stridewire_pose* pose);
 
 // ---------------------------------------------------------------------------------- statistics
 
-/// Counted since the client was created.
+/// Counters since the client was created.
 typedef struct stridewire_statistics {
   uint64_t bytes_received;
   uint64_t bytes_sent;
-  uint64_t batches_received;
+  uint64_t batches_received;  ///< Pose batches and movement messages.
   uint64_t poses_received;
-  uint64_t poses_refused;    ///< For no memory was left for that avatar, or its tick was old.
-  uint64_t batches_missing;  ///< By gaps in the ticks of a shard.
-  uint64_t dropped_batches;  ///< By the server, as it told.
+  uint64_t poses_refused;    ///< Poses dropped for lack of memory or because they were not newer.
+  uint64_t batches_missing;  ///< Estimated from gaps in the ticks of each shard.
+  uint64_t dropped_batches;  ///< Batches that the server reported as dropped.
   uint64_t events_received;
-  uint64_t events_dropped;  ///< By us, because nobody polled.
+  uint64_t events_dropped;  ///< Events dropped because the event queue was full.
   uint64_t commands_sent;
-  uint64_t commands_resent;
-  uint64_t commands_waiting;  ///< Without an answer now.
-  uint64_t connects;          ///< Times that the server welcomed us.
-  uint64_t resumes;           ///< Of which with the session still there.
+  uint64_t commands_resent;   ///< Commands sent again after a resume.
+  uint64_t commands_waiting;  ///< Commands that are unanswered now.
+  uint64_t connects;          ///< Completed handshakes.
+  uint64_t resumes;           ///< Completed handshakes that resumed a session.
   uint64_t connect_failures;
-  uint64_t buffered_bytes;  ///< Memory of poses, events and commands now.
-  double rtt_s;             ///< Smallest of the last pings; 0 before the first.
+  uint64_t buffered_bytes;  ///< Memory used by poses, events and commands now.
+  double rtt_s;             ///< Smallest round-trip time of the last 16 pings; 0 before the first.
 } stridewire_statistics;
 
+/// Gets the statistics of a client.
 stridewire_status stridewire_client_get_statistics(stridewire_client* client,
                                                    stridewire_statistics* statistics);
 

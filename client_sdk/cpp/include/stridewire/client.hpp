@@ -9,14 +9,15 @@
 
 #include "stridewire/client.h"
 
-/// C++17 over the C ABI of `stridewire/client.h`, where everything is explained: this only owns the
-/// handle and sizes the buffers. Throws nothing but std::bad_alloc.
+/// C++17 wrapper of `stridewire/client.h`. It owns the handle and resizes buffers; the C header
+/// documents each function. Only std::bad_alloc is ever thrown.
 namespace stridewire::client {
 
-/// What came of a call; true in a condition when it is well.
+/// Result of a call. Converts to true if the call succeeded.
 class [[nodiscard]] Result {
  public:
-  Result(stridewire_status status = STRIDEWIRE_OK) : status_(status) {}  // NOLINT: a status is one.
+  // NOLINTNEXTLINE(google-explicit-constructor): functions return a status as their result.
+  Result(stridewire_status status = STRIDEWIRE_OK) : status_(status) {}
   explicit operator bool() const { return status_ == STRIDEWIRE_OK; }
   stridewire_status status() const { return status_; }
   const char* name() const { return stridewire_status_name(status_); }
@@ -26,12 +27,25 @@ class [[nodiscard]] Result {
   stridewire_status status_;
 };
 
-/// Options with their defaults; change what you like.
+/// Options of a client. The constructor fills in the defaults.
 struct Options : stridewire_client_options {
   Options() { stridewire_client_options_init(this, sizeof(stridewire_client_options)); }
 };
 
-/// `stridewire_movement` made by name; every number not given is 0.
+/// A position in the world in metres.
+struct Position {
+  double x_m = 0.0;
+  double y_m = 0.0;
+  double z_m = 0.0;
+
+  void CopyTo(double (&out)[3]) const {
+    out[0] = x_m;
+    out[1] = y_m;
+    out[2] = z_m;
+  }
+};
+
+/// A step with the given parameters; all others are 0.
 inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, double length_m,
                                 double turn_rad = 0.0,
                                 stridewire_foot foot = STRIDEWIRE_FOOT_AUTO) {
@@ -44,46 +58,44 @@ inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, 
   m.turn_rad = turn_rad;
   return m;
 }
-/// A step whose foot lands in a place, looking where the server chooses unless told.
-inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id, double x_m,
-                                  double y_m, double z_m,
+/// A step that places the ball of the foot at a world position. Without `heading_rad` the server
+/// chooses the heading of the foot.
+inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id,
+                                  const Position& at,
                                   std::optional<double> heading_rad = std::nullopt,
                                   stridewire_foot foot = STRIDEWIRE_FOOT_AUTO) {
   stridewire_movement m = Step(avatar, request_id, 0.0, 0.0, foot);
   m.has_at = 1;
-  m.at_m[0] = x_m;
-  m.at_m[1] = y_m;
-  m.at_m[2] = z_m;
+  at.CopyTo(m.at_m);
   m.has_heading = heading_rad ? 1 : 0;
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// The same step, which is rejected rather than done when its place is out of reach.
+/// The same step, but rejected if its position is out of reach.
 inline stridewire_movement ExactOnly(stridewire_movement step_to) {
   step_to.exact_only = 1;
   return step_to;
 }
-/// The same movement, which takes over from what the avatar does.
+/// The same movement, but it interrupts the current one and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.interrupt = STRIDEWIRE_NOW;
   return movement;
 }
-/// A walk to a place and heading.
-inline stridewire_movement WalkTo(std::uint32_t avatar, std::uint64_t request_id, double x_m,
-                                  double y_m, double z_m, double heading_rad,
+/// A walk to a world position and heading. Without `speed_m_s` the server chooses the speed.
+inline stridewire_movement WalkTo(std::uint32_t avatar, std::uint64_t request_id,
+                                  const Position& destination, double heading_rad,
                                   std::optional<double> speed_m_s = std::nullopt) {
   stridewire_movement m{};
   m.avatar = avatar;
   m.request_id = request_id;
   m.type = STRIDEWIRE_WALK;
-  m.at_m[0] = x_m;
-  m.at_m[1] = y_m;
-  m.at_m[2] = z_m;
+  destination.CopyTo(m.at_m);
   m.heading_rad = heading_rad;
   m.has_speed = speed_m_s ? 1 : 0;
   m.speed_m_s = speed_m_s.value_or(0.0);
   return m;
 }
+/// A jump straight ahead.
 inline stridewire_movement Jump(std::uint32_t avatar, std::uint64_t request_id, double length_m) {
   stridewire_movement m{};
   m.avatar = avatar;
@@ -92,6 +104,7 @@ inline stridewire_movement Jump(std::uint32_t avatar, std::uint64_t request_id, 
   m.length_m = length_m;
   return m;
 }
+/// Standing for a given time.
 inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id, double seconds) {
   stridewire_movement m{};
   m.avatar = avatar;
@@ -101,47 +114,54 @@ inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id,
   return m;
 }
 
-/// Starts a clip of the library over what an avatar does.
-inline stridewire_layer LayerOn(std::uint32_t avatar, const char* name, double weight = 1.0,
-                                double blend_s = 0.3, double speed = 1.0) {
+/// A layer that starts, or that changes its weight and speed. `name` must outlive the call to
+/// SetLayers.
+inline stridewire_layer StartLayer(std::uint32_t avatar, const char* name, double weight = 1.0,
+                                   double blend_s = 0.3, double speed = 1.0) {
   return {avatar, name, 0, weight, blend_s, speed};
 }
-inline stridewire_layer LayerOff(std::uint32_t avatar, const char* name, double blend_s = 0.3) {
+/// A layer that fades out and ends. `name` must outlive the call to SetLayers.
+inline stridewire_layer FadeOutLayer(std::uint32_t avatar, const char* name, double blend_s = 0.3) {
   return {avatar, name, 1, 1.0, blend_s, 1.0};
 }
 
+/// A unit quaternion.
 struct Quaternion {
   float x;
   float y;
   float z;
   float w;
 };
-static_assert(sizeof(Quaternion) == 4 * sizeof(float), "rotations are written as floats");
+static_assert(sizeof(Quaternion) == 4 * sizeof(float),
+              "the C functions write four floats per quaternion");
 
-/// A pose with its rotations. Reuse one: its memory is kept.
+/// A pose with its rotations. Reuse an object to reuse its memory.
 struct Pose : stridewire_pose {
   Pose() : stridewire_pose() {}
   bool missing() const { return kind == STRIDEWIRE_POSE_MISSING; }
-  std::vector<Quaternion> rotations;  ///< `joint_count` of them when not missing.
+  std::vector<Quaternion> rotations;  ///< One per joint; empty if the pose is missing.
 };
 
+/// The skeleton of a world, with its joints and end sites.
 struct Skeleton : stridewire_skeleton {
   Skeleton() : stridewire_skeleton() {}
   std::vector<stridewire_joint> joints;
   std::vector<stridewire_end_site> end_sites;
 };
 
-/// The ground of a world; `columns` 0: without a height field.
+/// The terrain of a world. It has no height field if `columns` is 0.
 struct Terrain : stridewire_terrain {
   Terrain() : stridewire_terrain() {}
-  std::vector<float> heights_m;  ///< columns * rows of them, row by row, x fastest.
+  std::vector<float> heights_m;  ///< columns * rows heights, row by row along x.
   std::vector<stridewire_terrain_box> boxes;
 };
 
-/// One client. Movable, not copyable. Threads: as the C ABI.
+/// Owns a client handle. Movable, not copyable. All methods may be called from any thread. Methods
+/// without a comment have the behaviour of the C function with the same name.
 class Client {
  public:
-  /// Empty when it could not be made; `status` tells why.
+  /// Creates a client that is not connected. On failure it returns an empty optional and stores the
+  /// reason in `status` unless that is null.
   static std::optional<Client> Create(const stridewire_client_options& options = Options(),
                                       stridewire_status* status = nullptr) {
     stridewire_client* handle = nullptr;
@@ -157,7 +177,7 @@ class Client {
     return *this;
   }
 
-  /// For what this wrapper has no method for.
+  /// The handle, for C functions that have no method here. This object keeps the ownership.
   stridewire_client* get() const { return handle_; }
 
   Result Connect(const std::string& host, std::uint16_t port) {
@@ -167,7 +187,7 @@ class Client {
   stridewire_client_state state() const { return stridewire_client_get_state(handle_); }
   bool ready() const { return state() == STRIDEWIRE_STATE_READY; }
 
-  /// Why the last attempt, connection or call failed.
+  /// Describes why the last call, connection or attempt to connect failed.
   std::string LastError() const {
     char text[1100] = {};
     (void)stridewire_client_last_error(handle_, text, sizeof text);
@@ -197,7 +217,8 @@ class Client {
                 std::uint64_t* command = nullptr) {
     return stridewire_client_cancel(handle_, world, avatars.data(), avatars.size(), command);
   }
-  /// `box_count` follows from `boxes`. INVALID_ARGUMENT: heights_m are not columns * rows.
+  /// Sends the height field and the boxes; ignores `box_count`. Fails with INVALID_ARGUMENT if
+  /// `heights_m` does not have columns * rows elements.
   Result SetTerrain(stridewire_world world, const Terrain& terrain,
                     std::uint64_t* command = nullptr) {
     stridewire_height_field field{};
@@ -210,23 +231,29 @@ class Client {
     if (terrain.heights_m.size() != std::size_t{terrain.columns} * terrain.rows) {
       return STRIDEWIRE_INVALID_ARGUMENT;
     }
-    return stridewire_client_set_terrain(handle_, world, terrain.columns > 0 ? &field : nullptr,
-                                         terrain.boxes.data(), terrain.boxes.size(), command);
+    stridewire_terrain_def def{};
+    def.height_field = terrain.columns > 0 ? &field : nullptr;
+    def.boxes = terrain.boxes.data();
+    def.box_count = terrain.boxes.size();
+    return stridewire_client_set_terrain(handle_, world, &def, command);
   }
   Result SetLayers(stridewire_world world, const std::vector<stridewire_layer>& layers,
                    std::uint64_t* command = nullptr) {
     return stridewire_client_set_layers(handle_, world, layers.data(), layers.size(), command);
   }
-  Result SetPlanting(stridewire_world world, const std::vector<std::uint32_t>& avatars, bool on,
-                     std::uint64_t* command = nullptr) {
-    return stridewire_client_set_planting(handle_, world, avatars.data(), avatars.size(),
-                                          on ? 1 : 0, command);
+  Result SetPlanting(stridewire_world world, const std::vector<std::uint32_t>& avatars,
+                     bool enabled, std::uint64_t* command = nullptr) {
+    stridewire_planting planting{};
+    planting.avatars = avatars.data();
+    planting.avatar_count = avatars.size();
+    planting.enabled = enabled ? 1 : 0;
+    return stridewire_client_set_planting(handle_, world, &planting, command);
   }
   Result Observe(stridewire_world world, const stridewire_observation& observation,
                  std::uint32_t* subscription = nullptr, std::uint64_t* command = nullptr) {
     return stridewire_client_observe(handle_, world, &observation, subscription, command);
   }
-  /// All avatars of a world, every tick.
+  /// Observes all avatars of a world.
   Result Observe(stridewire_world world, stridewire_pose_mode mode = STRIDEWIRE_QUANTISED,
                  std::uint16_t every_n_ticks = 1) {
     stridewire_observation observation{};
@@ -234,11 +261,12 @@ class Client {
     observation.every_n_ticks = every_n_ticks;
     return Observe(world, observation);
   }
-  Result ObserveRegion(stridewire_world world, const stridewire_observation& observation,
+  /// Same as Observe with `observation.region` set to `region`.
+  Result ObserveRegion(stridewire_world world, stridewire_observation observation,
                        const stridewire_region& region, std::uint32_t* subscription = nullptr,
                        std::uint64_t* command = nullptr) {
-    return stridewire_client_observe_region(handle_, world, &observation, &region, subscription,
-                                            command);
+    observation.region = &region;
+    return Observe(world, observation, subscription, command);
   }
   Result MoveRegion(std::uint32_t subscription, const stridewire_region& region,
                     std::uint64_t* command = nullptr) {
@@ -249,28 +277,32 @@ class Client {
   }
   Result Ping() { return stridewire_client_ping(handle_); }
 
-  /// Takes the oldest event; false: there is none.
+  /// Removes the oldest event from the queue. Returns false if the queue is empty.
   bool PollEvent(stridewire_event& event) {
     std::size_t count = 0;
     return stridewire_client_poll_events(handle_, &event, 1, &count) == STRIDEWIRE_OK && count == 1;
   }
-  /// Waits for an event, at most `timeout_s`; false: none came.
+  /// Waits until the event queue is not empty. Returns false after `timeout_s`.
   bool WaitEvent(double timeout_s) {
     return stridewire_client_wait_event(handle_, timeout_s) == STRIDEWIRE_OK;
   }
 
   Result GetSkeleton(stridewire_world world, Skeleton& skeleton) const {
     for (;;) {
-      const stridewire_status status = stridewire_client_get_skeleton(
-          handle_, world, &skeleton, skeleton.joints.data(), skeleton.joints.size(),
-          skeleton.end_sites.data(), skeleton.end_sites.size());
+      stridewire_skeleton_buffers buffers{};
+      buffers.joints = skeleton.joints.data();
+      buffers.joint_capacity = skeleton.joints.size();
+      buffers.end_sites = skeleton.end_sites.data();
+      buffers.end_site_capacity = skeleton.end_sites.size();
+      const stridewire_status status =
+          stridewire_client_get_skeleton(handle_, world, &skeleton, &buffers);
       if (status != STRIDEWIRE_OK && status != STRIDEWIRE_BUFFER_TOO_SMALL) return status;
       skeleton.joints.resize(skeleton.joint_count);
       skeleton.end_sites.resize(skeleton.end_site_count);
       if (status == STRIDEWIRE_OK) return status;
     }
   }
-  /// Names of the layers of a world's library; none before the world is joined.
+  /// Names of the layers in a world's library. Empty before the event WORLD_JOINED.
   std::vector<std::string> ListLayers(stridewire_world world) const {
     std::vector<stridewire_layer_name> names;
     std::size_t count = 0;
@@ -284,15 +316,20 @@ class Client {
   }
   Result GetTerrain(stridewire_world world, Terrain& terrain) const {
     for (;;) {
-      const stridewire_status status = stridewire_client_get_terrain(
-          handle_, world, &terrain, terrain.heights_m.data(), terrain.heights_m.size(),
-          terrain.boxes.data(), terrain.boxes.size());
+      stridewire_terrain_buffers buffers{};
+      buffers.heights_m = terrain.heights_m.data();
+      buffers.height_capacity = terrain.heights_m.size();
+      buffers.boxes = terrain.boxes.data();
+      buffers.box_capacity = terrain.boxes.size();
+      const stridewire_status status =
+          stridewire_client_get_terrain(handle_, world, &terrain, &buffers);
       if (status != STRIDEWIRE_OK && status != STRIDEWIRE_BUFFER_TOO_SMALL) return status;
       terrain.heights_m.resize(std::size_t{terrain.columns} * terrain.rows);
       terrain.boxes.resize(terrain.box_count);
       if (status == STRIDEWIRE_OK) return status;
     }
   }
+  /// Ids of the avatars whose poses arrive, in ascending order.
   std::vector<std::uint32_t> ListAvatars(stridewire_world world) const {
     std::vector<std::uint32_t> avatars;
     std::size_t count = 0;
@@ -304,12 +341,13 @@ class Client {
     return avatars;
   }
 
-  /// Empty until the server's clock is known.
+  /// Server time in seconds. Empty before the first pose or pong.
   std::optional<double> ServerTime() const {
     double time_s = 0.0;
     if (stridewire_client_server_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
     return time_s;
   }
+  /// Time at which to sample poses, in seconds. Empty before the first pose or pong.
   std::optional<double> RenderTime() const {
     double time_s = 0.0;
     if (stridewire_client_render_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
@@ -317,22 +355,16 @@ class Client {
   }
 
   Result SamplePose(stridewire_world world, std::uint32_t avatar, double time_s, Pose& pose) const {
-    return Fill(pose, [&](float* rotations) {
-      return stridewire_client_sample_pose(handle_, world, avatar, time_s, &pose, rotations,
-                                           STRIDEWIRE_MAX_JOINTS);
-    });
+    return Fill(
+        pose, [&] { return stridewire_client_sample_pose(handle_, world, avatar, time_s, &pose); });
   }
   Result LatestPose(stridewire_world world, std::uint32_t avatar, Pose& pose) const {
-    return Fill(pose, [&](float* rotations) {
-      return stridewire_client_latest_pose(handle_, world, avatar, &pose, rotations,
-                                           STRIDEWIRE_MAX_JOINTS);
-    });
+    return Fill(pose, [&] { return stridewire_client_latest_pose(handle_, world, avatar, &pose); });
   }
   Result NextPose(stridewire_world world, std::uint32_t avatar, std::uint64_t after_tick,
                   Pose& pose) const {
-    return Fill(pose, [&](float* rotations) {
-      return stridewire_client_next_pose(handle_, world, avatar, after_tick, &pose, rotations,
-                                         STRIDEWIRE_MAX_JOINTS);
+    return Fill(pose, [&] {
+      return stridewire_client_next_pose(handle_, world, avatar, after_tick, &pose);
     });
   }
 
@@ -345,10 +377,16 @@ class Client {
  private:
   explicit Client(stridewire_client* handle) : handle_(handle) {}
 
+  // Calls `call` with the pose's own buffer, and detaches the buffer again, so that a copy of the
+  // pose does not point into it.
   template <typename Call>
   static Result Fill(Pose& pose, const Call& call) {
     pose.rotations.resize(STRIDEWIRE_MAX_JOINTS);
-    const stridewire_status status = call(reinterpret_cast<float*>(pose.rotations.data()));
+    pose.rotations_xyzw = reinterpret_cast<float*>(pose.rotations.data());
+    pose.joint_capacity = pose.rotations.size();
+    const stridewire_status status = call();
+    pose.rotations_xyzw = nullptr;
+    pose.joint_capacity = 0;
     pose.rotations.resize(pose.joint_count);
     return status;
   }

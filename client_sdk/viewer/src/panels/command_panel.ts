@@ -53,7 +53,7 @@ export class CommandPanel {
   private readonly toolRow: HTMLElement;
   private readonly exactOnlyBox = h('input', {type: 'checkbox', id: 'command-exact-only'});
   private readonly exactOnlyRow: HTMLElement;
-  private supportsExactOnly = false;
+  private connected = false;
   private readonly walkX = h('input', {type: 'number', id: 'walk-x', step: 'any', value: '0'});
   private readonly walkZ = h('input', {type: 'number', id: 'walk-z', step: 'any', value: '2'});
   private readonly walkHeading = h('input',
@@ -140,14 +140,13 @@ export class CommandPanel {
       this.randomWalkButton, this.terrainRow, this.message);
   }
 
-  /** Shows the controls that the server supports, and hides the others. */
-  setFeatures(footprints: boolean, walks: boolean, terrain: boolean, exactOnly: boolean): void {
-    this.supportsExactOnly = exactOnly;
-    this.exactOnlyRow.hidden = !exactOnly || this.tool !== 'step';
-    this.toolButtons.step.hidden = !footprints;
-    this.toolButtons.walk.hidden = this.walkRow.hidden = !walks;
-    this.toolRow.hidden = !footprints && !walks;
-    this.terrainRow.hidden = !terrain;
+  /** Hides the tools and the terrain without a connection. */
+  setConnected(connected: boolean): void {
+    this.connected = connected;
+    this.exactOnlyRow.hidden = !connected || this.tool !== 'step';
+    this.toolButtons.step.hidden = !connected;
+    this.toolButtons.walk.hidden = this.walkRow.hidden = !connected;
+    this.toolRow.hidden = this.terrainRow.hidden = !connected;
     if (this.tool !== null && this.toolButtons[this.tool].hidden) this.toggleTool(this.tool);
   }
   /** `on`: whether foot planting is on for all avatars that receive commands. */
@@ -178,12 +177,12 @@ export class CommandPanel {
     for (const name of ['step', 'walk'] as const) {
       setPressed(this.toolButtons[name], this.tool === name);
     }
-    this.exactOnlyRow.hidden = !this.supportsExactOnly || this.tool !== 'step';
+    this.exactOnlyRow.hidden = !this.connected || this.tool !== 'step';
     this.actions.setTool(this.tool);
   }
   /** Whether a step is rejected if the foot cannot reach the exact point. */
   get exactOnly(): boolean {
-    return this.supportsExactOnly && this.exactOnlyBox.checked;
+    return this.connected && this.exactOnlyBox.checked;
   }
   /** Copies the goal of a walk to the fields. */
   setGoalFields(atM: Vec3, headingRad: number | null): void {

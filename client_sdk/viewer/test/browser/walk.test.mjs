@@ -140,20 +140,6 @@ test('a click on flat terrain sends the avatar there', async () => {
   assert.deepEqual(third.atM, [-0.75, 0, 0.5]);
   assert.ok(Math.abs(third.headingRad + Math.PI / 2) < 1e-9);
   await arrives(third);
-
-  // The walk controls are hidden if the server does not support walks.
-  const visibleControls = () => page.locator('#command-walk-there, #walk-x').evaluateAll(
-    (elements) => elements.filter((element) => element.checkVisibility()).length);
-  assert.equal(await visibleControls(), 2);
-  await look(() => {
-    const {client} = window.stridewire;
-    const {serverHas} = Object.getPrototypeOf(client);
-    client.serverHas = (feature) => feature !== 'walks' && serverHas.call(client, feature);
-  });
-  await waitFor('the walk controls are hidden', async () => await visibleControls() === 0);
-  assert.equal(await page.locator('#command-step-there').isVisible(), true);
-  assert.equal(await look(() =>
-    document.querySelector('canvas.scene').classList.contains('placing')), false);
   assert.deepEqual(errors, []);
   await context.close();
 });

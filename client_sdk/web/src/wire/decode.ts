@@ -171,7 +171,6 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       protocolMin,
       protocolMax,
       clientName: name(m.clientName(asBytes), 'Hello.clientName'),
-      features: m.features(),
       authToken: text(m.authToken(asBytes), maxAuthTokenBytes, 'Hello.authToken'),
       resumeToken: resumeToken(m.resumeTokenArray(), 'Hello.resumeToken'),
       lastEventsNumber: m.lastEventsNumber(),
@@ -326,7 +325,6 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     return {
       type: 'Welcome',
       protocol: id(m.protocol(), 'Welcome.protocol'),
-      features: m.features(),
       session: id(m.session(), 'Welcome.session'),
       resumeToken: resumeToken(m.resumeTokenArray(), 'Welcome.resumeToken'),
       resumed: m.resumed(),

@@ -75,7 +75,7 @@ function build(b: Builder, m: ClientMessage): number {
       const name = b.createString(m.clientName);
       const auth = b.createString(m.authToken);
       const token = wire.Hello.createResumeTokenVector(b, m.resumeToken);
-      return wire.Hello.createHello(b, m.protocolMin, m.protocolMax, name, m.features, auth, token,
+      return wire.Hello.createHello(b, m.protocolMin, m.protocolMax, name, auth, token,
                                     m.lastEventsNumber);
     }
     case 'JoinWorld':

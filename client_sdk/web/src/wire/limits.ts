@@ -2,21 +2,6 @@
 export const frameHeaderBytes = 16;
 export const protocolVersion = 1;
 
-export const featureResume = 1n;
-export const featureEventReplay = 2n;
-export const featureQuantised = 4n;
-export const featureInspect = 16n;
-export const featureTerrain = 32n;
-export const featureFootprints = 64n;
-export const featureWalks = 128n;
-export const featureTakeovers = 256n;
-export const featureLayers = 512n;
-export const featureRefusals = 1024n;
-export const featurePlanting = 2048n;
-export const featureCompact = 4096n;
-export const featureDetail = 8192n;
-export const featureRegions = 16_384n;
-
 export const maxHelloBytes = 16 << 10;
 export const maxControlBytes = 1 << 20;
 export const maxBulkBytes = 16 << 20;

@@ -11,7 +11,6 @@ export interface Hello {
   protocolMin: number;
   protocolMax: number;
   clientName: string;
-  features: bigint;
   authToken: string;
   resumeToken: Uint8Array;
   lastEventsNumber: bigint;
@@ -112,7 +111,6 @@ export interface ServerLimits {
 export interface Welcome {
   type: 'Welcome';
   protocol: number;
-  features: bigint;
   session: bigint;
   resumeToken: Uint8Array;
   resumed: boolean;

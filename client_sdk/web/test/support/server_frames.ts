@@ -22,7 +22,6 @@ export interface WelcomeFields {
   replyMemory?: number;
   maxBulkBytes?: number;
   protocol?: number;
-  features?: bigint;
 }
 
 export function welcome(fields: WelcomeFields = {}): ArrayBuffer {
@@ -35,7 +34,6 @@ export function welcome(fields: WelcomeFields = {}): ArrayBuffer {
       fields.idleTimeoutS ?? 30, 60);
   wire.Welcome.startWelcome(b);
   wire.Welcome.addProtocol(b, fields.protocol ?? 1);
-  wire.Welcome.addFeatures(b, fields.features ?? 4095n);
   wire.Welcome.addSession(b, 5n);
   wire.Welcome.addResumeToken(b, token);
   wire.Welcome.addResumed(b, fields.resumed ?? false);

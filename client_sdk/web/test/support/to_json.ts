@@ -90,7 +90,7 @@ export function toJson(m: Message): {[name: string]: Json} {
     case 'Hello':
       return {
         protocol_min: m.protocolMin, protocol_max: m.protocolMax, client_name: m.clientName,
-        features: u64(m.features), auth_token: m.authToken, resume_token: token(m.resumeToken),
+        auth_token: m.authToken, resume_token: token(m.resumeToken),
         last_events_number: u64(m.lastEventsNumber),
       };
     case 'JoinWorld': return {seq: u64(m.seq), name: m.name, role: roles.indexOf(m.role)};
@@ -143,7 +143,7 @@ export function toJson(m: Message): {[name: string]: Json} {
     case 'Goodbye': return {code: m.code, text: m.text};
     case 'Welcome':
       return {
-        protocol: m.protocol, features: u64(m.features), session: u64(m.session),
+        protocol: m.protocol, session: u64(m.session),
         resume_token: token(m.resumeToken), resumed: m.resumed, last_seq: u64(m.lastSeq),
         tick_hz: m.tickHz, server_name: m.serverName, server_version: m.serverVersion,
         limits: {

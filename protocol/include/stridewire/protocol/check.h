@@ -5,10 +5,12 @@
 
 namespace stridewire::protocol {
 
-/// Whether a message means something (STANDARD.md, "Meaning"). Encoding and decoding both ask.
-/// kOutOfRange: a number not finite or an id 0; kMalformed: an unknown enumerator, text that is not
-/// UTF-8; kLimitExceeded: too many items, too long a text; kShapeMismatch: counts that do not
-/// match. `where` is the field, e.g. "Request.length_m", and `index` the item.
+/// Checks the rules of STANDARD.md, "Meaning". Encoder and decoder both call it. Error codes:
+///   kOutOfRange     a number is not finite, or an id is 0
+///   kMalformed      an enumerator is unknown, or a text is not UTF-8
+///   kLimitExceeded  too many items, or a text is too long
+///   kShapeMismatch  lists that belong together have different lengths
+/// `Error::where` names the field, for example "Request.length_m", and `index` is the item.
 [[nodiscard]] Status Check(const Hello& m);
 [[nodiscard]] Status Check(const JoinWorld& m);
 [[nodiscard]] Status Check(const LeaveWorld& m);

@@ -11,94 +11,103 @@
 
 namespace stridewire::protocol {
 
-/// Whether codes can be told and decoded: references unit, numbers finite, bits within RotationQuantization's limits, a root
-/// that turns every way. kOutOfRange, kMalformed; `index` is the joint. None at all is allowed: a world without.
+/// Checks the rotation codes of a WorldInfo: references are unit quaternions, numbers are finite
+/// and within the limits of RotationQuantization, and the root uses "smallest three". An empty list
+/// is valid. Fails with kOutOfRange, kMalformed or kLimitExceeded; `index` is the joint.
 [[nodiscard]] Status CheckRotationCodes(std::span<const RotationQuantization> codes);
 
-/// Whether some joints can be told without the others: numbers growing, the root among them and of each its parent.
-/// kShapeMismatch: more than there are joints; kMalformed with `index` in `joints`.
-[[nodiscard]] Status CheckFewerJoints(std::span<const std::uint16_t> joints,
-                                      std::span<const std::int16_t> parents);
+/// Checks the joints of PoseDetail::kReduced: ascending, with the root and the parent of every
+/// joint. Fails with kShapeMismatch if there are more than `parents`, and with kMalformed; `index`
+/// is the position in `joints`.
+[[nodiscard]] Status CheckReducedJoints(std::span<const std::uint16_t> joints,
+                                        std::span<const std::int16_t> parents);
 
-/// A RotationQuantization as the codec takes it.
+/// A RotationQuantization in the form that the encoder uses.
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
   float low[3] = {};
-  float step[3] = {};   ///< Of a free joint the first: of each of the three
-  float steps[3] = {};  ///< 1 / step
+  float step[3] = {};          ///< If "smallest three", step[0] applies to all components.
+  float inverse_step[3] = {};  ///< 1 / step
   std::int32_t bits[3] = {};
-  std::int32_t smallest_three_bits = 0;  ///< 0: not free
+  std::int32_t smallest_three_bits = 0;  ///< 0: not encoded as "smallest three".
   float least_w = 0.0f;
-  std::int32_t parent = -1;  ///< -1: none
-  bool is_turned = false;    ///< `reference` is not 1
-  bool bears_others = false;
-  bool is_left_out = false;  ///< Decoded to `reference`, however it is turned.
+  std::int32_t parent = -1;    ///< -1 for the root.
+  bool has_reference = false;  ///< `reference` is not the identity.
+  bool has_children = false;
+  bool is_omitted = false;  ///< The pose does not contain the joint. It is decoded to `reference`.
 };
 
-/// What a 32-bit word of a pose has of one number.
+/// The part of one number that a 32-bit word of a pose contains.
 struct CompactPart {
-  std::uint16_t row = 0;  ///< Of the number, among those of a pose
-  std::int8_t left = 0;   ///< Bits it is shifted by, to the right if negative
+  std::uint16_t row = 0;  ///< Index of the number among the numbers of a pose.
+  std::int8_t left = 0;   ///< Bits by which the number is shifted left; right if negative.
   bool ends_word = false;
 };
 
-/// PoseMode::kCompact (STANDARD.md, "Poses"): the root as in kQuantised, then every joint's bits behind one another, the
-/// first of a number in the lowest bits, in little-endian words of 16 bits. What is left of the last word is 0.
+/// Encodes and decodes compact poses (STANDARD.md, "Poses"): the quantised root, followed by the
+/// bits of each joint without gaps, lowest bit first, in little-endian words of 16 bits. The unused
+/// bits of the last word are 0.
 ///
-/// Joints are encoded from the root on, each relative to what its parent is decoded to, so that it makes up for the errors
-/// of those above: its own error is all that is left of its rotation in the world.
+/// The encoder starts at the root and encodes each joint relative to the decoded rotation of its
+/// parent. A joint therefore corrects the errors of its ancestors, and only its own error remains
+/// in its world rotation.
 class CompactCodec {
  public:
-  /// Poses that are encoded together.
+  /// Number of poses that are encoded together.
   static constexpr std::size_t kBlock = 16;
-  /// Of Block::StreamBytes.
+  /// Block::StreamBytes writes poses in pieces of this size.
   static constexpr std::size_t kPieceBytes = 16;
-  static constexpr std::size_t kMostBehind = 3;
+  /// Block::StreamBytes can write up to this many pieces after the end of a pose.
+  static constexpr std::size_t kMaxTrailingPieces = 3;
 
-  /// `parents` has one entry a joint, -1 for the first, then below its own index. `told`: the joints that are told;
-  /// none: all. Errors as CheckRotationCodes and CheckFewerJoints, kShapeMismatch: not as many parents; kOutOfRange:
-  /// a parent.
+  /// `parents` has one entry per joint: -1 for the root, else below the joint's own index. A pose
+  /// contains the joints in `included`, or all joints if it is empty. Fails with the errors of
+  /// CheckRotationCodes and CheckReducedJoints, with kShapeMismatch if the lists differ in length,
+  /// and with kOutOfRange for an invalid parent.
   [[nodiscard]] static Expected<CompactCodec> Make(std::span<const RotationQuantization> codes,
                                                    std::span<const std::int16_t> parents,
-                                                   std::span<const std::uint16_t> told = {});
+                                                   std::span<const std::uint16_t> included = {});
 
   [[nodiscard]] std::size_t joint_count() const { return joints_.size(); }
-  /// Bytes of a pose.
+  /// Size of a pose in bytes.
   [[nodiscard]] std::size_t pose_bytes() const { return pose_bytes_; }
+  /// Number of pieces that contain a pose.
   [[nodiscard]] std::size_t pieces() const { return (pose_bytes_ + kPieceBytes - 1) / kPieceBytes; }
 
-  /// Poses side by side, of which the first `count` are there: all of joint_count() joints.
-  struct Lanes {
+  /// Poses in structure-of-arrays layout, each with joint_count() joints.
+  struct SoaPoses {
     const float* roots_m;    ///< [x y z][kBlock]
     const float* rotations;  ///< [joint][x y z w][kBlock]
-    std::size_t count;       ///< At most kBlock
-    /// Rotations are unit, as who evaluates poses makes them, or no numbers at all: their lengths are not looked at.
+    std::size_t count;       ///< Number of valid poses, at most kBlock.
+    /// The caller guarantees that rotations are unit quaternions or NaN, so the encoder does not
+    /// check their lengths.
     bool are_unit = false;
   };
 
-  /// Up to kBlock poses on their way to be encoded, and what came of it. Keep one: only Encode of a codec with more
-  /// joints than any before allocates.
+  /// Up to kBlock poses and their encoded bytes. Reuse a block: it allocates only for skeletons
+  /// with more joints than before.
   class Block {
    public:
     [[nodiscard]] std::size_t size() const { return size_; }
-    /// Forgets them.
+    /// Removes all poses.
     void Clear() { size_ = 0; }
-    /// Copies a pose in; there is room for kBlock.
+    /// Adds a copy of a pose. The block must have fewer than kBlock poses.
     void Add(const Vec3& root_position_m, std::span<const Quat> rotations);
-    /// The pose as it was added to it.
+    /// Gets the i-th pose as it was added.
     void Get(std::size_t i, Vec3& root_position_m, std::span<Quat> rotations) const;
-    /// After Encode: the pose is one that these codes can tell.
+    /// After Encode: returns whether the pose is inside the range of the rotation codes.
     [[nodiscard]] bool fits(std::size_t i) const { return fits_[i] != 0; }
-    /// After Encode: its bytes, pose_bytes() of them; without meaning unless it fits.
+    /// After Encode: copies the pose_bytes() bytes of a pose. They are unspecified unless fits(i).
     void CopyBytes(std::size_t i, std::span<std::byte> out) const;
-    /// The same past the caches, which keep what is at hand, for who reads it much later: pieces of kPieceBytes, up to
-    /// kMostBehind more than its bytes take, which mean nothing. `to` is a multiple of kPieceBytes; lines of the cache
-    /// ought to be filled from one end to the other, for half of one is slow.
+    /// Same as CopyBytes with non-temporal stores, which bypass the caches; for bytes that are read
+    /// much later. Writes `pieces` pieces, at most kMaxTrailingPieces more than the pose needs; the
+    /// excess is unspecified. `to` is aligned to kPieceBytes. Fill whole cache lines: partial ones
+    /// are slow.
     void StreamBytes(std::size_t i, std::size_t pieces, std::byte* to) const;
 
    private:
     friend class CompactCodec;
-    // One number of each pose: a line of the cache, so that no vector lies across two.
+    // One number of each pose. Aligned to a cache line, so that no vector crosses two lines.
     struct alignas(64) Floats {
       float of[kBlock];
     };
@@ -115,14 +124,16 @@ class CompactCodec {
     std::uint32_t fits_[kBlock] = {};
   };
 
-  /// Encodes what was added, all of joint_count() joints. Not every pose fits: one whose joints turn out of the codes'
-  /// ranges, whose root is beyond kMaxRootM, or with a number that is not finite or a quaternion not unit within 1e-5.
+  /// Encodes the poses of a block, which must have joint_count() joints. A pose does not fit if a
+  /// rotation is outside the range of its code, the root exceeds kMaxRootM, a number is not finite,
+  /// or the length of a quaternion deviates from 1 by more than 1e-5.
   void Encode(Block& block) const;
-  /// The same of poses that lie elsewhere; of the block's own nothing is left.
-  void Encode(const Lanes& poses, Block& block) const;
+  /// Same for poses of the caller. Replaces the poses of the block.
+  void Encode(const SoaPoses& poses, Block& block) const;
 
-  /// Reads one pose of pose_bytes() bytes, of any alignment; `rotations` has joint_count() entries and come back unit to
-  /// float32. kShapeMismatch: another size; kOutOfRange: the root; kMalformed: bits that no encoder writes.
+  /// Decodes a pose. `in` needs no alignment. Rotations are unit to float32 precision. Fails with
+  /// kShapeMismatch if a size is wrong, kOutOfRange for the root, and kMalformed for bits that no
+  /// encoder writes.
   [[nodiscard]] Status Decode(std::span<const std::byte> in, Vec3& root_position_m,
                               std::span<Quat> rotations) const;
 
@@ -130,8 +141,8 @@ class CompactCodec {
   CompactCodec() = default;
 
   std::vector<CompactJoint> joints_;
-  std::vector<std::uint16_t> order_;  // of encoding
-  std::vector<CompactPart> parts_;    // of a pose's words, one after the other
+  std::vector<std::uint16_t> order_;  // order in which joints are encoded
+  std::vector<CompactPart> parts_;    // parts of all words of a pose
   std::size_t pose_bytes_ = 0;
 };
 

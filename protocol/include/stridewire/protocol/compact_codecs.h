@@ -12,19 +12,20 @@
 
 namespace stridewire::protocol {
 
-/// The codecs of one world's compact poses: one a level of detail, all by the same codes.
+/// The codecs for the compact poses of one world: one per PoseDetail, all with the same
+/// quantization.
 class CompactCodecs {
  public:
-  /// None: a world whose poses are not compact.
+  /// No codecs.
   CompactCodecs() = default;
 
-  /// `fewer_joints` as CheckFewerJoints takes them, or none: then there is no PoseDetail::kFewer. Errors as
+  /// Without `reduced_joints` there is no codec for PoseDetail::kReduced. Fails with the errors of
   /// CompactCodec::Make.
   [[nodiscard]] static Expected<CompactCodecs> Make(std::span<const RotationQuantization> codes,
                                                     std::span<const std::int16_t> parents,
-                                                    std::span<const std::uint16_t> fewer_joints);
+                                                    std::span<const std::uint16_t> reduced_joints);
 
-  /// Null: poses of that mode are not compact, or not known here.
+  /// Returns the codec of a mode, or null if there is none.
   [[nodiscard]] const CompactCodec* Find(PoseMode mode) const;
 
  private:

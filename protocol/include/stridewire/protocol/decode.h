@@ -6,11 +6,12 @@
 
 namespace stridewire::protocol {
 
-/// Reads a frame's payload: verifies the FlatBuffers structure (depth, number of tables, every
-/// offset), then counts and lengths before anything is copied, then the meaning (check.h). Bytes
-/// from anyone are safe to give. A PoseBatch borrows the payload; every other message owns what it
-/// holds. kMalformed, kLimitExceeded, kOutOfRange, kShapeMismatch, kUnsupported (unknown type),
-/// kInvalidArgument (payload not on a multiple of 8 bytes). After an error the connection closes.
+/// Decodes the payload of a frame. Safe for untrusted bytes: it verifies the FlatBuffers structure
+/// (depth, number of tables, every offset), then counts and lengths before it copies anything, and
+/// then the rules of check.h. A PoseBatch borrows the payload; all other messages own their data.
+///
+/// Fails with the errors of Check, with kUnsupported for an unknown type, and with kInvalidArgument
+/// if the payload is not aligned to 8 bytes. The caller must close the connection after an error.
 [[nodiscard]] Expected<Message> DecodeMessage(const FrameView& frame);
 
 }  // namespace stridewire::protocol

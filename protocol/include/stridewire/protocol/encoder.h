@@ -11,12 +11,12 @@
 
 namespace stridewire::protocol {
 
-/// Turns messages into frames. Keeps its memory from one message to the next: one a connection or
-/// thread. Not thread-safe.
+/// Encodes messages as frames. Reuses its memory for every message; use one encoder per connection
+/// or thread. Not thread-safe.
 ///
-/// `Encode` appends header and payload to `frame`, so several frames may go out in one write. It
-/// refuses what a peer would refuse, with the errors of Check (check.h) or kLimitExceeded for a
-/// payload over its cap, and then leaves `frame` as it was.
+/// `Encode` appends header and payload to `frame`, so that one write can send several frames. It
+/// fails with the errors of Check (check.h), and with kLimitExceeded if the payload exceeds its
+/// cap. On failure `frame` is unchanged.
 class Encoder {
  public:
   explicit Encoder(const FrameLimits& limits = {});

@@ -11,7 +11,7 @@
 
 namespace stridewire::protocol {
 
-/// Message types as they stand in the frame header. Append only.
+/// Message types in the frame header. Numbers are never reused.
 enum class MessageType : std::uint16_t {
   // Client to server.
   kHello = 1,
@@ -29,7 +29,7 @@ enum class MessageType : std::uint16_t {
   kSetLayers = 13,
   kSetPlanting = 14,
   kFetchLibrary = 15,
-  // Both ways.
+  // In both directions.
   kGoodbye = 32,
   // Server to client.
   kWelcome = 64,
@@ -46,59 +46,66 @@ enum class MessageType : std::uint16_t {
   kLibraryPiece = 75,
 };
 
-/// Who sent it.
+/// Side that sent a frame.
 enum class Sender : std::uint8_t { kClient, kServer };
 
-/// "Hello", "PoseBatch"; "unknown" for a number that is no type.
+/// Returns the name of a type, for example "PoseBatch", or "unknown".
 [[nodiscard]] std::string_view MessageTypeName(MessageType type);
+/// Returns whether the number is a message type.
 [[nodiscard]] bool IsKnown(MessageType type);
+/// Returns whether this side may send messages of this type.
 [[nodiscard]] bool MaySend(Sender sender, MessageType type);
 
-/// Messages that carry a crowd: they may be as large as FrameLimits::max_bulk_bytes.
+/// Returns whether messages of this type may be as large as FrameLimits::max_bulk_bytes, because
+/// they can hold data of a whole crowd.
 [[nodiscard]] bool IsBulk(MessageType type);
 
-/// Largest payloads to take or make. Lower them freely; the defaults are what the standard allows.
+/// Caps of payload sizes in bytes. The defaults are the limits of the standard. A program may use
+/// lower ones.
 struct FrameLimits {
   std::size_t max_control_bytes = kMaxControlBytes;
   std::size_t max_bulk_bytes = kMaxBulkBytes;
 };
 
-/// Cap of a payload of this type. Hello is capped at kMaxHelloBytes as well.
+/// Returns the cap of payloads of this type in bytes. Hello is also capped at kMaxHelloBytes.
 [[nodiscard]] std::size_t MaxPayloadBytes(MessageType type, const FrameLimits& limits = {});
 
-/// Frame header: 16 bytes, little-endian (STANDARD.md, "Frame").
+/// Size of the frame header in bytes. Its fields are little-endian (STANDARD.md, "Frame"):
 ///   0 magic "SWP\x1a"   4 u16 frame version   6 u16 type   8 u32 payload bytes   12 u32 flags = 0
-/// The payload is a multiple of 8 bytes long (zeros at its end), so that every frame of a stream
-/// begins on a multiple of 8.
+/// Payloads are padded with zeros to a multiple of 8 bytes, so that every frame of a stream is
+/// aligned to 8 bytes.
 inline constexpr std::size_t kFrameHeaderBytes = 16;
 inline constexpr std::array<std::byte, 4> kFrameMagic = {std::byte{'S'}, std::byte{'W'},
                                                          std::byte{'P'}, std::byte{0x1a}};
 inline constexpr std::uint16_t kFrameVersion = 1;
 inline constexpr std::size_t kPayloadAlignment = 8;
 
+/// The fields of a frame header that vary.
 struct FrameHeader {
   MessageType type = MessageType::kHello;
   std::uint32_t payload_bytes = 0;
 };
 
-/// A frame in somebody else's memory.
+/// A frame whose payload is borrowed.
 struct FrameView {
   MessageType type = MessageType::kHello;
-  std::span<const std::byte> payload;  ///< Begins on a multiple of 8 bytes.
+  std::span<const std::byte> payload;  ///< Aligned to 8 bytes.
 };
 
-/// Writes a header. `out` is kFrameHeaderBytes long.
+/// Writes a frame header.
 void WriteFrameHeader(const FrameHeader& header, std::span<std::byte, kFrameHeaderBytes> out);
 
-/// Reads a header sent by `sender` and checks magic, version, type, direction, length and flags.
-/// kMalformed, kVersionMismatch, kUnsupported (type), kLimitExceeded (length). After an error
-/// nothing that follows can be trusted: the connection closes.
+/// Reads a frame header that `sender` sent. Fails with kMalformed (magic, direction, flags, or a
+/// length that is 0 or not a multiple of 8), kVersionMismatch, kUnsupported (unknown type) or
+/// kLimitExceeded (length). After an error the rest of the stream is invalid, so the caller must
+/// close the connection.
 [[nodiscard]] Expected<FrameHeader> ReadFrameHeader(
     std::span<const std::byte, kFrameHeaderBytes> bytes, Sender sender,
     const FrameLimits& limits = {});
 
-/// One whole frame, e.g. a WebSocket message: header and exactly its payload. `bytes` begins on a
-/// multiple of 8 (kInvalidArgument otherwise) and must outlive the view.
+/// Parses one whole frame, for example a WebSocket message. `bytes` must outlive the returned view.
+/// Fails with the errors of ReadFrameHeader, with kMalformed if the payload has another size than
+/// the header states, and with kInvalidArgument if `bytes` is not aligned to 8 bytes.
 [[nodiscard]] Expected<FrameView> ParseFrame(std::span<const std::byte> bytes, Sender sender,
                                              const FrameLimits& limits = {});
 

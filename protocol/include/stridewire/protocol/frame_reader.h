@@ -9,29 +9,30 @@
 
 namespace stridewire::protocol {
 
-/// Cuts a stream of bytes into frames.
+/// Splits a stream of bytes into frames.
 ///
-///   std::span<const std::byte> bytes = …;                  // as they came from the socket
+///   std::span<const std::byte> bytes = ...;                // from the socket
 ///   for (;;) {
 ///     auto next = reader.Next(bytes);
-///     if (!next) return Close(next.error());               // nothing after it can be trusted
-///     if (!*next) break;                                   // all bytes taken, no frame complete
+///     if (!next) return Close(next.error());               // the rest of the stream is invalid
+///     if (!*next) break;                                   // the next frame is incomplete
 ///     Handle(**next);
 ///   }
 ///
-/// Holds at most one frame, and never more memory than twice what has arrived of it: an announced
-/// length alone allocates nothing. Not thread-safe.
+/// Buffers at most one frame. Its memory is at most twice the number of received bytes of that
+/// frame, so a header alone cannot make it allocate a large buffer. Not thread-safe.
 class FrameReader {
  public:
-  /// `sender` is the peer: frames it may not send are errors.
+  /// `sender` is the peer. Types that it may not send are errors.
   explicit FrameReader(Sender sender, const FrameLimits& limits = {});
 
-  /// Takes bytes off the front of `bytes` up to the end of one frame. The view is valid until the
-  /// next call and while the bytes given live (a frame that lies whole and aligned in them is not
-  /// copied). Errors as ReadFrameHeader; after one every call gives the same error.
+  /// Consumes bytes from the front of `bytes` up to the end of one frame. Returns an empty optional
+  /// if the frame is incomplete. The view is valid until the next call and as long as the memory of
+  /// `bytes`, because a complete and aligned frame is not copied. Fails with the errors of
+  /// ReadFrameHeader. After an error every call returns the same error.
   [[nodiscard]] Expected<std::optional<FrameView>> Next(std::span<const std::byte>& bytes);
 
-  /// Changes the caps from the next header on, e.g. after a handshake.
+  /// Sets the caps for all following frames, for example after the handshake.
   void set_limits(const FrameLimits& limits) { limits_ = limits; }
 
   [[nodiscard]] std::size_t buffered_bytes() const { return buffer_.size(); }
@@ -41,8 +42,8 @@ class FrameReader {
   Sender sender_;
   FrameLimits limits_;
   std::vector<std::byte> buffer_;
-  std::optional<FrameHeader> header_;  ///< Of the frame in `buffer_`, once its header is there.
-  bool frame_given_ = false;           ///< The frame in `buffer_` was handed out.
+  std::optional<FrameHeader> header_;  ///< Header of the frame in `buffer_`.
+  bool frame_given_ = false;           ///< The frame in `buffer_` was returned.
   std::optional<Error> error_;
 };
 

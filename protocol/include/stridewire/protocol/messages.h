@@ -17,52 +17,59 @@
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/status_code.h"
 
-/// The messages as plain values. Encoding and decoding check the same things (Check): numbers are
-/// finite, ids are not zero, counts are within limits.h and match, texts are short UTF-8. Whether
-/// an avatar exists or a step is possible is for the server to say, item by item.
+/// The messages of the protocol as plain structs. STANDARD.md defines their fields.
+///
+/// Encoder and decoder run the same checks (check.h): numbers are finite, ids are not 0, counts
+/// match and are within limits.h, and texts are short UTF-8. The server alone checks whether an
+/// avatar exists or a step is possible, and it replies item by item.
 namespace stridewire::protocol {
 
-using WorldId = std::uint32_t;         ///< Given by the server, never 0.
-using AvatarId = std::uint32_t;    ///< Number within its world, never 0.
+using WorldId = std::uint32_t;         ///< Assigned by the server, never 0.
+using AvatarId = std::uint32_t;        ///< Unique in its world, never 0.
 using SubscriptionId = std::uint32_t;  ///< Chosen by the client, unique in its session, never 0.
-using RequestId = std::uint64_t;       ///< Chosen by the client; 0 is the avatar's own doing.
+using RequestId = std::uint64_t;  ///< Chosen by the client. 0: a step that the server inserted.
 
-/// Number of a command in its session: 1, 2, 3, … (STATE_MACHINE.md, "Commands").
+/// Sequence number of a command in its session: 1, 2, 3, ... (STATE_MACHINE.md, "Commands").
 using Seq = std::uint64_t;
 
+/// What a session may do in a world. Only controllers may command avatars.
 enum class Role : std::uint8_t { kController = 0, kObserver = 1 };
+/// Moving foot of a requested step. kAuto is the foot that did not move last.
 enum class FootChoice : std::uint8_t { kAuto = 0, kLeft = 1, kRight = 2 };
-/// When a request begins, and what becomes of those before it.
+/// When a request begins, and whether it replaces queued requests.
 enum class Interrupt : std::uint8_t {
-  kNone = 0,  ///< After all that is queued.
-  kAfterMovement =
-      1,     ///< After the movement under way; the queue is dropped, a stand or walk ends.
-  kNow = 2,  ///< As soon as feet allow; the queue is dropped.
+  kNone = 0,           ///< After all queued requests.
+  kAfterMovement = 1,  ///< After the current movement. Drops the queue; a stand or walk ends.
+  kNow = 2,            ///< As soon as the feet allow. Drops the queue.
 };
+/// A foot of an avatar.
 enum class FootSide : std::uint8_t { kLeft = 0, kRight = 1 };
+/// Kind of a movement that an avatar executes.
 enum class MovementKind : std::uint8_t { kStepLeft = 0, kStepRight = 1, kJump = 2, kStand = 3 };
 
-/// Frame of reference of an avatar: where it stands and where it faces.
+/// Base frame of an avatar: its position and horizontal rotation.
 struct Placement {
   DVec3 position_m = DVec3(0.0);
-  double heading_rad = 0.0;  ///< About +Y, left positive, unwrapped.
+  double heading_rad = 0.0;  ///< Rotation about +Y, positive to the left, not wrapped.
   bool operator==(const Placement&) const = default;
 };
 
 // ---- client to server
 
+/// First message of a connection.
 struct Hello {
   static constexpr MessageType kType = MessageType::kHello;
-  std::uint16_t protocol_min = kProtocolMin;  ///< 1 <= min <= max
-  std::uint16_t protocol_max = kProtocolMax;
-  std::string client_name;  ///< 1 to kMaxNameBytes, for logs.
-  std::uint64_t features = 0;
-  std::string auth_token;                ///< May be empty.
-  std::vector<std::byte> resume_token;   ///< Empty: a new session. Else from Welcome.
-  std::uint64_t last_events_number = 0;  ///< Resuming: Events::number last received.
+  std::uint16_t protocol_min = kProtocolVersion;  ///< At least 1, at most protocol_max.
+  std::uint16_t protocol_max = kProtocolVersion;
+  std::string client_name;  ///< For the server's log, 1 to kMaxNameBytes.
+  std::string auth_token;   ///< May be empty.
+  std::vector<std::byte>
+      resume_token;  ///< From Welcome, to resume a session. Empty: a new session.
+  std::uint64_t last_events_number = 0;  ///< On resume: the last received Events::number.
   bool operator==(const Hello&) const = default;
 };
 
+/// Joins a world. The server answers with WorldInfo and a Reply.
 struct JoinWorld {
   static constexpr MessageType kType = MessageType::kJoinWorld;
   Seq seq = 0;
@@ -71,6 +78,7 @@ struct JoinWorld {
   bool operator==(const JoinWorld&) const = default;
 };
 
+/// Leaves a world and ends its subscriptions.
 struct LeaveWorld {
   static constexpr MessageType kType = MessageType::kLeaveWorld;
   Seq seq = 0;
@@ -78,12 +86,14 @@ struct LeaveWorld {
   bool operator==(const LeaveWorld&) const = default;
 };
 
+/// An avatar to spawn.
 struct SpawnItem {
-  AvatarId avatar = 0;  ///< 0: the server chooses and tells in the reply.
+  AvatarId avatar = 0;  ///< 0: the server chooses an id and returns it in the Reply.
   Placement start;
   bool operator==(const SpawnItem&) const = default;
 };
 
+/// Spawns avatars.
 struct Spawn {
   static constexpr MessageType kType = MessageType::kSpawn;
   Seq seq = 0;
@@ -92,6 +102,7 @@ struct Spawn {
   bool operator==(const Spawn&) const = default;
 };
 
+/// Removes avatars.
 struct Remove {
   static constexpr MessageType kType = MessageType::kRemove;
   Seq seq = 0;
@@ -100,26 +111,28 @@ struct Remove {
   bool operator==(const Remove&) const = default;
 };
 
-/// Where a foot is to land, in the world.
+/// Target of a foot in the world.
 struct Footprint {
-  DVec3 position_m = DVec3(0.0);      ///< Of the ball of the foot, on the ground.
+  DVec3 position_m = DVec3(0.0);      ///< Position of the ball of the foot.
   std::optional<double> heading_rad;  ///< Absent: the server chooses.
   bool operator==(const Footprint&) const = default;
 };
 
+/// A requested step, either by parameters or to a footprint.
 struct StepMovement {
-  FootChoice foot = FootChoice::kAuto;  ///< kAuto: the other foot than last time.
-  double length_m = 0.0;                ///< Forward distance between the feet at the end.
-  std::optional<double> side_m;         ///< Fixed to moving foot, towards the moving foot's side.
-  double height_m = 0.0;
-  double turn_rad = 0.0;
-  /// Lands here, if there is one; then length, side, height and turn are not sent.
+  FootChoice foot = FootChoice::kAuto;
+  double length_m = 0.0;         ///< Forward distance between the feet at the end.
+  std::optional<double> side_m;  ///< From fixed to moving foot, positive to the moving foot's side.
+  double height_m = 0.0;         ///< Height of the moving foot above the fixed foot at the end.
+  double turn_rad = 0.0;         ///< Change of heading.
+  /// Target of the foot. If present, length, side, height and turn are not encoded.
   std::optional<Footprint> at;
-  /// Only with `at` and kFeatureRefusals: rejected when it is about to start and `at` is out of reach.
+  /// Only with `at`: reject the step, when it is about to start, if `at` is out of reach.
   bool exact_only = false;
   bool operator==(const StepMovement&) const = default;
 };
 
+/// A requested jump with both feet.
 struct JumpMovement {
   double length_m = 0.0;
   double height_m = 0.0;
@@ -127,30 +140,33 @@ struct JumpMovement {
   bool operator==(const JumpMovement&) const = default;
 };
 
+/// A request to stand.
 struct StandMovement {
-  double seconds = 0.0;
+  double seconds = 0.0;  ///< Duration.
   bool operator==(const StandMovement&) const = default;
 };
 
-/// As many steps as it takes to a place. Only with kFeatureWalks. Its steps carry its request id; a
-/// finished stand with that id says it has arrived, a rejected one why it can not.
+/// A request to walk to a position. Events of its steps carry its request id. The walk ends with a
+/// finished stand of that id when the avatar has arrived, or with a rejected event.
 struct WalkMovement {
-  DVec3 position_m = DVec3(0.0);   ///< Of the base frame; the height is the ground's.
-  double heading_rad = 0.0;        ///< Of the base frame.
-  std::vector<DVec3> waypoints_m;  ///< Passed on the way, in order; at most kMaxWaypoints.
-  std::optional<double> speed_m_s;
+  DVec3 position_m = DVec3(0.0);   ///< Destination of the base frame. The terrain gives its height.
+  double heading_rad = 0.0;        ///< Heading of the base frame at the destination.
+  std::vector<DVec3> waypoints_m;  ///< Passed in order; at most kMaxWaypoints.
+  std::optional<double> speed_m_s;  ///< Absent: the server chooses.
   bool operator==(const WalkMovement&) const = default;
 };
 
+/// One requested movement of one avatar.
 struct RequestItem {
-  AvatarId avatar = 0;   ///< Not 0.
-  RequestId request_id = 0;  ///< Not 0; comes back in events.
+  AvatarId avatar = 0;       ///< Not 0.
+  RequestId request_id = 0;  ///< Not 0. Events repeat it.
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
-  Interrupt interrupt = Interrupt::kNone;  ///< Another one only with kFeatureTakeovers.
+  Interrupt interrupt = Interrupt::kNone;
   bool operator==(const RequestItem&) const = default;
 };
 
-/// Movements asked for, of one avatar or a whole crowd; an avatar may stand in it several times.
+/// Requests movements of one or more avatars. An avatar may appear several times and executes its
+/// movements in order.
 struct Request {
   static constexpr MessageType kType = MessageType::kRequest;
   Seq seq = 0;
@@ -159,7 +175,7 @@ struct Request {
   bool operator==(const Request&) const = default;
 };
 
-/// Drops what has not started.
+/// Drops all requests of the avatars that have not started.
 struct CancelQueue {
   static constexpr MessageType kType = MessageType::kCancelQueue;
   Seq seq = 0;
@@ -168,60 +184,60 @@ struct CancelQueue {
   bool operator==(const CancelQueue&) const = default;
 };
 
-/// A place on the ground, seen from above.
-struct GroundPlace {
+/// Horizontal coordinates in metres.
+struct GroundPoint {
   double x = 0.0;
   double z = 0.0;
-  bool operator==(const GroundPlace&) const = default;
+  bool operator==(const GroundPoint&) const = default;
 };
 
-/// Heights at the corners of a grid, from `origin_m` on; bilinear between them.
+/// Heights on a regular grid, interpolated bilinearly. The height outside the grid is 0.
 struct HeightFieldInfo {
-  GroundPlace origin_m;
-  double cell_m = 0.0;
+  GroundPoint origin_m;          ///< Position of the first sample.
+  double cell_m = 0.0;           ///< Distance between neighbouring samples.
   std::uint16_t columns = 0;     ///< Along x, 2 to kMaxTerrainColumns.
   std::uint16_t rows = 0;        ///< Along z, 2 to kMaxTerrainColumns.
-  std::vector<float> heights_m;  ///< Row by row, x fastest.
+  std::vector<float> heights_m;  ///< columns * rows heights, row by row along x.
   bool operator==(const HeightFieldInfo&) const = default;
 };
 
+/// A block with vertical sides and a flat top.
 struct TerrainBoxInfo {
-  GroundPlace min_m;
-  GroundPlace max_m;
-  double height_m = 0.0;  ///< Of the flat top.
+  GroundPoint min_m;
+  GroundPoint max_m;
+  double height_m = 0.0;  ///< y of the top.
   bool operator==(const TerrainBoxInfo&) const = default;
 };
 
-/// Ground of a world: the highest of its height field (0 beside it) and its boxes. Nothing: flat
-/// at 0.
+/// Terrain of a world. Its height at a point is the maximum of the height field and of all boxes
+/// there.
 struct TerrainInfo {
   std::optional<HeightFieldInfo> height_field;
-  std::vector<TerrainBoxInfo> boxes;  ///< Up to kMaxTerrainBoxes.
+  std::vector<TerrainBoxInfo> boxes;  ///< At most kMaxTerrainBoxes.
   bool operator==(const TerrainInfo&) const = default;
 };
 
-/// Gives a world another ground, or none. Only with kFeatureTerrain.
+/// Replaces the terrain of a world.
 struct SetTerrain {
   static constexpr MessageType kType = MessageType::kSetTerrain;
   Seq seq = 0;
   WorldId world = 0;
-  std::optional<TerrainInfo> terrain;  ///< Absent: flat at 0.
+  std::optional<TerrainInfo> terrain;  ///< Absent: flat at y = 0.
   bool operator==(const SetTerrain&) const = default;
 };
 
-/// Starts a clip of the library over what an avatar does, or ends it. Ranges are the server's to check,
-/// item by item.
+/// Starts, changes or ends a layer of an avatar. The server checks the ranges item by item.
 struct LayerItem {
-  AvatarId avatar = 0;  ///< Not 0.
-  std::string layer;        ///< One of WorldInfo::layers, 1 to kMaxNameBytes.
-  bool is_off = false;      ///< Ends it; weight and speed then mean nothing.
-  double weight = 1.0;      ///< Above 0, up to 1.
-  double blend_s = 0.3;     ///< How long weight and speed take to get there: 0 to 10.
-  double speed = 1.0;       ///< 0.1 to 4; 1: as recorded.
+  AvatarId avatar = 0;    ///< Not 0.
+  std::string layer;      ///< One of WorldInfo::layers, 1 to kMaxNameBytes.
+  bool fade_out = false;  ///< Fades the layer out and ends it. `weight` and `speed` are ignored.
+  double weight = 1.0;    ///< Above 0, at most 1.
+  double blend_s = 0.3;   ///< Time until weight and speed reach their new values, 0 to 10.
+  double speed = 1.0;     ///< Playback speed, 0.1 to 4. 1 plays as recorded.
   bool operator==(const LayerItem&) const = default;
 };
 
-/// Only with kFeatureLayers.
+/// Starts, changes and ends layers: clips that play over the current movement.
 struct SetLayers {
   static constexpr MessageType kType = MessageType::kSetLayers;
   Seq seq = 0;
@@ -230,54 +246,56 @@ struct SetLayers {
   bool operator==(const SetLayers&) const = default;
 };
 
-/// Feet stand still where they land, or are where the examples have them: each avatar's from the next movement on
-/// that it begins. Only with kFeaturePlanting.
+/// Enables or disables foot planting from the next movement of each avatar on. With planting, feet
+/// stand still where they land. Without it, they move as in the examples.
 struct SetPlanting {
   static constexpr MessageType kType = MessageType::kSetPlanting;
   Seq seq = 0;
   WorldId world = 0;
-  std::vector<AvatarId> avatars;  ///< At least one.
-  bool is_off = false;
+  std::vector<AvatarId> avatars;  ///< 1 to kMaxItems
+  bool enabled = true;
   bool operator==(const SetPlanting&) const = default;
 };
 
-/// Within `to_m` of a region's centre poses come every so many ticks.
+/// Within `to_m` of a region's centre, the server sends poses every `every_n_ticks` ticks.
 struct RateRing {
-  double to_m = 0.0;                ///< Above 0, and above that of the ring before.
+  double to_m = 0.0;                ///< Outer radius. Above 0, and above that of the previous ring.
   std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
   bool operator==(const RateRing&) const = default;
 };
 
-/// A circle on the ground. Avatars whose root comes within its radius enter; they leave where they are further than
-/// radius and `leave_m`.
+/// A circle on the ground. An avatar enters when its root comes within `radius_m` of the centre and
+/// leaves at a distance of `radius_m` + `leave_m`.
 struct Region {
-  GroundPlace centre_m;
+  GroundPoint centre_m;
   double radius_m = 0.0;          ///< Above 0.
-  std::optional<double> leave_m;  ///< At least 0; absent: the server chooses.
-  std::vector<RateRing> rings;    ///< At most kMaxRateRings. Beyond them: Observe::every_n_ticks.
-  /// In which detail poses come within each ring, beyond them Observe::detail; none: that everywhere. Of quantised
-  /// poses only, and as Observe::detail with kFeatureDetail and kFeatureCompact.
+  std::optional<double> leave_m;  ///< At least 0. Absent: the server chooses.
+  std::vector<RateRing>
+      rings;  ///< At most kMaxRateRings. Beyond them Observe::every_n_ticks applies.
+  /// Detail of each ring, or empty to use Observe::detail everywhere. Needs PoseMode::kQuantised.
   std::vector<PoseDetail> ring_details;
   bool operator==(const Region&) const = default;
 };
 
+/// Starts a subscription to poses, or moves the region of one.
 struct Observe {
   static constexpr MessageType kType = MessageType::kObserve;
   Seq seq = 0;
   WorldId world = 0;
   SubscriptionId subscription = 0;  ///< Not 0.
-  PoseMode mode = PoseMode::kFull;
-  std::vector<AvatarId> avatars;  ///< Empty: all. Numbers nobody has yet may be among them.
-  std::uint16_t every_n_ticks = 1;    ///< 1 to kMaxEveryNTicks
-  bool with_events = false;           ///< Events of the world, too.
-  /// Who is in it, instead of `avatars`, which is empty then. Only with kFeatureRegions.
+  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or kMovement.
+  std::vector<AvatarId> avatars;  ///< Empty: all. Ids of avatars that do not exist yet are allowed.
+  std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
+  bool with_events = false;         ///< Also receive the events of the world.
+  /// Observes the avatars inside this region. `avatars` must then be empty.
   std::optional<Region> region;
-  bool replace = false;  ///< Puts this region in place of that of the subscription of that number.
-  /// Of quantised poses only. With kFeatureDetail and kFeatureCompact, else kAll.
+  bool replace = false;  ///< Replaces the region of the existing subscription with this id.
+  /// Detail of kQuantised poses; kAll in other modes.
   PoseDetail detail = PoseDetail::kAll;
   bool operator==(const Observe&) const = default;
 };
 
+/// Ends a subscription.
 struct StopObserving {
   static constexpr MessageType kType = MessageType::kStopObserving;
   Seq seq = 0;
@@ -285,29 +303,30 @@ struct StopObserving {
   bool operator==(const StopObserving&) const = default;
 };
 
+/// Measures the round-trip time and keeps the connection alive.
 struct Ping {
   static constexpr MessageType kType = MessageType::kPing;
   std::uint64_t nonce = 0;
-  double time_s = 0.0;  ///< The client's clock; comes back in Pong.
+  double time_s = 0.0;  ///< Time of the client's clock. Pong repeats it.
   bool operator==(const Ping&) const = default;
 };
 
-/// Asks for a piece of the library of a world joined; LibraryPiece answers. A question, like InspectAvatar. Needs
-/// kFeatureMovementMode.
+/// Requests a piece of the library of a joined world. A query like InspectAvatar, answered by
+/// LibraryPiece.
 struct FetchLibrary {
   static constexpr MessageType kType = MessageType::kFetchLibrary;
-  std::uint64_t nonce = 0;   ///< Comes back in LibraryPiece.
+  std::uint64_t nonce = 0;   ///< LibraryPiece repeats it.
   std::string hash;          ///< WorldInfo::library_hash
-  std::uint64_t offset = 0;  ///< Where in its file
-  std::uint32_t length = 0;  ///< 1 to kMaxPieceBytes; less may come
+  std::uint64_t offset = 0;  ///< Position in the file, in bytes.
+  std::uint32_t length = 0;  ///< 1 to kMaxPieceBytes. The server may send fewer bytes.
   bool operator==(const FetchLibrary&) const = default;
 };
 
-/// Asks what an avatar is doing; AvatarState answers. A question, like Ping: it changes nothing, and
-/// what was under way when a connection broke is not answered. Needs kFeatureInspect.
+/// Queries what an avatar is doing. The answer is AvatarState. A query changes nothing, and the
+/// server does not answer it if the connection is lost.
 struct InspectAvatar {
   static constexpr MessageType kType = MessageType::kInspectAvatar;
-  std::uint64_t nonce = 0;  ///< Comes back in AvatarState.
+  std::uint64_t nonce = 0;  ///< AvatarState repeats it.
   WorldId world = 0;
   AvatarId avatar = 0;
   bool operator==(const InspectAvatar&) const = default;
@@ -315,8 +334,8 @@ struct InspectAvatar {
 
 // ---- both ways
 
-/// Last message of a connection, and the end of the session: it cannot be resumed. A server that
-/// only wants the client to come back closes without it.
+/// Ends the connection and the session, which cannot be resumed. A server closes the connection
+/// without Goodbye if the client should reconnect.
 struct Goodbye {
   static constexpr MessageType kType = MessageType::kGoodbye;
   StatusCode code = StatusCode::kOk;
@@ -326,65 +345,70 @@ struct Goodbye {
 
 // ---- server to client
 
+/// Limits of the server. A client must not exceed them.
 struct ServerLimits {
   std::uint32_t max_control_bytes = static_cast<std::uint32_t>(kMaxControlBytes);
   std::uint32_t max_bulk_bytes = static_cast<std::uint32_t>(kMaxBulkBytes);
   std::uint32_t max_items = static_cast<std::uint32_t>(kMaxItems);
   std::uint32_t max_avatars_per_world = 0;
-  std::uint32_t max_queue = 0;  ///< Requests waiting, per avatar.
-  std::uint32_t reply_memory = kReplyCache;
-  double idle_timeout_s = 0.0;   ///< A connection silent for longer is closed; 0: never.
-  double resume_window_s = 0.0;  ///< How long a session waits for its client; 0: not at all.
+  std::uint32_t max_queue = 0;               ///< Queued requests per avatar.
+  std::uint32_t reply_memory = kReplyCache;  ///< Replies that the server stores per session.
+  double idle_timeout_s = 0.0;   ///< The server closes a connection after this silence. 0: never.
+  double resume_window_s = 0.0;  ///< Time in which a lost session can be resumed. 0: not at all.
   bool operator==(const ServerLimits&) const = default;
 };
 
+/// Accepts a Hello.
 struct Welcome {
   static constexpr MessageType kType = MessageType::kWelcome;
-  std::uint16_t protocol = kProtocolMax;  ///< The version both speak from now on.
-  std::uint64_t features = 0;             ///< The client's features that the server has as well.
-  std::uint64_t session = 0;              ///< Not 0.
-  std::vector<std::byte> resume_token;    ///< For Hello after a lost connection; secret.
-  bool resumed = false;                   ///< False: nothing is left of an earlier session.
-  Seq last_seq = 0;                       ///< Last command done; 0 in a new session.
-  double tick_hz = 60.0;                  ///< > 0
+  std::uint16_t protocol = kProtocolVersion;  ///< Protocol version of the connection.
+  std::uint64_t session = 0;                  ///< Not 0.
+  std::vector<std::byte> resume_token;        ///< Secret for Hello after a lost connection.
+  bool resumed = false;                       ///< False: the session is new.
+  Seq last_seq = 0;                           ///< Last command that the server accepted; 0 if new.
+  double tick_hz = 60.0;                      ///< Above 0.
   std::string server_name;
   std::string server_version;
   ServerLimits limits;
   bool operator==(const Welcome&) const = default;
 };
 
+/// A joint of a skeleton.
 struct JointInfo {
-  std::string name;          ///< Unique in its skeleton.
-  std::int16_t parent = -1;  ///< Smaller than its own index; -1 for the root, which comes first.
-  Vec3 offset_m = Vec3(0.0f);
+  std::string name;            ///< Unique in the skeleton.
+  std::int16_t parent = -1;    ///< Below the joint's own index. -1 for the root, joint 0.
+  Vec3 offset_m = Vec3(0.0f);  ///< Position relative to the parent.
   bool operator==(const JointInfo&) const = default;
 };
 
+/// The end of a chain of joints, for example a fingertip.
 struct EndSiteInfo {
   std::uint16_t joint = 0;
-  Vec3 offset_m = Vec3(0.0f);
+  Vec3 offset_m = Vec3(0.0f);  ///< Position relative to `joint`.
   bool operator==(const EndSiteInfo&) const = default;
 };
 
+/// Joint indices of a leg. -1: the library does not define the joint.
 struct LegInfo {
-  std::int16_t hip = -1;  ///< Joint indices; -1: not known.
+  std::int16_t hip = -1;
   std::int16_t knee = -1;
   std::int16_t ankle = -1;
   std::int16_t ball = -1;
-  Vec3 ball_offset_m = Vec3(0.0f);
-  Vec3 toe_tip_offset_m = Vec3(0.0f);
+  Vec3 ball_offset_m = Vec3(0.0f);     ///< The ball of the foot, relative to joint `ball`.
+  Vec3 toe_tip_offset_m = Vec3(0.0f);  ///< The tip of the toes, relative to joint `ball`.
   bool operator==(const LegInfo&) const = default;
 };
 
+/// Skeleton of all avatars of a world.
 struct SkeletonInfo {
   std::vector<JointInfo> joints;  ///< 1 to kMaxJoints
   std::vector<EndSiteInfo> end_sites;
-  std::array<LegInfo, 2> legs;  ///< Left, right.
+  std::array<LegInfo, 2> legs;  ///< Left leg, right leg.
   bool operator==(const SkeletonInfo&) const = default;
 };
 
-/// Describes a world joined; comes before the Reply to JoinWorld, and after Welcome with seq 0 for
-/// each world a resumed session is in.
+/// Describes a joined world. Precedes the Reply to JoinWorld. After a resume the server sends one
+/// with seq 0 for each joined world.
 struct WorldInfo {
   static constexpr MessageType kType = MessageType::kWorldInfo;
   Seq seq = 0;
@@ -392,109 +416,114 @@ struct WorldInfo {
   std::string name;
   Role role = Role::kController;
   std::uint64_t tick = 0;
-  std::string library_hash;  ///< As `stridewire-library inspect` prints it.
+  std::string library_hash;  ///< XXH3-128 of the library's payload in hexadecimal digits.
   SkeletonInfo skeleton;
-  std::vector<std::string> layers;  ///< Names for SetLayers; only with kFeatureLayers.
-  /// One a joint, for compact poses; only with kFeatureCompact, else none.
+  std::vector<std::string> layers;  ///< Names for SetLayers.
+  /// Quantization of each joint in compact poses.
   std::vector<RotationQuantization> rotation_codes;
-  /// Those that PoseDetail::kFewer tells, growing, the root among them and of each its parent (CheckFewerJoints);
-  /// only with kFeatureDetail and codes, else none.
-  std::vector<std::uint16_t> fewer_joints;
+  /// Joints of PoseDetail::kReduced in ascending order (CheckReducedJoints).
+  std::vector<std::uint16_t> reduced_joints;
   bool operator==(const WorldInfo&) const = default;
 };
 
+/// Result of one item of a command.
 struct ReplyItem {
   std::uint32_t index = 0;  ///< Position in the command's items or avatars.
   AvatarId avatar = 0;
-  RequestId request_id = 0;  ///< Only for Request.
+  RequestId request_id = 0;  ///< Only in the Reply to a Request.
   StatusCode code = StatusCode::kOk;
   std::string text;
   bool operator==(const ReplyItem&) const = default;
 };
 
-/// The answer to a command; every command has exactly one.
+/// Answers a command. Every command has exactly one Reply.
 struct Reply {
   static constexpr MessageType kType = MessageType::kReply;
   Seq seq = 0;
-  StatusCode code = StatusCode::kOk;  ///< Of the command as a whole.
+  StatusCode code = StatusCode::kOk;  ///< Result of the command as a whole.
   std::string text;
-  std::uint32_t accepted = 0;    ///< How many of its items were done.
-  std::vector<ReplyItem> items;  ///< Spawn: every item. Otherwise only those refused.
+  std::uint32_t accepted = 0;    ///< Number of items that were executed.
+  std::vector<ReplyItem> items;  ///< Spawn: every item. Other commands: refused items only.
   bool operator==(const Reply&) const = default;
 };
 
-/// Flags of an avatar in a batch. Unknown bits are ignored.
-inline constexpr std::uint8_t kPoseDiscontinuity = 1;  ///< Do not interpolate from the last pose.
-inline constexpr std::uint8_t kPoseStanding = 2;       ///< Standing, nothing queued.
-/// In a compact batch: this pose is quantised, since the world's codes cannot tell it.
-inline constexpr std::uint8_t kPoseWide = 4;
+/// Flag of an avatar in a batch: do not interpolate from its previous pose. Receivers ignore
+/// unknown flags.
+inline constexpr std::uint8_t kPoseDiscontinuity = 1;
+/// Flag of an avatar in a batch: it stands and its queue is empty.
+inline constexpr std::uint8_t kPoseStanding = 2;
+/// Flag of an avatar in a compact batch: its pose is outside the range of the world's quantization
+/// and has the layout of PoseMode::kQuantised.
+inline constexpr std::uint8_t kPoseUncompressed = 4;
 
-/// What a batch says about itself. Nothing in it is a session's: a batch is encoded once and sent
-/// to every observer of that world and mode.
+/// Header of a batch. It contains nothing about a session, because the server encodes a batch once
+/// and sends it to every observer of that world and mode.
 struct PoseBatchInfo {
   WorldId world = 0;
   std::uint16_t shard = 0;
-  std::uint16_t part = 0;  ///< A shard with more avatars than fit in a frame sends several parts.
-  std::uint16_t parts = 1;
+  std::uint16_t part = 0;   ///< Below `parts`.
+  std::uint16_t parts = 1;  ///< Above 1 if the avatars of the shard do not fit in one frame.
   std::uint64_t tick = 0;
-  double server_time_s = 0.0;       ///< The server's clock at that tick.
-  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or IsCompact
+  double server_time_s = 0.0;       ///< Server time of the tick.
+  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or a compact mode.
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
-  bool is_partial = false;          ///< Who is not in it may be there all the same: of a region.
+  bool is_partial = false;          ///< An avatar that is not in the batch may still exist.
   bool operator==(const PoseBatchInfo&) const = default;
 };
 
-/// Poses of many avatars at one tick, as views into the frame it was decoded from (or, when it is
-/// to be encoded, into the caller's arrays). Decoding checks that the sizes match; each pose is
-/// checked when DecodePose reads it. Poses are displayed poses: root in the world.
+/// Poses of many avatars at one tick. Borrows its arrays: from the frame it was decoded from, or
+/// from the caller of the encoder. Decoding checks the sizes of the arrays, and DecodePose checks
+/// each pose. Root positions and rotations are in world space.
 struct PoseBatch {
   static constexpr MessageType kType = MessageType::kPoseBatch;
   PoseBatchInfo info;
-  std::span<const AvatarId> avatars;  ///< 0 to kMaxItems, none 0
-  std::span<const std::uint8_t> flags;    ///< One an avatar.
-  std::span<const std::byte> poses;       ///< One after the other (PoseBatchReader).
+  std::span<const AvatarId> avatars;    ///< 0 to kMaxItems ids, none of them 0.
+  std::span<const std::uint8_t> flags;  ///< One per avatar.
+  std::span<const std::byte> poses;     ///< One pose after the other; see PoseBatchReader.
 
-  /// One of a full or quantised batch.
+  /// Bytes of the i-th pose of a full or quantised batch.
   [[nodiscard]] std::span<const std::byte> pose(std::size_t i) const {
     const std::size_t bytes = PoseBytes(info.mode, info.joint_count);
     return poses.subspan(i * bytes, bytes);
   }
 };
 
-/// Bytes of each pose of a compact batch that is not wide, 0 if there is none. Empty: the batch's size is not that of
-/// so many poses.
+/// Computes the size of each compressed pose of a compact batch; 0 if all poses are uncompressed.
+/// Empty if the size of the batch does not match its flags.
 [[nodiscard]] std::optional<std::size_t> CompactPoseBytes(const PoseBatch& batch);
 
+/// Type of an event. The comments list the fields of Event that the type uses.
 enum class EventType : std::uint8_t {
-  kAccepted = 0,    ///< A request was queued.
-  kStarted = 1,     ///< kind, group, requested, applied, extrapolated, clamped
-  kFootStrike = 2,  ///< foot, position_m
-  kFinished = 3,    ///< base: the new base frame. The commit point.
-  kIdle = 4,        ///< Queue empty and standing; base
-  kRejected = 5,    ///< A request turned out impossible: code, reason
+  kAccepted = 0,    ///< request_id. The request was queued.
+  kStarted = 1,     ///< request_id, kind, group, requested, applied, extrapolated, clamped
+  kFootStrike = 2,  ///< request_id, foot, position_m
+  kFinished = 3,    ///< request_id, kind, base (the new base frame), cut_short
+  kIdle = 4,        ///< base. The avatar stands and its queue is empty.
+  kRejected = 5,    ///< request_id, code, reason. The request turned out to be impossible.
   kSpawned = 6,     ///< base
   kRemoved = 7,
-  kEntered = 8,  ///< The region this session observes. Only with kFeatureRegions.
-  kLeft = 9,     ///< That region, or the world. The same.
+  kEntered = 8,  ///< The avatar has entered the region that this session observes.
+  kLeft = 9,     ///< The avatar has left that region or the world.
 };
 
-/// Values by parameter name: 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m, 4 end_y_m,
-/// 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m.
+/// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m,
+/// 4 end_y_m, 5 end_z_m, 6 turn_rad, 7 length_m, 8 height_m.
 struct ParameterSet {
   std::array<std::uint8_t, kMaxParameters> names{};
   std::array<double, kMaxParameters> values{};
-  std::uint8_t count = 0;  ///< Entries past it are zero.
+  std::uint8_t count = 0;  ///< Number of valid entries. All further entries are 0.
   bool operator==(const ParameterSet&) const = default;
 };
 
+/// Something that happened to an avatar.
 struct Event {
   EventType type = EventType::kAccepted;
   AvatarId avatar = 0;
-  RequestId request_id = 0;  ///< 0: the avatar's own doing.
+  RequestId request_id = 0;  ///< 0: a step that the server inserted.
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
   std::uint64_t tick = 0;
-  double time_s = 0.0;  ///< On the server's clock, as PoseBatchInfo::server_time_s.
+  double time_s = 0.0;  ///< Server time of the tick.
   ParameterSet requested;
   ParameterSet applied;
   bool extrapolated = false;
@@ -504,21 +533,21 @@ struct Event {
   Placement base;
   StatusCode code = StatusCode::kOk;
   std::string reason;
-  bool cut_short = false;  ///< Finished: another request took over before its end.
+  bool cut_short = false;  ///< Another request interrupted the movement.
   bool operator==(const Event&) const = default;
 };
 
-/// What happened in a world, in order.
+/// Events of a world in chronological order.
 struct Events {
   static constexpr MessageType kType = MessageType::kEvents;
   WorldId world = 0;
-  std::uint64_t number = 0;  ///< 1, 2, 3, … in the session; 0 without kFeatureEventReplay.
+  std::uint64_t number = 0;  ///< 1, 2, 3, ... in the session.
   std::uint64_t tick = 0;
   std::vector<Event> events;  ///< 1 to kMaxItems
   bool operator==(const Events&) const = default;
 };
 
-/// Tells a slow observer what it did not get, counted since it joined the world.
+/// Reports how much the server has dropped for a slow reader since it joined the world.
 struct Lagging {
   static constexpr MessageType kType = MessageType::kLagging;
   WorldId world = 0;
@@ -527,135 +556,140 @@ struct Lagging {
   bool operator==(const Lagging&) const = default;
 };
 
-/// Something wrong that is no command's answer. After a fatal one the server closes.
+/// Reports an error outside of a Reply. After a fatal error the server closes the connection.
 struct ErrorNotice {
   static constexpr MessageType kType = MessageType::kError;
   StatusCode code = StatusCode::kInternal;
   std::string text;
   bool fatal = false;
-  Seq seq = 0;  ///< The command it was about, 0 if none.
+  Seq seq = 0;  ///< Command that caused the error, or 0.
   bool operator==(const ErrorNotice&) const = default;
 };
 
+/// Answers a Ping.
 struct Pong {
   static constexpr MessageType kType = MessageType::kPong;
   std::uint64_t nonce = 0;
-  double time_s = 0.0;  ///< From Ping.
+  double time_s = 0.0;  ///< Copied from Ping.
   double server_time_s = 0.0;
   std::uint64_t tick = 0;
   bool operator==(const Pong&) const = default;
 };
 
-/// Where a foot of the movement under way is about to stand.
+/// Where a foot will land in the current movement.
 struct Landing {
   FootSide foot = FootSide::kLeft;
-  DVec3 position_m = DVec3(0.0);  ///< Of its ball, on the ground
-  double heading_rad = 0.0;       ///< As a Footprint's
+  DVec3 position_m = DVec3(0.0);  ///< Position of the ball of the foot.
+  double heading_rad = 0.0;       ///< Heading of the foot.
   bool operator==(const Landing&) const = default;
 };
 
-/// A layer an avatar plays.
+/// A layer that an avatar plays.
 struct PlayingLayer {
-  std::string layer;       ///< One of WorldInfo::layers
-  double weight = 0.0;     ///< Now
-  double time_s = 0.0;     ///< In its clip
-  double speed = 1.0;      ///< Now
-  bool is_ending = false;  ///< On its way out
+  std::string layer;       ///< One of WorldInfo::layers.
+  double weight = 0.0;     ///< Current weight.
+  double time_s = 0.0;     ///< Position in the clip in seconds.
+  double speed = 1.0;      ///< Current playback speed.
+  bool is_ending = false;  ///< The layer fades out.
   bool operator==(const PlayingLayer&) const = default;
 };
 
-/// What an avatar does just now. A requested stand has no group, keytimes or weights.
+/// The movement that an avatar executes. A requested stand has no group, keytimes or weights.
 struct CurrentMovement {
   RequestId request_id = 0;
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
-  double started_s = 0.0;          ///< On the server's clock.
-  std::vector<double> keytimes_s;  ///< From its start, the first 0; at most kMaxKeytimes.
-  double generic_time = 0.0;       ///< 0 to keytimes - 1 (paper, Eq. (3)).
-  double ease_out_s = 0.0;         ///< How long the difference pose lasts.
+  double started_s = 0.0;          ///< Server time of the start.
+  std::vector<double> keytimes_s;  ///< Relative to the start; the first is 0. At most kMaxKeytimes.
+  double generic_time = 0.0;       ///< 0 to number of keytimes - 1 (paper, Eq. (3)).
+  double ease_out_s = 0.0;         ///< Duration of the difference pose.
   ParameterSet requested;
   ParameterSet applied;
   bool extrapolated = false;
   bool clamped = false;
-  std::vector<float> weights;                 ///< [example], at most kMaxWeights.
-  std::vector<std::uint8_t> parameter_names;  ///< As in ParameterSet.
-  std::vector<float> sites;       ///< [example][parameter]: where the examples lie; may be empty.
-  std::vector<Landing> landings;  ///< Of feet not there yet; at most kMaxLandings.
+  std::vector<float> weights;  ///< One per example of the group, at most kMaxWeights.
+  std::vector<std::uint8_t>
+      parameter_names;  ///< Parameters of the group; names as in ParameterSet.
+  /// Parameters of the examples, example by example. May be empty.
+  std::vector<float> sites;
+  std::vector<Landing> landings;  ///< Feet that have not landed yet, at most kMaxLandings.
   bool operator==(const CurrentMovement&) const = default;
 };
 
-/// The answer to InspectAvatar.
+/// Answers InspectAvatar.
 struct AvatarState {
   static constexpr MessageType kType = MessageType::kAvatarState;
   std::uint64_t nonce = 0;
   WorldId world = 0;
   AvatarId avatar = 0;
-  StatusCode code = StatusCode::kOk;  ///< If not kOk, nothing below `text` is set.
+  StatusCode code = StatusCode::kOk;  ///< If not kOk, only `text` follows.
   std::string text;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;
   Placement base;
   std::optional<CurrentMovement> movement;
   std::uint32_t queue_size = 0;
-  std::vector<RequestItem> queue;    ///< The first kMaxInspectedRequests of it.
-  bool is_planting_off = false;      ///< As SetPlanting left it.
-  std::vector<PlayingLayer> layers;  ///< At most kMaxPlayingLayers, those above later.
+  std::vector<RequestItem> queue;    ///< The first kMaxInspectedRequests queued requests.
+  bool planting_enabled = true;      ///< See SetPlanting.
+  std::vector<PlayingLayer> layers;  ///< At most kMaxPlayingLayers. Later layers are on top.
   bool operator==(const AvatarState&) const = default;
 };
 
-/// The ground of a world joined: after WorldInfo if it has one (after Welcome of a resumed session
-/// always), and whenever it changes. Only with kFeatureTerrain.
+/// Terrain of a joined world. The server sends it after WorldInfo if the world has a terrain,
+/// always after a resume, and whenever the terrain changes.
 struct WorldTerrain {
   static constexpr MessageType kType = MessageType::kWorldTerrain;
   WorldId world = 0;
-  std::optional<TerrainInfo> terrain;  ///< Absent: flat at 0.
+  std::optional<TerrainInfo> terrain;  ///< Absent: flat at y = 0.
   bool operator==(const WorldTerrain&) const = default;
 };
 
-/// Flag of an avatar in Movements, beside kPoseDiscontinuity: it is gone, and has no record.
+/// Flag of an avatar in Movements, besides kPoseDiscontinuity: the avatar is gone and has no
+/// record.
 inline constexpr std::uint8_t kMovementGone = 4;
 
-/// What avatars of a shard begin, for who evaluates their poses (STANDARD.md, "Movement records"). Avatars go on in steps of
-/// one tick; every step has a message, in order, with the changes in it. Other messages have the states after a step, of avatars
-/// that the receiver knows nothing of yet.
+/// Movement records of one shard, for clients that evaluate poses themselves (STANDARD.md,
+/// "Movement records"). The avatars of a shard advance in steps of one tick. The server sends the
+/// changes of every step in order, and the complete states of avatars that the client does not know
+/// yet.
 struct Movements {
   static constexpr MessageType kType = MessageType::kMovements;
   WorldId world = 0;
   std::uint16_t shard = 0;
-  std::uint16_t part = 0;
-  std::uint16_t parts = 1;
-  std::uint16_t more_steps = 0;  ///< That follow until poses of `tick` are to be shown.
-  std::uint64_t step =
-      0;  ///< Of this shard's avatars; one more each. A gap: what is known is no more.
+  std::uint16_t part = 0;        ///< Below `parts`.
+  std::uint16_t parts = 1;       ///< Messages that contain the changes of this step.
+  std::uint16_t more_steps = 0;  ///< Steps that follow before the poses of `tick` are displayed.
+  std::uint64_t step = 0;        ///< Step number of the shard. A gap makes all its avatars unknown.
   std::uint64_t tick = 0;
-  double server_time_s = 0.0;         ///< The server's clock at that tick.
-  bool states = false;                ///< After `step`, which came before; else the changes in it.
-  std::vector<AvatarId> avatars;  ///< 0 to kMaxItems, none 0
-  std::vector<std::uint8_t> flags;    ///< One an avatar.
-  std::vector<std::uint32_t>
-      ends;  ///< Where in `records` each one's ends; it begins where the one before ends.
+  double server_time_s = 0.0;       ///< Server time of the tick.
+  bool states = false;              ///< True: states after `step`. False: changes in `step`.
+  std::vector<AvatarId> avatars;    ///< 0 to kMaxItems ids, none of them 0.
+  std::vector<std::uint8_t> flags;  ///< One per avatar.
+  std::vector<std::uint32_t> ends;  ///< End of each avatar's record in `records`, in bytes.
   std::vector<std::byte> records;
   bool operator==(const Movements&) const = default;
 
+  /// Bytes of the i-th avatar's record.
   [[nodiscard]] std::span<const std::byte> record(std::size_t i) const {
     const std::size_t begin = i == 0 ? 0 : ends[i - 1];
     return std::span(records).subspan(begin, ends[i] - begin);
   }
 };
 
-/// The answer to FetchLibrary.
+/// Answers FetchLibrary.
 struct LibraryPiece {
   static constexpr MessageType kType = MessageType::kLibraryPiece;
   std::uint64_t nonce = 0;
-  StatusCode code = StatusCode::kOk;  ///< If not kOk, nothing below `text` is set but `hash`.
+  StatusCode code = StatusCode::kOk;  ///< If not kOk, only `text` and `hash` follow.
   std::string text;
   std::string hash;
-  std::uint64_t total_bytes = 0;  ///< Of the file.
+  std::uint64_t total_bytes = 0;  ///< Size of the library file.
   std::uint64_t offset = 0;
-  std::vector<std::byte> bytes;  ///< At most kMaxPieceBytes; none at the end of the file.
+  std::vector<std::byte> bytes;  ///< At most kMaxPieceBytes. Empty at the end of the file.
   bool operator==(const LibraryPiece&) const = default;
 };
 
+/// Any message.
 using Message =
     std::variant<Hello, JoinWorld, LeaveWorld, Spawn, Remove, Request, CancelQueue, Observe,
                  StopObserving, Ping, InspectAvatar, Goodbye, Welcome, WorldInfo, Reply, PoseBatch,

@@ -10,26 +10,26 @@
 
 namespace stridewire::protocol {
 
-/// Goes through the poses of a batch that was decoded, in the order of its avatars:
+/// Decodes the poses of a batch in the order of its avatars:
 ///
 ///   PoseBatchReader reader(batch, codec);
-///   for (…) {
+///   for (const AvatarId avatar : batch.avatars) {
 ///     reader.Next();
 ///     reader.Decode(root_position_m, rotations);
 ///   }
 ///
-/// Borrows both; never allocates.
+/// Borrows the batch and the codec. Never allocates.
 class PoseBatchReader {
  public:
-  /// `codec`: the world's for the batch's mode (CompactCodecs::Find), null if there is none.
+  /// `codec` is CompactCodecs::Find of the batch's mode, which is null if the batch is not compact.
   PoseBatchReader(const PoseBatch& batch, const CompactCodec* codec)
       : batch_(batch), codec_(codec), compact_bytes_(CompactPoseBytes(batch).value_or(0)) {}
 
-  /// The bytes of the next pose; no more often than there are avatars.
+  /// Moves to the next pose and returns its bytes. Call it at most once per avatar.
   std::span<const std::byte> Next();
 
-  /// Reads the pose that Next gave last. Errors as DecodePose and CompactCodec::Decode; kUnsupported: a compact pose
-  /// without a codec.
+  /// Decodes the current pose. Fails with the errors of DecodePose and CompactCodec::Decode, and
+  /// with kUnsupported for a compact pose without a codec.
   [[nodiscard]] Status Decode(Vec3& root_position_m, std::span<Quat> rotations) const;
 
  private:
@@ -38,7 +38,7 @@ class PoseBatchReader {
   std::size_t compact_bytes_;
   std::size_t index_ = 0;
   std::size_t at_ = 0;
-  PoseMode mode_ = PoseMode::kFull;  // of the last
+  PoseMode mode_ = PoseMode::kFull;  // layout of the current pose
   std::span<const std::byte> pose_;
 };
 

@@ -9,83 +9,92 @@
 
 namespace stridewire::protocol {
 
-/// How poses travel.
+/// Layouts of poses on the wire.
 enum class PoseMode : std::uint8_t {
   kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
-  kQuantised = 1,  ///< Root in fixed point, 3 x int32; 48 bits a joint ("smallest three").
-  kMovement = 2,   ///< What a movement was decided to be, once a step (Movements). No pose is sent.
-  /// What who agreed on kFeatureCompact gets in place of kQuantised (compact_codec.h); nobody asks for it.
+  kQuantised = 1,  ///< Root as 3 x int32 in fixed point; 48 bits per joint ("smallest three").
+  kMovement = 2,   ///< Movement records instead of poses (Movements).
+  /// Bits per joint as the library requires (compact_codec.h). The server sends it, kCompactReduced
+  /// and kCompactRoot to subscriptions of kQuantised. A client cannot request these three modes.
   kCompact = 3,
-  /// What who asked for PoseDetail::kFewer or kRoot gets: compact poses that tell some of the joints.
-  kCompactFewer = 4,
-  kCompactRoot = 5,
+  kCompactReduced = 4,  ///< Compact poses of PoseDetail::kReduced.
+  kCompactRoot = 5,     ///< Compact poses of PoseDetail::kRoot.
 };
 
-/// How much of a pose is told. The joints that are not are decoded to the references of the world's codes.
+/// Which joints a compact pose contains. Omitted joints are decoded to their reference rotations.
 enum class PoseDetail : std::uint8_t {
   kAll = 0,
-  kFewer = 1,  ///< WorldInfo::fewer_joints: what is left out moves little.
-  kRoot = 2,   ///< Where the figure is and how it is turned.
+  kReduced = 1,  ///< The joints in WorldInfo::reduced_joints.
+  kRoot = 2,     ///< The root only.
 };
 
-/// Whether poses are told by a CompactCodec.
+/// Returns whether CompactCodec decodes poses of this mode.
 [[nodiscard]] constexpr bool IsCompact(PoseMode mode) {
-  return mode == PoseMode::kCompact || mode == PoseMode::kCompactFewer ||
+  return mode == PoseMode::kCompact || mode == PoseMode::kCompactReduced ||
          mode == PoseMode::kCompactRoot;
 }
+/// Returns the compact mode of a detail.
 [[nodiscard]] constexpr PoseMode CompactMode(PoseDetail detail) {
-  return detail == PoseDetail::kAll     ? PoseMode::kCompact
-         : detail == PoseDetail::kFewer ? PoseMode::kCompactFewer
-                                        : PoseMode::kCompactRoot;
+  return detail == PoseDetail::kAll       ? PoseMode::kCompact
+         : detail == PoseDetail::kReduced ? PoseMode::kCompactReduced
+                                          : PoseMode::kCompactRoot;
 }
+/// Returns the detail of a mode; modes that are not compact contain all joints.
 [[nodiscard]] constexpr PoseDetail DetailOf(PoseMode mode) {
-  return mode == PoseMode::kCompactFewer  ? PoseDetail::kFewer
-         : mode == PoseMode::kCompactRoot ? PoseDetail::kRoot
-                                          : PoseDetail::kAll;
+  return mode == PoseMode::kCompactReduced ? PoseDetail::kReduced
+         : mode == PoseMode::kCompactRoot  ? PoseDetail::kRoot
+                                           : PoseDetail::kAll;
 }
 
-/// Quantised root: multiples of 2^-14 m (0.061 mm), so the error is at most 2^-15 m = 0.031 mm as
-/// long as float32 itself is that fine (|x| < 256 m), over +-131,071 m from the world's origin.
+/// Steps per metre of a quantised root position. A step is 2^-14 m (0.061 mm). The error is at most
+/// 2^-15 m (0.031 mm) where float32 is at least as precise, which is the case below 256 m.
 inline constexpr float kRootStepsPerM = 16384.0f;
+/// Largest coordinate of a quantised root position in metres.
 inline constexpr float kMaxRootM = 131'071.0f;
 
-/// Quantised joint: the largest component is left out (the lowest index of equals), the quaternion
-/// negated first if that component is negative; the others, in order, are floor(c sqrt(2) 16383 +
-/// 16384.5) in 15 bits, so that 0 is exact. Three little-endian u16: component in bits 0-14; bit 15 of
-/// the first and second is bit 0 and 1 of the index left out, bit 15 of the third is zero.
-/// The rotation is off by at most this angle (a component by 2.2e-5; worst where all are 0.5).
+/// Largest error of a quantised rotation in radians; a component is off by at most 2.2e-5.
+///
+/// A joint is encoded as three little-endian u16. The largest component is dropped (of equal ones
+/// the lowest index), after negating the quaternion if that component is negative. Each other
+/// component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that 0 is exact. Bit 15
+/// of the first and second word are bits 0 and 1 of the dropped index; bit 15 of the third is 0.
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 
-/// How far a quaternion's length may be from 1.
+/// Largest deviation of a quaternion's length from 1.
 inline constexpr float kUnitTolerance = 1e-3f;
 
-/// Bytes of one pose: full 12 + 16 n, quantised 12 + 6 n; 0 for kMovement and compact modes, whose poses differ by world.
+/// Returns the size of a pose in bytes: 12 + 16 n if full, 12 + 6 n if quantised, for n joints.
+/// Returns 0 for kMovement, and for compact modes, whose size depends on the world.
 [[nodiscard]] constexpr std::size_t PoseBytes(PoseMode mode, std::size_t joint_count) {
   switch (mode) {
     case PoseMode::kFull: return 12 + 16 * joint_count;
     case PoseMode::kQuantised: return 12 + 6 * joint_count;
     case PoseMode::kMovement:
     case PoseMode::kCompact:
-    case PoseMode::kCompactFewer:
+    case PoseMode::kCompactReduced:
     case PoseMode::kCompactRoot: return 0;
   }
   return 0;
 }
 
-/// Writes one pose. `out` is PoseBytes(mode, rotations.size()) long, of any alignment.
-/// kShapeMismatch: `out` has another size; kOutOfRange: a number is not finite, a quaternion not
-/// unit within kUnitTolerance, or the root beyond kMaxRootM (quantised); `index` is the joint;
-/// kUnsupported: another mode. On error the content of `out` is unspecified. Never allocates.
+/// Encodes a full or quantised pose. `out` needs no alignment. Never allocates. On failure the
+/// content of `out` is unspecified. Error codes:
+///   kShapeMismatch  the size of `out` is not PoseBytes(mode, rotations.size())
+///   kOutOfRange     a number is not finite, the length of a quaternion deviates from 1 by more
+///   than
+///                   kUnitTolerance, or a quantised root exceeds kMaxRootM; `index` is the joint
+///   kUnsupported    another mode
 [[nodiscard]] Status EncodePose(PoseMode mode, const Vec3& root_position_m,
                                 std::span<const Quat> rotations, std::span<std::byte> out);
 
-/// Reads one pose; `in` is PoseBytes(mode, rotations.size()) long, of any alignment. Errors as
-/// above, and kMalformed for quantised bits that no encoder writes. Quantised quaternions come back
-/// unit to float32; full ones exactly as they were sent. Never allocates.
+/// Decodes a full or quantised pose. `in` needs no alignment. Never allocates. Quantised
+/// quaternions are unit to float32 precision; full ones are returned unchanged. Fails with the
+/// errors of EncodePose, and with kMalformed for quantised bits that no encoder writes.
 [[nodiscard]] Status DecodePose(PoseMode mode, std::span<const std::byte> in, Vec3& root_position_m,
                                 std::span<Quat> rotations);
 
-/// The root of a quantised or compact pose, the first 12 bytes of it. kOutOfRange: beyond kMaxRootM.
+/// Decodes the root position from the first 12 bytes of a quantised or compact pose. Fails with
+/// kOutOfRange if a coordinate exceeds kMaxRootM.
 [[nodiscard]] Status DecodeRoot(std::span<const std::byte, 12> in, Vec3& root_position_m);
 
 }  // namespace stridewire::protocol

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <cstdint>
+
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire::client {
+
+/// Everything about a pose except its joints.
+struct PoseStamp {
+  std::uint64_t tick = 0;
+  double time_s = 0.0;         ///< Server time in seconds.
+  bool discontinuity = false;  ///< The client must not interpolate from the previous pose.
+  bool standing = false;       ///< The avatar stands and its queue is empty.
+  protocol::PoseDetail detail = protocol::PoseDetail::kAll;
+};
+
+}  // namespace stridewire::client

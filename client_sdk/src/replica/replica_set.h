@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "pose_stamp.h"
+#include "runtime/avatar/avatar_replica.h"
+#include "stridewire/protocol/messages.h"
+
+namespace stridewire::client {
+
+/// Receives the poses that a ReplicaSet evaluates.
+class PoseSink {
+ public:
+  virtual ~PoseSink() = default;
+
+  /// An avatar has a new pose. `pose` is valid until the call returns.
+  virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
+                      ConstPoseSpan pose) = 0;
+
+  /// The avatar was removed, left the subscription, or its state was lost with a message.
+  virtual void OnGone(protocol::AvatarId avatar) = 0;
+
+  /// The set evaluates only avatars for which this returns true. If the answer changes to true, the
+  /// avatar appears when the server sends its next state.
+  [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
+};
+
+/// Evaluates the avatars of one world from movement records (protocol/STANDARD.md, "Movement
+/// records"). The poses equal the server's poses of the same ticks, bit for bit.
+///
+///   message in order         apply its records; advance all avatars of the shard by one tick
+///   message missing          forget all avatars of the shard until the server sends their states
+///
+/// Used by the client library and by stridewire-load. Not thread-safe.
+class ReplicaSet {
+ public:
+  /// A message from more shards than this is an error.
+  static constexpr std::size_t kMaxShards = 1024;
+
+  /// Evaluates at most `max_avatars` avatars and ignores further ones. Each takes about 10 KB.
+  ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s, std::size_t max_avatars);
+
+  /// Applies one message and passes the resulting poses to `sink`. Fails with kLimitExceeded for
+  /// too many shards, and with the error of AvatarReplica::Apply for an invalid record or a record
+  /// made with another library. After an error the shard's avatars stay unknown until their next
+  /// states.
+  [[nodiscard]] Status Apply(const protocol::Movements& message, PoseSink& sink);
+
+  [[nodiscard]] const MotionLibrary& library() const { return *library_; }
+  [[nodiscard]] std::size_t avatar_count() const { return avatar_count_; }
+
+ private:
+  struct Avatar {
+    std::unique_ptr<AvatarReplica> replica;
+    bool discontinuity = true;  // the next pose must not be interpolated from the previous one
+  };
+  struct Shard {
+    bool is_synchronized = false;
+    std::uint64_t step = 0;           // the last complete step
+    std::uint16_t parts_applied = 0;  // parts of the next step
+    std::map<protocol::AvatarId, Avatar> avatars;
+  };
+
+  void Synchronize(const protocol::Movements& message, Shard& shard, PoseSink& sink);
+  [[nodiscard]] Status ApplyRecord(const protocol::Movements& message, std::size_t i, Shard& shard,
+                                   PoseSink& sink);
+  void EmitPose(const protocol::Movements& message, protocol::AvatarId id, Avatar& avatar,
+                PoseSink& sink);
+  void CheckAvatarCount() const;
+
+  std::shared_ptr<const MotionLibrary> library_;
+  double tick_s_;
+  std::size_t max_avatars_;
+  std::size_t avatar_count_ = 0;  // of all shards
+  std::map<std::uint16_t, Shard> shards_;
+  std::vector<AvatarReplica*> scratch_;
+  SoaPoseEvaluator evaluator_;
+};
+
+}  // namespace stridewire::client

@@ -1,0 +1,70 @@
+#pragma once
+
+#include "session_state.h"
+
+namespace stridewire::client {
+
+/// The commands of a session: it checks, queues, sends and ends them.
+///
+/// A command is first in `unsent` of its world, until the world has a server id and the output
+/// buffer has room. Then it is in `unanswered_`, in order of seq, and finally it becomes a REPLY
+/// event. After a lost session, the session joins its worlds and subscribes again before it sends
+/// unsent commands.
+class SessionCommands : public SessionState {
+ public:
+  using SessionState::SessionState;
+
+  stridewire_status JoinWorld(std::string_view name, protocol::Role role, stridewire_world& world,
+                              std::uint64_t& command);
+  stridewire_status LeaveWorld(stridewire_world world, std::uint64_t& command);
+  stridewire_status Spawn(stridewire_world world, protocol::Spawn message, std::uint64_t& command);
+  stridewire_status Remove(stridewire_world world, protocol::Remove message,
+                           std::uint64_t& command);
+  stridewire_status Request(stridewire_world world, protocol::Request message,
+                            std::uint64_t& command);
+  stridewire_status Cancel(stridewire_world world, protocol::CancelQueue message,
+                           std::uint64_t& command);
+  stridewire_status SetTerrain(stridewire_world world, protocol::SetTerrain message,
+                               std::uint64_t& command);
+  stridewire_status SetLayers(stridewire_world world, protocol::SetLayers message,
+                              std::uint64_t& command);
+  stridewire_status SetPlanting(stridewire_world world, protocol::SetPlanting message,
+                                std::uint64_t& command);
+  stridewire_status Observe(stridewire_world world, protocol::Observe message,
+                            std::uint32_t& subscription, std::uint64_t& command);
+  stridewire_status MoveRegion(std::uint32_t subscription, protocol::Region region,
+                               std::uint64_t& command);
+  stridewire_status StopObserving(std::uint32_t subscription, std::uint64_t& command);
+
+  /// Returns the next task for RunLibraryTask, if any. Report its result with OnLibraryTask.
+  [[nodiscard]] std::optional<LibraryTask> TakeLibraryTask() { return libraries_.TakeTask(); }
+  void OnLibraryTask(const std::string& hash,
+                     Expected<std::shared_ptr<const MotionLibrary>> result);
+
+ protected:
+  /// Calls Enqueue and then sends what can be sent.
+  template <typename Message>
+  stridewire_status SendCommand(stridewire_world world, Message message, std::size_t bytes,
+                                std::uint64_t& command);
+  /// Checks a command and appends it to the unsent commands of its world.
+  template <typename Message>
+  stridewire_status Enqueue(stridewire_world world, Message message, std::size_t bytes,
+                            std::uint64_t& command);
+  /// Encodes all commands that may be sent now.
+  void Pump();
+  [[nodiscard]] bool MaySend() const;
+  void Send(Command command);
+  /// Returns whether a command may be sent. An Observe of movements waits for its library, or is
+  /// answered here if the library is not available.
+  enum class Readiness : std::uint8_t { kReady, kWaits, kAnswered };
+  Readiness PrepareMovements(World& world, const Command& command);
+  void RequestLibraries();
+  void FailAll(stridewire_status status, std::string_view text);
+  void FailUnsent(World& world, stridewire_status status, std::string_view text);
+  /// Ends a command with a REPLY event, or with a NOTICE event if the session created it and it
+  /// failed.
+  void Answer(const Command& command, stridewire_status status, std::string_view text = {},
+              std::uint32_t accepted = 0);
+};
+
+}  // namespace stridewire::client

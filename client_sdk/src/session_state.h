@@ -1,0 +1,187 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "backoff.h"
+#include "clock_map.h"
+#include "event_queue.h"
+#include "library_fetch.h"
+#include "stridewire/client.h"
+#include "stridewire/protocol/encoder.h"
+#include "stridewire/protocol/frame_reader.h"
+#include "stridewire/protocol/messages.h"
+#include "world_view.h"
+
+namespace stridewire::client {
+
+/// Options of a session; see stridewire_client_options.
+struct SessionOptions {
+  std::string client_name = "stridewire-client";
+  std::string auth_token;
+  std::size_t max_events = 65'536;
+  std::size_t max_commands = 4096;
+  std::size_t max_command_bytes = std::size_t{64} << 20;
+  std::size_t pose_history = 32;
+  std::size_t max_pose_bytes = std::size_t{256} << 20;
+  double connect_timeout_s = 5.0;
+  double ping_interval_s = 1.0;
+  double render_delay_s = 0.1;
+  bool respawn = false;
+  std::string library_folder;  ///< Cache of libraries. Empty: no cache.
+  std::uint64_t seed = 1;
+};
+
+/// Returns the memory of a terrain in bytes.
+[[nodiscard]] std::size_t TerrainBytes(const std::optional<protocol::TerrainInfo>& terrain);
+
+/// The data of a session and what the application reads of it. SessionCommands and Session build on
+/// it.
+class SessionState {
+ public:
+  enum class State : std::uint8_t {
+    kIdle,
+    kWaiting,     ///< Waits for the next attempt to connect.
+    kConnecting,  ///< The TCP connection is being established.
+    kGreeting,    ///< Hello was sent; Welcome is expected.
+    kReady,       ///< The handshake is complete.
+    kClosing,     ///< Goodbye is being sent.
+    kClosed,
+  };
+
+  /// While more bytes than this wait for the socket, no further command is encoded.
+  static constexpr std::size_t kMaxOutputBytes = std::size_t{1} << 20;
+  static constexpr std::size_t kMaxWorlds = 256;
+
+  explicit SessionState(const SessionOptions& options);
+
+  [[nodiscard]] State state() const { return state_; }
+  [[nodiscard]] stridewire_status last_status() const { return last_status_; }
+  [[nodiscard]] const std::string& last_text() const { return last_text_; }
+  [[nodiscard]] EventQueue& events() { return events_; }
+  /// Returns null if the world does not exist.
+  [[nodiscard]] const WorldView* FindWorld(stridewire_world world) const;
+  /// Returns the terrain of an existing world, as last received.
+  [[nodiscard]] const std::optional<protocol::TerrainInfo>& TerrainOf(
+      stridewire_world world) const {
+    return worlds_.at(world).terrain;
+  }
+  [[nodiscard]] const ClockMap& clock() const { return clock_; }
+  [[nodiscard]] double render_delay_s() const { return options_.render_delay_s; }
+  [[nodiscard]] double tick_hz() const { return tick_hz_; }
+  [[nodiscard]] stridewire_statistics Statistics() const;
+
+ protected:
+  using CommandMessage =
+      std::variant<protocol::JoinWorld, protocol::LeaveWorld, protocol::Spawn, protocol::Remove,
+                   protocol::Request, protocol::CancelQueue, protocol::SetTerrain,
+                   protocol::SetLayers, protocol::SetPlanting, protocol::Observe,
+                   protocol::StopObserving>;
+
+  struct Command {
+    std::uint64_t id = 0;
+    stridewire_world world = 0;
+    bool own = false;  ///< The session created it after a lost session.
+    std::size_t bytes = 0;
+    CommandMessage message;
+  };
+
+  struct Subscription {
+    protocol::Observe message;
+    bool unsent = true;
+  };
+
+  struct World {
+    enum class State : std::uint8_t { kWanted, kJoining, kJoined, kRefused, kLeft };
+    State state = State::kWanted;
+    std::string name;
+    protocol::Role role = protocol::Role::kController;
+    protocol::WorldId server_id = 0;  ///< 0: unknown.
+    std::uint64_t join_command = 0;
+    bool join_answered = false;  ///< The application has received its REPLY.
+    std::deque<Command> unsent;
+    std::map<protocol::SubscriptionId, Subscription> subscriptions;
+    std::map<protocol::AvatarId, protocol::Placement>
+        spawned;                             ///< Own avatars with their last base frames.
+    std::uint64_t last_dropped_batches = 0;  ///< Count in the last Lagging.
+    std::unique_ptr<WorldView> view;
+    std::unique_ptr<ReplicaSet> replicas;  ///< Not null while movements are observed.
+    std::optional<protocol::TerrainInfo> terrain;
+  };
+
+  /// Stores the error for last_error and returns `status`.
+  stridewire_status Refuse(stridewire_status status, std::string_view text);
+  /// Returns whether the session is connected or tries to connect.
+  [[nodiscard]] bool IsOpen() const;
+  World* FindByServerId(protocol::WorldId id, stridewire_world& handle);
+  /// Lets the view of a world store only poses of avatars that a subscription covers.
+  void UpdateFilter(World& world);
+  /// Returns the shortest interval of the subscriptions that receive poses of a mode; 0: none.
+  [[nodiscard]] static std::uint64_t EveryNTicks(const World& world, protocol::PoseMode mode);
+  [[nodiscard]] stridewire_event MakeEvent(stridewire_event_type type, stridewire_world world = 0,
+                                           stridewire_status status = STRIDEWIRE_OK,
+                                           std::string_view text = {}) const;
+
+  SessionOptions options_;
+  State state_ = State::kIdle;
+  stridewire_status last_status_ = STRIDEWIRE_OK;
+  std::string last_text_;
+  Backoff backoff_;
+  EventQueue events_;
+  ClockMap clock_;
+  PoseBudget pose_budget_;
+  LibraryFetch libraries_;
+
+  std::map<stridewire_world, World> worlds_;
+  stridewire_world next_world_ = 1;
+  std::uint32_t next_subscription_ = 1;
+  std::uint64_t next_command_ = 1;
+  std::map<protocol::Seq, Command> unanswered_;
+  protocol::Seq resend_from_ = 0;  ///< First command to send again after a resume; 0: none.
+  std::size_t command_count_ = 0;  ///< Unsent and unanswered commands of the application.
+  std::size_t command_bytes_ = 0;
+
+  // State of the session on the server.
+  bool had_session_ = false;
+  std::vector<std::byte> resume_token_;  ///< Empty if the server has ended the session.
+  protocol::Seq next_seq_ = 1;
+  std::uint64_t last_events_number_ = 0;
+  protocol::ServerLimits limits_;
+  double tick_hz_ = 60.0;
+
+  // State of the connection.
+  std::uint64_t connection_number_ = 0;
+  double next_attempt_s_ = 0.0;
+  double deadline_s_ = 0.0;  ///< Timeout of kConnecting, kGreeting and kClosing.
+  double ready_s_ = 0.0;
+  double heard_s_ = 0.0;
+  double next_ping_s_ = 0.0;
+  std::uint64_t ping_nonce_ = 0;
+  std::set<std::uint64_t> pending_pings_;  ///< Pings of the application without Pong; at most 64.
+  std::optional<protocol::FrameReader> reader_;
+  protocol::Encoder encoder_;
+  std::vector<std::byte> output_;
+
+  WorldView::Counts counts_;
+  std::deque<double> rtts_s_;  ///< Of the last 16 pings.
+  std::uint64_t bytes_received_ = 0;
+  std::uint64_t bytes_sent_ = 0;
+  std::uint64_t dropped_batches_ = 0;
+  std::uint64_t events_received_ = 0;
+  std::uint64_t commands_sent_ = 0;
+  std::uint64_t commands_resent_ = 0;
+  std::uint64_t connects_ = 0;
+  std::uint64_t resumes_ = 0;
+  std::uint64_t connect_failures_ = 0;
+};
+
+}  // namespace stridewire::client

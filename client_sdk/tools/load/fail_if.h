@@ -1,0 +1,38 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "load_report.h"
+#include "stridewire/base/error.h"
+
+namespace stridewire::load {
+
+/// A condition on a number of the report, for example `step_latency_ms.p99 >= 50`.
+///
+///   NAME OPERATOR NUMBER      OPERATOR: > >= < <= == !=
+class FailIf {
+ public:
+  /// Fails with kMalformed; `where` is "--fail-if 'TEXT'".
+  [[nodiscard]] static Expected<FailIf> Parse(std::string_view text);
+
+  /// Returns whether the condition is true. A number that could not be measured makes it true as
+  /// well, so that a missing measurement does not pass as a success.
+  [[nodiscard]] bool Fails(const LoadReport& report) const;
+
+  /// Describes the failure, for example "ticks_missed>0: it is 3".
+  [[nodiscard]] std::string Explain(const LoadReport& report) const;
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+
+ private:
+  enum class Operator { kAbove, kAtLeast, kBelow, kAtMost, kEqual, kNotEqual };
+
+  std::string text_;
+  std::string name_;
+  Operator operator_ = Operator::kAbove;
+  double number_ = 0.0;
+};
+
+}  // namespace stridewire::load

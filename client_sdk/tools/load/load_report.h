@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "stridewire/protocol/pose_codec.h"
+
+namespace stridewire::load {
+
+/// Median, 99th percentile and maximum.
+struct Quantiles {
+  double p50 = 0.0;
+  double p99 = 0.0;
+  double max = 0.0;
+};
+
+/// Results of a run. `stridewire-load --json` prints them.
+struct LoadReport {
+  int avatars = 0;
+  int worlds = 0;
+  int observers = 0;
+  int partial_observers = 0;
+  int partial_avatars = 0;  ///< Avatars per partial observer.
+  protocol::PoseMode mode = protocol::PoseMode::kQuantised;
+  std::uint64_t seed = 0;
+  double seconds = 0.0;                ///< Duration of the measurement.
+  std::uint64_t poses_received = 0;    ///< By all observers, at measured ticks.
+  std::uint64_t poses_expected = 0;    ///< Observed avatars x measured ticks, of all observers.
+  std::uint64_t poses_invalid = 0;     ///< Received poses that failed a check.
+  std::uint64_t bytes_received = 0;    ///< Frames of measured batches, with headers.
+  std::uint64_t batches_dropped = 0;   ///< Dropped by the server for slow observers.
+  std::optional<double> moving_share;  ///< Share of received poses that were not standing.
+  std::optional<Quantiles> tick_ms;    ///< From the server's metrics; empty without them.
+  std::optional<std::uint64_t> ticks_missed;
+  std::optional<Quantiles> step_latency_ms;  ///< Empty if no step was measured.
+  std::uint64_t steps_measured = 0;
+  std::uint64_t requests_sent = 0;
+  std::uint64_t requests_accepted = 0;
+  std::uint64_t requests_rejected = 0;
+  std::uint64_t reconnects = 0;
+  int threads = 1;
+  double own_cpu_s = 0.0;  ///< Processor time of this program in the measurement.
+  Quantiles own_loop_late_ms;
+  Quantiles own_send_late_ms;
+  std::vector<std::string> errors;
+  bool failed = false;  ///< An error other than slowness occurred: exit code 1.
+};
+
+/// Formats a report as JSON on one line, without a newline.
+[[nodiscard]] std::string ToJson(const LoadReport& report);
+
+/// Formats a report as readable text.
+[[nodiscard]] std::string ToText(const LoadReport& report);
+
+/// Returns a number of the report by its JSON path, for example "tick_ms.p99". `errors` is the
+/// number of errors. Empty if it was not measured. `name` must be one of ReportNumberNames.
+[[nodiscard]] std::optional<double> ReportNumber(const LoadReport& report, std::string_view name);
+/// Returns the names of all numbers.
+[[nodiscard]] std::vector<std::string> ReportNumberNames();
+
+}  // namespace stridewire::load

@@ -1,0 +1,140 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "latency_probes.h"
+#include "replica_set.h"
+#include "run_state.h"
+#include "session.h"
+#include "stridewire/protocol/compact_codecs.h"
+#include "stridewire/protocol/pose_batch_reader.h"
+
+namespace stridewire::load {
+
+/// Counters of an observer. Read them after its thread has ended.
+struct ObserverCounts {
+  std::uint64_t poses_received = 0;
+  std::uint64_t poses_moving = 0;
+  std::uint64_t poses_invalid = 0;
+  std::uint64_t poses_excused = 0;  ///< Not expected, because the observer was dropped (--churn).
+  std::uint64_t bytes_received = 0;
+  std::uint64_t batches_dropped = 0;
+};
+
+/// A session that observes worlds and counts and checks the poses.
+///
+/// It checks that the world is known, that mode and number of joints are as requested, that ticks
+/// increase, that no avatar appears twice per tick, that poses can be decoded, and that no root
+/// moves faster than kMaxSpeedMPerS without the flag discontinuity.
+class Observer final : public Session {
+ public:
+  static constexpr double kMaxSpeedMPerS = 15.0;
+  static constexpr double kSpeedSlackM = 0.05;
+  /// Time after a reconnect in which missing poses are excused: in mode movement, the state of an
+  /// avatar arrives at least one tick after the first message.
+  static constexpr double kReconnectS = 1.0;
+
+  /// Observers with an `index` below LoadOptions::observers observe all avatars, the others some.
+  /// If `probes` is not null, this observer measures latency; it must run on the thread of the
+  /// probes and observe all avatars.
+  Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
+           int index, LatencyProbes* probes);
+
+  /// Returns whether it has received a pose of every observed avatar.
+  [[nodiscard]] bool sees_all() const { return sees_all_.load(); }
+  /// Returns whether it has received the last tick of the window from every shard.
+  [[nodiscard]] bool saw_last_tick() const { return saw_last_tick_.load(); }
+  [[nodiscard]] std::uint64_t latest_tick() const { return latest_tick_.load(); }
+
+  /// Number of observed avatars.
+  [[nodiscard]] std::uint64_t avatar_count() const { return avatar_count_; }
+  /// Returns the counters, including the excused poses of a disconnection at the end.
+  [[nodiscard]] ObserverCounts Counts() const;
+
+ private:
+  /// State of an observed avatar.
+  struct Seen {
+    std::uint64_t tick = 0;        ///< Tick of the last pose on this connection; 0: none.
+    std::uint64_t root_tick = 0;   ///< Tick of `root_m`; 0: unknown.
+    std::uint64_t away_since = 0;  ///< First tick missed because of a drop; 0: none.
+    Vec3 root_m = Vec3(0.0f);
+  };
+
+  /// Batches with the same shard and part number.
+  struct Stream {
+    std::uint32_t key = 0;
+    std::uint64_t tick = 0;
+    std::uint64_t avatar_count = 0;
+  };
+
+  struct World {
+    int index = 0;
+    std::size_t joint_count = 0;
+    std::vector<protocol::AvatarId> watched;  ///< Ascending ids; empty: all.
+    std::vector<Seen> seen;                   ///< One per observed avatar.
+    std::uint64_t first_tick = 0;             ///< First tick on this connection; 0: none.
+    protocol::CompactCodecs codecs;           ///< Codecs of compact poses.
+    /// Bytes of the last pose of each avatar, to detect changes. Used to measure latency.
+    std::vector<std::byte> last_poses;
+    std::vector<std::size_t> last_sizes;
+    std::size_t max_pose_bytes = 0;
+    std::vector<Stream> streams;
+    std::unique_ptr<client::ReplicaSet> replicas;  ///< Not null in mode movement.
+    std::uint64_t batches_dropped = 0;             ///< Reported by the server on this connection.
+  };
+
+  void OnWelcome() override;
+  void OnMessage(protocol::Message& message, std::size_t frame_bytes, std::int64_t now_ns) override;
+  void OnLost(const std::string& why, bool by_us) override;
+
+  /// Selects the avatars of the `which`-th partial observer.
+  void SelectAvatars(std::size_t which);
+  /// Returns the index of an avatar in World::seen. Empty: it is not observed by this run.
+  [[nodiscard]] std::optional<std::size_t> IndexIn(const World& world,
+                                                   protocol::AvatarId number) const;
+  void OnWorldInfo(const protocol::WorldInfo& info);
+  /// Returns the mode of the batches that the server sends.
+  [[nodiscard]] protocol::PoseMode SentMode() const;
+  void OnReply(const protocol::Reply& reply);
+  void OnMovements(const protocol::Movements& movements, std::size_t frame_bytes,
+                   std::int64_t now_ns);
+  void OnBatch(const protocol::PoseBatch& batch, std::size_t frame_bytes, std::int64_t now_ns);
+  void TakePoses(World& world, const protocol::PoseBatch& batch, std::int64_t now_ns);
+  /// Returns how many measured poses before `tick` are excused.
+  [[nodiscard]] std::uint64_t ExcusedBefore(const World& world, const Seen& seen,
+                                            std::uint64_t tick) const;
+  /// Checks that the tick of a batch increases. Returns false if the batch must be ignored.
+  bool AdvanceStream(World& world, const protocol::PoseBatch& batch);
+  bool CheckPose(World& world, Seen& seen, const protocol::PoseBatch& batch, std::size_t i,
+                 const protocol::PoseBatchReader& reader);
+  void Measure(World& world, const protocol::PoseBatch& batch, std::size_t i,
+               std::span<const std::byte> pose, std::int64_t now_ns);
+  void Invalid(const World& world, std::uint64_t tick, const std::string& what);
+  void UpdateProgress();
+
+  RunState& run_;
+  const int index_;
+  LatencyProbes* probes_;
+  std::uint64_t avatar_count_ = 0;
+  std::vector<World> worlds_;
+  std::map<protocol::WorldId, std::size_t> world_by_id_;   ///< -> worlds_
+  std::map<protocol::Seq, std::size_t> pending_joins_;     ///< -> worlds_
+  std::map<protocol::Seq, std::size_t> pending_observes_;  ///< -> worlds_
+  std::uint64_t seen_count_ = 0;
+  std::uint64_t batch_number_ = 0;
+  bool was_dropped_ = false;  ///< The last connection was dropped by this program.
+  std::vector<Quat> rotations_;
+  ObserverCounts counts_;
+  std::atomic<bool> sees_all_{false};
+  std::atomic<bool> saw_last_tick_{false};
+  std::atomic<std::uint64_t> latest_tick_{0};
+};
+
+}  // namespace stridewire::load

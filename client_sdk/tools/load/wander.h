@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "stridewire/protocol/messages.h"
+
+namespace stridewire::load {
+
+using Movement = decltype(protocol::RequestItem::movement);
+
+/// Random numbers with a state of eight bytes, so that each of many avatars can have its own
+/// (SplitMix64: Steele, Lea, Flood 2014).
+class SmallRandom {
+ public:
+  explicit SmallRandom(std::uint64_t seed) : state_(seed) {}
+  [[nodiscard]] std::uint64_t Next();
+  /// Uniform in [min, max).
+  [[nodiscard]] double Uniform(double min, double max);
+  /// Uniform in [min, max], both included.
+  [[nodiscard]] int Integer(int min, int max);
+
+ private:
+  std::uint64_t state_;
+};
+
+/// Movements to request at once, and the time until the next plan.
+struct WanderPlan {
+  std::vector<Movement> movements;  ///< The first is a step or jump, never a stand.
+  double period_s = 0.0;            ///< Time until the next plan. Longer than these movements.
+};
+
+/// Plans random movements of an avatar: 6 to 16 steps with turns and sometimes a pause, or a jump.
+///
+/// The plan does not depend on the server (open loop). A slow server therefore receives as many
+/// requests as a fast one, and its delays become visible. The period lets every avatar come to a
+/// stand, so that each plan starts from standing.
+class Wanderer {
+ public:
+  Wanderer(std::uint64_t seed, std::uint32_t avatar);
+
+  /// Returns the next plan. It contains jumps only if `can_jump`.
+  [[nodiscard]] WanderPlan Next(bool can_jump);
+
+  /// Returns a random start time of the first plan, so that avatars do not start simultaneously.
+  [[nodiscard]] double FirstStart(double within_s) { return random_.Uniform(0.0, within_s); }
+
+ private:
+  SmallRandom random_;
+};
+
+}  // namespace stridewire::load

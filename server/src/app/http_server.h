@@ -1,0 +1,93 @@
+#pragma once
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "base/metrics.h"
+#include "net/origin_policy.h"
+#include "net/transport.h"
+
+namespace stridewire::server {
+
+/// A request.
+struct HttpQuery {
+  std::string_view path;           ///< As received, without the query after '?'.
+  std::string_view fields;         ///< The query, such as "a=1&b=2".
+  std::string_view if_none_match;  ///< Empty if the header is missing.
+};
+
+/// A response.
+struct HttpAnswer {
+  unsigned status = 200;
+  std::string content_type = "text/plain; charset=utf-8";
+  std::string body;
+  std::shared_ptr<const std::string> shared_body;  ///< If not null, used instead of `body`.
+  std::string cache_control = "no-store";
+  std::vector<std::pair<std::string, std::string>> headers;  ///< Additional headers.
+
+  [[nodiscard]] std::string_view bytes() const { return shared_body ? *shared_body : body; }
+};
+
+/// A small HTTP/1.1 server. It supports GET and HEAD for registered pages, and one path that
+/// becomes a WebSocket. A request may have 8 KiB and must be received within 10 s; a response must
+/// be sent within 60 s. The server runs on one thread, except for slow pages, which have their own
+/// thread and a queue of 16 requests.
+class HttpServer {
+ public:
+  using Page = std::function<HttpAnswer(const HttpQuery&)>;
+  /// Receives a connection that requests a WebSocket upgrade, and the address of the client. The
+  /// transport answers the upgrade. The connection does not count against max_connections any more.
+  using OnStream = std::function<void(std::unique_ptr<Transport>, const boost::asio::ip::address&)>;
+
+  HttpServer(int max_connections, ThreadMetrics& metrics);
+  ~HttpServer();
+
+  void AddPage(std::string path, Page page) { pages_[std::move(path)] = std::move(page); }
+  /// Sets the page for all paths that start with `prefix` and have no page of their own. It is
+  /// called on a separate thread.
+  void SetSlowPage(std::string prefix, Page page);
+  /// Sets the page for all paths that have no other page.
+  void SetFallback(Page page) { fallback_ = std::move(page); }
+  /// Accepts WebSockets at `path` while `is_open` returns true.
+  void ServeStream(std::string path, OriginPolicy policy, std::function<bool()> is_open,
+                   OnStream on_stream);
+
+  void Accept(boost::asio::ip::tcp::socket socket);
+
+ private:
+  class Visit;
+  struct Stream {
+    std::string path;
+    OriginPolicy policy;
+    std::function<bool()> is_open;
+    OnStream on_stream;
+  };
+  static constexpr int kMaxWaitingRequests = 16;
+  struct SlowPage {
+    std::string prefix;
+    Page page;
+  };
+  [[nodiscard]] bool IsSlow(std::string_view method, const HttpQuery& query) const;
+  [[nodiscard]] HttpAnswer AnswerTo(std::string_view method, const HttpQuery& query) const;
+
+  int max_connections_;
+  ThreadMetrics& metrics_;
+  std::map<std::string, Page, std::less<>> pages_;
+  Page fallback_;
+  std::unique_ptr<const Stream> stream_;
+  std::shared_ptr<int> connections_ = std::make_shared<int>(0);
+  SlowPage slow_page_;
+  int waiting_requests_ = 0;
+  boost::asio::thread_pool worker_{
+      1};  // declared last, so that its thread ends before other members are destroyed
+};
+
+}  // namespace stridewire::server

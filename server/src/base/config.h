@@ -1,0 +1,99 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/limits.h"
+#include "stridewire/base/error.h"
+
+namespace stridewire::server {
+
+/// An address HOST:PORT. In text, an IPv6 host is enclosed in brackets. If the port is 0, the
+/// operating system chooses one.
+struct Endpoint {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 0;
+  bool operator==(const Endpoint&) const = default;
+};
+
+[[nodiscard]] Expected<Endpoint> ParseEndpoint(std::string_view text);
+[[nodiscard]] std::string ToText(const Endpoint& endpoint);
+[[nodiscard]] bool IsLoopback(const Endpoint& endpoint);
+
+/// The settings of section [worlds.NAME].
+struct WorldConfig {
+  std::string library;      ///< "builtin" or a file; empty: the default library.
+  std::string terrain;      ///< A terrain file; empty: flat ground.
+  bool persistent = false;  ///< Avatars outlive the session that spawned them.
+  bool operator==(const WorldConfig&) const = default;
+};
+
+/// All settings of the server. Each key has an option (--tick-hz), an environment variable
+/// (STRIDEWIRE_TICK_HZ) and a name in the file (tick_hz). The option takes precedence over the
+/// variable, the variable over the file, and the file over the default.
+struct Config {
+  Endpoint listen = {"127.0.0.1", 7420};
+  Endpoint http = {"127.0.0.1", 7421};
+  bool http_enabled = true;
+  std::vector<std::string> allowed_origins;  ///< Pages of other servers that may open a stream.
+  std::string viewer_dir;  ///< Empty: the viewer that was installed with the program.
+  std::string library = "builtin";
+  std::string data_dir;  ///< Reserved for stored worlds; the server writes nothing yet.
+  double tick_hz = 60.0;
+  int shards = 0;  ///< 0: one per processor.
+  int max_catch_up_ticks = 10;
+  bool run_time_correction = true;  ///< Correct the blend weights of each movement.
+  bool foot_planting = true;        ///< Keep feet fixed on the ground between landing and lifting.
+  double interest_cell_m = 8.0;     ///< Cell size of the grid that finds the avatars of a region.
+  bool allow_insecure = false;
+  bool open_worlds = true;  ///< Create a world that the file does not name when a client joins it.
+  bool persistent = false;  ///< For worlds that the file does not name.
+  std::string log_level = "info";
+  double drain_timeout_s = 5.0;
+  Limits limits;
+  std::map<std::string, WorldConfig, std::less<>> worlds;
+
+  [[nodiscard]] int shard_count() const;
+};
+
+/// One key of the configuration.
+struct ConfigKey {
+  std::string name;     ///< "tick_hz"
+  std::string section;  ///< "" or "limits"
+  std::string help;
+  std::string range;     ///< Allowed values of a number, such as "1 to 1000"; empty otherwise.
+  bool is_text = false;  ///< The file contains the value in quotes.
+  bool is_flag = false;
+  bool is_list = false;  ///< A TOML array of strings in the file, comma-separated elsewhere.
+  std::function<Status(Config&, std::string_view)> set;
+  std::function<std::string(const Config&)> get;
+
+  /// Sets the value from text. The error contains `where` and the allowed range.
+  [[nodiscard]] Status Set(Config& config, std::string_view value, std::string where) const;
+
+  [[nodiscard]] std::string option() const;       ///< "--tick-hz"
+  [[nodiscard]] std::string environment() const;  ///< "STRIDEWIRE_TICK_HZ"
+};
+
+/// Returns all keys except those of worlds, in the order of --print-config.
+[[nodiscard]] const std::vector<ConfigKey>& ConfigKeys();
+
+/// True for 1 to 64 of the characters A-Z a-z 0-9 _ - and '.', without a leading dot. World names
+/// become parts of file names and metric labels, so other characters are not allowed.
+[[nodiscard]] bool IsWorldName(std::string_view name);
+
+/// Reads TOML text into `config`. Errors contain `name`, which is the file's name, the line and
+/// the key. On error, `config` is unchanged.
+[[nodiscard]] Status ReadConfigText(std::string_view text, const std::string& name, Config& config);
+
+/// Checks rules that concern several keys, such as a public address without allow_insecure.
+[[nodiscard]] Status CheckConfig(const Config& config);
+
+/// Returns the configuration as TOML. ReadConfigText reads it back without loss.
+[[nodiscard]] std::string PrintConfig(const Config& config);
+
+}  // namespace stridewire::server

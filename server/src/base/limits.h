@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "stridewire/protocol/limits.h"
+
+namespace stridewire::server {
+
+/// The limits of the server. Each has a key of the same name in section [limits] of the
+/// configuration. The metric stridewire_limit_reached_total counts how often each was reached.
+struct Limits {
+  // Frames.
+  std::size_t max_control_bytes = protocol::kMaxControlBytes;  ///< Payload of a control message.
+  std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;        ///< Payload of a bulk message.
+
+  // Connections and sessions.
+  int max_handshakes = 256;            ///< Connections whose client has not sent Hello yet.
+  int max_sessions = 1024;             ///< Attached and detached sessions.
+  int max_sessions_per_address = 256;  ///< Sessions and handshakes per client address.
+  double handshake_timeout_s = 5.0;    ///< From accept to a complete Hello.
+  double idle_timeout_s = 30.0;        ///< Without received bytes; 0: no timeout.
+  double write_timeout_s = 30.0;       ///< Without progress of a pending write.
+  double resume_window_s = 60.0;       ///< A detached session waits this long; 0: no resuming.
+
+  // Worlds and avatars.
+  int max_worlds = 256;
+  int max_worlds_per_session = 64;
+  int max_subscriptions = 64;      ///< Per session.
+  int max_named_avatars = 65'536;  ///< Avatar ids in all subscriptions of a session.
+  int max_avatars = 65'536;        ///< In all worlds.
+  int max_avatars_per_world = 16'384;
+  int max_queue = 256;  ///< Waiting requests per avatar.
+
+  // Commands of one session.
+  int requests_per_s = 50'000;     ///< Command items per second; more are rejected.
+  int request_burst = 65'536;      ///< Command items that a session may send at once.
+  int starts_per_tick = 128;       ///< Avatars that one command starts per tick, on all shards.
+  int spawns_per_tick = 512;       ///< Avatars that one shard spawns per tick, for all sessions.
+  int messages_per_s = 4000;       ///< Messages of any kind; the server pauses reading beyond it.
+  int max_pending_commands = 256;  ///< Unanswered commands; the server pauses reading beyond it.
+
+  // Memory of one session.
+  /// Outgoing messages except poses and movements. Movements have a second budget of this size.
+  std::size_t control_buffer_bytes = std::size_t{4} << 20;
+  int observer_backlog_ticks = 4;  ///< Waiting pose batches per world, mode and shard.
+  std::size_t reply_cache_bytes = std::size_t{4} << 20;
+  std::size_t event_replay_bytes = std::size_t{1} << 20;  ///< Events stored for a lost connection.
+  std::size_t socket_send_buffer_bytes = 0;               ///< SO_SNDBUF; 0: the system's default.
+
+  int max_http_connections = 64;
+};
+
+/// Limits that stridewire_limit_reached_total counts.
+enum class Limit : std::uint8_t {
+  kFrameBytes,
+  kHandshakes,
+  kSessions,
+  kSessionsPerAddress,
+  kHandshakeTimeout,
+  kIdleTimeout,
+  kWriteTimeout,
+  kResumeWindow,
+  kWorlds,
+  kWorldsPerSession,
+  kSubscriptions,
+  kNamedAvatars,
+  kAvatars,
+  kAvatarsPerWorld,
+  kQueue,
+  kRequestsPerSecond,
+  kStartsPerTick,
+  kSpawnsPerTick,
+  kMessagesPerSecond,
+  kPendingCommands,
+  kControlBuffer,
+  kObserverBacklog,
+  kReplyCache,
+  kEventReplay,
+  kHttpConnections,
+  kHttpWork,
+  kCount,
+};
+
+/// Values of the metric's label `limit`, indexed by Limit.
+inline constexpr std::array<std::string_view, static_cast<std::size_t>(Limit::kCount)> kLimitNames =
+    {"frame_bytes",
+     "max_handshakes",
+     "max_sessions",
+     "max_sessions_per_address",
+     "handshake_timeout",
+     "idle_timeout",
+     "write_timeout",
+     "resume_window",
+     "max_worlds",
+     "max_worlds_per_session",
+     "max_subscriptions",
+     "max_named_avatars",
+     "max_avatars",
+     "max_avatars_per_world",
+     "max_queue",
+     "requests_per_s",
+     "starts_per_tick",
+     "spawns_per_tick",
+     "messages_per_s",
+     "max_pending_commands",
+     "control_buffer",
+     "observer_backlog",
+     "reply_cache",
+     "event_replay",
+     "max_http_connections",
+     "http_work"};
+
+}  // namespace stridewire::server

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <set>
+#include <span>
+#include <vector>
+
+#include "session/session.h"
+#include "world/shard_messages.h"
+
+namespace stridewire::server {
+
+/// Combines what the sessions of one shard need from each world, and sends it to all shards when it
+/// changes.
+class InterestTracker {
+ public:
+  using Sessions = std::map<SessionId, std::unique_ptr<Session>>;
+  using Broadcast = std::function<void(const Interest&)>;
+
+  /// Borrows `sessions`. `broadcast` must deliver an Interest to all shards.
+  InterestTracker(int shard, const Sessions& sessions, Broadcast broadcast);
+
+  /// Must be called when a session needs more or less of `world`. Sends the combined interest at
+  /// once if it has changed, except for selected avatars and regions.
+  void Update(const std::shared_ptr<World>& world);
+
+  /// Must be called when a session has changed only its selected avatars or its region. They are
+  /// sent with the next SendChangedSelections, because many sessions may change in one tick.
+  void SelectionChanged(WorldId world) { changed_selections_.insert(world); }
+  void SendChangedSelections();
+
+  /// Returns the sessions that need poses, movements or events of a world.
+  [[nodiscard]] std::span<Session* const> WatchersOf(WorldId world) const;
+
+ private:
+  [[nodiscard]] Interest Combine(const std::shared_ptr<World>& world);
+
+  int shard_;
+  const Sessions& sessions_;
+  Broadcast broadcast_;
+  std::map<WorldId, std::vector<Session*>> watchers_;
+  std::map<WorldId, Interest> sent_;  // as last broadcast; one entry per world with watchers
+  std::set<WorldId> changed_selections_;
+};
+
+}  // namespace stridewire::server

@@ -1,0 +1,131 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "session/event_replay.h"
+#include "session/movement_feed.h"
+#include "session/session_context.h"
+#include "session/subscriptions.h"
+
+namespace stridewire::server {
+
+/// The frames of one MovementDelivery. They are encoded once, when the first session needs them.
+class SharedMovements {
+ public:
+  SharedMovements(const MovementDelivery& delivery, protocol::Encoder& encoder)
+      : delivery_(delivery), encoder_(encoder) {}
+  [[nodiscard]] const MovementDelivery& delivery() const { return delivery_; }
+  /// Returns one frame per step, with all avatars.
+  [[nodiscard]] const std::vector<SharedFrame>& frames();
+  /// Returns the frame of step `i` without avatars. `empty` is this message.
+  [[nodiscard]] const SharedFrame& EmptyFrame(std::size_t i, const protocol::Movements& empty);
+
+ private:
+  const MovementDelivery& delivery_;
+  protocol::Encoder& encoder_;
+  std::vector<SharedFrame> frames_;
+  std::vector<SharedFrame> empty_frames_;  // null until needed
+};
+
+/// One PoseDelivery and the batches that sessions compose from it.
+class SharedPoses {
+ public:
+  SharedPoses(const PoseDelivery& delivery, protocol::PoseBatchComposer& composer,
+              ThreadMetrics& metrics)
+      : delivery_(delivery), composer_(composer), metrics_(metrics) {}
+  [[nodiscard]] const PoseDelivery& delivery() const { return delivery_; }
+  /// Composes a batch of the given rows.
+  [[nodiscard]] PoseDelivery Compose(std::span<const std::uint32_t> rows, bool is_partial);
+  /// Composes a partial batch. Sessions that need the same rows share the batch.
+  [[nodiscard]] const PoseDelivery& ComposeShared(std::span<const std::uint32_t> rows);
+
+ private:
+  const PoseDelivery& delivery_;
+  protocol::PoseBatchComposer& composer_;
+  ThreadMetrics& metrics_;
+  struct RowsHash {
+    std::size_t operator()(const std::vector<std::uint32_t>& rows) const {
+      return std::hash<std::string_view>()(
+          {reinterpret_cast<const char*>(rows.data()), rows.size() * sizeof(rows[0])});
+    }
+  };
+  std::unordered_map<std::vector<std::uint32_t>, PoseDelivery, RowsHash> shared_;
+};
+
+/// The part of a session that sends poses, movements, events and terrain to the client, according
+/// to its subscriptions.
+class SessionStream {
+ public:
+  explicit SessionStream(SessionContext& context);
+
+  // What the session needs of a world. Nothing while it has no connection, except events that are
+  // stored for the client.
+  [[nodiscard]] bool WantsEvents(WorldId world) const;
+  [[nodiscard]] bool WantsMovements(WorldId world) const {
+    return context_.connection != nullptr &&
+           subscriptions_.Observes(world, protocol::PoseMode::kMovement);
+  }
+  /// True if the session needs movements of a region, and therefore positions.
+  [[nodiscard]] bool WantsMovementRegions(WorldId world) const {
+    return WantsMovements(world) && subscriptions_.HasRegion(world);
+  }
+  [[nodiscard]] SendInterval IntervalOf(WorldId world, protocol::PoseMode mode) const;
+  [[nodiscard]] std::span<const AvatarId> SelectedAvatars(WorldId world,
+                                                          protocol::PoseMode mode) const;
+  [[nodiscard]] std::optional<RegionFilter> FilterOf(WorldId world, protocol::PoseMode mode) const;
+
+  [[nodiscard]] Subscriptions& subscriptions() { return subscriptions_; }
+  [[nodiscard]] const Subscriptions& subscriptions() const { return subscriptions_; }
+
+  void OnPoses(SharedPoses& poses);
+  void OnMovements(SharedMovements& movements);
+  void OnStates(const StatesResult& result);
+  void OnEvents(const EventDelivery& delivery);
+  void OnTerrain(WorldId world, const SharedFrame& frame);
+
+  /// Continues after a new connection has been set. Sends stored events after message number
+  /// `last_events_number`, and starts all movement feeds from new states.
+  void Resume(std::uint64_t last_events_number);
+  /// Stops everything that concerns a world and drops its waiting frames.
+  void LeaveWorld(WorldId world);
+  /// Removes a subscription and drops waiting frames that are not needed any more. Returns nullopt
+  /// if `id` does not exist.
+  std::optional<WorldId> RemoveSubscription(protocol::SubscriptionId id);
+
+  /// Applies changed subscriptions to the movement feeds of a world.
+  void UpdateMovementFeeds(const std::shared_ptr<World>& world);
+  /// Requests missing states if the send queue has room.
+  void RequestStates();
+  /// Sends the terrain of a world. Flat ground is sent only if `even_if_flat`.
+  void SendTerrain(const World& world, bool even_if_flat);
+  /// Sends Lagging if batches or events were dropped since it was last sent.
+  void SendLagging(Membership& membership);
+
+ private:
+  void EndMovementFeeds(WorldId world);
+  void SendMovements(WorldId world, int shard, MovementFeed& feed, const SharedFrame& frame);
+  void SendPoses(const PoseDelivery& delivery);
+  void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
+  /// Numbers and sends a message. While the client is away, stores it instead. Returns how many
+  /// events were dropped.
+  std::uint64_t SendEvents(protocol::Events&& message);
+  void CountDroppedEvents(WorldId world, std::uint64_t events);
+  void CountDroppedBatches(WorldId world, std::uint64_t batches);
+
+  SessionContext& context_;
+  Subscriptions subscriptions_;
+  std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;  // by world and avatars' shard
+  std::uint32_t states_nonce_ = 0;
+  EventReplay event_replay_;
+  std::uint64_t events_number_ = 0;  // of the last Events message
+};
+
+}  // namespace stridewire::server
