@@ -21,8 +21,8 @@ namespace stridewire::server {
 ///                                               weights are not corrected.
 ///   /libraries/HASH/GROUP/example.json?index=I  the movement of one example
 ///   /libraries/HASH/GROUP/errors.json?x=L&y=L&p=A,B,...&cells=N&correction=0|1
-///                                               the parameter error on a grid: parameters x and y
-///                                               cover their ranges, the others have the values of p
+///                                               the parameter errors on a grid: parameters x and y
+///                                               cover their ranges, others have the values of p
 ///
 /// Invalid queries get status 400 with an explanation; unknown libraries and groups get 404.
 /// Thread-safe.

@@ -98,9 +98,10 @@ RegionMembers::ShardMembers& RegionMembers::MembersOf(const Snapshot& snapshot) 
 }
 
 RegionMembers::Change RegionMembers::Update(const Snapshot& snapshot) {
-  const auto has_pose = [&](std::uint32_t row) {
-    return snapshot.rows == nullptr || snapshot.rows->has_pose(row);
-  };
+  const protocol::PoseRows* rows = snapshot.rows;
+  const PoseMode mode = snapshot.mode;
+  const std::uint64_t tick = snapshot.tick;
+  const auto has_pose = [&](std::uint32_t row) { return rows == nullptr || rows->has_pose(row); };
   ShardMembers& shard = MembersOf(snapshot);
   near_.clear();
   const double centre_x = centre_m_.x;
@@ -125,13 +126,13 @@ RegionMembers::Change RegionMembers::Update(const Snapshot& snapshot) {
   for (const auto& [row, distance_m2] : near_) {
     const AvatarId id = (*shard.avatars)[row];
     const Ring& ring = is_uniform ? rings_[0] : RingAt(distance_m2);
-    const bool is_of_mode = is_uniform || ring.mode == snapshot.mode;
+    const bool is_of_mode = is_uniform || ring.mode == mode;
     if (!shard.is_member[row]) {
       // Just after a region has moved, the shard may not have encoded this pose yet.
       if (!is_of_mode || !has_pose(row)) continue;
       entered_.push_back(id);
       due_.push_back(row);
-    } else if (is_of_mode && has_pose(row) && snapshot.tick % ring.every_n_ticks == 0) {
+    } else if (is_of_mode && has_pose(row) && tick % ring.every_n_ticks == 0) {
       due_.push_back(row);
     }
     now_.push_back(id);

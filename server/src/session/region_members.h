@@ -42,8 +42,8 @@ class RegionMembers {
 
   /// Returns the modes of all rings, each once.
   [[nodiscard]] std::vector<protocol::PoseMode> modes() const;
-  /// Returns the greatest common divisor of the intervals of all rings of this mode, in ticks. 0: no
-  /// ring has this mode.
+  /// Returns the greatest common divisor of the intervals of all rings of this mode, in ticks. 0:
+  /// no ring has this mode.
   [[nodiscard]] std::uint16_t interval(protocol::PoseMode mode) const {
     return intervals_[static_cast<std::size_t>(mode)];
   }

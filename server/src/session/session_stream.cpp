@@ -132,11 +132,12 @@ void SessionStream::OnPoses(SharedPoses& poses) {
     case Subscriptions::Share::kNone: return;
     case Subscriptions::Share::kAll:
       // Empty if the shard does not know yet that complete batches are needed.
-      if (!delivery.parts.empty()) SendPoses(delivery);
+      if (!delivery.parts.empty()) SendPoses(delivery, delivery.parts);
       return;
     case Subscriptions::Share::kSubset:
       if (const auto rows = subscriptions_.PickRows(delivery)) {
-        SendPoses(poses.Compose(*rows, false));
+        PoseDelivery batch = poses.Compose(*rows, false);
+        SendPoses(batch, std::move(batch.parts));
       }
       return;
     case Subscriptions::Share::kRegion:
@@ -144,18 +145,21 @@ void SessionStream::OnPoses(SharedPoses& poses) {
       if (delivery.grid == nullptr) return;
       const RegionMembers::Change change = subscriptions_.UpdateRegion(delivery);
       SendRegionChange(delivery.world, delivery.tick, change);
-      if (!change.due.empty()) SendPoses(poses.ComposeShared(change.due));
+      if (!change.due.empty()) {
+        const PoseDelivery& batch = poses.ComposeShared(change.due);
+        SendPoses(batch, batch.parts);
+      }
       return;
   }
 }
 
-void SessionStream::SendPoses(const PoseDelivery& delivery) {
+void SessionStream::SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames) {
   CountDroppedBatches(delivery.world,
                       context_.connection->SendPoses({.world = delivery.world,
                                                       .mode = delivery.mode,
                                                       .shard = delivery.from_shard,
                                                       .avatar_count = delivery.avatar_count,
-                                                      .frames = delivery.parts}));
+                                                      .frames = std::move(frames)}));
 }
 
 void SessionStream::CountDroppedBatches(WorldId world, std::uint64_t batches) {

@@ -112,7 +112,8 @@ class SessionStream {
  private:
   void EndMovementFeeds(WorldId world);
   void SendMovements(WorldId world, int shard, MovementFeed& feed, const SharedFrame& frame);
-  void SendPoses(const PoseDelivery& delivery);
+  /// Sends `frames`, which contain poses of `delivery`.
+  void SendPoses(const PoseDelivery& delivery, std::vector<SharedFrame> frames);
   void SendRegionChange(WorldId world, std::uint64_t tick, const RegionMembers::Change& change);
   /// Numbers and sends a message. While the client is away, stores it instead. Returns how many
   /// events were dropped.
