@@ -39,7 +39,7 @@ float DistanceM(const MotionLibrary& library, std::size_t from, std::size_t to) 
 // The toy library of steps as long as `is_kept` likes them, and its jumps.
 template <typename IsKept>
 std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawGroup& group : raw.groups) {
     if (!IsStep(group.kind)) continue;
     std::erase_if(group.examples, [&](const RawExample& step) {
@@ -81,7 +81,7 @@ TEST(Transitions, DistanceIsHowFarJointsAreApart) {
 
 // A jump that flies on at its end: what has to stop counts with 0.1 s of its speed.
 TEST(Transitions, VelocityCounts) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
       jump.clip.root_positions_m[static_cast<std::size_t>(f)].z =
@@ -221,7 +221,7 @@ TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
 }
 
 TEST(Ways, ALibraryOfOneFootSaysSo) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
   const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
   EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
@@ -233,7 +233,7 @@ TEST(Ways, ALibraryOfOneFootSaysSo) {
 
 // A jump that flies on at its end: feet are together, but the table says that no step begins so fast.
 TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
       const double s = f / (jump.clip.frame_count() - 1.0);
@@ -286,7 +286,7 @@ TEST(Ways, AreFoundWithoutAllocating) {
 }
 
 TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
   AvatarSimulation avatar(no_jumps, BaseFrame{});

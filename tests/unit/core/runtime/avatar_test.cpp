@@ -202,7 +202,7 @@ TEST_F(AvatarTest, CancelDropsOnlyWhatHasNotStarted) {
 }
 
 TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   raw.groups.pop_back();
   LibraryBuilder builder;
@@ -259,7 +259,7 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
 
 // Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read that is not.
 TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.skeleton.legs[0].ankle = raw.skeleton.legs[1].ankle;
   LibraryBuilder builder;
   const auto library = builder.Build(raw);
