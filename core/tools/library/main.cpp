@@ -11,6 +11,7 @@
 
 #include "command_line.h"
 #include "commands.h"
+#include "offline/base/text.h"
 #include "offline/build/refine.h"
 #include "stridewire/base/version.h"
 
@@ -32,10 +33,9 @@ CLI::Validator Number(double min, double max, bool is_open) {
     const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
     const bool is_number = failed == std::errc() && end == text.data() + text.size();
     if (is_number && (is_open ? value > min : value >= min) && value <= max) return {};
-    char expected[128];
-    std::snprintf(expected, sizeof(expected), "expected a number %s %g and at most %g, got ",
-                  is_open ? "above" : "of at least", min, max);
-    return expected + ("\"" + text + "\"");
+    return Text("expected a number %s %g and at most %g, got ", is_open ? "above" : "of at least",
+                min, max) +
+           "\"" + text + "\"";
   };
   return CLI::Validator(check, "");
 }

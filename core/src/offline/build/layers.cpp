@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
+#include "offline/base/text.h"
 #include "offline/build/library_writer.h"
 #include "offline/extract/assemble.h"
 
@@ -132,9 +132,8 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   layer.name = cut.name;
   layer.is_looping = cut.is_looping;
   layer.weights = UpperBodyMask(skeleton);
-  char times[64];
-  std::snprintf(times, sizeof(times), " %.2f-%.2f s", from_s, to_s);
-  layer.source = std::filesystem::path(capture.path).filename().string() + times;
+  layer.source =
+      std::filesystem::path(capture.path).filename().string() + Text(" %.2f-%.2f s", from_s, to_s);
 
   const double blend_s = cut.is_looping ? std::min(kLoopBlendS, 0.25 * (to_s - from_s)) : 0.0;
   const double duration_s = to_s - from_s - blend_s;

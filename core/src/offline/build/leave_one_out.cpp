@@ -185,11 +185,8 @@ class Comparer {
     }
     const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
     if (fitted == nullptr) return {};
-    std::vector<double> metric;
-    for (const Parameter& parameter : group_.parameters) metric.push_back(1.0 / parameter.scale);
-    ParameterValues applied;
-    applied.count = group_.parameter_count();
-    ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
+    ParameterValues applied{.count = group_.parameter_count()};
+    ProjectOntoHull(others.sites, MetricOf(group_), kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
     CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
                    DefaultCorrectionLimits(group_), scratch, movement_);
@@ -229,11 +226,8 @@ class Comparer {
       movement_.heading_change_rad += weights[e] * group_.heading_change_rad[e];
     }
     cache_.Clear();
-    ParameterValues wanted;
-    wanted.count = group_.parameter_count();
-    std::copy(group_.site(left_out).begin(), group_.site(left_out).end(), wanted.values.begin());
     result.parameter_m = LargestDifference(
-        group_, wanted,
+        group_, ValuesOf(group_.site(left_out)),
         MeasureMovement(library_.skeleton(), library_.layout(), group_, movement_, cache_, pose_));
     return result;
   }

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <numeric>
 #include <optional>
 
+#include "offline/base/text.h"
 #include "offline/build/grid_cells.h"
 #include "offline/build/grid_example.h"
 #include "offline/build/layers.h"
@@ -269,10 +269,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     if (smoothness) {
       selected.report.ridge = smoothness->ridge;
       selected.report.ridge_radius = smoothness->radius;
-      char text[64];
-      std::snprintf(text, sizeof text, "smoothed over their parameters, ridge %g",
-                    smoothness->ridge);
-      note(text);
+      note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
     }
     selections.push_back(std::move(selected.report));
 

@@ -296,11 +296,8 @@ class GroupRefiner {
       report.end = RefineEnd::kNothingHelps;
     }
     for (int s = group.example_count; s < group.site_count; ++s) {
-      ParameterValues p;
-      p.count = group.parameter_count();
-      std::copy(group.site(s).begin(), group.site(s).end(), p.values.begin());
-      report.pseudoexample_error_m =
-          std::max(report.pseudoexample_error_m, probes_[0].At(group, p).error_m);
+      report.pseudoexample_error_m = std::max(
+          report.pseudoexample_error_m, probes_[0].At(group, ValuesOf(group.site(s))).error_m);
     }
     return outcome;
   }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
 #include "offline/base/parallel.h"
 #include "offline/base/statistics.h"
+#include "offline/base/text.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/left_out_error.h"
 
@@ -19,12 +19,6 @@ constexpr double kInsideM = 1e-3;            // Points nearer to the hull count 
 constexpr double kDeviationOfMad = 1.4826;   // Standard deviation per MAD if normal.
 constexpr double kMinPoseDeviationM = 2e-3;  // Smaller spreads are not significant.
 constexpr double kMinDurationDeviationS = 5e-3;
-
-std::string Text(const char* format, double a, double b) {
-  char text[160];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
 
 // The examples of a group, or averages of them, with the data needed to compare them.
 class Candidates {

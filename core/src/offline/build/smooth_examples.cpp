@@ -147,10 +147,7 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
 bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const Skeleton& skeleton,
                       std::span<const double> parameters, std::span<double> scratch,
                       Movement& movement) {
-  ParameterValues wanted;
-  wanted.count = static_cast<int>(parameters.size());
-  std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
-  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, wanted,
+  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, ValuesOf(parameters),
                                            {.max_iterations = kSolveIterations}, scratch, movement);
   return solved.error_m <= kMaxMissM;
 }
@@ -190,8 +187,7 @@ std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group, std::span<c
   const auto n = static_cast<std::size_t>(group.example_count);
   if (m < static_cast<std::size_t>(kExamplesPerCoefficient) * (d + 1)) return std::nullopt;
   const std::vector<double> scales = ScalesOf(group);
-  std::vector<double> metric;
-  for (const double scale : scales) metric.push_back(1.0 / scale);
+  const std::vector<double> metric = MetricOf(group);
   const std::vector<double> sites = SitesOf(group, examples);
   std::vector<double> applied(sites.size());  // [example][d]
   std::vector<double> rest(sites.size() - d);

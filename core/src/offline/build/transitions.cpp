@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "offline/build/grid_example.h"
 #include "runtime/library/contact_keytimes.h"
 #include "stridewire/runtime/pose.h"
 
@@ -27,7 +28,6 @@ class MomentReader {
   explicit MomentReader(const Skeleton& skeleton)
       : skeleton_(skeleton),
         layout_(skeleton.joint_count()),
-        pose_(skeleton.joint_count()),
         points_(skeleton.joints.size()),
         rotations_(skeleton.joints.size()) {}
 
@@ -84,14 +84,9 @@ class MomentReader {
   std::vector<DVec3> PointsOf(const MotionGroup& group, int example, int point) {
     const auto n = static_cast<std::size_t>(group.example_count);
     const std::size_t row = static_cast<std::size_t>(point) * n + static_cast<std::size_t>(example);
-    const float* x = &group.grid[row * static_cast<std::size_t>(layout_.row_floats)];
-    for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
-      pose_.rotations[j] = GridLayout::RotationOf(x, j);
-    }
-    const auto [position, yaw_rad] = layout_.RootOf(x);
-    pose_.root_position_m = Vec3(position);
-    pose_.rotations[0] = YawRotation(yaw_rad) * pose_.rotations[0];
-    return PointsOf(pose_);
+    const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
+    return PointsOf(PoseOfRow(group.grid.subspan(row * row_floats, row_floats), layout_,
+                              skeleton_.joint_count()));
   }
 
   std::vector<DVec3> PointsOf(ConstPoseSpan pose) {
@@ -101,7 +96,6 @@ class MomentReader {
 
   const Skeleton& skeleton_;
   GridLayout layout_;
-  Pose pose_;
   std::vector<Vec3> points_;
   std::vector<Quat> rotations_;
 };

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/mat3x3.hpp>
@@ -12,6 +10,7 @@
 #include <system_error>
 
 #include "base/trig.h"
+#include "offline/base/text.h"
 #include "offline/capture/bvh_file.h"
 #include "offline/capture/leg_finder.h"
 
@@ -45,15 +44,6 @@ constexpr KnownUnit kKnownUnits[] = {
 constexpr double kTypicalLegM = 0.83;
 constexpr double kShortestLegM = 0.68;
 constexpr double kLongestLegM = 1.0;
-
-__attribute__((format(printf, 1, 2))) std::string Text(const char* format, ...) {
-  char buffer[512];
-  std::va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 

@@ -96,6 +96,14 @@ std::vector<double> BallSpeed(const BodyTracks::FootTrajectory& track, double fp
 
 }  // namespace
 
+std::vector<char> StandingFrames(const std::vector<Contact>& contacts, int frame_count) {
+  std::vector<char> standing(static_cast<std::size_t>(frame_count), 0);
+  for (const Contact& contact : contacts) {
+    std::fill(standing.begin() + contact.frames.begin, standing.begin() + contact.frames.end, 1);
+  }
+  return standing;
+}
+
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,
                         FootContacts& contacts) {
   for (int f = 0; f < 2; ++f) {

@@ -38,6 +38,10 @@ struct FootContacts {
 [[nodiscard]] FootContacts FindContacts(const BodyTracks& tracks,
                                         const ContactOptions& options = {});
 
+/// Returns one flag per frame of the tracks: non-zero during the contacts.
+[[nodiscard]] std::vector<char> StandingFrames(const std::vector<Contact>& contacts,
+                                               int frame_count);
+
 /// Measures `Contact::ball_height_m` of all contacts again on other tracks of the same length.
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,
                         FootContacts& contacts);

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "offline/base/horizontal_distance.h"
+#include "offline/base/text.h"
 #include "offline/capture/glitch_repair.h"
 #include "offline/extract/body_tracks.h"
 #include "offline/extract/ground.h"
@@ -150,10 +150,8 @@ class Extractor {
     for (const int k : keyframes) {
       example.keytimes_s.push_back((k - frames.begin) / clip_.fps);
     }
-    char times[64];
-    std::snprintf(times, sizeof times, " %.2f-%.2f s", Seconds(frames.begin),
-                  Seconds(frames.end - 1));
-    example.source = std::filesystem::path(capture_.path).filename().string() + times;
+    example.source = std::filesystem::path(capture_.path).filename().string() +
+                     Text(" %.2f-%.2f s", Seconds(frames.begin), Seconds(frames.end - 1));
     return example;
   }
 

@@ -90,19 +90,16 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
 }  // namespace
 
 std::vector<FrameRange> FlightRanges(const BodyTracks& tracks, const FootContacts& contacts) {
-  std::vector<char> standing(static_cast<std::size_t>(tracks.size()), 0);
-  for (const auto& foot : contacts.feet) {
-    for (const Contact& contact : foot) {
-      std::fill(standing.begin() + contact.frames.begin, standing.begin() + contact.frames.end, 1);
-    }
-  }
+  const std::vector<char> left = StandingFrames(contacts.feet[0], tracks.size());
+  const std::vector<char> right = StandingFrames(contacts.feet[1], tracks.size());
+  const auto stands = [&](int i) {
+    return left[static_cast<std::size_t>(i)] != 0 || right[static_cast<std::size_t>(i)] != 0;
+  };
   std::vector<FrameRange> flights;
   int begin = -1;
   for (int i = 1; i < tracks.size(); ++i) {
-    const bool now = standing[static_cast<std::size_t>(i)] != 0;
-    const bool before = standing[static_cast<std::size_t>(i) - 1] != 0;
-    if (before && !now) begin = i;
-    if (!before && now && begin > 0) flights.push_back({begin, i});
+    if (stands(i - 1) && !stands(i)) begin = i;
+    if (!stands(i - 1) && stands(i) && begin > 0) flights.push_back({begin, i});
   }
   return flights;
 }

@@ -236,7 +236,7 @@ TEST(Extract, RejectsEmptyCaptures) {
   capture.clip = Clip{};
   capture.clip.fps = 120.0;
   const Extraction empty = Extract(capture);
-  EXPECT_THAT(empty.error, ::testing::HasSubstr("no frame"));
+  EXPECT_THAT(empty.error, ::testing::HasSubstr("no usable frame"));
   EXPECT_EQ(empty.steps_left + empty.steps_right + empty.jumps, 0);
 }
 

@@ -121,12 +121,12 @@ TEST(RepairGlitches, DescribesEachJointOnce) {
   for (const int f : {60, 90, 130}) figure.At(f) = figure.At(f) * YawRotation(f == 90 ? 1.2 : 0.8);
   const GlitchReport report = figure.Repair();
   EXPECT_EQ(report.repaired.size(), 3u);
-  const std::vector<std::string> told =
+  const std::vector<std::string> sentences =
       DescribeRepairs(figure.capture.skeleton, report, figure.capture.clip.fps);
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_THAT(told[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
+  ASSERT_EQ(sentences.size(), 1u);
+  EXPECT_THAT(sentences[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
                                         ::testing::HasSubstr("0.75 s"),
-                                        ::testing::EndsWith("as 2 smaller flips of it")));
+                                        ::testing::EndsWith("with 2 smaller flips")));
 }
 
 }  // namespace
