@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/hull_survey.h"
 #include "offline/build/parameter_scales.h"
@@ -64,6 +65,7 @@ Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index
   map.error_m.resize(count);
   map.weight_sum.resize(count);
   std::vector<GroupProbe> probes = MakeProbes(library, 0);
+  STRIDEWIRE_CHECK(!probes.empty() && map.others.size() == width);
   ParallelFor(static_cast<int>(count), 16, static_cast<int>(probes.size()), [&](int i, int thread) {
     const auto at = static_cast<std::size_t>(i);
     ParameterValues p = ValuesOf(map.others);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/parameter_scales.h"
 #include "runtime/library/convex_hull.h"
@@ -69,6 +70,7 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::size_t d = group.parameters.size();
   std::mt19937 random(seed);
+  STRIDEWIRE_CHECK(n > 0 && d > 0 && samples >= 0);
   std::vector<ParameterValues> points;
   for (std::size_t e = 0; e < n; ++e) {
     points.push_back(ValuesOf(group.site(static_cast<int>(e))));
@@ -138,6 +140,7 @@ std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {
 HullSurvey SurveyHull(const MotionGroup& group, std::span<const ParameterValues> samples,
                       std::span<GroupProbe> probes) {
   const int threads = static_cast<int>(probes.size());
+  STRIDEWIRE_CHECK(!probes.empty() && !samples.empty());
   HullSurvey survey;
   survey.points.resize(samples.size());
   ParallelFor(static_cast<int>(samples.size()), 32, threads, [&](int i, int thread) {

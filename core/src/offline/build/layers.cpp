@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/check.h"
 #include "offline/base/text.h"
 #include "offline/build/library_writer.h"
 #include "offline/extract/assemble.h"
@@ -85,6 +86,7 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
 std::vector<float> UpperBodyMask(const Skeleton& skeleton) {
   const std::vector<bool> of_legs = JointsOfLegs(skeleton);
   std::vector<float> mask;
+  STRIDEWIRE_CHECK(of_legs.size() == skeleton.joints.size());
   for (const bool is_of_leg : of_legs) mask.push_back(is_of_leg ? 0.0f : 1.0f);
   const std::vector<int> trunk = TrunkOf(skeleton, of_legs);
   for (std::size_t k = 0; k < trunk.size(); ++k) {
@@ -135,6 +137,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   layer.source =
       std::filesystem::path(capture.path).filename().string() + Text(" %.2f-%.2f s", from_s, to_s);
 
+  STRIDEWIRE_CHECK(static_cast<int>(layer.weights.size()) == skeleton.joint_count());
   const double blend_s = cut.is_looping ? std::min(kLoopBlendS, 0.25 * (to_s - from_s)) : 0.0;
   const double duration_s = to_s - from_s - blend_s;
   const int intervals = std::max(1, static_cast<int>(std::lround(duration_s * capture.clip.fps)));
@@ -203,6 +206,8 @@ Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers, const Skele
                              .weights = content.weights,
                              .rotations = content.rotations});
   }
+  STRIDEWIRE_CHECK(stored.views_.size() == layers.size() &&
+                   stored.contents_.size() == layers.size());
   return stored;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <utility>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/parameter_scales.h"
@@ -28,6 +29,7 @@ struct Others {
 };
 
 Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_m) {
+  STRIDEWIRE_CHECK(left_out >= 0 && left_out < group.example_count);
   Others others;
   std::vector<GridExample> points;
   for (int e = 0; e < group.example_count; ++e) {
@@ -67,6 +69,8 @@ std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<
   const std::vector<double> scales = ScalesOf(original);
   const auto n = static_cast<std::size_t>(original.example_count);
   const std::size_t count = shares.size() / n;
+  STRIDEWIRE_CHECK(count > 0 && shares.size() == count * n);
+  STRIDEWIRE_CHECK(sites.size() == count * static_cast<std::size_t>(original.parameter_count()));
   auto fitted = std::make_unique<GroupOfOthers>();
   if (is_smooth) {
     auto wide = FitSmoothBasis(sites, scales);
@@ -107,6 +111,7 @@ std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<
 }
 
 std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::size_t used) {
+  STRIDEWIRE_CHECK(used > 0);
   const std::span<const double> wanted = group.site(left_out);
   std::vector<std::pair<double, int>> near;
   for (int e = 0; e < group.example_count; ++e) {
@@ -194,6 +199,7 @@ class Comparer {
   }
 
   Comparison Compare(int left_out, std::span<const double> weights) {
+    STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group_.example_count));
     std::vector<double> one(weights.size());
     one[static_cast<std::size_t>(left_out)] = 1.0;
     const std::vector<Pose> truth = PosesAtGridPoints(group_, library_.layout(), one);

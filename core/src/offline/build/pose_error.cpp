@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/extract/mirror.h"
 #include "stridewire/runtime/keytimes.h"
 
@@ -113,6 +114,7 @@ std::vector<Pose> PosesAtGridPoints(const Clip& clip, std::span<const double> ke
   const TimeWarp warp(keytimes_s, cells);
   std::vector<Pose> poses;
   int last = 0;
+  STRIDEWIRE_CHECK(keytimes_s.size() == cells.size() + 1);
   for (const int count : cells) last += count;
   for (int p = 0; p <= last; ++p) {
     Pose& pose = poses.emplace_back(clip.joint_count);
@@ -123,6 +125,7 @@ std::vector<Pose> PosesAtGridPoints(const Clip& clip, std::span<const double> ke
 
 std::vector<Pose> PosesAtGridPoints(const MotionGroup& group, const GridLayout& layout,
                                     std::span<const double> weights) {
+  STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group.example_count));
   Movement movement;
   movement.group = 0;
   movement.weights.assign(weights.begin(), weights.end());

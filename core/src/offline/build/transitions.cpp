@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/build/grid_example.h"
 #include "runtime/library/contact_keytimes.h"
 #include "stridewire/runtime/pose.h"
@@ -63,6 +64,7 @@ class MomentReader {
   // The velocity is the difference to the grid point `beside`, which is `away_s` later.
   Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
                   double heading_rad, double ground_m) {
+    STRIDEWIRE_CHECK(point >= 0 && point < group.grid_point_count && away_s != 0.0);
     const std::vector<DVec3> at = PointsOf(group, example, point);
     const DVec3 root_m = at[0];
     Moment moment{example, RelativeTo(at, root_m, heading_rad, ground_m),
@@ -101,6 +103,7 @@ class MomentReader {
 };
 
 Transition Nearest(const std::vector<Moment>& ends, const std::vector<Moment>& starts) {
+  STRIDEWIRE_CHECK(!ends.empty() && !starts.empty());
   Transition nearest;
   double least_m = HUGE_VAL;
   for (const Moment& end : ends) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "offline/builtin/elementary.h"
 
@@ -257,6 +258,7 @@ void FootPaths::RaiseSwingUntilClear() {
   };
   lift_m_ = kMinLiftM;
   while (!clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
+  STRIDEWIRE_CHECK(lift_m_ < kMaxLiftM);
 }
 
 }  // namespace stridewire::builtin

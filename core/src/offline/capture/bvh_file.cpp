@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <unordered_set>
 
+#include "base/check.h"
 #include "offline/base/utf8.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/runtime/skeleton.h"
@@ -172,6 +173,7 @@ class Parser {
     if (!(count >= 0.0 && count <= 6.0) || count != std::floor(count)) {
       return FailAt(token_line_, ErrorCode::kOutOfRange, "expected 0 to 6 channels");
     }
+    STRIDEWIRE_CHECK(joint.channels.empty());
     joint.first_channel = file_.channel_count;
     for (int i = 0; i < static_cast<int>(count); ++i) {
       const std::string_view word = Next();
@@ -185,7 +187,7 @@ class Parser {
       }
       for (const BvhChannel& other : joint.channels) {
         if (other.axis == channel.axis && other.is_rotation == channel.is_rotation) {
-          return Malformed("duplicate channel of a joint");
+          return Malformed("duplicate channel");
         }
       }
       joint.channels.push_back(channel);
@@ -229,6 +231,7 @@ class Parser {
       }
     }
     if (Next() != "{") return Malformed("expected { after a joint name");
+    STRIDEWIRE_CHECK(parent < static_cast<int>(file_.joints.size()));
     BvhJoint joint;
     joint.name = std::move(name);
     joint.parent = parent;
@@ -371,6 +374,7 @@ class Parser {
                             std::to_string(declared_frames_) + " frames, but the file contains " +
                             std::to_string(frames));
     }
+    STRIDEWIRE_CHECK(file_.values.size() == static_cast<std::size_t>(frames) * channels);
     file_.frame_count = static_cast<int>(frames);
     return {};
   }

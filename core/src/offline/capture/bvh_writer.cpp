@@ -14,6 +14,7 @@
 #include <system_error>
 #include <vector>
 
+#include "base/check.h"
 #include "base/trig.h"
 
 namespace stridewire {
@@ -146,6 +147,7 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out) {
   Tree tree(skeleton);
   std::string text = "HIERARCHY\n";
   AppendJoint(text, skeleton, tree, 0, 0);
+  STRIDEWIRE_CHECK(tree.depth_first.size() == skeleton.joints.size());
   text += "MOTION\nFrames: " + std::to_string(clip.frame_count()) + "\nFrame Time: ";
   AppendFixed(text, 1.0 / clip.fps, 12);
   text += '\n';

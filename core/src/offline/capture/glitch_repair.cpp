@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/check.h"
 #include "offline/base/text.h"
 
 namespace stridewire {
@@ -38,6 +39,7 @@ class Track {
 
 // Replaces the frames strictly between `before` and `after` by slerp between those two.
 void Interpolate(Track& track, int before, int after) {
+  STRIDEWIRE_CHECK(before < after);
   const Quat from = track[before];
   const Quat turn = glm::conjugate(from) * track[after];
   for (int f = before + 1; f < after; ++f) {
@@ -159,6 +161,7 @@ void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
 }  // namespace
 
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip) {
+  STRIDEWIRE_CHECK(skeleton.joint_count() == clip.joint_count);
   GlitchReport report;
   for (int joint = 0; joint < clip.joint_count; ++joint) {
     RepairJoint(skeleton, joint, std::max(0, first_frame), clip, report);
@@ -169,6 +172,8 @@ GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& cli
 }
 
 std::string DescribeFlip(const Skeleton& skeleton, const JointFlip& flip, double fps) {
+  STRIDEWIRE_CHECK(flip.joint >= 0 && flip.joint < skeleton.joint_count());
+  STRIDEWIRE_CHECK(flip.frames.size() > 0 && fps > 0.0);
   const double middle_s = 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps;
   return skeleton.joints[static_cast<std::size_t>(flip.joint)].name +
          (flip.distance_m > 0.0

@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 
+#include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/weights/measure.h"
 
@@ -133,6 +134,7 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
 // Measures how far the foot of a step is from its requested footprint when it first stands.
 void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& requested,
                     MovementRecord& record) {
+  STRIDEWIRE_CHECK(IsStep(record.kind) && !record.plants.empty());
   const Foot foot = MovingFoot(record.kind);
   const double end_s = clip.frame_count() / clip.fps;
   const int frame = Frames(clip, record.plants.back().from_s, end_s).first;
@@ -279,11 +281,13 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
       } else if (event.type == AvatarEventType::kRejected) {
         return std::unexpected(Rejected(event, requests, layers));
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
+        STRIDEWIRE_CHECK(event.time_s >= result.movements.back().start_s);
         result.movements.back().end_s = event.time_s;
         result.movements.back().base = event.base;
       }
     }
   }
+  STRIDEWIRE_CHECK(result.movements.size() == requested.size() && next == requests.size());
   for (std::size_t i = 0; i < result.movements.size(); ++i) {
     MovementRecord& record = result.movements[i];
     if (record.keytimes_s.empty()) continue;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/base/text.h"
 
 // pelvis height      ____                 .-.
@@ -106,6 +107,7 @@ std::vector<FrameRange> FlightRanges(const BodyTracks& tracks, const FootContact
 
 JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                      const FrameRange& flight, const SegmentOptions& options) {
+  STRIDEWIRE_CHECK(flight.begin > 0 && flight.size() > 0 && flight.end < tracks.size());
   const double seconds = flight.size() / tracks.fps;
   if (seconds < options.flight_min_s) {
     return {{}, Text("both feet off the ground for %.2f s", seconds)};
@@ -156,7 +158,7 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
   const Standing from = FindStanding(tracks, flight.begin, -1, support_begin, options.still_m_s);
   const Standing to = FindStanding(tracks, flight.end, +1, support_end - 1, options.still_m_s);
   if (from.speed_m_s > kNearlyStill * options.still_m_s) {
-    return {{}, Text("a leap without standing before it (%.2f m/s)", from.speed_m_s)};
+    return {{}, Text("the jump does not start from standing (%.2f m/s)", from.speed_m_s)};
   }
   if (support_end - flight.end < kUnsettledMinS * tracks.fps || to.lowest >= support_end - 1) {
     return {{}, "the recording or the landing ends too early"};
@@ -168,7 +170,7 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
   jump.end = jump.settled ? to.still : support_end - 1;
   if (!(jump.start < jump.crouch && jump.crouch < jump.toe_off && jump.landing < jump.absorb &&
         jump.absorb < jump.end)) {
-    return {{}, "a jump without a crouch before or after it"};
+    return {{}, "the jump has no crouch before or after it"};
   }
   return {jump, {}};
 }

@@ -152,7 +152,7 @@ Figure CurveFigure(const MotionLibrary& library, int group_index, const GroupRef
   figure.script +=
       "set xlabel 'pseudoexamples'\nset ylabel 'largest error, mm'\nset border 3\n"
       "set tics nomirror\nset xtics 2\nset yrange [0:*]\nset xrange [-0.3:*]\n"
-      "plot $bare w lp dt 2 lw 1.5 pt 4 lc rgb '#d55e00' t 'as the paper has it', "
+      "plot $bare w lp dt 2 lw 1.5 pt 4 lc rgb '#d55e00' t 'rule from the paper', "
       "$amended w lp lw 2 pt 7 lc rgb '#0072b2' t 'amended'\n";
   return figure;
 }

@@ -324,8 +324,8 @@ TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
                                       group.parameters.begin());
     };
     int mirrored = 0, starts = 0, stops = 0;
-    double slide_m[2] = {0.0,
-                         0.0};  // Of the fixed ball in single support: captured and mirrored steps.
+    double slide_m[2] = {
+        0.0, 0.0};  // Slide of the fixed ball in single support, of captured and mirrored steps.
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
       mirrored += example.mirrored;
