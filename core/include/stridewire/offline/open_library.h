@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// Opens a library by the name that all programs accept: `builtin` for the generated library, or the
-/// path of a file. Errors: those of MotionLibrary::Open.
+/// Opens a library by the name that all programs accept: `builtin` for the generated library, or
+/// the path of a file. Errors: those of MotionLibrary::Open.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::string_view name);
 
 }  // namespace stridewire

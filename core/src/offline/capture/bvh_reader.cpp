@@ -357,7 +357,8 @@ class Reader {
     ComputePositions(-1, p);
     const DVec3 rest_direction = legs_up();
     DVec3 rest_up = NearestAxis(rest_direction);
-    // The rest pose determines the up axis if its legs hang straight and the rest of the body is above them.
+    // The rest pose determines the up axis if its legs hang straight and the rest of the body is
+    // above them.
     const DVec3 hips = 0.5 * (p[Index(found_.legs[0].hip)] + p[Index(found_.legs[1].hip)]);
     DVec3 body(0.0);
     for (int j = 1; j < static_cast<int>(joints().size()); ++j) {
