@@ -5,7 +5,7 @@
 
 #include "frame_builder.h"
 #include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::protocol {

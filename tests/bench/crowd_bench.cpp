@@ -12,7 +12,7 @@
 #include "bench_libraries.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/weights/correction.h"
 #include "runtime/library/pose_quantization.h"
 #include "runtime/pose/reference_evaluation.h"

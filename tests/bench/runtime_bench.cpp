@@ -25,10 +25,13 @@
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/weights/correction.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "runtime/library/pose_quantization.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/library/locomotion_profile.h"
 
 namespace stridewire {
 namespace {

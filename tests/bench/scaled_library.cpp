@@ -8,7 +8,8 @@
 #include "base/check.h"
 #include "offline/builtin/builtin_library.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -1,6 +1,6 @@
-// Mutated library files: each ends as an error, or as a library every group of which can be
-// evaluated and walked with. STRIDEWIRE_FUZZ_COUNT sets how many (500), STRIDEWIRE_FUZZ_SEED repeats
-// a run.
+// Mutated library files: each must be rejected with an error, or result in a library whose groups
+// can all be evaluated and used for walking. STRIDEWIRE_FUZZ_COUNT sets the number of mutations
+// (500), STRIDEWIRE_FUZZ_SEED repeats a run.
 
 #include <gtest/gtest.h>
 
@@ -16,24 +16,25 @@
 #include <string>
 #include <vector>
 
-#include "runtime/library/library_file.h"
-#include "offline/builtin/builtin_library.h"
 #include "offline/build/interpolation_error.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/build/refine.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/movement.h"
+#include "offline/builtin/builtin_library.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/library_file.h"
+#include "runtime/movement/movement.h"
+#include "stridewire/offline/library_builder.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
 
 using Bytes = std::vector<std::byte>;
 
-// A good library, and where in its bytes the grids lie, which are nearly all of them.
+// A valid library and the byte ranges of its grids, which make up nearly all of the file.
 struct Seed {
   Bytes bytes;
-  std::vector<std::pair<std::size_t, std::size_t>> grids;  // [begin, end)
+  std::vector<std::pair<std::size_t, std::size_t>> grids;  // [begin, end).
 
   explicit Seed(const MotionLibrary& library)
       : bytes(library.bytes().begin(), library.bytes().end()) {
@@ -56,7 +57,7 @@ class Mutator {
   std::size_t Below(std::size_t n) { return static_cast<std::size_t>(random_() % n); }
   double Uniform() { return static_cast<double>(random_() >> 11) * 0x1p-53; }
 
-  // Damage that no hash goes with: a disk's, a network's or a foreign program's.
+  // Damage without a matching hash, as from a disk, a network or a foreign program.
   Bytes Damage(const Seed& seed) {
     Bytes bytes = seed.bytes;
     switch (Below(6)) {
@@ -79,7 +80,7 @@ class Mutator {
     return bytes;
   }
 
-  // Damage under a good header, so that the FlatBuffers verifier and the checks of meaning see it.
+  // Damage with a matching header, which the FlatBuffers verifier and later checks have to detect.
   Bytes Forge(const Seed& seed) {
     Bytes bytes = seed.bytes;
     const std::size_t mutations = Below(2) == 0 ? 1 : 1 + Below(6);
@@ -92,7 +93,7 @@ class Mutator {
   }
 
  private:
-  // Mostly outside the grids, where every byte means something else.
+  // Prefers positions outside the grids, where every byte has a different meaning.
   std::size_t Place(const Seed& seed, std::size_t size, std::size_t alignment) {
     for (int attempt = 0; attempt < 200; ++attempt) {
       const std::size_t at =
@@ -145,7 +146,7 @@ class Mutator {
       case 1: bytes[Place(seed, bytes.size(), 1)] ^= std::byte(1u << Below(8)); break;
       case 2:
       case 3: Extreme(bytes, Place(seed, bytes.size(), 4), bytes.size()); break;
-      case 4: {  // A number a little, or much, larger or smaller.
+      case 4: {  // Changes a double slightly or strongly.
         const std::size_t at = Place(seed, bytes.size(), 8);
         double value = 0.0;
         if (at + sizeof value > bytes.size()) break;
@@ -161,7 +162,7 @@ class Mutator {
         Put(bytes, at, value * static_cast<float>(4.0 * Uniform() - 2.0));
         break;
       }
-      case 6: {  // A count or offset a little off.
+      case 6: {  // Changes a count or offset slightly.
         const std::size_t at = Place(seed, bytes.size(), 4);
         std::uint32_t value = 0;
         if (at + sizeof value > bytes.size()) break;
@@ -169,7 +170,7 @@ class Mutator {
         Put(bytes, at, value + static_cast<std::uint32_t>(Below(9)) - 4);
         break;
       }
-      case 7: {  // A stretch from elsewhere.
+      case 7: {  // Copies bytes from elsewhere.
         const std::size_t from = Place(seed, bytes.size(), 8);
         const std::size_t to = Place(seed, bytes.size(), 8);
         const std::size_t count =
@@ -199,7 +200,7 @@ void ExpectPose(ConstPoseSpan pose, const char* what) {
   for (const Quat& q : pose.rotations) ASSERT_NEAR(glm::length(q), 1.0f, 2e-3f) << what;
 }
 
-// Every group at some of its sites and at points in and about their hull, over its time.
+// Evaluates every group at some sites and at points inside and around their hull, over its time.
 void Evaluate(const MotionLibrary& library, Mutator& mutator) {
   const int joints = library.skeleton().joint_count();
   std::vector<double> scratch(static_cast<std::size_t>(library.max_example_count()));
@@ -242,7 +243,7 @@ void Evaluate(const MotionLibrary& library, Mutator& mutator) {
   }
 }
 
-// An avatar given whatever the library takes.
+// Gives an avatar all requests that the library accepts.
 void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator) {
   AvatarSimulation avatar(library, {});
   for (int tick = 0; tick < 150; ++tick) {
@@ -271,7 +272,7 @@ void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator)
   }
 }
 
-TEST(LibraryMutation, EveryFileEndsAsAnErrorOrALibraryThatCanBePlayed) {
+TEST(LibraryMutation, EveryFileIsRejectedOrCanBePlayed) {
   const char* count_text = std::getenv("STRIDEWIRE_FUZZ_COUNT");
   const char* seed_text = std::getenv("STRIDEWIRE_FUZZ_SEED");
   const std::uint64_t count = count_text != nullptr ? std::strtoull(count_text, nullptr, 10) : 500;
@@ -295,7 +296,7 @@ TEST(LibraryMutation, EveryFileEndsAsAnErrorOrALibraryThatCanBePlayed) {
   std::map<std::string, int> refused;
   for (std::uint64_t i = 0; i < count; ++i) {
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", file " << i);
-    // The small ones mostly: more files a second.
+    // Prefer the small libraries, which allow more mutations per second.
     const Seed& good = seeds[mutator.Below(6) == 0 ? 2 : mutator.Below(2)];
     const bool forged = mutator.Below(4) != 0;
     const Bytes bytes = forged ? mutator.Forge(good) : mutator.Damage(good);
@@ -315,7 +316,8 @@ TEST(LibraryMutation, EveryFileEndsAsAnErrorOrALibraryThatCanBePlayed) {
   }
   std::cout << accepted << " accepted; refused:\n";
   for (const auto& [text, times] : refused) std::cout << "  " << times << "  " << text << "\n";
-  // Mutations that never or always break a file, or always in the same place, would test nothing.
+  // If the mutations always or never broke a file, or always in the same place, the test would be
+  // useless.
   if (count >= 500) {
     EXPECT_GT(accepted, count / 20);
     EXPECT_GT(refused.size(), 8u);

@@ -1,5 +1,5 @@
-// Compact poses: how many bytes they take and how far anything in them is from where it should be, over every frame of
-// every capture there is and over avatars that do all that avatars do; on every instruction set this machine has.
+// Quantized poses: their size and their largest error, over every frame of all captures and over
+// avatars with random requests, on every instruction set of this machine.
 
 #include <gtest/gtest.h>
 
@@ -11,15 +11,15 @@
 #include <vector>
 
 #include "captured_library.h"
-#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
+#include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/library/pose_quantization.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
-#include "stridewire/runtime/avatar.h"
-#include "runtime/library/pose_quantization.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 namespace {
@@ -43,7 +43,7 @@ CompactCodec CodecOf(const Skeleton& skeleton, const PoseQuantization& code) {
   return CompactCodec::Make(code.joints, ParentsOf(skeleton)).value();
 }
 
-// Puts poses through their codes, in double precision but for those, and keeps what came of them.
+// Quantizes poses and restores them, in double precision otherwise, and records the errors.
 class Passage {
  public:
   Passage(const Skeleton& skeleton, const CompactCodec& codec)
@@ -158,11 +158,11 @@ class Passage {
 
 struct Source {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
-class CompactPosesOf : public testing::TestWithParam<Source> {
+class QuantizedAvatars : public testing::TestWithParam<Source> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -175,19 +175,19 @@ class CompactPosesOf : public testing::TestWithParam<Source> {
   PoseQuantization code_;
 };
 constexpr auto kNameOf = [](const auto& source) { return source.param.name; };
-// Subject 01 is Debian's.
+// Subject 01 comes from a Debian package.
 const auto kCaptured = testing::Values(
     Source{"DebianTakes", {kDebianTakes}}, Source{"Subject03", {"03"}}, Source{"Subject05", {"05"}},
     Source{"Subject06", {"06"}}, Source{"Subject09", {"09"}}, Source{"Subject14", {"14"}},
     Source{"Subject16", {"16"}}, Source{"Subject29", {"29"}}, Source{"Subject32", {"32"}});
-INSTANTIATE_TEST_SUITE_P(Generated, CompactPosesOf, testing::Values(Source{"Builtin", {}}),
+INSTANTIATE_TEST_SUITE_P(Generated, QuantizedAvatars, testing::Values(Source{"Builtin", {}}),
                          kNameOf);
-INSTANTIATE_TEST_SUITE_P(Captured, CompactPosesOf, kCaptured, kNameOf);
+INSTANTIATE_TEST_SUITE_P(Captured, QuantizedAvatars, kCaptured, kNameOf);
 
-class CompactCapturesOf : public CompactPosesOf {};
-INSTANTIATE_TEST_SUITE_P(Captured, CompactCapturesOf, kCaptured, kNameOf);
+class QuantizedCaptures : public QuantizedAvatars {};
+INSTANTIATE_TEST_SUITE_P(Captured, QuantizedCaptures, kCaptured, kNameOf);
 
-TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
+TEST_P(QuantizedCaptures, KeepAllFramesWithinAMillimetre) {
   EXPECT_LE(code_.largest_error_m, kLargestErrorM);
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);
@@ -202,8 +202,8 @@ TEST_P(CompactCapturesOf, AllFramesAreWithinAMillimetre) {
   EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
 }
 
-// Of those that are left out the shift is stated, and within it what is shown.
-TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
+// The shift of joints that are left out must be within the stated limit.
+TEST_P(QuantizedCaptures, KeepReducedJointsWithinTheStatedError) {
   const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
@@ -217,7 +217,7 @@ TEST_P(CompactCapturesOf, FewerJointsAreWithinWhatIsStated) {
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
 }
 
-TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
+TEST_P(QuantizedAvatars, KeepReducedJointsWithinTheStatedError) {
   const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
@@ -250,7 +250,7 @@ TEST_P(CompactPosesOf, AvatarsOfFewerJointsAreWithinWhatIsStated) {
   EXPECT_LE(root.pose_bytes(), 20u);
 }
 
-TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
+TEST_P(QuantizedAvatars, StayWithinAMillimetre) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
   Passage passage(skeleton(), codec);
   DrawnCrowd crowd(library_, 20, 5);
@@ -264,9 +264,9 @@ TEST_P(CompactPosesOf, AvatarsOfItAreWithinAMillimetre) {
   EXPECT_LE(passage.mean_bytes(), kMostBytes31Joints);
 }
 
-TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
+TEST_P(QuantizedAvatars, HaveTheSameBytesOnEveryInstructionSet) {
   const CompactCodec codec = CodecOf(skeleton(), code_);
-  DrawnCrowd crowd(library_, 7, 6);  // the last block is not full
+  DrawnCrowd crowd(library_, 7, 6);  // The last block is not full.
   std::vector<CompactCodec::Block> blocks;
   for (int tick = 0; tick < 120; ++tick) {
     crowd.Advance();
@@ -292,7 +292,7 @@ TEST_P(CompactPosesOf, ItsBytesAreTheSameOnEveryInstructionSet) {
   }
 }
 
-TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
+TEST(PoseQuantization, UsesTheIdentityAsReferenceForSmallRotations) {
   const PoseQuantization code = ChoosePoseQuantization(*LibraryOf({}));
   int as_they_are = 0;
   for (std::size_t j = 1; j < code.joints.size(); ++j) {
@@ -305,11 +305,12 @@ TEST(CompactPoses, JointsTurnedLittleOnAverageAreToldAsTheyAre) {
   }
   // Spine, neck, head, shoulders, hands and toes.
   EXPECT_GE(as_they_are, 10);
-  EXPECT_LT(as_they_are, static_cast<int>(code.joints.size()) - 4);  // but not thighs, knees, arms
+  // But not the thighs, knees and arms.
+  EXPECT_LT(as_they_are, static_cast<int>(code.joints.size()) - 4);
 }
 
-// Any tree of joints that turn any way within any ranges: what is stated is kept.
-TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
+// For random skeletons and random ranges, the errors must be within the stated bound.
+TEST(PoseQuantization, KeepsItsBoundForRandomSkeletons) {
   const unsigned seed = std::random_device{}();
   std::cout << "seed " << seed << '\n';
   Random random(seed);
@@ -327,7 +328,7 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
       RotationRange range;
       const auto normal = [&] { return static_cast<float>(random.Draw(-1.0, 1.0)); };
       range.reference = Normalise(Quat(normal() + 2.0f, normal(), normal(), normal()));
-      // Some turn every way; others within a box of up to 0.5 a side.
+      // Some joints rotate in any direction, others within a box with sides of up to 0.5.
       if (j > 0 && random.Draw(0.0, 1.0) < 0.9) {
         double squared = 0.0;
         for (int c = 0; c < 3; ++c) {
@@ -354,7 +355,7 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
           q = Normalise(Quat(normal() + 0.1f, normal(), normal(), normal()));
           continue;
         }
-        // Less what it has to make up for of the joint above.
+        // Subtract what the joint has to compensate for the joint above.
         Vec3 v;
         for (int c = 0; c < 3; ++c) {
           v[c] = static_cast<float>(random.Draw(0.99, 1.0) *
@@ -373,11 +374,11 @@ TEST(CompactPoses, RandomSkeletonsKeepTheBoundThatIsStated) {
     EXPECT_LE(code.largest_error_m, kLargestErrorM) << "seed " << seed << ", round " << round;
     closest = std::max(closest, passage.largest_error_m() / kLargestErrorM);
   }
-  // The bound is no idle one.
+  // The bound must not be far too large either.
   EXPECT_GT(closest, 0.3) << "seed " << seed;
 }
 
-TEST(CompactPoses, BonesOfManyMetresGetAllBitsAndSaySo) {
+TEST(PoseQuantization, ReportsTheErrorIfBitsRunOut) {
   Skeleton skeleton;
   skeleton.joints = {{"root", -1, Vec3(0.0f)}, {"far", 0, Vec3(0.0f, 100.0f, 0.0f)}};
   const std::vector<RotationRange> ranges(2);

@@ -1,4 +1,5 @@
-// The fast evaluation beside the plain one, and on every instruction set this machine has.
+// Compares the fast evaluation with the reference evaluation, on every instruction set of this
+// machine.
 
 #include <gtest/gtest.h>
 #include <xxhash.h>
@@ -9,19 +10,22 @@
 #include <string>
 #include <vector>
 
-#include "captured_library.h"
-#include "random_requests.h"
-#include "runtime/plan/foot_sampler.h"
-#include "instruction_sets.h"
-#include "runtime/pose/pose_kernels.h"
-#include "random.h"
-#include "rough_ground.h"
 #include "base/trig.h"
+#include "captured_library.h"
+#include "instruction_sets.h"
+#include "random.h"
+#include "random_requests.h"
+#include "rough_ground.h"
+#include "runtime/plan/foot_sampler.h"
+#include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/pose_kernels.h"
+#include "runtime/pose/reference_evaluation.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
-#include "runtime/pose/reference_evaluation.h"
-#include "runtime/pose/evaluation_batcher.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
@@ -30,7 +34,7 @@ using Library = std::shared_ptr<const MotionLibrary>;
 
 struct Source {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
@@ -40,7 +44,7 @@ void AppendBytes(const AvatarSimulation& avatar, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(pose.rotations.data()), pose.rotations.size_bytes());
 }
 
-TEST(Evaluation, SinesAreThoseOfTheScalarCode) {
+TEST(Evaluation, SimdSinesMatchScalarSines) {
   Random random(20261122);
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
@@ -78,8 +82,8 @@ double AngleBetween(const DQuat& a, const DQuat& b) {
   return 2.0 * std::atan2(glm::length(DVec3(turn.x, turn.y, turn.z)), std::fabs(turn.w));
 }
 
-// What planning looks at side by side is what poses evaluated one by one have.
-TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
+// FootSampler must return the feet of poses that are evaluated one by one.
+TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   constexpr unsigned kSeed = 20261126;
   const Library library = OpenLibrary("builtin").value();
   const LegRig& rig = library->leg_rig();
@@ -88,8 +92,9 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
   Pose scratch = pose;
   int sampled = 0;
   for (int walk = 0; walk < 40; ++walk) {
-    AvatarSimulation avatar(library, {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
-                            random.Draw(-4.0, 4.0)});
+    AvatarSimulation avatar(library,
+                            {DVec3(random.Draw(-900.0, 900.0), 0.0, random.Draw(-900.0, 900.0)),
+                             random.Draw(-4.0, 4.0)});
     for (int step = 0; step < 6; ++step) {
       const bool jumps = random.Draw(0.0, 1.0) < 0.2;
       MovementRequest request;
@@ -106,7 +111,8 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
       for (int tick = 0; tick < ticks; ++tick) avatar.Advance(1.0 / 60.0);
       if (avatar.movement() == nullptr) continue;
       Movement movement = *avatar.movement();
-      if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);  // no mean
+      // Rotations without a mean.
+      if (look % 6 == 5) movement.weights.assign(movement.weights.size(), 0.0f);
       std::vector<double> times_s(static_cast<std::size_t>(random.Draw(1.0, 16.99)));
       for (double& time_s : times_s) {
         time_s = random.Draw(0.0, random.Draw(0.0, 1.0) < 0.5 ? 0.3 : movement.duration_s() + 0.01);
@@ -142,8 +148,8 @@ TEST(Evaluation, FeetLookedAtTogetherAreThoseOfSinglePoses) {
   EXPECT_GT(sampled, 300);
 }
 
-// Of what movements leave of the poses before, the largest are halves of a turn.
-TEST(Evaluation, EasesOutDifferencesOfAnySize) {
+// Difference poses of up to half a turn.
+TEST(Evaluation, FadesDifferencesOfAnySize) {
   constexpr unsigned kSeed = 20261125;
   constexpr std::size_t kJoints = 37;
   Random random(kSeed);
@@ -182,7 +188,7 @@ TEST(Evaluation, EasesOutDifferencesOfAnySize) {
   EXPECT_LT(worst_rad, 1e-6) << "seed " << kSeed;
 }
 
-// Sixteen rows side by side, all of which are eased out and go on as fast as they did.
+// Sixteen rows side by side, all with an inertial difference pose.
 struct Sixteen {
   static constexpr std::size_t kJoints = 5;
   static constexpr std::size_t kRowFloats = GridLayout(kJoints).row_floats;
@@ -248,9 +254,9 @@ struct Sixteen {
   alignas(64) std::array<Lanes, 4 * kJoints> rotations{};
 };
 
-// What is left of the poses before makes rotations longer before they are made unit: one that is too short to have a
-// mean must be seen through it.
-TEST(Evaluation, SeesARotationTooShortInEveryLaneAndJoint) {
+// Difference poses make rotations longer before they are normalized. A rotation that is too short
+// to have a mean must still be detected.
+TEST(Evaluation, DetectsShortRotationsInEveryLaneAndJoint) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   for (const std::int64_t set : InstructionSets()) {
@@ -269,10 +275,10 @@ TEST(Evaluation, SeesARotationTooShortInEveryLaneAndJoint) {
   }
 }
 
-// All machines give these bytes (decision 0002). Where a formula changes on purpose the hash does as well, and then movement
-// mode gets another feature bit: who evaluates movements by the old formulas would show other poses than the server
-// (decision 0021).
-TEST(Evaluation, IsWhatMovementModeStandsFor) {
+// All machines produce this hash (decision 0002). If a formula changes intentionally, the hash
+// changes, and the protocol needs a new number for movement mode. Otherwise clients that evaluate
+// movements with the old formulas would display other poses than the server (decision 0021).
+TEST(Evaluation, MatchesTheNumberInTheProtocol) {
   DrawnCrowd crowd(LibraryOf({}), 24, 10);
   std::string bytes;
   for (int tick = 0; tick < 300; ++tick) {
@@ -283,7 +289,7 @@ TEST(Evaluation, IsWhatMovementModeStandsFor) {
   EXPECT_EQ(protocol::kFeatureMovementMode, 32'768u);
 }
 
-class EvaluationOf : public testing::TestWithParam<Source> {
+class LibraryEvaluation : public testing::TestWithParam<Source> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -292,7 +298,7 @@ class EvaluationOf : public testing::TestWithParam<Source> {
   Library library_;
 };
 
-TEST_P(EvaluationOf, IsTheReference) {
+TEST_P(LibraryEvaluation, MatchesTheReference) {
   constexpr unsigned kSeed = 1;
   DrawnCrowd crowd(library_, 20, kSeed);
   Pose fast(library_->skeleton().joint_count());
@@ -301,7 +307,7 @@ TEST_P(EvaluationOf, IsTheReference) {
   GridCache cache(library_->layout());
   double largest_m = 0.0;
   double largest_rad = 0.0;
-  double sampled_rad = 0.0;  // sum
+  double sampled_rad = 0.0;  // Sum over all poses.
   int poses = 0;
   for (int tick = 0; tick < 600; ++tick) {
     crowd.Advance();
@@ -327,11 +333,11 @@ TEST_P(EvaluationOf, IsTheReference) {
   EXPECT_GT(poses, 4000);
   EXPECT_LT(largest_m, 1e-5) << "seed " << kSeed;
   EXPECT_LT(largest_rad, 1e-5) << "seed " << kSeed;
-  // Blending before interpolating, or after: two ways to the same pose, nearly.
+  // Blending before or after interpolating gives nearly the same pose.
   EXPECT_LT(sampled_rad / poses, 0.02) << "seed " << kSeed;
 }
 
-TEST_P(EvaluationOf, PlantsAsTheReference) {
+TEST_P(LibraryEvaluation, PlantingMatchesTheReference) {
   constexpr unsigned kSeed = 2;
   DrawnCrowd crowd(library_, 20, kSeed);
   const Skeleton& skeleton = library_->skeleton();
@@ -378,9 +384,9 @@ TEST_P(EvaluationOf, PlantsAsTheReference) {
   EXPECT_LT(largest_rad, 1e-4) << "seed " << kSeed;
 }
 
-TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
+TEST_P(LibraryEvaluation, HasTheSameBytesOnEveryInstructionSet) {
   constexpr unsigned kSeed = 7;
-  std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick]
+  std::map<std::string, std::vector<std::string>> bytes;  // [instruction set][tick].
   for (const std::int64_t set : InstructionSets()) {
     const OnlyInstructionSet only(set);
     DrawnCrowd crowd(library_, 24, kSeed);
@@ -403,7 +409,7 @@ TEST_P(EvaluationOf, IsTheSameBytesOnEveryInstructionSet) {
   std::printf("\n");
 }
 
-TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
+TEST_P(LibraryEvaluation, DoesNotDependOnOtherLanes) {
   constexpr unsigned kSeed = 8;
   std::vector<std::string> alone;
   for (const std::size_t at_once : {1, 3, 16, 29}) {
@@ -422,7 +428,7 @@ TEST_P(EvaluationOf, IsTheSameBytesWhoeverIsEvaluatedBeside) {
   }
 }
 
-// What is displayed of a movement, worked out for this one pose.
+// Evaluates the displayed pose of a movement on its own.
 Pose ShownAlone(const MotionLibrary& library, const Movement& movement, double time_s) {
   Pose pose(library.skeleton().joint_count());
   GridCache cache(library.layout());
@@ -431,7 +437,7 @@ Pose ShownAlone(const MotionLibrary& library, const Movement& movement, double t
   return pose;
 }
 
-TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
+TEST_P(LibraryEvaluation, SinglePosesMatchBatches) {
   constexpr unsigned kSeed = 9;
   constexpr std::size_t kCrowd = 37;
   DrawnCrowd crowd(library_, kCrowd, kSeed);
@@ -459,9 +465,9 @@ TEST_P(EvaluationOf, OnePoseIsTheSameBytesAsOneOfMany) {
   EXPECT_GT(poses, 3000);
 }
 
-// Poses of ticks to come, on every instruction set: of movements just begun and half over, on level and on rough ground,
-// planted or not, taken over and settling.
-TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
+// Runs of poses on every instruction set: of movements at their start and in their middle, on level
+// and uneven ground, with and without planting, redirected, and with a plant fade.
+TEST_P(LibraryEvaluation, SampleRunsMatchSinglePoses) {
   constexpr unsigned kSeed = 10;
   constexpr std::size_t kCrowd = 41;
   Random random(kSeed);
@@ -515,7 +521,8 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
           ++seen;
           const FootPlan& feet = stretch.movement->feet;
           ++planted[feet.is_active ? 1 : 0];
-          settling += feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
+          settling +=
+              feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
         }
       });
       if (HasFatalFailure()) return;
@@ -531,7 +538,7 @@ TEST_P(EvaluationOf, AStretchIsTheSameBytesAsItsPosesAlone) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Libraries, EvaluationOf,
+INSTANTIATE_TEST_SUITE_P(Libraries, LibraryEvaluation,
                          testing::Values(Source{"Builtin", {}}, Source{"Subject01", {kDebianTakes}},
                                          Source{"Subject16", {"16"}}),
                          [](const auto& tested) { return tested.param.name; });

@@ -1,5 +1,5 @@
-// Long random walks on the generated library and on captured ones, looked at from outside: the motion is
-// written as BVH and read back, feet are measured against where they were asked to stand.
+// Long random walks with the built-in library and with captured ones. The motion is written to BVH
+// and read back, and the feet are compared with the requested footprints.
 
 #include <gtest/gtest.h>
 
@@ -19,10 +19,10 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kDegrees = 180.0 / M_PI;
 
-// What random steps are drawn from: inside what each library spans.
+// Parameters of random steps, within what each library spans.
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
   double least_length_m;
   double most_length_m;
   double least_side_m;
@@ -32,7 +32,7 @@ struct Walker {
 
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-// The motion as anybody gets it: written and read back.
+// Writes the motion to BVH and reads it back.
 Clip ThroughBvh(const Skeleton& skeleton, const Clip& clip) {
   std::ostringstream text;
   EXPECT_TRUE(WriteBvh(skeleton, clip, text).has_value());
@@ -50,8 +50,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Walker{"DebianTakes", {kDebianTakes}, 0.5, 0.58, 0.1, 0.2, 0.2}),
     [](const auto& walker) { return walker.param.name; });
 
-// Footprints as a level designer would lay them: each from the one before by random length, side and
-// turn, in the world, all known before the first step is taken.
+// Footprints as a level designer might place them. Each has a random distance, side and turn from
+// the previous one, and all are known in world space before the first step.
 struct Trail {
   std::vector<MovementRequest> requests;
   std::vector<Footprint> prints;
@@ -70,10 +70,10 @@ Trail RandomTrail(const Walker& walker, const Library& library, int steps, unsig
   double heading_rad = 0.0;
   Foot foot = Foot::kLeft;
   for (int i = 0; i < steps; ++i) {
-    // Turning goes with the inner foot ahead of the outer: a left turn with a left step.
+    // Turn to the side of the moving foot: left turns happen with left steps.
     const double sign = foot == Foot::kLeft ? 1.0 : -1.0;
     double turn_rad = sign * random.Draw(-0.3, 1.0) * walker.most_turn_rad;
-    // Near the origin, where floats are fine: who is far away turns back.
+    // Stay near the origin, where floats are precise: turn back when far away.
     const DVec3 stands_at = stands[static_cast<int>(foot)];
     if (glm::length(stands_at) > 30.0) {
       const double home_rad = std::atan2(-stands_at.x, -stands_at.z);
@@ -94,7 +94,7 @@ Trail RandomTrail(const Walker& walker, const Library& library, int steps, unsig
   return trail;
 }
 
-TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
+TEST_P(FootPlant, RandomStepsLandOnTheirFootprintsAndStayThere) {
   const Walker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
@@ -112,13 +112,13 @@ TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
 
   const VelocityStep examples = LargestStepOfExamples(*LibraryOfAll(walker.subjects), kFps);
 
-  // Landings: where the ball is and the foot points when it is said to stand.
+  // At each landing, compare the ball and the heading of the foot with its footprint.
   const FootCurves curves = CurvesOf(skeleton, clip);
   int missed = 0;
   int steps = 0;
   double worst_m = 0.0;
   double worst_deg = 0.0;
-  double halves_m[2] = {};  // mean error of the first and the last hundred
+  double halves_m[2] = {};  // Mean error of the first and the last hundred steps.
   for (const MovementRecord& record : synthesis->movements) {
     if (record.request_id == 0) continue;
     const auto i = static_cast<std::size_t>(record.request_id - 1);
@@ -168,16 +168,16 @@ TEST_P(FootPlant, AThousandRandomStepsLandOnTheirFootprintsAndStayThere) {
   EXPECT_LE(figures.largest_join_step.root_m_s, std::max(0.5, 1.5 * examples.root_m_s));
 }
 
-// A footprint within reach is met, whatever the examples span; of one out of reach the report says how far
-// away the foot landed.
-TEST(Footprints, AreToldToBeMetOrByHowMuchTheyAreMissed) {
+// A footprint in reach is met even if the examples do not span the step. For one out of reach, the
+// report gives the distance between the foot and the footprint.
+TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   const Library library = OpenLibrary("builtin").value();
   const auto step_to = [&](const Footprint& print) {
     const std::vector<MovementRequest> requests = {
         {1, StepRequest{.foot = Foot::kLeft, .at = {{print.position_m, print.heading_rad}}}}};
     return Synthesize(library, BaseFrame{}, requests, kFps).value().movements.front();
   };
-  // Heading and place together are beyond what any example did.
+  // No example combines this turn with this length.
   const MovementRecord met = step_to({{0.3, 0.0, 0.55}, 0.5});
   EXPECT_FALSE(met.clamped);
   EXPECT_LE(met.landing_error_m, 1e-4);

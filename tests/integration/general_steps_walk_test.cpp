@@ -1,6 +1,6 @@
-// Stairs, a slalom, a shuffle, walking backward and turning on the spot as a user would see them, on
-// the generated library and on captures that span them: knees bend forward, legs do not cross, no foot
-// goes more than 3 cm through the ground.
+// Stairs, a slalom, sideways and backward steps and turns on the spot, with the built-in library
+// and with captures that span them. Knees must bend forward, legs must not cross, and no foot may
+// go more than 3 cm into the ground.
 
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ Steps Stairs(double rise_m, double tread_m) {
   return steps;
 }
 
-// Each stair with both feet before the next.
+// Stairs on which both feet stand on each step before the next.
 Steps StairsFootByFoot(double rise_m, double tread_m) {
   Steps steps;
   for (const double way : {1.0, -1.0}) {
@@ -87,8 +87,9 @@ struct Foothold {
   double height_m;
 };
 
-// Ground of stairs along z: treads begin 14 cm behind the ball of whoever climbs onto them, but ahead of
-// the toes of whoever stands below (by 1 cm: they are 9 cm ahead of the ball), and end 1 cm ahead of the ball of whoever goes down from them.
+// Ground height of stairs along z. Each tread begins 14 cm behind the ball of a foot that stands on
+// it, but 1 cm ahead of the toes of a foot on the step below, which are 9 cm ahead of its ball. It
+// ends 1 cm ahead of the ball of a foot that steps down from it.
 double GroundAt(const std::vector<Foothold>& holds, double z_m) {
   double height = holds.front().height_m;
   for (std::size_t i = 1; i < holds.size(); ++i) {
@@ -104,8 +105,8 @@ struct Looks {
   double least_knee_deg = 180.0;
   double most_knee_deg = 0.0;
   double nearest_legs_m = 1.0;
-  double deepest_m = 0.0;        // of heel, ball or tip of the toes below ground; NaN: unknown
-  double largest_drift_m = 0.0;  // of a planted ball
+  double deepest_m = 0.0;        // Depth of heel, ball or toes below the ground; NaN: unknown.
+  double largest_drift_m = 0.0;  // Drift of a planted ball.
   int extrapolated = 0;
   int clamped = 0;
   std::set<int> groups;
@@ -153,7 +154,7 @@ Looks LookAt(const char* name, const Library& library, const Steps& steps) {
     }
     looks.nearest_legs_m = std::min(looks.nearest_legs_m, legs.LegDistance());
   }
-  // Treads of a winding stair are not told by z.
+  // The ground of a winding staircase does not follow from z.
   if (!level && !is_along_z) looks.deepest_m = std::numeric_limits<double>::quiet_NaN();
   std::printf(
       "%-28s knees %4.1f to %5.1f deg, legs %.3f m apart, %.3f m into the ground, balls drift %.3f "
@@ -185,7 +186,7 @@ TEST(GeneralStepsBuiltin, ClimbsStairs) {
   }
 }
 
-TEST(GeneralStepsBuiltin, GoesUpAWindingStair) {
+TEST(GeneralStepsBuiltin, ClimbsAWindingStaircase) {
   Steps steps(7, Ahead(0.3, 0.35, 0.15));
   steps.front().turn_rad = 0.0;
   const Looks looks = LookAt("builtin winding stairs", Builtin(), steps);
@@ -204,7 +205,7 @@ TEST(GeneralStepsBuiltin, WalksASlalom) {
   }
 }
 
-TEST(GeneralStepsBuiltin, ShufflesAside) {
+TEST(GeneralStepsBuiltin, StepsSideways) {
   const Library library = Builtin();
   for (const Foot lead : {Foot::kLeft, Foot::kRight}) {
     const Looks looks = LookAt("builtin shuffle", library, Shuffle(lead, 0.4, 0.13));
@@ -241,12 +242,13 @@ INSTANTIATE_TEST_SUITE_P(Steps, GeneralStepsCaptured,
                                          Selection{"Selected", LibraryBuilder::Selecting()}),
                          [](const auto& selection) { return selection.param.name; });
 
-// Captured people pass their feet more closely, and their markers slide.
+// Captured people move their feet closer past each other, and their markers slide.
 constexpr double kCapturedApartM = 0.02;
 
-// Both subjects climb blocks of about 0.2 m, 0.43 m foot over foot. Stairs of 0.25 m are beyond what they
-// did: clamped to the grown hull, which has to look as well.
-TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
+// Both subjects climb blocks of about 0.2 m, with 0.43 m from foot to foot. Stairs of 0.25 m are
+// beyond their captures, so requests are clamped to the grown hull; the motion must still look
+// right.
+TEST_P(GeneralStepsCaptured, ClimbsTheBlocksOfSubjects03And14) {
   const std::vector<std::string> subjects = {"03", "14"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
@@ -261,14 +263,14 @@ TEST_P(GeneralStepsCaptured, ClimbTheBlocksOf03And14) {
   }
 }
 
-TEST_P(GeneralStepsCaptured, WalkASlalomAs16Does) {
+TEST_P(GeneralStepsCaptured, WalksTheSlalomOfSubject16) {
   const std::vector<std::string> subjects = {"16"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);
   ExpectGoodLooks(LookAt("16 slalom", library, Slalom(0.6, 0.4)), kCapturedApartM);
 }
 
-TEST_P(GeneralStepsCaptured, GoAsideAndBackwardAs09Does) {
+TEST_P(GeneralStepsCaptured, StepsSidewaysAndBackwardLikeSubject09) {
   const std::vector<std::string> subjects = {"09"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const Library library = BuildFromTakes(TakesOf(subjects), GetParam().builder);

@@ -1,5 +1,5 @@
-// Requests that take over from a movement under way, at any time: no joint changes its speed at once and no
-// foot that stands slides.
+// Requests that interrupt a movement at any time. No joint may change its speed abruptly, and no
+// standing foot may slide.
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "captured_library.h"
 #include "random.h"
 #include "random_walker.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "velocity_steps.h"
 
 namespace stridewire {
@@ -21,8 +21,8 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar, std::uint64_t id,
-                              Random& random) {
+MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar,
+                              std::uint64_t id, Random& random) {
   MovementRequest request{
       id, {}, random.Draw(0, 1) < 0.8 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
@@ -47,16 +47,15 @@ MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation
 }
 
 struct Figures {
-  int requests = 0;  // while a movement was under way
+  int requests = 0;  // Requests during a movement.
   int cut_short = 0;
-  double largest_drift_m = 0.0;  // of a foot from where it stood when it was said to stand
-  std::vector<double>
-      at_cuts;  // largest change of a joint's angular velocity at each interrupt, rad/s
-  double largest_at_joins = 0.0;  // wherever a movement begins
+  double largest_drift_m = 0.0;   // Drift of a standing foot.
+  std::vector<double> at_cuts;    // Largest change of angular velocity at each interrupt, rad/s.
+  double largest_at_joins = 0.0;  // The same at every start of a movement.
   double largest_elsewhere = 0.0;
 };
 
-// Looks at one avatar after every frame.
+// Measures one avatar after every frame.
 class Observer {
  public:
   Observer(const AvatarSimulation& avatar, Figures& figures)
@@ -76,7 +75,7 @@ class Observer {
   }
 
  private:
-  static constexpr int kFramesOfJoin = 3;  // a change of velocity shows in three poses
+  static constexpr int kFramesOfJoin = 3;  // A change of velocity affects three poses.
 
   void LookAtJoints() {
     const double step = steps_.Add(avatar_.pose()).joint_rad_s;
@@ -137,14 +136,14 @@ Figures InterruptAll(const RandomWalker& walker, const Library& library, BlendKi
   return figures;
 }
 
-class TakeOver : public testing::TestWithParam<RandomWalker> {};
-INSTANTIATE_TEST_SUITE_P(Libraries, TakeOver,
+class InterruptLibraries : public testing::TestWithParam<RandomWalker> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, InterruptLibraries,
                          testing::Values(RandomWalker{"Builtin", {}, 0.75},
                                          RandomWalker{"Subject16", {"16"}, 0.75},
                                          RandomWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
+TEST_P(InterruptLibraries, IsSmoothAtAnyTime) {
   const RandomWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
@@ -173,9 +172,9 @@ TEST_P(TakeOver, AtAnyTimeNothingJumpsOrSlides) {
   }
 }
 
-class TakeOverOfBuiltin : public testing::Test {
+class InterruptBuiltin : public testing::Test {
  protected:
-  // Advances until `done`, or for 20 s; the events meanwhile.
+  // Advances until `done` returns true, or for 20 s. Returns the events.
   template <typename Done>
   std::vector<AvatarEvent> AdvanceUntil(const Done& done) {
     std::vector<AvatarEvent> events;
@@ -197,8 +196,8 @@ class TakeOverOfBuiltin : public testing::Test {
     });
     for (int i = 0; i < 6; ++i) avatar_.Advance(kTickS);
   }
-  void TakeOverBy(decltype(MovementRequest::movement) movement,
-                  Interrupt interrupt = Interrupt::kNow) {
+  void InterruptWith(decltype(MovementRequest::movement) movement,
+                     Interrupt interrupt = Interrupt::kNow) {
     ASSERT_TRUE(avatar_.Enqueue({2, std::move(movement), interrupt}).has_value());
   }
 
@@ -207,9 +206,9 @@ class TakeOverOfBuiltin : public testing::Test {
 
 using Type = AvatarEventType;
 
-TEST_F(TakeOverOfBuiltin, ASwingingFootLandsOnItsNewFootprint) {
+TEST_F(InterruptBuiltin, RedirectsASwingToItsNewFootprint) {
   SwingTheLeftFoot();
-  TakeOverBy(StepRequest{.at = {{{0.22, 0.0, 0.4}, 0.2}}});
+  InterruptWith(StepRequest{.at = {{{0.22, 0.0, 0.4}, 0.2}}});
   avatar_.Advance(kTickS);
   ASSERT_EQ(avatar_.events().size(), 2u);
   EXPECT_EQ(avatar_.events()[0].type, Type::kFinished);
@@ -226,12 +225,12 @@ TEST_F(TakeOverOfBuiltin, ASwingingFootLandsOnItsNewFootprint) {
   EXPECT_NEAR(ball.z, 0.4, 1e-3);
 }
 
-TEST_F(TakeOverOfBuiltin, TheOtherFootWaitsForTheLandingOnly) {
+TEST_F(InterruptBuiltin, OtherFootStepsAfterTheLanding) {
   SwingTheLeftFoot();
   const double duration_s = avatar_.movement()->duration_s();
   const double land_s = avatar_.movement()->feet.foot(Foot::kLeft).land_s;
   const double now_s = avatar_.movement_time_s();
-  TakeOverBy(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
+  InterruptWith(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
   const auto events = AdvanceUntil([&] { return avatar_.started()->request_id == 2; });
   ASSERT_EQ(events.size(), 3u);
   EXPECT_EQ(events[0].type, Type::kFootStrike);
@@ -242,11 +241,11 @@ TEST_F(TakeOverOfBuiltin, TheOtherFootWaitsForTheLandingOnly) {
   EXPECT_GT(land_s, now_s);
 }
 
-TEST_F(TakeOverOfBuiltin, BeforeAFootHasLeftItNeedNot) {
+TEST_F(InterruptBuiltin, CancelsAStepBeforeTheFootLeavesTheGround) {
   ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}}).has_value());
   avatar_.Advance(kTickS);
   const Vec3 stood = BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft);
-  TakeOverBy(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
+  InterruptWith(StepRequest{.foot = Foot::kRight, .length_m = 0.5});
   avatar_.Advance(kTickS);
   EXPECT_EQ(avatar_.started()->request_id, 2u);
   EXPECT_EQ(avatar_.started()->kind, MovementKind::kStepRight);
@@ -255,25 +254,25 @@ TEST_F(TakeOverOfBuiltin, BeforeAFootHasLeftItNeedNot) {
   EXPECT_NEAR(std::hypot(stands.x - stood.x, stands.z - stood.z), 0.0, 1e-4);
 }
 
-TEST_F(TakeOverOfBuiltin, WhoHasBegunToJumpLands) {
+TEST_F(InterruptBuiltin, CompletesAJumpInProgress) {
   ASSERT_TRUE(avatar_.Enqueue({1, JumpRequest{.length_m = 1.0}}).has_value());
   avatar_.Advance(kTickS);
-  TakeOverBy(StepRequest{.length_m = 0.5});
+  InterruptWith(StepRequest{.length_m = 0.5});
   const auto events = AdvanceUntil([&] { return avatar_.started()->request_id == 2; });
   EXPECT_EQ(std::ranges::count(events, Type::kFootStrike, &AvatarEvent::type), 2);
   EXPECT_GT(BallPosition(avatar_.library().skeleton(), avatar_.pose(), Foot::kLeft).z, 0.9);
 }
 
-TEST_F(TakeOverOfBuiltin, AStandOrWhateverWaitsDropsTheQueueAndFinishesTheMovement) {
+TEST_F(InterruptBuiltin, StandsAndDelayedInterruptsFinishTheMovement) {
   for (const bool stands : {true, false}) {
     avatar_.Teleport({});
     ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
     ASSERT_TRUE(avatar_.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
     avatar_.Advance(kTickS);
     if (stands) {
-      TakeOverBy(StandRequest{0.1});
+      InterruptWith(StandRequest{0.1});
     } else {
-      TakeOverBy(StepRequest{.length_m = 0.3}, Interrupt::kAfterMovement);
+      InterruptWith(StepRequest{.length_m = 0.3}, Interrupt::kAfterMovement);
     }
     EXPECT_EQ(avatar_.queue_size(), 1);
     const auto events = AdvanceUntil([&] { return avatar_.idle(); });
@@ -286,17 +285,17 @@ TEST_F(TakeOverOfBuiltin, AStandOrWhateverWaitsDropsTheQueueAndFinishesTheMoveme
   }
 }
 
-TEST_F(TakeOverOfBuiltin, AWalkAndAStandEnd) {
+TEST_F(InterruptBuiltin, EndsWalksAndStands) {
   ASSERT_TRUE(avatar_.Enqueue({1, WalkRequest{.position_m = {0.0, 0.0, 5.0}}}).has_value());
   for (int i = 0; i < 90; ++i) avatar_.Advance(kTickS);
-  TakeOverBy(WalkRequest{.position_m = {1.0, 0.0, 0.0}, .heading_rad = 1.0});
+  InterruptWith(WalkRequest{.position_m = {1.0, 0.0, 0.0}, .heading_rad = 1.0});
   AdvanceUntil([&] { return avatar_.idle(); });
   EXPECT_NEAR(avatar_.base().position_m.x, 1.0, 0.01);
   EXPECT_NEAR(avatar_.base().position_m.z, 0.0, 0.01);
 
   ASSERT_TRUE(avatar_.Enqueue({1, StandRequest{100.0}}).has_value());
   avatar_.Advance(kTickS);
-  TakeOverBy(StepRequest{.length_m = 0.5});
+  InterruptWith(StepRequest{.length_m = 0.5});
   avatar_.Advance(kTickS);
   EXPECT_EQ(avatar_.started()->request_id, 2u);
 }

@@ -1,5 +1,5 @@
-// Layers over walks: what legs and root do is bit by bit what they do without, what arms do is the
-// clip's, weights come and go without a kink.
+// Layers over walks. Legs and root must keep the same bits as without layers, the arms must play
+// the clip, and weights must change smoothly.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,15 +12,16 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "random.h"
-#include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/bvh_writer.h"
 #include "offline/build/layers.h"
 #include "offline/build/library_writer.h"
 #include "offline/build/refine.h"
+#include "offline/builtin/builtin_library.h"
+#include "random.h"
+#include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/terrain.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {
@@ -30,12 +31,12 @@ constexpr double kTickS = 1.0 / 60.0;
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
   bool on_terrain;
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-// Captured libraries get layers cut out of their own first take.
+// Captured libraries get layers that are cut from their own first capture.
 Library LibraryWithLayers(const std::vector<std::string>& subjects) {
   const Library library = LibraryOf(subjects);
   if (subjects.empty()) return library;
@@ -71,7 +72,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, Layers,
                                          Walker{"DebianTakes", {kDebianTakes}, false}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
+TEST_P(Layers, PlayTheClipAndKeepTheBitsOfLegsAndRoot) {
   const Walker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryWithLayers(walker.subjects);
@@ -123,7 +124,7 @@ TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
       ASSERT_NEAR(glm::length(b.rotations[j]), 1.0f, 1e-4f);
     }
     ASSERT_EQ(plain.events().size(), layered.events().size());
-    if (ticks % 150 == 55) {  // eased in: joints of full weight are the clip's
+    if (ticks % 150 == 55) {  // The layer has faded in: joints of full weight play the clip.
       ASSERT_EQ(layered.layers().playing().size(), 1u);
       ApplyLayer(clip, layered.layers().playing()[0].time_s, 1.0, clip_pose);
       int full = 0;
@@ -144,7 +145,7 @@ TEST_P(Layers, LegsAndRootKeepTheirBitsAndArmsPlayTheClip) {
   EXPECT_TRUE(SameBits(plain.base().position_m, layered.base().position_m));
 }
 
-TEST(LayerWeights, EaseWithoutAKinkHoweverRequestsInterrupt) {
+TEST(LayerWeights, HaveContinuousSlopeUnderInterruptions) {
   const Library library = LibraryOf({});
   constexpr double kFineS = 1e-3;
   Random random(11);
@@ -171,13 +172,14 @@ TEST(LayerWeights, EaseWithoutAKinkHoweverRequestsInterrupt) {
     before = weight;
     slope_before = slope;
   }
-  // A weight bends by 6 / 0.2 s^2 = 150 a second squared at most, and its way back as much again: in a
-  // millisecond by 0.6 or so. One that forgot its slope would jump by 1.5 / 0.6 s and more.
+  // The second derivative of a weight is at most 6 / 0.2 s^2 = 150 per s^2, and fading out the old
+  // slope adds as much again. So the slope changes by about 0.6 per millisecond. If the slope were
+  // not continued, it would change by more than 1.5 / 0.6 s.
   EXPECT_LT(largest_bend, 0.8);
   EXPECT_GT(largest_weight, 0.6);
 }
 
-TEST(LayerWeights, AClipPlayedOnceEasesOutBeforeItsEndAndMakesRoom) {
+TEST(LayerWeights, FadeOutBeforeTheEndOfANonLoopingClip) {
   RawLibrary raw = GenerateBuiltinLibrary();
   raw.layers[0].is_looping = false;
   LibraryBuilder builder;
@@ -195,7 +197,7 @@ TEST(LayerWeights, AClipPlayedOnceEasesOutBeforeItsEndAndMakesRoom) {
   EXPECT_NEAR(time_s, library->layers()[0].duration_s(), 2.5 * kTickS);
 }
 
-TEST(LayerRequests, WhatMakesNoSenseIsRefusedAndChangesNothing) {
+TEST(LayerRequests, InvalidRequestsAreRejectedWithoutEffect) {
   RawLibrary raw = GenerateBuiltinLibrary();
   for (int i = 0; i < 4; ++i) {
     raw.layers.push_back(raw.layers[0]);
@@ -219,19 +221,21 @@ TEST(LayerRequests, WhatMakesNoSenseIsRefusedAndChangesNothing) {
   EXPECT_EQ(code({.speed = 0.05}), ErrorCode::kOutOfRange);
   EXPECT_EQ(code({.speed = NAN}), ErrorCode::kOutOfRange);
   EXPECT_TRUE(stack.empty());
-  EXPECT_EQ(code({.layer = 3, .enabled = false}), std::nullopt);  // not in play: done already
+  // The layer is not playing, so this has no effect.
+  EXPECT_EQ(code({.layer = 3, .enabled = false}), std::nullopt);
   EXPECT_TRUE(stack.empty());
   for (int i = 0; i < 4; ++i) EXPECT_EQ(code({.layer = i}), std::nullopt);
   EXPECT_EQ(code({.layer = 4}), ErrorCode::kLimitExceeded);
-  EXPECT_EQ(code({.layer = 2, .weight = 0.5}), std::nullopt);  // in play: no room needed
+  // The layer is already playing and needs no free slot.
+  EXPECT_EQ(code({.layer = 2, .weight = 0.5}), std::nullopt);
   EXPECT_EQ(stack.playing().size(), 4u);
 }
 
-TEST(LayerRequests, NoTickAllocates) {
+TEST(LayerRequests, TicksDoNotAllocate) {
   const Library library = LibraryOf({});
   AvatarSimulation avatar(library, {});
   ASSERT_TRUE(avatar.Enqueue({1, StepRequest{.length_m = 0.5}}).has_value());
-  // Only an avatar's first layer makes room for its pose with layers.
+  // Only the first layer of an avatar allocates its layered pose.
   ASSERT_TRUE(avatar.SetLayer({.layer = 0}).has_value());
   avatar.Advance(kTickS);
   const std::size_t before = counted_memory::LiveBytes();
@@ -244,7 +248,7 @@ TEST(LayerRequests, NoTickAllocates) {
   EXPECT_LE(counted_memory::PeakBytes(), before);
 }
 
-TEST(LayerFiles, AMaskThatTouchesALegOrTheRootIsRefused) {
+TEST(LayerFiles, MasksWithLegsOrTheRootAreRejected) {
   LibraryBuilder builder;
   for (const char* joint : {"Hips", "LeftUpLeg", "RightFoot", "LeftToeBase"}) {
     RawLibrary raw = GenerateBuiltinLibrary();
@@ -255,7 +259,7 @@ TEST(LayerFiles, AMaskThatTouchesALegOrTheRootIsRefused) {
     EXPECT_EQ(built.error().code, ErrorCode::kInvalidArgument);
     EXPECT_NE(Describe(built.error()).find(joint), std::string::npos) << Describe(built.error());
   }
-  // The file itself says it too: no builder stands between.
+  // The library's own checks must reject it as well, without the builder.
   const Library library = LibraryOf({});
   for (const int joint : {0, library->skeleton().leg(Foot::kLeft).hip, 500, -1}) {
     LayerClip layer = library->layers()[0];
@@ -270,7 +274,7 @@ TEST(LayerFiles, AMaskThatTouchesALegOrTheRootIsRefused) {
   }
 }
 
-TEST(LayerFiles, LayersAreInTheHashAndComeThroughRefinement) {
+TEST(LayerFiles, LayersAffectTheHashAndSurviveRefinement) {
   RawLibrary raw = GenerateBuiltinLibrary();
   LibraryBuilder builder;
   const Library with = builder.Build(raw).value();
@@ -291,7 +295,7 @@ TEST(LayerFiles, LayersAreInTheHashAndComeThroughRefinement) {
   EXPECT_EQ(refined->library->hash(), with->hash());
 }
 
-TEST(LayerFiles, AnotherSkeletonAndTimesOutsideTheCaptureAreRefused) {
+TEST(LayerFiles, OtherSkeletonsAndTimesOutsideTheCaptureAreRejected) {
   const Library library = LibraryOf({});
   std::ostringstream text;
   Clip clip;
@@ -302,7 +306,7 @@ TEST(LayerFiles, AnotherSkeletonAndTimesOutsideTheCaptureAreRefused) {
   Capture capture = ParseBvh(text.str(), "still.bvh").value();
   const auto layer = CutLayer(capture, library->skeleton(), {.name = "still"});
   ASSERT_TRUE(layer.has_value());
-  EXPECT_NEAR(layer->clip.duration_s(), 1.6, 1e-9);  // 2 s, 0.4 of them in the seam
+  EXPECT_NEAR(layer->clip.duration_s(), 1.6, 1e-9);  // 2 s minus the seam of 0.4 s.
   const auto error = [&](const LayerCut& cut) {
     const auto made = CutLayer(capture, library->skeleton(), cut);
     return made ? std::string("none") : Describe(made.error());
@@ -320,7 +324,7 @@ TEST(LayerFiles, AnotherSkeletonAndTimesOutsideTheCaptureAreRefused) {
   EXPECT_EQ(std::ranges::count(*mask, 1.0f), 3);
 }
 
-TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
+TEST(LayerFiles, CapturedLoopsCloseSmoothly) {
   const std::filesystem::path take = ModelFile("01_01.bvh");
   if (take.empty()) GTEST_SKIP() << "no captures of Debian's package assimp-testmodels";
   const Capture capture = ReadBvh(take).value();
@@ -333,7 +337,7 @@ TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
   }
   EXPECT_LT(LargestJointAngle(layer.clip.frame(frames - 2), layer.clip.frame(frames - 1)),
             1.2 * inside);
-  // The root's own mask: spine graded, arms whole.
+  // The default mask of the upper body: graded weights for the spine and full weights for the arms.
   const std::vector<float> mask = UpperBodyMask(capture.skeleton);
   const auto of = [&](const char* name) {
     return mask[static_cast<std::size_t>(capture.skeleton.FindJoint(name))];
@@ -346,7 +350,7 @@ TEST(LayerFiles, ACapturedLoopClosesWithoutAJump) {
   EXPECT_FLOAT_EQ(of("RightHand"), 1.0f);
 }
 
-TEST(LayersInChoreographies, BeginAndEndWithMovementsAndLeaveLegsAlone) {
+TEST(LayersInChoreographies, BeginAndEndWithMovementsAndKeepTheLegs) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests = {{1, StepRequest{.length_m = 0.5}},
                                                  {3, StepRequest{.length_m = 0.5}},

@@ -1,4 +1,4 @@
-// Who is told what an avatar begins shows the same bytes in every tick, on whatever instruction set.
+// Replicas must display the same bytes as the avatar in every tick, on every instruction set.
 
 #include <gtest/gtest.h>
 
@@ -12,11 +12,11 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "random_requests.h"
 #include "instruction_sets.h"
 #include "random.h"
+#include "random_requests.h"
 #include "rough_ground.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/avatar_replica.h"
 #include "runtime/avatar/movement_record.h"
 
@@ -35,20 +35,20 @@ std::string BytesOf(ConstPoseSpan pose) {
 bool IsSame(ConstPoseSpan a, ConstPoseSpan b) { return BytesOf(a) == BytesOf(b); }
 
 #ifdef __SANITIZE_ADDRESS__
-constexpr int kFewer = 10;  // of all: twenty times as slow
+constexpr int kFewer = 10;  // Divisor for sanitizer builds, which are twenty times as slow.
 #else
 constexpr int kFewer = 1;
 #endif
 
 struct Manner {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
   double tick_s;
-  int movements;  // as many at least
+  int movements;  // Minimum number of movements.
 };
 void PrintTo(const Manner& manner, std::ostream* out) { *out << manner.name; }
 
-// An avatar to which all that can happen to one happens, as `random` has it.
+// An avatar that receives all kinds of requests at random.
 class RandomlyDriven {
  public:
   RandomlyDriven(Library library, Random& random)
@@ -59,7 +59,7 @@ class RandomlyDriven {
                  .blend = Draws(0.8) ? BlendKind::kInertialization : BlendKind::kCubic,
                  .terrain = Draws(0.5) ? RoughGround(random) : nullptr}) {}
 
-  // What is done to it between two ticks.
+  // Changes something about the avatar between two ticks.
   void Stir() {
     if (Draws(avatar_.queue_size() == 0 ? 0.2 : 0.02)) {
       const MovementRequest request = DrawRequest(random_, avatar_);
@@ -89,7 +89,7 @@ std::string Refusal(AvatarReplica& replica, const Bytes& record) {
 struct Figures {
   int movements = 0;
   std::size_t records = 0;
-  std::size_t states = 0;  // of records
+  std::size_t states = 0;  // Bytes of records.
   std::size_t poses = 0;
 };
 
@@ -104,7 +104,7 @@ int Begun(const AvatarSimulation& avatar) {
   }));
 }
 
-class Replica : public testing::TestWithParam<Manner> {
+class ReplicaLibraries : public testing::TestWithParam<Manner> {
  protected:
   void SetUp() override {
     STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
@@ -113,8 +113,8 @@ class Replica : public testing::TestWithParam<Manner> {
   Library library_;
 };
 
-// One is told from the beginning, another from some tick on.
-TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
+// One replica receives all records, another one joins later.
+TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261123;
   Random random(kSeed);
@@ -164,8 +164,8 @@ TEST_P(Replica, ShowsTheBytesOfTheAvatarInEveryTick) {
   EXPECT_GT(figures.records, figures.states);
 }
 
-// Walking, as most avatars do most of the time.
-TEST_P(Replica, AStepTakesFewBytes) {
+// Walking, which is what most avatars do most of the time.
+TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261124;
   Random random(kSeed);
@@ -177,7 +177,7 @@ TEST_P(Replica, AStepTakesFewBytes) {
   std::size_t largest_state = 0;
   for (int walker = 0; walker < 10; ++walker) {
     AvatarSimulation avatar(library_, BaseFrame{},
-                  {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
+                            {.terrain = walker % 2 == 0 ? nullptr : RoughGround(random)});
     for (int tick = 0; tick < 3000; ++tick) {
       if (avatar.idle()) {
         (void)avatar.Enqueue({1, WalkRequest{.position_m = DVec3(random.Draw(0.0, 50.0), 0.0,
@@ -209,8 +209,8 @@ TEST_P(Replica, AStepTakesFewBytes) {
   EXPECT_LT(largest_state, MaxRecordBytes(*library_));
 }
 
-// What one machine's avatar did is shown by others, whose vectors are of another width.
-TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
+// A replica on a machine with another vector width displays the same bytes.
+TEST_P(ReplicaLibraries, HasTheSameBytesOnEveryInstructionSet) {
   const Manner& manner = GetParam();
   constexpr unsigned kSeed = 20261125;
   constexpr int kTicks = 400 / kFewer;
@@ -264,14 +264,14 @@ TEST_P(Replica, ShowsTheSameBytesOnEveryInstructionSet) {
   std::printf("\n");
 }
 
-INSTANTIATE_TEST_SUITE_P(Libraries, Replica,
+INSTANTIATE_TEST_SUITE_P(Libraries, ReplicaLibraries,
                          testing::Values(Manner{"Builtin", {}, 1.0 / 60.0, 10'000},
                                          Manner{"BuiltinAtFiveTicks", {}, 0.2, 2'000},
                                          Manner{"Subject01", {kDebianTakes}, 1.0 / 60.0, 2'000},
                                          Manner{"Subject16", {"16"}, 1.0 / 60.0, 2'000}),
                          [](const auto& tested) { return tested.param.name; });
 
-TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
+TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   constexpr unsigned kSeed = 20261127;
   Random random(kSeed);
   const Library library = LibraryOf({});
@@ -293,8 +293,8 @@ TEST(ReplicaOfAnything, TakesNoMemoryOnceItIsMade) {
   }
 }
 
-// Bytes that were damaged, and foreign ones: refused, or shown as something.
-TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
+// Damaged and foreign bytes must be rejected or displayed as something, without a crash.
+TEST(AvatarReplica, SurvivesDamagedRecords) {
   constexpr unsigned kSeed = 20261126;
   Random random(kSeed);
   const Library library = LibraryOf({});
@@ -328,7 +328,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
       (is_taken ? shown : refused) += 1;
       EXPECT_EQ(other.is_known(), is_taken);
       Advance(other, evaluator, 1.0 / 60.0);
-      // What was cut short or is too long is never taken.
+      // Records that are truncated or too long are always rejected.
       Bytes shorter = record;
       shorter.resize(below(record.size()));
       EXPECT_FALSE(AvatarReplica(replica).Apply(shorter).has_value()) << "seed " << kSeed;
@@ -344,7 +344,7 @@ TEST(ReplicaOfAnything, DamagedRecordsAreRefusedOrShown) {
   EXPECT_GT(shown, 100);
 }
 
-TEST(ReplicaOfAnything, KnowsNothingBeforeAState) {
+TEST(AvatarReplica, IsUnknownBeforeAState) {
   const Library library = LibraryOf({});
   AvatarSimulation avatar(library, BaseFrame{});
   avatar.Advance(1.0 / 60.0);

@@ -1,4 +1,5 @@
-// Planting switched off and on at any time: nothing jumps, and feet that are planted again stand still.
+// Foot planting is switched off and on at any time. Nothing may jump, and feet that are planted
+// again must stand still.
 
 #include <gtest/gtest.h>
 
@@ -10,7 +11,7 @@
 #include "captured_library.h"
 #include "random.h"
 #include "random_walker.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "velocity_steps.h"
 
 namespace stridewire {
@@ -20,7 +21,8 @@ using Library = std::shared_ptr<const MotionLibrary>;
 constexpr double kFps = 60.0;
 constexpr double kTickS = 1.0 / kFps;
 
-MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar, Random& random) {
+MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation& avatar,
+                              Random& random) {
   MovementRequest request{
       1, {}, random.Draw(0, 1) < 0.6 ? Interrupt::kNow : Interrupt::kAfterMovement};
   const double what = random.Draw(0.0, 1.0);
@@ -42,13 +44,13 @@ MovementRequest RandomRequest(const RandomWalker& walker, const AvatarSimulation
 enum Join { kStays, kGoesOff, kGoesOn };
 
 struct Figures {
-  int joins[3] = {};                // movements that began, by Join
-  VelocityStep largest[3];          // of velocities in the poses around them
-  double largest_drift_m = 0.0;     // of a planted foot from where it was when it was said to stand
-  double largest_settling_m = 0.0;  // the same while planting sets in
+  int joins[3] = {};                // Movements that began, by Join.
+  VelocityStep largest[3];          // Change of velocity in the poses around them.
+  double largest_drift_m = 0.0;     // Drift of a planted foot.
+  double largest_settling_m = 0.0;  // Drift of a planted foot during a plant fade.
 };
 
-// Looks at one avatar after every frame.
+// Measures one avatar after every frame.
 class Observer {
  public:
   Observer(const AvatarSimulation& avatar, Figures& figures)
@@ -73,7 +75,7 @@ class Observer {
   }
 
  private:
-  static constexpr int kFramesOfJoin = 3;  // a change of velocity shows in three poses
+  static constexpr int kFramesOfJoin = 3;  // A change of velocity affects three poses.
 
   void LookAtFeet() {
     const Movement* movement = avatar_.movement();
@@ -129,8 +131,8 @@ Figures SwitchAll(const RandomWalker& walker, const Library& library, double sec
   return figures;
 }
 
-// The largest of some hundred joins is compared with the largest of others. `climb_m_s`: what coming onto the ground
-// adds.
+// Compares the largest change of velocity in some hundred transitions with that inside the
+// examples. `climb_m_s` is the additional change due to moving onto the ground.
 void ExpectNoJumps(const Figures& figures, const VelocityStep& examples, double climb_m_s = 0.0) {
   for (const Join join : {kGoesOff, kGoesOn}) {
     ASSERT_GT(figures.joins[join], 4 * kRandomWalkers);
@@ -149,7 +151,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, SwitchPlanting,
                                          RandomWalker{"Subject01", {"01"}, 0.58}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
+TEST_P(SwitchPlanting, IsSmoothAtAnyTimeAndFeetStandStillAfterwards) {
   const RandomWalker& walker = GetParam();
   STRIDEWIRE_SKIP_WITHOUT_TAKES(walker.subjects);
   const Library library = LibraryOf(walker.subjects);
@@ -171,8 +173,8 @@ TEST_P(SwitchPlanting, AtAnyTimeNothingJumpsAndFeetPlantedAgainStandStill) {
   EXPECT_LE(figures.largest_settling_m, 5e-3);
 }
 
-// Unplanted, a body walks through hills as if they were not there, up to a metre into them.
-TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
+// Without planting, a body walks through hills as if they did not exist, up to a metre deep.
+TEST(SwitchPlantingOnHills, MovesFeetSmoothlyOntoTheGround) {
   const Library library = LibraryOf({});
   const unsigned seed = 20261122;
   HeightField field{.origin_m = {-50.0, -50.0}, .cell_m = 0.25, .columns = 401, .rows = 401};
@@ -227,13 +229,14 @@ TEST(SwitchPlantingOnHills, FeetComeOntoTheGroundWithoutAJump) {
       figures.largest[kGoesOn].root_m_s, deepest_m, worst_m);
   EXPECT_GT(deepest_m, 0.3);
   ASSERT_GT(landings, 20 * kRandomWalkers);
-  EXPECT_LE(worst_m, 0.05);  // soles rest on the highest of the ground below them
-  // The cubic that eases a height out over T sets out with 6 / T^2 of it.
+  EXPECT_LE(worst_m, 0.05);  // Soles rest on the highest point of the ground below them.
+  // The cubic that fades out a height over T starts with an acceleration of 6 / T^2 times the
+  // height.
   ExpectNoJumps(figures, LargestStepOfExamples(*library, kFps),
                 6.0 * deepest_m / (kEaseOutS * kEaseOutS) * kTickS);
 }
 
-TEST(SwitchPlantingOff, WhatMustBeMetIsRefusedAtOnceOrWhenItsTurnComes) {
+TEST(SwitchPlantingOff, RejectsNewAndQueuedExactPlacements) {
   AvatarSimulation avatar(LibraryOf({}), BaseFrame{});
   const MovementRequest must{
       2, StepRequest{.foot = Foot::kRight, .at = {{{-0.1, 0.0, 0.9}, 0.0}}, .exact_only = true}};
@@ -242,7 +245,7 @@ TEST(SwitchPlantingOff, WhatMustBeMetIsRefusedAtOnceOrWhenItsTurnComes) {
   avatar.Advance(kTickS);
   ASSERT_TRUE(avatar.SetFootPlanting(false).has_value());
   EXPECT_FALSE(avatar.foot_planting());
-  EXPECT_TRUE(avatar.movement()->feet.is_active);  // to its end
+  EXPECT_TRUE(avatar.movement()->feet.is_active);  // Until the end of the movement.
   EXPECT_EQ(avatar.Enqueue(must).error().code, ErrorCode::kUnsupported);
   AvatarEvent rejected;
   for (int i = 0; i < 300 && !avatar.idle(); ++i) {

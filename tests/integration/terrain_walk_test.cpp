@@ -1,5 +1,5 @@
-// Walks over stepping stones, stairs, a ramp and hills, looked at from outside: how deep soles go into the
-// ground, how high they pass over it, whether they stand on it.
+// Walks over stepping stones, stairs, a ramp and hills. The tests measure how deep soles go into
+// the ground, how much they clear it, and whether they stand on it.
 
 #include <gtest/gtest.h>
 
@@ -18,17 +18,18 @@ using Library = std::shared_ptr<const MotionLibrary>;
 using Ground = std::shared_ptr<const Terrain>;
 constexpr double kFps = 60.0;
 
-// At most this deep, at least that far above, and still.
+// Largest depth below the ground, smallest clearance above it, and largest drift.
 constexpr double kDeepestM = 0.002;
 constexpr double kMostDriftM = 0.001;
 constexpr double kLeastClearanceM = 0.01;
-// A sole that ends where the ground is this much below its ball's is over an edge, on slopes to 20 degrees.
+// A foot is over an edge if the ground below its heel or toes is this much below the ground at its
+// ball, on slopes of up to 20 degrees.
 constexpr double kEdgeM = 0.1;
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
-  // As far and high as its steps reach.
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
+  // Distances and heights within what its steps reach.
   double nearest_stone_m = 0.35;
   double furthest_stone_m = 0.6;
   double rise_m = 0.25;
@@ -45,7 +46,7 @@ void AddStep(Course& course, Foot foot, const DVec3& at, double heading_rad = 0.
       {course.requests.size() + 1, StepRequest{.foot = foot, .at = {{at, heading_rad}}}});
 }
 
-// The paper's ladder of slabs: one for each step, at random distances and heights.
+// The ladder of slabs in the paper: one slab per step, at random distances and heights.
 Course Stones(Random& random, int steps, const Walker& walker) {
   Course course;
   TerrainData data;
@@ -81,7 +82,7 @@ Course Stairs(double rise_m, double tread_m, int up) {
     z += tread_m;
   }
   add(z, up * rise_m);
-  // Down: each tread ends where the next begins.
+  // Going down, each tread ends where the next one begins.
   const double top_end = data.boxes.back().max_m.z;
   z = top_end - 0.08;
   add(z, up * rise_m);
@@ -93,7 +94,7 @@ Course Stairs(double rise_m, double tread_m, int up) {
   return course;
 }
 
-// Straight on over a field of heights.
+// A straight walk over a height field.
 Course Over(HeightField field, int steps, double length_m) {
   Course course;
   course.ground = Terrain::Make({.height_field = std::move(field), .boxes = {}}).value();
@@ -133,13 +134,13 @@ Course Hills(Random& random) {
 }
 
 struct Looks {
-  double deepest_m = 0.0;          // of heel, ball or toe below the ground
-  double standing_m = 0.0;         // the same of feet said to stand
-  double least_clearance_m = 9.0;  // of the ball in the middle of a swing
+  double deepest_m = 0.0;          // Depth of heel, ball or toes below the ground.
+  double standing_m = 0.0;         // The same for standing feet.
+  double least_clearance_m = 9.0;  // Clearance of the ball in the middle of a swing.
   double drift_m = 0.0;
-  double off_ground_m = 0.0;  // ball of a standing foot above where it should be
+  double off_ground_m = 0.0;  // Height of a standing foot's ball above where it should be.
   double least_knee_deg = 180.0;
-  int over_edges = 0;  // feet that stand with their heel or toes where the ground is much lower
+  int over_edges = 0;  // Standing feet whose heel or toes are over an edge.
   double travelled_m = 0.0;
 };
 
@@ -161,7 +162,7 @@ Looks LookAt(const char* name, const Library& library, const Course& course) {
   const Clip& clip = synthesis->clip;
   const Skeleton& skeleton = library->skeleton();
   LegGeometry legs(skeleton, library->stand_pose());
-  // Which feet stand in each frame, and how far through a swing the others are.
+  // Which feet stand in each frame, and the elapsed fraction of the swing of the others.
   const auto frames = static_cast<std::size_t>(clip.frame_count());
   std::vector<char> stands[2] = {std::vector<char>(frames), std::vector<char>(frames)};
   for (const MovementRecord& record : synthesis->movements) {
@@ -188,7 +189,7 @@ Looks LookAt(const char* name, const Library& library, const Course& course) {
         looks.deepest_m = std::max(looks.deepest_m, -above);
         if (planted[f]) looks.standing_m = std::max(looks.standing_m, -above);
         if (p == 1 && planted[f]) looks.off_ground_m = std::max(looks.off_ground_m, above);
-        // Away from lifting off and landing: a tenth of a second in the air on both sides.
+        // Only measure at least a tenth of a second after release and before landing.
         bool swings = p == 1;
         for (int k = -6; k <= 6; ++k) {
           const auto g = static_cast<std::ptrdiff_t>(f) + k;
@@ -238,14 +239,14 @@ INSTANTIATE_TEST_SUITE_P(Libraries, TerrainWalk, testing::Values(kBuiltin, kSubj
 INSTANTIATE_TEST_SUITE_P(Libraries, SteppingStones,
                          testing::Values(kBuiltin, kSubject16, kSubject01), kName);
 
-TEST_P(SteppingStones, AreSteppedOnOneByOne) {
+TEST_P(SteppingStones, AreUsedOneByOne) {
   for (const unsigned seed : {1u, 2u, 3u}) {
     Random random(seed);
     ExpectGoodLooks(LookAt("stones", library_, Stones(random, 30, GetParam())));
   }
 }
 
-TEST_P(TerrainWalk, ClimbsStairsUpAndDown) {
+TEST_P(TerrainWalk, WalksStairsUpAndDown) {
   for (const double rise_m : {0.15, 0.2, 0.25}) {
     ExpectGoodLooks(LookAt("stairs", library_, Stairs(rise_m, 0.34, 5)));
   }

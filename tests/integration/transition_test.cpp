@@ -1,4 +1,5 @@
-// How movements go on where others ended: the table a library has of it, and what an avatar makes of it.
+// Transitions between movements: the table in a library, and the steps that an avatar inserts
+// because of it.
 
 #include <gtest/gtest.h>
 
@@ -13,20 +14,21 @@
 
 #include "captured_library.h"
 #include "counted_memory.h"
-#include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
 #include "random.h"
+#include "runtime/library/library_file.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
-#include "runtime/skeleton/foot_vector.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "test_library.h"
 #include "velocity_steps.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {
 
-// Groups of the toy library, and the stand behind them.
+// Groups of the test library, followed by the stand.
 constexpr std::size_t kLeft = 0;
 constexpr std::size_t kRight = 1;
 constexpr std::size_t kJump = 2;
@@ -36,7 +38,7 @@ float DistanceM(const MotionLibrary& library, std::size_t from, std::size_t to) 
   return library.FindTransition(from, to)->distance_m;
 }
 
-// The toy library of steps as long as `is_kept` likes them, and its jumps.
+// The test library with only those steps whose length satisfies `is_kept`, and with its jumps.
 template <typename IsKept>
 std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
   RawLibrary raw = MakeTestRawLibrary();
@@ -49,7 +51,7 @@ std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
   return LibraryBuilder().Build(raw).value();
 }
 
-TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
+TEST(Transitions, ClosingStepsFitJumpsAndTheStand) {
   const auto library = MakeTestLibrary();
   ASSERT_EQ(library->transitions().size(), 16u);
   for (const std::size_t step : {kLeft, kRight}) {
@@ -63,9 +65,9 @@ TEST(Transitions, StepsThatCloseMeetJumpsAndTheStand) {
   }
 }
 
-// Legs of 0.9 m at angles that put feet 0.4 m apart: hips come down and knees and feet apart, as far as geometry
-// says. The toy's steps begin and end at rest.
-TEST(Transitions, DistanceIsHowFarJointsAreApart) {
+// Legs of 0.9 m at angles that put the feet 0.4 m apart. The expected distances of hips, knees and
+// feet follow from geometry. The steps of the test library begin and end at rest.
+TEST(Transitions, DistanceMeasuresJointPositions) {
   const auto library = ToyOf([](double l0, double l1) { return l0 >= 0.2 && l1 == 0.4; });
   const double lower_m = 0.9 - std::sqrt(0.81 - 0.04);
   const double hips = 3.0 * lower_m * lower_m;
@@ -74,13 +76,13 @@ TEST(Transitions, DistanceIsHowFarJointsAreApart) {
   const double expected_m = std::sqrt((hips + knees + feet) / 7.0);
   EXPECT_NEAR(DistanceM(*library, kLeft, kJump), expected_m, 0.01);
   EXPECT_NEAR(DistanceM(*library, kRight, kStand), expected_m, 0.01);
-  // The left foot ahead is where a right step begins, not a left one.
+  // With the left foot ahead, the next step is a right step, not a left one.
   EXPECT_LT(DistanceM(*library, kLeft, kRight), 0.02f);
   EXPECT_GT(DistanceM(*library, kLeft, kLeft), 0.17f);
 }
 
-// A jump that flies on at its end: what has to stop counts with 0.1 s of its speed.
-TEST(Transitions, VelocityCounts) {
+// A jump that still moves at its end. The speed counts with 0.1 s.
+TEST(Transitions, DistanceIncludesVelocities) {
   RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
@@ -94,7 +96,7 @@ TEST(Transitions, VelocityCounts) {
   EXPECT_NEAR(DistanceM(*library, kJump, kJump), 0.0, 0.001);
 }
 
-// The same library with its bytes changed and a header that fits them.
+// The library with changed bytes and a header that matches them.
 template <typename Change>
 Expected<std::shared_ptr<const MotionLibrary>> Changed(const MotionLibrary& library,
                                                        Change change) {
@@ -106,7 +108,7 @@ Expected<std::shared_ptr<const MotionLibrary>> Changed(const MotionLibrary& libr
   return MotionLibrary::FromBytes(bytes);
 }
 
-// The library as it was written before there were transitions.
+// The library in the format before transitions were added.
 Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& library) {
   return Changed(library, [](std::uint8_t* payload) {
     const auto* root = fb::GetMotionLibrary(payload);
@@ -116,7 +118,7 @@ Expected<std::shared_ptr<const MotionLibrary>> Older(const MotionLibrary& librar
   });
 }
 
-TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
+TEST(Transitions, AreOptionalInALibrary) {
   const auto older = Older(*MakeTestLibrary());
   ASSERT_TRUE(older.has_value()) << Describe(older.error());
   EXPECT_TRUE((*older)->transitions().empty());
@@ -124,7 +126,7 @@ TEST(Transitions, ALibraryFromBeforeThereWereAnyIsRead) {
   EXPECT_EQ((*older)->groups().size(), 3u);
 }
 
-TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
+TEST(Transitions, RejectsAnInvalidTable) {
   const auto with = [](std::size_t place, fb::Transition transition) {
     const auto library = Changed(*MakeTestLibrary(), [&](std::uint8_t* payload) {
       const auto* all = fb::GetMotionLibrary(payload)->transitions()->Data();
@@ -133,7 +135,7 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
     });
     return library ? "none" : std::string(library.error().text);
   };
-  const std::string refused = "a transition is not between two examples";
+  const std::string refused = "a transition refers to an example that does not exist";
   const std::size_t jump_to_stand = kJump * 4 + kStand;
   EXPECT_EQ(with(jump_to_stand, {0.1f, 3, -1}), "none");
   EXPECT_EQ(with(jump_to_stand, {0.1f, 4, -1}), refused);
@@ -144,8 +146,8 @@ TEST(Transitions, ATableThatMakesNoSenseIsRefused) {
   EXPECT_EQ(with(jump_to_stand, {std::numeric_limits<float>::infinity(), 3, -1}), refused);
 }
 
-// What an avatar does when it is asked for movements one after the other, until it stands idle: "left jump", with
-// "+" before what it inserts and "-" before what it refuses, and the reason.
+// Describes what an avatar does with a sequence of requests until it is idle, for example "left
+// jump". Inserted steps have the prefix "+", rejected requests the prefix "-" and the reason.
 std::string Does(std::shared_ptr<const MotionLibrary> library,
                  const std::vector<decltype(MovementRequest::movement)>& movements) {
   AvatarSimulation avatar(std::move(library), BaseFrame{});
@@ -173,7 +175,7 @@ std::string Does(std::shared_ptr<const MotionLibrary> library,
 
 StepRequest Step(Foot foot, double length_m) { return {.foot = foot, .length_m = length_m}; }
 
-TEST(Ways, AreAsShortAsCanBe) {
+TEST(TransitionPath, IsAsShortAsPossible) {
   const auto library = OpenLibrary("builtin").value();
   const StepRequest left = Step(Foot::kLeft, 0.6);
   const StepRequest right = Step(Foot::kRight, 0.6);
@@ -186,13 +188,13 @@ TEST(Ways, AreAsShortAsCanBe) {
             "step_left +step_right stand step_left +step_right");
   EXPECT_EQ(Does(library, {jump, right, jump}), "jump step_right +step_left jump");
   EXPECT_EQ(Does(library, {jump, jump, stand, jump}), "jump jump stand jump");
-  // Nothing is in the way of feet that are together, nor of one that is drawn back to the other.
+  // Feet that are together, or a step that brings them together, need no inserted step.
   EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.0), left}), "step_left step_left +step_right");
   EXPECT_EQ(Does(library, {Step(Foot::kLeft, 0.3), Step(Foot::kLeft, 0.0), jump}),
             "step_left step_left jump");
 }
 
-TEST(Ways, AStepOfTheSameFootIsWhatWasAskedFor) {
+TEST(TransitionPath, KeepsTheRequestedFoot) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests{{1, Step(Foot::kLeft, 0.6)},
                                               {2, Step(Foot::kLeft, 0.5)}};
@@ -203,36 +205,38 @@ TEST(Ways, AStepOfTheSameFootIsWhatWasAskedFor) {
   EXPECT_LT(synthesis.movements[2].landing_error_m, 0.001);
 }
 
-TEST(Ways, ALibraryThatCannotBringFeetTogetherSaysSo) {
+TEST(TransitionPath, ReportsThatFeetCannotComeTogether) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   ASSERT_GT(DistanceM(*strides, kLeft, kJump), 0.1f);
   const StepRequest left = Step(Foot::kLeft, 0.5);
   const JumpRequest jump{.length_m = 0.6};
   EXPECT_EQ(Does(strides, {jump, left}), "jump step_left +step_right");
-  EXPECT_EQ(
-      Does(strides, {left, jump, StepRequest{.length_m = 0.5}}),
-      "step_left -(no way leads from step_left to jump in this library) step_right +step_left");
+  EXPECT_EQ(Does(strides, {left, jump, StepRequest{.length_m = 0.5}}),
+            "step_left -(this library has no transition path from step_left to jump) step_right "
+            "+step_left");
   EXPECT_EQ(Does(strides, {left, left}), "step_left +step_right step_left +step_right");
   const std::vector<MovementRequest> requests{{1, left}, {2, jump}};
   const auto synthesis = Synthesize(strides, BaseFrame{}, requests, 60.0);
   ASSERT_FALSE(synthesis.has_value());
   EXPECT_EQ(Describe(synthesis.error()),
-            "movements[1]: no way leads from step_left to jump in this library");
+            "movements[1]: this library has no transition path from step_left to jump");
 }
 
-TEST(Ways, ALibraryOfOneFootSaysSo) {
+TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
   const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
-  EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
-            "step_left -(no way leads from step_left to step_left in this library) +step_left");
-  // What draws it back is no new step.
+  EXPECT_EQ(
+      Does(one_foot, {StepRequest{.length_m = 0.5}, StepRequest{.length_m = 0.5}}),
+      "step_left -(this library has no transition path from step_left to step_left) +step_left");
+  // The step that brings the feet together is not a new request.
   EXPECT_EQ(Does(one_foot, {StepRequest{.length_m = 0.2}, StepRequest{.length_m = 0.2}}),
             "step_left step_left +step_left");
 }
 
-// A jump that flies on at its end: feet are together, but the table says that no step begins so fast.
-TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
+// A jump that still moves at its end: the feet are together, but according to the table no step
+// starts that fast.
+TEST(TransitionPath, RejectsDistantTransitions) {
   RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
@@ -244,25 +248,25 @@ TEST(Ways, WhatTheTableSaysIsTooFarIsRefused) {
   ASSERT_GT(DistanceM(*library, kJump, kLeft), 0.3f);
   const StepRequest left = Step(Foot::kLeft, 0.4);
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, left}),
-            "jump -(no way leads from jump to step_left in this library)");
-  // Who has stood goes anywhere.
+            "jump -(this library has no transition path from jump to step_left)");
+  // After a stand, every movement is possible.
   EXPECT_EQ(Does(library, {JumpRequest{.length_m = 0.6}, StandRequest{0.1}, left}),
             "jump stand step_left +step_right");
 }
 
-// Without a table its feet alone decide.
-TEST(Ways, AnOlderLibraryGoesByItsFeet) {
+// Without a table, only the positions of the feet matter.
+TEST(TransitionPath, UsesFootPositionsWithoutATable) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   const auto older = Older(*strides);
   ASSERT_TRUE(older.has_value());
   const StepRequest left = Step(Foot::kLeft, 0.5);
   EXPECT_EQ(Does(*older, {left, JumpRequest{.length_m = 0.6}}),
-            "step_left -(no way leads from step_left to jump in this library) +step_right");
+            "step_left -(this library has no transition path from step_left to jump) +step_right");
   EXPECT_EQ(Does(Older(*MakeTestLibrary()).value(), {left, left, JumpRequest{.length_m = 0.6}}),
             "step_left +step_right step_left +step_right jump");
 }
 
-TEST(Ways, AreFoundWithoutAllocating) {
+TEST(TransitionPath, DoesNotAllocate) {
   const auto strides = ToyOf([](double l0, double l1) { return l0 != 0.2 && l1 >= 0.4; });
   for (const auto& library : {OpenLibrary("builtin").value(), strides}) {
     AvatarSimulation avatar(library, BaseFrame{});
@@ -285,7 +289,7 @@ TEST(Ways, AreFoundWithoutAllocating) {
   }
 }
 
-TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
+TEST(TransitionPath, RejectsMissingKindsImmediately) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
@@ -298,22 +302,23 @@ TEST(Ways, ALibraryWithoutAKindRefusesItAtOnce) {
 
 struct Subject {
   const char* name;
-  std::vector<std::string> subjects;  // none: generated
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Subject& subject, std::ostream* out) { *out << subject.name; }
 
-class Joins : public testing::TestWithParam<Subject> {};
-INSTANTIATE_TEST_SUITE_P(Libraries, Joins,
+class TransitionSmoothness : public testing::TestWithParam<Subject> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, TransitionSmoothness,
                          testing::Values(Subject{"Builtin", {}}, Subject{"Subject16", {"16"}},
                                          Subject{"Debian", {kDebianTakes}}),
                          [](const auto& subject) { return subject.param.name; });
 
-constexpr int kKinds = 4;  // of MovementKind, the stand last
+constexpr int kKinds = 4;  // Number of MovementKind values; the stand is last.
 constexpr double kFramesPerS = 60.0;
 
-// Steps, jumps and stands in any order. From one movement to the next no joint changes its speed more than half as
-// fast again as inside the examples of both kinds, a stand having none of its own.
-TEST_P(Joins, AreNoRougherThanMovements) {
+// Steps, jumps and stands in any order. Between two movements, no joint may change its velocity by
+// more than 1.5 times the largest change inside the examples of both kinds. A stand has no
+// examples.
+TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const auto library = LibraryOf(GetParam().subjects);
   std::array<double, kKinds> inside{};
@@ -357,7 +362,8 @@ TEST_P(Joins, AreNoRougherThanMovements) {
         since_s = 0.0;
         ++counts[from][to];
         if (!is_start || event.kind == MovementKind::kStand) continue;
-        // Nothing is inserted that feet do not need, and a jump does not wait for less.
+        // Steps are inserted only if the feet need them, and a jump waits only as long as
+        // necessary.
         const FootState feet{
             FootVector(library->skeleton(), avatar.pose(), Foot::kLeft, avatar.base().heading_rad)};
         if (event.request_id == 0) {

@@ -1,4 +1,4 @@
-// Steps to footprints that must be met: those out of reach are not played, all others are met.
+// Steps with exact placement: those out of reach are rejected, all others land on their footprint.
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,11 @@
 #include "captured_library.h"
 #include "counted_memory.h"
 #include "random.h"
-#include "stridewire/offline/synthesis.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/skeleton/leg_rig.h"
+#include "stridewire/offline/synthesis.h"
 
 namespace stridewire {
 namespace {
@@ -24,8 +27,7 @@ constexpr double kDegrees = 180.0 / M_PI;
 
 MovementRequest StepOnto(std::uint64_t id, Foot foot, const DVec3& place_m, double heading_rad,
                          bool exact_only = true) {
-  return {id,
-          StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
+  return {id, StepRequest{.foot = foot, .at = {{place_m, heading_rad}}, .exact_only = exact_only}};
 }
 
 BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
@@ -37,29 +39,30 @@ BlendedFoot SeenFoot(const AvatarSimulation& avatar, Foot foot) {
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-class Refusals : public testing::TestWithParam<Walker> {};
-INSTANTIATE_TEST_SUITE_P(Libraries, Refusals,
+class ExactPlacementLibraries : public testing::TestWithParam<Walker> {};
+INSTANTIATE_TEST_SUITE_P(Libraries, ExactPlacementLibraries,
                          testing::Values(Walker{"Builtin", {}}, Walker{"Subject16", {"16"}},
                                          Walker{"Debian", {kDebianTakes}}),
                          [](const auto& walker) { return walker.param.name; });
 
-// Where the foot of a step and the one that stays are from when it lands until it is over.
+// The error of both feet from landing to the end of a step.
 struct Seen {
   bool is_rejected = false;
-  double off_m = 0.0;  // of either from where it was to be
+  double off_m = 0.0;  // Distance of either foot from its target.
   double off_rad = 0.0;
 };
 
-// Advances until the request has ended; nobody but the pose is asked where feet are.
+// Advances until the request has ended and measures the feet from the displayed pose only.
 Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprint& asked,
            const DVec3& stays_m) {
   const double ball_m = avatar.library().leg_rig().side(foot).ball_height_m;
   Seen seen;
-  constexpr double kJustBeforeS = 1e-4;  // its end, so that nothing of what follows is seen
+  // Stop just before the end, so that the next movement has no effect.
+  constexpr double kJustBeforeS = 1e-4;
   bool has_finished = false;
   int looks = 0;
   for (int tick = 0; tick < 1200 && !has_finished; ++tick) {
@@ -85,7 +88,7 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
     const DVec3 away = lands.ball_m - asked.position_m;
     const DVec3 drawn = stays.ball_m - stays_m;
     seen.off_m = std::max({seen.off_m, std::hypot(away.x, away.z), std::hypot(drawn.x, drawn.z)});
-    // Heels go up, and balls with them.
+    // If the heel rises, the ball rises with it.
     for (const double up_m : {away.y - ball_m, drawn.y - ball_m}) {
       if (std::fabs(up_m) > 0.1) seen.off_m = std::max(seen.off_m, std::fabs(up_m));
     }
@@ -97,9 +100,10 @@ Seen Watch(AvatarSimulation& avatar, std::uint64_t id, Foot foot, const Footprin
   return seen;
 }
 
-// From a stand or in mid-walk; half of the footprints where a step may well end, the others anywhere around.
-// Whether one is in reach is seen from what the same avatar does when it need not be met.
-TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMet) {
+// From a stand or during a walk. Half of the footprints are at probable ends of a step, the others
+// anywhere around. Whether a footprint is in reach is determined with a copy of the avatar that
+// does not require exact placement.
+TEST_P(ExactPlacementLibraries, ReachesFootprintsInReachAndRejectsOthers) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261122;
@@ -116,7 +120,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
   const char* asked = std::getenv("STRIDEWIRE_FOOTPRINTS");
   const int footprints = asked == nullptr ? kFootprints : std::atoi(asked);
   for (std::uint64_t id = 1; id <= static_cast<std::uint64_t>(footprints); ++id) {
-    // Near the origin, where floats are fine.
+    // Stay near the origin, where floats are precise.
     if (glm::length(avatar.base().position_m) > 30.0) avatar.Teleport(BaseFrame{});
     if (random.Draw(0, 1) < 0.3) {
       while (!avatar.idle()) avatar.Advance(kTickS);
@@ -133,7 +137,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
     if (before != nullptr) stays_m = before->feet.foot(OtherFoot(foot)).to.position_m;
     const double sign = foot == Foot::kLeft ? 1.0 : -1.0;
     const bool is_near = random.Draw(0, 1) < 0.5;
-    const double far_m = random.Draw(0, 1) < 0.5 ? 0.0 : 2.5;  // up or down
+    const double far_m = random.Draw(0, 1) < 0.5 ? 0.0 : 2.5;  // Sometimes far up or down.
     heading_rad += is_near ? random.Draw(-0.3, 0.3) : random.Draw(-1.2, 1.2);
     const DVec3 vector = is_near ? DVec3(sign * random.Draw(0.1, 0.3), 0.0, random.Draw(0.1, 0.7))
                                  : DVec3(sign * random.Draw(-0.4, 1.0), random.Draw(-far_m, far_m),
@@ -145,7 +149,8 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
         other.Enqueue(StepOnto(id, foot, print.position_m, heading_rad, false)).has_value());
     const Seen near = Watch(other, id, foot, print, stays_m);
     const bool is_outside = near.off_m > 1e-3 || near.off_rad * kDegrees > 0.1;
-    // Half a metre up or down no leg is too short; further a pose does not tell a foot that is a little too high.
+    // Within half a metre up or down no leg is too short. Further away, the pose does not show
+    // whether a foot is slightly too high.
     const bool is_inside =
         near.off_m <= 0.8e-3 && near.off_rad * kDegrees <= 0.05 && std::fabs(vector.y) < 0.5;
     outside += is_outside;
@@ -168,7 +173,7 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
       worst_m = std::max(worst_m, seen.off_m);
       worst_rad = std::max(worst_rad, seen.off_rad);
     }
-    // On from there, in mid-walk.
+    // Continue from there, during the walk.
     if (!seen.is_rejected) {
       ASSERT_TRUE(avatar.Enqueue(StepOnto(id, foot, print.position_m, heading_rad)).has_value());
     } else {
@@ -195,9 +200,9 @@ TEST_P(Refusals, OfAThousandRandomFootprintsNoneOutsideIsPlayedAndAllInsideAreMe
   EXPECT_GT(outside, footprints / 5);
 }
 
-class RefusalOfBuiltin : public testing::Test {
+class ExactPlacement : public testing::Test {
  protected:
-  // Queues steps, of which those with an odd id are far out of reach and are to be met.
+  // Queues steps. Those with an odd id require exact placement and are far out of reach.
   static void Queue(AvatarSimulation& avatar, std::initializer_list<std::uint64_t> ids) {
     for (const std::uint64_t id : ids) {
       MovementRequest request{id, StepRequest{.length_m = 0.5}};
@@ -205,7 +210,8 @@ class RefusalOfBuiltin : public testing::Test {
       ASSERT_TRUE(avatar.Enqueue(request).has_value());
     }
   }
-  // Both avatars until they stand: bit by bit the same poses, and the same events but for those of refusals.
+  // Advances both avatars until they stand. They must display the same bits and have the same
+  // events, except for rejections.
   static int AdvanceAlike(AvatarSimulation& refusing, AvatarSimulation& other) {
     int refused = 0;
     for (int tick = 0; tick < 1200 && !(other.idle() && refusing.idle()); ++tick) {
@@ -234,15 +240,15 @@ class RefusalOfBuiltin : public testing::Test {
   AvatarSimulation other_{library_, BaseFrame{}};
 };
 
-TEST_F(RefusalOfBuiltin, TheQueueGoesOnAsIfItHadNotBeenThere) {
+TEST_F(ExactPlacement, RejectionDoesNotAffectOtherRequests) {
   Queue(avatar_, {1, 2, 4, 5, 7, 6, 9});
   Queue(other_, {2, 4, 6});
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 4);
   const DVec3 apart = FootVector(library_->skeleton(), avatar_.pose(), Foot::kLeft, 0.0);
-  EXPECT_LT(std::fabs(apart.z), 0.12);  // closed to a stand
+  EXPECT_LT(std::fabs(apart.z), 0.12);  // The feet are together.
 }
 
-TEST_F(RefusalOfBuiltin, SaysWhereTheNearestFootprintWouldBe) {
+TEST_F(ExactPlacement, ReportsTheNearestFootprintInReach) {
   Queue(avatar_, {1});
   avatar_.Advance(kTickS);
   ASSERT_EQ(avatar_.events().size(), 2u);
@@ -266,7 +272,7 @@ TEST_F(RefusalOfBuiltin, SaysWhereTheNearestFootprintWouldBe) {
             "the goal is a hole");
 }
 
-TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
+TEST_F(ExactPlacement, KeepsTheSwingIfARedirectionIsRejected) {
   for (AvatarSimulation* avatar : {&avatar_, &other_}) {
     Queue(*avatar, {2, 4});
     while (avatar->movement() == nullptr ||
@@ -284,7 +290,7 @@ TEST_F(RefusalOfBuiltin, ASwingThatCanNotBeRedirectedGoesOn) {
   EXPECT_EQ(AdvanceAlike(avatar_, other_), 1);
 }
 
-TEST_F(RefusalOfBuiltin, ASwingIsRedirectedToWhatItReaches) {
+TEST_F(ExactPlacement, RedirectsASwingToAFootprintInReach) {
   ASSERT_TRUE(avatar_.Enqueue(StepOnto(2, Foot::kLeft, {0.1, 0.0, 0.5}, 0.0)).has_value());
   avatar_.Advance(kTickS);
   while (avatar_.movement()->feet.foot(Foot::kLeft).IsPlanted(avatar_.movement_time_s())) {
@@ -306,11 +312,12 @@ TEST_F(RefusalOfBuiltin, ASwingIsRedirectedToWhatItReaches) {
   EXPECT_NEAR(SeenFoot(avatar_, Foot::kLeft).ball_m.z, 0.4, 1e-3);
 }
 
-TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
+TEST_F(ExactPlacement, TakesTheHeightFromTheGround) {
   TerrainData data;
   data.boxes.push_back({{-5.0, 0.2}, {5.0, 5.0}, 0.2});
   data.boxes.push_back({{-5.0, -5.0}, {5.0, -0.2}, 4.0});
-  AvatarSimulation avatar(library_, BaseFrame{}, {.terrain = Terrain::Make(std::move(data)).value()});
+  AvatarSimulation avatar(library_, BaseFrame{},
+                          {.terrain = Terrain::Make(std::move(data)).value()});
   ASSERT_TRUE(avatar.Enqueue(StepOnto(1, Foot::kLeft, {0.1, 0.0, -0.4}, 0.0)).has_value());
   ASSERT_TRUE(avatar.Enqueue(StepOnto(2, Foot::kLeft, {0.1, 9.0, 0.45}, 0.0)).has_value());
   avatar.Advance(kTickS);
@@ -321,7 +328,7 @@ TEST_F(RefusalOfBuiltin, GroundDecidesHowHighAFootprintIs) {
   EXPECT_NEAR(avatar.base().position_m.y, 0.2, 0.01);
 }
 
-TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
+TEST_F(ExactPlacement, DoesNotAllocateAndLimitsRejectionsPerTick) {
   for (int i = 0; i < AvatarSimulation::kMaxQueue; ++i) Queue(avatar_, {2ull * i + 1});
   const std::size_t before = counted_memory::LiveBytes();
   counted_memory::ResetPeak();
@@ -340,10 +347,10 @@ TEST_F(RefusalOfBuiltin, AllocatesNothingAndSpreadsManyOverTicks) {
   EXPECT_GE(ticks, AvatarSimulation::kMaxQueue / AvatarSimulation::kMaxEventsPerAdvance);
 }
 
-TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
+TEST_F(ExactPlacement, RequiresAFootprintAndFootPlanting) {
   const MovementRequest nowhere{1, StepRequest{.length_m = 0.5, .exact_only = true}};
   EXPECT_EQ(avatar_.Enqueue(nowhere).error().code, ErrorCode::kInvalidArgument);
-  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only has a meaning only beside at_m");
+  EXPECT_STREQ(avatar_.Enqueue(nowhere).error().text, "exact_only requires at_m");
   AvatarSimulation sliding(library_, BaseFrame{}, {.foot_planting = false});
   const MovementRequest somewhere = StepOnto(1, Foot::kLeft, {0.1, 0.0, 0.4}, 0.0);
   EXPECT_EQ(sliding.Enqueue(somewhere).error().code, ErrorCode::kUnsupported);
@@ -355,7 +362,7 @@ TEST_F(RefusalOfBuiltin, NeedsAFootprintAndFeetThatArePlanted) {
   EXPECT_EQ(avatar_.queue_size(), 0);
 }
 
-TEST_F(RefusalOfBuiltin, SynthesisTellsWhatItLeftOut) {
+TEST_F(ExactPlacement, SynthesisReportsRejectedSteps) {
   const std::vector<MovementRequest> requests = {
       {1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}},
       StepOnto(2, Foot::kRight, {0.0, 0.0, 5.0}, 0.0),

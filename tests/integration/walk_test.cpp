@@ -1,5 +1,5 @@
-// Walks as a user would see them: the joins, the straightness and the height of long walks on the
-// generated library and on one built from the captures of subject 16.
+// Long walks with the built-in library and with one built from the captures of subject 16. The
+// tests measure smoothness between steps, straightness and height.
 
 #include <gtest/gtest.h>
 
@@ -37,9 +37,9 @@ std::vector<MovementRequest> RandomSteps(int count, double low_m, double high_m,
 }
 
 struct Smoothness {
-  double largest_inside_rad = 0.0;  // joint rotation between frames, away from joins
+  double largest_inside_rad = 0.0;  // Rotation of a joint between frames, away from transitions.
   double largest_at_join_rad = 0.0;
-  double largest_pelvis_jump_m = 0.0;  // beyond its own speed, frame to frame
+  double largest_pelvis_jump_m = 0.0;  // Change of position between frames in excess of the speed.
 };
 
 Smoothness Measure(const Synthesis& walk) {
@@ -47,7 +47,7 @@ Smoothness Measure(const Synthesis& walk) {
   const Clip& clip = walk.clip;
   std::vector<bool> is_join(static_cast<std::size_t>(clip.frame_count()), false);
   for (const MovementRecord& record : walk.movements) {
-    // The start lies between two frames: the pair that straddles it.
+    // The start is between two frames; take the pair around it.
     const auto frame = static_cast<std::size_t>(std::ceil(record.start_s * kFps - 1e-9));
     if (frame < is_join.size()) is_join[frame] = true;
   }
@@ -81,7 +81,7 @@ void ExpectASmoothWalk(const Library& library, double low_m, double high_m, unsi
       smooth.largest_pelvis_jump_m);
   EXPECT_LE(smooth.largest_at_join_rad, 2.0 * smooth.largest_inside_rad) << "seed " << seed;
   EXPECT_LE(smooth.largest_pelvis_jump_m, 0.02) << "seed " << seed;
-  // Height: the last quarter as the first.
+  // The height in the last quarter must be that in the first quarter.
   const int frames = walk->clip.frame_count();
   EXPECT_NEAR(MeanHeight(walk->clip, 60, frames / 4),
               MeanHeight(walk->clip, 3 * frames / 4, frames - 60), 0.01);
@@ -100,9 +100,9 @@ void ExpectAStraightWalk(const Library& library, double length_m) {
   EXPECT_GT(base.position_m.z, 90 * length_m);
 }
 
-TEST(BuiltinWalk, JoinsAreSmooth) { ExpectASmoothWalk(Builtin(), 0.35, 0.75, 200); }
+TEST(BuiltinWalk, IsSmooth) { ExpectASmoothWalk(Builtin(), 0.35, 0.75, 200); }
 
-TEST(BuiltinWalk, EqualStepsGoStraight) {
+TEST(BuiltinWalk, IsStraightWithEqualSteps) {
   for (const double length_m : {0.35, 0.55, 0.75}) ExpectAStraightWalk(Builtin(), length_m);
 }
 
@@ -117,9 +117,9 @@ class CapturedWalk : public testing::TestWithParam<bool> {
   Library library_;
 };
 
-TEST_P(CapturedWalk, JoinsAreSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
+TEST_P(CapturedWalk, IsSmooth) { ExpectASmoothWalk(library_, 0.45, 0.77, 216); }
 
-TEST_P(CapturedWalk, EqualStepsGoStraight) {
+TEST_P(CapturedWalk, IsStraightWithEqualSteps) {
   for (const double length_m : {0.55, 0.65, 0.75}) ExpectAStraightWalk(library_, length_m);
 }
 

@@ -1,4 +1,5 @@
-// Walks to random places, on level and on rough ground: they arrive, by a short way, or say why not.
+// Walks to random places, on level and uneven ground. They must arrive on a short path or report a
+// reason.
 
 #include <gtest/gtest.h>
 
@@ -12,7 +13,7 @@
 #include "counted_memory.h"
 #include "random.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 namespace {
@@ -25,13 +26,13 @@ constexpr double kDegree = M_PI / 180.0;
 
 struct Walker {
   const char* name;
-  std::vector<std::string> subjects;  // captured; none: the generated library
-  double least_level;                 // part of the walks that arrive, on level ground …
-  double least_rough;                 // … and on rough ground
+  std::vector<std::string> subjects;  // Captured subjects; empty: the built-in library.
+  double least_level;                 // Least fraction of walks that arrive on level ground.
+  double least_rough;                 // Least fraction of walks that arrive on uneven ground.
 };
 void PrintTo(const Walker& walker, std::ostream* out) { *out << walker.name; }
 
-// Hills below 20 degrees, and slabs to step onto lying about.
+// Hills with slopes below 20 degrees, and slabs to step onto.
 Ground RoughGround(Random& random) {
   HeightField field{{-10.0, -10.0}, 0.5, 41, 41, {}};
   const double phase[3] = {random.Draw(0, 6), random.Draw(0, 6), random.Draw(0, 6)};
@@ -60,10 +61,10 @@ struct Walk {
   bool arrived = false;
   std::string reason;
   int steps = 0;
-  double away_m = 0.0;  // of the base from the goal
+  double away_m = 0.0;  // Distance of the base from the goal.
   double away_rad = 0.0;
-  double root_m = 0.0;  // of the displayed root
-  double path_m = 0.0;  // of the base from step to step
+  double root_m = 0.0;  // Distance of the displayed root from the goal.
+  double path_m = 0.0;  // Length of the path of the base.
 };
 
 Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
@@ -94,7 +95,7 @@ Walk GoTo(AvatarSimulation& avatar, const WalkRequest& goal) {
   return walk;
 }
 
-// A thousand walks; the part of them that arrived.
+// Walks to a thousand random goals. Returns the fraction that arrived.
 double WalkAbout(const char* name, const Library& library, const Ground& ground, Random& random) {
   std::map<std::string, int> reasons;
   int arrived = 0;
@@ -116,7 +117,7 @@ double WalkAbout(const char* name, const Library& library, const Ground& ground,
       start.position_m.y = ground->HeightAt(start.position_m.x, start.position_m.z);
     }
     WalkRequest goal;
-    // Half of them nearby, where the ways are many.
+    // Half of the goals are close, where there are many ways to get there.
     goal.position_m = i % 2 == 0 ? place() : start.position_m + 0.2 * place();
     goal.heading_rad = random.Draw(-M_PI, M_PI);
     AvatarSimulation avatar(library, start, {.terrain = ground});
@@ -156,7 +157,7 @@ INSTANTIATE_TEST_SUITE_P(Libraries, WalkTo,
                                          Walker{"Subject16", {"16"}, 1.0, 0.85}),
                          [](const auto& walker) { return walker.param.name; });
 
-TEST_P(WalkTo, AThousandPlacesOnLevelGround) {
+TEST_P(WalkTo, ReachesRandomGoalsOnLevelGround) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261121;
@@ -165,7 +166,7 @@ TEST_P(WalkTo, AThousandPlacesOnLevelGround) {
   EXPECT_GE(WalkAbout(GetParam().name, library, nullptr, random), GetParam().least_level);
 }
 
-TEST_P(WalkTo, AThousandPlacesOnRoughGround) {
+TEST_P(WalkTo, ReachesRandomGoalsOnRoughGround) {
   STRIDEWIRE_SKIP_WITHOUT_TAKES(GetParam().subjects);
   const Library library = LibraryOf(GetParam().subjects);
   const unsigned seed = 20261122;
@@ -175,7 +176,7 @@ TEST_P(WalkTo, AThousandPlacesOnRoughGround) {
   EXPECT_GE(WalkAbout(GetParam().name, library, ground, random), GetParam().least_rough);
 }
 
-TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
+TEST(WalkTo, AppliesANewGoalFromTheNextStep) {
   AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   ASSERT_TRUE(avatar.Enqueue({1, WalkRequest{.position_m = {0.0, 0.0, 5.0}}}).has_value());
   for (int i = 0; i < 60; ++i) avatar.Advance(kTickS);
@@ -188,9 +189,10 @@ TEST(WalkTo, ANewGoalMidwayCountsFromTheNextStep) {
   EXPECT_LT(walk.path_m, 5.0);
 }
 
-TEST(WalkTo, AllocatesNothingOnTheWay) {
+TEST(WalkTo, DoesNotAllocate) {
   Random random(3);
-  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{}, {.terrain = RoughGround(random)});
+  AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{},
+                          {.terrain = RoughGround(random)});
   WalkRequest goal{.position_m = {2.0, 0.0, 3.0}, .heading_rad = 2.0};
   goal.waypoints_m = {{0.0, 0.0, 2.0}};
   ASSERT_TRUE(avatar.Enqueue({1, goal}).has_value());
@@ -203,7 +205,7 @@ TEST(WalkTo, AllocatesNothingOnTheWay) {
   EXPECT_LE(counted_memory::PeakBytes(), before);
 }
 
-TEST(WalkTo, PassesItsWaypoints) {
+TEST(WalkTo, PassesWaypoints) {
   AvatarSimulation avatar(OpenLibrary("builtin").value(), BaseFrame{});
   WalkRequest goal{.position_m = {4.0, 0.0, 0.0}, .heading_rad = 3.0};
   goal.waypoints_m = {{0.0, 0.0, 3.0}, {4.0, 0.0, 3.0}};
@@ -224,7 +226,7 @@ TEST(WalkTo, PassesItsWaypoints) {
   EXPECT_LT(std::hypot(avatar.base().position_m.x - 4.0, avatar.base().position_m.z), 0.01);
 }
 
-TEST(WalkTo, KeepsToASpeedItsStepsHave) {
+TEST(WalkTo, KeepsTheRequestedSpeed) {
   const Library library = OpenLibrary("builtin").value();
   double seconds[2];
   const double speeds_m_s[2] = {0.5, 1.0};
@@ -240,7 +242,7 @@ TEST(WalkTo, KeepsToASpeedItsStepsHave) {
   EXPECT_LT(seconds[1], 0.7 * seconds[0]);
 }
 
-TEST(WalkTo, SaysWhyItCanNot) {
+TEST(WalkTo, ReportsWhyItFails) {
   const Library library = OpenLibrary("builtin").value();
   const Ground wall =
       Terrain::Make({.height_field = {}, .boxes = {{{-20.0, 2.0}, {20.0, 2.5}, 1.5}}}).value();
@@ -250,8 +252,8 @@ TEST(WalkTo, SaysWhyItCanNot) {
   EXPECT_FALSE(behind.reason.empty());
   EXPECT_LT(behind.steps, 60);
   const Walk edge = GoTo(avatar, {.position_m = {0.0, 0.0, 2.4}});
-  EXPECT_EQ(edge.reason, "the goal lies on an edge or a slope too steep to stand");
-  // It goes on from there.
+  EXPECT_EQ(edge.reason, "the ground at the goal is too steep or too uneven to stand on");
+  // The avatar accepts the next walk.
   EXPECT_TRUE(GoTo(avatar, {.position_m = {0.5, 0.0, -1.0}, .heading_rad = 3.0}).arrived);
 }
 

@@ -37,7 +37,7 @@ void ResetPeak() { peak_bytes = live_bytes.load(); }
 
 void* operator new(std::size_t size) { return stridewire::counted_memory::Allocate(size); }
 void* operator new[](std::size_t size) { return stridewire::counted_memory::Allocate(size); }
-// The standard library's own sorting asks in this way, and frees as all do.
+// The sorting functions of the standard library allocate in this way.
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   try {
     return stridewire::counted_memory::Allocate(size);

@@ -2,13 +2,13 @@
 
 #include <cstddef>
 
-/// Counts what `new` gives out, so that a test can hold a parser to its bound. A program that links
-/// counted_memory.cpp has its operators new and delete replaced; malloc itself is not counted.
+/// Counts memory allocated with `new`, so that tests can check limits on it. A program that links
+/// counted_memory.cpp has its operators new and delete replaced. malloc itself is not counted.
 namespace stridewire::counted_memory {
 
 [[nodiscard]] std::size_t LiveBytes();
 
-/// Largest LiveBytes since the last ResetPeak.
+/// Largest LiveBytes since the last call of ResetPeak.
 [[nodiscard]] std::size_t PeakBytes();
 void ResetPeak();
 

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-/// Does something with this program's kernels limited to one instruction set.
+/// Limits the kernels of this program to one instruction set for the lifetime of the object.
 class OnlyInstructionSet {
  public:
   explicit OnlyInstructionSet(std::int64_t target) { Choose(target); }
@@ -23,7 +23,7 @@ class OnlyInstructionSet {
   }
 };
 
-/// Widest first.
+/// A SIMD instruction set.
 struct InstructionSet {
   std::int64_t target;
   std::string_view name;
@@ -31,7 +31,8 @@ struct InstructionSet {
 inline constexpr InstructionSet kInstructionSets[] = {
     {HWY_AVX3, "AVX-512"}, {HWY_AVX2, "AVX2"}, {HWY_SSE4, "SSE4"}, {HWY_NEON, "NEON"}};
 
-/// Those compiled in that this machine has; the last is plain C++.
+/// Compiled instruction sets that this machine supports, the widest first. The last one is plain
+/// C++.
 inline std::vector<std::int64_t> InstructionSets() {
   std::vector<std::int64_t> sets;
   for (const InstructionSet& set : kInstructionSets) {

@@ -10,8 +10,9 @@
 
 namespace stridewire {
 
-/// Both legs of a pose as someone would look at them: which way knees bend, how near one leg is to the
-/// other, where the soles are. Any skeleton; soles are what lies on the ground in its stand pose.
+/// Measures both legs of a pose: which way the knees bend, how close the legs are to each other,
+/// and where the soles are. Works for any skeleton. A sole is what touches the ground in the stand
+/// pose.
 class LegGeometry {
  public:
   LegGeometry(const Skeleton& skeleton, ConstPoseSpan stand)
@@ -41,19 +42,19 @@ class LegGeometry {
     }
   }
 
-  /// Heel, ball and tip of the toes.
+  /// Positions of heel, ball and tip of the toes.
   [[nodiscard]] std::array<DVec3, 3> Sole(Foot foot) const {
     const Leg& leg = skeleton_.leg(foot);
     return {At(leg.ankle) +
                 rotations_[Index(leg.ankle)] * heel_offsets_[static_cast<std::size_t>(foot)],
             At(leg.ball, leg.ball_offset_m), At(leg.ball, leg.toe_tip_offset_m)};
   }
-  /// How high those three are in the stand pose.
+  /// Heights of these three points in the stand pose.
   [[nodiscard]] const std::array<double, 3>& RestingHeights(Foot foot) const {
     return resting_[static_cast<std::size_t>(foot)];
   }
 
-  /// Degrees between thigh and shank; 0 is straight, negative with the knee behind the leg.
+  /// Angle between thigh and shank in degrees: 0 is straight, negative means bent backward.
   [[nodiscard]] double KneeDegrees(Foot foot) const {
     const Leg& leg = skeleton_.leg(foot);
     const DVec3 thigh = glm::normalize(At(leg.knee) - At(leg.hip));
@@ -62,13 +63,13 @@ class LegGeometry {
     const DVec3 line = glm::normalize(At(leg.ankle) - At(leg.hip));
     const DVec3 out =
         At(leg.knee) - At(leg.hip) - glm::dot(At(leg.knee) - At(leg.hip), line) * line;
-    // Where the pelvis looks: a foot that hangs toes down points anywhere.
+    // Use the heading of the pelvis, because a foot that hangs toes down may point anywhere.
     const DVec3 across = At(skeleton_.leg(Foot::kLeft).hip) - At(skeleton_.leg(Foot::kRight).hip);
     const DVec3 ahead = glm::cross(across, DVec3(0.0, 1.0, 0.0));
     return glm::dot(out, ahead) < 0.0 ? -angle : angle;
   }
 
-  /// Least distance between one shank or foot and the other leg's, metres.
+  /// Smallest distance in metres between a shank or foot of one leg and the other leg.
   [[nodiscard]] double LegDistance() const {
     double least = 1e9;
     for (const auto& a : Segments(Foot::kLeft)) {

@@ -5,28 +5,30 @@
 #include <span>
 #include <vector>
 
-#include "leg_geometry.h"
 #include "base/trig.h"
+#include "leg_geometry.h"
 #include "stridewire/offline/synthesis.h"
 #include "velocity_steps.h"
 
 namespace stridewire {
 
-/// What someone sees of planted feet who has a motion and is told where feet are said to stand, and nothing else.
+/// Measurements of planted feet in a motion, given only the motion and the reported footprints.
 struct PlantFigures {
   int contacts = 0;
-  double largest_drift_m = 0.0;  ///< Of a planted ball from where it is said to stand, horizontally
-  double largest_speed_m_s = 0.0;  ///< The same over any tenth of a second
+  double largest_drift_m = 0.0;    ///< Of a planted ball from its footprint, horizontally.
+  double largest_speed_m_s = 0.0;  ///< Of a planted ball, over any tenth of a second.
   double least_knee_deg = 180.0;
-  std::vector<double> knee_acceleration;  ///< deg/s^2, magnitudes, both knees, every frame
+  /// Magnitudes in deg/s^2, for both knees in every frame.
+  std::vector<double> knee_acceleration;
   VelocityStep largest_join_step;
   VelocityStep largest_inside_step;
 };
 
-/// Balls and foot headings of every frame.
+/// Ball positions and foot headings in every frame.
 struct FootCurves {
   std::vector<DVec3> balls[2];
-  std::vector<double> headings_rad[2];  ///< Less the toe-out of frame 0, which stands at heading 0
+  /// Minus the toe-out of frame 0, which stands at heading 0.
+  std::vector<double> headings_rad[2];
 };
 
 inline FootCurves CurvesOf(const Skeleton& skeleton, const Clip& clip) {
@@ -104,7 +106,7 @@ inline PlantFigures MeasurePlanting(const Skeleton& skeleton, const Clip& clip,
   VelocitySteps steps(skeleton, clip.fps);
   for (int f = 0; f < frames; ++f) {
     const VelocityStep step = steps.Add(clip.frame(f));
-    // The pair of frame pairs around frame f - 1.
+    // The frames around the transition at frame f - 1.
     const bool at_join =
         is_join[static_cast<std::size_t>(f)] || (f > 0 && is_join[static_cast<std::size_t>(f - 1)]);
     VelocityStep& largest = at_join ? figures.largest_join_step : figures.largest_inside_step;

@@ -8,20 +8,20 @@
 
 #include "random.h"
 #include "rough_ground.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 
 inline bool Draws(Random& random, double likely) { return random.Draw(0.0, 1.0) < likely; }
 
-/// A place where avatars may be put.
+/// A random base frame for an avatar.
 inline BaseFrame DrawBase(Random& random) {
   return {DVec3(random.Draw(-50.0, 50.0), random.Draw(0.0, 3.0), random.Draw(-50.0, 50.0)),
           random.Draw(-20.0, 20.0)};
 }
 
-/// Whatever an avatar can be asked for: steps, also to footprints, walks, jumps, stands, some of which take over and some of
-/// which it cannot do.
+/// A random request of any kind: steps, steps to footprints, walks, jumps and stands. Some
+/// interrupt the current movement, and some cannot be fulfilled.
 inline MovementRequest DrawRequest(Random& random, const AvatarSimulation& avatar) {
   MovementRequest request{.id = 1};
   const double kind = random.Draw(0.0, 1.0);
@@ -54,7 +54,7 @@ inline MovementRequest DrawRequest(Random& random, const AvatarSimulation& avata
   return request;
 }
 
-/// One of its library's layers comes or goes, if there are any.
+/// Starts or ends a random layer of the library, if it has any.
 inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
   const auto layers = static_cast<double>(avatar.library().layers().size());
   if (layers == 0.0) return;
@@ -65,8 +65,8 @@ inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
                          .speed = random.Draw(0.2, 3.0)});
 }
 
-/// Avatars that are asked for something else all the time, every second one on rough ground, with layers. What they do
-/// depends on `seed` alone.
+/// Avatars that receive random requests all the time. Every second one is on uneven ground, and
+/// they play layers. Everything they do depends on `seed` only.
 class DrawnCrowd {
  public:
   DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed)
@@ -77,7 +77,7 @@ class DrawnCrowd {
     }
   }
 
-  /// A sixtieth of a second, `at_once` avatars together, the last ones fewer.
+  /// Advances by a sixtieth of a second, with batches of `at_once` avatars.
   void Advance(std::size_t at_once = 1000) {
     DrawRequests();
     std::vector<AvatarSimulation*> some;

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-/// Low boxes strewn over 100 m by 120 m.
+/// Low boxes, scattered over 100 m by 120 m.
 inline std::shared_ptr<const Terrain> RoughGround(Random& random) {
   TerrainData data;
   for (int i = 0; i < 200; ++i) {

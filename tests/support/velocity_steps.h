@@ -5,18 +5,20 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 
-/// How much velocities change from one frame to the next.
+/// Change of velocities from one frame to the next.
 struct VelocityStep {
-  double joint_rad_s = 0.0;  ///< Of the joint whose angular velocity, as a vector, changes most
+  double joint_rad_s = 0.0;  ///< Of the joint whose angular velocity, as a vector, changes most.
   double root_m_s = 0.0;
 };
 
-/// Watches poses frame by frame. Fingers and thumbs are left out: captured ones twitch by up to 186 rad/s, which
-/// would allow the other joints anything.
+/// Measures poses frame by frame. Fingers and thumbs are ignored: in captures they twitch by up to
+/// 186 rad/s, which would allow any change in the other joints.
 class VelocitySteps {
  public:
   VelocitySteps(const Skeleton& skeleton, double fps)
@@ -29,7 +31,7 @@ class VelocitySteps {
     }
   }
 
-  /// The step around the frame before; none of the first two.
+  /// Adds a pose and returns the change of velocity at the previous frame, zero for the first two.
   VelocityStep Add(ConstPoseSpan pose) {
     VelocityStep step;
     for (std::size_t j = 0; j < velocity_.size(); ++j) {
@@ -63,7 +65,7 @@ class VelocitySteps {
   int frames_ = 0;
 };
 
-/// The largest inside what was captured: every example of a kind on its own.
+/// Largest change of velocity inside the examples of one kind.
 inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double fps,
                                           MovementKind kind) {
   VelocityStep largest;
@@ -95,7 +97,7 @@ inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double f
   return largest;
 }
 
-/// The same of all steps.
+/// Largest change of velocity inside the examples of all steps.
 inline VelocityStep LargestStepOfExamples(const MotionLibrary& library, double fps) {
   const VelocityStep left = LargestStepOfExamples(library, fps, MovementKind::kStepLeft);
   const VelocityStep right = LargestStepOfExamples(library, fps, MovementKind::kStepRight);

@@ -2,11 +2,12 @@
 
 namespace stridewire {
 
-/// Prints the broken invariant and stops the program. Never returns.
+/// Prints the failed condition with its file and line to stderr, then aborts the program.
 [[noreturn]] void CheckFailed(const char* condition, const char* file, int line);
 
 }  // namespace stridewire
 
-/// An invariant of ours, on in every build. Bad input is never a reason for it.
+/// Aborts the program if an invariant of this code base does not hold. It is active in every build.
+/// Use it only for conditions that a bug could break. Invalid input returns an Error instead.
 #define STRIDEWIRE_CHECK(condition) \
   ((condition) ? (void)0 : ::stridewire::CheckFailed(#condition, __FILE__, __LINE__))

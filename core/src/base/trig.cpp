@@ -8,13 +8,13 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// pi/2 in three pieces (Cody and Waite): the first two have trailing zeros, so that k * piece is
-// exact for |k| < 2^20 and the reduced argument keeps full precision.
+// pi/2 split into three constants (Cody and Waite). The first two have trailing zero bits, so that
+// k times each of them is exact for |k| < 2^20 and the reduced argument keeps full precision.
 constexpr double kHalfPi1 = 1.57079632673412561417e+00;
 constexpr double kHalfPi2 = 6.07710050630396597660e-11;
 constexpr double kHalfPi3 = 2.02226624879595063154e-21;
 
-// Taylor polynomials; on |x| <= pi/4 the first term left out is below 1e-17.
+// Taylor polynomials. On |x| <= pi/4 the first omitted term is below 1e-17.
 double SinNearZero(double x) {
   const double s = x * x;
   double p = 1.0 / 355687428096000.0;
@@ -51,7 +51,8 @@ Reduced Reduce(double x) {
   return {r, static_cast<int>(static_cast<long long>(k) & 3)};
 }
 
-// atan on [0, 1]: three argument halvings bring x below 0.0985, where the series is short.
+// atan on [0, 1]. Halving the angle three times brings x below 0.0985, where a short series is
+// accurate enough.
 double AtanUnit(double x) {
   double scale = 1.0;
   for (int i = 0; i < 3; ++i) {

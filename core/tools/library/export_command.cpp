@@ -7,7 +7,8 @@
 #include "offline/base/text.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {

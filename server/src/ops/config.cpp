@@ -11,7 +11,7 @@
 
 #include "net/origin_policy.h"
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire::server {
 namespace {

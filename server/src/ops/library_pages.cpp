@@ -12,8 +12,9 @@
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire::server {
 namespace {

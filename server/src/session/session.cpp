@@ -11,6 +11,7 @@
 #include "base/check.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire::server {
 

@@ -3,7 +3,7 @@
 #include "net/transport.h"
 #include "stridewire/base/error.h"
 #include "stridewire/protocol/messages.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/terrain.h"
 

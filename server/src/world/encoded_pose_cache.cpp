@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
 #include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::server {

@@ -8,9 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
 #include "stridewire/protocol/compact_codecs.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluation_batcher.h"
 
 namespace stridewire::server {

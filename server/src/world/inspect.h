@@ -1,7 +1,7 @@
 #pragma once
 
 #include "stridewire/protocol/messages.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire::server {
 

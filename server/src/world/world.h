@@ -6,7 +6,7 @@
 #include <string>
 
 #include "stridewire/protocol/messages.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/world_terrain.h"
 #include "world/pose_quantizations.h"

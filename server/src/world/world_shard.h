@@ -10,7 +10,7 @@
 #include "ops/metrics.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "world/shard_messages.h"
 #include "world/pose_frames.h"
 #include "world/encoded_pose_cache.h"

@@ -13,7 +13,7 @@
 #include "counted_memory.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "test_server.h"
 #include "test_library.h"
 

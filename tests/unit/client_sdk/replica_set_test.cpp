@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
 #include "test_library.h"
 

@@ -5,7 +5,9 @@
 
 #include "base/check.h"
 #include "offline/build/grid_example.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 namespace {

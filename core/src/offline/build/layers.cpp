@@ -8,6 +8,7 @@
 #include "offline/base/text.h"
 #include "offline/build/library_writer.h"
 #include "offline/extract/assemble.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

@@ -12,9 +12,10 @@
 #include "offline/build/smooth_examples.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {

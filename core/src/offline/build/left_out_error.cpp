@@ -5,8 +5,8 @@
 
 #include "base/check.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/pose.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {

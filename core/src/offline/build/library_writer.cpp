@@ -10,6 +10,8 @@
 #include "motion_library_generated.h"
 #include "offline/build/transitions.h"
 #include "runtime/library/library_file.h"
+#include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

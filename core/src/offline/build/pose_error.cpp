@@ -5,7 +5,8 @@
 
 #include "base/check.h"
 #include "offline/extract/mirror.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

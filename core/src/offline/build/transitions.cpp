@@ -6,6 +6,7 @@
 #include "base/check.h"
 #include "offline/build/grid_example.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/library/transition.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {

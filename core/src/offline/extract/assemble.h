@@ -6,7 +6,7 @@
 
 #include "offline/extract/extract.h"
 #include "stridewire/base/error.h"
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {

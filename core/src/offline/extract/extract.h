@@ -6,7 +6,7 @@
 
 #include "offline/extract/contacts.h"
 #include "offline/extract/segment.h"
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {

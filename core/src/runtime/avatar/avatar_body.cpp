@@ -1,4 +1,6 @@
-#include "stridewire/runtime/avatar_body.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 
 #include <algorithm>
 #include <utility>
@@ -41,8 +43,9 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   }
   Evaluate(time_s);
   earlier_feet[0] = corrections(time_s, blended_pose);
-  // Planting that has not set in yet sets in anew.
-  begins_planting = movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
+  // If planting has not faded in completely, the next movement fades it in again from the start.
+  begins_planting =
+      movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
   if (begins_planting) TakeForBlended(time_s, keeps_speed);
 }
 
@@ -83,7 +86,7 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
     movement.feet.packed = PackFootPlan(movement);
     return;
   }
-  // D = P - M, with P what is displayed.
+  // D = P - M, where P is the displayed pose.
   movement.feet.is_active = false;
   EvaluateBlend(group(), library->layout(), movement, movement.start_offset_s, cache,
                 movement.difference);
@@ -94,13 +97,15 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   }
 }
 
-void AvatarBody::BlendIn(const LandingTarget& wish, bool keeps_speed) { BlendInAt(wish, keeps_speed); }
+void AvatarBody::BlendIn(const LandingTarget& wish, bool keeps_speed) {
+  BlendInAt(wish, keeps_speed);
+}
 
 void AvatarBody::BlendIn(const LandingDecision& choice, bool keeps_speed) {
   BlendInAt(choice, keeps_speed);
 }
 
-// The corrections of the movement just planned go on from those before it.
+// Makes the foot corrections of the planned movement continue smoothly from the previous ones.
 void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
   const double start_offset_s = movement.start_offset_s;
   std::array<FeetCorrection, 2> planned{CorrectFeet(movement, start_offset_s, blended[0])};
@@ -116,7 +121,7 @@ void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& bl
 void AvatarBody::ShowLayers() {
   has_layers = !layers.empty();
   if (!has_layers) return;
-  layered_pose = pose;  // of the same size: no allocation
+  layered_pose = pose;  // Both have the same size, so this does not allocate.
   layers.Apply(*library, layered_pose);
 }
 

@@ -1,24 +1,30 @@
-// The part of an avatar that plans a step to a footprint and does not play it when it would land elsewhere.
+// AvatarSimulation: plans steps with exact placement and rejects those that would land elsewhere.
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
 
-// A foot this near is on its footprint, which is within 1 mm: planting is exact to a hundredth of that.
+// A foot within these tolerances is on its footprint. The documented tolerance is 1 mm; planting is
+// accurate to a hundredth of that.
 constexpr double kMetM = 0.9e-3;
 constexpr double kMetRad = 1e-3;
-// The pose is looked at as often from landing to the end.
+// Number of times between landing and the end of the step at which the pose is checked.
 constexpr int kLooks = 5;
-// On terrain a sole may be lifted out of the ground by as much as heels and toes go down: not a miss.
+// On terrain, a sole is lifted out of the ground if its heel or toes are below it. A lift up to
+// this height does not count as an error.
 constexpr double kLiftedM = 0.1;
 
-// What a step lands on when sent too far is not always where it lands when sent there: the library's own part of it is
-// another. Going on from there comes to one that is met soon; sooner when going on by more than was missed.
+// The nearest footprint in reach is found iteratively. A step that aims too far lands short, but a
+// step that aims at that landing place may land elsewhere again, because the library blends a
+// different step. Aiming further by kOvershoot times the error converges faster.
 constexpr int kMaxTries = 8;
 constexpr double kOvershoot = 1.5;
 
@@ -44,10 +50,10 @@ std::string DescribeRejection(const AvatarEvent& event) {
   return text;
 }
 
-// Plans the movement of a request. False: its footprint had to be met and is not; it is rejected, and everything is
-// as it was before.
+// Plans the movement of a request. If the request needs exact placement and would miss its
+// footprint, rejects it, restores the previous state and returns false.
 bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                           double swing_part) {
+                                     double swing_part) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
     PlanMovement(plan, swing_part);
@@ -60,7 +66,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
               .reason = kNotPlanted});
     return false;
   }
-  kept_.front().pose = body_.pose;  // of the same size: no allocation
+  kept_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
   std::swap(body_.movement, kept_.front().movement);
   PlanMovement(plan, swing_part);
   FootprintError missed = LandingErrorFrom(*plan.exact);
@@ -79,9 +85,9 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   return false;
 }
 
-// A footprint near one that was missed that the step just planned would meet were it sent there.
-FootprintError AvatarSimulation::NearestInReach(const Footprint& asked, const FootprintError& missed,
-                                     double swing_part) {
+// Finds a footprint close to one that was missed that the avatar's step can meet exactly.
+FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
+                                                const FootprintError& missed, double swing_part) {
   const Foot moving = MovingFoot(group().kind);
   Footprint tried = asked;
   FootprintError off = missed;
@@ -100,9 +106,10 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked, const Fo
           std::fabs(asked.heading_rad - off.nearest.heading_rad)};
 }
 
-// Where the step just planned brings its foot. What the plan misses is not all of it: that legs are too short for a
-// step up or down shows in the pose only. If there the other foot gives way instead, the one would have landed as
-// far off had the other stayed.
+// Computes where the planned step brings its foot, and how far that is from the requested
+// footprint. The plan's own error is not enough: a leg that is too short for a step up or down
+// shows only in the planted pose. If the other foot is displaced instead, its displacement counts
+// as the error.
 FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();
@@ -138,7 +145,8 @@ FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
     const DVec3 from_other_m = off_m - (lands[x].ball_m - planned[x].ball_m);
     if (glm::dot(from_other_m, from_other_m) > glm::dot(off_m, off_m)) off_m = from_other_m;
     if (body_.movement.feet.keeps_above_ground && std::fabs(off_m.y) < kLiftedM) off_m.y = 0.0;
-    // Heights of balls follow the blend, so they are compared with what was planned.
+    // The heights of the balls follow the blend, so compare them with the plan, not with the
+    // request.
     const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - off_m.x, -off_m.y,
                        asked.position_m.z - planned[m].ball_m.z - off_m.z);
     const double turn_rad = WrapAngle(asked.heading_rad - lands[m].heading_rad);

@@ -1,14 +1,17 @@
-// The part of an avatar that goes from one movement to the next, at its end or in the middle of it.
+// AvatarSimulation: changes from one movement to the next, at its end or in the middle of it.
 
 #include <algorithm>
 
 #include "base/check.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 
-// When both feet stand again, or if they do the time that it is. Who has begun to jump jumps.
+// Movement time at which both feet are on the ground: now, if they are, else when the swing ends. A
+// jump that has begun is always completed.
 double AvatarSimulation::Landed() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && movement_time_s_ <= swing.release_s
@@ -18,12 +21,14 @@ double AvatarSimulation::Landed() const {
 
 double AvatarSimulation::EndOfMovement() const {
   return interrupts_ && !IsStartDelayed() ? std::min(Landed(), body_.movement.duration_s())
-                                  : body_.movement.duration_s();
+                                          : body_.movement.duration_s();
 }
 
-// The foot in the air is the one that the request at the queue's head moves, and far from landing.
+// True if the request at the head of the queue can redirect the current swing: it moves the foot
+// that is in the air, and enough of the swing is left.
 bool AvatarSimulation::RedirectsSwing() const {
-  if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) || body_.plants_feet != foot_planting()) {
+  if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) ||
+      body_.plants_feet != foot_planting()) {
     return false;
   }
   const auto* step = std::get_if<StepRequest>(&queue_[queue_head_].movement);
@@ -36,16 +41,17 @@ bool AvatarSimulation::RedirectsSwing() const {
          swing.land_s - movement_time_s_ > kLeastSwingLeft * (swing.land_s - swing.release_s);
 }
 
-// What a movement that begins at `time_s` of this one goes on from.
+// Stores the state at `time_s` of the current movement that the next movement will blend from.
 void AvatarSimulation::CaptureBlendSource(double time_s) {
-  const bool keeps_speed =
-      options_.blend == BlendKind::kInertialization && time_s - body_.movement.start_offset_s >= kBlendStepS;
+  const bool keeps_speed = options_.blend == BlendKind::kInertialization &&
+                           time_s - body_.movement.start_offset_s >= kBlendStepS;
   moved_until_s_ = keeps_speed ? time_s_ : -1.0;
   body_.CaptureBlendSource(time_s, keeps_speed);
 }
 
-// Tells who shows the avatar elsewhere that the movement under way is left at `time_s`. One that began in the same
-// Advance they know nothing of.
+// Records in change_, for replicas, that the avatar leaves the current movement at `time_s`.
+// Replicas do not know a movement that began in the same Advance, so such a change needs the whole
+// state.
 void AvatarSimulation::Leave(double time_s, bool is_redirected) {
   if (change_.has_left || change_.has_begun) {
     change_.is_any = true;
@@ -58,8 +64,8 @@ void AvatarSimulation::Leave(double time_s, bool is_redirected) {
   change_.is_redirected = is_redirected;
 }
 
-// A step of the foot in the air takes over from the step under way, at the same part of the swing. One that may
-// be refused and is leaves the step under way to go on.
+// Replaces the current step by a step of the same foot, at the same fraction of the swing. If the
+// new step is rejected, the current step continues.
 void AvatarSimulation::RedirectSwing() {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
@@ -82,7 +88,7 @@ void AvatarSimulation::RedirectSwing() {
   BeginMovement(*plan, request.id);
 }
 
-// Before a movement is planned that feet are planted in as they were not before, or the other way round.
+// Applies a change of the foot planting setting. Call it before planning a movement.
 void AvatarSimulation::SwitchPlanting() {
   if (body_.plants_feet == foot_planting()) return;
   body_.plants_feet = body_.begins_planting = foot_planting();
@@ -98,7 +104,7 @@ void AvatarSimulation::SwitchPlanting() {
     hold.height_m = 0.0;
     hold.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;
-    // Level, but for feet on different steps of stairs.
+    // The ground is level, unless the feet stand on different steps of a staircase.
     const double stands_m =
         BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
     hold.print.position_m.y += GroundRise(stands_m - base_.position_m.y);

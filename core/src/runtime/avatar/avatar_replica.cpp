@@ -6,21 +6,22 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/avatar/record_fields.h"
 #include "base/check.h"
+#include "runtime/avatar/record_fields.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 namespace {
 
-// No number of a record is larger: metres, seconds, radians.
+// Limits on the numbers of a record, in metres, seconds or radians, and on weights.
 constexpr double kMostOfANumber = 1e9;
 constexpr float kMostOfAWeight = 1e3f;
-// Products of rotations are not of unit length exactly.
+// Tolerance for the squared length of rotations, which products of rotations need.
 constexpr float kNearlyUnit = 0.02f;
 
 }  // namespace
 
-// Reads the fields of a record. The first thing that is wrong is kept; all that is read after it is 0.
+// Reads the fields of a record. Keeps the first error; every field read after it is 0.
 class AvatarReplica::Reader {
  public:
   explicit Reader(std::span<const std::byte> record) : record_(record) {}
@@ -31,7 +32,7 @@ class AvatarReplica::Reader {
     if (ok()) status_ = Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(at_));
   }
   void Finish() {
-    if (at_ != record_.size()) Refuse("a movement record is longer than what it tells");
+    if (at_ != record_.size()) Refuse("a movement record has extra bytes at its end");
   }
 
   void F64(double& value) { Number(value); }
@@ -54,12 +55,12 @@ class AvatarReplica::Reader {
   }
   void CheckUnit(Quat& q) {
     if (std::fabs(Dot(q, q) - 1.0f) <= kNearlyUnit) return;
-    Refuse("a rotation of a movement record is not of unit length");
+    Refuse("a rotation in a movement record is not of unit length");
     q = kIdentityQuat;
   }
   void CheckUnit(Vec3& v) {
     if (std::fabs(glm::dot(v, v) - 1.0f) <= kNearlyUnit && v.y > 0.0f) return;
-    Refuse("a normal of a movement record is not of unit length and up");
+    Refuse("a normal in a movement record is not of unit length or does not point up");
     v = Vec3(0.0f, 1.0f, 0.0f);
   }
 
@@ -69,13 +70,13 @@ class AvatarReplica::Reader {
     value = 0;
     Take(&value, sizeof value);
     if (std::fabs(value) <= static_cast<T>(kMostOfANumber)) return;
-    Refuse("a number of a movement record is none or too large");
+    Refuse("a number in a movement record is not finite or is too large");
     value = 0;
   }
   void Take(void* value, std::size_t bytes) {
     if (!ok()) return;
     if (record_.size() - at_ < bytes) {
-      Refuse("a movement record is cut short");
+      Refuse("a movement record is truncated");
       return;
     }
     std::memcpy(value, record_.data() + at_, bytes);
@@ -95,13 +96,13 @@ void ReadLayers(const MotionLibrary& library, LayerStack& layers, Reader& reader
   reader.Index(count);
   std::array<LayerStack::Playing, LayerStack::kMaxLayers> playing{};
   if (count > static_cast<int>(playing.size())) {
-    reader.Refuse("a movement record tells of too many layers");
+    reader.Refuse("a movement record contains too many layers");
     return;
   }
   const auto told = std::span(playing).first(static_cast<std::size_t>(count));
   for (LayerStack::Playing& p : told) record::LayerFields(reader, p);
   if (reader.ok() && !layers.Restore(library, told)) {
-    reader.Refuse("a movement record tells of a layer that cannot be");
+    reader.Refuse("a movement record contains an invalid layer");
   }
 }
 
@@ -111,7 +112,7 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   reader.Index(group);
   if (!reader.ok()) return;
   if (static_cast<std::size_t>(group) >= library.groups().size()) {
-    reader.Refuse("a movement record tells of a group that the library has not");
+    reader.Refuse("a movement record refers to a group that the library does not have");
     return;
   }
   movement.group = group;
@@ -128,7 +129,8 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   }
 }
 
-// Feet of the movement's kind leave the ground and land when it says.
+// Sets the release and landing times and the root weights of the feet, which follow from the kind
+// and the keytimes of the movement.
 void SetTimes(MovementKind kind, Movement& movement) {
   const SwingTimes times = SwingTimesOf(kind, movement);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -158,7 +160,7 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
   if ((flags & record::kIsState) != 0) {
     ReadState(flags, reader);
   } else if (!is_known_) {
-    return Fail(ErrorCode::kNotFound, "a change of an avatar of which no state is known");
+    return Fail(ErrorCode::kNotFound, "a change record arrived before the first state record");
   } else {
     ReadChange(flags, reader);
   }
@@ -168,31 +170,32 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
 }
 
 void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
-  // All is read before anything of it is done: what is done allows no going back.
+  // Check each part of the record before applying it, because the steps cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
   if (has_left && !is_moving_) {
-    reader.Refuse("a movement record ends a movement that is not under way");
+    reader.Refuse("a movement record ends a movement, but none is in progress");
     return;
   }
   if (has_begun && is_moving_ && !has_left) {
-    reader.Refuse("a movement record begins a movement and ends none");
+    reader.Refuse("a movement record begins a movement before the current one ends");
     return;
   }
   if (has_begun && ((flags & record::kPlants) != 0) != body_.plants_feet) {
-    reader.Refuse("a movement record plants feet that are not, or the other way round");
+    reader.Refuse("a movement record does not agree with the state about foot planting");
     return;
   }
   if (has_left) {
     double left_s = movement.duration_s();
     if ((flags & record::kLeftAtEnd) == 0) reader.F64(left_s);
     if (!(left_s >= 0.0 && left_s <= movement.duration_s())) {
-      reader.Refuse("a movement record ends a movement outside of it");
+      reader.Refuse("a movement record ends a movement at a time outside its duration");
     }
     if (!reader.ok()) return;
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
-    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0) body_.CaptureFootLocks(left_s);
+    if (movement.feet.is_active && (flags & record::kIsRedirected) == 0)
+      body_.CaptureFootLocks(left_s);
     is_moving_ = false;
   }
   if (has_begun) {
@@ -212,8 +215,9 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     }
     if (!reader.ok()) return;
     body_.StartWeighted(base);
-    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && time_s >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement outside of it");
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
+          time_s >= start_offset_s)) {
+      reader.Refuse("a movement record begins a movement at a time outside its duration");
       return;
     }
     body_.EnterAt(start_offset_s);
@@ -236,7 +240,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   body_.begins_planting = (flags & record::kBeginsPlanting) != 0;
   is_moving_ = (flags & record::kMoves) != 0;
   if (body_.plants_feet && !body_.library->leg_rig().is_usable) {
-    reader.Refuse("a movement record plants feet that the library has not");
+    reader.Refuse("a movement record plants feet, but the library does not support it");
     return;
   }
   if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
@@ -253,8 +257,9 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     if (!reader.ok()) return;
     body_.StartWeighted(base);
     movement.extra_turn_rad = extra_turn_rad;
-    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() && movement_time_s_ >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement outside of it");
+    if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
+          movement_time_s_ >= start_offset_s)) {
+      reader.Refuse("a movement record begins a movement at a time outside its duration");
       return;
     }
     body_.EnterAt(start_offset_s);
@@ -266,7 +271,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
       SetTimes(body_.group().kind, movement);
       record::PlanFields(reader, movement.feet);
       for (const FootResidual& rest : movement.feet.residuals) {
-        if (!(rest.over_s > 0.0)) reader.Refuse("what feet keep ends before it begins");
+        if (!(rest.over_s > 0.0))
+          reader.Refuse("a foot residual in a movement record has no duration");
       }
       movement.feet.packed = PackFootPlan(movement);
     }
@@ -290,7 +296,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                                SoaPoseEvaluator& evaluator) {
-  constexpr std::size_t kAtOnce = 16;  // as AvatarSimulation::AdvanceAll
+  constexpr std::size_t kAtOnce = 16;  // As in AvatarSimulation::AdvanceAll.
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {
     const auto block = replicas.first(std::min(replicas.size(), kAtOnce));

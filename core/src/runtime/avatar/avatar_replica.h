@@ -6,39 +6,44 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/avatar_body.h"
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {
 
-/// Shows an avatar that lives elsewhere: is told what it begins (MovementRecord) and evaluates the same poses,
-/// bit by bit, in the same ticks. Not thread-safe; one owner. Allocates when it is made only.
+/// A copy of an avatar that another program simulates. It receives movement records (see
+/// movement_record.h) and evaluates the same poses, bit for bit, in the same ticks. Not
+/// thread-safe; one owner. Allocates only in its constructor.
 ///
-///   for each tick:  Apply the record of the tick, if there is one;  AdvanceAll by the length of the avatar's tick
+/// For each tick, call Apply with the record of the tick, if there is one, and then AdvanceAll with
+/// the length of the avatar's tick.
 class AvatarReplica {
  public:
-  /// Nothing is known of the avatar until a state comes. The library is that of the avatar.
+  /// The replica is unknown until it receives a state. `library` must be the avatar's library.
   explicit AvatarReplica(std::shared_ptr<const MotionLibrary> library);
 
-  /// Whether a record tells a state, and not a change.
+  /// True if a record contains a whole state, false if it contains a change.
   [[nodiscard]] static bool IsState(std::span<const std::byte> record);
 
-  /// Takes the record of a tick. Of the changes none may be left out; a state may come at any time.
-  /// kMalformed: bytes that are none, or do not fit the library or what is known; kNotFound: a change, and no state was
-  /// there before. `index`: where in the record. Nothing is known then until the next state.
+  /// Applies the record of a tick. No change may be skipped; a state may arrive at any time.
+  ///
+  /// kMalformed: the record is invalid, or does not fit the library or the current state.
+  /// kNotFound: a change arrived before any state. The index of an error is the offset in the
+  /// record. After an error the replica is unknown until the next state.
   [[nodiscard]] Status Apply(std::span<const std::byte> record);
 
-  /// Goes on by one tick of the avatars', and shows it. All have the same library; those of which nothing is known stay
-  /// so.
+  /// Advances replicas by one tick and evaluates their poses. All must have the same library.
+  /// Unknown replicas are skipped.
   static void AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                          SoaPoseEvaluator& evaluator);
 
+  /// True if the replica has received a state and no error occurred since.
   [[nodiscard]] bool is_known() const { return is_known_; }
-  /// Displayed after AdvanceAll, in the world; anything while nothing is known.
+  /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
   [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
-  /// As the avatar's idle(): stands, and has nothing else to do.
+  /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
-  /// The movement under way, null while standing.
+  /// The current movement, or null while standing.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
@@ -52,8 +57,10 @@ class AvatarReplica {
   bool is_known_ = false;
   bool is_moving_ = false;
   bool is_idle_ = false;
-  bool is_told_ = false;          // of the tick that comes: its time needs no adding
-  bool are_layers_told_ = false;  // the same of the layers
+  // The last record set the movement time (or the layers) for the next tick, so AdvanceAll must not
+  // advance it.
+  bool is_told_ = false;
+  bool are_layers_told_ = false;
 };
 
 }  // namespace stridewire

@@ -3,8 +3,8 @@
 #include <bit>
 #include <cstring>
 
-#include "runtime/avatar/record_fields.h"
 #include "base/check.h"
+#include "runtime/avatar/record_fields.h"
 
 namespace stridewire {
 namespace {
@@ -144,8 +144,8 @@ void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
 }
 
 std::size_t MaxRecordBytes(const MotionLibrary& library) {
-  // Plan, holds, corrections and four layers take some 1,700; of poses there are three at most, or one and its
-  // velocity.
+  // The plan, foot locks, corrections and four layers take about 1,700 bytes. A record contains at
+  // most three poses, or one pose and its velocity.
   return 2000 + 48 * static_cast<std::size_t>(library.skeleton().joint_count()) +
          4 * static_cast<std::size_t>(library.max_example_count());
 }

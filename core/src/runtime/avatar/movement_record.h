@@ -3,26 +3,27 @@
 #include <cstddef>
 #include <vector>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 
-/// What an avatar's owner tells who shows the avatar elsewhere (AvatarReplica): bytes, as protocol/STANDARD.md
-/// describes them under "Movement records". Two kinds:
+/// Movement records carry the state of an avatar to its replicas (AvatarReplica). Their bytes are
+/// described in protocol/STANDARD.md under "Movement records". There are two kinds:
 ///
-///   change: what the last Advance changed (AvatarChange). Of a movement that began only what was decided is told: group,
-///           weights, heading, where the feet land. What it goes on from, and the difference pose, are those of
-///           who showed what was before; they come out the same there.
-///   state:  all of it, for who showed nothing before. Some five to ten times as long.
+///   change: what the last Advance changed (AvatarChange). For a new movement it contains only the
+///           decisions: group, weights, heading and footprints. The replica derives the rest, such
+///           as the difference pose, from the previous movement.
+///   state:  everything, for replicas without a previous state. About five to ten times as long.
 
-/// Appends what the last Advance changed, the whole state if no less tells it; nothing if nothing but time went on.
-/// Returns whether there was something. May allocate in `out` only.
+/// Appends a record of what the last Advance changed, or of the whole state if a change record
+/// cannot express it. Returns false and appends nothing if only time advanced. Allocates only in
+/// `out`.
 bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out);
 
-/// Appends the state after the last Advance, which must be the last thing that was done to the avatar.
+/// Appends a record of the whole state. The last call on the avatar must have been Advance.
 void AppendState(const AvatarSimulation& avatar, std::vector<std::byte>& out);
 
-/// No record of an avatar of this library is longer.
+/// Upper bound on the size of a record of an avatar with this library.
 [[nodiscard]] std::size_t MaxRecordBytes(const MotionLibrary& library);
 
 }  // namespace stridewire

@@ -1,38 +1,40 @@
 #pragma once
 
-// What records of movements are made of: read and written by the same description, so that neither knows a field
-// that the other does not. A stream has F64, F32, Index and Bool for a value each, and tells by kReads whether the
-// value is set. Bytes are little-endian, without padding.
+// Fields of movement records. The same functions describe reading and writing, so that the two
+// cannot differ. A stream has the members F64, F32, Index and Bool for single values, and
+// CheckUnit, which validates unit vectors when reading. Values are little-endian, without padding.
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
 
-#include "stridewire/runtime/avatar_body.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire::record {
 
 enum Flag : std::uint16_t {
   kIsState = 1 << 0,
-  kMoves = 1 << 1,   // change: a movement began; state: one is under way
-  kIsIdle = 1 << 2,  // AvatarSimulation::idle()
-  kPlants = 1 << 3,  // AvatarBody::plants_feet
-  kLayers = 1 << 4,  // layers follow; in a state without there are none
-  // Of a change.
-  kLeft = 1 << 5,            // the movement before was left
-  kLeftAtEnd = 1 << 6,       // at its end: the time is not told
-  kIsRedirected = 1 << 7,    // in mid-swing: feet stand where they stood
-  kLeftKeepsSpeed = 1 << 8,  // as told to AvatarBody::CaptureBlendSource
-  // Of a change; of the state of who stands, whether what was kept keeps a speed.
-  kKeepsSpeed = 1 << 9,  // as told to AvatarBody::BlendIn
-  // Of a movement that began.
-  kIsEntered = 1 << 10,  // later than at its beginning
-  kIsSteered = 1 << 11,
-  kOnTerrain = 1 << 12,
-  kAside = 1 << 13,
-  kRootShift = 1 << 14,
-  // Of the state of who stands.
-  kBeginsPlanting = 1 << 15,
+  kMoves = 1 << 1,   // Change: a movement began. State: a movement is in progress.
+  kIsIdle = 1 << 2,  // AvatarSimulation::idle().
+  kPlants = 1 << 3,  // AvatarBody::plants_feet.
+  kLayers = 1 << 4,  // Layers follow. A state without this flag has no layers.
+  // Changes only:
+  kLeft = 1 << 5,            // The previous movement ended or was interrupted.
+  kLeftAtEnd = 1 << 6,       // It ended at its end, so its time is omitted.
+  kIsRedirected = 1 << 7,    // It was redirected in mid-swing; the foot locks stay the same.
+  kLeftKeepsSpeed = 1 << 8,  // Argument of AvatarBody::CaptureBlendSource.
+  // Argument of AvatarBody::BlendIn. In the state of a standing avatar: the next movement keeps the
+  // speed of the previous one.
+  kKeepsSpeed = 1 << 9,
+  // If a movement began:
+  kIsEntered = 1 << 10,  // It began at a time later than 0.
+  kIsSteered = 1 << 11,  // LandingDecision::extra_turn_rad follows.
+  kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; lift_m and normal follow.
+  kAside = 1 << 13,      // LandingDecision::aside_m follows.
+  kRootShift = 1 << 14,  // LandingDecision::root_shift_m follows.
+  // State of a standing avatar only:
+  kBeginsPlanting = 1 << 15,  // AvatarBody::begins_planting.
 };
 
 template <typename Stream, typename V>
@@ -108,7 +110,7 @@ void FootLockFields(Stream& stream, H& locks) {
   }
 }
 
-// A plan but for what its movement's kind and times say.
+// A foot plan, except for the parts that follow from the kind and the keytimes of its movement.
 template <typename Stream, typename P>
 void PlanFields(Stream& stream, P& plan) {
   stream.Bool(plan.keeps_above_ground);
@@ -149,9 +151,9 @@ void PlanFields(Stream& stream, P& plan) {
   }
 }
 
-// Whether something of the difference pose may still be asked for.
+// True if part of the difference pose may still be needed.
 inline bool NeedsDifference(const Movement& movement, double movement_time_s) {
-  // Twice the step that a join looks back by: no rounding decides.
+  // A blend looks back by kBlendStepS. Use twice that, so that rounding cannot matter.
   return movement_time_s - 2.0 * kBlendStepS < movement.start_offset_s + movement.ease_out_s;
 }
 

@@ -7,7 +7,7 @@
 namespace stridewire {
 namespace {
 
-// Row-major, as the library file stores them.
+// Matrices are row-major because the library file stores them that way.
 using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 double Distance(std::span<const double> a, std::span<const double> b,
@@ -73,11 +73,11 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
     }
   }
   if (!AllFinite(sites) || !AllFinite(pseudo_weights)) {
-    return Fail(ErrorCode::kOutOfRange, "a parameter or weight is not finite");
+    return Fail(ErrorCode::kOutOfRange, "a parameter or a weight is not finite");
   }
   for (const double scale : scales) {
     if (!(scale > 0.0) || !std::isfinite(scale)) {
-      return Fail(ErrorCode::kOutOfRange, "a parameter scale is not positive");
+      return Fail(ErrorCode::kOutOfRange, "a parameter's scale is not positive");
     }
   }
 
@@ -126,8 +126,8 @@ Expected<CardinalBasis> CardinalBasisFit::Run() const {
     }
   }
   const Matrix r_matrix = RadialMatrix(sites, basis.dilations, scales);
-  // Minimum norm where no example spans a direction. A complete orthogonal decomposition gives the
-  // pseudo-inverse's solution as an SVD does and compiles in a fraction of the time.
+  // If the examples do not span every direction, the solution of minimum norm is used. A complete
+  // orthogonal decomposition finds it as an SVD would, and compiles in a fraction of the time.
   Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> a_decomposition;
   a_decomposition.setThreshold(1e-9);
   a_decomposition.compute(a_matrix);

@@ -7,64 +7,74 @@
 
 namespace stridewire {
 
-/// Cubic B-spline kernel: B(u) = 2/3 - u^2 + u^3/2 (u < 1), (2 - u)^3 / 6 (1 <= u < 2), 0 beyond.
+/// Cubic B-spline kernel: B(u) = 2/3 - u^2 + u^3/2 for u < 1, (2 - u)^3 / 6 for 1 <= u < 2, and 0
+/// for u >= 2.
 [[nodiscard]] double CubicBSpline(double u);
 
-/// Weights by cardinal basis functions (Sloan, Rose, Cohen 2001; paper, Section 3): a linear
-/// part fitted by least squares plus radial functions that take up the rest at every site,
+/// Weights by cardinal basis functions (Sloan, Rose, Cohen 2001; paper, Section 3). A linear part
+/// is fitted by least squares, and radial functions correct the remaining error at every site:
 ///
 ///   w_i(p) = sum_l a_il A_l(p) + sum_j r_ij R_j(p),   A_0 = 1,  A_l = (p_l - centre_l) / scale_l
 ///   R_j(p) = B(|p - p_j| / d_j),  d_j = distance from site j to the nearest other site
 ///
-/// The weights sum to 1 everywhere, are one-hot at the examples, and are dense: the linear part
-/// does not vanish anywhere.
+/// The weights sum to 1 everywhere. At an example, its own weight is 1 and all others are 0.
+/// Elsewhere usually all weights are nonzero, because the linear part does not vanish.
 struct CardinalBasis {
   int parameter_count = 0;        ///< d >= 1
   int example_count = 0;          ///< n >= 1
   std::vector<double> centres;    ///< [d]
   std::vector<double> scales;     ///< [d], > 0
-  std::vector<double> sites;      ///< [site][d], physical units
-  std::vector<double> dilations;  ///< [site], scaled units
+  std::vector<double> sites;      ///< [site][d], in metres and radians
+  std::vector<double> dilations;  ///< [site], after division by `scales`
   std::vector<double> linear;     ///< [1 + d][n]
   std::vector<double> radial;     ///< [site][n]
-  double condition = 1.0;         ///< Of R, estimated in the 1-norm.
+  double condition = 1.0;         ///< Condition number of R, estimated in the 1-norm.
 };
 
-/// A borrowed basis; what evaluation needs.
+/// A borrowed view of the parts of a basis that evaluation needs.
 struct ConstBasisSpan {
   std::span<const double> centres, scales, sites, dilations, linear, radial;
 };
 
-inline constexpr double kMinSiteDistance = 1e-4;  ///< Scaled; nearer sites must be merged first.
+/// Least distance between two sites after scaling. Callers must merge sites that are closer.
+inline constexpr double kMinSiteDistance = 1e-4;
+/// Run fails if the condition number of R is larger.
 inline constexpr double kMaxCondition = 1e6;
 
+/// A job that fits a CardinalBasis to examples and pseudoexamples. Borrows its spans.
 struct CardinalBasisFit {
   int parameter_count = 0;
   int example_count = 0;
   std::span<const double> sites;           ///< [site][d]: examples, then pseudoexamples
-  std::span<const double> pseudo_weights;  ///< [site - n][n]
+  std::span<const double> pseudo_weights;  ///< [site - n][n]: weights of the pseudoexamples
   std::span<const double> scales;          ///< [d], > 0
-  std::span<const double> radius_factors;  ///< [site], > 0: of dilations; empty: all 1
-  /// Every dilation from the nearest other site of either sort, as the paper has it.
+  std::span<const double> radius_factors;  ///< [site], > 0: multiply the dilations; empty: all 1
+  /// If true, every dilation is the distance to the nearest other site of either sort, as in the
+  /// paper.
   bool radii_from_all_sites = false;
 
-  /// Centre of parameter l = its mean over the *examples*: under rank deficiency the weights sum to 1
-  /// off the sites only if parameters are centred. Dilations come from the example sites alone (for
-  /// an example: the nearest other example; for a pseudoexample: the nearest site), as
-  /// refinement would otherwise shrink every radius. Least squares by complete orthogonal decomposition
-  /// (minimum norm), relative cut 1e-9.
+  /// Fits the basis.
   ///
-  /// kShapeMismatch; kOutOfRange: a number not finite; kIllConditioned: two sites nearer than
-  /// kMinSiteDistance (index: the site), or the condition of R above kMaxCondition.
+  /// The centre of a parameter is its mean over the *examples*. If the examples do not span all
+  /// parameters, the weights sum to 1 away from the sites only if parameters are centred.
+  /// The dilation of an example is the distance to the nearest other example, that of a
+  /// pseudoexample the distance to the nearest site. Otherwise refinement, which adds
+  /// pseudoexamples, would shrink every radius. The least-squares solution has minimum norm;
+  /// directions with a relative weight below 1e-9 are ignored.
+  ///
+  /// kShapeMismatch: the spans do not fit each other. kOutOfRange: a number is not finite or not
+  /// positive. kIllConditioned: two sites are closer than kMinSiteDistance (index: the site), or
+  /// the condition number of R is above kMaxCondition.
   [[nodiscard]] Expected<CardinalBasis> Run() const;
 };
 
-/// Condition of R, R_kj = B(|p_k - p_j| / d_j), estimated in the 1-norm; HUGE_VAL if singular.
+/// Condition number of R, with R_kj = B(|p_k - p_j| / d_j), estimated in the 1-norm. Returns
+/// HUGE_VAL if R is singular.
 [[nodiscard]] double RadialCondition(std::span<const double> sites,
                                      std::span<const double> dilations,
                                      std::span<const double> scales);
 
-/// Weights at `parameters` [d] into `weights` [n]. Double throughout; never allocates.
+/// Writes the weights at `parameters` [d] to `weights` [n]. Never allocates.
 void EvaluateWeights(const ConstBasisSpan& basis, std::span<const double> parameters,
                      std::span<double> weights);
 

@@ -7,9 +7,10 @@
 #include "base/check.h"
 #include "stridewire/runtime/motion_library.h"
 
-// Wolfe's algorithm finds the point of smallest norm in a polytope. The corral is a set of affinely
-// independent vertices; each round adds the vertex furthest towards the origin and then drops
-// vertices until the affine minimum of the corral lies inside it:
+// Wolfe's algorithm finds the point of smallest norm in a polytope. It keeps a "corral", a set of
+// affinely independent vertices. Each round adds the vertex that is furthest towards the origin.
+// Then it drops vertices until the point of smallest norm in the affine hull of the corral is
+// inside the corral:
 //
 //            o  origin (= the target)
 //            |
@@ -33,7 +34,7 @@ double DotProduct(const Point& a, const Point& b, std::size_t d) {
 struct Corral {
   std::size_t size = 0;
   std::array<Point, kMaxCorral> points{};
-  std::array<double, kMaxCorral> lambda{};  // convex weights
+  std::array<double, kMaxCorral> lambda{};  // Weights of the points: >= 0, sum 1.
 
   void Remove(std::size_t i) {
     --size;
@@ -44,8 +45,9 @@ struct Corral {
   }
 };
 
-// Weights (sum 1, any sign) of the smallest-norm point in the corral's affine hull:
-// solve (1 1^T + P P^T) v = 1 by elimination with pivoting, weights = v / sum v.
+// Weights (of any sign, sum 1) of the point of smallest norm in the affine hull of the corral.
+// Solves (1 1^T + P P^T) v = 1 by Gaussian elimination with pivoting; the weights are v / sum v.
+// Returns false if the system is singular.
 bool AffineMinimum(const Corral& corral, std::size_t d, std::array<double, kMaxCorral>& weights) {
   const std::size_t n = corral.size;
   std::array<std::array<double, kMaxCorral + 1>, kMaxCorral> m{};
@@ -92,8 +94,8 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t l = 0; l < d; ++l) sum[l] += points[i * d + l];
   }
-  // Vertices relative to the target, in the metric.
-  std::array<Point, MotionLibrary::kMaxExamples> vertices;  // of which the first ones are touched
+  // Vertices relative to the target, multiplied by the metric. Only the first `count` are used.
+  std::array<Point, MotionLibrary::kMaxExamples> vertices;
   for (std::size_t l = 0; l < d; ++l) {
     const double mean = sum[l] / static_cast<double>(count);
     for (std::size_t i = 0; i < count; ++i) {
@@ -129,8 +131,8 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
         candidate = i;
       }
     }
-    if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // no vertex is nearer to the origin
-    if (corral.size == d + 1) {  // full: the least useful vertex makes room
+    if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // No vertex is closer to the origin.
+    if (corral.size == d + 1) {  // The corral is full: remove the vertex of least weight.
       const auto smallest = std::min_element(
           corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
       corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));
@@ -143,7 +145,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     bool solved = false;
     while (corral.size > 0) {
       if (!AffineMinimum(corral, d, weights)) {
-        corral.Remove(corral.size - 1);  // affinely dependent: the newcomer adds nothing
+        corral.Remove(corral.size - 1);  // The new vertex is affinely dependent on the others.
         break;
       }
       const auto end = weights.begin() + static_cast<long>(corral.size);
@@ -151,7 +153,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
         solved = true;
         break;
       }
-      // Go from lambda towards the affine minimum until a weight reaches 0, and drop that vertex.
+      // Move lambda towards the affine minimum until a weight reaches 0, then drop that vertex.
       double theta = 1.0;
       for (std::size_t i = 0; i < corral.size; ++i) {
         if (weights[i] <= 1e-12 && corral.lambda[i] > weights[i]) {
@@ -173,7 +175,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
     for (std::size_t i = 0; i < corral.size; ++i) {
       for (std::size_t l = 0; l < d; ++l) next[l] += corral.lambda[i] * corral.points[i][l];
     }
-    if (DotProduct(next, next, d) >= norm) break;  // rounding: no more progress
+    if (DotProduct(next, next, d) >= norm) break;  // Rounding errors prevent further progress.
     x = next;
   }
 

@@ -4,13 +4,16 @@
 
 namespace stridewire {
 
-/// Nearest point to `target` [d] in the convex hull of `points` [count][d], grown about their mean
-/// by `growth` (0.1: every point moved 10 % further out). Distances are taken after multiplying
-/// parameter l by `metric[l]`. Writes `nearest` [d], returns the distance (0 inside).
+/// Finds the point nearest to `target` [d] in the grown convex hull of `points` [count][d].
 ///
-/// Any d <= kMaxParameters. Wolfe's algorithm ("Finding the nearest point in a polytope", 1976) on a
-/// corral of at most d + 1 points; at most 200 rounds. At most
-/// MotionLibrary::kMaxExamples points, 56 bytes of stack each. Never allocates.
+/// The hull is scaled about the mean of the points: a `growth` of 0.1 moves every point 10 %
+/// further from the mean. Distances are measured after multiplying parameter l by `metric[l]`.
+/// Writes the point to `nearest` [d] and returns its distance from `target`, which is 0 inside the
+/// hull.
+///
+/// d is at most kMaxParameters and `count` at most MotionLibrary::kMaxExamples. Uses Wolfe's
+/// algorithm ("Finding the nearest point in a polytope", 1976) with at most 200 rounds. Needs 56
+/// bytes of stack per point and never allocates.
 double ProjectOntoHull(std::span<const double> points, std::span<const double> metric,
                        double growth, std::span<const double> target, std::span<double> nearest);
 

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,7 +16,8 @@ double At(std::span<const double> values, int i) { return values[static_cast<std
 
 Status ValidateKeytimes(std::span<const double> keytimes_s) {
   const int count = static_cast<int>(keytimes_s.size());
-  if (count < 2) return Fail(ErrorCode::kOutOfRange, "a movement needs two keytimes", count);
+  if (count < 2)
+    return Fail(ErrorCode::kOutOfRange, "a movement needs at least two keytimes", count);
   if (count > kMaxIntervals + 1) return Fail(ErrorCode::kOutOfRange, "too many keytimes", count);
   if (keytimes_s[0] != 0.0) return Fail(ErrorCode::kOutOfRange, "the first keytime must be 0");
   for (int i = 0; i + 1 < count; ++i) {
@@ -75,7 +76,7 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
     : interval_count_(static_cast<int>(cells.size())) {
   const std::size_t n = cells.size();
   std::array<double, kMaxIntervals> length{};
-  std::array<double, kMaxIntervals> rate{};  // cells a second in each interval
+  std::array<double, kMaxIntervals> rate{};  // Cells per second in each interval.
   knots_[0].time_s = keytimes_s[0];
   for (std::size_t i = 0; i < n; ++i) {
     knots_[i + 1].time_s = keytimes_s[i + 1];
@@ -83,9 +84,9 @@ TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cell
     length[i] = keytimes_s[i + 1] - keytimes_s[i];
     rate[i] = cells[i] / length[i];
   }
-  // Fritsch and Carlson: the weighted harmonic mean of the neighbouring rates keeps the cubic
-  // monotone. All rates are positive here. Ends: one-sided three-point formula, kept within
-  // [0, 3 rate], which is what monotonicity needs.
+  // Fritsch and Carlson: with the weighted harmonic mean of the neighbouring rates as slope, the
+  // cubic is monotone. All rates are positive here. The slopes at the ends use the one-sided
+  // three-point formula, clamped to [0, 3 rate], which guarantees monotonicity.
   if (n == 1) {
     knots_[0].slope = knots_[1].slope = rate[0];
     return;
@@ -115,7 +116,8 @@ double TimeWarp::GridPosition(double time_s) const {
   const double h = piece.end_s - piece.begin_s;
   const double s = (time_s - piece.begin_s) / h;
   const double rise = piece.end - piece.begin;
-  // Cubic Hermite, relative to the piece's start so that small steps keep their precision.
+  // Cubic Hermite interpolation relative to the start of the piece, which keeps small steps
+  // precise.
   const double m0 = piece.begin_slope * h;
   const double m1 = piece.end_slope * h;
   const double value =

@@ -10,8 +10,9 @@
 
 namespace stridewire {
 
-static_assert(std::endian::native == std::endian::little,
-              "library files are mapped as they are; a big-endian build needs a copying loader");
+static_assert(
+    std::endian::native == std::endian::little,
+    "library files are used as mapped; a big-endian build needs a loader that converts them");
 
 LibraryHash HashPayload(std::span<const std::byte> payload) {
   const XXH128_hash_t hash = XXH3_128bits(payload.data(), payload.size());

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-// The 64 bytes before the payload of a `.swl` file, little-endian:
+// The header of a `.swl` file: the 64 bytes before its payload, little-endian.
 //
 //   0  8  magic "STRDWSWL"      16  8  payload bytes
 //   8  4  format version        24 16  XXH3-128 of the payload, high half first
@@ -16,6 +16,7 @@ namespace stridewire {
 inline constexpr std::size_t kLibraryHeaderBytes = 64;
 inline constexpr char kLibraryMagic[9] = "STRDWSWL";
 
+/// XXH3-128 of a library's payload. It identifies the library.
 struct LibraryHash {
   std::uint64_t high = 0;
   std::uint64_t low = 0;
@@ -23,7 +24,9 @@ struct LibraryHash {
 };
 
 [[nodiscard]] LibraryHash HashPayload(std::span<const std::byte> payload);
+/// The hash as 32 lower-case hexadecimal digits.
 [[nodiscard]] std::string HashText(const LibraryHash& hash);
+/// The header for a payload, in the current format version.
 [[nodiscard]] std::array<std::byte, kLibraryHeaderBytes> MakeLibraryHeader(
     std::span<const std::byte> payload);
 

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/locomotion_profile.h"
+#include "runtime/library/locomotion_profile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,9 +9,12 @@
 namespace stridewire {
 namespace {
 
-constexpr double kComfortablePart = 0.8;  // of the longest step
+// The comfortable step length is this fraction of the longest step, but at most kMaxComfortableM.
+constexpr double kComfortablePart = 0.8;
 constexpr double kMaxComfortableM = 0.62;
-constexpr double kStrideM = 0.3;  // a step this long is one of who walks on …
+// The width of a walk is taken from examples that step at least kStrideM forward and turn by at
+// most kStraightRad. Examples with the feet closer than kLeastWidthM sideways are ignored.
+constexpr double kStrideM = 0.3;
 constexpr double kStraightRad = 0.2;
 constexpr double kLeastWidthM = 0.08;
 

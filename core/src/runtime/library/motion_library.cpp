@@ -13,7 +13,12 @@
 #include <cstring>
 #include <string>
 
+#include "runtime/library/keytimes.h"
 #include "runtime/library/library_file.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "motion_library_generated.h"
 
 namespace stridewire {
@@ -23,26 +28,26 @@ constexpr std::size_t kAlignment = 64;
 constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
-// What a person's movement stays far below; beyond it arithmetic in floats would suffer.
-constexpr double kMaxParameter = 100.0;  // metres, radians
-constexpr double kMaxRootM = 1000.0;     // from the base frame
+// Limits that no human movement comes near. Larger values would lose too much precision in floats.
+constexpr double kMaxParameter = 100.0;  // Metres or radians.
+constexpr double kMaxRootM = 1000.0;     // From the base frame, along each axis.
 constexpr double kMaxYawRad = 100.0;
 constexpr double kMaxMovementS = 600.0;
 constexpr double kMinScale = 1e-7;
 constexpr double kMaxRadiusFactor = 100.0;
 
-// A parameter may lie this far outside the hull of the examples, in parts of its extent: what
-// requests are clamped to (10 %) and something over.
+// The weights must stay bounded up to this far outside the range of each parameter, as a fraction
+// of that range. Requests are clamped to 10 % outside, so this leaves a margin.
 constexpr double kReach = 0.5;
-// The most that |w| may sum to there, by a bound that grows with the examples: 230 for 70 captured
-// steps in five parameters, whose real sum stays below 3.
+// Limit on the sum of |w|, checked against an upper bound that grows with the number of examples.
+// For 70 captured steps with five parameters the bound is 230, while the real sum stays below 3.
 constexpr double kMaxWeightSum = 1e6;
-// Sums of weights are 1 to this.
+// Tolerance for sums of weights that must be 1.
 constexpr double kSumTolerance = 1e-7;
 
 Vec3 ToVec3(const fb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-// A number that arithmetic can be done with: finite and of a size that cannot overflow later.
+// True if the number is finite and small enough that later arithmetic cannot overflow.
 template <typename T>
 bool IsSane(T value) {
   return std::isfinite(value) && std::fabs(static_cast<double>(value)) <= kLargestNumber;
@@ -94,7 +99,7 @@ Expected<Skeleton> LoadSkeleton(const fb::Skeleton& from) {
   return skeleton;
 }
 
-// Which parameters a kind may have, as a range of names.
+// True if movements of that kind may have that parameter.
 bool NameFitsKind(ParameterName name, MovementKind kind) {
   if (IsStep(kind)) return name <= ParameterName::kTurn;
   return name == ParameterName::kTurn || name == ParameterName::kLength ||
@@ -109,17 +114,18 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
   for (const fb::Parameter* parameter : *from.parameters()) {
     const auto name = static_cast<ParameterName>(parameter->name());
     if (parameter->name() >= kParameterNameCount || !NameFitsKind(name, group.kind)) {
-      return Fail(ErrorCode::kMalformed, "a parameter's name is unknown or not of its kind",
+      return Fail(ErrorCode::kMalformed,
+                  "a parameter's name is unknown or not valid for the group's kind",
                   parameter->name());
     }
     if (group.FindParameter(name) >= 0) {
-      return Fail(ErrorCode::kMalformed, "a parameter stands twice", parameter->name());
+      return Fail(ErrorCode::kMalformed, "a group has the same parameter twice", parameter->name());
     }
-    // Not "a > b", so that what is not a number fails as well.
+    // Written this way so that NaN is rejected.
     if (!(parameter->min() >= -kMaxParameter && parameter->max() <= kMaxParameter &&
           parameter->min() <= parameter->max() && parameter->scale() >= kMinScale &&
           parameter->scale() <= kMaxParameter)) {
-      return Fail(ErrorCode::kMalformed, "a parameter's range or scale makes no sense",
+      return Fail(ErrorCode::kMalformed, "a parameter's range or scale is invalid",
                   parameter->name());
     }
     group.parameters.push_back(
@@ -128,7 +134,8 @@ Status LoadParameters(const fb::Group& from, MotionGroup& group) {
   return {};
 }
 
-// Sites lie where the parameters say, so that requests clamped to their hull stay within reach.
+// Checks that all sites are inside the ranges of their parameters. Requests are clamped to the hull
+// of the sites, so they then stay within the bounds that CheckWeightTables verifies.
 Status CheckSites(const MotionGroup& group) {
   const std::size_t d = group.parameters.size();
   for (std::size_t l = 0; l < d; ++l) {
@@ -151,11 +158,11 @@ Status CheckSites(const MotionGroup& group) {
   return {};
 }
 
-// Every row of the weight tables sums to what makes all weights sum to 1 wherever they are taken,
-// and no weight can grow out of hand within reach of the examples.
+// Checks that the weights sum to 1 for all parameters, and that no weight can become huge within
+// kReach of the examples. The constant row of the table must sum to 1 and all other rows to 0.
 Status CheckWeightTables(const MotionGroup& group) {
   const auto n = static_cast<std::size_t>(group.example_count);
-  double bound = 0.0;  // of the sum of |w|
+  double bound = 0.0;  // Upper bound on the sum of |w|.
   const auto check = [&](std::span<const double> row, double wanted, double factor) {
     double sum = 0.0;
     double size = 0.0;
@@ -180,7 +187,7 @@ Status CheckWeightTables(const MotionGroup& group) {
   }
   if (!sums_are_right) return Fail(ErrorCode::kMalformed, "a group's weights do not sum to 1");
   if (!(bound <= kMaxWeightSum)) {
-    return Fail(ErrorCode::kMalformed, "a group's weights are far too large");
+    return Fail(ErrorCode::kMalformed, "a group's weights are too large");
   }
   return {};
 }
@@ -208,7 +215,8 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
     return Fail(ErrorCode::kMalformed, "a group's weight tables hold a number out of range");
   }
   for (const double dilation : group.dilations) {
-    if (!(dilation > 1e-9)) return Fail(ErrorCode::kMalformed, "a dilation is not positive");
+    if (!(dilation > 1e-9))
+      return Fail(ErrorCode::kMalformed, "a group's dilation is not positive");
   }
   group.radius_factor = from.radius_factor();
   if (!(group.radius_factor > 0.0 && group.radius_factor <= kMaxRadiusFactor)) {
@@ -318,14 +326,14 @@ Expected<MotionGroup> LoadGroup(const fb::Group& from, const GridLayout& layout,
   return group;
 }
 
-// What a layer may touch, and keys that can be played.
+// Checks that a layer affects only joints that layers may affect, and that its keys can be played.
 Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_legs) {
   const auto fail = [&](const char* text) { return Fail(ErrorCode::kMalformed, text); };
   if (!IsLayerName(layer.name)) {
     return fail("a layer's name is not 1 to 32 of a-z, A-Z, 0-9, '_', '-', '.'");
   }
   if (!(layer.fps >= kMinLayerFps && layer.fps <= kMaxLayerFps)) {
-    return fail("a layer's keys a second are out of range");
+    return fail("a layer's frame rate is out of range");
   }
   if (layer.joints.empty() || layer.joints.size() > joints_of_legs.size() ||
       layer.weights.size() != layer.joints.size()) {
@@ -334,16 +342,17 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
   int before = -1;
   for (const int joint : layer.joints) {
     if (joint <= before || static_cast<std::size_t>(joint) >= joints_of_legs.size()) {
-      return fail("a layer's mask names a joint that is not there, or not in order");
+      return fail("a layer's mask lists joints that do not exist or are not in order");
     }
     if (joints_of_legs[static_cast<std::size_t>(joint)]) {
-      return Fail(ErrorCode::kMalformed, "a layer's mask touches the root or a leg", joint);
+      return Fail(ErrorCode::kMalformed, "a layer's mask contains the root or a joint of a leg",
+                  joint);
     }
     before = joint;
   }
   for (const float weight : layer.weights) {
     if (!(weight > 0.0f && weight <= 1.0f))
-      return fail("a layer's mask holds a weight not in (0, 1]");
+      return fail("a layer's mask contains a weight outside (0, 1]");
   }
   const std::size_t key_floats = 4 * layer.joints.size();
   if (layer.rotations.empty() || layer.rotations.size() % key_floats != 0 ||
@@ -355,7 +364,7 @@ Status CheckLayer(const LayerClip& layer, const std::vector<bool>& joints_of_leg
     const double norm = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] + double{q[2]} * q[2] +
                                   double{q[3]} * q[3]);
     if (!(std::fabs(norm - 1.0) <= kUnitTolerance)) {
-      return Fail(ErrorCode::kMalformed, "a layer holds a rotation not of unit length",
+      return Fail(ErrorCode::kMalformed, "a layer contains a rotation that is not of unit length",
                   static_cast<std::int64_t>(i / 4));
     }
   }
@@ -399,6 +408,15 @@ std::string_view ParameterText(ParameterName name) {
   return "unknown";
 }
 
+MotionLibrary::MotionLibrary() = default;
+
+std::span<const LayerClip> MotionLibrary::layers() const { return layers_; }
+std::span<const Transition> MotionLibrary::transitions() const { return transitions_; }
+
+const Transition* MotionLibrary::FindTransition(std::size_t from, std::size_t to) const {
+  return transitions_.empty() ? nullptr : &transitions_[from * (groups_.size() + 1) + to];
+}
+
 int MotionLibrary::FindLayer(std::string_view name) const {
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     if (layers_[i].name == name) return static_cast<int>(i);
@@ -440,7 +458,7 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
   if (size > kMaxFileBytes || size < kLibraryHeaderBytes) {
     close(file);
     return failed(size > kMaxFileBytes ? ErrorCode::kLimitExceeded : ErrorCode::kMalformed,
-                  size > kMaxFileBytes ? "larger than a library may be (1 GiB)"
+                  size > kMaxFileBytes ? "the file is larger than 1 GiB, the limit for libraries"
                                        : "not a Stridewire library: shorter than its header");
   }
   void* mapping = mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
@@ -461,7 +479,8 @@ Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::Open(
 Expected<std::shared_ptr<const MotionLibrary>> MotionLibrary::FromBytes(
     std::span<const std::byte> bytes) {
   if (bytes.size() > kMaxFileBytes) {
-    return Fail(ErrorCode::kLimitExceeded, "larger than a library may be (1 GiB)");
+    return Fail(ErrorCode::kLimitExceeded,
+                "the file is larger than 1 GiB, the limit for libraries");
   }
   const std::size_t rounded = (bytes.size() + kAlignment) / kAlignment * kAlignment;
   auto* copy = static_cast<std::byte*>(std::aligned_alloc(kAlignment, rounded));
@@ -483,19 +502,19 @@ Status MotionLibrary::Load() {
   std::uint32_t version = 0;
   std::memcpy(&version, bytes_.data() + 8, 4);
   if (version != static_cast<std::uint32_t>(kFormatVersion)) {
-    return Fail(ErrorCode::kVersionMismatch, "made for another version of the format", version);
+    return Fail(ErrorCode::kVersionMismatch, "the library has another format version", version);
   }
   const std::span<const std::byte> payload = bytes_.subspan(kLibraryHeaderBytes);
   std::uint64_t payload_bytes = 0;
   std::memcpy(&payload_bytes, bytes_.data() + 16, 8);
   if (payload_bytes != payload.size()) {
     return Fail(ErrorCode::kMalformed, payload_bytes > payload.size()
-                                           ? "the file is cut short"
-                                           : "the file goes on past its end");
+                                           ? "the file is truncated"
+                                           : "the file is longer than its header says");
   }
   const auto expected_header = MakeLibraryHeader(payload);
   if (std::memcmp(expected_header.data(), bytes_.data(), kLibraryHeaderBytes) != 0) {
-    return Fail(ErrorCode::kMalformed, "the content does not match its hash: the file is damaged");
+    return Fail(ErrorCode::kMalformed, "the file is damaged: its content does not match its hash");
   }
   hash_ = HashText(HashPayload(payload));
 
@@ -529,7 +548,7 @@ Status MotionLibrary::Load() {
         std::fabs(stand.z) <= kMaxRootM)) {
     return Fail(ErrorCode::kMalformed, "the stand pose's root is out of range");
   }
-  leg_rig_ = MakeLegRig(skeleton_, stand_pose_);
+  leg_rig_ = std::make_unique<const LegRig>(MakeLegRig(skeleton_, stand_pose_));
 
   if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
     return Fail(ErrorCode::kMalformed, "the group count is out of range", root.groups()->size());
@@ -540,7 +559,7 @@ Status MotionLibrary::Load() {
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
   }
-  locomotion_profile_ = MakeLocomotionProfile(*this);
+  locomotion_profile_ = std::make_unique<const LocomotionProfile>(MakeLocomotionProfile(*this));
   if (const auto* from = root.transitions()) {
     std::vector<Transition> transitions;
     for (const fb::Transition* t : *from) {
@@ -550,7 +569,7 @@ Status MotionLibrary::Load() {
   }
   if (root.layers() == nullptr) return {};
   if (root.layers()->size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kMalformed, "there are too many layers", root.layers()->size());
+    return Fail(ErrorCode::kMalformed, "the library has too many layers", root.layers()->size());
   }
   const std::vector<bool> joints_of_legs = JointsOfLegs(skeleton_);
   for (const fb::Layer* from : *root.layers()) {
@@ -578,7 +597,7 @@ Status MotionLibrary::LoadTransitions(const std::vector<Transition>& transitions
     const Transition& t = transitions[i];
     if (!(t.distance_m >= 0.0f && IsSane(t.distance_m)) ||
         !is_example_of(t.end_example, i / nodes) || !is_example_of(t.start_example, i % nodes)) {
-      return Fail(ErrorCode::kMalformed, "a transition is not between two examples",
+      return Fail(ErrorCode::kMalformed, "a transition refers to an example that does not exist",
                   static_cast<std::int64_t>(i));
     }
   }

@@ -4,31 +4,37 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {
 
-// What is added to a range on each side: of its width, and anyway.
+// Margin added to each side of a range of components: kMarginOfWidth times its width, plus kMargin.
 constexpr double kMarginOfWidth = 0.2;
 constexpr double kMargin = 0.12;
-// The same of joints that planting turns, where ground, reach and a swing sent elsewhere ask for it.
+// Used instead of kMargin for joints that foot planting rotates. Uneven ground, short legs and
+// redirected swings rotate these joints further than the examples do.
 constexpr double kPlantedMargin = 0.3;
-// A component that stays what it is: room for what it has to make up for of the joints above.
+// A component that varies by less than kStillWidth counts as constant. Its margin only has to
+// compensate for the quantization errors of the joints above it.
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
-// Joints that come nearer to half a turn than this turn every way.
+// A joint whose w falls below this may rotate in any direction and uses smallest-three encoding.
 constexpr double kMinSeenW = 0.4;
-// A joint turned by less than 9 degrees on average is told as it is: a turn less for who encodes it, and no more bits.
+// A joint whose mean rotation is below 9 degrees uses the identity as its reference. That saves the
+// encoder a multiplication and needs no more bits.
 constexpr float kLittleTurnedW = 0.997f;
 
-// A joint's error as an angle: of one that bears others, which make up for it, and of one at an end.
+// Largest error of a joint as an angle. Joints with children get the smaller limit, because their
+// children have to compensate for the error.
 constexpr double kMostInnerRad = 0.002;
 constexpr double kMostOuterRad = 0.004;
 
-// Of 1 mm less the root's own (2^-15 m along each axis) and a little for single precision.
+// Largest error of a joint relative to the root: 1 mm minus the root's own error (2^-15 m along
+// each axis) and a small allowance for single precision.
 constexpr double kLargestAgainstRootM = 0.001 - 0.0000529 - 0.00002;
 
-// Calls back with each rotation of the joint that the library has.
+// Calls `callback` with each rotation of a joint that occurs in the library.
 template <typename Callback>
 void ForEachRotation(const MotionLibrary& library, std::size_t joint, const Callback& callback) {
   const GridLayout& layout = library.layout();
@@ -59,7 +65,7 @@ double LengthOf(const Vec3& v) {
   return std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
 }
 
-// Joints that planting turns, about whatever axis.
+// The joints that foot planting rotates, about any axis.
 std::vector<bool> PlantedJoints(const Skeleton& skeleton) {
   std::vector<bool> planted(skeleton.joints.size(), false);
   for (const Leg& leg : skeleton.legs) {
@@ -110,7 +116,8 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   return range;
 }
 
-// Gives out bits, the next where they help the worst-told point most.
+// Distributes bits over the components of all joints. Each bit goes to the component where it
+// reduces the error of the least accurate point most.
 class BitChoice {
  public:
   BitChoice(const Skeleton& skeleton, std::span<const RotationRange> ranges, double most_m)
@@ -140,7 +147,7 @@ class BitChoice {
   void GiveBits() {
     while (GiveOne()) {
     }
-    // What turned out to be more than enough.
+    // Take back bits that turned out to be unnecessary.
     for (std::size_t j = joints_.size(); j-- > 0;) {
       for (std::size_t c = 0; c < 3; ++c) {
         while (TakeOne(j, c)) {
@@ -181,7 +188,7 @@ class BitChoice {
     Bits bits{};
     double angle_rad = 0.0;
     double most_rad = 0.0;
-    std::vector<std::size_t> chains;  // that it is in
+    std::vector<std::size_t> chains;  // Indices of the chains that contain this joint.
   };
   struct Bone {
     std::size_t joint = 0;
@@ -212,10 +219,12 @@ class BitChoice {
            static_cast<double>(1 << bits);
   }
 
-  // How far a rotation is off at most. A component told within half a step leaves w off by that times |v| / w.
+  // Largest error of a quantized rotation in radians. If a component is off by half a step, then w,
+  // which follows from the components, is off by half a step times |v| / w.
   [[nodiscard]] double AngleOf(std::size_t joint, const Bits& bits) const {
     if (joints_[joint].is_free) {
-      // Worst where all are 0.5: each of three off by half of sqrt(1/2) / (2^(b - 1) - 1), the fourth by their sum.
+      // The error is largest where all four components are 0.5. Then each of the three encoded ones
+      // is off by half of sqrt(1/2) / (2^(b - 1) - 1), and the fourth by the sum of these errors.
       return std::sqrt(6.0) / static_cast<double>((1 << (bits[0] - 1)) - 1);
     }
     double squared = 0.0;
@@ -223,7 +232,7 @@ class BitChoice {
       const double step = StepOf(joint, c, bits[static_cast<std::size_t>(c)]);
       squared += 0.25 * step * step;
     }
-    // What is told may have a slightly smaller w than what is.
+    // The decoded rotation may have a slightly smaller w than the original.
     return 2.0 * std::sqrt(squared) / (ranges_[joint].least_w - 0.005);
   }
 
@@ -231,11 +240,13 @@ class BitChoice {
     const Joint& joint = joints_[j];
     const int bits = joint.bits[component];
     if (joint.is_free) return component == 0 && bits < RotationQuantization::kMaxFreeBits;
-    return bits < RotationQuantization::kMaxBits && StepOf(j, static_cast<int>(component), bits + 1) >=
-                                                static_cast<double>(RotationQuantization::kMinStep);
+    return bits < RotationQuantization::kMaxBits &&
+           StepOf(j, static_cast<int>(component), bits + 1) >=
+               static_cast<double>(RotationQuantization::kMinStep);
   }
 
-  // The component that one more bit helps most, radians a bit; -1 if there is none.
+  // Finds the component whose error shrinks most with one more bit. Returns the gain in radians per
+  // bit, or -1 if no component can take more bits.
   double BestOf(std::size_t j, std::size_t& component) const {
     const Joint& joint = joints_[j];
     double best = -1.0;
@@ -305,7 +316,7 @@ class BitChoice {
   std::span<const RotationRange> ranges_;
   double most_m_;
   std::vector<Joint> joints_;
-  std::vector<Chain> chains_;  // from each end to the root
+  std::vector<Chain> chains_;  // From each leaf to the root.
 };
 
 }  // namespace
@@ -317,8 +328,9 @@ std::vector<RotationRange> FindRotationRanges(const MotionLibrary& library) {
   return ranges;
 }
 
-PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton, std::span<const RotationRange> ranges,
-                        double largest_error_m) {
+PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
+                                        std::span<const RotationRange> ranges,
+                                        double largest_error_m) {
   STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
   BitChoice choice(skeleton, ranges, largest_error_m);
   choice.GiveBits();
@@ -330,13 +342,13 @@ std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
                                              double largest_shift_m) {
   STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
   const std::size_t count = ranges.size();
-  std::vector<double> reach_m(count, 0.0);  // of the longest chain that hangs from it
+  std::vector<double> reach_m(count, 0.0);  // Length of the longest chain below each joint.
   for (const EndSite& site : skeleton.end_sites) {
     double& reach = reach_m[static_cast<std::size_t>(site.joint)];
     reach = std::max(reach, LengthOf(site.offset_m));
   }
   std::vector<double> shift_m(count, 0.0);
-  std::vector<double> below_m(count, 0.0);  // of the worst of those that hang from it
+  std::vector<double> below_m(count, 0.0);  // Largest shift of any child of each joint.
   for (std::size_t j = count; j-- > 0;) {
     const RotationRange& range = ranges[j];
     double squared = 0.0;
@@ -364,7 +376,8 @@ std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library) {
 }
 
 PoseQuantization ChoosePoseQuantization(const MotionLibrary& library) {
-  return ChoosePoseQuantization(library.skeleton(), FindRotationRanges(library), kLargestAgainstRootM);
+  return ChoosePoseQuantization(library.skeleton(), FindRotationRanges(library),
+                                kLargestAgainstRootM);
 }
 
 }  // namespace stridewire

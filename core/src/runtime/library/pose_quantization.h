@@ -10,47 +10,58 @@
 
 namespace stridewire {
 
-/// Where the rotations of a joint are: the components x, y, z of conj(reference) q lie between `low` and `high`,
-/// its w is `least_w` or more.
+/// The range of rotations that a joint takes. For every rotation q of the joint, the components
+/// x, y, z of conj(reference) q are between `low` and `high`, and its w is at least `least_w`.
 struct RotationRange {
   Quat reference = kIdentityQuat;
   Vec3 low = Vec3(-1.0f);
   Vec3 high = Vec3(1.0f);
-  double least_w = 0.0;  ///< Below RotationQuantization::kMinLeastW: it turns every way
+  /// If below RotationQuantization::kMinLeastW, the joint may rotate in any direction.
+  double least_w = 0.0;
 };
 
-/// The range of each joint in a library: its examples, layers and stand pose, and a good deal more, since movements are
-/// blended, planted and eased into one another. The root turns every way.
+/// Finds the range of each joint over the examples, layers and stand pose of a library. The ranges
+/// include wide margins, because avatars blend movements, plant feet and ease from one movement
+/// into the next. The root may rotate in any direction.
 [[nodiscard]] std::vector<RotationRange> FindRotationRanges(const MotionLibrary& library);
 
-/// Codes for all joints of a skeleton, and the bound they keep.
+/// Quantization parameters for all joints of a skeleton.
 struct PoseQuantization {
   std::vector<RotationQuantization> joints;
-  double largest_error_m =
-      0.0;  ///< Of any joint or end site against the root, in a pose within the ranges
+  /// Largest error in the position of any joint or end site relative to the root, for poses within
+  /// the ranges.
+  double largest_error_m = 0.0;
 };
 
-/// Chooses as few bits as keep every joint and end site within `largest_error_m` of where it is against the root, for
-/// who encodes joints from the root on and lets each make up for the errors of those above it: then a joint's own error
-/// (an angle) moves only what its bones reach, and the bound is the sum over a chain of bone times angle. No angle is
-/// off by more than 0.23 degrees. `largest_error_m` of the result is larger than asked for only if no bits were left to
-/// give: bones of many metres. `ranges` has one entry a joint. Same bytes on every machine.
+/// Chooses the fewest bits that keep every joint and end site within `largest_error_m` of its
+/// position relative to the root.
+///
+/// The encoder must process joints from the root on, and each joint must compensate for the errors
+/// of those above it. Then the error of a joint (an angle) moves only its own bone, and the bound
+/// is the sum of bone length times angle over a chain. No angle is off by more than 0.23 degrees.
+/// `largest_error_m` of the result exceeds the requested one only if all joints have the maximum
+/// number of bits, which takes bones of many metres. `ranges` has one entry per joint. The result
+/// is the same on every machine.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
-                                      std::span<const RotationRange> ranges,
-                                      double largest_error_m);
+                                                      std::span<const RotationRange> ranges,
+                                                      double largest_error_m);
 
-/// The joints that are worth telling of who is seen from afar, growing. Left out are those that, shown with everything
-/// below them as their ranges' references, move no joint or end site by more than `largest_shift_m` within the ranges: a
-/// joint's turn from its reference, as a chord, times the reach of what hangs from it, and the sum of that along a chain.
-/// The root is never left out, nor is the parent of one that is told. Same on every machine.
+/// Chooses the joints to send for avatars that are seen from far away, in increasing order.
+///
+/// A joint is left out if displaying it and all joints below it in their reference rotations moves
+/// no joint or end site by more than `largest_shift_m`. The shift caused by one joint is the chord
+/// of its largest rotation from the reference times the length of the chain below it, and shifts
+/// add up along a chain. The root and the parents of chosen joints are never left out. The result
+/// is the same on every machine.
 [[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
                                                            std::span<const RotationRange> ranges,
                                                            double largest_shift_m);
-/// The largest shift of those left out of a library's poses.
+/// Largest shift of a joint when a library's reduced set of joints is sent.
 inline constexpr double kFewerJointsShiftM = 0.12;
 [[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library);
 
-/// Both, so that with the root in steps of 2^-14 m everything is within 1 mm of where it is in the world.
+/// Finds the ranges of a library and chooses the bits so that, with the root position rounded to
+/// 2^-14 m, every joint is within 1 mm of its position in the world.
 [[nodiscard]] PoseQuantization ChoosePoseQuantization(const MotionLibrary& library);
 
 }  // namespace stridewire

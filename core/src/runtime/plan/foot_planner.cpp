@@ -1,50 +1,65 @@
-#include "stridewire/runtime/foot_planner.h"
+#include "runtime/plan/foot_planner.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/plan/foot_sampler.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/plan/foot_sampler.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
 
-// On captures the ball leaves the ground this long before toe-off and comes to rest this long after
-// heel-strike.
+// In captures, the ball of a foot leaves the ground kBallLeavesS before toe-off and comes to rest
+// kBallRestsS after heel-strike.
 constexpr double kBallLeavesS = 0.06;
 constexpr double kBallRestsS = 0.08;
 constexpr double kShortestSwingS = 0.05;
+// Velocities are measured as differences over twice this time.
 constexpr double kVelocityStepS = 0.004;
 
 constexpr double kHalfFootWidthM = 0.04;
+// A sole rests on ground that rises up to kBumpM above its plane. Anything higher is a wall.
 constexpr double kBumpM = 0.05;
+// A swinging foot clears the ground within kPassingRadiusM by up to kClearanceM, but is lifted by
+// at most kMaxLiftM.
 constexpr double kClearanceM = 0.037;
 constexpr double kMaxLiftM = 0.4;
 constexpr double kPassingRadiusM = 0.02;
-// Nearer its prints a foot is kept out of their ground instead (LiftOutOfGround).
+// Fractions of the swing at which clearance is checked. Closer to its footprints, LiftOutOfGround
+// keeps the foot above their ground.
 constexpr std::array<double, 15> kClearanceSamples{0.13,   0.1825, 0.235,  0.2875, 0.34,
                                                    0.3925, 0.445,  0.4975, 0.55,   0.6025,
                                                    0.655,  0.7075, 0.76,   0.8125, 0.865};
 
+// Largest sideways correction per step towards the line of the walk.
 constexpr double kMaxAsideM = 0.05;
 
-// A foot that passes the other closer than this is pushed aside for it.
+// Sideways distance between the balls of the feet. A swinging foot that would pass the standing
+// foot closer than kPassApartM is pushed outward by up to kMaxPushM. This is checked while the feet
+// are within kPassingM of each other in the walking direction. A step that starts or lands closer
+// than kCrossingM crosses the legs intentionally.
 constexpr double kPassApartM = 0.11;
-constexpr double kLandApartM = 0.05;  // no nearer unless asked to
+constexpr double kLandApartM = 0.05;  // Feet do not land closer unless the request gives the side.
 constexpr double kPassingM = 0.2;
 constexpr double kCrossingM = 0.04;
 constexpr double kMaxPushM = 0.08;
+// Fractions of the swing and of the stance at which feet are sampled.
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
 constexpr std::array<double, 5> kStanceSamples{0.1, 0.3, 0.5, 0.7, 0.9};
 
-// The ball's centre is this much higher over a slope than over level ground, straight above the same
-// point of the sole.
+// Additional height of the ball's centre above the ground on a slope. The centre is at a fixed
+// distance from the ground plane, so the vertical distance grows with the slope.
 double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
   return side.ball_height_m * (1.0 / normal.y - 1.0);
 }
 
-// A sole rests on what sticks out of the plane it fits, but for walls that it should not stand at.
+// Height of the ground under a sole. The sole rests on the highest bump within it, except for
+// walls, which a step should not be placed at in the first place.
 double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }
@@ -76,7 +91,8 @@ class Planner {
     }
     return feet;
   }
-  // Looks at all times of a movement that has its difference that matter for its plan.
+  // Samples the feet at all times that the plan depends on. The movement's difference pose must be
+  // set.
   void SampleKeyPoses(const SwingTimes& swing) {
     const auto around = [&](double time_s, std::size_t before) {
       times_s_[before] = std::max(0.0, time_s - kVelocityStepS);
@@ -98,12 +114,12 @@ class Planner {
   }
   FeetAt Landing() const { return KeyPoseAt(kLanding); }
   std::array<FeetAt, 2> Entry() const { return {KeyPoseAt(kEntry), KeyPoseAt(kEntry + 1)}; }
-  // From one ball to the other where the blend ends.
+  // Vector from one ball to the other at the end of the blend.
   DVec3 EndVector(Foot from, Foot to) const {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
 
-  // The base below which the feet that stay stand where they do.
+  // Chooses the base position so that, on average, the staying feet keep their positions.
   void SolveBase(const FootLocks& locks, std::span<const Foot> staying, double stance_end_s) {
     movement_.base.position_m = DVec3(0.0);
     std::array<double, 1 + kStanceSamples.size()> times_s{0.0};
@@ -128,7 +144,7 @@ class Planner {
     movement_.base.position_m = position / static_cast<double>(staying.size());
   }
 
-  // Where and how the moving foot of a step lands; where the eased pose has it then.
+  // Chooses the footprint of a step's moving foot. Returns the foot at landing before planting.
   BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& wish, Foot moving) {
     const RequestPlan& request = wish.request;
     FootPlan& plan = movement_.feet;
@@ -137,7 +153,8 @@ class Planner {
     const double end_heading_rad =
         movement_.base.heading_rad + movement_.heading_change_rad + movement_.extra_turn_rad;
     const DVec3 blended = RotateYaw(-end_heading_rad, EndVector(OtherFoot(moving), moving));
-    // Feet that only follow one another sidewise wander off: captured feet do not stand equally wide.
+    // If each foot were placed only relative to the other, the walk would drift sideways, because
+    // left and right steps of a capture are not equally wide. Steer back towards the line.
     const double aside_m =
         std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement_.base.position_m).x,
                    -kMaxAsideM, kMaxAsideM);
@@ -185,7 +202,7 @@ class Planner {
     return landing;
   }
 
-  // Where the feet of a jump land.
+  // Positions where the feet of a jump land, [foot].
   std::array<DVec3, 2> ChooseJumpLanding(const FootLocks& locks, const RequestPlan& request) {
     const DVec3 centre =
         0.5 * (locks[0].print.position_m + locks[1].print.position_m) +
@@ -197,7 +214,8 @@ class Planner {
     return {centre + 1.0 * flat, centre + -1.0 * flat};
   }
 
-  // Offsets and their velocities at release and landing, so that the way between is smooth.
+  // Computes offsets and their velocities at release and landing, so that the foot's path is
+  // smooth.
   void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& track) {
     const auto velocity_around = [&](std::size_t time) {
       const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
@@ -212,7 +230,7 @@ class Planner {
     track.land_offset_m = track.to.position_m - landing.ball_m;
   }
 
-  // How far the swinging foot must be pushed outward, at most of its swing, to pass the standing leg.
+  // Largest outward push of the swinging foot that is needed to pass the standing leg.
   double PushAside(Foot moving) {
     const FootTrajectory& track = movement_.feet.foot(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
@@ -221,7 +239,7 @@ class Planner {
       const double heading = movement_.base.heading_rad + part * movement_.heading_change_rad;
       return RotateYaw(-heading, ball - stands);
     };
-    // Who starts or lands across the other foot means to.
+    // A step that starts or lands across the other foot does so intentionally.
     if (outward * vector(track.from.position_m, 0.0).x < kCrossingM ||
         outward * vector(track.to.position_m, 1.0).x < kCrossingM) {
       return 0.0;
@@ -231,7 +249,7 @@ class Planner {
       const double part = kSwingSamples[i];
       const double time_s = times_s_[kSwing + i];
       const BlendedFoot blended{
-          .ball_m = sampler_.Ball(kSwing + i, moving)};  // its heading moves no ball
+          .ball_m = sampler_.Ball(kSwing + i, moving)};  // The heading does not affect the ball.
       const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
       const DVec3 apart = vector(ball, part);
       if (std::fabs(apart.z) > kPassingM) continue;
@@ -241,7 +259,7 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
-  // What brings the root above a place by the end of the movement.
+  // The shift that moves the root above `place_m` by the end of the movement.
   DVec3 RootShift(const DVec3& place_m) {
     const double end_s = movement_.duration_s();
     EvaluateMovement(group_, library_.layout(), movement_, end_s, cache_, pose_);
@@ -263,7 +281,8 @@ class Planner {
     track.normals[1] = support.normal;
   }
 
-  // How much higher the swinging foot must go, at most of its swing, to clear the ground below its sole.
+  // Lift that the swinging foot needs at the middle of its swing to clear the ground below its
+  // sole.
   double LiftOver(Foot moving, const Terrain& terrain) {
     const FootTrajectory& track = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
@@ -300,12 +319,15 @@ class Planner {
   Movement& movement_;
   FootSampler sampler_;
 
-  // Times that Look looks at; kRelease and kLanding are between one before and one after them.
+  // Indices of the times that SampleKeyPoses samples. kRelease and kLanding each have one time
+  // before and one after them, for velocities.
   static constexpr std::size_t kRelease = 1;
   static constexpr std::size_t kLanding = 4;
   static constexpr std::size_t kSwing = 6;
-  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();  // and kBlendStepS later
-  static constexpr std::size_t kBlendedEnd = kEntry + 2;  // without what is left of the pose before
+  // Two times: the entry, and kBlendStepS later.
+  static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();
+  // The end of the movement, without the difference pose.
+  static constexpr std::size_t kBlendedEnd = kEntry + 2;
   static_assert(kBlendedEnd < FootSampler::kMost);
   std::array<double, kBlendedEnd + 1> times_s_;
 };
@@ -329,8 +351,8 @@ FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side, const Fo
                    {side.foot_m + kSoleBehindAnkleM, side.toe_m, kHalfFootWidthM});
 }
 
-FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose, double ground_m,
-                  const Terrain* terrain) {
+FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
+                      double ground_m, const Terrain* terrain) {
   FootLocks locks;
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -367,8 +389,9 @@ void StandOn(const FootLocks& locks, Movement& movement) {
 
 namespace {
 
-// A plan of the feet of one movement, as wished or, where there is no wish, as chosen elsewhere: both go the same way,
-// so that whoever is told what was chosen has the same plan.
+// Plans the feet of a movement: for the target `wish` or, if that is null, from the decision
+// `chosen` that another program made. Both cases share this code, so a replica that receives the
+// decision computes the same plan.
 std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
                            const LandingTarget* wish, const LandingDecision& chosen,
                            const BlendSource& source, GridCache& cache, PoseSpan pose,
@@ -385,7 +408,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     movement.extra_turn_rad = chosen.extra_turn_rad;
   } else if (wish->request.turn_rad) {
     movement.extra_turn_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
-                                    -kMaxExtraTurnRad, kMaxExtraTurnRad);
+                                         -kMaxExtraTurnRad, kMaxExtraTurnRad);
   }
 
   constexpr std::array<Foot, 2> kBoth{Foot::kLeft, Foot::kRight};
@@ -396,8 +419,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     planner.SolveBase(locks, kBoth, times.release_s);
   }
 
-  // D = P - M, with P what was before.
-  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache, movement.difference);
+  // D = P - M, where P is the pose at which the previous movement ended.
+  EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache,
+                movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
   const FeetAt was = planner.FeetOf(source.before);
   Subtract(source.before, movement.difference, movement.difference);
@@ -416,8 +440,9 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     const FootLock& hold = locks[f];
     track.from = track.to = hold.print;
     track.normals.fill(hold.normal);
-    // What the difference pose takes away in height and turning while it fades is put back, so that
-    // a foot on the ground does neither; only the foot that carries comes to rest.
+    // While the difference pose fades, it moves and turns the feet. Compensate for that, so that a
+    // foot on the ground neither sinks nor turns. Only the supporting foot may sink to its rest
+    // height.
     const double sinks_m = was[f].ball_m.y - start[f].ball_m.y;
     const double turns_rad = WrapAngle(was[f].heading_rad - start[f].heading_rad);
     const bool stays_down = is_step && f == x;
@@ -480,22 +505,22 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
 }  // namespace
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingTarget& wish, const BlendSource& source, GridCache& cache,
-                               PoseSpan pose, Movement& movement) {
+                               const LandingTarget& wish, const BlendSource& source,
+                               GridCache& cache, PoseSpan pose, Movement& movement) {
   return Plan(library, locks, &wish, {}, source, cache, pose, movement);
 }
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingDecision& choice, const BlendSource& source, GridCache& cache,
-                               PoseSpan pose, Movement& movement) {
+                               const LandingDecision& choice, const BlendSource& source,
+                               GridCache& cache, PoseSpan pose, Movement& movement) {
   return Plan(library, locks, nullptr, choice, source, cache, pose, movement);
 }
 
 LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
   const FootPlan& plan = movement.feet;
   LandingDecision choice{.extra_turn_rad = movement.extra_turn_rad,
-                       .is_on_terrain = plan.keeps_above_ground,
-                       .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
+                         .is_on_terrain = plan.keeps_above_ground,
+                         .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
   if (!IsStep(kind)) return choice;
   const FootTrajectory& track = plan.foot(MovingFoot(kind));
   choice.turn_rad = track.turn_rad[2];
@@ -508,7 +533,7 @@ LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
 }
 
 FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, double time_s,
-                  ConstPoseSpan pose) {
+                      ConstPoseSpan pose) {
   FootLocks locks;
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {

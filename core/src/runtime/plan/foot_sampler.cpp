@@ -4,27 +4,30 @@
 #include <array>
 #include <cstring>
 
-#include "runtime/pose/grid_blend.h"
 #include "base/check.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/grid_blend.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
 
 constexpr std::size_t kBlock = kernels::kBlock;
 
-// The same number in all lanes.
+// Sets all lanes to the same number.
 template <typename Number>
 void Fill(Number* lanes, Number number) {
   std::fill_n(lanes, kBlock, number);
 }
 
-// Lanes of a movement that is the same in all of them.
+// Arrays for evaluating one movement at several times, one time per lane.
 struct Lanes {
   static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
   kernels::GridTimes times{};
   kernels::GridPlaces places;
-  alignas(64) double base_m[3 * kBlock],
-      heading_rad[kBlock], sine[kBlock], cosine[kBlock], extra_turn_rad[kBlock];
+  alignas(64) double base_m[3 * kBlock], heading_rad[kBlock], sine[kBlock], cosine[kBlock],
+      extra_turn_rad[kBlock];
   alignas(64) float rows[kBlock][4 * (kJoints + 1)];
   alignas(64) float differences[kJoints * 4 * kBlock];
   alignas(64) float ease[kJoints * kernels::kEaseFloats * kBlock];
@@ -48,7 +51,7 @@ void FindPlaces(const MotionGroup& group, const Movement& movement, std::span<co
   kernels::FindInGrids(times_s.size(), t, lanes.places);
 }
 
-// What is left of the pose before, of the joints of legs.
+// Collects the difference pose for the joints of the legs.
 void TakeEasing(const Movement& movement, std::span<const int> joints, std::size_t count,
                 Lanes& lanes) {
   const Pose& difference = movement.difference;
@@ -87,7 +90,8 @@ void FootSampler::Sample(const Movement& movement, std::span<const double> times
   for (std::size_t i = 0; i < times_s.size(); ++i) SampleOne(movement, times_s[i], i < eased, i);
 }
 
-// False if some rotation may have no mean (BlendRotations).
+// Returns false if the examples' rotations of some joint may cancel each other (see
+// BlendRotations).
 bool FootSampler::SampleTogether(const Movement& movement, std::span<const double> times_s,
                                  std::size_t eased) {
   const MotionGroup& group = library_.group(movement.group);

@@ -4,28 +4,34 @@
 #include <span>
 
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/foot_plan.h"
+#include "runtime/movement/foot_plan.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 
-/// Where a movement has the feet at several times before they are planted: to the bit what EvaluateMovement,
-/// EvaluateBlend and FootOf say of each time. The times are evaluated side by side, and of poses only the legs.
+/// Computes the feet of a movement, before planting, at several times at once. The results have the
+/// same bits as EvaluateMovement or EvaluateBlend followed by FootOf. It evaluates the times side
+/// by side and only the joints of the legs.
 class FootSampler {
  public:
-  static constexpr std::size_t kMost = kernels::kBlock;
+  static constexpr std::size_t kMost = kernels::kBlock;  ///< Largest number of times per call.
 
-  /// Borrows everything; the library's leg rig is usable. `scratch` is of its skeleton.
+  /// Borrows all arguments. The library's leg rig must be usable. `scratch` is a pose of its
+  /// skeleton.
   FootSampler(const MotionLibrary& library, GridCache& cache, PoseSpan scratch)
       : library_(library), cache_(cache), scratch_(scratch) {}
 
-  /// Looks at up to kMost times of a movement: at the first `eased` with what is left of the pose before
-  /// (EvaluateMovement), at the others without (EvaluateBlend). `cache` is of this movement.
+  /// Samples up to kMost times of a movement: the first `eased` of them with the difference pose,
+  /// as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache may only
+  /// contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
-  /// Of the `i`th time, in the world.
+  /// The ball of a foot at the `i`th time, in world space.
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
+  /// A foot at the `i`th time.
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
 
  private:
@@ -39,9 +45,9 @@ class FootSampler {
   const MotionLibrary& library_;
   GridCache& cache_;
   PoseSpan scratch_;
-  alignas(64) float roots_m_[3][kMost];      // in the world
-  alignas(64) float balls_m_[2][3][kMost];   // of each foot, relative to the root
-  alignas(64) float ankles_m_[2][3][kMost];  // the same
+  alignas(64) float roots_m_[3][kMost];      // In world space.
+  alignas(64) float balls_m_[2][3][kMost];   // [foot]: relative to the root.
+  alignas(64) float ankles_m_[2][3][kMost];  // [foot]: relative to the root.
 };
 
 }  // namespace stridewire

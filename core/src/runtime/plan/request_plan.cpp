@@ -1,4 +1,4 @@
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
 
 #include <algorithm>
 #include <array>
@@ -12,41 +12,52 @@
 namespace stridewire {
 namespace {
 
-constexpr double kStartWeight = 4.0;     // the start is a fact, the end a wish
-constexpr double kFreeWeight = 0.02;     // a parameter nobody asked for follows the others
-constexpr double kPerParameterM = 1e-3;  // of groups that span a request alike, the plainer
+// Costs are in metres: distances between the requested parameters and those a group can produce,
+// multiplied by a weight per parameter.
+
+// The start is dictated by where the feet stand, so it counts more than the end.
+constexpr double kStartWeight = 4.0;
+// A parameter that the request does not give has a small weight, so that it follows the others.
+constexpr double kFreeWeight = 0.02;
+// Of two groups that fit equally well, the one with fewer parameters is preferred.
+constexpr double kPerParameterM = 1e-3;
+// A standing avatar starts with the unexpected foot only if that reduces the cost by this much.
 constexpr double kFootPreferenceM = 0.01;
 
-// A step asked for without turn, side or height stays in a straight group unless that misses it by
-// this much more: parameters nobody asked for would bend the walk.
+// Extra cost of a group with turn, side or height parameters for a step that requests none of them.
+// Such parameters take arbitrary values and would bend a straight walk.
 constexpr double kPlainPreferenceM = 0.15;
-// Inside the hull beats its edge grown by 10 %: a metre outside counts for this much more.
+// Extra cost per metre outside the hull of the examples, even where requests may extrapolate.
 constexpr double kOutsideWeight = 0.25;
-// A group without a parameter for where feet stand aside or in height takes them to be about as the
-// stand pose has them (people stand wider than they walk); beyond this, they are missed.
+// Tolerances for the start of a step in groups without a start parameter for side or height. Such a
+// group assumes the feet of the stand pose. The side tolerance is large because people stand with
+// their feet wider apart than they walk. The height tolerance covers the roll of the feet.
 constexpr double kStartSlackM = 0.12;
-constexpr double kLevelSlackM = 0.05;  // balls roll up and down on level ground
-// Metres a radian of unwanted turn counts where none was asked for: turns add up over a walk.
+constexpr double kLevelSlackM = 0.05;
+// Cost in metres per radian of turn if no turn was requested. It is high because unwanted turns add
+// up over a walk.
 constexpr double kStraightMetresPerRadian = 2.0;
-// Of a footprint, what a group misses sidewise is eased into the swing, and little of a turn is missed.
+// Weights for steps to a footprint. A sideways error costs less, because planting corrects it
+// during the swing. A turn costs more, because planting can correct little of it.
 constexpr double kExactSideWeight = 0.4;
 constexpr double kExactMetresPerRadian = 1.0;
-// Landing higher or lower than asked puts a foot into the air or the ground: worse than falling short.
+// A wrong landing height leaves the foot in the air or in the ground, which is worse than landing
+// at the wrong distance.
 constexpr double kHeightWeight = 4.0;
 constexpr double kChangeM = 1e-6;
 
-// What is wanted of one parameter; not `given`: anything the examples have.
+// Requested value of one parameter. If it is not `given`, any value that the examples have will do.
 struct Wish {
   double value = 0.0;
   bool given = false;
   double weight = 1.0;
-  bool natural = false;  // not given, but as the stand pose has it
+  bool natural = false;  // Not given, but the value of the stand pose is preferred.
 };
 using Wishes = std::array<Wish, kParameterNameCount>;
 
 Wish& At(Wishes& wishes, ParameterName name) { return wishes[static_cast<std::size_t>(name)]; }
 
-// Whether a group is for more than steps straight ahead.
+// True if a group has parameters other than those of straight steps on level ground.
 bool IsGeneral(const MotionGroup& group) {
   for (const ParameterName name :
        {ParameterName::kTurn, ParameterName::kStartX, ParameterName::kEndX, ParameterName::kStartY,
@@ -56,10 +67,11 @@ bool IsGeneral(const MotionGroup& group) {
   return false;
 }
 
-// How far outside the range of a group's examples, grown by `growth`, a target is: no more than outside their hull.
+// Distance from a target to the box around a group's examples, grown by `growth`. It is a cheap
+// lower bound for the distance to their hull.
 double OutsideRange(const MotionGroup& group, std::span<const double> metric,
                     std::span<const double> target, double growth) {
-  constexpr double kSlack = 1e-6;  // ranges are told in other digits than examples
+  constexpr double kSlack = 1e-6;  // Ranges and examples are rounded differently.
   double sum = 0.0;
   for (std::size_t l = 0; l < target.size(); ++l) {
     const Parameter& parameter = group.parameters[l];
@@ -71,7 +83,8 @@ double OutsideRange(const MotionGroup& group, std::span<const double> metric,
   return std::sqrt(sum);
 }
 
-// Null if it costs, with `for_itself_m`, as much as `best_cost_m` or more.
+// Plans a request in one group. Returns nullopt if its cost plus `for_itself_m` is not less than
+// `best_cost_m`.
 std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
                                        const Wishes& wishes, double natural_side_m,
                                        double for_itself_m, double best_cost_m) {
@@ -94,7 +107,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
     }
   }
 
-  // What the group has no parameter for is missed by as much as was asked.
+  // A requested value for which the group has no parameter is missed completely.
   double missed_m = 0.0;
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
@@ -117,7 +130,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
 
   const std::span<const double> target = std::span(plan.requested.values).first(d);
   const std::span<const double> metric = std::span(metric_room).first(d);
-  // Most groups are out of the question before hulls, which take their time, are looked at.
+  // Projecting onto a hull is slow. A lower bound on the cost rules out most groups before that.
   const double least_m = OutsideRange(group, metric, target, kHullGrowth) +
                          kOutsideWeight * OutsideRange(group, metric, target, 0.0);
   if (least_m + missed_m + beside_m + for_itself_m >= best_cost_m) return std::nullopt;
@@ -244,26 +257,26 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
   };
   if (const auto* step = std::get_if<StepRequest>(&request.movement)) {
     if (!within(step->length_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "length_m: expected a number within 10 m", "step");
     }
     if (step->side_m && !within(*step->side_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "side_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "side_m: expected a number within 10 m", "step");
     }
     if (!within(step->height_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "height_m: expected a number within 10 m", "step");
     }
     if (!within(step->turn_rad, kMaxRequestTurnRad)) {
-      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "step");
+      return Fail(ErrorCode::kOutOfRange, "turn_rad: expected a number within 3.2 rad", "step");
     }
     if (step->at && !is_place(step->at->position_m)) {
-      return Fail(ErrorCode::kOutOfRange, "at_m is not within 1000000 m", "step");
+      return Fail(ErrorCode::kOutOfRange, "at_m: expected numbers within 1000000 m", "step");
     }
     if (step->at && !within(step->at->heading_rad.value_or(0.0), kMaxWalkHeadingRad)) {
-      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad", "step");
+      return Fail(ErrorCode::kOutOfRange, "heading_rad: expected a number within 10000 rad",
+                  "step");
     }
     if (step->exact_only && !step->at) {
-      return Fail(ErrorCode::kInvalidArgument, "exact_only has a meaning only beside at_m",
-                  "step");
+      return Fail(ErrorCode::kInvalidArgument, "exact_only requires at_m", "step");
     }
     const bool found =
         step->foot ? has_kind(StepKind(*step->foot))
@@ -271,42 +284,44 @@ Status ValidateRequest(const MotionLibrary& library, const MovementRequest& requ
     if (!found) return Fail(ErrorCode::kUnsupported, "the library has no such step", "step");
   } else if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
     if (!within(jump->length_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "length_m is not a number within 10 m", "jump");
+      return Fail(ErrorCode::kOutOfRange, "length_m: expected a number within 10 m", "jump");
     }
     if (!within(jump->height_m, kMaxRequestLengthM)) {
-      return Fail(ErrorCode::kOutOfRange, "height_m is not a number within 10 m", "jump");
+      return Fail(ErrorCode::kOutOfRange, "height_m: expected a number within 10 m", "jump");
     }
     if (!within(jump->turn_rad, kMaxRequestTurnRad)) {
-      return Fail(ErrorCode::kOutOfRange, "turn_rad is not a number within 3.2 rad", "jump");
+      return Fail(ErrorCode::kOutOfRange, "turn_rad: expected a number within 3.2 rad", "jump");
     }
     if (!has_kind(MovementKind::kJump)) {
       return Fail(ErrorCode::kUnsupported, "the library has no jump", "jump");
     }
   } else if (const auto* walk = std::get_if<WalkRequest>(&request.movement)) {
     if (!is_place(walk->position_m)) {
-      return Fail(ErrorCode::kOutOfRange, "position_m is not within 1000000 m", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "position_m: expected numbers within 1000000 m",
+                  "walk_to");
     }
     if (!within(walk->heading_rad, kMaxWalkHeadingRad)) {
-      return Fail(ErrorCode::kOutOfRange, "heading_rad is not a number within 10000 rad",
+      return Fail(ErrorCode::kOutOfRange, "heading_rad: expected a number within 10000 rad",
                   "walk_to");
     }
     if (walk->waypoints_m.size() > kMaxWaypoints) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m holds more than 64 places", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m: expected at most 64 points", "walk_to");
     }
     if (!std::all_of(walk->waypoints_m.begin(), walk->waypoints_m.end(), is_place)) {
-      return Fail(ErrorCode::kOutOfRange, "waypoints_m has a place not within 1000000 m",
+      return Fail(ErrorCode::kOutOfRange, "waypoints_m: expected numbers within 1000000 m",
                   "walk_to");
     }
     if (walk->speed_m_s &&
         !(*walk->speed_m_s >= kMinWalkSpeedMPerS && *walk->speed_m_s <= kMaxWalkSpeedMPerS)) {
-      return Fail(ErrorCode::kOutOfRange, "speed_m_s is not a number from 0.05 to 5", "walk_to");
+      return Fail(ErrorCode::kOutOfRange, "speed_m_s: expected a number from 0.05 to 5", "walk_to");
     }
     if (!has_kind(MovementKind::kStepLeft) || !has_kind(MovementKind::kStepRight)) {
-      return Fail(ErrorCode::kUnsupported, "the library has no steps of both feet", "walk_to");
+      return Fail(ErrorCode::kUnsupported, "the library does not have steps of both feet",
+                  "walk_to");
     }
   } else if (const auto* stand = std::get_if<StandRequest>(&request.movement)) {
     if (!(stand->seconds >= 0.0 && stand->seconds <= kMaxStandS)) {
-      return Fail(ErrorCode::kOutOfRange, "seconds is not a number from 0 to 3600", "stand");
+      return Fail(ErrorCode::kOutOfRange, "seconds: expected a number from 0 to 3600", "stand");
     }
   }
   return {};

@@ -1,10 +1,11 @@
-#include "stridewire/runtime/transition_path.h"
+#include "runtime/plan/transition_path.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 namespace {
@@ -12,13 +13,16 @@ namespace {
 constexpr double kFeetApartForwardM = 0.12;
 constexpr double kFeetApartAsideM = 0.3;
 
-// Captured movements that do meet are up to 0.125 m apart, strides and what begins with feet together more than
-// 0.2 m. Some captures have nothing that begins near their stand: what they begin with anyhow is no bound then.
+// Captured movements that fit together have a transition distance of up to 0.125 m. A stride and a
+// movement that begins with the feet together are more than 0.2 m apart. In some captures no
+// movement begins close to the stand pose, so the limit also grows with the distance from the
+// stand.
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
-// As much as planting eases into a swing (RequestPlan::most_residual_m).
+// Planting can distribute an error of this size over a swing (RequestPlan::most_residual_m).
 constexpr double kMaxStartMissM = 0.25;
-// What steps that go before must be worth.
+// An inserted step must reduce the cost of a request by at least this much: kWorthAStepM for steps,
+// kWorthClosingM for jumps, whose cost is the distance between the feet.
 constexpr double kWorthAStepM = 0.25;
 constexpr double kWorthClosingM = 0.03;
 
@@ -30,12 +34,14 @@ class TransitionPathFinder {
         step_(std::get_if<StepRequest>(&request.movement)),
         jump_(std::get_if<JumpRequest>(&request.movement)) {}
 
-  [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct, const Stance& stance) const {
+  [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct,
+                                    const Stance& stance) const {
     if (step_ != nullptr && step_->at) return {direct};
     const bool can_begin = direct && CanBegin(*direct, stance);
     const TransitionPath as_it_is{can_begin ? direct : std::nullopt};
     if (can_begin && !BeginsWithFeetApart(*direct, stance)) return as_it_is;
-    // What can begin may be made better by one step; what cannot takes as many as it needs.
+    // If the request can begin now, one inserted step may improve it. If it cannot, insert as many
+    // steps as it needs.
     const double most_cost_m = can_begin ? WorthAStepM(CostM(*direct, stance)) : HUGE_VAL;
     const int most =
         std::min(can_begin ? 1 : kMaxInsertedSteps, kMaxInsertedSteps - stance.inserted_steps);
@@ -46,7 +52,7 @@ class TransitionPathFinder {
   }
 
  private:
-  // The first of so many steps after which the request costs no more than that.
+  // Finds the first of `steps` inserted steps after which the request costs at most `most_cost_m`.
   std::optional<RequestPlan> FirstOf(int steps, const Stance& stance, double most_cost_m) const {
     for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
       auto step =
@@ -84,7 +90,8 @@ class TransitionPathFinder {
            (!BeginsWithFeetApart(plan, stance) || StartMissM(plan, stance) <= kMaxStartMissM);
   }
 
-  // A jump, or a step of the foot that moved last: the other one has to come first.
+  // True if the feet are apart and the movement is a jump or a step of the foot that moved last.
+  // Then the other foot should step first.
   bool BeginsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
     const MovementKind kind = library_.group(plan.group).kind;
     return AreFeetApart(stance.feet, stand_) &&
@@ -100,7 +107,7 @@ class TransitionPathFinder {
                     kMaxTransitionOfStand * library_.FindTransition(stand, to)->distance_m);
   }
 
-  // How far the feet are, forward, from where the movement's examples have them at the start.
+  // Forward distance of the feet from their positions at the start of the movement's examples.
   double StartMissM(const RequestPlan& plan, const Stance& stance) const {
     const MotionGroup& group = library_.group(plan.group);
     const int l = group.FindParameter(ParameterName::kStartZ);
@@ -109,7 +116,8 @@ class TransitionPathFinder {
                      plan.applied.values[static_cast<std::size_t>(l)]);
   }
 
-  // Steps: as planned. Jumps: how much further than in a stand feet are apart.
+  // Cost of a request in metres. For a jump it is how much further apart than in a stand the feet
+  // are.
   double CostM(const RequestPlan& plan, const Stance& stance) const {
     if (jump_ == nullptr) return plan.cost_m;
     const DVec3 apart = stance.feet.left_from_right_m - stand_.left_from_right_m;
@@ -117,7 +125,7 @@ class TransitionPathFinder {
         {0.0, std::fabs(apart.z) - kFeetApartForwardM, std::fabs(apart.x) - kFeetApartAsideM});
   }
 
-  // What it may cost at most after a step that goes before it.
+  // Highest cost after an inserted step that makes the step worthwhile.
   double WorthAStepM(double cost_m) const {
     return jump_ != nullptr ? std::max(0.0, cost_m - kWorthClosingM) : cost_m - kWorthAStepM;
   }
@@ -136,21 +144,21 @@ bool AreFeetApart(const FootState& feet, const FootState& stand) {
 }
 
 TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
-            const std::optional<RequestPlan>& direct, const Stance& stance) {
+                                  const std::optional<RequestPlan>& direct, const Stance& stance) {
   return TransitionPathFinder(library, request).Find(direct, stance);
 }
 
 const char* NoPathReason(MovementKind from, MovementKind to) {
   static constexpr std::array<std::array<const char*, 3>, 3> kReasons{
-      {{"no way leads from step_left to step_left in this library",
-        "no way leads from step_left to step_right in this library",
-        "no way leads from step_left to jump in this library"},
-       {"no way leads from step_right to step_left in this library",
-        "no way leads from step_right to step_right in this library",
-        "no way leads from step_right to jump in this library"},
-       {"no way leads from jump to step_left in this library",
-        "no way leads from jump to step_right in this library",
-        "no way leads from jump to jump in this library"}}};
+      {{"this library has no transition path from step_left to step_left",
+        "this library has no transition path from step_left to step_right",
+        "this library has no transition path from step_left to jump"},
+       {"this library has no transition path from step_right to step_left",
+        "this library has no transition path from step_right to step_right",
+        "this library has no transition path from step_right to jump"},
+       {"this library has no transition path from jump to step_left",
+        "this library has no transition path from jump to step_right",
+        "this library has no transition path from jump to jump"}}};
   return kReasons.at(static_cast<std::size_t>(from)).at(static_cast<std::size_t>(to));
 }
 

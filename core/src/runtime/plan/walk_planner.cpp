@@ -1,46 +1,49 @@
-#include "stridewire/runtime/walk_planner.h"
+#include "runtime/plan/walk_planner.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/trig.h"
-#include "stridewire/runtime/foot_planner.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/plan/foot_planner.h"
 #include "runtime/plan/walk_steering.h"
 
 namespace stridewire {
 namespace {
 
-// A foot this near its place at the goal is there.
+// A foot within this distance and angle of its footprint at the goal has arrived.
 constexpr double kThereM = 0.002;
 constexpr double kThereRad = 0.004;
-// Without planting feet land where the blend has them: that is as near as it gets.
+// The same tolerances without planting, when feet land wherever the blend puts them.
 constexpr double kRoughlyThereM = 0.15;
 constexpr double kRoughlyThereRad = 0.25;
 
-// How far off the library's own step may be, which is eased into the swing. Libraries without steps in
-// place turn and close with what they have.
+// Largest distance between the library's own step and the footprint, which planting distributes
+// over the swing. The larger limit applies to small steps and to the second attempt, because
+// libraries without steps in place have to turn and close with the steps they have.
 constexpr double kMaxMissM = 0.16;
 constexpr double kMostMissM = 0.6;
-// Who steps no further than this stands above their feet at the end.
+// A step that goes no further forward than this ends with the body above both feet.
 constexpr double kForwardM = 0.2;
 
-// A sole that hangs over an edge or lies on bumps stands badly; in front of a wall it does not stand.
+// Limits on the ground below a sole (FootSupport). They exclude edges, bumps and walls.
 constexpr double kLeastCarried = 0.999;
 constexpr double kDeepestGapM = 0.04;
 constexpr double kHighestRiseM = 0.04;
-// Nothing in the way of a swing may be higher than this above both its ends.
+// An obstacle along a swing may be at most this much higher than both ends of the swing.
 constexpr double kMaxHurdleM = 0.25;
 constexpr double kHurdleRadiusM = 0.06;
 
-// Where else a foot may land, nearest first: rings of eight around where it should.
+// Radii of the rings of eight alternative footprints around the desired one, closest first.
 constexpr std::array<double, 6> kRingsM{0.04, 0.08, 0.12, 0.16, 0.22, 0.28};
 
-constexpr int kMaxOutOfReach = 3;  // of these, until a step is given up
+// After this many alternatives that the library cannot reach, the step is given up.
+constexpr int kMaxOutOfReach = 3;
 
-// What is tried when a step does not work out: shorter ones, then to either side.
+// Variations of a step to try in turn: shorter steps, then steps towards either side.
 struct Attempt {
-  double part;      // of the step
-  double bend_rad;  // of the course
+  double part;      // Fraction of the full step.
+  double bend_rad;  // Change of the walking direction, left positive.
 };
 constexpr std::array<Attempt, 11> kAttempts{{{1.0, 0.0},
                                              {0.75, 0.0},
@@ -54,23 +57,28 @@ constexpr std::array<Attempt, 11> kAttempts{{{1.0, 0.0},
                                              {0.6, -1.4},
                                              {0.15, 0.0}}};
 
-// Nearer than this the goal's ground is looked at again: it may have changed.
+// Within this distance the ground at the goal is checked again, because it may have changed.
 constexpr double kGoalInSightM = 1.5;
 
+// A walk makes progress if its remaining distance shrinks by kProgressM. A radian of remaining turn
+// counts as kMetresPerRadianLeft.
 constexpr double kProgressM = 0.02;
 constexpr double kMetresPerRadianLeft = 0.3;
 
 class StepPlanner {
  public:
   StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance)
-      : library_(library), gait_(library.locomotion_profile()), terrain_(terrain), stance_(stance) {}
+      : library_(library),
+        gait_(library.locomotion_profile()),
+        terrain_(terrain),
+        stance_(stance) {}
 
   void Begin(bool is_strict) {
     is_strict_ = is_strict;
     candidates_ = 0;
   }
 
-  // Null: no step of this foot that far and onto good ground.
+  // Plans a step of a foot. Returns nullopt if the library has no such step onto suitable ground.
   std::optional<RequestPlan> Plan(Foot moving, const WalkStep& step) {
     moving_ = moving;
     outward_ = moving == Foot::kLeft ? 1.0 : -1.0;
@@ -83,7 +91,7 @@ class StepPlanner {
     int out_of_reach = 0;
     for (const double ring_m : kRingsM) {
       for (int i = 0; i < 8; ++i) {
-        // First ahead and behind, then aside.
+        // Directions of the alternatives: ahead and behind first, sideways last.
         constexpr std::array<double, 8> kAround{0.0,        kPi,         0.25 * kPi, -0.25 * kPi,
                                                 0.75 * kPi, -0.75 * kPi, 0.5 * kPi,  -0.5 * kPi};
         const double way = wanted.heading_rad + kAround[static_cast<std::size_t>(i)];
@@ -97,7 +105,7 @@ class StepPlanner {
     return std::nullopt;
   }
 
-  // Whether both feet can stand as the goal has them.
+  // True if both feet can stand at their footprints at the goal.
   bool GoalIsGood(const WalkSteering& course) {
     double heights_m[2];
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -124,7 +132,7 @@ class StepPlanner {
     return print;
   }
 
-  // A foot that was moved aside lands beside the other still, not across or behind it.
+  // True if an alternative footprint is still beside the other foot, not across or far behind it.
   bool KeepsApart(const Footprint& print) const {
     const DVec3 v = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
     return outward_ * v.x >= 0.08 && outward_ * v.x <= gait_.stand_m + 0.3 &&
@@ -161,7 +169,8 @@ class StepPlanner {
     return true;
   }
 
-  // The library's step there, null where it misses by more than can be eased into the swing.
+  // Plans the library's step to a footprint. Returns nullopt if the step misses the footprint by
+  // more than planting can distribute over the swing.
   std::optional<RequestPlan> Reach(const Footprint& print, const DVec3& root_m) const {
     auto plan =
         PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector);
@@ -227,19 +236,19 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
     progress.least_left = left;
     progress.steps_without = 0;
   } else if (++progress.steps_without > kMaxStepsWithout) {
-    return Refuse("the walk comes no nearer to its goal");
+    return Refuse("the walk makes no progress towards its goal");
   }
   if (++progress.steps > kMaxWalkSteps) {
-    return Refuse("the walk takes more than 10000 steps");
+    return Refuse("the walk needs more than 10000 steps");
   }
 
   StepPlanner planner(library, terrain, stance);
   const bool looks_at_goal =
       terrain != nullptr && (progress.steps == 1 || (is_last_leg && left < kGoalInSightM));
   if (looks_at_goal && !planner.GoalIsGood(course)) {
-    return Refuse("the goal lies on an edge or a slope too steep to stand");
+    return Refuse("the ground at the goal is too steep or too uneven to stand on");
   }
-  // First what the library has of its own, then what can be eased into its steps.
+  // First try steps that the library has, then steps that planting has to change much.
   for (const bool is_strict : {true, false}) {
     planner.Begin(is_strict);
     for (const Attempt& attempt : kAttempts) {
@@ -254,12 +263,12 @@ WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
     }
   }
   if (planner.has_seen_heights()) {
-    return Refuse("the way is too high or too low to step on");
+    return Refuse("the ground ahead is too high or too low to step on");
   }
   if (planner.has_seen_bad_ground()) {
-    return Refuse("there is no ground for a foot, but edges and slopes");
+    return Refuse("the ground ahead is too steep or too uneven for a foot");
   }
-  return Refuse("the library has no steps that lead there");
+  return Refuse("the library has no step towards the goal");
 }
 
 }  // namespace stridewire

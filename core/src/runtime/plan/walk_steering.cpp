@@ -4,11 +4,12 @@
 #include <cmath>
 
 #include "base/trig.h"
+#include "runtime/library/locomotion_profile.h"
 
 namespace stridewire {
 namespace {
 
-// How far a foot turns in one step, away from the other one and towards it, walking and on the spot.
+// Largest turn of a foot per step, away from the other foot (out) and towards it (in).
 struct TurnLimits {
   double out_rad;
   double in_rad;
@@ -16,27 +17,32 @@ struct TurnLimits {
 constexpr TurnLimits kWalkTurn{0.6, 0.35};
 constexpr TurnLimits kSpotTurn{0.85, 0.3};
 
+// A waypoint counts as passed within this distance.
 constexpr double kPassWaypointM = 0.35;
+// Feet this close to their standing positions relative to each other are together.
 constexpr double kTogetherM = 0.05;
 constexpr double kTogetherRad = 0.15;
+// A foot this close to its footprint at the goal is at the goal.
 constexpr double kAtGoalM = 1e-3;
 constexpr double kAtGoalRad = 2e-3;
 
-// Further than this nobody goes aside or backward.
+// Goals further away than this are reached by walking, not by stepping sideways or backward.
 constexpr double kMaxShiftM = 1.3;
 constexpr double kSideStepM = 0.28;
 constexpr double kLeastBackM = 0.12;
 constexpr double kLeastApartM = 0.12;
 
-// Somebody who faces away from the way by more than this turns before they set out.
+// An avatar that faces away from its path by more than this turns on the spot first.
 constexpr double kSlowTurnRad = 0.7;
-// The goal's heading is walked into in a curve, as far as that is not a loop.
+// The walk approaches the goal in a curve that ends in the goal's heading. The curve is this
+// fraction of the remaining distance long, at most kCurveM. It fades out for headings that would
+// need a loop, from kMaxCurveRad - kCurveFadeRad to kMaxCurveRad.
 constexpr double kCurvePart = 0.2;
 constexpr double kCurveM = 0.6;
 constexpr double kMaxCurveRad = 1.9;
 constexpr double kCurveFadeRad = 0.6;
 
-// A step that would be this much longer than a comfortable one is not divided.
+// A distance is not divided further if its steps are at most this fraction longer than comfortable.
 constexpr double kStretch = 0.15;
 constexpr double kFirstStepS = 0.6;
 constexpr double kShortestStepM = 0.2;
@@ -45,7 +51,7 @@ double Length(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 double HeadingTo(const DVec3& v) { return Atan2(v.x, v.z); }
 double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
-// Parts that a length is divided into, so that none is longer than one.
+// Number of equal parts to divide a length into, so that no part is much longer than `one`.
 double Parts(double length, double one) {
   return std::max(1.0, std::ceil(length / one - kStretch));
 }
@@ -58,7 +64,8 @@ double TurnWithin(double turn_rad, Foot moving, const TurnLimits& limits) {
 
 }  // namespace
 
-WalkSteering::WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance)
+WalkSteering::WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk,
+                           const WalkStance& stance)
     : gait_(gait), walk_(walk), stance_(stance) {
   goal_.position_m = walk.position_m;
   goal_.heading_rad = UnwrapAngle(walk.heading_rad, stance.heading_rad);
@@ -147,7 +154,7 @@ double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const 
   return HeadingTo(way - RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
-// Whether stepping aside or backward, or turning on the spot, takes fewer steps than walking there.
+// True if stepping sideways or backward, or turning on the spot, takes no more steps than walking.
 bool WalkSteering::Shifts(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = goal_.position_m - body.position_m;
@@ -181,7 +188,7 @@ std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
           kTogetherRad;
   if (!is_together) return std::span(feet_).first(1);
 
-  // From a stand either foot may go: the one on the side that it turns or goes to.
+  // From a stand, either foot may step first. Prefer the foot on the side of the turn or the path.
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   Foot first = expected;
   const Body body = BodyNow();
@@ -204,7 +211,7 @@ std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
 }
 
 WalkStep WalkSteering::Next(Foot moving, std::size_t next_waypoint, double part,
-                          double bend_rad) const {
+                            double bend_rad) const {
   const Body body = BodyOver(OtherFoot(moving));
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   if (is_last_leg && IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad)) {
@@ -221,7 +228,7 @@ WalkStep WalkSteering::LandAtGoal(Foot moving) const {
           true};
 }
 
-// Part of the way to the goal, for a foot that does not get there at once.
+// A step that covers the fraction `part` of the distance to the foot's place at the goal.
 WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
   WalkStep step = LandAtGoal(moving);
   const Footprint& from = At(moving);
@@ -235,7 +242,7 @@ WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
 WalkStep WalkSteering::Land(const Body& body, Foot moving) const {
   const DVec3 fixed = At(OtherFoot(moving)).position_m;
   const DVec3 local = RotateYaw(-body.heading_rad, body.position_m - fixed);
-  // Who strides walks narrow, who stands stands wide.
+  // Long steps place the feet closer together than standing does.
   const double stride = std::clamp(std::fabs(local.z) / 0.35, 0.0, 1.0);
   const double width_m = gait_.stand_m + (gait_.width_m - gait_.stand_m) * stride;
   DVec3 vector = local + FootOffset(moving, width_m);
@@ -251,7 +258,7 @@ WalkStep WalkSteering::Land(const Body& body, Foot moving) const {
 }
 
 WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
-                          double bend_rad) const {
+                            double bend_rad) const {
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   const double away_rad = WrapAngle(Bearing(body, next_waypoint) + bend_rad - body.heading_rad);
   const double turn_rad =
@@ -282,7 +289,7 @@ WalkStep WalkSteering::Shift(const Body& body, Foot moving, double part, double 
   const double turn_out_rad = outward * turn_rad;
   const double inner_m = std::max(0.02, gait_.stand_m - kLeastApartM);
 
-  // In pairs of steps: the outer foot goes, the other follows.
+  // Sideways movement and turning take pairs of steps: the outer foot moves, the other follows.
   const double side_pairs =
       std::fabs(local.x) <= inner_m && aside_m < 0.0 ? 0.0 : Parts(std::fabs(local.x), kSideStepM);
   const double turn_pairs = std::fabs(turn_rad) <= kSpotTurn.in_rad && turn_out_rad < 0.0

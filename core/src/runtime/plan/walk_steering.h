@@ -4,43 +4,45 @@
 #include <cstddef>
 #include <span>
 
-#include "stridewire/runtime/walk_planner.h"
+#include "runtime/plan/walk_planner.h"
+#include "runtime/library/locomotion_profile.h"
 
 namespace stridewire {
 
-/// Where a foot is to land next.
+/// A step that WalkSteering proposes.
 struct WalkStep {
-  Footprint print;            ///< Without a height; its heading is that of the body after the step
-  DVec3 root_m = DVec3(0.0);  ///< Where the body is then, for who does not stride on
-  bool is_last = false;       ///< It is a place of the goal's own: exactly there or not at all
+  Footprint print;  ///< Target without a height. Its heading is that of the body afterwards.
+  DVec3 root_m = DVec3(0.0);  ///< Position of the body after the step if the avatar stops there.
+  bool is_last = false;       ///< The footprint is at the goal, so no alternative is acceptable.
 };
 
-/// Where a walk leads from where the feet stand, on level ground and with feet that go anywhere within a
-/// box: the planner tries what of it the library and the ground allow.
+/// Computes where the next steps of a walk should lead. It assumes level ground and feet that reach
+/// every place within a box. The planner then checks which of these steps the library and the
+/// ground allow.
 ///
-/// The body is taken to be where the foot that stays has it, as if the other stood beside it. A step
-/// moves it on by one part of the way left, in equal parts.
+/// The position of the body is derived from the foot that stays, as if the other foot stood beside
+/// it. Each step moves the body by an equal part of the remaining distance.
 class WalkSteering {
  public:
   WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance);
 
-  /// Counts waypoints on that have been reached.
+  /// Advances `next` past all waypoints that have been reached.
   void PassWaypoints(std::size_t& next) const;
 
-  /// Both feet stand as the goal has them.
+  /// True if both feet stand at the goal within the tolerances.
   [[nodiscard]] bool IsThere(double within_m, double within_rad) const;
-  /// The way left by the waypoints, and the heading.
+  /// Remaining distance through the waypoints, and remaining turn.
   [[nodiscard]] double LeftM(std::size_t next_waypoint) const;
   [[nodiscard]] double LeftRad() const;
 
-  /// The feet that may go next, the better first.
+  /// The feet that may step next, the preferred foot first.
   [[nodiscard]] std::span<const Foot> Feet(std::size_t next_waypoint);
 
-  /// The next step of a foot: `part` of it, on a course bent to the left by `bend_rad`.
+  /// The next step of a foot, scaled by `part`, in a direction turned to the left by `bend_rad`.
   [[nodiscard]] WalkStep Next(Foot moving, std::size_t next_waypoint, double part,
                               double bend_rad) const;
 
-  /// Where a foot stands at the goal.
+  /// The footprint of a foot at the goal.
   [[nodiscard]] Footprint GoalPrint(Foot foot) const;
 
  private:

@@ -4,14 +4,15 @@
 
 namespace stridewire {
 
-/// Catmull-Rom weights of the grid points around a position in a grid, ends by quadratic extrapolation.
+/// Catmull-Rom weights of the grid points around a position in a grid. Points beyond the ends of
+/// the grid are extrapolated quadratically.
 struct CellWeights {
-  int first = 0;  ///< Grid point of weights[0]
-  int count = 0;  ///< 2 to 4
+  int first = 0;  ///< Grid point that weights[0] belongs to.
+  int count = 0;  ///< Number of weights, 2 to 4.
   std::array<float, 4> weights{};
 };
 
-/// `grid_position` in [0, point_count - 1], clamped; at least two points.
+/// `grid_position` is clamped to [0, point_count - 1]. `point_count` is at least 2.
 [[nodiscard]] CellWeights CellWeightsAt(double grid_position, int point_count);
 
 }  // namespace stridewire

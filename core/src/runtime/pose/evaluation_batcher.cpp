@@ -6,15 +6,15 @@ namespace stridewire {
 
 namespace {
 
-// A key is sorted by in two halves.
+// The radix sort takes two passes, one per half of the key.
 constexpr int kHalfBits = 11;
 constexpr std::uint32_t kHalfMask = (1u << kHalfBits) - 1;
-constexpr std::uint32_t kParts = 64;  // of a movement
+constexpr std::uint32_t kParts = 64;  // Times are grouped into this many parts of a movement.
 
 }  // namespace
 
 int SampleRunCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
-                 int most) {
+                   int most) {
   const double apart_s = step_s * ticks_apart;
   const double left = (movement.duration_s() - time_s) / apart_s;
   if (!(left < most)) return most;
@@ -25,7 +25,7 @@ void EvaluationBatcher::Add(const SampleRun& stretch, int count, std::uint32_t t
   STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
   const Movement& movement = *stretch.movement;
   const double part = std::clamp(stretch.time_s / movement.duration_s(), 0.0, 1.0);
-  // Those not planted first, the longest first.
+  // Runs without foot planting come first, and longer runs come before shorter ones.
   auto key = movement.feet.is_active ? 1u : 0u;
   key = key << 5 | static_cast<std::uint32_t>(kMaxCount - count);
   key = key << 8 | (static_cast<std::uint32_t>(movement.group) & 0xffu);
@@ -52,12 +52,13 @@ void EvaluationBatcher::Sort() {
 std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
   const bool is_planted = order_[begin].stretch.movement->feet.is_active;
-  // Planted ones come last, so that the first that is otherwise is the end.
+  // Runs with planting come last, so a block ends before the first run that differs from `begin`.
   while (order_[end - 1].stretch.movement->feet.is_active != is_planted) --end;
   return std::span(order_).subspan(begin, end - begin);
 }
 
-// A part of the blocks to come in the time of each pose: first where what they read lies, then that.
+// While one pose of a block is evaluated, prefetches a share of the data of the next two blocks: of
+// the block after next the movements themselves, and of the next block the arrays they point to.
 void EvaluationBatcher::PrefetchBehind(std::size_t end, int pose, int count) const {
   const std::size_t lanes = SoaPose::kLanes;
   const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);

@@ -6,37 +6,42 @@
 #include <span>
 #include <vector>
 
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {
 
-/// How many poses of a movement, from `time_s` on and `ticks_apart` ticks of `step_s` apart, come before its end: 1 to
-/// `most`.
+/// Number of poses of a movement before its end, 1 to `most`, starting at `time_s` and spaced
+/// `ticks_apart` ticks of `step_s` seconds.
 [[nodiscard]] int SampleRunCount(const Movement& movement, double time_s, double step_s,
-                               int ticks_apart, int most);
+                                 int ticks_apart, int most);
 
-/// Stretches of different lengths that wait to be evaluated, in the order in which those that are alike lie side by side:
-/// planted or not, equally long, of one group and at about the same part of it, so that they read the same of the
-/// library and ease out together. Keeps its memory.
+/// Collects sample runs of different lengths and evaluates similar runs side by side.
+///
+/// Runs are similar if all or none have planted feet, and if they have the same length, the same
+/// group and about the same time within the group. Similar runs read the same parts of the library
+/// and fade out their difference poses together. The batcher keeps its memory between evaluations.
 class EvaluationBatcher {
  public:
-  /// Of more poses none may be asked for at once.
+  /// Largest number of poses per run.
   static constexpr int kMaxCount = 32;
 
   struct Item {
     SampleRun stretch;
-    std::uint32_t key = 0;  ///< What is alike comes together
-    std::uint32_t tag = 0;  ///< The caller's
-    int count = 1;          ///< Poses
+    std::uint32_t key = 0;  ///< Sort key; similar runs have similar keys.
+    std::uint32_t tag = 0;  ///< Chosen by the caller, to recognize the run.
+    int count = 1;          ///< Number of poses.
   };
 
-  /// `count`: 1 to kMaxCount.
+  /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate
+  /// returns.
   void Add(const SampleRun& stretch, int count, std::uint32_t tag);
   [[nodiscard]] bool empty() const { return items_.empty(); }
 
-  /// Evaluates all of them, and forgets them. For the poses of each block of stretches one after the other calls
+  /// Evaluates all added runs in blocks of up to SoaPose::kLanes and then removes them. For each
+  /// pose index of a block it calls
   ///   use(std::span<const Item> items, int pose, const SoaPose& poses)
-  /// where `poses` has the pose of items[i], its `pose`th, in lane i; those beyond an item's count mean nothing.
+  /// Lane i of `poses` holds the pose with index `pose` of items[i]. If `pose` is not less than
+  /// items[i].count, lane i is undefined.
   template <typename Use>
   void Evaluate(SoaPoseEvaluator& evaluator, Use&& use) {
     Sort();
@@ -62,7 +67,7 @@ class EvaluationBatcher {
   [[nodiscard]] std::span<const Item> BlockAt(std::size_t begin) const;
   void PrefetchBehind(std::size_t end, int pose, int count) const;
 
-  // Key and place of an item.
+  // The key of an item and its index in items_.
   struct Place {
     std::uint32_t key;
     std::uint32_t item;

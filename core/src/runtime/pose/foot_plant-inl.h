@@ -1,5 +1,6 @@
-// The planting of several avatars' feet at once. The same as PlantFeetByReference of foot_plan.cpp, which says why what
-// is done is done; a test holds the two together. Positions are relative to each movement's base, so that floats do.
+// Plants the feet of several avatars at once. The formulas are those of PlantFeetByReference in
+// foot_plan.cpp, where they are explained; a test compares the two. Positions are relative to the
+// base of each movement, so that single precision suffices.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
 #undef STRIDEWIRE_FOOT_PLANT_INL_H
@@ -7,8 +8,10 @@
 #define STRIDEWIRE_FOOT_PLANT_INL_H
 #endif
 
-#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/pose/simd_math-inl.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/foot_plant_constants.h"
+#include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
@@ -23,7 +26,7 @@ HWY_INLINE Float EaseOutSlope(Float s) {
   const Float r = Float(1.0f) - in;
   return in * r * r;
 }
-// By a length that is known, without dividing.
+// Divides by a constant: multiplies by its reciprocal, which is computed in double precision.
 HWY_INLINE Float Over(Float x, double length) {
   return x * Float(static_cast<float>(1.0 / length));
 }
@@ -32,9 +35,10 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// A FootTrajectory and its FootResidual, as PackFootPlan lays them out.
+// A FootTrajectory and its FootResidual, in the layout of PackFootPlan.
 struct Track {
-  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height, turn;
+  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height,
+      turn;
   SoaVec3 normals[2];
   SoaVec3 rest_offset, rest_velocity, root_shift;
   Float from_heading, to_heading, release_turn, root_weight, lift, rest_turn, rest_turn_s;
@@ -75,7 +79,7 @@ HWY_INLINE Track LoadTrack(const float* plan) {
   return t;
 }
 
-// What all of a movement's plan shares.
+// The part of a movement's plan that concerns both feet, and the time to evaluate.
 struct Common {
   SoaVec3 root_rest, root_rest_velocity;
   Float steer, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
@@ -83,7 +87,7 @@ struct Common {
   Float per_duration, per_ease_out;  // 1 / s
 };
 
-// A leg by forward kinematics, relative to the root and in world axes.
+// Result of forward kinematics of a leg. Positions are relative to the root, in world axes.
 struct LegLanes {
   SoaVec3 positions[kMaxLegChain];
   SoaQuat rotations[kMaxLegChain];
@@ -92,15 +96,15 @@ struct LegLanes {
 
 HWY_INLINE SoaVec3 Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
-// Whatever is done to a leg waits for what was done before, so both legs take each step together: a processor works on
-// one while the other waits.
+// Calls `step` for both legs. Each computation for a leg depends on the previous one, so the two
+// legs alternate: the processor works on one leg while results of the other are pending.
 template <typename Step>
 HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[0], std::size_t{0});
   step(rig.bones[1], std::size_t{1});
 }
 
-// `joints`: those that `rotations` has.
+// `joints` maps places in a leg's chain to joints in `rotations`.
 HWY_INLINE void EvaluateLegs(
     const LegRig& rig, const float* rotations, SoaQuat root, LegLanes* legs,
     const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
@@ -146,8 +150,8 @@ void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, floa
 struct Correction {
   SoaVec3 offset;
   Float swing;
-  SoaQuat turn;  // of the foot
-  SoaVec3 root;  // what the root goes along with it
+  SoaQuat turn;  // Rotation of the foot in world axes.
+  SoaVec3 root;  // Part of the correction by which the root moves as well.
 };
 
 HWY_INLINE Float Steered(const Common& common, Float at_s) {
@@ -171,9 +175,9 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaV
   const Float print_heading = Select(has_landed, track.to_heading, track.from_heading);
   const Float across = Float(4.0f) * s * r;
   const SoaVec3 flying = track.release_offset * ((one + s + s) * r * r) +
-                       track.land_offset * (s * s * (one + r + r)) +
-                       (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
-                       track.aside * (across * across);
+                         track.land_offset * (s * s * (one + r + r)) +
+                         (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
+                         track.aside * (across * across);
   c.offset = Select(is_planted, print - ball, flying);
   const Float since_s = t - common.start_offset_s;
   const Float settled = one - EaseOut(since_s * common.per_ease_out);
@@ -211,7 +215,8 @@ HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaV
   return c;
 }
 
-// How deep a sole is below the ground a print lies on, taken for a plane; less the further it is away.
+// Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
+// between the foot and the footprint.
 HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
                             const LegLanes& leg, SoaVec3 ball, SoaQuat turn) {
   const Float dx = ball.x - print.x;
@@ -255,16 +260,18 @@ HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) 
   return plane * forward + reference * (Float(kReferenceWeight) * weight);
 }
 
-// What is unit but for rounding made so: a step of Newton's is as good as a root and a division.
+// Normalizes a quaternion that differs from unit length only by rounding errors. For these, one
+// Newton step is as accurate as a square root and a division.
 HWY_INLINE SoaQuat NearlyUnit(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
 
-// Where an ankle is to be, from the root, and how it is turned there.
+// Target position of an ankle, relative to the root, and its rotation in world axes.
 struct AnkleGoal {
   SoaVec3 at_m;
   SoaQuat rotation;
 };
 
-// Bends both legs so that their ankles are where they are to be, and stores what of the rotations changes.
+// Solves both legs for the given ankle targets and stores the changed rotations (hips, knees and
+// ankles).
 HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGoal* goals,
                           float* rotations) {
   struct Work {
@@ -321,7 +328,7 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGo
   });
 }
 
-// As many as a vector has lanes, from `lane` on.
+// Plants the feet of one vector of poses, starting at `lane`.
 void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
@@ -385,7 +392,7 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
       const Float lift = (Float(1.0f) - second) *
                              DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
                          second * DepthBelow(track.to, track.normals[1], bones, leg, at, c.turn);
-      // The root goes with what it goes with on level ground too, and with this.
+      // The root follows this lift as it follows the other corrections of the foot.
       const Mask is_settling = common.plant_fade_s > Float(0.0f);
       const Float settled =
           Float(1.0f) - EaseOut((common.time_s - common.start_offset_s) /
@@ -426,7 +433,8 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   }
   shift.y = shift.y - lower;
 
-  // The root is shown in floats of the world: the legs reach from where that is.
+  // The pose stores the root as floats in world space. Round the root first, so that the legs are
+  // solved from the root position that is displayed.
   HWY_ALIGN float shifts_m[3 * kBlock];
   StoreLanes(shift.x, shifts_m);
   StoreLanes(shift.y, shifts_m + kBlock);
@@ -457,16 +465,16 @@ void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
   }
 }
 
-// The same number in the lanes of one vector.
+// Broadcasts each of `count` numbers to all lanes of one vector.
 HWY_INLINE void Spread(const float* from, std::size_t count, float* to) {
   const FloatTag d;
   for (std::size_t i = 0; i < count; ++i) hn::Store(hn::Set(d, from[i]), d, to + i * kBlock);
 }
 
-// One pose in all lanes of a vector, of which the first is kept.
+// Plants the feet of one pose: evaluates the same pose in all lanes of a vector and uses the first.
 void PlantOne(const LegRig& rig, const PlantJob& job) {
   HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
-  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // of which those of the legs are used
+  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // Only the joints of the legs are used.
   HWY_ALIGN double time_s[kBlock];
   HWY_ALIGN double base_m[3 * kBlock];
   HWY_ALIGN float root_m[3 * kBlock];

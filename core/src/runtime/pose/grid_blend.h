@@ -4,22 +4,25 @@
 #include <array>
 
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 
-/// The rows of a movement's grid that make up a pose.
+/// The four grid points between which a pose is interpolated.
 struct GridPlace {
-  int first_point;               ///< Of the four that are interpolated
-  std::array<float, 4> weights;  ///< Of them
+  int first_point;               ///< First of the four points.
+  std::array<float, 4> weights;  ///< Weight of each point.
 };
 
-/// Point `k` of a place. One behind the last weighs nothing, but is read.
+/// Index of point `k` of a place. Indices beyond the last grid point return that point: their
+/// weight is zero, but the row is still read.
 [[nodiscard]] inline int PointOf(const MotionGroup& group, const GridPlace& place, int k) {
   return std::min(place.first_point + k, group.grid_point_count - 1);
 }
 
-/// The piece of a movement's warp that a lane's time is in.
+/// Sets the piece of a movement's time warp that is used for a lane.
 inline void SetPiece(const TimeWarp::Piece& piece, std::size_t lane, kernels::GridTimes& times) {
   times.begin_s[lane] = piece.begin_s;
   times.end_s[lane] = piece.end_s;
@@ -29,7 +32,7 @@ inline void SetPiece(const TimeWarp::Piece& piece, std::size_t lane, kernels::Gr
   times.end_slope[lane] = piece.end_slope;
 }
 
-/// row = the blended row there. Its rotations are not unit.
+/// Writes the blended row at `place` to `row`. Its rotations are not normalized.
 inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                      const GridPlace& place, GridCache& cache, float* row) {
   std::array<const float*, 4> points;
@@ -41,7 +44,8 @@ inline void BlendRow(const MotionGroup& group, const GridLayout& layout, const M
                        static_cast<std::size_t>(layout.row_floats), row);
 }
 
-/// Of a blended row's rotations that cancel each other, takes those of the largest example: it is at least a pose.
+/// Replaces rotations of a blended row that cancel each other, and so have no mean, by those of the
+/// example with the largest weight.
 void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                  const GridPlace& place, float* row);
 

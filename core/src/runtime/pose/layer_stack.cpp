@@ -1,19 +1,20 @@
-#include "stridewire/runtime/layer_stack.h"
+#include "runtime/pose/layer_stack.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "stridewire/runtime/motion_library.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {
 
 bool IsWithin(double value, double low, double high) { return value >= low && value <= high; }
 
-// 0 to 1 with no slope at either end.
+// Eases from 0 to 1 with zero slope at both ends.
 double Ease(double u) { return u >= 1.0 ? 1.0 : u * u * (3.0 - 2.0 * u); }
 
-// The part of the way that is behind, and how fast it is gone there.
+// Elapsed fraction of the current blend.
 double Progress(const LayerStack::Playing& p) {
   return p.elapsed_s >= p.ease_s ? 1.0 : p.elapsed_s / p.ease_s;
 }
@@ -21,7 +22,8 @@ double Progress(const LayerStack::Playing& p) {
 double WeightOf(const LayerStack::Playing& p) {
   const double weight = p.from_weight + (p.to_weight - p.from_weight) * Ease(Progress(p));
   if (p.elapsed_s >= p.slope_s) return std::clamp(weight, 0.0, 1.0);
-  // t (1 - t / T)^2: the slope at first, none at T.
+  // t (1 - t / T)^2 has slope 1 at t = 0 and value and slope 0 at t = T. It lets the weight start
+  // with the slope that it had before.
   const double left = 1.0 - p.elapsed_s / p.slope_s;
   return std::clamp(weight + p.slope * p.elapsed_s * left * left, 0.0, 1.0);
 }
@@ -36,8 +38,8 @@ double SlopeOf(const LayerStack::Playing& p) {
   return slope;
 }
 
-// Heads for another weight and speed from where it is. What slope the weight has runs off within what
-// was left of the way: then it does not overshoot.
+// Starts a blend from the current weight and speed to new ones. The slope that the weight has now
+// fades out within the remaining time of the previous blend, so that the weight does not overshoot.
 void HeadFor(double weight, double speed, double blend_s, LayerStack::Playing& p) {
   const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
   p.slope = SlopeOf(p);
@@ -62,9 +64,9 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
   if (request.layer < 0 || static_cast<std::size_t>(request.layer) >= library.layers().size()) {
     return Fail(ErrorCode::kNotFound, "the library has no such layer", request.layer);
   }
-  // Not "outside", so that what is not a number fails as well.
+  // Written this way so that NaN is rejected.
   if (!IsWithin(request.blend_s, 0.0, kMaxLayerBlendS)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's blend must take 0 to 10 s");
+    return Fail(ErrorCode::kOutOfRange, "a layer's blend time must be from 0 to 10 s");
   }
   Playing* on = Find(request.layer, false);
   if (!request.enabled) {
@@ -74,17 +76,17 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
     return {};
   }
   if (!(request.weight > 0.0 && request.weight <= 1.0)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's weight must lie above 0 and up to 1");
+    return Fail(ErrorCode::kOutOfRange, "a layer's weight must be above 0 and at most 1");
   }
   if (!IsWithin(request.speed, kMinLayerSpeed, kMaxLayerSpeed)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer's speed must lie from 0.1 to 4");
+    return Fail(ErrorCode::kOutOfRange, "a layer's speed must be from 0.1 to 4");
   }
   if (on == nullptr && library.layers()[static_cast<std::size_t>(request.layer)].is_looping) {
     on = Find(request.layer, true);
   }
   if (on == nullptr) {
     if (playing_.size() == kMaxLayers) {
-      return Fail(ErrorCode::kLimitExceeded, "the avatar plays four layers already", kMaxLayers);
+      return Fail(ErrorCode::kLimitExceeded, "the avatar already plays four layers", kMaxLayers);
     }
     MakeRoom();
     on = &playing_.emplace_back(Playing{.layer = request.layer, .speed = request.speed});
@@ -122,7 +124,7 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 }
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
-  constexpr double kLongestS = 1e6;  // a clip is no longer than ten minutes
+  constexpr double kLongestS = 1e6;  // Far above the longest clip, which takes ten minutes.
   const auto could_be = [&](const Playing& p) {
     const auto is_part = [](double value) { return IsWithin(value, 0.0, 1.0); };
     const auto is_time = [](double value) { return IsWithin(value, 0.0, kLongestS); };
@@ -134,7 +136,7 @@ Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing
            is_time(p.elapsed_s) && is_time(p.ease_s) && is_time(p.blend_s);
   };
   if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, could_be)) {
-    return Fail(ErrorCode::kOutOfRange, "no stack has these layers in play");
+    return Fail(ErrorCode::kOutOfRange, "the layer state is not valid");
   }
   if (!playing.empty()) MakeRoom();
   playing_.assign(playing.begin(), playing.end());

@@ -3,31 +3,34 @@
 #include <cstring>
 
 #include "runtime/skeleton/foot_plant_constants.h"
-#include "stridewire/runtime/foot_plan.h"
+#include "runtime/movement/foot_plan.h"
 
 #undef HWY_TARGET_INCLUDE
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
 #define HWY_TARGET_INCLUDE "runtime/pose/pose_kernels.cpp"
 #include "hwy/foreach_target.h"
-// Behind foreach_target.h, which includes this file once for each instruction set.
-#include "runtime/pose/foot_plant-inl.h"
+// These must follow foreach_target.h, which includes this file once per instruction set.
 #include "hwy/highway.h"
+#include "runtime/pose/foot_plant-inl.h"
 #include "runtime/pose/simd_math-inl.h"
 #include "runtime/pose/soa_pose-inl.h"
+#include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-// Read once for all that multiply it: g++ would read it from memory for each, and reads are what there are most of.
+// Keeps a value in a register. Otherwise g++ reads it from memory again for every multiplication,
+// and the kernel is limited by the number of reads.
 HWY_INLINE void StayInRegister([[maybe_unused]] hn::Vec<FloatTag>& x) {
 #if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL
   asm("" : "+v"(x.raw));
 #endif
 }
 
-// Vectors vectors from `source` on of the rows of Rows movements, summed side by side: an addition waits for the one
-// before, and what is read of the library serves all.
+// Sums `Vectors` vectors, starting at offset `at`, of the rows of `Rows` movements at the same
+// time. The sums are independent, so their additions overlap, and each value read from the library
+// is used for all movements.
 template <std::size_t Rows, std::size_t Vectors>
 HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const* weights,
                            std::size_t count, std::size_t row_floats, float* const* rows,
@@ -53,7 +56,7 @@ HWY_INLINE void SumVectors(const float* HWY_RESTRICT source, const float* const*
   }
 }
 
-// Rows of Rows movements at one grid point.
+// Computes the rows of `Rows` movements at one grid point.
 template <std::size_t Rows>
 HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, std::size_t count,
                           std::size_t row_floats, float* const* rows) {
@@ -64,7 +67,7 @@ HWY_INLINE void SumRowsOf(const float* examples, const float* const* weights, st
       SumVectors<Rows, Vectors>(examples, weights, count, row_floats, rows, i);
     }
   };
-  // As many sums as there are registers for.
+  // Use as many sums at a time as there are registers.
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<8>();
   if constexpr (Rows == 1 || HWY_TARGET <= HWY_AVX3) take.template operator()<6>();
   take.template operator()<4>();
@@ -91,7 +94,7 @@ void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTR
 
 void BlendRun(const GridRun& run) {
   const auto last = static_cast<std::size_t>(run.point_count) - 1;
-  std::size_t next[kBlock] = {};  // pose of each lane
+  std::size_t next[kBlock] = {};  // Next pose of each lane.
   const auto first_of = [&](std::size_t i) HWY_ATTR {
     return static_cast<std::size_t>(run.places[next[i]].first_point[run.lane + i]);
   };
@@ -103,7 +106,7 @@ void BlendRun(const GridRun& run) {
     const float* examples = run.grid + point * run.examples * run.row_floats;
     const float* weights[kBlock];
     float* sums[kBlock];
-    std::size_t passing[kBlock];  // lanes that need this point
+    std::size_t passing[kBlock];  // Lanes that need this point.
     std::size_t count = 0;
     for (std::size_t i = 0; i < run.lanes; ++i) {
       if (next[i] == run.poses || point < first_of(i)) continue;
@@ -121,7 +124,7 @@ void BlendRun(const GridRun& run) {
       for (; next[lane] < run.poses; ++next[lane]) {
         const std::size_t first = first_of(lane);
         if ((first + 3 < last ? first + 3 : last) != point) break;
-        // A point behind the last weighs nothing, but is read.
+        // Points beyond the last have weight zero, but a row is read for them nevertheless.
         const float* points[4];
         float part[4];
         const GridPlaces& place = run.places[next[lane]];
@@ -143,7 +146,8 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   Mask is_short = {hn::FirstN(d, 0)};
   std::size_t next = 0;
   while (next < blend.joint_count) {
-    // The last ones go with some before them, which come out the same again: no vector is part empty.
+    // If fewer joints remain than a vector holds, the last vector also repeats some earlier joints,
+    // with the same results. So no vector is partly empty.
     const std::size_t j = next + width > blend.joint_count && blend.joint_count >= width
                               ? blend.joint_count - width
                               : next;
@@ -152,7 +156,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
     SoaQuat q = LoadQuats(blend.row + 4 * j, left);
     const Mask is_small = Dot(q, q) < Float(kSmallestNorm * kSmallestNorm);
     is_short = is_short || (is_small && Mask{hn::FirstN(d, left)});
-    // Lengths multiply: one division at the end serves all.
+    // Lengths multiply, so a single normalization at the end is enough.
     if (blend.difference != nullptr) {
       const SoaQuat difference = LoadQuats(blend.difference + 4 * j, left);
       q = Multiply(q, SlerpOf(SlerpPartsOf(difference), Float(blend.fraction)));
@@ -184,7 +188,7 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
     const auto end_s = hn::Load(d, times.end_s + i);
     const auto begin = hn::Load(d, times.begin + i);
     const auto end = hn::Load(d, times.end + i);
-    // Hermite's cubic, as TimeWarp::GridPosition has it.
+    // Cubic Hermite interpolation with the operations of TimeWarp::GridPosition.
     const auto h = hn::Sub(end_s, begin_s);
     const auto s = hn::Div(hn::Sub(time, begin_s), h);
     const auto rise = hn::Sub(end, begin);
@@ -199,7 +203,7 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
     u = hn::IfThenElse(hn::Ge(time, end_s), end, u);
     u = hn::IfThenElse(hn::Gt(time, begin_s), u, begin);
 
-    // As CellWeightsAt.
+    // Weights with the operations of CellWeightsAt.
     const auto last = hn::Load(d, times.last_cell + i);
     const auto cell = hn::Min(hn::Max(hn::Trunc(u), zero), last);
     const auto f = hn::Min(hn::Max(hn::Sub(u, cell), zero), one);

@@ -3,47 +3,54 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire::kernels {
 
-/// The inner loops of evaluation, written once for vectors of any width (Google Highway) and compiled for each
-/// instruction set; which one runs is decided when the program does. They use no fused multiply-add, no estimates
-/// and no sums across lanes, so that every instruction set gives the same bytes (docs/decisions/0002, 0017).
+/// The inner loops of evaluation. They are written once for vectors of any width (Google Highway)
+/// and compiled for each instruction set; the program chooses one at run time. They use no fused
+/// multiply-add, no approximate instructions and no sums across lanes, so that every instruction
+/// set produces the same bytes (docs/decisions/0002, 0017).
+///
+/// Poses of up to kBlock movements are processed side by side, one movement per lane. An array
+/// [n][kBlock] holds n numbers per lane. Unused lanes are read, but their content does not matter.
 
-/// Rows have a multiple of so many floats; batches have so many avatars at most.
+/// Largest number of movements per block. Rows have a multiple of this many floats.
 inline constexpr std::size_t kBlock = 16;
+
 /// row = sum of weights[e] * examples[e * row_floats ...] over `count` examples, in order.
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row);
 
-/// row = sum of weights[k] * points[k], of four rows, in order.
+/// row = sum of weights[k] * points[k] over four rows, in order.
 void BlendPoints(const float* const points[4], const float weights[4], std::size_t row_floats,
                  float* row);
 
-/// A time of each movement of a block: one number a lane.
+/// A time of each movement of a block, one per lane, and the piece of its time warp.
 struct GridTimes {
   alignas(64) double time_s[kBlock];
   alignas(64) double begin_s[kBlock], end_s[kBlock];  ///< TimeWarp::Piece
   alignas(64) double begin[kBlock], end[kBlock];
   alignas(64) double begin_slope[kBlock], end_slope[kBlock];
-  alignas(64) double last_cell[kBlock];  ///< Points of the grid less two
-  alignas(64) double duration_s[kBlock], start_offset_s[kBlock],
-      ease_out_s[kBlock];  ///< Of the movement
+  alignas(64) double last_cell[kBlock];  ///< Number of grid points minus 2
+  /// Members of Movement with the same names.
+  alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
-/// Where its poses lie in their grids, and how much of the poses before is left.
+/// Positions of poses in their grids, and how much of their difference poses remains.
 struct GridPlaces {
-  alignas(64) std::int32_t first_point[kBlock];  ///< Of the rows that are interpolated
-  alignas(64) float weights[4][kBlock];          ///< Of them, in order; 0 for one that is not there
-  alignas(64) double steered[kBlock];            ///< EaseOut of the part of the movement behind
-  alignas(64) float is_eased[kBlock];  ///< 1 while there is something left to ease out, or 0
-  alignas(64) float fraction[kBlock];  ///< EaseOut of the part of the easing out behind
-  alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of it, times ease_out_s
+  alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
+  alignas(64) float weights[4][kBlock];          ///< Of these points; 0 beyond the last point
+  alignas(64) double steered[kBlock];  ///< EaseOut of the elapsed fraction of the movement
+  alignas(64) float is_eased[kBlock];  ///< 1 while part of the difference pose remains, else 0
+  alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
+  alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
 };
-/// In doubles and in the order of operations of TimeWarp::GridPosition, CellWeightsAt and EaseOut.
+/// Finds the places of `count` times. Uses doubles and the operations of TimeWarp::GridPosition,
+/// CellWeightsAt and EaseOut, in the same order.
 void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places);
 
-/// Movements of one group side by side, whose poses are to be blended: those of the lanes from `lane` on.
+/// A job that blends the poses of several movements of one group: those in the lanes from `lane`
+/// on.
 struct GridRun {
   const float* grid;  ///< [point][example][row_floats]
   std::size_t examples;
@@ -51,104 +58,104 @@ struct GridRun {
   int point_count;
   std::size_t lane;
   std::size_t lanes;
-  std::size_t poses;            ///< Of each movement
+  std::size_t poses;            ///< Number of poses per movement
   const GridPlaces* places;     ///< [pose]
-  const float* const* weights;  ///< [lane]: of the examples; of all kBlock
-  float* ring;                  ///< [4][row_floats] for each of `lanes`: scratch
-  float* rows;                  ///< [pose][lane][row_floats]: blended; of all kBlock
+  const float* const* weights;  ///< [kBlock][example]
+  float* ring;                  ///< Scratch: [4][row_floats] for each of `lanes`
+  float* rows;                  ///< Output: [pose][kBlock][row_floats]
 };
 
-/// Blends the rows of all poses: SumRows of each grid point, BlendPoints of four of them. Movements that pass the same
-/// points read the library together.
+/// Blends the rows of all poses: SumRows for each grid point, then BlendPoints for each pose.
+/// Movements that need the same grid point read it from the library once.
 void BlendRun(const GridRun& run);
 
-/// Rotations of a blended row and, while the movement before is eased out, the difference to it.
+/// Rotations of a blended row and the difference pose that is added to them.
 struct RotationBlend {
-  const float* row;  ///< Summed, as in GridLayout
+  const float* row;  ///< Blended row in the layout of GridLayout
   std::size_t joint_count;
-  const float* difference;  ///< [joint] x y z w, or null; see slerp below
-  float fraction;           ///< r := r slerp(1, difference, fraction), in [0, 1]
-  const float* velocity;    ///< [joint] x y z rotation vectors a second, or null
-  float seconds;            ///< r := r * rotation along seconds * velocity
+  const float* difference;  ///< [joint] x y z w, or null
+  float fraction;           ///< In [0, 1]: r := r slerp(1, difference, fraction)
+  const float* velocity;    ///< [joint] x y z rotation vectors per second, or null
+  float seconds;            ///< r := r * (rotation by the vector seconds * velocity)
 };
 
-/// out[joint] x y z w, unit. False if a rotation of the row is shorter than kSmallestNorm: rotations that cancel each
-/// other have no mean, and what is written of such a joint means nothing.
+/// Writes the unit rotations to out[joint] x y z w. Returns false if a rotation of the row is
+/// shorter than kSmallestNorm. Then the examples' rotations cancel each other and have no mean, and
+/// the output for that joint is undefined.
 [[nodiscard]] bool BlendRotations(const RotationBlend& blend, float* out);
 
-/// Sums of rotations that are shorter are none.
+/// A sum of rotations that is shorter than this has no usable direction.
 inline constexpr float kSmallestNorm = 0.1f;
 
-/// Sine and cosine of `count` angles, the same bits as Sin and Cos of base/trig.h. |x| <= 1e5.
+/// Sine and cosine of `count` angles with |x| <= 1e5, the same bits as Sin and Cos of base/trig.h.
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines);
-
-/// Poses of up to kBlock movements side by side, a movement a lane: an array [n][kBlock] holds a number of each. What
-/// stands in lanes of nobody is read, but means nothing.
 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
-/// What does not change of a difference while it is eased out, [joint][kEaseFloats][kBlock]: the rotation vector of half
-/// the short arc, and the square of its length.
+/// Number of floats per joint that PrepareEase writes: the rotation vector of half the short arc,
+/// and the square of its length.
 inline constexpr std::size_t kEaseFloats = 4;
-/// `difference`: [joint][x y z w][kBlock].
+/// Precomputes, for a difference pose [joint][x y z w][kBlock], the quantities that stay constant
+/// while it fades out: [joint][kEaseFloats][kBlock].
 void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease);
-/// fastest[lane] = the square of the longest of `velocity`, [joint][x y z][kBlock].
+/// fastest[lane] = the largest squared length of any vector of `velocity`, [joint][x y z][kBlock].
 void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes, float* fastest);
 
-/// Blended rows of a block on their way to be its poses in the world.
+/// Input of FinishLanes: the blended rows of a block and the difference poses to add to them.
 struct LaneBlend {
-  const float* const* rows;  ///< [lane]: a row as in GridLayout, kBlock of them
+  const float* const* rows;  ///< [kBlock]: rows in the layout of GridLayout
   std::size_t joint_count;
   std::size_t lanes;
-  const double* base_m;       ///< [x y z][kBlock]
-  const double* heading_rad;  ///< [kBlock], of the base
-  const double* sine;         ///< Of it
-  const double* cosine;
-  const double* extra_turn_rad;
-  const double* steered;  ///< GridPlaces
-  // What is left of the poses before, while any lane has something left:
-  const float* ease;           ///< PrepareEase, or null
-  const float* velocity;       ///< [joint][x y z][kBlock], or null: no lane is inertial
-  const float* fastest;        ///< FindFastest of it
-  const float* root_ease_m;    ///< [x y z][kBlock]
-  const float* root_ease_m_s;  ///< The same of its velocity
-  const float* fraction;       ///< GridPlaces
-  const float* slope_s;
-  const float* is_eased;     ///< [kBlock]: 1 or 0
-  const float* is_inertial;  ///< The same; only of those eased
+  const double* base_m;          ///< [x y z][kBlock]: position of each movement's base frame
+  const double* heading_rad;     ///< [kBlock]: heading of each base frame
+  const double* sine;            ///< [kBlock]: sine of the heading
+  const double* cosine;          ///< [kBlock]: cosine of the heading
+  const double* extra_turn_rad;  ///< [kBlock]: Movement::extra_turn_rad
+  const double* steered;         ///< GridPlaces::steered
+  // Remaining difference poses. Unused if `ease` is null.
+  const float* ease;           ///< Output of PrepareEase; null if no lane has a difference left
+  const float* velocity;       ///< [joint][x y z][kBlock]; null if no lane is inertial
+  const float* fastest;        ///< Output of FindFastest for `velocity`
+  const float* root_ease_m;    ///< [x y z][kBlock]: difference of the root position
+  const float* root_ease_m_s;  ///< [x y z][kBlock]: velocity of that difference
+  const float* fraction;       ///< GridPlaces::fraction
+  const float* slope_s;        ///< GridPlaces::slope_s
+  const float* is_eased;       ///< GridPlaces::is_eased
+  const float* is_inertial;    ///< [kBlock]: 1 if the lane is inertial, else 0; used if it is eased
 };
 
-/// Makes rotations unit, adds what is left of the poses before and takes the poses into the world: roots
-/// [x y z][kBlock], rotations [joint][x y z w][kBlock]. False if a rotation of some lane's row may be shorter than
-/// kSmallestNorm (BlendRotations).
+/// Normalizes rotations, adds the remaining difference poses and transforms the poses into world
+/// space. Writes roots [x y z][kBlock] and rotations [joint][x y z w][kBlock]. Returns false if a
+/// rotation in a row of some lane may be shorter than kSmallestNorm (see BlendRotations).
 [[nodiscard]] bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations);
 
-/// Balls and ankles of both legs, relative to the root and in world axes: [foot][x y z][kBlock] each. `rotations` as of
-/// FinishLanes, of LegRig::joints alone. `rig` is usable.
+/// Computes the balls and ankles of both legs, relative to the root and in world axes, each
+/// [foot][x y z][kBlock]. `rotations` has the layout that FinishLanes writes, but only for the
+/// joints in LegRig::joints. `rig` must be usable.
 void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
               float* ankles_m);
 
-/// A block of poses whose feet are planted, in place.
+/// A block of poses to plant in place.
 struct PlantBlock {
-  const float* plan;     ///< [number of PackedFootPlan][kBlock]
-  const double* time_s;  ///< [kBlock], of the movement
-  const double* base_m;  ///< [x y z][kBlock], the movement's base
-  float* root_m;         ///< [x y z][kBlock] in the world
-  float* rotations;      ///< [joint][x y z w][kBlock]; those of the legs change
+  const float* plan;     ///< [kPackedPlanFloats][kBlock]: transposed PackedFootPlan of each lane
+  const double* time_s;  ///< [kBlock]: time since the start of the movement
+  const double* base_m;  ///< [x y z][kBlock]: base position of the movement
+  float* root_m;         ///< [x y z][kBlock]: in world space; changed
+  float* rotations;      ///< [joint][x y z w][kBlock]; hips, knees and ankles are changed
 };
-/// PlantFeet of the first `count` lanes. `rig` is usable.
+/// Plants the feet of the first `count` lanes, as PlantFeet does. `rig` must be usable.
 void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count);
 
-/// One pose whose feet are planted, in place.
+/// One pose to plant in place.
 struct PlantJob {
   const float* plan = nullptr;  ///< PackedFootPlan
-  double time_s = 0.0;          ///< Of its movement
-  double base_m[3] = {};        ///< The movement's base
-  float* root_m = nullptr;      ///< [3] in the world
-  float* rotations = nullptr;   ///< [joint] x y z w; those of the legs change
+  double time_s = 0.0;          ///< Time since the start of the movement
+  double base_m[3] = {};        ///< Base position of the movement
+  float* root_m = nullptr;      ///< [3]: in world space; changed
+  float* rotations = nullptr;   ///< [joint] x y z w; hips, knees and ankles are changed
 };
-/// PlantFeet of one pose: the same bytes as PlantLanes of it.
+/// Plants the feet of one pose. The result has the same bytes as that of PlantLanes.
 void PlantOne(const LegRig& rig, const PlantJob& job);
 
 }  // namespace stridewire::kernels

@@ -11,7 +11,7 @@ namespace {
 
 constexpr float kSmallestNorm = 0.1f;
 
-// One row of a grid.
+// A row of a grid: one example at one grid point.
 struct Row {
   const float* floats;
   const GridLayout& layout;
@@ -20,7 +20,7 @@ struct Row {
   [[nodiscard]] double yaw() const { return layout.RootOf(floats).yaw_rad; }
 };
 
-// A pose in the base frame, the root's yaw apart.
+// A pose in the base frame, with the yaw of the root stored separately.
 struct LocalPose {
   std::vector<Quat> rotations;
   DVec3 position{0.0};
@@ -32,7 +32,8 @@ Row ExampleRow(const MotionGroup& group, const GridLayout& layout, int point, st
   return {&group.grid[(rows + example) * static_cast<std::size_t>(layout.row_floats)], layout};
 }
 
-// All examples at the points of a cell at once: rotations are made unit once.
+// Blends all examples at all points of a cell in a single sum, so that rotations are normalized
+// only once.
 LocalPose BlendCell(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                     const CellWeights& cell) {
   LocalPose pose;
@@ -65,7 +66,8 @@ LocalPose BlendCell(const MotionGroup& group, const GridLayout& layout, const Mo
   return pose;
 }
 
-// Catmull-Rom between the poses of four grid points; `at(k)` gives those of cell.first + k.
+// Catmull-Rom interpolation between the poses at the grid points of a cell. `at(point)` returns the
+// pose at a grid point.
 template <typename At>
 LocalPose Interpolate(const CellWeights& cell, At&& at) {
   std::vector<LocalPose> poses;
@@ -96,7 +98,8 @@ void ToWorld(const LocalPose& local, const Movement& movement, double time_s, Po
   out.rotations[0] = YawRotation(movement.base.heading_rad + yaw_rad) * out.rotations[0];
 }
 
-// M' = f D + M, i.e. r = r_M slerp(1, r_D, f), and along the velocity of D.
+// Adds the difference pose: M' = f D + M, that is r = r_M slerp(1, r_D, f), plus the term of the
+// velocity of D.
 void AddDifference(const Movement& movement, double time_s, PoseSpan out) {
   const double s = (time_s - movement.start_offset_s) / movement.ease_out_s;
   if (s >= 1.0) return;

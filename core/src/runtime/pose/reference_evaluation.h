@@ -1,17 +1,18 @@
 #pragma once
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 namespace stridewire {
 
-/// EvaluateMovement without vectors, cache or batches, as the paper has it (Eq. (2), (3) and (5)): the four grid
-/// poses around the time are blended anew, then interpolated. For tests, which hold the fast evaluation to it (1e-5 m
-/// and rad; its sums are the same, its trigonometry is not), and for measurements. Allocates.
+/// EvaluateMovement without SIMD, cache or batches, as the paper defines it (Eq. (2), (3) and (5)).
+/// It blends the four grid poses around the time and interpolates between them. Tests and
+/// benchmarks compare the fast evaluation with it, to within 1e-5 m and rad; the trigonometry
+/// differs. Allocates.
 void EvaluateMovementByReference(const MotionGroup& group, const GridLayout& layout,
                                  const Movement& movement, double time_s, PoseSpan out);
 
-/// The same the way animation programs commonly do: every example is sampled at the time itself, unless its weight is
-/// 0, and the poses are blended.
+/// EvaluateMovement the way animation systems commonly do it: samples every example with a nonzero
+/// weight at the given time and blends the sampled poses. Allocates.
 void EvaluateMovementBySampling(const MotionGroup& group, const GridLayout& layout,
                                 const Movement& movement, double time_s, PoseSpan out);
 

@@ -1,6 +1,7 @@
-// Numbers of several avatars or joints at once: what the kernels are written in. Compiled once for each instruction
-// set by pose_kernels.cpp, hence no ordinary guard. Additions, multiplications, divisions, square roots and comparisons
-// alone, each rounded by itself, so that all of them give the same bytes.
+// SIMD vector, quaternion and trigonometry types for the kernels. pose_kernels.cpp compiles this
+// file once per instruction set, which is why it has no ordinary include guard. It uses only
+// additions, multiplications, divisions, square roots and comparisons, each rounded separately, so
+// that all instruction sets produce the same bytes.
 #if defined(STRIDEWIRE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_LANES_INL_H
 #undef STRIDEWIRE_LANES_INL_H
@@ -30,7 +31,7 @@ struct Float {
   hn::Vec<FloatTag> v;
   Float() = default;
   HWY_INLINE explicit Float(hn::Vec<FloatTag> value) : v(value) {}
-  // A number is the same in every lane.
+  // Broadcasts the value to all lanes.
   HWY_INLINE Float(float value) : v(hn::Set(FloatTag(), value)) {}  // NOLINT
 };
 
@@ -51,13 +52,13 @@ HWY_INLINE Float Select(Mask mask, Float yes, Float no) {
 HWY_INLINE Float Sqrt(Float a) { return Float(hn::Sqrt(a.v)); }
 HWY_INLINE Float Abs(Float a) { return Float(hn::Abs(a.v)); }
 HWY_INLINE Float Round(Float a) { return Float(hn::Round(a.v)); }
-// Of two numbers neither of which is not one.
+// Neither argument may be NaN.
 HWY_INLINE Float Max(Float a, Float b) { return Select(a < b, b, a); }
 HWY_INLINE Float Min(Float a, Float b) { return Select(b < a, b, a); }
 HWY_INLINE Float Clamp(Float a, Float low, Float high) { return Min(Max(a, low), high); }
 HWY_INLINE bool Any(Mask mask) { return !hn::AllFalse(FloatTag(), mask.m); }
 
-// Vec3 and Quat of the scalar code, by lanes.
+// One Vec3 per lane.
 struct SoaVec3 {
   Float x, y, z;
 };
@@ -72,6 +73,7 @@ HWY_INLINE SoaVec3 Select(Mask mask, SoaVec3 yes, SoaVec3 no) {
   return {Select(mask, yes.x, no.x), Select(mask, yes.y, no.y), Select(mask, yes.z, no.z)};
 }
 
+// One Quat per lane.
 struct SoaQuat {
   Float x, y, z, w;
 };
@@ -95,7 +97,7 @@ HWY_INLINE SoaVec3 Rotate(SoaQuat q, SoaVec3 v) {
   const SoaVec3 t = Cross(u, v);
   return v + (t * q.w + Cross(u, t)) * Float(2.0f);
 }
-// Of a quaternion and Dot of it with itself.
+// Normalizes `q`; `square` is Dot(q, q).
 HWY_INLINE SoaQuat UnitOf(SoaQuat q, Float square) {
   const Float norm = Sqrt(square);
   const Mask is_sound = norm > Float(1e-12f);
@@ -104,7 +106,8 @@ HWY_INLINE SoaQuat UnitOf(SoaQuat q, Float square) {
 }
 HWY_INLINE SoaQuat Normalise(SoaQuat q) { return UnitOf(q, Dot(q, q)); }
 
-// Polynomials by interpolation at Chebyshev's nodes; errors below 2e-8, the last digit of a float.
+// Polynomials interpolated at Chebyshev nodes. Their errors are below 2e-8, about the precision of
+// a float.
 HWY_INLINE Float AtanOverX(Float square) {  // |x| <= 1
   Float p = 2.834064299e-03f;
   p = p * square - Float(1.600503050e-02f);
@@ -132,10 +135,11 @@ HWY_INLINE Float CosNearZero(Float square) {  // |x| <= pi / 2
   return p * square + Float(1.0f);
 }
 
-// slerp(1, q, fraction) along the short arc. With m = |xyz| / (1 + w), the tangent of a quarter of the angle, half of
-// it is 2 atan m: nothing is divided by a small sine.
+// Parts of slerp(1, q, fraction), along the short arc, that do not depend on the fraction. The
+// tangent of a quarter of the angle is m = |xyz| / (1 + |w|), and half the angle is 2 atan m. This
+// avoids a division by a small sine.
 struct SlerpParts {
-  SoaVec3 half;    // the rotation vector of half the angle
+  SoaVec3 half;  // Rotation vector of half the angle.
   Float square;  // |half|^2
 };
 HWY_INLINE SlerpParts SlerpPartsOf(SoaQuat q) {
@@ -143,18 +147,20 @@ HWY_INLINE SlerpParts SlerpPartsOf(SoaQuat q) {
   const Float sign = Select(is_long, Float(-1.0f), Float(1.0f));
   const Float beside = Float(1.0f) / (Float(1.0f) + Abs(q.w));
   const Float xx = q.x * q.x + q.y * q.y + q.z * q.z;
-  // Half the angle by its sine, negative if the long arc is turned round.
+  // Half the angle divided by its sine. Negative if q is negated to follow the short arc.
   const Float per_sine =
       sign * Float(2.0f) * beside * AtanOverX(Min(xx * beside * beside, Float(1.0f)));
   return {SoaVec3{q.x, q.y, q.z} * per_sine, xx * per_sine * per_sine};
 }
-// The rotation, of a length between 1 and 1.12: all that counts is the tangent of half its angle, and a quotient of two
-// short polynomials is nearer to that than sine and cosine of the same length to theirs. By interpolation at
-// Chebyshev's nodes of the square of half the angle; the error of the angle is below 2e-8.
+// Returns the slerp as a quaternion of length 1 to kLongestSlerp. The length does not matter until
+// the final normalization, so only the ratio of xyz to w must be accurate. A quotient of two short
+// polynomials approximates that ratio better than separate polynomials of the same length for sine
+// and cosine. They are interpolated at Chebyshev nodes in the square of half the angle; the error
+// of the angle is below 2e-8.
 constexpr float kLongestSlerp = 1.12f;
 HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   const Float square = parts.square * (fraction * fraction);
-  Float sine = 2.061795443e-03f;  // by half the angle
+  Float sine = 2.061795443e-03f;  // Divided by half the angle.
   sine = sine * square - Float(1.216445714e-01f);
   sine = sine * square + Float(1.0f);
   Float cosine = -1.004631922e-04f;
@@ -165,7 +171,7 @@ HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   return {xyz.x, xyz.y, xyz.z, cosine};
 }
 
-// Angle of (x, y) in [-pi, pi]; 0 for (0, 0).
+// Angle of the vector (x, y) in [-pi, pi]. Returns 0 for (0, 0).
 HWY_INLINE Float Atan2(Float y, Float x) {
   const Float ax = Abs(x);
   const Float ay = Abs(y);
@@ -178,7 +184,7 @@ HWY_INLINE Float Atan2(Float y, Float x) {
   return Select(y < Float(0.0f), -angle, angle);
 }
 
-// Into [-pi, pi].
+// Maps an angle to [-pi, pi].
 HWY_INLINE Float WrapAngle(Float angle) {
   return angle - Float(6.28318530718f) * Round(angle * Float(0.159154943092f));
 }
@@ -190,7 +196,8 @@ HWY_INLINE SoaQuat YawRotation(Float yaw) {
   return {Float(0.0f), half * SinOverX(square), Float(0.0f), CosNearZero(square)};
 }
 
-// Quaternions x y z w one behind the other; of the last lanes only `left` are there.
+// Loads consecutive quaternions x y z w. If fewer than a full vector remain, `left` of them, the
+// other lanes are zero.
 HWY_INLINE SoaQuat LoadQuats(const float* at, std::size_t left) {
   const FloatTag d;
   HWY_ALIGN float buffer[4 * kBlock];
@@ -214,10 +221,11 @@ HWY_INLINE void StoreQuats(SoaQuat q, float* at, std::size_t left) {
   std::memcpy(at, buffer, left * 4 * sizeof(float));
 }
 
-// Four floats from each of several places, address(lane), turned into four vectors. Blocks are put together in
-// registers: a vector read from where its parts were just stored would wait for them.
+// GatherQuats loads four floats from address(lane) for each lane and transposes them into four
+// vectors. The transposition happens in registers, because a vector load from memory that was just
+// written in parts would stall.
 #if HWY_TARGET != HWY_SCALAR && !HWY_HAVE_SCALABLE
-// Four by four numbers of each block of four lanes, rows for columns.
+// Transposes the 4 x 4 floats in each block of four lanes.
 HWY_INLINE void TransposeBlocks(hn::Vec<FloatTag>& a, hn::Vec<FloatTag>& b, hn::Vec<FloatTag>& c,
                                 hn::Vec<FloatTag>& e) {
   const FloatTag d;
@@ -256,11 +264,11 @@ template <typename Address>
 HWY_INLINE SoaQuat GatherQuats(Address address) {
   const FloatTag d;
   SoaQuat q = {Float(LoadBlocks(d, 0, address)), Float(LoadBlocks(d, 1, address)),
-             Float(LoadBlocks(d, 2, address)), Float(LoadBlocks(d, 3, address))};
+               Float(LoadBlocks(d, 2, address)), Float(LoadBlocks(d, 3, address))};
   TransposeBlocks(q.x.v, q.y.v, q.z.v, q.w.v);
   return q;
 }
-// The way back, of the first `lanes`.
+// The inverse of GatherQuats for the first `lanes` lanes.
 template <typename Address>
 HWY_INLINE void ScatterQuats(SoaQuat q, std::size_t lanes, Address address) {
   const FloatTag d;
@@ -302,7 +310,7 @@ HWY_INLINE SoaVec3 LoadVectors(const float* at, std::size_t left) {
   return v;
 }
 
-// Numbers of the first of a vector's lanes.
+// LoadLanes and StoreLanes access one float per lane, starting at `at`.
 HWY_INLINE Float LoadLanes(const float* at) { return Float(hn::LoadU(FloatTag(), at)); }
 HWY_INLINE void StoreLanes(Float value, float* at) { hn::StoreU(value.v, FloatTag(), at); }
 HWY_INLINE SoaVec3 LoadVec3(const float* at) {
@@ -321,7 +329,7 @@ HWY_INLINE void StoreQuat(SoaQuat q, float* at) {
 
 HWY_INLINE SoaVec3 XyzOf(SoaQuat q) { return {q.x, q.y, q.z}; }
 
-// Sine and cosine with the operations of base/trig.cpp, in their order.
+// Sine and cosine with the same operations as in base/trig.cpp, in the same order.
 HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cosine) {
   const auto number = [d](double value) HWY_ATTR { return hn::Set(d, value); };
   const auto angle = hn::Load(d, x);
@@ -348,7 +356,7 @@ HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cos
   p = hn::Add(hn::Mul(p, s), number(1.0 / 24.0));
   const auto cos =
       hn::Add(hn::Sub(number(1.0), hn::Mul(number(0.5), s)), hn::Mul(hn::Mul(s, s), p));
-  // The quadrant: k - 4 round(k / 4) is -2, -1, 0, 1 or 2.
+  // The quadrant, k - 4 round(k / 4), is -2, -1, 0, 1 or 2.
   const auto quadrant = hn::Sub(k, hn::Mul(number(4.0), hn::Round(hn::Mul(k, number(0.25)))));
   const auto is_odd = hn::Eq(hn::Abs(quadrant), number(1.0));
   const auto is_far = hn::Eq(hn::Abs(quadrant), number(2.0));

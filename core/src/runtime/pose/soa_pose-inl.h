@@ -1,5 +1,5 @@
-// The poses of several movements side by side, a movement a lane. Compiled once for each instruction set by
-// pose_kernels.cpp.
+// Kernels that process the poses of several movements side by side, one movement per lane.
+// pose_kernels.cpp compiles this file once per instruction set.
 #if defined(STRIDEWIRE_POSE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_POSE_LANES_INL_H
 #undef STRIDEWIRE_POSE_LANES_INL_H
@@ -13,7 +13,7 @@ HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {
 namespace {
 
-// Where four floats of the row of each lane are.
+// Address of four consecutive floats in the row of each lane.
 struct RowAddress {
   const float* const* rows;
   std::size_t at;
@@ -29,7 +29,7 @@ void Transpose(const float* const* from, std::size_t count, std::size_t lanes, f
   }
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     for (std::size_t next = 0; next < count;) {
-      // The last four go with some before them.
+      // The last group of four may overlap the previous one.
       const std::size_t i = next + 4 <= count ? next : count - 4;
       StoreQuat(GatherQuats(RowAddress{from + lane, i}), to + i * kBlock + lane);
       next = i + 4;
@@ -60,17 +60,17 @@ void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lan
   }
 }
 
-// What is left of the poses before, as the vectors of one block of lanes take it.
+// How much of the difference poses remains in the lanes of one vector.
 struct Easing {
   bool is_any = false;
   bool is_any_inertial = false;
-  bool are_all = false;  // eased, and inertial: nothing is to be selected
+  bool are_all = false;  // All lanes are eased and inertial, so no lanes have to be masked out.
   Mask is_eased, is_inertial;
   Float fraction, half_s;
 };
 
 HWY_INLINE SoaQuat Ease(SoaQuat q, const Easing& easing, const LaneBlend& blend, std::size_t joint,
-                      std::size_t lane) {
+                        std::size_t lane) {
   const SoaQuat ease = LoadQuat(blend.ease + joint * kEaseFloats * kBlock + lane);
   SoaQuat eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, easing.fraction));
   if (easing.is_any_inertial) {
@@ -82,7 +82,8 @@ HWY_INLINE SoaQuat Ease(SoaQuat q, const Easing& easing, const LaneBlend& blend,
   return Select(easing.is_eased, eased, q);
 }
 
-// Where blended roots are in the world, and the headings poses turn to.
+// Transforms blended roots into world space. `sines` and `cosines` receive those of half the
+// heading of each pose.
 void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, float* root_m,
                 float* sines, float* cosines) {
   const DoubleTag d;
@@ -106,8 +107,8 @@ void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, fl
     put(0, hn::Add(hn::Mul(c, part(0)), hn::Mul(s, part(2))));
     put(1, part(1));
     put(2, hn::Sub(hn::Mul(c, part(2)), hn::Mul(s, part(0))));
-    const auto yaw =
-        hn::Add(part(3), hn::Mul(of(blend.extra_turn_rad), hn::Sub(hn::Set(d, 1.0), of(blend.steered))));
+    const auto yaw = hn::Add(
+        part(3), hn::Mul(of(blend.extra_turn_rad), hn::Sub(hn::Set(d, 1.0), of(blend.steered))));
     hn::Store(hn::Mul(hn::Set(d, 0.5), hn::Add(of(blend.heading_rad), yaw)), d, half_rad + i);
     SinCosOf(d, half_rad + i, sine + i, cosine + i);
     hn::StoreU(hn::DemoteTo(floats, hn::Load(d, sine + i)), floats, sines + i);
@@ -135,7 +136,8 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
                               LoadLanes(blend.is_inertial + lane) < half);
       }
     }
-    // What is left of the poses before makes rotations longer, at most so much: squares.
+    // Adding the difference poses makes rotations longer. Compute the squared length that a
+    // rotation of length kSmallestNorm may have afterwards.
     Float shortest = kSmallestNorm * kSmallestNorm;
     if (easing.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
     if (easing.is_any_inertial) {
@@ -148,12 +150,12 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
       least = Float(hn::Min(square.v, least.v));
       StoreQuat(UnitOf(q, square), unit);
     };
-    // A rotation is made unit while the next is blended: each waits long for what it is made of.
+    // Normalize each rotation while the next one is blended, because both have long latencies.
     SoaQuat last = {half, half, half, half};
     float* to = rotations + lane;
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
       SoaQuat q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
-      // Lengths multiply: one division at the end serves all.
+      // Lengths multiply, so a single normalization at the end is enough.
       if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
       if (joint > 0) {
         make_unit(last, to);
@@ -162,7 +164,7 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
       last = q;
     }
     make_unit(last, to);
-    HWY_ALIGN float local[4 * kBlock];  // root x, y, z, yaw
+    HWY_ALIGN float local[4 * kBlock];  // Root x, y, z and yaw.
     StoreQuat(GatherQuats(RowAddress{blend.rows + lane, 4 * blend.joint_count}), local);
     const Mask is_there = {hn::FirstN(FloatTag(), blend.lanes - lane)};
     is_any_short |= Any(least < shortest && is_there);

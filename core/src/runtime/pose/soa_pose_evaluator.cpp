@@ -1,12 +1,13 @@
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 #include <algorithm>
 #include <array>
 
+#include "base/check.h"
 #include "runtime/pose/grid_blend.h"
 #include "runtime/pose/pose_kernels.h"
-#include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 
@@ -42,7 +43,7 @@ struct SoaPoseEvaluator::Work {
   struct LaneDoubles {
     alignas(64) double of[kBlock] = {};
   };
-  // So many movements are blended together that what is summed of them stays in the nearest cache.
+  // Number of movements that BlendRun blends together. Their sums fit into the level-1 cache.
   static constexpr std::size_t kRun = 8;
   static float* FloatsOf(std::vector<LaneFloats>& lanes) { return lanes.front().of; }
 
@@ -89,36 +90,36 @@ struct SoaPoseEvaluator::Work {
   std::size_t row_floats;
   int max_count;
 
-  // Of the block under way:
+  // The block that is being evaluated:
   std::array<SampleRun, kBlock> stretches;
   std::size_t lanes = 0;
   std::size_t count = 0;
   std::size_t next = 0;
   bool is_planted = false;
-  bool is_eased = false;     // some lane, at some time
-  bool is_inertial = false;  // the same
-  bool settles = false;
+  bool is_eased = false;     // Some lane has a difference pose left at some time.
+  bool is_inertial = false;  // Some of these lanes are inertial.
+  bool settles = false;      // Some lane has a plant fade.
 
   std::vector<kernels::GridPlaces> places;  // [pose]
   std::vector<LaneDoubles> times;           // [pose]
   std::vector<LaneFloats> ring;             // [kRun][4][row_floats]
   std::vector<LaneFloats> rows;             // [pose][lane][row_floats]
-  kernels::GridTimes grid_times = {};       // lanes of nobody are worked out, too
+  kernels::GridTimes grid_times = {};       // Initialized, because unused lanes are computed too.
   std::array<LaneDoubles, 3> base_m;
   LaneDoubles heading_rad, sine, cosine, extra_turn_rad;
-  std::vector<LaneFloats> plan;        // [number]
-  std::vector<LaneFloats> transposed;  // [joint][x y z w]: of differences
-  std::vector<LaneFloats> ease;        // [joint][number]
+  std::vector<LaneFloats> plan;        // [kPackedPlanFloats]
+  std::vector<LaneFloats> transposed;  // [joint][x y z w]: difference poses
+  std::vector<LaneFloats> ease;        // [joint][kEaseFloats]
   std::vector<LaneFloats> velocity;    // [joint][x y z]
   std::array<LaneFloats, 3> root_ease_m, root_ease_m_s;
   LaneFloats fastest;
   LaneFloats is_inertial_lane;
-  std::vector<float> none;  // of who has no difference
+  std::vector<float> none;  // Zeros, for lanes without a difference pose.
   SoaPose poses;
   Pose one;  // scratch
 };
 
-// Where each pose lies in its grid.
+// Finds the position of each pose in its grid.
 void SoaPoseEvaluator::Work::FindPlaces() {
   kernels::GridTimes& t = grid_times;
   const auto take_piece = [&](std::size_t i) {
@@ -179,7 +180,7 @@ void SoaPoseEvaluator::Work::TakePlans() {
   kernels::Transpose(plans.data(), kPackedPlanFloats, lanes, FloatsOf(plan));
 }
 
-// What is left of the poses before.
+// Collects the difference poses that have not faded out yet.
 void SoaPoseEvaluator::Work::TakeEasing() {
   is_eased = is_inertial = false;
   std::array<const float*, kBlock> differences;
@@ -189,7 +190,7 @@ void SoaPoseEvaluator::Work::TakeEasing() {
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
     is_inertial_lane.of[i] = 0.0f;
-    if (places[0].is_eased[i] == 0.0f) continue;  // and not later either
+    if (places[0].is_eased[i] == 0.0f) continue;  // Later poses have no difference left either.
     is_eased = true;
     differences[i] = &of.difference.rotations[0].x;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -327,7 +328,7 @@ void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
 }
 
 void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
-  // Those whose feet are planted go together, and the others.
+  // A block may contain only poses with planted feet or only poses without.
   for (const bool is_planted : {false, true}) {
     std::array<SampleRun, kBlock> stretches;
     std::array<Pose*, kBlock> shown;

@@ -12,9 +12,9 @@ bool IsFinite(const Vec3& v) {
   return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
-// Catmull-Rom weights of the four samples around a position `u` in [0, 1) of the middle interval.
-// Beyond the clip's ends the missing sample is the mirror image of its neighbour's, 2 p_0 - p_1,
-// which leaves the velocity of the first interval; its weight is folded into the two that exist.
+// Catmull-Rom weights of the four samples around position `u`, in [0, 1), of the middle interval.
+// The sample before the first one is extrapolated linearly as 2 p_0 - p_1, and likewise at the end.
+// Its weight is added to the weights of the two samples that define it.
 struct CubicWeights {
   float w[4];
 
@@ -42,13 +42,14 @@ struct CubicWeights {
 
 Status Clip::Validate() const {
   if (!(fps > 0.0 && fps <= 10000.0)) {
-    return Fail(ErrorCode::kOutOfRange, "a clip's frames a second must lie in (0, 10000]");
+    return Fail(ErrorCode::kOutOfRange,
+                "a clip's frame rate must be above 0 and at most 10000 per second");
   }
-  if (frame_count() < 1) return Fail(ErrorCode::kOutOfRange, "a clip needs a frame");
-  if (joint_count < 1) return Fail(ErrorCode::kOutOfRange, "a clip needs a joint");
+  if (frame_count() < 1) return Fail(ErrorCode::kOutOfRange, "a clip has no frames");
+  if (joint_count < 1) return Fail(ErrorCode::kOutOfRange, "a clip has no joints");
   const std::size_t joints = static_cast<std::size_t>(joint_count);
   if (rotations.size() / joints != root_positions_m.size() || rotations.size() % joints != 0) {
-    return Fail(ErrorCode::kShapeMismatch, "a clip needs one rotation a joint and frame",
+    return Fail(ErrorCode::kShapeMismatch, "a clip needs one rotation per joint and frame",
                 static_cast<std::int64_t>(rotations.size()));
   }
   for (int f = 0; f < frame_count(); ++f) {
@@ -58,7 +59,7 @@ Status Clip::Validate() const {
     }
     for (const Quat& q : pose.rotations) {
       const float norm = std::sqrt(Dot(q, q));
-      if (!(std::fabs(norm - 1.0f) <= 1e-3f)) {  // Also true for a number that is not finite.
+      if (!(std::fabs(norm - 1.0f) <= 1e-3f)) {  // Written this way so that NaN is rejected.
         return Fail(ErrorCode::kInvalidArgument, "a rotation is not of unit length", f);
       }
     }
@@ -79,7 +80,7 @@ void SampleClip(const Clip& clip, double time_s, PoseSpan out) {
   const int last = clip.frame_count() - 1;
   STRIDEWIRE_CHECK(last >= 0);
   STRIDEWIRE_CHECK(out.rotations.size() == static_cast<std::size_t>(clip.joint_count));
-  // Written so that a time that is no number is 0.
+  // Written this way so that NaN samples the clip at 0 s.
   const double position =
       time_s > 0.0 ? std::min(time_s * clip.fps, static_cast<double>(last)) : 0.0;
   const int f1 = std::min(static_cast<int>(position), std::max(last - 1, 0));
@@ -89,7 +90,7 @@ void SampleClip(const Clip& clip, double time_s, PoseSpan out) {
     out.root_position_m = source.root_position_m;
     std::copy(source.rotations.begin(), source.rotations.end(), out.rotations.begin());
   };
-  // At a sample the sample itself, bit by bit.
+  // At the time of a sample, return that sample unchanged to the last bit.
   if (u <= 0.0f || last == 0) return copy(f1);
   if (u >= 1.0f) return copy(f1 + 1);
 
@@ -101,7 +102,8 @@ void SampleClip(const Clip& clip, double time_s, PoseSpan out) {
   out.root_position_m = k.w[0] * p0.root_position_m + k.w[1] * p1.root_position_m +
                         k.w[2] * p2.root_position_m + k.w[3] * p3.root_position_m;
   for (std::size_t j = 0; j < out.rotations.size(); ++j) {
-    // Signs are taken along the track even if the clip was never made continuous.
+    // q and -q are the same rotation. Align the signs here, because callers may not have called
+    // MakeSignContinuous.
     const Quat q1 = p1.rotations[j];
     const Quat q0 = Dot(p0.rotations[j], q1) < 0.0f ? -p0.rotations[j] : p0.rotations[j];
     const Quat q2 = Dot(p2.rotations[j], q1) < 0.0f ? -p2.rotations[j] : p2.rotations[j];

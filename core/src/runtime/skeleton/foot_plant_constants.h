@@ -2,32 +2,41 @@
 
 namespace stridewire {
 
-// What planting is tuned by, shared by the plain and the fast code.
+// Tuning constants of foot planting, shared by the scalar and the SIMD implementation. Names that
+// end in M are in metres.
 
-// A leg may always be as long as the blend has it, and anyway this part of its length.
+// Planting may extend a leg to kEasyExtension of its length, or as far as the blended pose extends
+// it, whichever is longer, but never beyond kLongestExtension of its length.
 inline constexpr double kEasyExtension = 0.995;
 inline constexpr double kLongestExtension = 0.999;
-// Roundness of maxima: the root goes down softly.
+// Smoothing distances of SmoothMax. They keep the root and the feet from changing speed abruptly
+// when a limit becomes active.
 inline constexpr double kSoftM = 0.002;
 inline constexpr double kSoftLowerM = 0.01;
 inline constexpr double kSoftGroundM = 0.006;
-// A foot this near to a print is kept out of its ground wholly, and this far from it not at all.
+// Within kNearPrintM of a footprint (horizontally), soles are lifted fully out of its ground plane.
+// The lift fades to zero at kFarFromPrintM.
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
-// The ground left gives way to the ground landed on from this part of the swing, over this part of it.
+// During a swing, the ground to stay above changes from that of the old footprint to that of the
+// new one. The change begins at kGroundFrom and takes kGroundOver, as fractions of the swing.
 inline constexpr double kGroundFrom = 0.3;
 inline constexpr double kGroundOver = 0.4;
-// A foot that sinks does so from this part of the swing on; one that rises has risen so much before its end.
+// A foot that lands lower than it started descends after this fraction of the swing. A foot that
+// lands higher finishes its rise by the same fraction before the end of the swing.
 inline constexpr double kSinkFrom = 0.35;
-// What a foot is lifted by comes and goes in this part of the swing at either end.
+// Fraction of the swing, at each end, in which the extra lift of a foot fades in and out.
 inline constexpr double kLiftEnds = 0.35;
-// How flat a standing foot is (LegPose::Flatness) whose heading is held not at all, and wholly.
+// Flatness (LegPose::Flatness) of a standing foot at which its heading lock is zero (kHeelUp) and
+// at which it is complete (kSoleDown).
 inline constexpr double kHeelUp = 0.5;
 inline constexpr double kSoleDown = 0.8;
 
+// A leg with a shorter thigh or shank cannot be planted.
 inline constexpr float kSmallestBoneM = 1e-3f;
-// Below the smaller sine of the knee's bend its plane says nothing and the figure's own left-right axis takes over;
-// above the larger the plane alone counts.
+// The axis of a knee is the normal of the leg's plane once the sine of the knee's bend exceeds
+// kBentSine. A straighter knee has no reliable plane, so the left-right axis of the hip joint is
+// mixed in with weight kReferenceWeight; below kStraightSine it has its full weight.
 inline constexpr float kStraightSine = 0.04f;
 inline constexpr float kBentSine = 0.14f;
 inline constexpr float kReferenceWeight = 0.1f;

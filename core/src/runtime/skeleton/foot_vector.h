@@ -4,8 +4,9 @@
 
 namespace stridewire {
 
-/// d = R_y(-heading)(F_moving - F_fixed): where the moving foot stands from the fixed one, in a
-/// heading frame, ball to ball, metres. A general step's parameters are d at its start and end.
+/// Position of the moving foot relative to the fixed foot, from ball to ball, in the heading frame:
+/// d = R_y(-heading)(F_moving - F_fixed), in metres. The parameters of a general step are d at its
+/// start and at its end.
 [[nodiscard]] inline DVec3 FootVector(const Skeleton& skeleton, ConstPoseSpan pose, Foot moving,
                                       double heading_rad) {
   const DVec3 difference = DVec3(BallPosition(skeleton, pose, moving)) -

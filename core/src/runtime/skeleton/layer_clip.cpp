@@ -1,4 +1,4 @@
-#include "stridewire/runtime/layer_clip.h"
+#include "runtime/skeleton/layer_clip.h"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 namespace stridewire {
 namespace {
 
-// Four keys about a time and their Catmull-Rom weights. At the ends of a clip that does not loop the
-// missing key is its neighbour's, which only slows it down there.
+// The four keys around a time and their Catmull-Rom weights. A clip that does not loop repeats its
+// first and last key beyond its ends, which only slows the motion down there.
 struct KeyBlend {
   std::array<std::size_t, 4> frames;
   std::array<float, 4> weights;
@@ -82,7 +82,7 @@ void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan po
       const float* q = &clip.rotations[(blend.frames[k] * count + i) * 4];
       return Quat(q[3], q[0], q[1], q[2]);
     };
-    // Signs as along the track: q and -q are one rotation.
+    // q and -q are the same rotation: choose the signs that make neighbouring keys closest.
     const Quat q1 = key(1);
     Quat q0 = key(0);
     Quat q2 = key(2);

@@ -1,11 +1,11 @@
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 
-#include "runtime/skeleton/foot_plant_constants.h"
 #include "base/trig.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 
 namespace stridewire {
 namespace {
@@ -15,21 +15,21 @@ int PlaceOf(const std::vector<int>& chain, int joint) {
   return it == chain.end() ? -1 : static_cast<int>(it - chain.begin());
 }
 
-// The shortest rotation that turns one direction into another; no trigonometry.
+// The shortest rotation that turns the direction `from` into `to`, without trigonometry.
 Quat ShortestArc(const Vec3& from, const Vec3& to) {
   const float scale = std::sqrt(glm::dot(from, from) * glm::dot(to, to));
   const Vec3 axis = glm::cross(from, to);
   return Normalise(Quat(scale + glm::dot(from, to), axis.x, axis.y, axis.z));
 }
 
-// The knee's axis: bending about it by the right hand takes the shank backward.
+// The axis of the knee. A positive rotation about it moves the shank backward.
 Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Quat& hip_rotation) {
   const float scale = std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank));
   const Vec3 plane = glm::cross(thigh, shank) / scale;
   const float sine = std::sqrt(glm::dot(plane, plane));
   const float s = std::clamp((kBentSine - sine) / (kBentSine - kStraightSine), 0.0f, 1.0f);
   const Vec3 reference = hip_rotation * Vec3(1.0f, 0.0f, 0.0f);
-  // A knee bent backward counts as straight.
+  // Treat a knee that is bent backward as straight.
   const float forward = glm::dot(plane, reference) < 0.0f ? 0.0f : 1.0f;
   const float weight = forward > 0.0f ? s * s * (3.0f - 2.0f * s) : 1.0f;
   return forward * plane + kReferenceWeight * weight * reference;
@@ -107,7 +107,8 @@ LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose) {
     const Vec3 toes = pose.toe_tip_m - pose.ball_m;
     side.toe_m = std::sqrt(static_cast<double>(toes.x) * toes.x + toes.z * toes.z);
     side.toe_height_m = static_cast<double>(stand_pose.root_position_m.y) + pose.toe_tip_m.y;
-    // A ball on the ankle gives the foot no direction, and so no heel behind it.
+    // If the ball coincides with the ankle, the foot has no direction, so the heel is placed
+    // directly below the ankle.
     const Vec3 behind = side.foot_m < kSmallestBoneM
                             ? Vec3(0.0f)
                             : static_cast<float>(-kSoleBehindAnkleM / side.foot_m) * sole;
@@ -172,12 +173,13 @@ void SolveLeg(const LegRig& rig, Foot foot, const LegPose& leg, const Vec3& ankl
   const float shortest = std::fabs(l1 - l2) + 1e-3f * (l1 + l2);
   const float d = std::clamp(distance, shortest, kMaxLegExtension * (l1 + l2));
 
-  // The knee lies a along the line to the ankle and h off it, to the side of the knee's plane.
+  // The knee is at distance `a` along the line from hip to ankle and at distance `h` off that line,
+  // in the plane of the knee.
   const float a = (l1 * l1 - l2 * l2 + d * d) / (2.0f * d);
   const float h = std::sqrt(std::max(0.0f, l1 * l1 - a * a));
   Vec3 pole = glm::cross(u, KneeAxis(thigh, shank, leg.world_rotations[hip]));
   const float pole_length = std::sqrt(glm::dot(pole, pole));
-  // A leg stretched along its own knee axis has no plane at all: any will do.
+  // A leg that points along its own knee axis has no plane, so any direction is as good.
   pole = pole_length > 1e-6f ? pole / pole_length : Vec3(0.0f, 0.0f, 1.0f);
   const Vec3 new_thigh = a * u + h * pole;
   const Vec3 new_shank = d * u - new_thigh;

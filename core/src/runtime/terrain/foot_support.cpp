@@ -1,4 +1,4 @@
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/terrain/foot_support.h"
 
 #include <algorithm>
 #include <array>
@@ -10,18 +10,20 @@
 namespace stridewire {
 namespace {
 
-// Points of a sole that are looked at: rows from heel to toe, columns from side to side.
-constexpr int kHeelRows = 6;  // Behind the ball's own.
+// Sample points of a sole: rows from heel to toe, columns from one side to the other.
+constexpr int kHeelRows = 6;  // Rows behind the ball's row.
 constexpr int kToeRows = 3;
 constexpr int kRows = kHeelRows + 1 + kToeRows;
 constexpr int kColumns = 5;
 constexpr int kBallColumn = kColumns / 2;
+// Neighbouring points belong to the same ground if their heights differ by at most kMaxSlope (45
+// degrees) times their distance plus kForgivenM.
 constexpr double kMaxSlope = 1.0;
 constexpr double kForgivenM = 0.005;
 
 struct SolePoint {
-  double side;     // To the left of the ball.
-  double forward;  // In front of it.
+  double side;     // Metres to the left of the ball.
+  double forward;  // Metres in front of the ball.
   double height;
   bool is_reached;
 };
@@ -36,8 +38,8 @@ class SolePoints {
   [[nodiscard]] auto end() const { return points_.end(); }
   [[nodiscard]] static constexpr double size() { return kRows * kColumns; }
 
-  // What is reached from the ball, found by sweeping until nothing changes: at most as often as there are
-  // points, twice on ordinary ground.
+  // Marks the points that are connected to the ball by slopes within the limit. Sweeps over all
+  // points until nothing changes: twice on ordinary ground, at most once per point.
   void Spread() {
     ball().is_reached = true;
     for (bool is_changed = true; is_changed;) {
@@ -65,15 +67,16 @@ class SolePoints {
   std::array<SolePoint, std::size_t{kRows} * kColumns> points_{};
 };
 
-// height = ball_height + at_ball + side_slope side + forward_slope forward
+// The plane height = ball_height + at_ball + side_slope * side + forward_slope * forward.
 struct Plane {
   double at_ball = 0.0;
   double side_slope = 0.0;
   double forward_slope = 0.0;
-  int count = 0;  // of points it fits
+  int count = 0;  // Number of points that the plane was fitted to.
 };
 
-// Least squares over the points reached, about their mean so that a level ground gives exactly level.
+// Least-squares fit to the reached points. Subtracting their mean first makes level ground give an
+// exactly level plane.
 Plane FitPlane(const SolePoints& points, double ball_height) {
   Plane plane;
   double mean_side = 0.0;
@@ -110,7 +113,7 @@ Plane FitPlane(const SolePoints& points, double ball_height) {
     plane.side_slope = (sh * ff - fh * sf) / determinant;
     plane.forward_slope = (fh * ss - sh * sf) / determinant;
   } else if (ss + ff > 0.0) {
-    // All on one line: the slope along it, none across.
+    // All points are on one line: use the slope along it and none across.
     const bool is_along = ff >= ss;
     (is_along ? plane.forward_slope : plane.side_slope) = is_along ? fh / ff : sh / ss;
   }
@@ -122,7 +125,7 @@ Plane FitPlane(const SolePoints& points, double ball_height) {
 
 FootSupport SupportOf(const Terrain& terrain, double x, double z, double heading_rad,
                       const Sole& sole) {
-  // Forward is (sin, cos) in x and z, left is (cos, -sin).
+  // In (x, z), the forward direction is (sin, cos) and the left direction is (cos, -sin).
   const double sine = Sin(heading_rad);
   const double cosine = Cos(heading_rad);
   SolePoints points;

@@ -11,19 +11,21 @@
 namespace stridewire {
 namespace {
 
-// The index: as many cells as boxes at first, and finer while a cell holds more than a few.
+// The grid index starts with about as many cells as there are boxes. It is refined while a cell
+// holds more than kFewBoxes.
 constexpr std::int32_t kMaxIndexCellsPerAxis = 1024;
 constexpr std::size_t kFewBoxes = 16;
-constexpr double kMinIndexedM = 1e-6;  // Narrower grids have cells as if they were so wide.
+constexpr double kMinIndexedM = 1e-6;  // Smallest extent that cell sizes are computed from.
 constexpr std::size_t kMaxIndexEntries = std::size_t{4} << 20;
 
-constexpr std::size_t kMaxLocalBoxes = 32;  // Of LowestWithin; the header says so.
+// LowestWithin considers at most this many boxes. The header documents the number.
+constexpr std::size_t kMaxLocalBoxes = 32;
 
 bool IsWithin(double value, double limit) { return value >= -limit && value <= limit; }
 
 Status CheckPoint(const GroundPoint& point, const std::string& where) {
   if (IsWithin(point.x, kMaxTerrainPositionM) && IsWithin(point.z, kMaxTerrainPositionM)) return {};
-  return Fail(ErrorCode::kOutOfRange, "is not a number within 1000000 m", where);
+  return Fail(ErrorCode::kOutOfRange, "expected a number within 1000000 m", where);
 }
 
 Status CheckField(const HeightField& field) {
@@ -32,26 +34,26 @@ Status CheckField(const HeightField& field) {
   static_assert(kMaxTerrainHeightM == 1e4 && kMaxTerrainPositionM == 1e6);
   if (auto ok = CheckPoint(field.origin_m, "height_field.origin_m"); !ok) return ok;
   if (!(field.cell_m >= kMinTerrainCellM && field.cell_m <= kMaxTerrainCellM)) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 0.01 to 1000 m",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 0.01 to 1000 m",
                 std::string("height_field.cell_m"));
   }
   if (field.columns < 2 || field.columns > kMaxTerrainColumns) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 2 to 1024",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 2 to 1024",
                 std::string("height_field.columns"), field.columns);
   }
   if (field.rows < 2 || field.rows > kMaxTerrainRows) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number from 2 to 1024",
+    return Fail(ErrorCode::kOutOfRange, "expected a number from 2 to 1024",
                 std::string("height_field.rows"), field.rows);
   }
   if (field.heights_m.size() !=
       static_cast<std::size_t>(field.columns) * static_cast<std::size_t>(field.rows)) {
-    return Fail(ErrorCode::kShapeMismatch, "has not columns x rows numbers",
+    return Fail(ErrorCode::kShapeMismatch, "expected columns x rows numbers",
                 std::string("height_field.heights_m"),
                 static_cast<std::int64_t>(field.heights_m.size()));
   }
   for (std::size_t i = 0; i < field.heights_m.size(); ++i) {
     if (!IsWithin(static_cast<double>(field.heights_m[i]), kMaxTerrainHeightM)) {
-      return Fail(ErrorCode::kOutOfRange, "is not a number within 10000 m",
+      return Fail(ErrorCode::kOutOfRange, "expected a number within 10000 m",
                   "height_field.heights_m[" + std::to_string(i) + "]");
     }
   }
@@ -62,21 +64,21 @@ Status CheckBox(const TerrainBox& box, const std::string& where) {
   if (auto ok = CheckPoint(box.min_m, where + ".min_m"); !ok) return ok;
   if (auto ok = CheckPoint(box.max_m, where + ".max_m"); !ok) return ok;
   if (!(box.min_m.x < box.max_m.x && box.min_m.z < box.max_m.z)) {
-    return Fail(ErrorCode::kOutOfRange, "is not above min_m", where + ".max_m");
+    return Fail(ErrorCode::kOutOfRange, "expected values above min_m", where + ".max_m");
   }
   if (!IsWithin(box.height_m, kMaxTerrainHeightM)) {
-    return Fail(ErrorCode::kOutOfRange, "is not a number within 10000 m", where + ".height_m");
+    return Fail(ErrorCode::kOutOfRange, "expected a number within 10000 m", where + ".height_m");
   }
   return {};
 }
 
-/// Cell of a grid with `cells` cells, its ends for what lies beyond. `offset` may be infinite, not
-/// NaN.
+// Index of the cell that contains `offset`, clamped to [0, cells - 1]. `offset` may be infinite but
+// not NaN.
 std::int32_t CellOf(double offset, std::int32_t cells) {
   return static_cast<std::int32_t>(std::clamp(offset, 0.0, static_cast<double>(cells - 1)));
 }
 
-/// Where a cell stands in a list row by row.
+// Index of a cell in a row-major array.
 std::size_t CellIndex(std::int32_t column, std::int32_t row, std::int32_t columns) {
   return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
          static_cast<std::size_t>(column);
@@ -86,7 +88,7 @@ bool Contains(const TerrainBox& box, double x, double z) {
   return x >= box.min_m.x && x <= box.max_m.x && z >= box.min_m.z && z <= box.max_m.z;
 }
 
-/// Square of the distance from a point to a rectangle, 0 inside.
+// Squared distance from a point to a rectangle; 0 if the point is inside.
 double DistanceSquared(const GroundPoint& min, const GroundPoint& max, double x, double z) {
   const double dx = std::max({min.x - x, 0.0, x - max.x});
   const double dz = std::max({min.z - z, 0.0, z - max.z});
@@ -101,7 +103,7 @@ Expected<std::shared_ptr<const Terrain>> Terrain::Make(TerrainData data) {
     if (auto ok = CheckField(*data.height_field); !ok) return std::unexpected(ok.error());
   }
   if (data.boxes.size() > kMaxTerrainBoxes) {
-    return Fail(ErrorCode::kLimitExceeded, "holds more than 65536 boxes", std::string("boxes"));
+    return Fail(ErrorCode::kLimitExceeded, "expected at most 65536 boxes", std::string("boxes"));
   }
   for (std::size_t b = 0; b < data.boxes.size(); ++b) {
     if (auto ok = CheckBox(data.boxes[b], "boxes[" + std::to_string(b) + "]"); !ok) {
@@ -124,7 +126,8 @@ Status Terrain::IndexBoxes() {
     bounds_.min = {std::min(bounds_.min.x, box.min_m.x), std::min(bounds_.min.z, box.min_m.z)};
     bounds_.max = {std::max(bounds_.max.x, box.max_m.x), std::max(bounds_.max.z, box.max_m.z)};
   }
-  // Near-square cells, about as many as there are boxes; then finer as long as that helps.
+  // Start with nearly square cells, about as many as there are boxes. Halve them while the fullest
+  // cell gets emptier.
   const double width = std::max(bounds_.max.x - bounds_.min.x, kMinIndexedM);
   const double depth = std::max(bounds_.max.z - bounds_.min.z, kMinIndexedM);
   double cell = std::sqrt(width * depth / static_cast<double>(data_.boxes.size()));
@@ -133,8 +136,9 @@ Status Terrain::IndexBoxes() {
     const auto cells_x = 1 + CellOf(width / cell, kMaxIndexCellsPerAxis);
     const auto cells_z = 1 + CellOf(depth / cell, kMaxIndexCellsPerAxis);
     if (!TryIndex(cells_x, cells_z)) {
-      if (!starts_.empty()) break;  // The one before stays.
-      // Large boxes and many small ones; one cell is never too many.
+      if (!starts_.empty()) break;  // Keep the previous, coarser index.
+      // A mixture of large and many small boxes needs too many entries. Coarser cells need fewer,
+      // and a single cell always fits.
       is_coarser_needed = true;
       cell *= 2.0;
       continue;
@@ -151,7 +155,7 @@ Status Terrain::IndexBoxes() {
   for (std::size_t c = 0; c + 1 < starts_.size(); ++c) {
     static_assert(kMaxTerrainBoxesPerCell == 256);
     if (starts_[c + 1] - starts_[c] > kMaxTerrainBoxesPerCell) {
-      return Fail(ErrorCode::kLimitExceeded, "has more than 256 boxes over one another",
+      return Fail(ErrorCode::kLimitExceeded, "more than 256 boxes overlap in one place",
                   std::string("boxes"), static_cast<std::int64_t>(boxes_[starts_[c]]));
     }
   }
@@ -184,7 +188,7 @@ bool Terrain::TryIndex(std::int32_t cells_x, std::int32_t cells_z) {
   }
   std::partial_sum(starts.begin(), starts.end(), starts.begin());
 
-  // Filled in the order of heights, so that each cell has its highest first.
+  // Insert the boxes in the order of their heights, so that each cell lists its highest box first.
   std::vector<std::uint32_t> order(data_.boxes.size());
   std::iota(order.begin(), order.end(), 0u);
   std::sort(order.begin(), order.end(), [this](std::uint32_t a, std::uint32_t b) {
@@ -207,7 +211,7 @@ bool Terrain::TryIndex(std::int32_t cells_x, std::int32_t cells_z) {
 }
 
 Terrain::CellRange Terrain::IndexCells(const Rectangle& area) const {
-  // Monotonic in the coordinate, so a box and a point inside it always share a cell.
+  // The index is monotonic in the coordinate, so a box and a point inside it always share a cell.
   return {CellOf((area.min.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.max.x - bounds_.min.x) * cells_per_m_x_, cells_x_),
           CellOf((area.min.z - bounds_.min.z) * cells_per_m_z_, cells_z_),
@@ -226,7 +230,7 @@ void Terrain::VisitBoxes(const Rectangle& area, Visit&& visit) const {
       const auto cell = CellIndex(i, j, cells_x_);
       for (std::uint32_t e = starts_[cell]; e < starts_[cell + 1]; ++e) {
         const TerrainBox& box = data_.boxes[boxes_[e]];
-        // A box of several cells is visited in the first of them that is looked at.
+        // Visit a box that spans several cells only in the first of them that is in `range`.
         const CellRange own = IndexCells({box.min_m, box.max_m});
         if (std::max(own.first_x, range.first_x) == i &&
             std::max(own.first_z, range.first_z) == j) {
@@ -279,9 +283,10 @@ double Terrain::FieldHeight(double x, double z) const {
   return near * (1.0 - p.t) + far * p.t;
 }
 
-// `area` lies in the field. On an axis-parallel rectangle a bilinear patch has its extremes at the
-// corners, so it is enough to look at the corners of what each cell has of the area: the points of
-// a grid made of the area's own borders and the samples' lines between them.
+// `area` must be inside the field. A bilinear patch has its extremes over an axis-parallel
+// rectangle at the corners of that rectangle. So it suffices to sample the corners of the part of
+// `area` in each cell, that is, the points of the grid formed by the area's borders and the sample
+// lines between them.
 Terrain::Extremes Terrain::FieldExtremes(const Rectangle& area) const {
   const HeightField& field = *data_.height_field;
   const auto line = [&](double origin, std::int32_t l) { return origin + field.cell_m * l; };
@@ -360,9 +365,9 @@ double Terrain::HighestWithin(double x, double z, double radius) const {
   return highest;
 }
 
-// The borders of the boxes and of the field cut the square around the disc into rectangles; in each
-// of them the boxes' top is one number, and so the lowest of max(field, top) is
-// max(lowest of the field, top).
+// The borders of the boxes and of the field divide the square around the disc into rectangles. The
+// height of the highest box is constant in each rectangle. So the minimum of max(field, top) over a
+// rectangle is max(minimum of the field, top).
 double Terrain::LowestWithin(double x, double z, double radius) const {
   if (!(radius > 0.0) || !std::isfinite(x) || !std::isfinite(z)) return HeightAt(x, z);
   const Rectangle around{{x - radius, z - radius}, {x + radius, z + radius}};

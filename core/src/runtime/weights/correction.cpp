@@ -11,15 +11,18 @@ namespace stridewire {
 namespace {
 
 constexpr auto kMaxExamples = static_cast<std::size_t>(MotionLibrary::kMaxExamples);
-constexpr std::size_t kMaxRows = kMaxParameters + 1;  // of [J; 1]
-using Vector = std::array<double, kMaxRows>;          // metres; a radian is kMetresPerRadian
+constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
+using Vector = std::array<double, kMaxRows>;  // In metres; a radian counts kMetresPerRadian.
 using Matrix = std::array<Vector, kMaxRows>;
 
-constexpr double kLeastUse = 0.5;  // of the mean |w|
-constexpr double kMargin = 0.1;    // below the largest sum of |w|
-constexpr double kShrinkErrorM =
-    1e-4;                        // at smaller errors less: the weights follow the request smoothly
-constexpr double kRidge = 1e-9;  // of the trace: directions that no example spans
+// Every example may change by at least this fraction of the mean |w|.
+constexpr double kLeastUse = 0.5;
+// Weights start to shrink this far below the largest permitted sum of |w|.
+constexpr double kMargin = 0.1;
+// At errors below this, weights shrink less. Then they are a smooth function of the request.
+constexpr double kShrinkErrorM = 1e-4;
+// Ridge added to the diagonal, relative to the trace. It handles directions that no example spans.
+constexpr double kRidge = 1e-9;
 constexpr int kMaxHalvings = 3;
 
 double Sum(std::span<const double> values) {
@@ -34,7 +37,8 @@ double SumOfSizes(std::span<const double> values) {
   return sum;
 }
 
-// L L^T = matrix (Cholesky), L below the diagonal and on it; false if it is not positive definite.
+// Cholesky factorization L L^T = matrix. Stores L in the lower triangle, including the diagonal.
+// Returns false if the matrix is not positive definite.
 bool Factor(Matrix& matrix, std::size_t rows) {
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
@@ -62,10 +66,10 @@ void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
   }
 }
 
-// [J; 1], row by row, and its step.
+// Solves for one Gauss-Newton step of the weights (see CorrectWeights).
 class WeightStep {
  public:
-  // `slopes` [d][n]: J, metres.
+  // `slopes` is J, [d][n], in metres.
   WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
       : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
     least_use_ = kLeastUse * SumOfSizes(weights) / static_cast<double>(n_);
@@ -85,7 +89,8 @@ class WeightStep {
 
   [[nodiscard]] bool is_there() const { return is_there_; }
 
-  // Weights [n] that make up for `missing` and shrink by a share of themselves otherwise.
+  // Writes weights [n] that compensate for the error `missing`. The part of the weights that does
+  // not affect the parameters shrinks by the fraction `shrinking`.
   void To(const Vector& missing, double shrinking, std::span<double> out) const {
     Vector y = missing;
     y[rows_ - 1] = 1.0 - Sum(weights_);
@@ -100,7 +105,7 @@ class WeightStep {
       for (std::size_t a = 0; a < rows_; ++a) change += At(a, e) * y[a];
       out[e] = (1.0 - shrinking) * weights_[e] + Use(e) * change;
     }
-    const double left = (1.0 - Sum(out)) / uses_;  // by the ridge
+    const double left = (1.0 - Sum(out)) / uses_;  // Correct the sum, which the ridge changes.
     for (std::size_t e = 0; e < n_; ++e) out[e] += left * Use(e);
   }
 
@@ -143,7 +148,7 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   const std::size_t d = group.parameters.size();
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::span<double> weights = weight_scratch.first(n);
-  // Of which the first ones are touched.
+  // Only the first n elements of each are used.
   std::array<double, kMaxExamples> next_room;
   std::array<double, kMaxExamples> halved_room;
   std::array<double, kMaxParameters * kMaxExamples> slopes_room;
@@ -157,7 +162,7 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   EndPoses ends(skeleton, layout, group);
 
   struct Miss {
-    Vector missing{};  // p^ - a(w)
+    Vector missing{};  // p^ - a(w).
     double largest_m = 0.0;
   };
   const auto measure = [&](std::span<const double> w) {
@@ -190,7 +195,8 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
     if (size > most - kMargin) {
       step.To(best.missing, 1.0, halved);
       const double least = SumOfSizes(halved);
-      // Steps are linear in how much weights shrink, sums of |w| no more than that.
+      // The new weights depend linearly on how much they shrink, and the sum of |w| is convex. So
+      // linear interpolation finds a sufficient amount.
       const double shrinking = least < size
                                    ? std::min((size - most + kMargin) / (size - least), 1.0) *
                                          best.largest_m / (best.largest_m + kShrinkErrorM)

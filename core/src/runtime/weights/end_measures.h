@@ -5,16 +5,18 @@
 
 namespace stridewire {
 
-/// What is measured of a movement's first and last pose.
+/// Measurements of a movement's first and last pose. Feet are measured at their balls.
 struct EndMeasures {
-  DVec3
-      start_m;  ///< From the foot that stands to the one that moves, in the heading frame of the start
-  DVec3 end_m;     ///< The same of the end
-  DVec3 travel_m;  ///< How far the centre between the balls goes, in the heading frame of the start
+  /// Vector from the fixed foot to the moving foot in the first pose, in its heading frame.
+  DVec3 start_m;
+  /// Vector from the fixed foot to the moving foot in the last pose, in its heading frame.
+  DVec3 end_m;
+  /// Displacement of the centre between the balls, in the heading frame of the first pose.
+  DVec3 travel_m;
   double heading_change_rad;
 };
 
-/// The parameters of a group that these are.
+/// Converts the measurements to the parameters of a group.
 [[nodiscard]] inline ParameterValues ParametersOf(const MotionGroup& group,
                                                   const EndMeasures& ends) {
   ParameterValues measured;

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/weights/end_measures.h"
-#include "runtime/pose/pose_kernels.h"
 #include "base/trig.h"
+#include "runtime/pose/pose_kernels.h"
+#include "runtime/weights/end_measures.h"
 
 namespace stridewire {
 namespace {
@@ -18,10 +18,11 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 class EndPoses::Gradient {
  public:
-  // By the four parts of a joint's quaternion, or of the root behind them.
+  // Adds the derivative by the four components of a joint's quaternion. The joint index after the
+  // last one stands for the root's position and yaw.
   void Add(int joint, const DVec3& by_xyz, double by_w) {
     const auto j = static_cast<std::size_t>(joint);
-    // Chains share where they come from.
+    // The chains of the two legs share their first joints, so look for an existing entry.
     std::size_t i = 0;
     while (i < joint_count_ && joints_[i].joint != j) ++i;
     if (i == joint_count_) joints_[joint_count_++] = {j, {}};
@@ -31,7 +32,7 @@ class EndPoses::Gradient {
     parts.by[2] += by_xyz.z;
     parts.by[3] += by_w;
   }
-  // The change with an example's weight.
+  // The derivative by the weight of the example with this row.
   [[nodiscard]] double Of(const float* row) const {
     std::array<double, 4> sums{};
     for (std::size_t i = 0; i < joint_count_; ++i) {
@@ -96,13 +97,13 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
       DQuat blended(GridLayout::RotationOf(sum.data(), j));
       double norm = std::sqrt(glm::dot(blended, blended));
       link.per_norm = 1.0 / norm;
-      if (norm < kernels::kSmallestNorm) {  // as EvaluateBlend
+      if (norm < kernels::kSmallestNorm) {  // As in EvaluateBlend.
         const auto largest = static_cast<std::size_t>(
             std::max_element(movement.weights.begin(), movement.weights.end()) -
             movement.weights.begin());
         blended = DQuat(GridLayout::RotationOf(rows + largest * row_floats, j));
         norm = std::sqrt(glm::dot(blended, blended));
-        link.per_norm = 0.0;  // it changes as nothing says
+        link.per_norm = 0.0;  // This rotation does not depend on the weights smoothly.
       }
       link.rotation = blended * (1.0 / norm);
       link.arm = arm;
@@ -122,12 +123,16 @@ ParameterValues EndPoses::Measure() const {
                        .heading_change_rad = heading_change_rad_});
 }
 
-// How far a foot's ball goes `along` a direction of the world. From the root down: the direction in the axes of each
-// joint's parent, g, tells what the joint's own rotation does to it. With v the arm and R(q) v its end, q = (u, w),
+// Adds the derivative of the position of a foot's ball in the world direction `along`.
+//
+// Walks from the root to the ball. g is the direction in the axes of the parent of the current
+// joint. With the arm v (the vector from the joint to the ball) and the joint's rotation q = (u,
+// w), the rotated arm is
 //
 //   R(q) v = (w w - u u) v + 2 (u v) u + 2 w (u x v)
 //
-// and of its change with q what only makes q longer is taken off.
+// The part of its derivative that only changes the length of q is subtracted, because rotations are
+// normalized.
 void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
                            Gradient& gradient) const {
   const DVec3& arm = end.arms_m[foot];
@@ -154,7 +159,7 @@ void EndPoses::MeasureSlopes(std::span<double> slopes) const {
   const auto n = static_cast<std::size_t>(group_.example_count);
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
   const DVec3 apart = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1));
-  // Examples turn the frame that the end is told in.
+  // Changing the weights also rotates the heading frame in which the end is measured.
   const DVec3 by_heading(-apart.z, 0.0, apart.x);
   for (std::size_t l = 0; l < group_.parameters.size(); ++l) {
     const std::span<double> out = slopes.subspan(l * n, n);

@@ -5,6 +5,7 @@
 
 #include "runtime/weights/end_measures.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

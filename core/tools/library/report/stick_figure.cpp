@@ -5,6 +5,7 @@
 #include "gnuplot.h"
 #include "offline/build/parameter_scales.h"
 #include "runtime/weights/correction.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -5,8 +5,9 @@
 #include <vector>
 
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/movement_request.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 

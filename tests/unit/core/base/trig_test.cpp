@@ -8,7 +8,7 @@
 namespace stridewire {
 namespace {
 
-TEST(Trig, AgreesWithTheCLibrary) {
+TEST(Trig, MatchesTheCLibrary) {
   for (double x = -50.0; x <= 50.0; x += 0.000717) {
     ASSERT_NEAR(Sin(x), std::sin(x), 1e-15) << x;
     ASSERT_NEAR(Cos(x), std::cos(x), 1e-15) << x;
@@ -19,7 +19,7 @@ TEST(Trig, AgreesWithTheCLibrary) {
   for (double x = -1.0; x <= 1.0; x += 0.0000371) ASSERT_NEAR(Acos(x), std::acos(x), 2e-15) << x;
 }
 
-TEST(Trig, EdgesAreExact) {
+TEST(Trig, IsExactAtSpecialValues) {
   EXPECT_EQ(Sin(0.0), 0.0);
   EXPECT_EQ(Cos(0.0), 1.0);
   EXPECT_EQ(Atan2(0.0, 0.0), 0.0);

@@ -10,10 +10,10 @@
 #include "capture_files.h"
 #include "offline/builtin/builtin_library.h"
 #include "offline/extract/mirror.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/keytimes.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {

@@ -186,7 +186,7 @@ const BadText kBadTexts[] = {
     {R"({"terrain":[],"movements":[]})", ErrorCode::kMalformed,
      "c.json: terrain: expected an object"},
     {R"({"terrain":{"boxes":[{"min_m":[0,0],"max_m":[1,0],"height_m":0.5}]},"movements":[]})",
-     ErrorCode::kOutOfRange, "c.json: terrain.boxes[0].max_m: is not above min_m"},
+     ErrorCode::kOutOfRange, "c.json: terrain.boxes[0].max_m: expected values above min_m"},
     {R"({"start":[],"movements":[]})", ErrorCode::kMalformed, "c.json: start: expected an object"},
     {R"({"start":{"x":0},"movements":[]})", ErrorCode::kMalformed, "c.json: start.x: unknown key"},
     {R"({"start":{"position_m":[0,0]},"movements":[]})", ErrorCode::kMalformed,

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "runtime/skeleton/foot_vector.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {

@@ -13,6 +13,7 @@
 #include "runtime/weights/measure.h"
 #include "stridewire/offline/library_builder.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

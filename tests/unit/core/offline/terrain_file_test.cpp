@@ -53,7 +53,7 @@ const BadText kBadTerrains[] = {
     {R"({"boxes":[{"min_m":[0,0],"max_m":[1,1],"height_m":20000}]})", ErrorCode::kOutOfRange,
      "t.json: boxes[0].height_m: expected a number from -10000 to 10000 m"},
     {R"({"boxes":[{"min_m":[0,0],"max_m":[-1,1],"height_m":0}]})", ErrorCode::kOutOfRange,
-     "t.json: boxes[0].max_m: is not above min_m"},
+     "t.json: boxes[0].max_m: expected values above min_m"},
     {R"({"height_field":null})", ErrorCode::kMalformed, "t.json: height_field: expected an object"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":0,"columns":2,"rows":2,"heights_m":[0,0,0,0]}})",
      ErrorCode::kOutOfRange, "t.json: height_field.cell_m: expected a number from 0.01 to 1000 m"},

@@ -7,8 +7,9 @@
 
 #include "offline/builtin/builtin_library.h"
 #include "runtime/weights/measure.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 namespace {

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 #include <gtest/gtest.h>
 
@@ -6,9 +6,9 @@
 #include <limits>
 #include <vector>
 
+#include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 
 namespace stridewire {
@@ -22,7 +22,7 @@ class AvatarTest : public testing::Test {
     const Status status = avatar_.Enqueue({++last_id_, movement});
     ASSERT_TRUE(status.has_value()) << Describe(status.error());
   }
-  // Advances until idle, collecting events; fails after 60 s.
+  // Advances until the avatar is idle and collects the events. Fails after 60 s.
   std::vector<AvatarEvent> RunUntilIdle() {
     std::vector<AvatarEvent> all;
     for (int tick = 0; tick < 3600; ++tick) {
@@ -46,8 +46,8 @@ class AvatarTest : public testing::Test {
   std::uint64_t last_id_ = 0;
 };
 
-TEST_F(AvatarTest, StandsWhereItIsPut) {
-  // Planting bends the toy's straight legs a little.
+TEST_F(AvatarTest, StandsAtTheGivenBaseFrame) {
+  // Planting bends the straight legs of the test library a little.
   AvatarSimulation planted(library_, {{2.0, 1.0, -3.0}, M_PI / 2});
   EXPECT_NEAR(planted.pose().root_position_m.y, 1.9, 0.01);
   AvatarSimulation avatar(library_, {{2.0, 1.0, -3.0}, M_PI / 2}, {.foot_planting = false});
@@ -59,7 +59,7 @@ TEST_F(AvatarTest, StandsWhereItIsPut) {
   EXPECT_TRUE(avatar.idle());
 }
 
-TEST_F(AvatarTest, WalksAndClosesItsFeet) {
+TEST_F(AvatarTest, ClosesItsFeetAfterAWalk) {
   for (int i = 0; i < 4; ++i) Request(StepRequest{.length_m = 0.4});
   const auto events = RunUntilIdle();
   const auto started = Of(events, AvatarEventType::kStarted);
@@ -70,17 +70,18 @@ TEST_F(AvatarTest, WalksAndClosesItsFeet) {
   EXPECT_EQ(Of(events, AvatarEventType::kFootStrike).size(), 5u);
   EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), 5u);
   EXPECT_EQ(Of(events, AvatarEventType::kIdle).size(), 1u);
-  // (0 + .4)/2 + 3 * .4 + .4/2 of hip travel
+  // The hips travel (0 + .4)/2 + 3 * .4 + .4/2.
   EXPECT_NEAR(avatar_.base().position_m.z, 1.6, 0.03);
   EXPECT_NEAR(avatar_.base().position_m.x, 0.0, 1e-6);
   const DVec3 feet = FootVector(library_->skeleton(), avatar_.pose(), Foot::kLeft, 0.0);
   EXPECT_NEAR(feet.z, 0.0, 0.01);
 }
 
-TEST_F(AvatarTest, PoseIsContinuousThroughJoins) {
+TEST_F(AvatarTest, PoseIsContinuousBetweenMovements) {
   Request(StepRequest{.length_m = 0.5});
   Request(StepRequest{.length_m = 0.2});
-  Request(StepRequest{.foot = Foot::kRight, .length_m = 0.6});  // the same foot again: a wild join
+  // Stepping twice with the same foot makes a rough transition.
+  Request(StepRequest{.foot = Foot::kRight, .length_m = 0.6});
   Request(JumpRequest{.length_m = 1.0});
   const auto Copy = [](ConstPoseSpan from, Pose& to) {
     to.root_position_m = from.root_position_m;
@@ -98,11 +99,11 @@ TEST_F(AvatarTest, PoseIsContinuousThroughJoins) {
     Copy(avatar_.pose(), last);
     if (avatar_.idle()) break;
   }
-  EXPECT_LT(largest_rad, 0.03);  // 18 rad/s
+  EXPECT_LT(largest_rad, 0.03);  // 18 rad/s.
   EXPECT_LT(largest_m, 0.015f);
 }
 
-TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
+TEST_F(AvatarTest, ClosesItsFeetBeforeAJumpAndAStand) {
   Request(StepRequest{.length_m = 0.4});
   Request(JumpRequest{.length_m = 0.6});
   Request(StepRequest{.length_m = 0.4});
@@ -115,8 +116,8 @@ TEST_F(AvatarTest, ClosesBeforeAJumpAndAStand) {
   EXPECT_EQ(started[5].kind, MovementKind::kStand);
 }
 
-TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
-  // Ten equal steps last as long as their durations say, whatever the tick.
+TEST_F(AvatarTest, CarriesRemainingTimeToTheNextMovement) {
+  // Ten equal steps take as long as their durations, whatever the length of a tick.
   for (const double dt : {1.0 / 60.0, 1.0 / 37.0, 0.4}) {
     AvatarSimulation avatar(library_, {});
     for (int i = 0; i < 10; ++i) {
@@ -134,7 +135,7 @@ TEST_F(AvatarTest, CarriesTimeFromMovementToMovement) {
   }
 }
 
-TEST_F(AvatarTest, ClampsWhatTheExamplesDoNotSpanAndSaysSo) {
+TEST_F(AvatarTest, ReportsClampedAndExtrapolatedRequests) {
   Request(StepRequest{.length_m = 5.0});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
@@ -143,13 +144,13 @@ TEST_F(AvatarTest, ClampsWhatTheExamplesDoNotSpanAndSaysSo) {
   EXPECT_LT(started[0].applied.values[1], 0.7);
 }
 
-TEST_F(AvatarTest, ReportsWhatItsLibraryCannotDo) {
+TEST_F(AvatarTest, ReportsParametersThatTheLibraryLacks) {
   Request(StepRequest{.length_m = 0.3, .height_m = 0.2, .turn_rad = 0.5});
   const auto started = Of(RunUntilIdle(), AvatarEventType::kStarted);
   EXPECT_TRUE(started[0].clamped);
 }
 
-TEST_F(AvatarTest, ALongWalkStaysStraightAndLevel) {
+TEST_F(AvatarTest, LongWalkStaysStraightAndLevel) {
   for (int i = 0; i < 200; ++i) {
     Request(StepRequest{.length_m = 0.2 + 0.4 * ((i * 7) % 11) / 10.0});
   }
@@ -167,7 +168,7 @@ TEST_F(AvatarTest, ALongWalkStaysStraightAndLevel) {
   EXPECT_LT(highest, 0.92f);
 }
 
-TEST_F(AvatarTest, BadRequestsAreRefused) {
+TEST_F(AvatarTest, RejectsInvalidRequests) {
   const auto code = [&](decltype(MovementRequest::movement) movement) {
     const Status status = avatar_.Enqueue({1, movement});
     return status ? "none" : std::string(ErrorCodeName(status.error().code));
@@ -189,19 +190,20 @@ TEST_F(AvatarTest, QueueIsBounded) {
   const Status status = avatar_.Enqueue({1, StandRequest{}});
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kLimitExceeded);
-  // A thousand empty stands in one tick must not outrun the event list.
+  // A thousand stands of 0 s in one tick must not overflow the event list.
   const auto events = RunUntilIdle();
-  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(), std::size_t{AvatarSimulation::kMaxQueue});
+  EXPECT_EQ(Of(events, AvatarEventType::kFinished).size(),
+            std::size_t{AvatarSimulation::kMaxQueue});
 }
 
-TEST_F(AvatarTest, CancelDropsOnlyWhatHasNotStarted) {
+TEST_F(AvatarTest, CancelQueueKeepsTheCurrentMovement) {
   for (int i = 0; i < 5; ++i) Request(StepRequest{.length_m = 0.4});
   avatar_.Advance(kTickS);
   EXPECT_EQ(avatar_.CancelQueue(), 4);
   EXPECT_EQ(Of(RunUntilIdle(), AvatarEventType::kFinished).size(), 2u);
 }
 
-TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
+TEST_F(AvatarTest, RejectsKindsThatTheLibraryLacks) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   raw.groups.pop_back();
@@ -220,7 +222,7 @@ TEST_F(AvatarTest, LibraryWithoutAKindRefusesIt) {
   EXPECT_TRUE(avatar.idle());
 }
 
-TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
+TEST_F(AvatarTest, StartDelayAppliesOnlyWhileStanding) {
   const auto ticks_until = [&](auto is_so) {
     int ticks = 0;
     for (; ticks < 1000 && !is_so(); ++ticks) avatar_.Advance(kTickS);
@@ -230,10 +232,11 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
     return avatar_.started() != nullptr && avatar_.started()->request_id == id;
   };
   const auto ask = [&](std::uint64_t id, int delay_ticks, Interrupt interrupt = Interrupt::kNone) {
-    EXPECT_TRUE(avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, delay_ticks * kTickS));
+    EXPECT_TRUE(
+        avatar_.Enqueue({id, StepRequest{.length_m = 0.4}, interrupt}, delay_ticks * kTickS));
   };
   ask(1, 5);
-  ask(2, 100);  // goes on from the one before: not held
+  ask(2, 100);  // It follows another movement, so it is not delayed.
   EXPECT_EQ(ticks_until([&] { return begun(1); }), 6);
   const double duration_s = avatar_.movement()->duration_s();
   EXPECT_NEAR(ticks_until([&] { return begun(2); }) * kTickS, duration_s, 2 * kTickS);
@@ -241,7 +244,7 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   EXPECT_LT(ticks_until([&] { return begun(3); }), 90);
   ticks_until([&] { return avatar_.idle(); });
 
-  // Asked again and again it does not wait for ever, and a smaller command is not held by a larger one.
+  // Repeating the request does not extend its delay, and a shorter delay replaces a longer one.
   ask(4, 10, Interrupt::kNow);
   for (int i = 0; i < 5; ++i) avatar_.Advance(kTickS);
   ask(5, 10, Interrupt::kNow);
@@ -251,14 +254,15 @@ TEST_F(AvatarTest, AHeldRequestWaitsForAStandOnly) {
   ask(7, 0, Interrupt::kNow);
   EXPECT_EQ(ticks_until([&] { return begun(7); }), 1);
 
-  // Who moves is not taken over before.
+  // The current movement is not interrupted before the delay has passed.
   avatar_.Advance(kTickS);
   ask(8, 4, Interrupt::kNow);
   EXPECT_EQ(ticks_until([&] { return begun(8); }), 5);
 }
 
-// Its feet can not be planted: they are where the blend has them. Under sanitizers nothing is read that is not.
-TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
+// The feet of this library cannot be planted, so they stay where the blend puts them. Under
+// sanitizers, the test also checks that no uninitialized data is read.
+TEST_F(AvatarTest, DoesNotPlantFeetIfTheLegsShareAnAnkle) {
   RawLibrary raw = MakeTestRawLibrary();
   raw.skeleton.legs[0].ankle = raw.skeleton.legs[1].ankle;
   LibraryBuilder builder;
@@ -275,8 +279,9 @@ TEST_F(AvatarTest, AnAnkleOfAnotherLegIsNotPlanted) {
   EXPECT_GT(avatar.pose().root_position_m.z, 0.1f);
 }
 
-// Quiet is who goes on walking: what ends that is told at once, what happens never while it lasts.
-TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
+// A moving avatar is event-free between its events. A request that changes the current movement
+// ends that at once, and no event may occur while the avatar is event-free.
+TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
   const auto library = OpenLibrary("builtin").value();
   AvatarSimulation avatar(library, {});
   EXPECT_FALSE(avatar.is_event_free());
@@ -310,7 +315,7 @@ TEST(Avatar, IsQuietOnlyWhileNothingHappens) {
   };
   for (int tick = 0; tick < 100; ++tick) advance();
   EXPECT_GT(quiet, 60);
-  EXPECT_GE(eventful, 4);  // two steps started, two feet struck
+  EXPECT_GE(eventful, 4);  // Two steps start and two feet land.
 
   walk_on();
   ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{}, .interrupt = Interrupt::kNow}));

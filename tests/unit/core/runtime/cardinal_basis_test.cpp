@@ -17,7 +17,7 @@ double Sum(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
-TEST(CubicBSpline, IsTwiceContinuous) {
+TEST(CubicBSpline, HasContinuousSecondDerivative) {
   const double h = 1e-4;
   for (const double knot : {1.0, 2.0}) {
     EXPECT_NEAR(CubicBSpline(knot - 1e-12), CubicBSpline(knot + 1e-12), 1e-10);
@@ -32,10 +32,10 @@ TEST(CubicBSpline, IsTwiceContinuous) {
   EXPECT_EQ(CubicBSpline(7.0), 0.0);
 }
 
-// Random sets in 1 to 7 dimensions: what the method promises of the weights everywhere.
+// Random sites in 1 to 7 dimensions.
 class RandomSites : public testing::TestWithParam<int> {};
 
-TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
+TEST_P(RandomSites, WeightsSumToOneAndReproduceTheExamples) {
   const auto d = static_cast<std::size_t>(GetParam());
   const unsigned seed = 7000 + static_cast<unsigned>(GetParam());
   std::mt19937 random(seed);
@@ -46,7 +46,7 @@ TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
     for (double& value : sites) value = 5.0 + 0.4 * coordinate(random);
     const auto fit =
         CardinalBasisFit{static_cast<int>(d), static_cast<int>(n), sites, {}, scales}.Run();
-    if (!fit) {  // in 1-D, 60 random sites may touch
+    if (!fit) {  // In one dimension, two of 60 random sites may be too close.
       ASSERT_EQ(fit.error().code, ErrorCode::kIllConditioned);
       ASSERT_EQ(d, 1u);
       continue;
@@ -60,7 +60,8 @@ TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
     }
     for (int sample = 0; sample < 300; ++sample) {
       std::vector<double> p(d);
-      for (double& value : p) value = 5.0 + 0.8 * coordinate(random);  // also far outside
+      // Also far outside the sites.
+      for (double& value : p) value = 5.0 + 0.8 * coordinate(random);
       EvaluateWeights(View(*fit), p, weights);
       ASSERT_NEAR(Sum(weights), 1.0, 1e-9) << "seed " << seed << " n " << n;
       if (n < d + 2) continue;
@@ -75,8 +76,9 @@ TEST_P(RandomSites, SumToOneAndAreOneHotAndReproduceParameters) {
 
 INSTANTIATE_TEST_SUITE_P(Dimensions, RandomSites, testing::Range(1, 8));
 
-TEST(CardinalBasis, SumsToOneUnderRankDeficiencyBecauseParametersAreCentred) {
-  // All sites on a line far from the origin: the uncentred fit errs by 0.2 here (method).
+TEST(CardinalBasis, WeightsSumToOneUnderRankDeficiency) {
+  // All sites are on a line far from the origin. Without centred parameters, the sum of the weights
+  // would be off by 0.2.
   std::vector<double> sites;
   for (int i = 0; i < 6; ++i) sites.insert(sites.end(), {3.0 + 0.1 * i, 7.0 - 0.2 * i});
   const auto fit = CardinalBasisFit{2, 6, sites, {}, std::vector<double>{1.0, 1.0}}.Run();
@@ -88,8 +90,8 @@ TEST(CardinalBasis, SumsToOneUnderRankDeficiencyBecauseParametersAreCentred) {
   }
 }
 
-TEST(CardinalBasis, IsDense) {
-  // The paper calls most weights zero; the linear part makes them dense.
+TEST(CardinalBasis, UsesAllExamplesBetweenSites) {
+  // The paper says that most weights are zero. With the linear part they are not.
   std::vector<double> sites;
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j < 4; ++j) {
@@ -118,7 +120,7 @@ TEST(CardinalBasis, IsDense) {
   EXPECT_LT(largest_sum, 2.5);
 }
 
-TEST(CardinalBasis, PseudoexamplesReceiveTheirWeights) {
+TEST(CardinalBasis, ReproducesTheWeightsOfPseudoexamples) {
   const std::vector<double> sites = {0.0, 1.0, 2.0, 0.6};
   const std::vector<double> pseudo = {0.5, 0.3, 0.2};
   const auto fit = CardinalBasisFit{1, 3, sites, pseudo, std::vector<double>{1.0}}.Run();
@@ -132,7 +134,7 @@ TEST(CardinalBasis, PseudoexamplesReceiveTheirWeights) {
   }
 }
 
-TEST(CardinalBasis, BadInputIsAnswered) {
+TEST(CardinalBasis, RejectsInvalidInput) {
   const std::vector<double> scale = {1.0};
   const auto code = [&](std::vector<double> sites, int n, std::vector<double> scales) {
     const auto fit = CardinalBasisFit{1, n, sites, {}, scales}.Run();

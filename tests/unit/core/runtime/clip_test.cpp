@@ -13,14 +13,16 @@ Quat AxisAngle(const Vec3& axis, double angle_rad) {
   return glm::angleAxis(static_cast<float>(angle_rad), glm::normalize(axis));
 }
 
-// A smooth motion known at every time: two joints turning at changing speed, a root on a curve.
+// A smooth motion with a known value at every time: two joints rotate at varying speeds and the
+// root follows a curve.
 Vec3 RootAt(double t) {
   return Vec3(static_cast<float>(std::sin(2.0 * t)),
               static_cast<float>(0.9 + 0.05 * std::cos(5 * t)), static_cast<float>(1.2 * t));
 }
 Quat RotationAt(int joint, double t) {
   return joint == 0 ? AxisAngle(Vec3(0, 1, 0), 0.8 * std::sin(1.5 * t))
-                    : AxisAngle(Vec3(1, 0.2f, 0), 4.0 * t);  // Passes half a turn: signs matter.
+                    // Passes half a turn, so the signs of quaternions matter.
+                    : AxisAngle(Vec3(1, 0.2f, 0), 4.0 * t);
 }
 
 double LargestAngle(const ConstPoseSpan& a, const ConstPoseSpan& b) {
@@ -43,7 +45,7 @@ Clip MakeClip(double fps, int frames) {
   return clip;
 }
 
-TEST(Clip, ValidateNamesWhatIsWrong) {
+TEST(Clip, ValidateReportsEveryError) {
   const Clip good = MakeClip(30.0, 10);
   EXPECT_TRUE(good.Validate().has_value());
 
@@ -79,7 +81,7 @@ TEST(Clip, ValidateNamesWhatIsWrong) {
   EXPECT_TRUE(long_rotation.Validate().has_value());
 }
 
-TEST(Clip, SignsBecomeContinuousAndRotationsStay) {
+TEST(Clip, MakeSignContinuousKeepsRotations) {
   const std::uint64_t seed = std::random_device{}();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
   std::mt19937_64 random(seed);
@@ -100,7 +102,7 @@ TEST(Clip, SignsBecomeContinuousAndRotationsStay) {
   }
 }
 
-TEST(SampleClip, AtASampleGivesTheSample) {
+TEST(SampleClip, ReturnsSamplesUnchanged) {
   const Clip clip = MakeClip(120.0, 50);
   Pose pose(2);
   for (int f = 0; f < 50; ++f) {
@@ -112,7 +114,7 @@ TEST(SampleClip, AtASampleGivesTheSample) {
   }
 }
 
-TEST(SampleClip, FollowsASmoothMotionBetweenSamples) {
+TEST(SampleClip, InterpolatesSmoothMotion) {
   const Clip clip = MakeClip(30.0, 60);
   Pose pose(2);
   double worst_m = 0.0;
@@ -126,15 +128,15 @@ TEST(SampleClip, FollowsASmoothMotionBetweenSamples) {
       worst_rad = std::max(worst_rad, AngleBetween(q, RotationAt(j, t)));
     }
   }
-  // Linear interpolation would miss by a h^2 / 8: 0.7 mm at 5 m/s^2. Inside, the cubic misses by
-  // terms in h^3; the two end intervals know one neighbour less and miss by some h^2.
+  // Linear interpolation would be off by a h^2 / 8, which is 0.7 mm at 5 m/s^2. The error of the
+  // cubic is of order h^3, except in the first and last interval, where it is of order h^2.
   EXPECT_LT(worst_m, 0.6e-3);
   EXPECT_LT(worst_rad, 1e-3);
 }
 
-TEST(SampleClip, VelocityHasNoStepsAtSamples) {
+TEST(SampleClip, HasContinuousVelocityAtSamples) {
   Clip clip = MakeClip(30.0, 40);
-  // Uneven data, so that a piecewise linear reading would kink clearly; random signs as well.
+  // Irregular data, for which linear interpolation would have clear kinks, with random signs.
   std::mt19937_64 random(11);
   std::uniform_real_distribution<double> noise(-0.05, 0.05);
   for (int f = 0; f < 40; ++f) {
@@ -166,13 +168,13 @@ TEST(SampleClip, VelocityHasNoStepsAtSamples) {
     linear_kink = std::max(linear_kink, std::fabs(30.0 * (x(f + 1) - 2.0 * x(f) + x(f - 1))));
   }
   EXPECT_GT(linear_kink, 2.0);
-  // What is left is acceleration times h: second differences of 0.2 m over (1/30 s)^2 make some
-  // hundred m/s^2.
+  // The remaining step in velocity is the acceleration times h. Second differences of 0.2 m over
+  // (1/30 s)^2 are some hundred m/s^2.
   EXPECT_LT(largest_kink, 0.35 * linear_kink);
   EXPECT_LT(largest_spin_kink, 1.0);
 }
 
-TEST(SampleClip, ClampsTimeAndTakesOneFrame) {
+TEST(SampleClip, ClampsTimeAndAcceptsASingleFrame) {
   const Clip clip = MakeClip(30.0, 10);
   Pose pose(2);
   for (const double t : {-1.0, -std::numeric_limits<double>::infinity(), std::nan("")}) {

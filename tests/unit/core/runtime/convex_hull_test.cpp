@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-TEST(ConvexHull, LeavesPointsInsideAlone) {
+TEST(ConvexHull, KeepsPointsInside) {
   const std::vector<double> square = {0, 0, 1, 0, 1, 1, 0, 1};
   std::array<double, 2> nearest{};
   EXPECT_EQ(ProjectOntoHull(square, std::array{1.0, 1.0}, 0.0, std::array{0.3, 0.8}, nearest), 0.0);
@@ -37,7 +37,7 @@ TEST(ConvexHull, GrowsAboutTheMean) {
   EXPECT_NEAR(nearest[0], 2.1, 1e-12);
 }
 
-TEST(ConvexHull, OnePointAndRepeatedPointsAreFine) {
+TEST(ConvexHull, AcceptsSingleAndRepeatedPoints) {
   std::array<double, 3> nearest{};
   const std::vector<double> point = {1.0, 2.0, 3.0};
   EXPECT_NEAR(
@@ -49,9 +49,9 @@ TEST(ConvexHull, OnePointAndRepeatedPointsAreFine) {
       2.0, 1e-12);
 }
 
-// Optimality in any dimension: no vertex lies further towards the target than the answer
-// (for the nearest point x of a convex set, (v - x) . (target - x) <= 0 for every v).
-TEST(ConvexHull, MeetsTheOptimalityCondition) {
+// Checks the optimality condition in any dimension: for the nearest point x of a convex set, (v -
+// x) . (target - x) <= 0 holds for every vertex v.
+TEST(ConvexHull, SatisfiesTheOptimalityCondition) {
   const unsigned seed = 5150;
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;

@@ -12,16 +12,17 @@
 #include "counted_memory.h"
 #include "distorted_library.h"
 #include "runtime/weights/end_poses.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/terrain/foot_support.h"
 #include "runtime/weights/measure.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
 
-// Everything a correction needs besides a library.
+// Scratch objects for corrections and measurements.
 struct Scratch {
   explicit Scratch(const MotionLibrary& library)
       : weights(static_cast<std::size_t>(library.max_example_count())),
@@ -33,7 +34,7 @@ struct Scratch {
                      const CorrectionLimits& limits) {
     return CorrectWeights(library, 0, wanted, limits, weights, movement);
   }
-  // A movement of these parameters, measured as anybody would.
+  // Measures a movement with these parameters independently of the correction.
   ParameterValues Measure(const MotionLibrary& library, const ParameterValues& parameters,
                           int group = 0) {
     StartMovement(library.group(group), group,
@@ -41,13 +42,14 @@ struct Scratch {
                   {}, weights, movement);
     return MeasureAsIs(library);
   }
-  // The movement as it is, measured as anybody would.
+  // Measures the current movement independently of the correction.
   ParameterValues MeasureAsIs(const MotionLibrary& library) {
     cache.Clear();
     return MeasureMovement(library, movement, cache, pose);
   }
-  // How far that may be from what is measured without poses, metres: theirs are floats, and too few examples may
-  // have weights of a thousand that place the root a hundred metres from where they do together.
+  // Largest difference in metres between two ways to measure, due to rounding. Poses are floats.
+  // With few examples, weights may reach a thousand, and then single terms place the root a hundred
+  // metres away from their sum.
   double RoundingM(const MotionGroup& group, const GridLayout& layout) {
     double far_m = 0.0;
     for (const int point : {0, group.grid_point_count - 1}) {
@@ -72,7 +74,7 @@ std::uint32_t Seed() { return std::random_device{}(); }
 
 class InDimensions : public testing::TestWithParam<int> {};
 
-TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
+TEST_P(InDimensions, ReachesRequestsInsideTheHull) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -91,28 +93,29 @@ TEST_P(InDimensions, ReachesWhatIsAskedInsideTheHull) {
       EXPECT_NEAR(correction.initial_error_m, miss_m, 1e-6);
       EXPECT_LE(correction.iterations, d <= 2 ? 3 : 8);
       EXPECT_LT(correction.error_m, 1e-4) << "library " << l << " point " << i;
-      // What it says is what is measured.
+      // The reported parameters are those that are measured.
       EXPECT_NEAR(LargestDifference(group, wanted, scratch.MeasureAsIs(*library)),
                   correction.error_m, 1e-6);
       EXPECT_EQ(scratch.movement.parameters.values, wanted.values);
       EXPECT_LT(scratch.Correct(*library, wanted, {.max_iterations = 3}).error_m, 1e-3);
     }
   }
-  // Else nothing was there to correct: of 600 random libraries one misses by 0.09 mm at most, four in a row do not.
+  // If all errors were smaller, nothing would have been corrected. One in 600 random libraries has
+  // errors below 0.09 mm, but not four in a row.
   EXPECT_GT(largest_m, 1e-4);
 }
 
-TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
+TEST_P(InDimensions, NeverIncreasesTheErrorAndKeepsWeightsBounded) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
-  // Too few examples for the parameters, so that much cannot be reached.
+  // There are too few examples for the parameters, so many requests cannot be reached.
   const auto library = MakeDistortedLibrary(d, d + 1, 0.7, seed);
   const MotionGroup& group = library->group(0);
   std::mt19937 random(seed);
   Scratch scratch(*library);
   for (int i = 0; i < 200; ++i) {
-    // Outside the hull as well, far beyond what requests are clamped to.
+    // Also try parameters outside the hull, far beyond the limit for requests.
     ParameterValues wanted = PointInHull(group, random);
     for (std::size_t l = 0; l < group.parameters.size(); ++l) {
       const Parameter& parameter = group.parameters[l];
@@ -130,8 +133,8 @@ TEST_P(InDimensions, IsNeverWorseThanNoneAndKeepsItsBounds) {
   }
 }
 
-// J is what differences say, at weights that are a blend and beyond the hull.
-TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
+// Compares J with finite differences, at blended weights inside and outside the hull.
+TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -151,7 +154,7 @@ TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
     ends.Blend(scratch.movement);
     ends.MeasureSlopes(slopes);
     for (std::size_t e = 1; e < n; ++e) {
-      // From the first example to this one: the sum stays.
+      // Move weight from the first example to this one, which keeps the sum.
       const auto measured = [&](double by) {
         std::vector<double> w = weights;
         w[e] += by;
@@ -170,8 +173,8 @@ TEST_P(InDimensions, SlopesAreWhatDifferencesSay) {
   }
 }
 
-// Requests next to each other get weights next to each other, wherever they lie.
-TEST_P(InDimensions, IsContinuousInWhatIsAsked) {
+// Similar requests must result in similar weights, everywhere.
+TEST_P(InDimensions, IsContinuousInTheRequest) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -212,7 +215,7 @@ TEST_P(InDimensions, IsContinuousInWhatIsAsked) {
 
 INSTANTIATE_TEST_SUITE_P(Correction, InDimensions, testing::Range(1, 8));
 
-TEST(Correction, WithoutIterationsChangesNothing) {
+TEST(Correction, ChangesNothingWithoutIterations) {
   const auto library = MakeDistortedLibrary(3, 20, 0.6, 5);
   std::mt19937 random(1);
   Scratch scratch(*library);
@@ -226,7 +229,7 @@ TEST(Correction, WithoutIterationsChangesNothing) {
   EXPECT_EQ(correction.iterations, 0);
 }
 
-TEST(Correction, LeavesAnExampleAlone) {
+TEST(Correction, KeepsTheWeightsOfAnExample) {
   const auto library = MakeDistortedLibrary(4, 30, 0.6, 6);
   Scratch scratch(*library);
   const MotionGroup& group = library->group(0);
@@ -252,7 +255,7 @@ TEST(Correction, NeverAllocates) {
   EXPECT_GT(correction.iterations, 1);
 }
 
-TEST(Terrain, NeverAllocatesWhenAsked) {
+TEST(Terrain, QueriesDoNotAllocate) {
   TerrainData data;
   data.height_field = HeightField{{-1, -1}, 0.5, 3, 3, {0, 1, 0, 1, 0, 1, 0, 1, 0}};
   for (int b = 0; b < 100; ++b) data.boxes.push_back({{0.1 * b, 0}, {0.1 * b + 0.2, 1}, 0.01 * b});
@@ -270,8 +273,9 @@ TEST(Terrain, NeverAllocatesWhenAsked) {
   EXPECT_GT(sum, 0.0);
 }
 
-// Where a movement starts has no part in its weights: a client that evaluates it far away gets the same.
-TEST(Correction, IsTheSameWhereverAnAvatarStands) {
+// The weights of a movement must not depend on its base frame. A client that evaluates the movement
+// elsewhere must get the same weights.
+TEST(Correction, DoesNotDependOnTheBaseFrame) {
   const auto library = MakeTestLibrary();
   const auto weights = [&](const BaseFrame& start) {
     AvatarSimulation avatar(library, start);
@@ -283,7 +287,7 @@ TEST(Correction, IsTheSameWhereverAnAvatarStands) {
   EXPECT_EQ(weights({}), weights({{1.0, 2.0, 3.0}, 0.0}));
 }
 
-TEST(Correction, AvatarsStepAsFarAsAppliedUnlessToldNotTo) {
+TEST(Correction, CanBeDisabledForAnAvatar) {
   const auto library = MakeTestLibrary();
   for (const bool corrected : {true, false}) {
     AvatarSimulation avatar(library, {}, {.run_time_correction = corrected});

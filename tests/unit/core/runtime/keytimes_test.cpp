@@ -1,4 +1,4 @@
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 const std::vector<double> kKeytimes = {0.0, 0.1, 0.45, 0.5};
 
-TEST(Keytimes, GenericTimeIsEquation3) {
+TEST(Keytimes, GenericTimeMatchesEquation3) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.0), 0.0);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.05), 0.5);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.1), 1.0);
@@ -19,25 +19,25 @@ TEST(Keytimes, GenericTimeIsEquation3) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 0.5), 3.0) << "t = K_n, which Eq. (3) leaves out";
 }
 
-TEST(Keytimes, TimesOutsideAreClamped) {
+TEST(Keytimes, ClampsTimesOutside) {
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, -1.0), 0.0);
   EXPECT_DOUBLE_EQ(GenericTime(kKeytimes, 9.0), 3.0);
   EXPECT_DOUBLE_EQ(TimeAtGenericTime(kKeytimes, -1.0), 0.0);
   EXPECT_DOUBLE_EQ(TimeAtGenericTime(kKeytimes, 9.0), 0.5);
 }
 
-TEST(Keytimes, OfEmptyIntervalsTheLastOneWins) {
+TEST(Keytimes, UsesTheLastOfSeveralEmptyIntervals) {
   const std::vector<double> keytimes = {0.0, 0.2, 0.2, 0.4};
   EXPECT_DOUBLE_EQ(GenericTime(keytimes, 0.2), 2.0);
 }
 
-TEST(Keytimes, InverseUndoesGenericTime) {
+TEST(Keytimes, TimeAtGenericTimeIsTheInverse) {
   for (double t = 0.0; t <= 0.5; t += 0.001) {
     EXPECT_NEAR(TimeAtGenericTime(kKeytimes, GenericTime(kKeytimes, t)), t, 1e-12);
   }
 }
 
-TEST(Keytimes, InvalidOnesAreRejected) {
+TEST(Keytimes, RejectsInvalidKeytimes) {
   EXPECT_TRUE(ValidateKeytimes(kKeytimes).has_value());
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>{0.0}).has_value());
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>(kMaxIntervals + 2, 0.0)).has_value());
@@ -48,7 +48,7 @@ TEST(Keytimes, InvalidOnesAreRejected) {
   EXPECT_FALSE(ValidateKeytimes(std::vector<double>{0.0, NAN}).has_value());
 }
 
-TEST(BlendKeytimes, AtAnExampleGivesItsKeytimes) {
+TEST(BlendKeytimes, ReproducesTheKeytimesOfAnExample) {
   const std::vector<double> examples = {0.0, 0.1, 0.5, 0.6, 0.0, 0.2, 0.7, 1.0};
   std::vector<double> out(4);
   BlendKeytimes(examples, std::vector<float>{0.0f, 1.0f}, out);
@@ -56,7 +56,8 @@ TEST(BlendKeytimes, AtAnExampleGivesItsKeytimes) {
 }
 
 TEST(BlendKeytimes, StaysIncreasingUnderNegativeWeights) {
-  // Random sets and weights far outside the hull: sum w K alone turns negative (method: -45 ms).
+  // Random keytimes and weights far outside the hull, for which sum w K alone decreases (by 45 ms
+  // in the paper's method).
   const unsigned seed = 20261;
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> length(0.03, 0.6);
@@ -95,7 +96,7 @@ class TimeWarpTest : public testing::Test {
   const TimeWarp warp_{kKeytimes, cells_};
 };
 
-TEST_F(TimeWarpTest, KeytimesFallOnGridPoints) {
+TEST_F(TimeWarpTest, MapsKeytimesToGridPoints) {
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.0), 0.0);
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.1), 3.0);
   EXPECT_DOUBLE_EQ(warp_.GridPosition(0.45), 13.0);
@@ -111,7 +112,8 @@ TEST_F(TimeWarpTest, IsMonotoneAndContinuousInVelocity) {
     const double u = warp_.GridPosition(t);
     ASSERT_GE(u, last);
     const double rate = (warp_.GridPosition(t + h) - warp_.GridPosition(t)) / h;
-    // The piecewise linear map jumps from 30 to 28.6 to 40 cells a second within one step here.
+    // The piecewise linear map would jump from 30 to 28.6 to 40 cells per second within one step
+    // here.
     if (!std::isnan(last_rate)) {
       ASSERT_NEAR(rate, last_rate, 0.1) << t;
     }
@@ -120,14 +122,15 @@ TEST_F(TimeWarpTest, IsMonotoneAndContinuousInVelocity) {
   }
 }
 
-TEST_F(TimeWarpTest, InverseUndoesIt) {
+TEST_F(TimeWarpTest, TimeAtIsTheInverse) {
   for (double u = 0.0; u <= 15.0; u += 0.01) {
     ASSERT_NEAR(warp_.GridPosition(warp_.TimeAt(u)), u, 1e-9);
   }
 }
 
-TEST(TimeWarp, StaysNearTheLinearMap) {
-  // Step keytimes whose interval rates differ by a factor of 4, as when blending 0.51 and 0.90 s.
+TEST(TimeWarp, StaysCloseToTheLinearMap) {
+  // Keytimes of a step whose intervals differ in rate by a factor of 4, as when blending steps of
+  // 0.51 s and 0.90 s.
   const std::vector<double> keytimes = {0.0, 0.12, 0.55, 0.62};
   const std::vector<int> cells = {2, 13, 2};
   const TimeWarp warp(keytimes, cells);

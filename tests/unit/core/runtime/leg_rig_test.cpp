@@ -1,6 +1,6 @@
-// Inverse kinematics of a leg against forward kinematics, for any target a leg reaches.
+// Compares the inverse kinematics of a leg with its forward kinematics for random targets in reach.
 
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 #include <gtest/gtest.h>
 
@@ -31,7 +31,7 @@ class SolveLegTest : public testing::Test {
 };
 using SolveLegs = SolveLegTest;
 
-TEST_F(SolveLegs, PutsTheAnkleWhereItIsAskedFor) {
+TEST_F(SolveLegs, MovesTheAnkleToTheTarget) {
   ASSERT_TRUE(rig_.is_usable);
   int reached = 0;
   for (int i = 0; i < 2000; ++i) {
@@ -62,7 +62,7 @@ TEST_F(SolveLegs, PutsTheAnkleWhereItIsAskedFor) {
       EXPECT_LT(glm::length(glm::cross(glm::normalize(at - hip), Vec3(away))), 1e-3f);
     }
     EXPECT_LT(AngleBetween(solved.world_rotations[ankle], rotation), 1e-3);
-    // Bones keep their lengths, and other joints their rotations.
+    // Bones must keep their lengths, and other joints their rotations.
     EXPECT_NEAR(glm::length(solved.positions_m[knee] - hip), side.thigh_m, 1e-5);
     EXPECT_NEAR(glm::length(at - solved.positions_m[knee]), side.shank_m, 1e-5);
     for (const Quat& local : pose.rotations) EXPECT_NEAR(Dot(local, local), 1.0f, 1e-5f);
@@ -70,12 +70,12 @@ TEST_F(SolveLegs, PutsTheAnkleWhereItIsAskedFor) {
   EXPECT_GT(reached, 1000);
 }
 
-TEST_F(SolveLegs, LeavesALegAloneThatIsThere) {
+TEST_F(SolveLegs, KeepsALegThatIsAtItsTarget) {
   for (int i = 0; i < 500; ++i) {
     Pose pose = library_->stand_pose();
     const Foot foot = i % 2 == 0 ? Foot::kLeft : Foot::kRight;
     const LegRig::Side& side = rig_.side(foot);
-    // A knee bent forward by 10 to 100 degrees, the rest turned anyhow.
+    // A knee that is bent forward by 10 to 100 degrees; all other joints are random.
     pose.rotations[0] = DrawRotation(3.0);
     const auto joint = [&](int place) {
       return static_cast<std::size_t>(side.chain[static_cast<std::size_t>(place)]);

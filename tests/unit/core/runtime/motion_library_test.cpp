@@ -8,10 +8,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "stridewire/offline/library_builder.h"
 #include "runtime/library/cardinal_basis.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "stridewire/offline/library_builder.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
@@ -25,7 +26,7 @@ std::string CodeOf(std::span<const std::byte> bytes) {
   return library ? "none" : std::string(ErrorCodeName(library.error().code));
 }
 
-TEST(MotionLibrary, HoldsWhatWasBuilt) {
+TEST(MotionLibrary, ContainsWhatTheBuilderWrote) {
   const auto library = MakeTestLibrary();
   ASSERT_EQ(library->groups().size(), 3u);
   EXPECT_EQ(library->skeleton().joints[2].name, "LeftLeg");
@@ -37,11 +38,11 @@ TEST(MotionLibrary, HoldsWhatWasBuilt) {
   EXPECT_EQ(reinterpret_cast<std::uintptr_t>(library->group(0).grid.data()) % 64, 0u);
 }
 
-TEST(MotionLibrary, SameInputGivesTheSameBytes) {
+TEST(MotionLibrary, BuildsTheSameBytesFromTheSameInput) {
   EXPECT_EQ(Copy(MakeTestLibrary()->bytes()), Copy(MakeTestLibrary()->bytes()));
 }
 
-TEST(MotionLibrary, OpensItsFile) {
+TEST(MotionLibrary, OpensAFile) {
   const auto library = MakeTestLibrary();
   const auto path = std::filesystem::temp_directory_path() /
                     ("motion_library_test_" + std::to_string(::getpid()) + ".swl");
@@ -62,7 +63,7 @@ TEST(MotionLibrary, OpensItsFile) {
             ErrorCode::kIo);
 }
 
-TEST(MotionLibrary, DamageTruncationAndForeignFilesAreNamed) {
+TEST(MotionLibrary, ReportsDamagedTruncatedAndForeignFiles) {
   const std::vector<std::byte> good = Copy(MakeTestLibrary()->bytes());
   EXPECT_EQ(CodeOf({}), "malformed");
   EXPECT_EQ(CodeOf(std::span(good).first(40)), "malformed");
@@ -81,7 +82,7 @@ TEST(MotionLibrary, DamageTruncationAndForeignFilesAreNamed) {
   EXPECT_EQ(CodeOf(bytes), "malformed");
 }
 
-TEST(LibraryBuilder, RefusesBadExamplesByName) {
+TEST(LibraryBuilder, NamesInvalidExamples) {
   const auto refused = [](const auto& spoil) {
     RawLibrary raw = MakeTestRawLibrary();
     spoil(raw);
@@ -116,7 +117,7 @@ TEST(LibraryBuilder, AveragesNearDuplicates) {
   EXPECT_NE(builder.notes[0].text.find("16 examples averaged to 15"), std::string::npos);
 }
 
-TEST(LibraryBuilder, StoredExamplesAreTheClips) {
+TEST(LibraryBuilder, StoresTheClips) {
   const RawLibrary raw = MakeTestRawLibrary();
   const auto library = MakeTestLibrary();
   double largest_rad = 0.0;
@@ -137,7 +138,8 @@ TEST(LibraryBuilder, StoredExamplesAreTheClips) {
         EvaluateBlend(group, library->layout(), movement, t, cache, got);
         SampleClip(example.clip, t, expected);
         largest_rad = std::max(largest_rad, LargestJointAngle(got, expected));
-        // The toy jump leaves the ground with a kink, which 30 Hz rounds off.
+        // The jump of the test library takes off with a step in velocity, which sampling at 30 Hz
+        // smooths.
         ASSERT_LT(glm::length(got.root_position_m - expected.root_position_m), 0.015f);
       }
     }

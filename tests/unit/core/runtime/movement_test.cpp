@@ -1,4 +1,4 @@
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 #include <gtest/gtest.h>
 
@@ -10,6 +10,7 @@
 
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
@@ -41,7 +42,7 @@ class MovementTest : public testing::Test {
   std::vector<double> scratch_ = std::vector<double>(15);
 };
 
-TEST_F(MovementTest, HitsTheRequestedLengths) {
+TEST_F(MovementTest, ReachesTheRequestedLengths) {
   for (const auto& p : {std::array{-0.3, 0.5}, std::array{-0.1, 0.35}, std::array{-0.55, 0.15}}) {
     const Movement movement = Start(0, p);
     EXPECT_NEAR(std::accumulate(movement.weights.begin(), movement.weights.end(), 0.0), 1.0, 1e-6);
@@ -53,7 +54,7 @@ TEST_F(MovementTest, HitsTheRequestedLengths) {
   }
 }
 
-TEST_F(MovementTest, BaseFrameMovesAndTurnsEverything) {
+TEST_F(MovementTest, BaseFrameTransformsTheWholeMovement) {
   const std::array p = {-0.3, 0.5};
   const Movement at_origin = Start(0, p);
   const Pose plain = Blend(at_origin, 0.3);
@@ -88,7 +89,7 @@ TEST_F(MovementTest, StartsInThePreviousPoseAndEndsInItsOwn) {
   }
 }
 
-TEST_F(MovementTest, IsContinuousInVelocityInside) {
+TEST_F(MovementTest, HasContinuousVelocityBetweenItsEnds) {
   const Movement movement = Start(0, std::array{-0.35, 0.45});
   const double h = 1.0 / 960.0;
   Vec3 last_velocity(0.0f);
@@ -115,14 +116,14 @@ TEST_F(MovementTest, CacheDoesNotChangeBytes) {
   }
 }
 
-TEST_F(MovementTest, ExtrapolatedWeightsStillGiveUnitRotations) {
+TEST_F(MovementTest, ReturnsUnitRotationsForExtrapolatedWeights) {
   const Movement movement = Start(0, std::array{-2.0, 3.0});
   for (double t = 0.0; t <= movement.duration_s(); t += 0.01) {
     for (const Quat& q : Blend(movement, t).rotations) ASSERT_NEAR(glm::length(q), 1.0f, 1e-5f);
   }
 }
 
-TEST_F(MovementTest, RotationsThatCancelAreThoseOfTheLargestExample) {
+TEST_F(MovementTest, UsesTheLargestExampleIfRotationsCancel) {
   Movement cancels = Start(0, std::array{-0.35, 0.45});
   std::ranges::fill(cancels.weights, 0.0f);
   Movement alone = cancels;

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 namespace stridewire {
 namespace {
@@ -22,7 +22,7 @@ Pose RandomPose(std::mt19937& random) {
   return pose;
 }
 
-TEST(PoseArithmetic, DifferencePlusSubtrahendIsTheMinuend) {
+TEST(PoseArithmetic, AddUndoesSubtract) {
   std::mt19937 random(kSeed);
   for (int i = 0; i < 100; ++i) {
     const Pose a = RandomPose(random);
@@ -36,8 +36,8 @@ TEST(PoseArithmetic, DifferencePlusSubtrahendIsTheMinuend) {
   }
 }
 
-TEST(PoseArithmetic, TheReversedProductIsAnotherPose) {
-  // Sums do not commute: r_A r_B instead of r_B r_A ends far away (method: 133 degrees off).
+TEST(PoseArithmetic, SumsDoNotCommute) {
+  // Sums do not commute: with r_A r_B instead of r_B r_A the result is up to 133 degrees off.
   std::mt19937 random(kSeed);
   const Pose a = RandomPose(random);
   const Pose b = RandomPose(random);
@@ -49,7 +49,8 @@ TEST(PoseArithmetic, TheReversedProductIsAnotherPose) {
 }
 
 TEST(PoseArithmetic, ScalingTakesTheShortArc) {
-  // A difference of 6.2 degrees stored with w < 0 shows as 177 degrees half-way if taken as it is.
+  // A difference of 6.2 degrees that is stored with w < 0 must not be interpolated along the long
+  // arc, where it would be 177 degrees half-way.
   const double half = 0.5 * 6.2 * M_PI / 180.0;
   Pose difference(1);
   difference.rotations[0] =
@@ -59,7 +60,7 @@ TEST(PoseArithmetic, ScalingTakesTheShortArc) {
   EXPECT_NEAR(AngleBetween(scaled.rotations[0], kIdentityQuat), half, 1e-6);
 }
 
-TEST(PoseArithmetic, ScaleByZeroAndOneAreEnds) {
+TEST(PoseArithmetic, ScalesByZeroAndOneExactly) {
   std::mt19937 random(kSeed);
   const Pose a = RandomPose(random);
   Pose out(5);
@@ -69,7 +70,7 @@ TEST(PoseArithmetic, ScaleByZeroAndOneAreEnds) {
   EXPECT_LT(LargestJointAngle(out, a), 1e-3);
 }
 
-TEST(EaseOut, StartsAtOneEndsAtZeroWithoutSlope) {
+TEST(EaseOut, FallsFromOneToZeroWithZeroSlopeAtBothEnds) {
   EXPECT_EQ(EaseOut(0.0), 1.0);
   EXPECT_EQ(EaseOut(1.0), 0.0);
   EXPECT_EQ(EaseOut(5.0), 0.0);
@@ -78,7 +79,7 @@ TEST(EaseOut, StartsAtOneEndsAtZeroWithoutSlope) {
   EXPECT_NEAR(EaseOut(1.0 - 1e-4) / 1e-4, 0.0, 1e-3);
 }
 
-TEST(Heading, FollowsThePrintedQuaternion) {
+TEST(Heading, MatchesAKnownQuaternion) {
   for (double heading = -3.0; heading < 3.1; heading += 0.1) {
     double found = 99.0;
     ASSERT_TRUE(HeadingOf(YawRotation(heading), found));
@@ -91,21 +92,21 @@ TEST(Heading, FollowsThePrintedQuaternion) {
   }
 }
 
-TEST(Heading, IsKeptWhenTheRootLooksStraightUp) {
+TEST(Heading, IsUnchangedIfTheRootPointsUp) {
   double heading = 0.7;
   const float s = std::sqrt(0.5f);
   EXPECT_FALSE(HeadingOf(Quat(s, -s, 0.0f, 0.0f), heading));
   EXPECT_EQ(heading, 0.7);
 }
 
-TEST(ForwardKinematics, WalksTheTree) {
+TEST(ForwardKinematics, ComputesPositionsAndRotations) {
   Skeleton skeleton;
   skeleton.joints = {{"root", -1, {}}, {"a", 0, {0, 1, 0}}, {"b", 1, {0, 1, 0}}};
   skeleton.legs[0] = skeleton.legs[1] = {0, 1, 2, 2, {0, 0.5f, 0}, {0, 1, 0}};
   Pose pose(3);
   pose.root_position_m = {1, 2, 3};
   const float s = std::sqrt(0.5f);
-  pose.rotations[1] = Quat(s, 0.0f, 0.0f, s);  // 90 degrees about z: y becomes -x
+  pose.rotations[1] = Quat(s, 0.0f, 0.0f, s);  // 90 degrees about z turns y into -x.
   std::vector<Vec3> positions(3);
   std::vector<Quat> rotations(3);
   ForwardKinematics(skeleton, pose, positions, rotations);

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/terrain/foot_support.h"
 
 namespace stridewire {
 namespace {
@@ -34,7 +34,7 @@ std::shared_ptr<const Terrain> MakeTerrain(TerrainData data) {
   return *terrain;
 }
 
-/// The definition, word by word.
+/// The definition of the height, without an index.
 double BruteHeight(const TerrainData& data, double x, double z) {
   double height = 0.0;
   if (data.height_field) {
@@ -42,7 +42,7 @@ double BruteHeight(const TerrainData& data, double x, double z) {
     const double u = (x - f.origin_m.x) / f.cell_m;
     const double v = (z - f.origin_m.z) / f.cell_m;
     if (u >= 0 && v >= 0 && u <= f.columns - 1 && v <= f.rows - 1) {
-      // Each sample counts by a tent over its two neighbours.
+      // Each sample contributes with a tent function over its two neighbouring cells.
       for (std::int32_t j = 0; j < f.rows; ++j) {
         for (std::int32_t i = 0; i < f.columns; ++i) {
           const double weight =
@@ -66,7 +66,7 @@ double DistanceTo(GroundPoint min, GroundPoint max, double x, double z) {
   return std::sqrt(dx * dx + dz * dz);
 }
 
-/// Borders at multiples of 1/4 m, so that queries at multiples of 1/8 often lie on them.
+/// The borders are at multiples of 1/4 m, so that queries at multiples of 1/8 m often hit them.
 TerrainData RandomTerrain(std::mt19937& random, bool with_field) {
   const auto quarter = [&random](int from, int to) {
     return 0.25 * std::uniform_int_distribution<int>(from, to)(random);
@@ -92,7 +92,7 @@ double RandomEighth(std::mt19937& random) {
   return 0.125 * std::uniform_int_distribution<int>(-56, 56)(random);
 }
 
-TEST(Terrain, NothingIsFlat) {
+TEST(Terrain, EmptyTerrainIsFlat) {
   const auto terrain = MakeTerrain({});
   EXPECT_EQ(terrain->HeightAt(3.0, -4.0), 0.0);
   EXPECT_EQ(terrain->NormalAt(3.0, -4.0), Vec3(0, 1, 0));
@@ -123,26 +123,26 @@ TEST(Terrain, BordersBelongToBoxAndField) {
   EXPECT_EQ(terrain->HeightAt(std::nextafter(3.0, 0.0), 4.0), 0.25);
   EXPECT_EQ(terrain->HeightAt(4.0, std::nextafter(4.0, 5.0)), 0.0);
 
-  // Exact at edges: the disc touches the box, or just does not.
+  // The test is exact at edges: the disc touches the box, or barely does not.
   EXPECT_EQ(terrain->HighestWithin(1.75, 3.0, 0.25), 0.25);
   EXPECT_EQ(terrain->HighestWithin(1.75, 3.0, std::nextafter(0.25, 0.0)), 0.0);
   EXPECT_EQ(terrain->HighestWithin(2.75, 3.0, 0.25), 0.5);
   EXPECT_EQ(terrain->HighestWithin(2.75, 3.0, std::nextafter(0.25, 0.0)), 0.25);
   EXPECT_EQ(terrain->LowestWithin(3.75, 3.0, 0.25), 0.5);
   EXPECT_EQ(terrain->LowestWithin(3.75, 3.0, 0.2500001), 0.0);
-  // Corners count by their distance, not by the square around the disc.
+  // Corners count by their distance from the centre, not by the square around the disc.
   EXPECT_EQ(terrain->HighestWithin(1.8, 1.8, 0.25), 0.0);
   EXPECT_EQ(terrain->HighestWithin(1.8, 1.8, 0.29), 0.25);
 }
 
-TEST(Terrain, SeamsOfSlabsAreNoGaps) {
+TEST(Terrain, AdjacentBoxesHaveNoGap) {
   const auto terrain =
       MakeTerrain({{}, {{{0, 0}, {1, 1}, 0.3}, {{1, 0}, {2, 1}, 0.3}, {{0, 1}, {2, 2}, 0.3}}});
   EXPECT_EQ(terrain->LowestWithin(1.0, 1.0, 0.5), 0.3);
   EXPECT_EQ(terrain->LowestWithin(1.0, 0.3, 0.5), 0.0);
 }
 
-TEST(Terrain, AgreesWithBruteForce) {
+TEST(Terrain, MatchesBruteForce) {
   const unsigned seed = 20261121;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -160,7 +160,7 @@ TEST(Terrain, AgreesWithBruteForce) {
   }
 }
 
-TEST(Terrain, DiscsHoldWhatLiesInThem) {
+TEST(Terrain, DiscQueriesBoundAllHeightsInside) {
   const unsigned seed = 77;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -183,7 +183,8 @@ TEST(Terrain, DiscsHoldWhatLiesInThem) {
         ASSERT_LE(lowest, height + 1e-12) << x << ", " << z << ", " << radius;
       }
       if (data.height_field) continue;
-      // Boxes alone: in each quarter-metre cell the ground is level, so the answer is exact.
+      // With boxes only, the ground is level within each quarter-metre cell, so the result is
+      // exact.
       double expected_highest = 0.0;
       for (const TerrainBox& box : data.boxes) {
         if (DistanceTo(box.min_m, box.max_m, x, z) <= radius) {
@@ -206,7 +207,7 @@ TEST(Terrain, DiscsHoldWhatLiesInThem) {
   }
 }
 
-TEST(Terrain, NormalIsThatOfTheHeight) {
+TEST(Terrain, NormalMatchesTheHeights) {
   const unsigned seed = 4;
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -232,7 +233,7 @@ TEST(Terrain, NormalIsThatOfTheHeight) {
   }
 }
 
-TEST(Terrain, SupportOnASlopeIsTheSlope) {
+TEST(Terrain, FootSupportOnASlopeMatchesTheSlope) {
   HeightField field = MakeField({-5, -5}, 1.0, 11, 11);
   for (int j = 0; j < 11; ++j) {
     for (int i = 0; i < 11; ++i) {
@@ -252,8 +253,8 @@ TEST(Terrain, SupportOnASlopeIsTheSlope) {
   }
 }
 
-TEST(Terrain, SupportTellsEdgesFromSlopes) {
-  // A slab that ends at z = 1, a wall that begins at z = 3.
+TEST(Terrain, FootSupportDistinguishesEdgesFromSlopes) {
+  // A slab that ends at z = 1 and a wall that begins at z = 3.
   const auto terrain = MakeTerrain({{}, {{{-1, 0}, {1, 1}, 0.2}, {{-1, 3}, {1, 4}, 0.5}}});
   const FootSupport on = SupportOf(*terrain, 0.0, 0.9, 0.0, {0.18, 0.08, 0.05});
   EXPECT_EQ(on.gap_m, 0.0);
@@ -277,12 +278,12 @@ TEST(Terrain, SupportTellsEdgesFromSlopes) {
   EXPECT_NEAR(at_wall.rise_m, 0.5, 1e-12);
   EXPECT_EQ(at_wall.plane_height_m, 0.0);
 
-  // Seen from the side, too: x = 1 is the slab's left border.
+  // The same sideways: x = 1 is the left border of the slab.
   const FootSupport side_over = SupportOf(*terrain, 0.97, 0.5, 0.0, {0.18, 0.08, 0.05});
   EXPECT_NEAR(side_over.gap_m, 0.2, 1e-12);
 }
 
-TEST(Terrain, SupportOfASoleWithoutAnAreaIsALineOrPoint) {
+TEST(Terrain, FootSupportAcceptsASoleWithoutArea) {
   HeightField field = MakeField({-5, -5}, 10.0, 2, 2);
   field.heights_m = {0, 0, 2, 2};  // Rises along z by 0.2.
   const auto terrain = MakeTerrain({field, {}});
@@ -293,7 +294,7 @@ TEST(Terrain, SupportOfASoleWithoutAnAreaIsALineOrPoint) {
   EXPECT_NEAR(point.plane_height_m, 1.0, 1e-12);
 }
 
-TEST(Terrain, NumbersThatAreNotFiniteLieOutside) {
+TEST(Terrain, TreatsNonFiniteCoordinatesAsOutside) {
   HeightField field = MakeField({-1, -1}, 1.0, 3, 3);
   std::fill(field.heights_m.begin(), field.heights_m.end(), 1.0f);
   const auto terrain = MakeTerrain({field, {{{-1, -1}, {1, 1}, 2.0}}});
@@ -314,7 +315,7 @@ void ExpectRefused(TerrainData data, ErrorCode code, const std::string& where) {
   EXPECT_EQ(terrain.error().where, where);
 }
 
-TEST(Terrain, RefusesNamingTheField) {
+TEST(Terrain, ErrorsNameTheField) {
   const HeightField good = MakeField({0, 0}, 0.5, 2, 3);
   const auto field = [&good](auto change) {
     TerrainData data{good, {}};
@@ -351,7 +352,7 @@ TEST(Terrain, RefusesNamingTheField) {
                 ErrorCode::kLimitExceeded, "boxes");
 }
 
-TEST(Terrain, TakesWhatTheLimitsAllow) {
+TEST(Terrain, AcceptsTheLargestTerrain) {
   HeightField field = MakeField({-1e6, 1e6}, kMaxTerrainCellM, 1024, 1024);
   field.heights_m.back() = 1e4f;
   const auto large = MakeTerrain({field, {}});
@@ -360,7 +361,7 @@ TEST(Terrain, TakesWhatTheLimitsAllow) {
   EXPECT_NO_FATAL_FAILURE(
       MakeTerrain({{}, std::vector<TerrainBox>(kMaxTerrainBoxesPerCell, {{0, 0}, {1, 1}, 0.5})}));
 
-  // As many stones as there may be, in two heaps far apart, and a slab under each.
+  // The largest number of boxes, in two piles far apart, with a slab below each.
   std::vector<TerrainBox> stones;
   for (int i = 0; i < 65'534; ++i) {
     const double x = (i % 2 == 0 ? 0.0 : 900.0) + 0.5 * (i / 2 % 181);
@@ -378,8 +379,8 @@ TEST(Terrain, TakesWhatTheLimitsAllow) {
   }
 }
 
-// A box thinner than anything, and a world wider than the index has cells for.
-TEST(Terrain, IndexTakesAnyShape) {
+// A box that is thinner than any cell, and a world that is wider than the largest index.
+TEST(Terrain, IndexesBoxesOfAnyShape) {
   const double next = std::nextafter(1.0, 2.0);
   const auto terrain = MakeTerrain({{}, {{{1, 1}, {next, next}, 0.25}}});
   EXPECT_EQ(terrain->HeightAt(1.0, next), 0.25);
