@@ -198,7 +198,7 @@ TEST(TransitionPath, KeepsTheRequestedFoot) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests{{1, Step(Foot::kLeft, 0.6)},
                                               {2, Step(Foot::kLeft, 0.5)}};
-  const Synthesis synthesis = Synthesize(library, BaseFrame{}, requests, 60.0).value();
+  const Synthesis synthesis = Synthesize({.library = library, .requests = requests}).value();
   ASSERT_EQ(synthesis.movements.size(), 4u);
   EXPECT_EQ(synthesis.movements[1].request_id, 0u);
   EXPECT_EQ(synthesis.movements[2].request_id, 2u);
@@ -216,7 +216,7 @@ TEST(TransitionPath, ReportsThatFeetCannotComeTogether) {
             "+step_left");
   EXPECT_EQ(Does(strides, {left, left}), "step_left +step_right step_left +step_right");
   const std::vector<MovementRequest> requests{{1, left}, {2, jump}};
-  const auto synthesis = Synthesize(strides, BaseFrame{}, requests, 60.0);
+  const auto synthesis = Synthesize({.library = strides, .requests = requests});
   ASSERT_FALSE(synthesis.has_value());
   EXPECT_EQ(Describe(synthesis.error()),
             "movements[1]: this library has no transition path from step_left to jump");

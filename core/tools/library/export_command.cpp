@@ -5,10 +5,10 @@
 #include "command_line.h"
 #include "commands.h"
 #include "offline/base/text.h"
-#include "stridewire/offline/bvh_writer.h"
-#include "stridewire/offline/open_library.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "stridewire/offline/bvh_writer.h"
+#include "stridewire/offline/open_library.h"
 
 namespace stridewire {
 namespace {

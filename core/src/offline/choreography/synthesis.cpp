@@ -184,9 +184,8 @@ void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
 
 }  // namespace
 
-Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
-                               std::span<const MovementRequest> requests, double fps,
-                               const AvatarOptions& options, std::span<const LayerCue> layers) {
+Expected<Synthesis> Synthesize(const SynthesisInput& input) {
+  const auto& [library, start, requests, fps, options, layers] = input;
   if (!(fps >= 10.0 && fps <= 1000.0)) {
     return Fail(ErrorCode::kOutOfRange, "expected 10 to 1000 frames per second");
   }
