@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "base/check.h"
 #include "base/trig.h"
 #include "offline/builtin/elementary.h"
 
@@ -258,7 +257,6 @@ void FootPaths::RaiseSwingUntilClear() {
   };
   lift_m_ = kMinLiftM;
   while (!clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
-  STRIDEWIRE_CHECK(lift_m_ < kMaxLiftM);
 }
 
 }  // namespace stridewire::builtin
