@@ -73,7 +73,7 @@ RawGroup MakeGroup(Pool pool, const std::vector<std::size_t>& parameters) {
     std::vector<double> kept;
     for (const std::size_t i : parameters) kept.push_back(example.parameters[i]);
     example.parameters = std::move(kept);
-    STRIDEWIRE_CHECK(kept.size() == group.parameters.size());
+    STRIDEWIRE_CHECK(example.parameters.size() == group.parameters.size());
     group.examples.push_back(std::move(example));
   }
   return group;
