@@ -1,5 +1,5 @@
-// Mutated BVH files: each ends as a capture or as an error that names the file, whatever it says.
-// STRIDEWIRE_FUZZ_COUNT sets how many (2000), STRIDEWIRE_FUZZ_SEED repeats a run.
+// Reads mutated BVH files. Each must give a capture or an error that names the file.
+// STRIDEWIRE_FUZZ_COUNT sets their number (default 2000), STRIDEWIRE_FUZZ_SEED repeats a run.
 
 #include <gtest/gtest.h>
 
@@ -45,7 +45,7 @@ std::vector<std::string> Seeds() {
   for (const std::filesystem::path& path : test::PackagedCaptures()) captures.push_back(path);
   std::sort(captures.begin(), captures.end());
   for (const std::filesystem::path& path : captures) {
-    // The head and a few rows; the tenth line end after "Frame Time" or so.
+    // Uses the header and the first few rows.
     const std::string whole = test::FileText(path);
     std::size_t end = whole.find("Frame Time");
     for (int line = 0; line < 8 && end != std::string::npos; ++line)
@@ -68,8 +68,8 @@ class Mutator {
   std::size_t Below(std::size_t n) { return n == 0 ? 0 : static_cast<std::size_t>(random_() % n); }
 
  private:
-  // [begin, end) of a line or word around a random place.
-  std::pair<std::size_t, std::size_t> Stretch(const std::string& text, const char* separators) {
+  // Returns [begin, end) of the line or word at a random position.
+  std::pair<std::size_t, std::size_t> RandomPart(const std::string& text, const char* separators) {
     const std::size_t at = Below(text.size());
     const std::size_t before = at == 0 ? std::string::npos : text.find_last_of(separators, at - 1);
     const std::size_t begin = before == std::string::npos ? 0 : before + 1;
@@ -101,13 +101,13 @@ class Mutator {
       case 0: text[Below(text.size())] = static_cast<char>(random_()); break;
       case 1: text[Below(text.size())] ^= static_cast<char>(1u << Below(8)); break;
       case 2: text.resize(Below(text.size())); break;
-      case 3: {  // A line less.
-        const auto [begin, end] = Stretch(text, "\r\n");
+      case 3: {  // Deletes a line.
+        const auto [begin, end] = RandomPart(text, "\r\n");
         text.erase(begin, end - begin + 1);
         break;
       }
-      case 4: {  // A line twice, or many times.
-        const auto [begin, end] = Stretch(text, "\r\n");
+      case 4: {  // Repeats a line once or many times.
+        const auto [begin, end] = RandomPart(text, "\r\n");
         const std::string line = text.substr(begin, end - begin) + "\n";
         const std::size_t times = Below(20) == 0 ? 300 : 1;
         std::string copies;
@@ -116,26 +116,26 @@ class Mutator {
         break;
       }
       case 5:
-      case 6: {  // Another word.
-        const auto [begin, end] = Stretch(text, " \t\r\n");
+      case 6: {  // Replaces a word.
+        const auto [begin, end] = RandomPart(text, " \t\r\n");
         text.replace(begin, end - begin, kWords[Below(std::size(kWords))]);
         break;
       }
-      case 7: {  // A random number.
-        const auto [begin, end] = Stretch(text, " \t\r\n");
+      case 7: {  // Replaces a word by a random number.
+        const auto [begin, end] = RandomPart(text, " \t\r\n");
         const double digits = static_cast<double>(random_()) / 1e19 * 2 - 1;
         text.replace(begin, end - begin,
                      std::to_string(digits * std::pow(10.0, static_cast<double>(Below(14)) - 4)));
         break;
       }
-      case 8: {  // A stretch moved elsewhere.
+      case 8: {  // Moves a part of the text.
         const std::size_t begin = Below(text.size());
         const std::string piece = text.substr(begin, Below(400));
         text.erase(begin, piece.size());
         text.insert(Below(text.size() + 1), piece);
         break;
       }
-      default: {  // Bytes in between.
+      default: {  // Inserts random bytes.
         std::string bytes(1 + Below(8), '\0');
         for (char& c : bytes) c = static_cast<char>(random_());
         text.insert(Below(text.size() + 1), bytes);
@@ -146,7 +146,7 @@ class Mutator {
   std::mt19937_64 random_;
 };
 
-TEST(BvhMutation, EveryFileEndsAsACaptureOrAnErrorThatNamesIt) {
+TEST(BvhMutation, GivesACaptureOrAnErrorThatNamesTheFile) {
   const char* count_text = std::getenv("STRIDEWIRE_FUZZ_COUNT");
   const char* seed_text = std::getenv("STRIDEWIRE_FUZZ_SEED");
   const std::uint64_t count = count_text != nullptr ? std::strtoull(count_text, nullptr, 10) : 2000;
@@ -157,14 +157,14 @@ TEST(BvhMutation, EveryFileEndsAsACaptureOrAnErrorThatNamesIt) {
   for (const std::string& text : seeds) ASSERT_TRUE(ParseBvh(text, "seed.bvh").has_value());
 
   Mutator mutator(seed);
-  std::uint64_t read = 0;
-  std::uint64_t refused = 0;
+  std::uint64_t parsed = 0;
+  std::uint64_t rejected = 0;
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string text = mutator.Mutate(seeds[mutator.Below(seeds.size())]);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", file " << i);
     const Expected<Capture> capture = ParseBvh(text, "mutated.bvh");
     if (!capture) {
-      ++refused;
+      ++rejected;
       const Error& error = capture.error();
       const bool names_file =
           error.where == "mutated.bvh" || error.where.starts_with("mutated.bvh:");
@@ -173,24 +173,24 @@ TEST(BvhMutation, EveryFileEndsAsACaptureOrAnErrorThatNamesIt) {
       ASSERT_LT(Describe(error).size(), 300u);
       continue;
     }
-    ++read;
+    ++parsed;
     ASSERT_TRUE(capture->skeleton.Validate().has_value());
     ASSERT_TRUE(capture->clip.Validate().has_value());
     ASSERT_GE(capture->first_frame, 0);
     ASSERT_LT(capture->first_frame, capture->clip.frame_count());
     ASSERT_GT(capture->unit_m, 0.0);
-    // Nothing grows beyond what the text holds: a frame takes a line of at least two characters.
+    // Memory is bounded by the size of the text: a frame takes a line of at least two characters.
     ASSERT_LE(static_cast<std::size_t>(capture->clip.frame_count()) * 2, text.size() + 2);
     ASSERT_LE(capture->clip.rotations.capacity(), capture->clip.rotations.size() * 2 + 64);
     std::size_t note_bytes = 0;
     for (const std::string& note : capture->notes) note_bytes += note.size();
     ASSERT_LT(note_bytes, 200'000u);
   }
-  std::cout << read << " read, " << refused << " refused\n";
-  // Mutations that never or always break a file would test nothing.
+  std::cout << parsed << " parsed, " << rejected << " rejected\n";
+  // The test is meaningful only if mutations break some files and not others.
   if (count >= 500) {
-    EXPECT_GT(read, count / 20);
-    EXPECT_GT(refused, count / 20);
+    EXPECT_GT(parsed, count / 20);
+    EXPECT_GT(rejected, count / 20);
   }
 }
 

@@ -100,10 +100,13 @@ TEST_P(FootPlant, RandomStepsLandOnTheirFootprintsAndStayThere) {
   const Library library = LibraryOf(walker.subjects);
   const unsigned seed = 20261121;
   const Trail trail = RandomTrail(walker, library, 1000, seed);
-  const auto synthesis = Synthesize(library, BaseFrame{}, trail.requests, kFps);
+  const auto synthesis = Synthesize({.library = library, .requests = trail.requests, .fps = kFps});
   ASSERT_TRUE(synthesis.has_value());
   const auto unplanted =
-      Synthesize(library, BaseFrame{}, trail.requests, kFps, {.foot_planting = false});
+      Synthesize({.library = library,
+                  .requests = trail.requests,
+                  .fps = kFps,
+                  .options = {.foot_planting = false}});
   ASSERT_TRUE(unplanted.has_value());
   const Skeleton& skeleton = library->skeleton();
   const Clip clip = ThroughBvh(skeleton, synthesis->clip);
@@ -175,7 +178,9 @@ TEST(FootprintError, ReportsHowFarAStepMissesItsFootprint) {
   const auto step_to = [&](const Footprint& print) {
     const std::vector<MovementRequest> requests = {
         {1, StepRequest{.foot = Foot::kLeft, .at = {{print.position_m, print.heading_rad}}}}};
-    return Synthesize(library, BaseFrame{}, requests, kFps).value().movements.front();
+    return Synthesize({.library = library, .requests = requests, .fps = kFps})
+        .value()
+        .movements.front();
   };
   // No example combines this turn with this length.
   const MovementRecord met = step_to({{0.3, 0.0, 0.55}, 0.5});

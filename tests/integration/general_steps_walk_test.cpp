@@ -116,7 +116,7 @@ struct Looks {
 Looks LookAt(const char* name, const Library& library, const Steps& steps) {
   std::vector<MovementRequest> requests;
   for (const StepRequest& step : steps) requests.push_back({requests.size() + 1, step});
-  const auto synthesis = Synthesize(library, BaseFrame{}, requests, 60.0);
+  const auto synthesis = Synthesize({.library = library, .requests = requests});
   EXPECT_TRUE(synthesis.has_value());
   Looks looks;
   LegGeometry legs(library->skeleton(), library->stand_pose());

@@ -359,8 +359,9 @@ TEST(LayersInChoreographies, BeginAndEndWithMovementsAndKeepTheLegs) {
   const std::vector<LayerCue> cues = {
       {.before = 1, .layer = "wave", .blend_s = 0.1},
       {.before = 3, .layer = "wave", .enabled = false, .blend_s = 0.1}};
-  const auto plain = Synthesize(library, {}, requests, 60.0).value();
-  const auto waving = Synthesize(library, {}, requests, 60.0, {}, cues).value();
+  const auto plain = Synthesize({.library = library, .requests = requests}).value();
+  const auto waving =
+      Synthesize({.library = library, .requests = requests, .layers = cues}).value();
   ASSERT_EQ(plain.clip.frame_count(), waving.clip.frame_count());
   const auto joint = [&](std::string_view name) {
     std::size_t j = 0;
@@ -388,13 +389,14 @@ TEST(LayersInChoreographies, BeginAndEndWithMovementsAndKeepTheLegs) {
   }
 
   const auto error = [&](LayerCue cue) {
-    return Describe(Synthesize(library, {}, requests, 60.0, {}, std::vector{cue}).error());
+    return Describe(
+        Synthesize({.library = library, .requests = requests, .layers = {&cue, 1}}).error());
   };
   EXPECT_EQ(error({.before = 2, .layer = "dance"}),
             "movements[2].layer: the library has no such layer");
   std::vector<MovementRequest> bad = requests;
   bad[2].movement = StepRequest{.length_m = 50.0};
-  EXPECT_THAT(Describe(Synthesize(library, {}, bad, 60.0, {}, cues).error()),
+  EXPECT_THAT(Describe(Synthesize({.library = library, .requests = bad, .layers = cues}).error()),
               testing::HasSubstr("movements[3]."));
 }
 

@@ -1,5 +1,5 @@
-// The paper's identities, held by every group of every library the project can make: the generated
-// one, subject 01 (Debian's assimp-testmodels) and subject 16 (beside the project).
+// Identities of the paper that must hold for every group of every library: the generated one, one
+// of subject 01 (Debian's package assimp-testmodels) and one of subject 16 (external captures).
 
 #include <gtest/gtest.h>
 
@@ -26,11 +26,11 @@ constexpr double kDegrees = 57.29577951308232;
 
 struct Source {
   const char* name;
-  std::vector<std::string> captures;  // none: generated
-  bool all;                           // every movement, none averaged
+  std::vector<std::string> captures;  // Empty: the generated library.
+  bool all;                           // Keeps every movement without averaging.
 };
 
-// GoogleTest would print the bytes of the struct into the test's name.
+// Without this, GoogleTest prints the bytes of the struct as part of the test name.
 void PrintTo(const Source& source, std::ostream* out) { *out << source.name; }
 
 struct Library {
@@ -74,7 +74,7 @@ class LibraryIdentity : public testing::TestWithParam<Source> {
   void SetUp() override {
     const Source& source = GetParam();
     STRIDEWIRE_SKIP_WITHOUT_TAKES(source.captures);
-    // Built once for all tests of one program.
+    // Each library is built once per program.
     static std::map<std::string, Library> made;
     auto found = made.find(source.name);
     if (found == made.end()) found = made.emplace(source.name, Make(source)).first;
@@ -137,7 +137,7 @@ class LibraryIdentity : public testing::TestWithParam<Source> {
     return movement;
   }
 
-  // The example as stored: all weight on it, its own keytimes.
+  // Returns the stored example: weight 1 for it, with its own keytimes.
   Movement Stored(int g, int example) {
     const MotionGroup& group = library().group(g);
     Movement movement = Start(g, group.site(example));
@@ -169,7 +169,7 @@ class LibraryIdentity : public testing::TestWithParam<Source> {
   std::vector<double> scratch_;
 };
 
-TEST_P(LibraryIdentity, WeightsSumToOneEverywhere) {
+TEST_P(LibraryIdentity, WeightsSumToOne) {
   std::printf("seed %u\n", kSeed);
   for (int g = 0; g < group_count(); ++g) {
     const MotionGroup& group = library().group(g);
@@ -197,7 +197,7 @@ TEST_P(LibraryIdentity, WeightsAreOneHotAtTheExamples) {
   }
 }
 
-TEST_P(LibraryIdentity, MovementsStartInThePreviousPoseAndEaseIntoTheirOwn) {
+TEST_P(LibraryIdentity, MovementsStartInThePreviousPose) {
   std::printf("seed %u\n", kSeed);
   double start_m = 0.0;
   double start_rad = 0.0;
@@ -239,7 +239,7 @@ TEST_P(LibraryIdentity, MovementsStartInThePreviousPoseAndEaseIntoTheirOwn) {
   EXPECT_LE(end_rad, 1e-5);
 }
 
-TEST_P(LibraryIdentity, AtAnExamplesParametersTheMovementIsTheExample) {
+TEST_P(LibraryIdentity, ReproducesEachExampleAtItsParameters) {
   double largest_rad = 0.0;
   double largest_m = 0.0;
   for (int g = 0; g < group_count(); ++g) {
@@ -265,7 +265,7 @@ TEST_P(LibraryIdentity, AtAnExamplesParametersTheMovementIsTheExample) {
   EXPECT_LE(largest_m, 1e-4);
 }
 
-TEST_P(LibraryIdentity, StoredExamplesAreTheCapturedOnes) {
+TEST_P(LibraryIdentity, StoredExamplesEqualTheCapture) {
   double sum_rad = 0.0;
   double largest_rad = 0.0;
   double largest_mean_rad = 0.0;

@@ -1,5 +1,6 @@
-// How many examples selection keeps of captured steps, and what it costs: the error of every step found
-// when made without it, from the chosen ones, from all of them, and from as many taken by chance.
+// How many examples the selection keeps of captured steps, and at what cost: the error of every
+// step when it is left out and synthesized from the selected steps, from all steps, and from the
+// same number of random steps.
 
 #include <gtest/gtest.h>
 
@@ -11,11 +12,11 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "offline/base/statistics.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/grid_cells.h"
 #include "offline/build/left_out_error.h"
 #include "offline/build/select_examples.h"
-#include "offline/base/statistics.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
@@ -23,7 +24,7 @@ namespace {
 
 using Clusters = std::vector<std::vector<int>>;
 
-// A group as the builder has it before it selects.
+// A group in the state in which LibraryBuilder selects its examples.
 struct Steps {
   Steps(const RawLibrary& library, const RawGroup& raw)
       : skeleton(library.skeleton), group(raw), layout(skeleton.joint_count()) {
@@ -44,8 +45,8 @@ struct Steps {
     return SelectExamplesJob{examples, units, diameter_m, options, layout, skeleton, group}.Run();
   }
 
-  // Mean over all examples of how far each is from what the stored ones make of its parameters, when it
-  // is not among them.
+  // Returns the mean error with which the stored examples reproduce each example, which is left out
+  // if it is stored itself.
   [[nodiscard]] double LeftOutM(const Clusters& stored) const {
     std::vector<GridExample> averages;
     for (const auto& cluster : stored) {
@@ -80,7 +81,7 @@ struct Steps {
     return all;
   }
 
-  // Median over several seeds.
+  // Returns the median over several seeds.
   [[nodiscard]] double RandomLeftOutM(std::size_t count, unsigned seeds) const {
     std::vector<double> errors;
     for (unsigned seed = 1; seed <= seeds; ++seed) {
@@ -126,7 +127,7 @@ Figures MeasureSelection(const char* folder, const RawLibrary& raw, const RawGro
   return figures;
 }
 
-TEST(Selection, KeepsAFewOfSubject16sStepsThatMakeTheOthersAsWellAsAllDo) {
+TEST(Selection, FewStepsOfSubject16ReproduceTheOthersAsWellAsAll) {
   const std::vector<std::string> subjects = {"16"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
@@ -145,8 +146,8 @@ TEST(Selection, KeepsAFewOfSubject16sStepsThatMakeTheOthersAsWellAsAllDo) {
   EXPECT_EQ(general, 2);
 }
 
-// Every step over blocks of unequal height is unlike the others.
-TEST(Selection, KeepsSubject03sStepsOverBlocks) {
+// Steps over blocks of different heights are all different.
+TEST(Selection, KeepsStepsOfSubject03OverBlocks) {
   const std::vector<std::string> subjects = {"03"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
@@ -158,7 +159,7 @@ TEST(Selection, KeepsSubject03sStepsOverBlocks) {
   }
 }
 
-TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
+TEST(Selection, ReproducesLeftOutExamplesWithinItsBound) {
   const std::vector<std::string> subjects = {"16"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
@@ -167,7 +168,7 @@ TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
   std::size_t before = steps.examples.size() + 1;
   for (const double bound_m : {0.015, 0.025, 0.05}) {
     const Selected selected = steps.Select({bound_m, 0.0}, 0.0);
-    EXPECT_LT(selected.clusters.size(), before);  // a looser bound needs fewer
+    EXPECT_LT(selected.clusters.size(), before);  // A larger bound needs fewer examples.
     before = selected.clusters.size();
     std::vector<const GridExample*> set;
     for (const GridExample& example : selected.examples) set.push_back(&example);
@@ -186,7 +187,7 @@ TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
       EXPECT_NEAR(error.pose_m, example.error_m, 1e-12);
     }
     EXPECT_EQ(left_out + static_cast<int>(before), static_cast<int>(steps.examples.size()));
-    // None of the chosen can be spared.
+    // Every selected example is necessary.
     for (std::size_t c = 0; c < set.size(); ++c) {
       std::vector<const GridExample*> fewer = set;
       fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(c));
@@ -207,8 +208,8 @@ TEST(Selection, MakesWhatIsLeftOutWithinItsBound) {
   }
 }
 
-// A step that lies among the others and is made unlike them.
-TEST(Selection, DropsWhatIsUnlikeAllOthersAndSaysWhy) {
+// Changes the motion of a step whose parameters are inside the hull of the others.
+TEST(Selection, DropsOutliersWithAReason) {
   const std::vector<std::string> subjects = {"16"};
   STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects);
   const RawLibrary raw = AssembleTakes(TakesOf(subjects), {.mirror = true});
@@ -230,7 +231,7 @@ TEST(Selection, DropsWhatIsUnlikeAllOthersAndSaysWhy) {
   }();
   EXPECT_NE(clean.Select(options, 0.0).report.examples[victim].fate, ExampleFate::kOutlier);
   const RawExample captured = group.examples[victim];
-  group.examples[victim].clip.fps /= 1.8;  // the same poses, slowly
+  group.examples[victim].clip.fps /= 1.8;  // The same poses at a lower speed.
   for (double& keytime : group.examples[victim].keytimes_s) keytime *= 1.8;
   {
     const Selected selected = Steps(raw, group).Select(options, 0.0);

@@ -155,8 +155,11 @@ bool IsOverEdge(LegGeometry& legs, const Clip& clip, std::size_t frame, Foot foo
 
 Looks LookAt(const char* name, const Library& library, const Course& course) {
   const double ground = course.ground->HeightAt(0.0, 0.0);
-  const auto synthesis = Synthesize(library, BaseFrame{{0.0, ground, 0.0}, 0.0}, course.requests,
-                                    kFps, {.terrain = course.ground});
+  const auto synthesis = Synthesize({.library = library,
+                                     .start = {{0.0, ground, 0.0}, 0.0},
+                                     .requests = course.requests,
+                                     .fps = kFps,
+                                     .options = {.terrain = course.ground}});
   EXPECT_TRUE(synthesis.has_value());
   Looks looks;
   const Clip& clip = synthesis->clip;

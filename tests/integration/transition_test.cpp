@@ -41,7 +41,7 @@ float DistanceM(const MotionLibrary& library, std::size_t from, std::size_t to) 
 // The test library with only those steps whose length satisfies `is_kept`, and with its jumps.
 template <typename IsKept>
 std::shared_ptr<const MotionLibrary> ToyOf(IsKept is_kept) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawGroup& group : raw.groups) {
     if (!IsStep(group.kind)) continue;
     std::erase_if(group.examples, [&](const RawExample& step) {
@@ -83,7 +83,7 @@ TEST(Transitions, DistanceMeasuresJointPositions) {
 
 // A jump that still moves at its end. The speed counts with 0.1 s.
 TEST(Transitions, DistanceIncludesVelocities) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
       jump.clip.root_positions_m[static_cast<std::size_t>(f)].z =
@@ -198,7 +198,7 @@ TEST(TransitionPath, KeepsTheRequestedFoot) {
   const auto library = OpenLibrary("builtin").value();
   const std::vector<MovementRequest> requests{{1, Step(Foot::kLeft, 0.6)},
                                               {2, Step(Foot::kLeft, 0.5)}};
-  const Synthesis synthesis = Synthesize(library, BaseFrame{}, requests, 60.0).value();
+  const Synthesis synthesis = Synthesize({.library = library, .requests = requests}).value();
   ASSERT_EQ(synthesis.movements.size(), 4u);
   EXPECT_EQ(synthesis.movements[1].request_id, 0u);
   EXPECT_EQ(synthesis.movements[2].request_id, 2u);
@@ -216,14 +216,14 @@ TEST(TransitionPath, ReportsThatFeetCannotComeTogether) {
             "+step_left");
   EXPECT_EQ(Does(strides, {left, left}), "step_left +step_right step_left +step_right");
   const std::vector<MovementRequest> requests{{1, left}, {2, jump}};
-  const auto synthesis = Synthesize(strides, BaseFrame{}, requests, 60.0);
+  const auto synthesis = Synthesize({.library = strides, .requests = requests});
   ASSERT_FALSE(synthesis.has_value());
   EXPECT_EQ(Describe(synthesis.error()),
             "movements[1]: this library has no transition path from step_left to jump");
 }
 
 TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.erase(raw.groups.begin() + kRight);
   const auto one_foot = std::shared_ptr(LibraryBuilder().Build(raw).value());
   EXPECT_EQ(
@@ -237,7 +237,7 @@ TEST(TransitionPath, ReportsThatTheLibraryHasOneFootOnly) {
 // A jump that still moves at its end: the feet are together, but according to the table no step
 // starts that fast.
 TEST(TransitionPath, RejectsDistantTransitions) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   for (RawExample& jump : raw.groups[kJump].examples) {
     for (int f = 0; f < jump.clip.frame_count(); ++f) {
       const double s = f / (jump.clip.frame_count() - 1.0);
@@ -290,7 +290,7 @@ TEST(TransitionPath, DoesNotAllocate) {
 }
 
 TEST(TransitionPath, RejectsMissingKindsImmediately) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   const auto no_jumps = std::shared_ptr(LibraryBuilder().Build(raw).value());
   AvatarSimulation avatar(no_jumps, BaseFrame{});

@@ -367,7 +367,7 @@ TEST_F(ExactPlacement, SynthesisReportsRejectedSteps) {
       {1, StepRequest{.foot = Foot::kLeft, .length_m = 0.5}},
       StepOnto(2, Foot::kRight, {0.0, 0.0, 5.0}, 0.0),
       {3, StepRequest{.length_m = 0.5}}};
-  const auto synthesis = Synthesize(library_, BaseFrame{}, requests, 60.0);
+  const auto synthesis = Synthesize({.library = library_, .requests = requests});
   ASSERT_TRUE(synthesis.has_value());
   ASSERT_EQ(synthesis->unreachable_footprints.size(), 1u);
   EXPECT_EQ(synthesis->unreachable_footprints[0].request_id, 2u);

@@ -71,7 +71,8 @@ double MeanHeight(const Clip& clip, int from, int to) {
 }
 
 void ExpectASmoothWalk(const Library& library, double low_m, double high_m, unsigned seed) {
-  const auto walk = Synthesize(library, {}, RandomSteps(200, low_m, high_m, seed), kFps);
+  const auto walk = Synthesize(
+      {.library = library, .requests = RandomSteps(200, low_m, high_m, seed), .fps = kFps});
   ASSERT_TRUE(walk.has_value()) << Describe(walk.error());
   const Smoothness smooth = Measure(*walk);
   std::printf(
@@ -89,7 +90,8 @@ void ExpectASmoothWalk(const Library& library, double low_m, double high_m, unsi
 }
 
 void ExpectAStraightWalk(const Library& library, double length_m) {
-  const auto walk = Synthesize(library, {}, RandomSteps(100, length_m, length_m, 1), kFps);
+  const auto walk = Synthesize(
+      {.library = library, .requests = RandomSteps(100, length_m, length_m, 1), .fps = kFps});
   ASSERT_TRUE(walk.has_value()) << Describe(walk.error());
   ASSERT_GE(walk->movements.size(), 101u);
   const BaseFrame& base = walk->movements[99].base;

@@ -11,20 +11,20 @@
 
 namespace stridewire::test {
 
-/// Small walking figures as BVH text, each trait of a file by itself.
+/// Generates BVH text of a small walking figure. Each member controls one property of the file.
 struct BvhText {
   std::string line_end = "\n";
-  bool names = true;  ///< False: J0, J1, … which say nothing.
-  bool toes = true;   ///< False: the ankle ends in an End Site.
+  bool names = true;  ///< False: the joints are called J0, J1, ...
+  bool toes = true;   ///< False: the ankle has an End Site instead of a toe joint.
   bool end_sites = true;
   bool last_line_end = true;
   bool positions_everywhere = false;
-  bool folded = false;  ///< At rest the legs stick up; every frame turns them down.
-  double unit = 1.0;    ///< File units a metre.
+  bool folded = false;  ///< The legs point up in the rest pose; every frame turns them down.
+  double unit = 1.0;    ///< File units per metre.
   int frames = 12;
   std::string frame_time = "0.0333333";
-  std::string frames_text;  ///< What `Frames:` says if not `frames`.
-  /// Columns of a rotation: where the figure's x, y and z point in the file; +-1, +-2, +-3.
+  std::string frames_text;  ///< Replaces the number after `Frames:` if not empty.
+  /// The file axes in which x, y and z of the figure point: +-1, +-2 or +-3, forming a rotation.
   std::array<int, 3> axes{1, 2, 3};
 
   struct Part {
@@ -63,7 +63,7 @@ struct BvhText {
     return parts;
   }
 
-  /// File axis (0..2) and sign of the figure's axis.
+  /// The file axis (0 to 2) and the sign of an axis of the figure.
   [[nodiscard]] int FileAxis(int axis) const {
     return std::abs(axes[static_cast<std::size_t>(axis)]) - 1;
   }
@@ -140,7 +140,7 @@ struct BvhText {
         } else if (positions_everywhere) {
           row += ' ' + numbers(InFile(part.x, part.y + 0.01 * (f % 2 == 0 ? 1 : -1), part.z));
         }
-        // Angles about the figure's z, x, y; a turned axis turns the other way round.
+        // Angles about z, x and y of the figure. An inverted axis inverts the angle.
         double angles[] = {3.0 * std::sin(phase), 20.0 * std::sin(0.7 * phase),
                            4.0 * std::cos(phase)};
         if (folded && std::string(part.name).find("UpLeg") != std::string::npos) angles[1] += 180.0;
@@ -158,7 +158,7 @@ struct BvhText {
   }
 };
 
-/// All captures at hand: the shared ones and those of Debian's assimp-testmodels.
+/// Returns the external captures; empty if they are not available.
 inline std::vector<std::filesystem::path> SharedCaptures() {
   std::vector<std::filesystem::path> paths;
   if (std::filesystem::is_directory(STRIDEWIRE_MOCAP_DIR)) {
@@ -169,6 +169,7 @@ inline std::vector<std::filesystem::path> SharedCaptures() {
   return paths;
 }
 
+/// Returns the captures of Debian's package assimp-testmodels; empty if it is not installed.
 inline std::vector<std::filesystem::path> PackagedCaptures() {
   std::vector<std::filesystem::path> paths;
   for (const char* name : {"01_01.bvh", "01_03.bvh"}) {

@@ -11,10 +11,10 @@
 
 namespace stridewire {
 
-/// The recordings to test with, beside the project; not part of it.
+/// Folder of the external captures for tests. They are not part of the project.
 inline std::filesystem::path MocapDir() { return STRIDEWIRE_MOCAP_DIR; }
 
-/// All BVH files of a folder below MocapDir(), by name; empty if it is not there.
+/// Returns all BVH files in a folder below MocapDir(), sorted by name; empty if it does not exist.
 inline std::vector<std::filesystem::path> MocapFiles(const std::string& folder) {
   std::vector<std::filesystem::path> files;
   std::error_code error;
@@ -26,7 +26,8 @@ inline std::vector<std::filesystem::path> MocapFiles(const std::string& folder) 
   return files;
 }
 
-/// 01_01 or 01_03: beside the project, or Debian's assimp-testmodels; empty if neither is there.
+/// Returns the path of 01_01.bvh or 01_03.bvh, from the external captures or from Debian's package
+/// assimp-testmodels; empty if neither is available.
 inline std::filesystem::path ModelFile(const std::string& name) {
   for (const std::filesystem::path& folder :
        {MocapDir() / "cmu/01", std::filesystem::path("/usr/share/assimp/models/BVH")}) {

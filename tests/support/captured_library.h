@@ -12,10 +12,10 @@
 
 namespace stridewire {
 
-/// Names the two takes of subject 01 that Debian's assimp-testmodels carries, so that any machine has them.
+/// Stands for the two takes of subject 01 in Debian's package assimp-testmodels.
 inline constexpr const char* kDebianTakes = "assimp-testmodels";
 
-/// The takes of one subject of CMU's ("03", "16"), or kDebianTakes.
+/// Returns the takes of one subject of the CMU captures ("03", "16"), or those of kDebianTakes.
 inline std::vector<std::filesystem::path> TakesOfOne(const std::string& subject) {
   if (subject != kDebianTakes) return MocapFiles("cmu/" + subject);
   std::vector<std::filesystem::path> takes;
@@ -25,7 +25,7 @@ inline std::vector<std::filesystem::path> TakesOfOne(const std::string& subject)
   return takes;
 }
 
-/// All takes of the subjects.
+/// Returns all takes of some subjects.
 inline std::vector<std::filesystem::path> TakesOf(const std::vector<std::string>& subjects) {
   std::vector<std::filesystem::path> all;
   for (const std::string& subject : subjects) {
@@ -35,7 +35,7 @@ inline std::vector<std::filesystem::path> TakesOf(const std::vector<std::string>
   return all;
 }
 
-/// Which of the subjects have no takes on this machine, and where they were looked for; empty if all have.
+/// Describes which subjects have no takes on this machine; empty if all have takes.
 inline std::string MissingTakes(const std::vector<std::string>& subjects) {
   std::string text;
   for (const std::string& subject : subjects) {
@@ -48,7 +48,7 @@ inline std::string MissingTakes(const std::vector<std::string>& subjects) {
   return text;
 }
 
-/// What extraction finds in takes that are there.
+/// Extracts and combines the movements of existing takes.
 inline RawLibrary AssembleTakes(const std::vector<std::filesystem::path>& takes,
                                 const AssembleOptions& options) {
   LibraryAssembler assembler(options);
@@ -56,21 +56,21 @@ inline RawLibrary AssembleTakes(const std::vector<std::filesystem::path>& takes,
   return assembler.Assemble().value();
 }
 
-/// The library that `stridewire-library build --mirror` makes of takes that are there.
+/// Builds a library from existing takes like `stridewire-library build --mirror`.
 inline std::shared_ptr<const MotionLibrary> BuildFromTakes(
     const std::vector<std::filesystem::path>& takes,
     LibraryBuilder builder = LibraryBuilder::Selecting()) {
   return builder.Build(AssembleTakes(takes, {.mirror = true})).value();
 }
 
-/// The generated library if no subjects are named, else BuildFromTakes() of theirs.
+/// Returns the library of some subjects, or the generated library if there are none.
 inline std::shared_ptr<const MotionLibrary> LibraryOf(const std::vector<std::string>& subjects) {
   if (subjects.empty()) return OpenLibrary("builtin").value();
   return BuildFromTakes(TakesOf(subjects));
 }
 
-/// The same with every movement as it was captured: nothing selected, averaged or made smooth. What made movements are
-/// compared with.
+/// Same, with every movement as captured, without selection, averaging or smoothing. A reference
+/// for synthesized movements.
 inline std::shared_ptr<const MotionLibrary> LibraryOfAll(const std::vector<std::string>& subjects) {
   if (subjects.empty()) return OpenLibrary("builtin").value();
   return BuildFromTakes(TakesOf(subjects), LibraryBuilder{});
@@ -78,7 +78,7 @@ inline std::shared_ptr<const MotionLibrary> LibraryOfAll(const std::vector<std::
 
 }  // namespace stridewire
 
-/// Skips a test of subjects of which one or more have no takes here; never one that names none.
+/// Skips a test if takes of one of its subjects are missing. Never skips tests without subjects.
 #define STRIDEWIRE_SKIP_WITHOUT_TAKES(subjects)                                             \
   if (const std::string missing = ::stridewire::MissingTakes(subjects); !missing.empty()) { \
     GTEST_SKIP() << missing;                                                                \

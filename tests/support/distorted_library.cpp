@@ -7,8 +7,8 @@
 #include <cstdlib>
 #include <vector>
 
-#include "stridewire/offline/library_builder.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "stridewire/offline/library_builder.h"
 
 namespace stridewire {
 namespace {
@@ -49,18 +49,19 @@ Skeleton MakeSkeleton() {
   return skeleton;
 }
 
-// Hip and knee of one leg, so that its foot is `aside`, `below` and `ahead` of the hip.
+// Sets hip and knee of one leg such that its foot is sideways, below and ahead of the hip by these
+// distances.
 void SetLeg(std::size_t hip, double aside_m, double below_m, double ahead_m, PoseSpan pose) {
   const double far_m = std::sqrt(aside_m * aside_m + below_m * below_m);
   const double reach_m = std::min(std::hypot(far_m, ahead_m), 0.999 * (kThighM + kShinM));
-  const double half = std::acos(reach_m / (kThighM + kShinM));  // thigh and shin are equally long
+  const double half = std::acos(reach_m / (kThighM + kShinM));  // Thigh and shin have equal length.
   const double swing = std::atan2(ahead_m, far_m);
   pose.rotations[hip] = Normalise(AboutZ(std::atan2(aside_m, below_m)) * AboutX(-swing - half));
   pose.rotations[hip + 1] = AboutX(2.0 * half);
 }
 
-// Feet apart by left minus right, half of it on either side of the hips, which are now high, now low:
-// between two examples of equal steps knees bend otherwise than in either.
+// Places the feet symmetrically to the hips, with the given left minus right position. The height
+// of the hips varies, so that blends of two examples bend the knees differently from both.
 void SetLegs(const DVec3& apart_m, PoseSpan pose) {
   const double height_m = 0.72 + 0.08 * std::sin(6.0 * (apart_m.z + 2.0 * apart_m.x - apart_m.y));
   pose.root_position_m.y = static_cast<float>(height_m);
@@ -84,7 +85,7 @@ RawLibrary DrawLibrary(int parameter_count, int example_count, double reach_m,
     group.parameters.push_back(kOrder[l]);
   }
   while (static_cast<int>(group.examples.size()) < example_count) {
-    // What the group has no parameter for is the same in all examples.
+    // Properties without a parameter are equal in all examples.
     DVec3 start(0.2, 0.0, -0.3 * reach_m);
     DVec3 end(0.2, 0.0, 0.0);
     double turn_rad = 0.0;
@@ -125,7 +126,7 @@ RawLibrary DrawLibrary(int parameter_count, int example_count, double reach_m,
         default: example.parameters.push_back(first.y);
       }
     }
-    // Near duplicates would make the weights jump, which is another matter.
+    // Avoids near duplicates, which would make the weights jump.
     const bool is_near =
         std::any_of(group.examples.begin(), group.examples.end(), [&](const RawExample& other) {
           double largest = 0.0;
@@ -145,14 +146,15 @@ RawLibrary DrawLibrary(int parameter_count, int example_count, double reach_m,
 std::shared_ptr<const MotionLibrary> MakeDistortedLibrary(int parameter_count, int example_count,
                                                           double reach_m, std::uint32_t seed) {
   std::mt19937 random(seed);
-  // Of one more example than parameters some lie in a plane, nearly: such a library is refused, and drawn again.
+  // With d + 1 examples the sites may be almost coplanar, which the builder rejects. Then new
+  // examples are drawn.
   constexpr int kMaxDraws = 20;
   for (int draw = 1;; ++draw) {
     auto library =
         LibraryBuilder{}.Build(DrawLibrary(parameter_count, example_count, reach_m, random));
     if (library) return *library;
     if (draw < kMaxDraws) continue;
-    std::fprintf(stderr, "distorted library: %s\n", Describe(library.error()).c_str());
+    std::fprintf(stderr, "MakeDistortedLibrary: %s\n", Describe(library.error()).c_str());
     std::abort();
   }
 }

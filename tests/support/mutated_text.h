@@ -12,10 +12,10 @@
 
 namespace stridewire {
 
-/// Fuzzes a JSON parser with `rounds` versions of a text that have one to three random changes each,
-/// and prints the seed on failure. `parse` takes a text and returns an Expected; `check` receives the
-/// parsed value. Expects every error to name `file` and to have a message of one line. At least one
-/// version must parse and one must fail.
+/// Fuzzes a JSON parser with `rounds` versions of a text that have one to three random changes
+/// each, and prints the seed on failure. `parse` takes a text and returns an Expected; `check`
+/// receives the parsed value. Expects every error to name `file` and to have a message of one line.
+/// At least one version must parse and one must fail.
 template <typename Parse, typename Check>
 void ParseMutated(const std::string& original, int rounds, const std::string& file, Parse&& parse,
                   Check&& check) {

@@ -67,7 +67,8 @@ Capture SyntheticWalker::Render(const std::vector<Instant>& instants) const {
     pose.root_position_m = Vec3(leg_scale * (start_m + RotateYaw(heading_rad, now.pelvis_m)));
     pose.rotations[0] = YawRotation(heading_rad + now.pelvis_yaw_rad);
     for (int f = 0; f < 2; ++f) {
-      // The leg in the pelvis' frame: swing sideways is left out, the hips are as wide as the track.
+      // Solves the leg in the frame of the pelvis without sideways motion: the hips are as wide as
+      // the track.
       const DVec3 hip(SideOf(f) * kHalfHipsM, 0.0, 0.0);
       const DVec3 reach = RotateYaw(-now.pelvis_yaw_rad, now.ankle_m[f] - now.pelvis_m) - hip;
       const double distance = std::min(std::hypot(reach.y, reach.z), kThighM + kShankM - 1e-4);
@@ -102,7 +103,8 @@ Capture SyntheticWalker::Walk(const std::vector<WalkerStep>& steps) const {
     for (int i = 0; i < std::lround(seconds * fps); ++i) instants.push_back(now);
   };
   hold(stand_s);
-  // The pelvis goes from middle to middle over a step, double support halves included.
+  // Over a step, including half of each double support, the pelvis moves between the centres of the
+  // feet.
   double stride_phase = 0.0;
   for (const WalkerStep& step : steps) {
     const int moving = static_cast<int>(step.foot);
@@ -145,7 +147,7 @@ Capture SyntheticWalker::Jump(double length_m) const {
   constexpr double kDownS = 0.4;
   constexpr double kPushS = 0.25;
   const double total = 2.0 * stand_s + 2.0 * (kDownS + kPushS) + kFlightS;
-  // Cubic from rest to (value, speed) over `duration`.
+  // Cubic that starts at rest and reaches `value` with `speed` after `duration`.
   const auto push = [](double t, double duration, double value, double speed) {
     const double s = t / duration;
     return s * s * (value * (3.0 - 2.0 * s) + speed * duration * (s - 1.0));
@@ -159,7 +161,7 @@ Capture SyntheticWalker::Jump(double length_m) const {
     double y = y0, z = 0.0, lift = 0.0, foot_z = 0.0;
     const double half = 0.5 * (2.0 * (kDownS + kPushS) + kFlightS);
     const bool second = t > half;
-    const double r = second ? 2.0 * half - t : t;  // The landing is the take-off backwards.
+    const double r = second ? 2.0 * half - t : t;  // The landing is the reversed take-off.
     if (r > 0.0 && r <= kDownS) {
       y = y0 - kCrouchM * Ease(r / kDownS);
     } else if (r > kDownS && r <= kDownS + kPushS) {

@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-/// One step of the synthetic figure: the foot goes `length_m` ahead of the other one and `rise_m`
+/// One step of the synthetic figure: the foot lands `length_m` ahead of the other foot and `rise_m`
 /// above it.
 struct WalkerStep {
   Foot foot = Foot::kLeft;
@@ -14,19 +14,19 @@ struct WalkerStep {
   double rise_m = 0.0;
 };
 
-/// A plain figure with flat feet that walks, stands and jumps as told, so that a test knows every
-/// contact, length and heading. Stands at (start_x, start_z), walks along `heading_rad`.
+/// A simple figure with flat feet that walks, stands and jumps, with known contacts, lengths and
+/// headings. It starts at `start_m` and walks in the direction `heading_rad`.
 struct SyntheticWalker {
   double fps = 120.0;
   double heading_rad = 0.0;
   DVec3 start_m = DVec3(0.0);
-  double stand_s = 0.6;  ///< Before and after
+  double stand_s = 0.6;  ///< Standing time before and after the movement.
   double double_support_s = 0.2;
   double swing_s = 0.5;
-  double pelvis_swing_rad = 0.0;  ///< Pelvis yaw to either side, once a stride
+  double pelvis_swing_rad = 0.0;  ///< Amplitude of the pelvis yaw, once per stride.
   double leg_scale = 1.0;
 
-  /// What was generated: true times, from the first frame.
+  /// The true contact times of the last generated capture, since its first frame.
   struct Truth {
     std::vector<double> toe_off_s;
     std::vector<double> heel_strike_s;
@@ -35,20 +35,20 @@ struct SyntheticWalker {
 
   [[nodiscard]] Skeleton MakeSkeleton() const;
   [[nodiscard]] Capture Walk(const std::vector<WalkerStep>& steps) const;
-  /// Stands, crouches, jumps `length_m` ahead, stands. Flight 0.4 s.
+  /// Stands, crouches, jumps `length_m` ahead with a flight of 0.4 s, and stands again.
   [[nodiscard]] Capture Jump(double length_m) const;
   [[nodiscard]] Capture Stand(double seconds) const;
 
  private:
   struct Instant {
-    DVec3 pelvis_m;  // before heading and start are applied
+    DVec3 pelvis_m;  // Before `heading_rad` and `start_m` are applied.
     DVec3 ankle_m[2];
     double pelvis_yaw_rad = 0.0;
   };
   [[nodiscard]] Capture Render(const std::vector<Instant>& instants) const;
 };
 
-/// Height of the balls of the standing figure.
+/// Height of the balls of the standing figure above the ground.
 inline constexpr double kWalkerBallHeightM = 0.03;
 
 }  // namespace stridewire

@@ -15,7 +15,7 @@ constexpr double kLegM = 0.9;
 constexpr double kFps = 120.0;
 constexpr double kHipHalfM = 0.1;
 
-Quat PitchRotation(double angle_rad) {  // about +X: positive leans +Z's way down
+Quat PitchRotation(double angle_rad) {  // About +X; positive turns +Y towards +Z.
   return Quat(static_cast<float>(std::cos(angle_rad / 2)),
               static_cast<float>(std::sin(angle_rad / 2)), 0.0f, 0.0f);
 }
@@ -37,7 +37,7 @@ Skeleton MakeSkeleton() {
   return skeleton;
 }
 
-// Hips above the middle of two feet `apart_m` apart along z (left minus right), feet level.
+// Sets the hips at a height above two level feet, given the z of each foot relative to the hips.
 void SetLegs(double left_from_hip_m, double right_from_hip_m, double hip_height_m, Pose& pose) {
   pose.root_position_m.y = static_cast<float>(hip_height_m);
   pose.rotations[1] = PitchRotation(-std::asin(left_from_hip_m / kLegM));
@@ -54,7 +54,7 @@ RawExample MakeStep(Foot moving, double l0, double l1) {
   example.keytimes_s = {0.0, 0.15 * last_s, 0.85 * last_s, last_s};
   example.parameters = {-l0, l1};
   for (int f = 0; f < frames; ++f) {
-    // Fixed foot at l0/2 ahead of the start; the hips glide on, the moving foot passes.
+    // The fixed foot is l0/2 ahead of the start. The hips glide forward and the moving foot passes.
     const double s = static_cast<double>(f) / (frames - 1);
     const double ease = s * s * (3 - 2 * s);
     const double hips = ease * (l0 + l1) / 2;
@@ -93,7 +93,7 @@ RawExample MakeJump(double length_m) {
 
 }  // namespace
 
-RawLibrary MakeToyRawLibrary() {
+RawLibrary MakeTestRawLibrary() {
   RawLibrary raw;
   raw.skeleton = MakeSkeleton();
   raw.stand_pose = Pose(7);
@@ -116,9 +116,9 @@ RawLibrary MakeToyRawLibrary() {
 
 std::shared_ptr<const MotionLibrary> MakeTestLibrary() {
   LibraryBuilder builder;
-  auto library = builder.Build(MakeToyRawLibrary());
+  auto library = builder.Build(MakeTestRawLibrary());
   if (!library) {
-    std::fprintf(stderr, "toy library: %s\n", Describe(library.error()).c_str());
+    std::fprintf(stderr, "MakeTestLibrary: %s\n", Describe(library.error()).c_str());
     std::abort();
   }
   return *library;

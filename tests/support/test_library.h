@@ -7,12 +7,12 @@
 
 namespace stridewire {
 
-/// A walker of seven joints whose steps are exact in closed form: straight legs that swing like
-/// compasses, 15 steps a foot over lengths 0, 0.2, 0.4, 0.6 m, jumps of 0.3 to 1.2 m. For tests that
-/// must know the truth without asking the code under test.
-[[nodiscard]] RawLibrary MakeToyRawLibrary();
+/// Returns a walker with seven joints whose motion has a closed form, for tests that need expected
+/// values independent of the code under test. Its straight legs swing like compasses. It has 15
+/// steps per foot with lengths 0, 0.2, 0.4 and 0.6 m, and jumps of 0.3 to 1.2 m.
+[[nodiscard]] RawLibrary MakeTestRawLibrary();
 
-/// The same, built. Aborts if the builder refuses.
+/// Builds the library of MakeTestRawLibrary. Aborts on failure.
 [[nodiscard]] std::shared_ptr<const MotionLibrary> MakeTestLibrary();
 
 }  // namespace stridewire

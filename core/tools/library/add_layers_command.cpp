@@ -32,8 +32,8 @@ std::optional<double> TakeTime(std::string_view& text) {
   return value;
 }
 
-// Parses "wave=file.bvh:1.5:3". The two times are optional together. The file name may contain
-// colons.
+// Parses "wave=file.bvh:1.5:3". The times are optional, but one requires the other. The file name
+// may contain colons.
 std::optional<LayerSource> ParseSource(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos || equals == 0) return std::nullopt;

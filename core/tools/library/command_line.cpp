@@ -3,8 +3,10 @@
 #include <unistd.h>
 
 #include <cstdio>
-#include <fstream>
+#include <ostream>
 #include <system_error>
+
+#include "offline/base/replace_file.h"
 
 namespace stridewire {
 
@@ -39,26 +41,11 @@ bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b) 
 }
 
 Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  const std::filesystem::path partial = path.string() + ".part" + std::to_string(::getpid());
-  {
-    std::ofstream out(partial, std::ios::binary);
+  return ReplaceFile(path, [&](std::ostream& out) -> Status {
     out.write(reinterpret_cast<const char*>(bytes.data()),
               static_cast<std::streamsize>(bytes.size()));
-    out.close();
-    if (!out) {
-      std::error_code ignored;
-      std::filesystem::remove(partial, ignored);
-      return Fail(ErrorCode::kIo, "cannot write the file", path.string());
-    }
-  }
-  std::error_code failed;
-  std::filesystem::rename(partial, path, failed);
-  if (failed) {
-    std::error_code ignored;
-    std::filesystem::remove(partial, ignored);
-    return Fail(ErrorCode::kIo, "cannot rename the temporary file to this path", path.string());
-  }
-  return {};
+    return {};
+  });
 }
 
 }  // namespace stridewire

@@ -4,10 +4,11 @@
 
 #include "command_line.h"
 #include "commands.h"
-#include "stridewire/offline/bvh_writer.h"
-#include "stridewire/offline/open_library.h"
+#include "offline/base/text.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "stridewire/offline/bvh_writer.h"
+#include "stridewire/offline/open_library.h"
 
 namespace stridewire {
 namespace {
@@ -44,9 +45,8 @@ int RunExport(const ExportCommand& command) {
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
     const MotionGroup& group = (*library)->groups()[g];
     for (int e = 0; e < group.example_count; ++e) {
-      char name[64];
-      std::snprintf(name, sizeof(name), "%02zu_%s_%03d.bvh", g,
-                    std::string(MovementKindName(group.kind)).c_str(), e);
+      const std::string name =
+          Text("%02zu_%s_%03d.bvh", g, std::string(MovementKindName(group.kind)).c_str(), e);
       const std::filesystem::path path = std::filesystem::path(command.out) / name;
       const Clip clip = ExampleClip(**library, static_cast<int>(g), e);
       if (Status status = WriteBvh((*library)->skeleton(), clip, path); !status) {

@@ -7,8 +7,8 @@
 
 #include "offline/build/interpolation_error.h"
 #include "offline/build/refine.h"
-#include "runtime/skeleton/layer_clip.h"
 #include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {
@@ -227,8 +227,9 @@ Json LayersToJson(const MotionLibrary& library) {
 void PrintLayers(const MotionLibrary& library) {
   for (const LayerClip& layer : library.layers()) {
     std::printf(
-        "layer %s: %.2f s, %s, %zu joints from %s on, from %s\n", std::string(layer.name).c_str(),
-        layer.duration_s(), layer.is_looping ? "looping" : "plays once", layer.joints.size(),
+        "layer %s: %.2f s, %s, %zu joints from %s on, source: %s\n",
+        std::string(layer.name).c_str(), layer.duration_s(),
+        layer.is_looping ? "looping" : "plays once", layer.joints.size(),
         library.skeleton().joints[static_cast<std::size_t>(layer.joints.front())].name.c_str(),
         std::string(layer.source).c_str());
   }

@@ -11,6 +11,7 @@
 
 #include "command_line.h"
 #include "commands.h"
+#include "offline/base/text.h"
 #include "offline/build/refine.h"
 #include "stridewire/base/version.h"
 
@@ -32,10 +33,9 @@ CLI::Validator Number(double min, double max, bool is_open) {
     const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
     const bool is_number = failed == std::errc() && end == text.data() + text.size();
     if (is_number && (is_open ? value > min : value >= min) && value <= max) return {};
-    char expected[128];
-    std::snprintf(expected, sizeof(expected), "expected a number %s %g and at most %g, got ",
-                  is_open ? "above" : "of at least", min, max);
-    return expected + ("\"" + text + "\"");
+    return Text("expected a number %s %g and at most %g, got ", is_open ? "above" : "of at least",
+                min, max) +
+           "\"" + text + "\"";
   };
   return CLI::Validator(check, "");
 }
@@ -72,7 +72,9 @@ void AddRefinement(CLI::App* command, double& max_error_m, int& max_pseudoexampl
                    "Stop refining a group below this error; metres, a radian counts as 0.5 m")
       ->capture_default_str()
       ->check(Number(0.0, 1000.0, false));
-  command->add_option("--max-pseudoexamples", max_pseudoexamples, "Most pseudoexamples per group")
+  command
+      ->add_option("--max-pseudoexamples", max_pseudoexamples,
+                   "Largest number of pseudoexamples per group")
       ->capture_default_str()
       ->check(CLI::Range(0, RefineOptions::kMaxPseudoexamples));
 }
@@ -194,8 +196,9 @@ int Run(int argc, char** argv) {
   AddOut(refine_app, refine.out, "The library file to write (.swl)");
   AddRefinement(refine_app, refine.max_error_m, refine.max_pseudoexamples);
   refine_app
-      ->add_option("--rule", refine.rule,
-                   "bare: the rule of the paper; amended: keeps only improvements")
+      ->add_option(
+          "--rule", refine.rule,
+          "bare: the rule of the paper; amended: adds a pseudoexample only if it reduces the error")
       ->capture_default_str()
       ->check(CLI::IsMember({"amended", "bare"}));
   AddJson(refine_app, refine.json);

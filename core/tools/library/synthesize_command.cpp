@@ -62,11 +62,14 @@ int RunSynthesize(const SynthesizeCommand& command) {
   if (!choreography) return PrintInputError(choreography.error());
   const auto library = OpenLibrary(command.library);
   if (!library) return PrintInputError(library.error());
-  auto synthesis = Synthesize(*library, choreography->start, choreography->movements, command.fps,
-                              {.run_time_correction = !command.no_correction,
-                               .foot_planting = !command.no_planting,
-                               .terrain = choreography->terrain},
-                              choreography->layers);
+  auto synthesis = Synthesize({.library = *library,
+                               .start = choreography->start,
+                               .requests = choreography->movements,
+                               .fps = command.fps,
+                               .options = {.run_time_correction = !command.no_correction,
+                                           .foot_planting = !command.no_planting,
+                                           .terrain = choreography->terrain},
+                               .layers = choreography->layers});
   if (!synthesis) {
     Error error = synthesis.error();
     std::string where = command.choreography;

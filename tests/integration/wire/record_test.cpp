@@ -136,7 +136,7 @@ class RecordTest : public testing::TestWithParam<int> {};
 
 TEST_P(RecordTest, EqualsOfflineSynthesis) {
   const auto library = OpenLibrary("builtin").value();
-  const auto truth = Synthesize(library, {}, Choreography(), kFps);
+  const auto truth = Synthesize({.library = library, .requests = Choreography(), .fps = kFps});
   ASSERT_TRUE(truth.has_value()) << Describe(truth.error());
 
   test::ChildProcess server = StartServer(GetParam());

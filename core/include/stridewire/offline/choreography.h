@@ -63,13 +63,6 @@ struct Choreography {
 /// Errors: kNotFound or kIo with the file in `where`. kMalformed with "file:line:column" if the
 /// text is not JSON. kMalformed, kOutOfRange, kShapeMismatch or kUnsupported with the field, for
 /// example "c.json: movements[3].step.length_m". kLimitExceeded with the file or the field.
-
-/// Reads a choreography. Numbers are checked against the limits of requests (movement_request.h);
-/// whether a library has such movements is for ValidateRequest to say.
-///
-/// Errors: kNotFound, kIo with `where` = file; kMalformed with "file:line:column" where the text is
-/// not JSON; kMalformed, kOutOfRange, kShapeMismatch, kUnsupported with the field, e.g.
-/// "c.json: movements[3].step.length_m"; kLimitExceeded with file or field.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 
 /// Same as ReadChoreography, for text in memory. `name` replaces the path in errors.

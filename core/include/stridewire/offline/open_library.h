@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// A library as every command line names it: `builtin` is generated, anything else is a file.
-/// Errors as MotionLibrary::Open.
+/// Opens a library by the name that all programs accept: `builtin` for the generated library, or
+/// the path of a file. Errors: those of MotionLibrary::Open.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> OpenLibrary(std::string_view name);
 
 }  // namespace stridewire

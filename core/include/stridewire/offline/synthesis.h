@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -82,17 +85,24 @@ struct Synthesis {
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Longest result of Synthesize.
 
-/// Plays requests on an avatar without a server and records one pose per tick, with `fps` ticks per
-/// second, until the avatar is idle. `layers` must be sorted by `before`; each takes effect in the
-/// frame after its movement (or a step inserted before that movement) begins.
+/// What Synthesize plays.
+struct SynthesisInput {
+  std::shared_ptr<const MotionLibrary> library;
+  BaseFrame start;
+  std::span<const MovementRequest> requests;
+  double fps = 60.0;  ///< Ticks per second, 10 to 1000.
+  AvatarOptions options;
+  /// Must be sorted by `before`. Each cue takes effect in the frame after its movement, or a step
+  /// inserted before that movement, begins.
+  std::span<const LayerCue> layers;
+};
+
+/// Plays requests on an avatar without a server and records one pose per tick until the avatar is
+/// idle.
 ///
 /// Errors: kUnsupported or kOutOfRange if the library rejects a request or no transition path leads
 /// to it. kLimitExceeded if the result exceeds kMaxSynthesisFrames. For layers the errors of
 /// LayerStack::Set. `where` names a movement by its index in a choreography, which counts layers.
-[[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
-                                             const BaseFrame& start,
-                                             std::span<const MovementRequest> requests, double fps,
-                                             const AvatarOptions& options = {},
-                                             std::span<const LayerCue> layers = {});
+[[nodiscard]] Expected<Synthesis> Synthesize(const SynthesisInput& input);
 
 }  // namespace stridewire

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/check.h"
+
 namespace stridewire {
 namespace {
 
@@ -31,6 +33,7 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
   bool end_array() override { return Close(); }
 
   bool key(string_t& name) override {
+    STRIDEWIRE_CHECK(!open_.empty() && open_.back()->is_object());
     if (open_.back()->contains(name)) {
       return Stop(ErrorCode::kMalformed, "duplicate key before this position");
     }
@@ -84,6 +87,7 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
   }
 
   bool Close() {
+    STRIDEWIRE_CHECK(!open_.empty());
     open_.pop_back();
     return true;
   }

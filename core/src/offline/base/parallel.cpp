@@ -5,6 +5,8 @@
 #include <thread>
 #include <vector>
 
+#include "base/check.h"
+
 namespace stridewire {
 
 int ThreadCount(int requested) {
@@ -15,6 +17,7 @@ int ThreadCount(int requested) {
 }
 
 void ParallelFor(int count, int chunk, int threads, const std::function<void(int, int)>& work) {
+  STRIDEWIRE_CHECK(count >= 0 && chunk > 0 && threads > 0);
   std::atomic<int> next{0};
   const auto run = [&](int thread) {
     for (;;) {

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/hull_survey.h"
+#include "offline/build/parameter_scales.h"
 #include "runtime/library/convex_hull.h"
 
 namespace stridewire {
@@ -57,26 +59,23 @@ Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index
   } else {
     map.y = {0.0};
   }
-  std::array<double, kMaxParameters> metric{};
-  for (std::size_t l = 0; l < width; ++l) metric[l] = 1.0 / group.parameters[l].scale;
+  const std::vector<double> metric = MetricOf(group);
 
   const std::size_t count = map.x.size() * map.y.size();
   map.error_m.resize(count);
   map.weight_sum.resize(count);
   std::vector<GroupProbe> probes = MakeProbes(library, 0);
+  STRIDEWIRE_CHECK(!probes.empty() && map.others.size() == width);
   ParallelFor(static_cast<int>(count), 16, static_cast<int>(probes.size()), [&](int i, int thread) {
     const auto at = static_cast<std::size_t>(i);
-    ParameterValues p;
-    p.count = d;
-    std::copy(map.others.begin(), map.others.end(), p.values.begin());
+    ParameterValues p = ValuesOf(map.others);
     p.values[axis_x] = map.x[at % map.x.size()];
     if (options.axis_y >= 0) {
       p.values[static_cast<std::size_t>(options.axis_y)] = map.y[at / map.x.size()];
     }
     std::array<double, kMaxParameters> nearest{};
-    const double outside =
-        ProjectOntoHull(examples, std::span(metric).first(width), 0.0,
-                        std::span(p.values).first(width), std::span(nearest).first(width));
+    const double outside = ProjectOntoHull(examples, metric, 0.0, std::span(p.values).first(width),
+                                           std::span(nearest).first(width));
     const HullPoint point =
         outside <= kInside ? probes[static_cast<std::size_t>(thread)].At(group, p) : HullPoint{};
     const double nothing = std::numeric_limits<double>::quiet_NaN();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
@@ -22,6 +23,7 @@ double Distance(const GridExample& a, const GridExample& b, std::span<const doub
 std::vector<std::vector<int>> CompleteLinkage(const std::vector<GridExample>& examples,
                                               std::span<const double> units, double diameter) {
   const std::size_t n = examples.size();
+  STRIDEWIRE_CHECK(diameter >= 0.0);
   std::vector<std::vector<int>> clusters(n);
   std::vector<double> distance(n * n, 0.0);  // Between clusters: of their most distant members.
   for (std::size_t i = 0; i < n; ++i) {
@@ -52,6 +54,7 @@ std::vector<std::vector<int>> CompleteLinkage(const std::vector<GridExample>& ex
     }
   }
   std::erase_if(clusters, [](const std::vector<int>& cluster) { return cluster.empty(); });
+  STRIDEWIRE_CHECK(!clusters.empty() || n == 0);
   for (std::vector<int>& cluster : clusters) std::sort(cluster.begin(), cluster.end());
   return clusters;
 }
@@ -59,6 +62,7 @@ std::vector<std::vector<int>> CompleteLinkage(const std::vector<GridExample>& ex
 GridExample AverageExamples(const std::vector<GridExample>& examples, std::span<const int> members,
                             const GridLayout& layout, const Skeleton& skeleton,
                             const RawGroup& group) {
+  STRIDEWIRE_CHECK(!members.empty());
   GridExample mean = examples[static_cast<std::size_t>(members[0])];
   if (members.size() == 1) return mean;
   const double share = 1.0 / static_cast<double>(members.size());
@@ -68,6 +72,8 @@ GridExample AverageExamples(const std::vector<GridExample>& examples, std::span<
   mean.heading_change_rad = 0.0;
   for (const int member : members) {
     const GridExample& example = examples[static_cast<std::size_t>(member)];
+    STRIDEWIRE_CHECK(example.rows.size() == rows.size() &&
+                     example.parameters.size() == mean.parameters.size());
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i] += share * example.rows[i];
     for (std::size_t i = 0; i < mean.keytimes_s.size(); ++i) {
       mean.keytimes_s[i] += share * example.keytimes_s[i];

@@ -3,10 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/build/grid_example.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
-#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 namespace {
@@ -70,6 +71,7 @@ std::vector<double> StoredErrors(const RawExample& example, const std::vector<in
 }  // namespace
 
 std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout& layout) {
+  STRIDEWIRE_CHECK(!group.examples.empty());
   const std::size_t intervals = group.examples.front().keytimes_s.size() - 1;
   double clip_fps = 0.0;
   for (const RawExample& example : group.examples) clip_fps = std::max(clip_fps, example.clip.fps);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/keytimes.h"
 
 namespace stridewire {
@@ -36,6 +37,8 @@ std::size_t MedoidIndex(const std::vector<GridExample>& examples) {
 
 GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                            const GridLayout& layout) {
+  STRIDEWIRE_CHECK(example.keytimes_s.size() == cells.size() + 1);
+  STRIDEWIRE_CHECK(example.clip.joint_count == layout.joint_count);
   Clip clip = example.clip;
   MakeSignContinuous(clip);
   const TimeWarp warp(example.keytimes_s, cells);
@@ -71,6 +74,7 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count) {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
+  STRIDEWIRE_CHECK(!examples.empty());
   GridExample& reference = examples[MedoidIndex(examples)];
   const std::size_t points = reference.rows.size() / row_floats;
   const auto flip = [&](float* row, std::size_t j) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/parameter_scales.h"
 #include "runtime/library/convex_hull.h"
@@ -29,8 +30,7 @@ HullPoint Climb(const MotionGroup& group, HullPoint at, GroupProbe& probe) {
   const std::size_t d = group.parameters.size();
   const std::span<const double> examples =
       group.sites.first(static_cast<std::size_t>(group.example_count) * d);
-  std::array<double, kMaxParameters> metric{};
-  for (std::size_t l = 0; l < d; ++l) metric[l] = 1.0 / group.parameters[l].scale;
+  const std::vector<double> metric = MetricOf(group);
   double stride = kFirstStride;
   for (int round = 0; round < kClimbRounds && stride > kLastStride; ++round) {
     std::array<double, kMaxParameters> slope{};
@@ -50,7 +50,7 @@ HullPoint Climb(const MotionGroup& group, HullPoint at, GroupProbe& probe) {
         p.values[l] += stride * slope[l] / size * group.parameters[l].scale;
       }
       ParameterValues inside = p;
-      ProjectOntoHull(examples, std::span(metric).first(d), 0.0, std::span(p.values).first(d),
+      ProjectOntoHull(examples, metric, 0.0, std::span(p.values).first(d),
                       std::span(inside.values).first(d));
       const HullPoint next = probe.At(group, inside);
       if (next.error_m > at.error_m) {
@@ -70,11 +70,10 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::size_t d = group.parameters.size();
   std::mt19937 random(seed);
+  STRIDEWIRE_CHECK(n > 0 && d > 0 && samples >= 0);
   std::vector<ParameterValues> points;
   for (std::size_t e = 0; e < n; ++e) {
-    ParameterValues& point = points.emplace_back();
-    point.count = static_cast<int>(d);
-    std::copy_n(&group.sites[e * d], d, point.values.begin());
+    points.push_back(ValuesOf(group.site(static_cast<int>(e))));
   }
   std::vector<double> share(n);
   for (int s = 0; s < samples; ++s) {
@@ -141,6 +140,7 @@ std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {
 HullSurvey SurveyHull(const MotionGroup& group, std::span<const ParameterValues> samples,
                       std::span<GroupProbe> probes) {
   const int threads = static_cast<int>(probes.size());
+  STRIDEWIRE_CHECK(!probes.empty() && !samples.empty());
   HullSurvey survey;
   survey.points.resize(samples.size());
   ParallelFor(static_cast<int>(samples.size()), 32, threads, [&](int i, int thread) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/hull_survey.h"
 
@@ -22,6 +23,7 @@ InterpolationError MeasureInterpolationError(const MotionLibrary& library, int g
   error.max_m = survey.max_m;
   error.weight_sum_max = survey.weight_sum_max;
   error.samples = static_cast<int>(points.size());
+  STRIDEWIRE_CHECK(survey.points.size() == points.size());
   const CorrectionLimits limits = DefaultCorrectionLimits(group);
   error.iterations = limits.max_iterations;
   for (const HullPoint& peak : survey.peaks) points.push_back(peak.p);

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
+#include "base/check.h"
+#include "offline/base/text.h"
 #include "offline/build/library_writer.h"
 #include "offline/extract/assemble.h"
 #include "runtime/skeleton/layer_clip.h"
@@ -86,6 +87,7 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
 std::vector<float> UpperBodyMask(const Skeleton& skeleton) {
   const std::vector<bool> of_legs = JointsOfLegs(skeleton);
   std::vector<float> mask;
+  STRIDEWIRE_CHECK(of_legs.size() == skeleton.joints.size());
   for (const bool is_of_leg : of_legs) mask.push_back(is_of_leg ? 0.0f : 1.0f);
   const std::vector<int> trunk = TrunkOf(skeleton, of_legs);
   for (std::size_t k = 0; k < trunk.size(); ++k) {
@@ -133,10 +135,10 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   layer.name = cut.name;
   layer.is_looping = cut.is_looping;
   layer.weights = UpperBodyMask(skeleton);
-  char times[64];
-  std::snprintf(times, sizeof(times), " %.2f-%.2f s", from_s, to_s);
-  layer.source = std::filesystem::path(capture.path).filename().string() + times;
+  layer.source =
+      std::filesystem::path(capture.path).filename().string() + Text(" %.2f-%.2f s", from_s, to_s);
 
+  STRIDEWIRE_CHECK(static_cast<int>(layer.weights.size()) == skeleton.joint_count());
   const double blend_s = cut.is_looping ? std::min(kLoopBlendS, 0.25 * (to_s - from_s)) : 0.0;
   const double duration_s = to_s - from_s - blend_s;
   const int intervals = std::max(1, static_cast<int>(std::lround(duration_s * capture.clip.fps)));
@@ -205,6 +207,8 @@ Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers, const Skele
                              .weights = content.weights,
                              .rotations = content.rotations});
   }
+  STRIDEWIRE_CHECK(stored.views_.size() == layers.size() &&
+                   stored.contents_.size() == layers.size());
   return stored;
 }
 

@@ -5,16 +5,17 @@
 #include <memory>
 #include <utility>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/parameter_scales.h"
 #include "offline/build/smooth_examples.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/library/convex_hull.h"
-#include "runtime/weights/correction.h"
-#include "runtime/weights/measure.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
+#include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {
@@ -29,6 +30,7 @@ struct Others {
 };
 
 Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_m) {
+  STRIDEWIRE_CHECK(left_out >= 0 && left_out < group.example_count);
   Others others;
   std::vector<GridExample> points;
   for (int e = 0; e < group.example_count; ++e) {
@@ -68,6 +70,8 @@ std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<
   const std::vector<double> scales = ScalesOf(original);
   const auto n = static_cast<std::size_t>(original.example_count);
   const std::size_t count = shares.size() / n;
+  STRIDEWIRE_CHECK(count > 0 && shares.size() == count * n);
+  STRIDEWIRE_CHECK(sites.size() == count * static_cast<std::size_t>(original.parameter_count()));
   auto fitted = std::make_unique<GroupOfOthers>();
   if (is_smooth) {
     auto wide = FitSmoothBasis(sites, scales);
@@ -108,6 +112,7 @@ std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<
 }
 
 std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::size_t used) {
+  STRIDEWIRE_CHECK(used > 0);
   const std::span<const double> wanted = group.site(left_out);
   std::vector<std::pair<double, int>> near;
   for (int e = 0; e < group.example_count; ++e) {
@@ -186,11 +191,8 @@ class Comparer {
     }
     const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
     if (fitted == nullptr) return {};
-    std::vector<double> metric;
-    for (const Parameter& parameter : group_.parameters) metric.push_back(1.0 / parameter.scale);
-    ParameterValues applied;
-    applied.count = group_.parameter_count();
-    ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
+    ParameterValues applied{.count = group_.parameter_count()};
+    ProjectOntoHull(others.sites, MetricOf(group_), kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
     CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
                    DefaultCorrectionLimits(group_), scratch, movement_);
@@ -198,6 +200,7 @@ class Comparer {
   }
 
   Comparison Compare(int left_out, std::span<const double> weights) {
+    STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group_.example_count));
     std::vector<double> one(weights.size());
     one[static_cast<std::size_t>(left_out)] = 1.0;
     const std::vector<Pose> truth = PosesAtGridPoints(group_, library_.layout(), one);
@@ -230,11 +233,8 @@ class Comparer {
       movement_.heading_change_rad += weights[e] * group_.heading_change_rad[e];
     }
     cache_.Clear();
-    ParameterValues wanted;
-    wanted.count = group_.parameter_count();
-    std::copy(group_.site(left_out).begin(), group_.site(left_out).end(), wanted.values.begin());
     result.parameter_m = LargestDifference(
-        group_, wanted,
+        group_, ValuesOf(group_.site(left_out)),
         MeasureMovement(library_.skeleton(), library_.layout(), group_, movement_, cache_, pose_));
     return result;
   }

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/convex_hull.h"
-#include "stridewire/runtime/pose.h"
 #include "runtime/plan/request_plan.h"
+#include "stridewire/runtime/pose.h"
 
 namespace stridewire {
 namespace {
@@ -33,6 +34,7 @@ std::optional<BlendSet> MakeBlendSet(std::vector<const GridExample*> examples) {
   for (const GridExample* example : set.examples) {
     set.sites.insert(set.sites.end(), example->parameters.begin(), example->parameters.end());
   }
+  STRIDEWIRE_CHECK(set.sites.size() == set.examples.size() * d);
   Expected<CardinalBasis> basis =
       CardinalBasisFit{
           static_cast<int>(d), static_cast<int>(set.examples.size()), set.sites, {}, scales}
@@ -62,6 +64,7 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
                                    std::span<const Vec3> truth) {
   LeftOutError error;
   const std::size_t d = units_.size();
+  STRIDEWIRE_CHECK(target.parameters.size() == d && set.sites.size() == set.examples.size() * d);
   applied_.resize(d);
   error.outside_m = ProjectOntoHull(set.sites, units_, 0.0, target.parameters, applied_);
   error.miss_m = ProjectOntoHull(set.sites, units_, kHullGrowth, target.parameters, applied_);
@@ -97,6 +100,7 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
     }
   }
   const std::vector<Vec3> synthesized = JointPositions(blend_, layout_, skeleton_);
+  STRIDEWIRE_CHECK(synthesized.size() == truth.size());
   for (std::size_t i = 0; i < synthesized.size(); ++i) {
     error.pose_m += static_cast<double>(glm::length(synthesized[i] - truth[i]));
   }

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 #include <numeric>
 #include <optional>
 
+#include "base/check.h"
+#include "offline/base/text.h"
 #include "offline/build/grid_cells.h"
 #include "offline/build/grid_example.h"
 #include "offline/build/layers.h"
@@ -113,6 +114,7 @@ struct StoredGroup {
     const std::size_t n = examples.size();
     const auto row_floats = static_cast<std::size_t>(layout.row_floats);
     const std::size_t points = examples.front().rows.size() / row_floats;
+    STRIDEWIRE_CHECK(examples.front().rows.size() == points * row_floats);
     grid.resize(points * n * row_floats);
     for (std::size_t e = 0; e < n; ++e) {
       const GridExample& example = examples[e];
@@ -260,6 +262,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
         SelectExamplesJob{found, units, diameter, selection, layout, raw.skeleton, group}.Run();
     std::vector<GridExample> examples = std::move(selected.examples);
     selected.report.group = static_cast<int>(g);
+    STRIDEWIRE_CHECK(!examples.empty() && examples.size() == selected.clusters.size());
     NoteSelection(selected.report, examples.size(), note);
     std::optional<Smoothness> smoothness;
     if (smooths) {
@@ -269,11 +272,9 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     if (smoothness) {
       selected.report.ridge = smoothness->ridge;
       selected.report.ridge_radius = smoothness->radius;
-      char text[64];
-      std::snprintf(text, sizeof text, "smoothed over their parameters, ridge %g",
-                    smoothness->ridge);
-      note(text);
+      note(Text("smoothed over their parameters, ridge %g", smoothness->ridge));
     }
+    STRIDEWIRE_CHECK(selected.report.examples.size() == group.examples.size());
     selections.push_back(std::move(selected.report));
 
     StoredGroup& stored =
@@ -296,6 +297,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
       error.where = "group " + std::string(MovementKindName(group.kind));
       return std::unexpected(error);
     }
+    STRIDEWIRE_CHECK(stored.basis.centres.size() == scales.size());
     view.dilations = stored.basis.dilations;
     view.linear = stored.basis.linear;
     view.radial = stored.basis.radial;
@@ -304,6 +306,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     }
     views.push_back(std::move(view));
   }
+  STRIDEWIRE_CHECK(views.size() == groups.size() && views.size() == selections.size());
   Expected<StoredLayers> layers = StoreLayers(raw.layers, raw.skeleton);
   if (!layers) return std::unexpected(layers.error());
   return WriteLibrary({raw.skeleton, raw.stand_pose, views, layers->views()});

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/check.h"
 #include "motion_library_generated.h"
 #include "offline/build/transitions.h"
 #include "runtime/library/library_file.h"
@@ -30,6 +31,10 @@ flatbuffers::Offset<flatbuffers::Vector<T>> AddVector(Builder& builder, std::spa
 }
 
 flatbuffers::Offset<fb::Group> AddGroup(Builder& builder, const MotionGroup& group) {
+  STRIDEWIRE_CHECK(group.sources.size() == static_cast<std::size_t>(group.example_count));
+  STRIDEWIRE_CHECK(group.sites.size() ==
+                   static_cast<std::size_t>(group.site_count) * group.parameters.size());
+  STRIDEWIRE_CHECK(group.dilations.size() == static_cast<std::size_t>(group.site_count));
   std::vector<flatbuffers::Offset<flatbuffers::String>> sources;
   for (const std::string_view source : group.sources) {
     sources.push_back(builder.CreateString(source.data(), source.size()));
@@ -105,6 +110,7 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   for (const Transition& t : FindTransitions(content)) {
     transitions.emplace_back(t.distance_m, t.end_example, t.start_example);
   }
+  STRIDEWIRE_CHECK(transitions.size() == (content.groups.size() + 1) * (content.groups.size() + 1));
   const auto transitions_offset = builder.CreateVectorOfStructs(transitions);
   fb::FinishMotionLibraryBuffer(
       builder, fb::CreateMotionLibrary(builder, skeleton, &stand_root, stand_offset, groups_offset,

@@ -3,9 +3,9 @@
 #include <memory>
 #include <span>
 
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
-#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <span>
 #include <vector>
 
 #include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
@@ -14,6 +16,20 @@ namespace stridewire {
   std::vector<double> scales;
   for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
   return scales;
+}
+
+// Returns the inverse scales, the metric that ProjectOntoHull takes.
+[[nodiscard]] inline std::vector<double> MetricOf(const MotionGroup& group) {
+  std::vector<double> metric;
+  for (const Parameter& parameter : group.parameters) metric.push_back(1.0 / parameter.scale);
+  return metric;
+}
+
+// Copies the parameters of a point.
+[[nodiscard]] inline ParameterValues ValuesOf(std::span<const double> point) {
+  ParameterValues values{.count = static_cast<int>(point.size())};
+  std::copy(point.begin(), point.end(), values.values.begin());
+  return values;
 }
 
 // Returns the scaled distance of two points. `a` and `b` may have more than d values.

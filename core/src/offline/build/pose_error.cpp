@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/extract/mirror.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/pose/evaluate_poses.h"
@@ -114,6 +115,7 @@ std::vector<Pose> PosesAtGridPoints(const Clip& clip, std::span<const double> ke
   const TimeWarp warp(keytimes_s, cells);
   std::vector<Pose> poses;
   int last = 0;
+  STRIDEWIRE_CHECK(keytimes_s.size() == cells.size() + 1);
   for (const int count : cells) last += count;
   for (int p = 0; p <= last; ++p) {
     Pose& pose = poses.emplace_back(clip.joint_count);
@@ -124,6 +126,7 @@ std::vector<Pose> PosesAtGridPoints(const Clip& clip, std::span<const double> ke
 
 std::vector<Pose> PosesAtGridPoints(const MotionGroup& group, const GridLayout& layout,
                                     std::span<const double> weights) {
+  STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group.example_count));
   Movement movement;
   movement.group = 0;
   movement.weights.assign(weights.begin(), weights.end());

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <optional>
 
+#include "base/check.h"
 #include "offline/build/hull_survey.h"
 #include "offline/build/library_writer.h"
 #include "offline/build/parameter_scales.h"
@@ -57,6 +58,8 @@ Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Site
           .Run();
   if (!basis) return std::unexpected(basis.error());
   candidate->basis = *std::move(basis);
+  STRIDEWIRE_CHECK(candidate->basis.sites.size() == candidate->sites.parameters.size());
+  STRIDEWIRE_CHECK(candidate->sites.radius_factors.size() == candidate->basis.dilations.size());
   MotionGroup& group = candidate->group;
   group = original;
   group.sites = candidate->basis.sites;
@@ -179,6 +182,7 @@ class GroupRefiner {
                      .max_error_curve_m = {survey.max_m},
                      .end = RefineEnd::kNothingHelps};
     }
+    STRIDEWIRE_CHECK(best.candidate != nullptr && !best.report.max_error_curve_m.empty());
     return best;
   }
 
@@ -208,6 +212,7 @@ class GroupRefiner {
     for (const HullPoint& peak : survey.peaks) samples_.push_back(peak.p);
     const MotionGroup& group = current.group;
     const std::span<const double> site = group.site(group.site_count - 1);
+    STRIDEWIRE_CHECK(group.site_count > group.example_count);
     const double radius = 2.0 * group.dilations.back();
     for (std::size_t i = 0; i < kNearSamples; ++i) {
       // Moves towards another point of the hull, so that the sample is inside the hull.
@@ -289,6 +294,7 @@ class GroupRefiner {
     }
     // Drops the sites that were added after the best state.
     const MotionGroup& group = outcome.candidate->group;
+    STRIDEWIRE_CHECK(group.site_count >= group.example_count);
     const auto kept = static_cast<std::size_t>(group.site_count - group.example_count + 1);
     if (kept < report.max_error_curve_m.size()) {
       report.rejected += static_cast<int>(report.max_error_curve_m.size() - kept);
@@ -296,11 +302,8 @@ class GroupRefiner {
       report.end = RefineEnd::kNothingHelps;
     }
     for (int s = group.example_count; s < group.site_count; ++s) {
-      ParameterValues p;
-      p.count = group.parameter_count();
-      std::copy(group.site(s).begin(), group.site(s).end(), p.values.begin());
-      report.pseudoexample_error_m =
-          std::max(report.pseudoexample_error_m, probes_[0].At(group, p).error_m);
+      report.pseudoexample_error_m = std::max(
+          report.pseudoexample_error_m, probes_[0].At(group, ValuesOf(group.site(s))).error_m);
     }
     return outcome;
   }
@@ -449,6 +452,8 @@ Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
     candidates.push_back(std::move(outcome->candidate));
     refinement.groups.push_back(std::move(outcome->report));
   }
+  STRIDEWIRE_CHECK(groups.size() == library->groups().size() &&
+                   refinement.groups.size() == groups.size());
   auto refined =
       WriteLibrary({library->skeleton(), library->stand_pose(), groups, library->layers()});
   if (!refined) return std::unexpected(refined.error());

@@ -92,10 +92,9 @@ struct Refinement {
 /// kMaxRefinedWeightSum. It runs these passes until one reaches max_error_m. If none does, the pass
 /// with the smallest largest error, measured with samples of another seed, is used:
 ///
-///   1. The radii of the examples are constant, and sites that do not reduce the error are
-///   rejected. 2. Radii shrink, and every site is added. At the end the sites after the best state
-///   are dropped.
-///      The pass is repeated with several radii tried for each new site.
+///   1. The radii of the examples are constant. Sites that do not reduce the error are rejected.
+///   2. Radii shrink, and every site is added. At the end the sites after the best state are
+///      dropped. The pass is repeated with several radii tried for each new site.
 ///   3. Like 1, with the radii of the examples 2 and 3 times as wide, which suits evenly spaced
 ///      examples.
 ///

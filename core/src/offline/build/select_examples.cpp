@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 
+#include "base/check.h"
 #include "offline/base/parallel.h"
 #include "offline/base/statistics.h"
+#include "offline/base/text.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/left_out_error.h"
 
@@ -16,15 +17,9 @@ namespace {
 constexpr std::size_t kOutlierExamplesMin = 8;
 constexpr std::size_t kExamplesPerOutlier = 10;
 constexpr double kInsideM = 1e-3;            // Points nearer to the hull count as inside.
-constexpr double kDeviationOfMad = 1.4826;   // Standard deviation per MAD if normal.
+constexpr double kDeviationOfMad = 1.4826;   // Ratio of standard deviation and MAD.
 constexpr double kMinPoseDeviationM = 2e-3;  // Smaller spreads are not significant.
 constexpr double kMinDurationDeviationS = 5e-3;
-
-std::string Text(const char* format, double a, double b) {
-  char text[160];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
 
 // The examples of a group, or averages of them, with the data needed to compare them.
 class Candidates {
@@ -145,6 +140,7 @@ void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidat
     }
     if (worst_by <= deviations) return;
     SelectedExample& dropped = report.examples[static_cast<std::size_t>(left[worst])];
+    STRIDEWIRE_CHECK(dropped.fate == ExampleFate::kKept);
     dropped.fate = ExampleFate::kOutlier;
     dropped.error_m = errors[worst].pose_m;
     if (by_duration) {
@@ -207,6 +203,8 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
 }  // namespace
 
 Selected SelectExamplesJob::Run() const {
+  STRIDEWIRE_CHECK(!examples.empty() && units.size() == group.parameters.size());
+  STRIDEWIRE_CHECK(examples.size() == group.examples.size());
   Selected selected;
   selected.report.kind = group.kind;
   for (const GridExample& example : examples) {
@@ -235,6 +233,7 @@ Selected SelectExamplesJob::Run() const {
   if (options.max_pose_error_m > 0.0) {
     Candidates candidates(averages, units, layout, skeleton);
     chosen = ChooseFew(candidates, units, options.max_pose_error_m, errors);
+    STRIDEWIRE_CHECK(!chosen.empty() && std::ranges::is_sorted(chosen));
   }
   for (std::size_t c = 0; c < clusters.size(); ++c) {
     const auto found = std::ranges::lower_bound(chosen, static_cast<int>(c));
@@ -260,6 +259,8 @@ Selected SelectExamplesJob::Run() const {
       selected.examples.push_back(std::move(averages[c]));
     }
   }
+  STRIDEWIRE_CHECK(selected.examples.size() == chosen.size() &&
+                   selected.clusters.size() == chosen.size());
   return selected;
 }
 

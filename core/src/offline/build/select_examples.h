@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "offline/build/grid_example.h"
-#include "stridewire/offline/raw_library.h"
 #include "stridewire/offline/library_builder.h"
+#include "stridewire/offline/raw_library.h"
 
 namespace stridewire {
 
@@ -20,9 +20,9 @@ struct Selected {
 //
 //   1. Outliers are dropped.
 //   2. Examples within `diameter` of each other are averaged.
-//   3. Forward: the average that the chosen ones reproduce worst is added until all are within the
-//   bound. 4. Backward, in the order of adding: averages that the others reproduce are removed
-//   again.
+//   3. Starting with one average, the average that the chosen ones reproduce worst is added, until
+//      all are within the bound.
+//   4. In the order of adding, averages that the others reproduce within the bound are removed.
 //
 // The result does not depend on the number of threads.
 struct SelectExamplesJob {

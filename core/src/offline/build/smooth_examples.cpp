@@ -6,14 +6,15 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/check.h"
 #include "offline/build/hull_survey.h"
 #include "offline/build/parameter_scales.h"
 #include "offline/build/pose_error.h"
 #include "runtime/library/convex_hull.h"
-#include "runtime/weights/correction.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
@@ -127,6 +128,7 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
   for (std::size_t i = 0; i < m; ++i) {
     const auto column = static_cast<Eigen::Index>(i);
     const auto e = static_cast<std::size_t>(examples[i]);
+    STRIDEWIRE_CHECK(e < n);
     for (std::size_t j = 0; j < m; ++j) {
       smooth->radial[j * n + e] = kriging.inverse(static_cast<Eigen::Index>(j), column);
     }
@@ -148,10 +150,8 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
 bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const Skeleton& skeleton,
                       std::span<const double> parameters, std::span<double> scratch,
                       Movement& movement) {
-  ParameterValues wanted;
-  wanted.count = static_cast<int>(parameters.size());
-  std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
-  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, wanted,
+  STRIDEWIRE_CHECK(scratch.size() >= static_cast<std::size_t>(smooth.group.example_count));
+  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, ValuesOf(parameters),
                                            {.max_iterations = kSolveIterations}, scratch, movement);
   return solved.error_m <= kMaxMissM;
 }
@@ -190,9 +190,9 @@ std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group, std::span<c
   const std::size_t m = examples.size();
   const auto n = static_cast<std::size_t>(group.example_count);
   if (m < static_cast<std::size_t>(kExamplesPerCoefficient) * (d + 1)) return std::nullopt;
+  STRIDEWIRE_CHECK(products.size() == n * n);
   const std::vector<double> scales = ScalesOf(group);
-  std::vector<double> metric;
-  for (const double scale : scales) metric.push_back(1.0 / scale);
+  const std::vector<double> metric = MetricOf(group);
   const std::vector<double> sites = SitesOf(group, examples);
   std::vector<double> applied(sites.size());  // [example][d]
   std::vector<double> rest(sites.size() - d);
@@ -250,6 +250,7 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   Movement movement;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   for (GridExample& example : examples) {
+    STRIDEWIRE_CHECK(example.parameters.size() == group.parameters.size());
     if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, movement)) {
       continue;
     }
@@ -271,6 +272,7 @@ Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
                                      std::span<const double> scales) {
   const std::size_t d = scales.size();
   const std::size_t n = sites.size() / d;
+  STRIDEWIRE_CHECK(n > 0 && sites.size() == n * d);
   CardinalBasisFit fit{.parameter_count = static_cast<int>(d),
                        .example_count = static_cast<int>(n),
                        .sites = sites,

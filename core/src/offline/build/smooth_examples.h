@@ -7,9 +7,9 @@
 
 #include "offline/build/grid_example.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/movement/movement.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
-#include "runtime/movement/movement.h"
 
 namespace stridewire {
 
@@ -18,8 +18,8 @@ namespace stridewire {
 // following kind (universal kriging: Matheron 1969; equivalently Wahba's smoothing with an
 // unpenalised linear part):
 //
-//   w(p) = R(p) r + A(p) a,   (R + ridge I) r + A a = I,   A^T r = 0,   R_j(p) = B(|p - p_j| /
-//   radius)
+//   w(p) = R(p) r + A(p) a,   (R + ridge I) r + A a = I,   A^T r = 0,
+//   R_j(p) = B(|p - p_j| / radius)
 //
 // with A and B as in CardinalBasisFit. The weights sum to 1 and reproduce the parameters
 // (sum w_i p_i = p), but are not one-hot at the examples. A larger ridge removes more individual

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
+#include "offline/build/grid_example.h"
 #include "runtime/library/contact_keytimes.h"
-#include "stridewire/runtime/pose.h"
 #include "runtime/library/transition.h"
+#include "stridewire/runtime/pose.h"
 
 namespace stridewire {
 namespace {
@@ -28,7 +30,6 @@ class MomentReader {
   explicit MomentReader(const Skeleton& skeleton)
       : skeleton_(skeleton),
         layout_(skeleton.joint_count()),
-        pose_(skeleton.joint_count()),
         points_(skeleton.joints.size()),
         rotations_(skeleton.joints.size()) {}
 
@@ -64,6 +65,7 @@ class MomentReader {
   // The velocity is the difference to the grid point `beside`, which is `away_s` later.
   Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
                   double heading_rad, double ground_m) {
+    STRIDEWIRE_CHECK(point >= 0 && point < group.grid_point_count && away_s != 0.0);
     const std::vector<DVec3> at = PointsOf(group, example, point);
     const DVec3 root_m = at[0];
     Moment moment{example, RelativeTo(at, root_m, heading_rad, ground_m),
@@ -85,14 +87,9 @@ class MomentReader {
   std::vector<DVec3> PointsOf(const MotionGroup& group, int example, int point) {
     const auto n = static_cast<std::size_t>(group.example_count);
     const std::size_t row = static_cast<std::size_t>(point) * n + static_cast<std::size_t>(example);
-    const float* x = &group.grid[row * static_cast<std::size_t>(layout_.row_floats)];
-    for (std::size_t j = 0; j < pose_.rotations.size(); ++j) {
-      pose_.rotations[j] = GridLayout::RotationOf(x, j);
-    }
-    const auto [position, yaw_rad] = layout_.RootOf(x);
-    pose_.root_position_m = Vec3(position);
-    pose_.rotations[0] = YawRotation(yaw_rad) * pose_.rotations[0];
-    return PointsOf(pose_);
+    const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
+    return PointsOf(PoseOfRow(group.grid.subspan(row * row_floats, row_floats), layout_,
+                              skeleton_.joint_count()));
   }
 
   std::vector<DVec3> PointsOf(ConstPoseSpan pose) {
@@ -102,12 +99,12 @@ class MomentReader {
 
   const Skeleton& skeleton_;
   GridLayout layout_;
-  Pose pose_;
   std::vector<Vec3> points_;
   std::vector<Quat> rotations_;
 };
 
 Transition Nearest(const std::vector<Moment>& ends, const std::vector<Moment>& starts) {
+  STRIDEWIRE_CHECK(!ends.empty() && !starts.empty());
   Transition nearest;
   double least_m = HUGE_VAL;
   for (const Moment& end : ends) {

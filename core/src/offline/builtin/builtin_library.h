@@ -14,12 +14,10 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 /// second. The result has the same bytes on every machine.
 ///
 ///   step_left   15 examples (start_z, end_z): every pair of the states 0, 0.35, 0.55, 0.75 m
-///   except
-///               standing to standing; keytimes start, toe-off, heel-strike, end
+///               except standing to standing; keytimes start, toe-off, heel-strike, end
 ///   step_right  their mirror images
 ///   jump        0.3, 0.7, 1.1, 1.5 m; keytimes start, lowest point of the crouch, toe-off,
-///   landing,
-///               lowest point of the absorption, end
+///               landing, lowest point of the absorption, end
 ///
 /// General steps, each kind with a left group and its mirror image:
 ///
@@ -29,9 +27,8 @@ inline constexpr Vec3 kBuiltinHeelOffsetM = Vec3(0.0f, -0.06825f, -0.06f);
 ///              apart, which start_x describes.
 ///   sideways  16 (start_x, start_z, end_x, end_z): 0 and 0.3 m wider than standing and 0 and 0.4 m
 ///              ahead, at either end
-///   up, down  30 each (start_y, start_z, end_y, end_z, turn): 0.125 and 0.25 m per foot, from and
-///   to
-///              level ground and on stairs, turns of 35 degrees to both sides
+///   up, down  30 each (start_y, start_z, end_y, end_z, turn): 0.125 and 0.25 m per foot, from
+///              and to level ground and on stairs, turns of 35 degrees to both sides
 ///
 /// A state is a pose and a velocity in the middle of double support, with the feet a given length
 /// apart. All examples that end in a state have the same final pose, and all that start in it have

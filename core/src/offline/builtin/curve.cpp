@@ -2,9 +2,12 @@
 
 #include <cstddef>
 
+#include "base/check.h"
+
 namespace stridewire::builtin {
 
 Curve::Curve(const std::vector<Knot>& knots) {
+  STRIDEWIRE_CHECK(!knots.empty());
   std::vector<std::optional<double>> given;
   for (const Knot& knot : knots) {
     if (!times_s_.empty() && knot.time_s < times_s_.back() + 1e-9) continue;

@@ -1,5 +1,6 @@
 #include "offline/builtin/figure.h"
 
+#include "base/check.h"
 #include "base/trig.h"
 
 namespace stridewire::builtin {
@@ -57,6 +58,7 @@ Skeleton MakeFigure() {
                       {kRightHand, Vec3(static_cast<float>(-kHandM), 0.0f, 0.0f)}};
   figure.legs[0] = {kLeftUpLeg, kLeftLeg, kLeftFoot, kLeftToeBase, Vec3(0.0f), toe_tip};
   figure.legs[1] = {kRightUpLeg, kRightLeg, kRightFoot, kRightToeBase, Vec3(0.0f), toe_tip};
+  STRIDEWIRE_CHECK(figure.joint_count() == kFigureJointCount);
   return figure;
 }
 
@@ -112,6 +114,7 @@ DVec3 BodyCentre(const Skeleton& figure, const FigurePose& pose) {
 }
 
 void StorePose(const FigurePose& pose, PoseSpan out) {
+  STRIDEWIRE_CHECK(out.rotations.size() == kFigureJointCount);
   out.root_position_m = Vec3(pose.root_m);
   for (std::size_t j = 0; j < kFigureJointCount; ++j) {
     out.rotations[j] = Normalise(Quat(pose.rotations[j]));

@@ -39,11 +39,10 @@ class FootPaths {
   [[nodiscard]] FootPose Fixed(double time_s) const;
   [[nodiscard]] FootPose Moving(double time_s) const;
 
-  /// Positions of the balls with flat feet: of the fixed foot, and of the moving foot before and
-  /// after its swing.
+  /// Positions of the balls with flat feet: of the fixed foot, and of the moving foot before its
+  /// swing.
   [[nodiscard]] const DVec3& fixed_ball_m() const { return fixed_ball_m_; }
   [[nodiscard]] const DVec3& start_ball_m() const { return start_ball_m_; }
-  [[nodiscard]] const DVec3& end_ball_m() const { return end_ball_m_; }
 
  private:
   [[nodiscard]] FootPose MovingBeforeToeOff(double time_s) const;

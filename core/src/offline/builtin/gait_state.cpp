@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "offline/builtin/curve.h"
 #include "offline/builtin/elementary.h"
@@ -38,6 +39,7 @@ double GaitState::front_ball_back_m() const {
 }
 
 GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
+  STRIDEWIRE_CHECK(length_m >= 0.0 && rise_m >= 0.0);
   GaitState state;
   state.length_m = length_m;
   state.pelvis_ahead_m = 0.02;
@@ -45,6 +47,7 @@ GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
   const double step_s = SteadyStepTime(length_m) + kRiseTime_s_m * rise_m;
   const double mean_speed = length_m / step_s;
   state.half_support_s = ToWholeFrames(0.12 * step_s);
+  STRIDEWIRE_CHECK(state.half_support_s > 0.0);
   state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   state.strike_pitch_rad = flat ? 0.0 : 22.0 * kDegree * Tanh(length_m / 0.5);

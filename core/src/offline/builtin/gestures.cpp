@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "offline/builtin/figure.h"
 
@@ -80,6 +81,7 @@ FigurePose Carrying(double phase) {
 template <typename PoseAt>
 RawLayer MakeLoop(const char* name, double duration_s, PoseAt pose_at) {
   const int frames = static_cast<int>(std::lround(duration_s * kFps));
+  STRIDEWIRE_CHECK(frames > 0);
   RawLayer layer;
   layer.name = name;
   layer.source = std::string("generated ") + name;

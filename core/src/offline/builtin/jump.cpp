@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "offline/builtin/curve.h"
 #include "offline/builtin/elementary.h"
@@ -62,6 +63,7 @@ class JumpPath {
     for (std::size_t i = 0; i < lengths.size(); ++i)
       times_[i + 1] = times_[i] + ToWholeFrames(lengths[i]);
     for (double& time_s : times_) time_s = ToWholeFrames(time_s);
+    STRIDEWIRE_CHECK(std::ranges::is_sorted(times_));
     const double flight_s = landing_s() - toe_off_s();
     velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;  // For the rounded flight time.
   }
@@ -255,6 +257,7 @@ class JumpPath {
 }  // namespace
 
 RawExample MakeJump(const Skeleton& figure, double length_m) {
+  STRIDEWIRE_CHECK(length_m > 0.0 && figure.joint_count() == kFigureJointCount);
   const JumpPath path(figure, length_m);
   RawExample example;
   example.keytimes_s = path.keytimes_s();

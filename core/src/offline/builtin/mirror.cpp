@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/check.h"
 #include "offline/builtin/figure.h"
 
 namespace stridewire::builtin {
@@ -18,6 +19,8 @@ int OtherSide(int joint) {
 }  // namespace
 
 RawExample Mirrored(const RawExample& example, std::span<const ParameterName> names) {
+  STRIDEWIRE_CHECK(names.size() == example.parameters.size());
+  STRIDEWIRE_CHECK(example.clip.joint_count == kFigureJointCount);
   RawExample mirrored = example;
   mirrored.mirrored = !example.mirrored;
   mirrored.heading_change_rad = -example.heading_change_rad;
@@ -41,6 +44,7 @@ RawExample Mirrored(const RawExample& example, std::span<const ParameterName> na
 }
 
 RawExample Reversed(const RawExample& example) {
+  STRIDEWIRE_CHECK(example.parameters.size() == 2 && example.heading_change_rad == 0.0);
   RawExample reversed = example;
   const double end_s = example.keytimes_s.back();
   const std::size_t keys = example.keytimes_s.size();

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "base/check.h"
 #include "offline/builtin/curve.h"
 #include "offline/builtin/elementary.h"
 #include "offline/builtin/foot_path.h"
@@ -137,6 +138,7 @@ RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
   example.source = std::move(source);
   example.clip.fps = kClipFps;
   const int frames = static_cast<int>(std::floor(timing.end_s * kClipFps + 0.5)) + 1;
+  STRIDEWIRE_CHECK(frames > 1 && example.parameters.size() == names.size());
   example.clip.Resize(frames, figure.joint_count());
   const DVec3 start = pelvis.Position(0.0);
   for (int f = 0; f < frames; ++f) {

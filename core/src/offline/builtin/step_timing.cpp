@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
+
 namespace stridewire::builtin {
 
 StepTiming MakeStepTiming(const StepShape& shape) {
+  STRIDEWIRE_CHECK(shape.start_m.z <= 0.0 && shape.end_m.z >= 0.0);
   const double start_length_m = -shape.start_m.z, end_length_m = shape.end_m.z;
   const double start_rise_m = std::fabs(shape.start_m.y), end_rise_m = std::fabs(shape.end_m.y);
   StepTiming timing;
@@ -30,6 +33,8 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   timing.toe_off_s = ToWholeFrames(timing.toe_off_s);
   timing.heel_strike_s = ToWholeFrames(timing.heel_strike_s);
   timing.end_s = ToWholeFrames(timing.end_s);
+  STRIDEWIRE_CHECK(timing.toe_off_s > 0.0 && timing.toe_off_s < timing.heel_strike_s);
+  STRIDEWIRE_CHECK(timing.heel_strike_s < timing.end_s);
   return timing;
 }
 

@@ -6,6 +6,8 @@
 #include <cstdlib>
 #include <unordered_set>
 
+#include "base/check.h"
+#include "offline/base/utf8.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/runtime/skeleton.h"
 
@@ -47,21 +49,9 @@ NumberFault ReadNumber(std::string_view token, double& value) {
 // Joint names are written to reports and other files, which are UTF-8.
 bool IsUtf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
-    const unsigned char lead = static_cast<unsigned char>(text[i]);
-    const int extra = lead < 0x80   ? 0
-                      : lead < 0xC2 ? -1
-                      : lead < 0xE0 ? 1
-                      : lead < 0xF0 ? 2
-                      : lead < 0xF5 ? 3
-                                    : -1;
-    if (extra < 0 || text.size() - i <= static_cast<std::size_t>(extra)) return false;
-    for (int k = 1; k <= extra; ++k) {
-      const unsigned char c = static_cast<unsigned char>(text[i + static_cast<std::size_t>(k)]);
-      const unsigned char low = k > 1 ? 0x80 : lead == 0xE0 ? 0xA0 : lead == 0xF0 ? 0x90 : 0x80;
-      const unsigned char high = k > 1 ? 0xBF : lead == 0xED ? 0x9F : lead == 0xF4 ? 0x8F : 0xBF;
-      if (c < low || c > high) return false;
-    }
-    i += static_cast<std::size_t>(extra) + 1;
+    const std::size_t length = Utf8SequenceLength(text, i);
+    if (length == 0) return false;
+    i += length;
   }
   return true;
 }
@@ -183,6 +173,7 @@ class Parser {
     if (!(count >= 0.0 && count <= 6.0) || count != std::floor(count)) {
       return FailAt(token_line_, ErrorCode::kOutOfRange, "expected 0 to 6 channels");
     }
+    STRIDEWIRE_CHECK(joint.channels.empty());
     joint.first_channel = file_.channel_count;
     for (int i = 0; i < static_cast<int>(count); ++i) {
       const std::string_view word = Next();
@@ -196,7 +187,7 @@ class Parser {
       }
       for (const BvhChannel& other : joint.channels) {
         if (other.axis == channel.axis && other.is_rotation == channel.is_rotation) {
-          return Malformed("duplicate channel of a joint");
+          return Malformed("duplicate channel");
         }
       }
       joint.channels.push_back(channel);
@@ -240,6 +231,7 @@ class Parser {
       }
     }
     if (Next() != "{") return Malformed("expected { after a joint name");
+    STRIDEWIRE_CHECK(parent < static_cast<int>(file_.joints.size()));
     BvhJoint joint;
     joint.name = std::move(name);
     joint.parent = parent;
@@ -382,6 +374,7 @@ class Parser {
                             std::to_string(declared_frames_) + " frames, but the file contains " +
                             std::to_string(frames));
     }
+    STRIDEWIRE_CHECK(file_.values.size() == static_cast<std::size_t>(frames) * channels);
     file_.frame_count = static_cast<int>(frames);
     return {};
   }

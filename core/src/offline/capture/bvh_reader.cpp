@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/mat3x3.hpp>
 #include <numbers>
 #include <system_error>
 
+#include "base/check.h"
 #include "base/trig.h"
+#include "offline/base/text.h"
 #include "offline/capture/bvh_file.h"
 #include "offline/capture/leg_finder.h"
 
@@ -45,15 +45,6 @@ constexpr KnownUnit kKnownUnits[] = {
 constexpr double kTypicalLegM = 0.83;
 constexpr double kShortestLegM = 0.68;
 constexpr double kLongestLegM = 1.0;
-
-__attribute__((format(printf, 1, 2))) std::string Text(const char* format, ...) {
-  char buffer[512];
-  std::va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 std::size_t Index(int i) { return static_cast<std::size_t>(i); }
 
@@ -262,6 +253,7 @@ class Reader {
     int first = 1;
     const int last = std::min(static_cast<int>(0.1 * clip.fps), clip.frame_count() - 2);
     while (first < last && FastJoints(first) >= 2) ++first;
+    STRIDEWIRE_CHECK(first >= 1 && first < clip.frame_count());
     capture_.first_frame = first;
     Note(Text("skipped %d frame%s at the start: an artificial pose that %d joints leave too fast",
               first, first == 1 ? "" : "s", std::max(jumping, FastJoints(0))));
@@ -365,7 +357,8 @@ class Reader {
     ComputePositions(-1, p);
     const DVec3 rest_direction = legs_up();
     DVec3 rest_up = NearestAxis(rest_direction);
-    // The rest pose determines up if its legs hang straight and the rest of the body is above them.
+    // The rest pose determines the up axis if its legs hang straight and the rest of the body is
+    // above them.
     const DVec3 hips = 0.5 * (p[Index(found_.legs[0].hip)] + p[Index(found_.legs[1].hip)]);
     DVec3 body(0.0);
     for (int j = 1; j < static_cast<int>(joints().size()); ++j) {
@@ -377,7 +370,7 @@ class Reader {
     const bool rest_stands =
         glm::dot(rest_direction, rest_up) >= 0.8 && glm::dot(body, rest_up) >= 0.0;
 
-    // The motion determines up if the legs are below the hips on average.
+    // The motion determines the up axis if the legs are below the hips on average.
     const int frames = capture_.clip.frame_count() - capture_.first_frame;
     DVec3 motion_sum(0.0);
     const int step = std::max(1, frames / kSampledFrames);
@@ -421,6 +414,8 @@ class Reader {
   }
 
   Status TurnAxes(const DVec3& world_up, const DVec3& rest_up) {
+    STRIDEWIRE_CHECK(std::fabs(glm::length(world_up) - 1.0) < 1e-6 &&
+                     std::fabs(glm::length(rest_up) - 1.0) < 1e-6);
     std::vector<DVec3> p;
     ComputePositions(-1, p);
     const auto level = [&](const DVec3& v) { return v - glm::dot(v, rest_up) * rest_up; };
@@ -509,6 +504,8 @@ class Reader {
 
   Status Convert() {
     const double unit = capture_.unit_m;
+    STRIDEWIRE_CHECK(unit > 0.0);
+    STRIDEWIRE_CHECK(roots_.size() == Index(capture_.clip.frame_count()));
     const DQuat identity(1.0, 0.0, 0.0, 0.0);
     const bool turns = joint_turn_ != identity;
     const auto point = [&](Vec3& v) { v = Vec3(unit * (joint_turn_ * DVec3(v))); };
@@ -603,6 +600,8 @@ class Reader {
 
   // Fills in `leg`, in metres and our axes.
   void SetFoot(const FoundLeg& found, Leg& leg) {
+    STRIDEWIRE_CHECK(found.hip >= 0 && found.hip < found.knee && found.knee < found.ankle);
+    STRIDEWIRE_CHECK(found.ball < 0 || found.ball >= found.ankle);
     leg.hip = found.hip;
     leg.knee = found.knee;
     leg.ankle = found.ankle;

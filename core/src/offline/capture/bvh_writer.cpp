@@ -1,20 +1,18 @@
 #include "stridewire/offline/bvh_writer.h"
 
-#include <unistd.h>
-
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <numbers>
 #include <ostream>
 #include <string>
-#include <system_error>
 #include <vector>
 
+#include "base/check.h"
 #include "base/trig.h"
+#include "offline/base/replace_file.h"
 
 namespace stridewire {
 namespace {
@@ -146,6 +144,7 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out) {
   Tree tree(skeleton);
   std::string text = "HIERARCHY\n";
   AppendJoint(text, skeleton, tree, 0, 0);
+  STRIDEWIRE_CHECK(tree.depth_first.size() == skeleton.joints.size());
   text += "MOTION\nFrames: " + std::to_string(clip.frame_count()) + "\nFrame Time: ";
   AppendFixed(text, 1.0 / clip.fps, 12);
   text += '\n';
@@ -171,25 +170,7 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out) {
 }
 
 Status WriteBvh(const Skeleton& skeleton, const Clip& clip, const std::filesystem::path& path) {
-  std::filesystem::path part = path;
-  part += ".part" + std::to_string(getpid());
-  std::error_code code;
-  Status status;
-  {
-    std::ofstream out(part, std::ios::binary | std::ios::trunc);
-    if (!out) return Fail(ErrorCode::kIo, "cannot create the file", path.string());
-    status = WriteBvh(skeleton, clip, out);
-    out.close();
-    if (status && !out) status = Fail(ErrorCode::kIo, "cannot write the motion");
-  }
-  if (status) {
-    std::filesystem::rename(part, path, code);
-    if (!code) return {};
-    status = Fail(ErrorCode::kIo, "cannot rename the temporary file to this path");
-  }
-  std::filesystem::remove(part, code);
-  status.error().where = path.string();
-  return status;
+  return ReplaceFile(path, [&](std::ostream& out) { return WriteBvh(skeleton, clip, out); });
 }
 
 }  // namespace stridewire

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
+
+#include "base/check.h"
+#include "offline/base/text.h"
 
 namespace stridewire {
 namespace {
@@ -37,6 +39,7 @@ class Track {
 
 // Replaces the frames strictly between `before` and `after` by slerp between those two.
 void Interpolate(Track& track, int before, int after) {
+  STRIDEWIRE_CHECK(before < after);
   const Quat from = track[before];
   const Quat turn = glm::conjugate(from) * track[after];
   for (int f = before + 1; f < after; ++f) {
@@ -158,6 +161,7 @@ void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
 }  // namespace
 
 GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& clip) {
+  STRIDEWIRE_CHECK(skeleton.joint_count() == clip.joint_count);
   GlitchReport report;
   for (int joint = 0; joint < clip.joint_count; ++joint) {
     RepairJoint(skeleton, joint, std::max(0, first_frame), clip, report);
@@ -168,16 +172,14 @@ GlitchReport RepairGlitches(const Skeleton& skeleton, int first_frame, Clip& cli
 }
 
 std::string DescribeFlip(const Skeleton& skeleton, const JointFlip& flip, double fps) {
-  char text[64];
+  STRIDEWIRE_CHECK(flip.joint >= 0 && flip.joint < skeleton.joint_count());
+  STRIDEWIRE_CHECK(flip.frames.size() > 0 && fps > 0.0);
   const double middle_s = 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps;
-  if (flip.distance_m > 0.0) {
-    std::snprintf(text, sizeof text, " moves %.1f cm in one frame at %.2f s",
-                  100.0 * flip.distance_m, middle_s);
-  } else {
-    std::snprintf(text, sizeof text, " turns %.0f degrees in one frame at %.2f s",
-                  flip.angle_rad / kDegree, middle_s);
-  }
-  return skeleton.joints[static_cast<std::size_t>(flip.joint)].name + text;
+  return skeleton.joints[static_cast<std::size_t>(flip.joint)].name +
+         (flip.distance_m > 0.0
+              ? Text(" moves %.1f cm in one frame at %.2f s", 100.0 * flip.distance_m, middle_s)
+              : Text(" turns %.0f degrees in one frame at %.2f s", flip.angle_rad / kDegree,
+                     middle_s));
 }
 
 std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchReport& report,
@@ -194,7 +196,8 @@ std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchR
     if (count == 0) continue;
     std::string sentence = DescribeFlip(skeleton, *worst, fps) + ": repaired";
     if (count > 1)
-      sentence += ", with " + std::to_string(count - 1) + " smaller flips of the joint";
+      sentence +=
+          ", with " + std::to_string(count - 1) + (count == 2 ? " smaller flip" : " smaller flips");
     sentences.push_back(std::move(sentence));
   }
   for (const JointFlip& flip : report.repaired) {

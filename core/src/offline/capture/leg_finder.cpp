@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "base/check.h"
+
 namespace stridewire {
 namespace {
 
@@ -145,6 +147,7 @@ bool FindLegAbove(const std::vector<Joint>& joints, int ankle, FoundLeg& leg) {
   if (leg.knee <= 0) return false;
   leg.hip = nearest_above(leg.knee, LegPart::kHip);
   if (leg.hip <= 0) return false;
+  STRIDEWIRE_CHECK(leg.hip < leg.knee && leg.knee < ankle);
   leg.ball = FindBall(joints, ankle);
   return true;
 }
@@ -215,6 +218,7 @@ bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs) {
   if (best[0] < 0) return false;
   for (int side = 0; side < 2; ++side) {
     const std::vector<int> chain = chain_below(best[side]);
+    STRIDEWIRE_CHECK(chain.size() >= 3);
     std::size_t knee = 1;
     float longest = -1.0f;
     for (std::size_t k = 1; k + 1 < chain.size(); ++k) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "base/check.h"
 #include "offline/base/json_document.h"
 #include "offline/base/json_field.h"
 #include "offline/choreography/terrain_json.h"
@@ -237,6 +238,7 @@ Expected<Choreography> ParseChoreography(std::string_view text, std::string_view
   if (choreography.movements.empty()) {
     return Fail(ErrorCode::kOutOfRange, "expected at least one movement", where);
   }
+  STRIDEWIRE_CHECK(choreography.movements.size() + choreography.layers.size() == movements->size());
   return choreography;
 }
 

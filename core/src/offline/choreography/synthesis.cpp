@@ -5,12 +5,13 @@
 #include <optional>
 #include <set>
 
+#include "base/check.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/weights/measure.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/leg_rig.h"
+#include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {
@@ -137,6 +138,7 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
 // Measures how far the foot of a step is from its requested footprint when it first stands.
 void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& requested,
                     MovementRecord& record) {
+  STRIDEWIRE_CHECK(IsStep(record.kind) && !record.plants.empty());
   const Foot foot = MovingFoot(record.kind);
   const double end_s = clip.frame_count() / clip.fps;
   const int frame = Frames(clip, record.plants.back().from_s, end_s).first;
@@ -182,9 +184,8 @@ void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
 
 }  // namespace
 
-Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
-                               std::span<const MovementRequest> requests, double fps,
-                               const AvatarOptions& options, std::span<const LayerCue> layers) {
+Expected<Synthesis> Synthesize(const SynthesisInput& input) {
+  const auto& [library, start, requests, fps, options, layers] = input;
   if (!(fps >= 10.0 && fps <= 1000.0)) {
     return Fail(ErrorCode::kOutOfRange, "expected 10 to 1000 frames per second");
   }
@@ -283,11 +284,13 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
       } else if (event.type == AvatarEventType::kRejected) {
         return std::unexpected(Rejected(event, requests, layers));
       } else if (event.type == AvatarEventType::kFinished && !result.movements.empty()) {
+        STRIDEWIRE_CHECK(event.time_s >= result.movements.back().start_s);
         result.movements.back().end_s = event.time_s;
         result.movements.back().base = event.base;
       }
     }
   }
+  STRIDEWIRE_CHECK(result.movements.size() == requested.size() && next == requests.size());
   for (std::size_t i = 0; i < result.movements.size(); ++i) {
     MovementRecord& record = result.movements[i];
     if (record.keytimes_s.empty()) continue;

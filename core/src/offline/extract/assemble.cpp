@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "base/check.h"
 #include "offline/base/statistics.h"
 #include "offline/extract/mirror.h"
 
@@ -59,6 +60,7 @@ std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const Par
   if (candidates.size() > most) candidates.resize(most);
   std::vector<std::size_t> indices;
   for (const Candidate& candidate : candidates) indices.push_back(candidate.index);
+  STRIDEWIRE_CHECK(indices.size() >= always.size());
   std::ranges::sort(indices);
   return indices;
 }
@@ -71,6 +73,7 @@ RawGroup MakeGroup(Pool pool, const std::vector<std::size_t>& parameters) {
     std::vector<double> kept;
     for (const std::size_t i : parameters) kept.push_back(example.parameters[i]);
     example.parameters = std::move(kept);
+    STRIDEWIRE_CHECK(example.parameters.size() == group.parameters.size());
     group.examples.push_back(std::move(example));
   }
   return group;
@@ -200,6 +203,7 @@ class Assembler {
   // Returns the stillest standing pose of all captures. If there is none, returns the first pose of
   // the first example.
   [[nodiscard]] Pose StandPose(const RawLibrary& library) const {
+    STRIDEWIRE_CHECK(!library.groups.empty() && !library.groups.front().examples.empty());
     const Extraction* best = nullptr;
     for (const Extraction& file : files_) {
       if (!file.error.empty() || !file.stand) continue;

@@ -25,12 +25,12 @@ struct AssembleOptions {
 
 /// Combines the examples of several captures into a RawLibrary with these groups:
 ///
-///   straight step_left, step_right   start_z, end_z                  straight level steps
-///   level step_left, step_right      x, z and turn as far as they    all steps on level ground
-///                                    vary
-///   general step_left, step_right    all seven as far as they vary   all steps, if some are not
-///                                                                    level
-///   jump                             length; height and turn as far as they vary
+///   straight step_left, step_right: straight level steps with start_z and end_z
+///   level step_left, step_right: all steps on level ground with start_z, end_z, and the other x, z
+///       and turn parameters as far as they vary
+///   general step_left, step_right: all steps, if some are not level, with start_z, end_z, and the
+///       other parameters of a general step as far as they vary
+///   jump: length, and height and turn as far as they vary
 ///
 /// A group without examples of its own is omitted. So are straight or level groups with fewer than
 /// three steps, which span no area, if another group contains those steps.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -63,6 +64,7 @@ BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame
     yaw_rad = f == tracks.frames.begin ? frame_yaw_rad : UnwrapAngle(frame_yaw_rad, yaw_rad);
     tracks.pelvis_yaw_rad.push_back(yaw_rad);
   }
+  STRIDEWIRE_CHECK(tracks.pelvis_m.size() == count);
   const int window = static_cast<int>(std::lround(kPelvisSmoothS * clip.fps));
   tracks.pelvis_speed_m_s = PathSpeed(SmoothPath(tracks.pelvis_m, window), clip.fps);
   return tracks;

@@ -3,13 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/base/statistics.h"
 
 namespace stridewire {
 namespace {
 
 constexpr double kLongContactS = 0.3;   // Slow moments of swings and jumps are shorter.
-constexpr double kFreeFallM_s2 = -5.0;  // Mean pelvis acceleration below this: in the air.
+constexpr double kFreeFallM_s2 = -5.0;  // The figure falls if its pelvis accelerates like this.
 constexpr double kBallAtRestM_s = 0.3;  // A slower ball belongs to a flat foot.
 
 using Flags = std::vector<char>;
@@ -96,17 +97,28 @@ std::vector<double> BallSpeed(const BodyTracks::FootTrajectory& track, double fp
 
 }  // namespace
 
+std::vector<char> StandingFrames(const std::vector<Contact>& contacts, int frame_count) {
+  std::vector<char> standing(static_cast<std::size_t>(frame_count), 0);
+  for (const Contact& contact : contacts) {
+    STRIDEWIRE_CHECK(contact.frames.begin >= 0 && contact.frames.end <= frame_count);
+    std::fill(standing.begin() + contact.frames.begin, standing.begin() + contact.frames.end, 1);
+  }
+  return standing;
+}
+
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,
                         FootContacts& contacts) {
   for (int f = 0; f < 2; ++f) {
     const std::vector<double> speed = BallSpeed(tracks.feet[f], tracks.fps, options);
     for (Contact& contact : contacts.feet[f]) {
+      STRIDEWIRE_CHECK(contact.frames.size() > 0 && contact.frames.end <= tracks.size());
       contact.ball_height_m = RestingBallHeight(tracks.feet[f], speed, contact.frames);
     }
   }
 }
 
 FootContacts FindContacts(const BodyTracks& tracks, const ContactOptions& options) {
+  STRIDEWIRE_CHECK(tracks.fps > 0.0);
   FootContacts contacts;
   std::vector<FrameRange> by_speed[2];
   for (int f = 0; f < 2; ++f) {

@@ -9,8 +9,8 @@ namespace stridewire {
 /// Thresholds for ground contacts. They fit adults recorded in metres and were tuned on twelve
 /// captured walks. For example, a maximum speed of 0.35 instead of 0.8 m/s loses half of the steps.
 struct ContactOptions {
-  double speed_max_m_s = 0.8;       ///< A point stands if it is slower than this, and lower than
-  double height_max_m = 0.06;       ///< this above its own resting height.
+  double speed_max_m_s = 0.8;       ///< A point stands only if it is slower than this.
+  double height_max_m = 0.06;       ///< A point stands only below this, above its resting height.
   double resting_percentile = 3.0;  ///< Percentile of the height of a point: its resting height.
   double smooth_s = 0.04;
   double gap_min_s = 0.05;       ///< Shorter gaps between contacts are filled.
@@ -37,6 +37,10 @@ struct FootContacts {
 /// top of a jump, where the feet are slow, is not a contact.
 [[nodiscard]] FootContacts FindContacts(const BodyTracks& tracks,
                                         const ContactOptions& options = {});
+
+/// Returns one flag per frame of the tracks: non-zero during the contacts.
+[[nodiscard]] std::vector<char> StandingFrames(const std::vector<Contact>& contacts,
+                                               int frame_count);
 
 /// Measures `Contact::ball_height_m` of all contacts again on other tracks of the same length.
 void MeasureBallHeights(const BodyTracks& tracks, const ContactOptions& options,

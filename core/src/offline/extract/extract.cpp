@@ -2,10 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
+#include "base/check.h"
 #include "offline/base/horizontal_distance.h"
+#include "offline/base/text.h"
 #include "offline/capture/glitch_repair.h"
 #include "offline/extract/body_tracks.h"
 #include "offline/extract/ground.h"
@@ -60,6 +61,7 @@ class Extractor {
     contacts_ = FindContacts(tracks_, options_.contacts);
     Segmentation segments = Segment(tracks_, contacts_, options_.segments);
     heading_rad_ = StrideHeading(tracks_, contacts_);
+    STRIDEWIRE_CHECK(heading_rad_.size() == static_cast<std::size_t>(tracks_.size()));
     if (options_.target != nullptr) Retarget();
     ground_ = FindGround(contacts_);
     out_.has_contacts = ground_.has_contacts;
@@ -92,10 +94,12 @@ class Extractor {
     const double scale = own > 0.0 ? LegLength(out_.skeleton) / own : 1.0;
     for (Vec3& position : clip_.root_positions_m) position *= static_cast<float>(scale);
     tracks_ = TrackBody(out_.skeleton, clip_, capture_.first_frame);
+    STRIDEWIRE_CHECK(heading_rad_.size() == static_cast<std::size_t>(tracks_.size()));
     MeasureBallHeights(tracks_, options_.contacts, contacts_);
   }
 
   [[nodiscard]] double GroundBelow(Foot foot, int contact) const {
+    STRIDEWIRE_CHECK(contact >= 0 && contact < static_cast<int>(contacts_.foot(foot).size()));
     return ground_.Below(foot,
                          contacts_.foot(foot)[static_cast<std::size_t>(contact)].ball_height_m);
   }
@@ -150,14 +154,14 @@ class Extractor {
     for (const int k : keyframes) {
       example.keytimes_s.push_back((k - frames.begin) / clip_.fps);
     }
-    char times[64];
-    std::snprintf(times, sizeof times, " %.2f-%.2f s", Seconds(frames.begin),
-                  Seconds(frames.end - 1));
-    example.source = std::filesystem::path(capture_.path).filename().string() + times;
+    example.source = std::filesystem::path(capture_.path).filename().string() +
+                     Text(" %.2f-%.2f s", Seconds(frames.begin), Seconds(frames.end - 1));
     return example;
   }
 
   void AddStep(const StepSegment& step) {
+    STRIDEWIRE_CHECK(step.start < step.toe_off && step.toe_off < step.heel_strike);
+    STRIDEWIRE_CHECK(step.heel_strike < step.end && step.end < tracks_.size());
     const FrameRange frames{step.start, step.end + 1};
     if (std::string flip = FlipWithin(frames); !flip.empty()) {
       Reject(frames, std::move(flip));
@@ -230,6 +234,10 @@ class Extractor {
   }
 
   void AddJump(const JumpSegment& jump) {
+    STRIDEWIRE_CHECK(jump.start < jump.crouch && jump.crouch < jump.toe_off &&
+                     jump.toe_off < jump.landing);
+    STRIDEWIRE_CHECK(jump.landing < jump.absorb && jump.absorb < jump.end &&
+                     jump.end < tracks_.size());
     const FrameRange frames{jump.start, jump.end + 1};
     if (std::string flip = FlipWithin(frames); !flip.empty()) {
       Reject(frames, std::move(flip));

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/offline/bvh_reader.h"
 #include "offline/extract/contacts.h"
 #include "offline/extract/segment.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {

@@ -8,7 +8,8 @@
 namespace stridewire {
 namespace {
 
-constexpr double kFloorBandM = 0.06;  // Feet within this of the lowest ones stand on the floor.
+constexpr double kFloorBandM =
+    0.06;  // Feet at most this much above the lowest ones stand on the floor.
 constexpr double kFeetDifferMaxM = 0.03;
 constexpr double kTiltMaxM = 0.015;
 constexpr double kBallUsualM = 0.04;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/check.h"
 #include "offline/base/statistics.h"
 
 namespace stridewire {
@@ -89,6 +90,7 @@ double FitAtEnd(const std::vector<double>& yaw, int begin, int end, int centre,
 std::vector<double> StrideHeading(const BodyTracks& tracks, const FootContacts& contacts) {
   const std::vector<double>& yaw = tracks.pelvis_yaw_rad;
   const int count = tracks.size();
+  STRIDEWIRE_CHECK(yaw.size() == static_cast<std::size_t>(count));
   const std::vector<StepTime> times = StepTimes(contacts, tracks.fps);
   std::vector<double> sums(static_cast<std::size_t>(count) + 1, 0.0);
   for (int i = 0; i < count; ++i) {

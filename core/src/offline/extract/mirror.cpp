@@ -62,8 +62,8 @@ std::optional<std::vector<int>> PairByName(const Skeleton& skeleton) {
 }
 
 constexpr double kNoPair = 1e9;
-constexpr double kShapeShare = 0.08;  // Relative tolerance for bones of a mirrored pair,
-constexpr double kShapeM = 0.01;      // plus an absolute tolerance in metres.
+constexpr double kShapeShare = 0.08;  // Relative tolerance for bones of a mirrored pair.
+constexpr double kShapeM = 0.01;      // Absolute tolerance, added to the relative one.
 
 // Pairs joints by their positions at identity rotations; x = 0 is the plane of symmetry.
 class ShapePairs {
@@ -163,6 +163,8 @@ ExtractedExample MirrorExample(const Skeleton& skeleton, const std::vector<int>&
                                std::span<const ParameterName> names,
                                const ExtractedExample& source) {
   STRIDEWIRE_CHECK(names.size() == source.example.parameters.size());
+  STRIDEWIRE_CHECK(partners.size() == skeleton.joints.size());
+  STRIDEWIRE_CHECK(source.example.clip.joint_count == skeleton.joint_count());
   ExtractedExample out = source;
   out.example.mirrored = !source.example.mirrored;
   out.example.heading_change_rad = -source.example.heading_change_rad;

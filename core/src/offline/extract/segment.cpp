@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/base/horizontal_distance.h"
 #include "offline/base/statistics.h"
 #include "offline/base/text.h"
@@ -40,6 +41,7 @@ std::vector<Swing> FindSwings(const FootContacts& contacts) {
       swing.before = &own[k];
       swing.after = &own[k + 1];
       swing.frames = {own[k].frames.end, own[k + 1].frames.begin};
+      STRIDEWIRE_CHECK(swing.frames.size() > 0);
       swing.before_index = static_cast<int>(k);
       const std::vector<Contact>& others = contacts.foot(OtherFoot(foot));
       for (std::size_t o = 0; o < others.size(); ++o) {
@@ -145,6 +147,7 @@ class StepFinder {
 
 Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
                      const SegmentOptions& options) {
+  STRIDEWIRE_CHECK(tracks.fps > 0.0);
   Segmentation result;
   std::vector<FrameRange> held;
   std::vector<FrameRange> explained;  // Flights that are jumps or were already rejected.

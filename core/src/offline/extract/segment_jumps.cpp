@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/base/text.h"
 
 // pelvis height      ____                 .-.
@@ -90,25 +91,23 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
 }  // namespace
 
 std::vector<FrameRange> FlightRanges(const BodyTracks& tracks, const FootContacts& contacts) {
-  std::vector<char> standing(static_cast<std::size_t>(tracks.size()), 0);
-  for (const auto& foot : contacts.feet) {
-    for (const Contact& contact : foot) {
-      std::fill(standing.begin() + contact.frames.begin, standing.begin() + contact.frames.end, 1);
-    }
-  }
+  const std::vector<char> left = StandingFrames(contacts.feet[0], tracks.size());
+  const std::vector<char> right = StandingFrames(contacts.feet[1], tracks.size());
+  const auto stands = [&](int i) {
+    return left[static_cast<std::size_t>(i)] != 0 || right[static_cast<std::size_t>(i)] != 0;
+  };
   std::vector<FrameRange> flights;
   int begin = -1;
   for (int i = 1; i < tracks.size(); ++i) {
-    const bool now = standing[static_cast<std::size_t>(i)] != 0;
-    const bool before = standing[static_cast<std::size_t>(i) - 1] != 0;
-    if (before && !now) begin = i;
-    if (!before && now && begin > 0) flights.push_back({begin, i});
+    if (stands(i - 1) && !stands(i)) begin = i;
+    if (!stands(i - 1) && stands(i) && begin > 0) flights.push_back({begin, i});
   }
   return flights;
 }
 
 JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                      const FrameRange& flight, const SegmentOptions& options) {
+  STRIDEWIRE_CHECK(flight.begin > 0 && flight.size() > 0 && flight.end < tracks.size());
   const double seconds = flight.size() / tracks.fps;
   if (seconds < options.flight_min_s) {
     return {{}, Text("both feet off the ground for %.2f s", seconds)};
@@ -159,7 +158,7 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
   const Standing from = FindStanding(tracks, flight.begin, -1, support_begin, options.still_m_s);
   const Standing to = FindStanding(tracks, flight.end, +1, support_end - 1, options.still_m_s);
   if (from.speed_m_s > kNearlyStill * options.still_m_s) {
-    return {{}, Text("a leap without standing before it (%.2f m/s)", from.speed_m_s)};
+    return {{}, Text("the jump does not start from standing (%.2f m/s)", from.speed_m_s)};
   }
   if (support_end - flight.end < kUnsettledMinS * tracks.fps || to.lowest >= support_end - 1) {
     return {{}, "the recording or the landing ends too early"};
@@ -171,7 +170,7 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
   jump.end = jump.settled ? to.still : support_end - 1;
   if (!(jump.start < jump.crouch && jump.crouch < jump.toe_off && jump.landing < jump.absorb &&
         jump.absorb < jump.end)) {
-    return {{}, "a jump without a crouch before or after it"};
+    return {{}, "the jump has no crouch before or after it"};
   }
   return {jump, {}};
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "offline/base/horizontal_distance.h"
 #include "offline/base/statistics.h"
 #include "offline/extract/normalise.h"
@@ -44,14 +45,10 @@ std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip&
                                            const Ground& ground,
                                            const std::vector<double>& heading_rad) {
   const int count = tracks.size();
-  std::vector<char> standing[2];
-  for (int f = 0; f < 2; ++f) {
-    standing[f].assign(static_cast<std::size_t>(count), 0);
-    for (const Contact& contact : contacts.feet[f]) {
-      std::fill(standing[f].begin() + contact.frames.begin,
-                standing[f].begin() + contact.frames.end, 1);
-    }
-  }
+  STRIDEWIRE_CHECK(heading_rad.size() == static_cast<std::size_t>(count));
+  STRIDEWIRE_CHECK(tracks.frames.end <= clip.frame_count());
+  const std::vector<char> standing[2] = {StandingFrames(contacts.feet[0], count),
+                                         StandingFrames(contacts.feet[1], count)};
   const int reach = std::max(1, static_cast<int>(std::lround(0.5 * kWindowS * clip.fps)));
   const double stand_height = StandHeight(tracks);
   const auto joints = static_cast<std::size_t>(skeleton.joint_count());

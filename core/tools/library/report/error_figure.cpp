@@ -4,6 +4,7 @@
 
 #include "figures.h"
 #include "gnuplot.h"
+#include "offline/base/text.h"
 #include "offline/build/error_map.h"
 
 namespace stridewire {
@@ -46,18 +47,10 @@ std::string HeldAt(const MotionGroup& group, const FigureAxes& axes, const Error
   std::string text;
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
     if (static_cast<int>(l) == axes.x || static_cast<int>(l) == axes.y) continue;
-    std::array<char, 64> value{};
-    std::snprintf(value.data(), value.size(), " %.2f", map.others[l]);
     text += (text.empty() ? "; fixed: " : ", ") +
-            std::string(ParameterText(group.parameters[l].name)) + value.data();
+            std::string(ParameterText(group.parameters[l].name)) + Text(" %.2f", map.others[l]);
   }
   return text;
-}
-
-std::string Millimetres(double m) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.2f mm", 1000.0 * m);
-  return text.data();
 }
 
 Figure LineFigure(const ErrorFigureInput& input) {
@@ -117,9 +110,10 @@ Figure ErrorFigure(const ErrorFigureInput& input) {
                      "set multiplot layout 1,2\n";
     for (const char* name : {"before", "after"}) {
       const double max_m = name[0] == 'b' ? map_before.max_error_m : map_after.max_error_m;
-      figure.script += "set title " +
-                       Quoted(std::string(name) + " refinement: at most " + Millimetres(max_m)) +
-                       "\n";
+      figure.script +=
+          "set title " +
+          Quoted(std::string(name) + " refinement: at most " + Text("%.2f mm", 1000.0 * max_m)) +
+          "\n";
       const std::string n = name;
       figure.script += "plot $" + n + " u 1:2:3 w image notitle, $lines_" + n +
                        " w l lw 0.7 lc rgb '#ffffff' notitle, $examples_" + n +
@@ -158,7 +152,7 @@ Figure CurveFigure(const MotionLibrary& library, int group_index, const GroupRef
   figure.script +=
       "set xlabel 'pseudoexamples'\nset ylabel 'largest error, mm'\nset border 3\n"
       "set tics nomirror\nset xtics 2\nset yrange [0:*]\nset xrange [-0.3:*]\n"
-      "plot $bare w lp dt 2 lw 1.5 pt 4 lc rgb '#d55e00' t 'as the paper has it', "
+      "plot $bare w lp dt 2 lw 1.5 pt 4 lc rgb '#d55e00' t 'rule from the paper', "
       "$amended w lp lw 2 pt 7 lc rgb '#0072b2' t 'amended'\n";
   return figure;
 }

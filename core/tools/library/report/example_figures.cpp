@@ -5,6 +5,7 @@
 
 #include "figures.h"
 #include "gnuplot.h"
+#include "offline/base/text.h"
 #include "stick_figure.h"
 
 namespace stridewire {
@@ -35,9 +36,7 @@ std::vector<int> InOrder(const MotionGroup& group, const FigureAxes& axes) {
 std::string Values(const MotionGroup& group, int example) {
   std::string text;
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
-    std::array<char, 64> value{};
-    std::snprintf(value.data(), value.size(), "%s%.2f", l == 0 ? "" : ", ", group.site(example)[l]);
-    text += value.data();
+    text += Text("%s%.2f", l == 0 ? "" : ", ", group.site(example)[l]);
   }
   return text;
 }

@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <memory>
 
+#include "offline/base/text.h"
+
 extern "C" char** environ;
 
 namespace stridewire {
@@ -81,12 +83,7 @@ Expected<std::string> DrawSvg(const std::string& script, int width, int height) 
   return svg;
 }
 
-std::string Number(double value) {
-  if (!std::isfinite(value)) return "NaN";
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.6g", value);
-  return text.data();
-}
+std::string Number(double value) { return std::isfinite(value) ? Text("%.6g", value) : "NaN"; }
 
 std::string Quoted(const std::string& text) {
   // Inside single quotes gnuplot interprets nothing, not even backquotes; '' stands for one quote.

@@ -3,30 +3,12 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "offline/base/utf8.h"
+
 namespace stridewire {
 namespace {
 
 constexpr std::string_view kReplacement = "\xef\xbf\xbd";
-
-// Returns the length of the UTF-8 sequence that starts at `at`, or 0 if it is invalid.
-std::size_t SequenceAt(std::string_view text, std::size_t at) {
-  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
-  const unsigned char first = byte(at);
-  const std::size_t length = first < 0x80                    ? 1
-                             : first >= 0xc2 && first < 0xe0 ? 2
-                             : first >= 0xe0 && first < 0xf0 ? 3
-                             : first >= 0xf0 && first < 0xf5 ? 4
-                                                             : 0;
-  if (length == 0 || at + length > text.size()) return 0;
-  for (std::size_t i = 1; i < length; ++i) {
-    if ((byte(at + i) & 0xc0) != 0x80) return 0;
-  }
-  if (length < 3) return length;
-  const unsigned char second = byte(at + 1);
-  const bool is_overlong = (first == 0xe0 && second < 0xa0) || (first == 0xf0 && second < 0x90);
-  const bool is_beyond = (first == 0xed && second >= 0xa0) || (first == 0xf4 && second >= 0x90);
-  return is_overlong || is_beyond ? 0 : length;
-}
 
 bool IsNumber(const std::string& text) {
   return !text.empty() && text.find_first_not_of("0123456789.-+ %") == std::string::npos;
@@ -50,7 +32,7 @@ td.n { text-align: right; font-variant-numeric: tabular-nums; }
 std::string EscapeHtml(std::string_view text) {
   std::string escaped;
   for (std::size_t i = 0; i < text.size();) {
-    const std::size_t length = SequenceAt(text, i);
+    const std::size_t length = Utf8SequenceLength(text, i);
     const char c = text[i];
     if (length == 0) {
       escaped += kReplacement;

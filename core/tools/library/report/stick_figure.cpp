@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "gnuplot.h"
+#include "offline/build/parameter_scales.h"
 #include "runtime/weights/correction.h"
 #include "runtime/pose/evaluate_poses.h"
 
@@ -72,12 +73,9 @@ MovementPlayer::MovementPlayer(const MotionLibrary& library, int group_index)
 
 void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   const MotionGroup& group = library_.group(group_index_);
-  ParameterValues wanted;
-  wanted.count = group.parameter_count();
-  std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
   if (corrected) {
-    CorrectWeights(library_, group_index_, wanted, DefaultCorrectionLimits(group), scratch_,
-                   movement_);
+    CorrectWeights(library_, group_index_, ValuesOf(parameters), DefaultCorrectionLimits(group),
+                   scratch_, movement_);
   } else {
     SetWeights(group, group_index_, parameters, scratch_, movement_);
   }

@@ -53,7 +53,7 @@ std::vector<Slab> SlabsOf(const Synthesis& synthesis, const MotionLibrary& libra
 Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
                             const std::string& name, const std::string& caption,
                             std::span<const MovementRequest> requests) {
-  const auto synthesis = Synthesize(library, {}, requests, kFps);
+  const auto synthesis = Synthesize({.library = library, .requests = requests, .fps = kFps});
   if (!synthesis) return std::unexpected(synthesis.error());
   const Clip& clip = synthesis->clip;
   const Skeleton& skeleton = library->skeleton();

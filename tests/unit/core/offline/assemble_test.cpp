@@ -9,11 +9,11 @@
 
 #include "capture_files.h"
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/extract/mirror.h"
 #include "runtime/avatar/avatar_simulation.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "runtime/library/keytimes.h"
+#include "runtime/skeleton/foot_vector.h"
+#include "stridewire/offline/library_builder.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {
@@ -41,7 +41,7 @@ Capture StairWalk() {
                                  {Foot::kRight, 0.0}});
 }
 
-// What every RawLibrary promises (raw_library.h).
+// Expects the properties that raw_library.h documents.
 void ExpectWellFormed(const RawLibrary& library) {
   EXPECT_TRUE(library.skeleton.Validate().has_value());
   EXPECT_EQ(library.stand_pose.rotations.size(), library.skeleton.joints.size());
@@ -95,15 +95,15 @@ TEST(LibraryAssembler, StairsGiveGroupsWithHeight) {
   const Expected<RawLibrary> library = assembler.Assemble();
   ASSERT_TRUE(library.has_value()) << Describe(library.error());
   ExpectWellFormed(*library);
-  // Up and down ahead; nothing turns or goes aside. The level steps are the plain walk's: its two of the right
-  // foot span no area, and are with the others.
+  // The steps go up, down and ahead, without turns. The level steps are those of the plain walk.
+  // Its two right steps span no area, so they belong to the general group.
   EXPECT_THAT(GroupTexts(*library),
               ElementsAre("step_left 3: start_z_m end_z_m",
                           "step_left 15: start_y_m start_z_m end_y_m end_z_m",
                           "step_right 14: start_y_m start_z_m end_y_m end_z_m"));
 }
 
-TEST(LibraryAssembler, KindsCanBeLeftOut) {
+TEST(LibraryAssembler, ExtractsOnlyTheRequestedKinds) {
   AssembleOptions options;
   options.steps = false;
   LibraryAssembler jumps(options);
@@ -114,7 +114,7 @@ TEST(LibraryAssembler, KindsCanBeLeftOut) {
   EXPECT_THAT(GroupTexts(*jumps.Assemble()), ElementsAre("jump 1: length_m"));
 }
 
-TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
+TEST(LibraryAssembler, RejectsCapturesWithAnotherJointTree) {
   LibraryAssembler assembler;
   assembler.Add(PlainWalk());
   Capture other = PlainWalk();
@@ -134,9 +134,9 @@ TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
   EXPECT_EQ(assembler.files().size(), 4u);
 }
 
-// Two people of different size on one figure: joints turn as captured, the root goes as far as legs of
-// the figure's length go.
-TEST(LibraryAssembler, PutsSubjects03And14OnOneFigure) {
+// Two people of different size on one skeleton: rotations are those of the capture, and the path of
+// the root is scaled by the length of the legs.
+TEST(LibraryAssembler, RetargetsSubject14ToSubject03) {
   const auto first = MocapFiles("cmu/03");
   const auto second = MocapFiles("cmu/14");
   STRIDEWIRE_SKIP_WITHOUT(first);
@@ -159,7 +159,7 @@ TEST(LibraryAssembler, PutsSubjects03And14OnOneFigure) {
     const Extraction& fitted = assembler.Add(capture);
     ASSERT_TRUE(fitted.error.empty()) << fitted.error;
     const double scale = leg_length(fitted.skeleton) / leg_length(own.skeleton);
-    EXPECT_GT(std::fabs(scale - 1.0), 0.01) << scale << ": too alike to test with";
+    EXPECT_GT(std::fabs(scale - 1.0), 0.01) << scale << ": the sizes must differ";
     ASSERT_EQ(fitted.general_steps.size(), own.general_steps.size());
     for (std::size_t i = 0; i < own.general_steps.size(); ++i) {
       const RawExample& a = own.general_steps[i].example;
@@ -174,7 +174,8 @@ TEST(LibraryAssembler, PutsSubjects03And14OnOneFigure) {
         const Vec3& to = b.clip.root_positions_m[static_cast<std::size_t>(f)];
         ASSERT_NEAR(std::hypot(to.x, to.z), scale * std::hypot(from.x, from.z), 1e-4);
       }
-      // Thighs and shanks differ in proportion, so feet land only about there.
+      // The proportions of thigh and shank differ, so feet land only approximately at the scaled
+      // position.
       for (std::size_t l = 0; l < 6; ++l) {
         EXPECT_NEAR(b.parameters[l], scale * a.parameters[l], 0.06) << b.source << " " << l;
       }
@@ -195,7 +196,7 @@ TEST(LibraryAssembler, PutsSubjects03And14OnOneFigure) {
   }
 }
 
-TEST(LibraryAssembler, AnUnusableFirstCaptureDoesNotGiveTheSkeleton) {
+TEST(LibraryAssembler, IgnoresTheSkeletonOfAnUnusableFirstCapture) {
   LibraryAssembler assembler;
   Capture empty = PlainWalk();
   empty.clip = Clip{};
@@ -204,14 +205,14 @@ TEST(LibraryAssembler, AnUnusableFirstCaptureDoesNotGiveTheSkeleton) {
   EXPECT_TRUE(assembler.Assemble().has_value());
 }
 
-TEST(LibraryAssembler, WithoutMovementsThereIsAnError) {
+TEST(LibraryAssembler, FailsWithoutMovements) {
   LibraryAssembler none;
   EXPECT_EQ(none.Assemble().error().code, ErrorCode::kNotFound);
   none.Add(SyntheticWalker{}.Stand(2.0));
   EXPECT_EQ(none.Assemble().error().code, ErrorCode::kNotFound);
 }
 
-TEST(LibraryAssembler, OtherBonesAreFittedToTheFirstFigure) {
+TEST(LibraryAssembler, RetargetsOtherBoneLengths) {
   SyntheticWalker tall;
   tall.leg_scale = 1.15;
   LibraryAssembler assembler;
@@ -231,7 +232,7 @@ TEST(LibraryAssembler, OtherBonesAreFittedToTheFirstFigure) {
   }
 }
 
-TEST(LibraryAssembler, RecordingsWithOtherFloorsMeetAtOneHeight) {
+TEST(LibraryAssembler, AlignsFloorsOfRecordings) {
   LibraryAssembler assembler;
   for (const float rise : {0.0f, 0.02f, -0.01f, 0.5f}) {
     Capture capture = PlainWalk();
@@ -248,7 +249,7 @@ TEST(LibraryAssembler, RecordingsWithOtherFloorsMeetAtOneHeight) {
   }
 }
 
-TEST(LibraryAssembler, MirroringFillsBothFeetEqually) {
+TEST(LibraryAssembler, MirroringGivesBothFeetTheSameSteps) {
   AssembleOptions options;
   options.mirror = true;
   LibraryAssembler assembler(options);
@@ -271,7 +272,7 @@ TEST(LibraryAssembler, MirroringFillsBothFeetEqually) {
   }
 }
 
-TEST(LibraryAssembler, MirroringNeedsSidesThatPair) {
+TEST(LibraryAssembler, MirroringFailsForAsymmetricSkeletons) {
   AssembleOptions options;
   options.mirror = true;
   LibraryAssembler assembler(options);
@@ -282,8 +283,8 @@ TEST(LibraryAssembler, MirroringNeedsSidesThatPair) {
   EXPECT_EQ(assembler.Assemble().error().code, ErrorCode::kUnsupported);
 }
 
-// A skeleton whose names say nothing is paired by where its joints are, just as by names.
-TEST(FindMirrorJoints, PairsByShapeWhatNamesDoNot) {
+// Pairing by shape must give the same result as pairing by names.
+TEST(FindMirrorJoints, PairsByShapeWithoutNames) {
   std::vector<Skeleton> skeletons = {PlainWalk().skeleton, GenerateBuiltinLibrary().skeleton};
   for (const char* folder : {"cmu/01", "cmu/03", "cmu/16"}) {
     const std::vector<std::filesystem::path> captures = MocapFiles(folder);
@@ -296,14 +297,14 @@ TEST(FindMirrorJoints, PairsByShapeWhatNamesDoNot) {
       skeleton.joints[j].name = "joint " + std::to_string(j);
     }
     EXPECT_EQ(FindMirrorJoints(skeleton), by_name) << skeleton.joints.size() << " joints";
-    // Not a mirror image of itself any more.
+    // This makes the skeleton asymmetric.
     skeleton.joints[static_cast<std::size_t>(skeleton.leg(Foot::kLeft).knee)].offset_m.y *= 1.3f;
     EXPECT_EQ(FindMirrorJoints(skeleton), std::nullopt);
   }
 }
 
-// Subject 16 starts with the left foot only and stops with either; mirrored, both feet do both. What is
-// mirrored passes the checks of what was captured: parameters where the balls are, feet planted as
+// Subject 16 starts only with the left foot and stops with both. With mirroring, both feet do both.
+// Mirrored examples must pass the checks of captured ones: parameters at the balls, feet planted as
 // well as in the capture, and the same order of contacts.
 TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
   const std::vector<std::filesystem::path> captures = MocapFiles("cmu/16");
@@ -323,7 +324,8 @@ TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
                                       group.parameters.begin());
     };
     int mirrored = 0, starts = 0, stops = 0;
-    double slide_m[2] = {0.0, 0.0};  // of the fixed ball in single support: captured, mirrored
+    double slide_m[2] = {
+        0.0, 0.0};  // Slide of the fixed ball in single support, of captured and mirrored steps.
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
       mirrored += example.mirrored;
@@ -350,7 +352,7 @@ TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
         const DVec3 ball(BallPosition(library->skeleton, example.clip.frame(f), fixed));
         slide = std::max(slide, std::hypot(ball.x - planted.x, ball.z - planted.z));
       }
-      EXPECT_LE(slide, 0.12);  // what segmentation lets pass
+      EXPECT_LE(slide, 0.12);  // The limit of the segmentation.
       slide_m[example.mirrored ? 1 : 0] = std::max(slide_m[example.mirrored ? 1 : 0], slide);
     }
     EXPECT_GE(mirrored, 20);
@@ -364,7 +366,7 @@ TEST(LibraryAssembler, MirroredSubject16StartsAndStopsOnBothFeet) {
   }
 }
 
-TEST(MirrorExample, TwiceIsTheSame) {
+TEST(MirrorExample, IsItsOwnInverse) {
   const Extraction found = Extract(PlainWalk());
   const std::optional<std::vector<int>> partners = FindMirrorJoints(found.skeleton);
   ASSERT_TRUE(partners.has_value());
@@ -385,7 +387,7 @@ TEST(MirrorExample, TwiceIsTheSame) {
   }
 }
 
-TEST(FindMirrorJoints, KnowsTheNamesInUse) {
+TEST(FindMirrorJoints, RecognizesCommonNames) {
   const auto partners = [](const std::vector<std::string>& names) {
     Skeleton skeleton;
     for (const std::string& name : names) {
@@ -402,9 +404,9 @@ TEST(FindMirrorJoints, KnowsTheNamesInUse) {
   EXPECT_EQ(partners({"root", "LeftUpLeg"}), std::nullopt);
 }
 
-// Level steps blended from a walk over blocks of all heights stay on their floor, though the balls
-// of rolling feet differ by centimetres at every join.
-TEST(LibraryAssembler, LevelWalksOfALibraryOfBlocksDoNotClimb) {
+// Level steps blended from a walk over blocks of all heights must stay on their floor, although the
+// heights of rolling balls differ by centimetres where steps join.
+TEST(LibraryAssembler, LevelWalksDoNotClimb) {
   const std::vector<std::filesystem::path> captures = MocapFiles("cmu/03");
   STRIDEWIRE_SKIP_WITHOUT(captures);
   LibraryAssembler assembler;
@@ -426,13 +428,13 @@ TEST(LibraryAssembler, LevelWalksOfALibraryOfBlocksDoNotClimb) {
       finished += event.type == AvatarEventType::kFinished;
     }
     ASSERT_NEAR(avatar.base().position_m.y, 0.0, 1e-9) << "after " << finished << " steps";
-    // From 0.92 m, in the first step after standing, to 0.99 m.
+    // The height ranges from 0.92 m, in the first step after standing, to 0.99 m.
     ASSERT_NEAR(avatar.pose().root_position_m.y, 0.96, 0.06) << "after " << finished << " steps";
   }
   EXPECT_EQ(finished, kSteps);
 }
 
-TEST(LibraryAssembler, PutsTheCapturesOfASubjectTogether) {
+TEST(LibraryAssembler, CombinesAllCapturesOfASubject) {
   const std::vector<std::filesystem::path> captures = MocapFiles("cmu/16");
   STRIDEWIRE_SKIP_WITHOUT(captures);
   LibraryAssembler assembler;

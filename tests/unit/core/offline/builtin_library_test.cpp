@@ -21,7 +21,7 @@ const RawLibrary& Library() {
   return library;
 }
 
-/// Positions and rotations of all joints in one frame, in double precision.
+/// World positions and rotations of all joints in one frame, in double precision.
 struct Figure {
   std::vector<DVec3> positions;
   std::vector<DQuat> rotations;
@@ -59,7 +59,8 @@ struct Figure {
     return Point(leg.ball, leg.toe_tip_offset_m);
   }
 
-  // Sagittal angles, degrees: hip flexion against the pelvis, knee flexion, ankle dorsiflexion.
+  // Sagittal angles in degrees: hip flexion relative to the pelvis, knee flexion, ankle
+  // dorsiflexion.
   [[nodiscard]] double FootPitch(Foot foot) const {
     const DQuat& q = rotations[static_cast<std::size_t>(Library().skeleton.leg(foot).ankle)];
     const DVec3 ahead = q * DVec3(0.0, 0.0, 1.0);
@@ -99,7 +100,7 @@ const RawExample& Step(double start_m, double end_m, std::size_t group = 0) {
 
 constexpr std::array kFeet = {Foot::kLeft, Foot::kRight};
 
-// Largest distance of a point from where it first is, over frames from..to.
+// Returns the largest distance of a point from its first position, over frames from..to.
 template <typename PointOf>
 double Drift(const RawExample& example, int from, int to, PointOf point_of) {
   const DVec3 first = point_of(FrameOf(example, from));
@@ -110,10 +111,10 @@ double Drift(const RawExample& example, int from, int to, PointOf point_of) {
   return drift;
 }
 
-TEST(BuiltinLibrary, HasTheExamplesItPromises) {
+TEST(BuiltinLibrary, HasTheDocumentedExamples) {
   const RawLibrary& library = Library();
   ASSERT_TRUE(library.skeleton.Validate());
-  ASSERT_GE(library.groups.size(), 3u);  // general_steps_test.cpp has the others
+  ASSERT_GE(library.groups.size(), 3u);  // general_steps_test.cpp tests the others.
   EXPECT_EQ(library.groups[0].kind, MovementKind::kStepLeft);
   EXPECT_EQ(library.groups[1].kind, MovementKind::kStepRight);
   EXPECT_EQ(library.groups[2].kind, MovementKind::kJump);
@@ -139,7 +140,7 @@ TEST(BuiltinLibrary, HasTheExamplesItPromises) {
   }
 }
 
-TEST(BuiltinLibrary, ParametersAreWhereTheBallsAre) {
+TEST(BuiltinLibrary, ParametersEqualThePositionsOfTheBalls) {
   for (const std::size_t g : {0u, 1u}) {
     const Foot moving = MovingFoot(Library().groups[g].kind);
     for (const RawExample& example : Library().groups[g].examples) {
@@ -161,7 +162,7 @@ TEST(BuiltinLibrary, ParametersAreWhereTheBallsAre) {
   }
 }
 
-TEST(BuiltinLibrary, WhatTouchesTheGroundStaysThere) {
+TEST(BuiltinLibrary, ContactPointsDoNotSlide) {
   for (const std::size_t g : {0u, 1u}) {
     const Foot moving = MovingFoot(Library().groups[g].kind), fixed = OtherFoot(moving);
     for (const RawExample& example : Library().groups[g].examples) {
@@ -172,10 +173,11 @@ TEST(BuiltinLibrary, WhatTouchesTheGroundStaysThere) {
       const auto heel = [](Foot foot) { return [foot](const Figure& f) { return f.Heel(foot); }; };
       const auto ball = [](Foot foot) { return [foot](const Figure& f) { return f.Ball(foot); }; };
       const auto tip = [](Foot foot) { return [foot](const Figure& f) { return f.ToeTip(foot); }; };
-      EXPECT_LE(Drift(example, 0, toe_off, heel(fixed)), 1e-4);    // heel rocker
-      EXPECT_LE(Drift(example, toe_off, end, ball(fixed)), 1e-4);  // flat, then forefoot rocker
-      EXPECT_LE(Drift(example, 0, toe_off, tip(moving)), 1e-4);    // toe rocker
-      EXPECT_LE(Drift(example, strike, end, heel(moving)), 1e-4);  // heel rocker
+      EXPECT_LE(Drift(example, 0, toe_off, heel(fixed)), 1e-4);  // Heel rocker.
+      EXPECT_LE(Drift(example, toe_off, end, ball(fixed)),
+                1e-4);                                           // Flat foot, then forefoot rocker.
+      EXPECT_LE(Drift(example, 0, toe_off, tip(moving)), 1e-4);  // Toe rocker.
+      EXPECT_LE(Drift(example, strike, end, heel(moving)), 1e-4);  // Heel rocker.
       EXPECT_NEAR(FrameOf(example, strike).Heel(moving).y, 0.0, 1e-4);
       EXPECT_NEAR(FrameOf(example, toe_off).Heel(fixed).y, 0.0, 1e-4);
     }
@@ -193,7 +195,7 @@ TEST(BuiltinLibrary, WhatTouchesTheGroundStaysThere) {
   }
 }
 
-TEST(BuiltinLibrary, JointsStayWithinAHumanRange) {
+TEST(BuiltinLibrary, JointsStayInTheHumanRange) {
   for (const RawGroup& group : std::span(Library().groups).first(3)) {
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
@@ -215,7 +217,7 @@ TEST(BuiltinLibrary, JointsStayWithinAHumanRange) {
   }
 }
 
-TEST(BuiltinLibrary, FeetNeverEnterTheGroundAndClearItInSwing) {
+TEST(BuiltinLibrary, FeetClearTheGround) {
   for (const RawGroup& group : std::span(Library().groups).first(3)) {
     for (const RawExample& example : group.examples) {
       SCOPED_TRACE(example.source);
@@ -246,7 +248,7 @@ TEST(BuiltinLibrary, FeetNeverEnterTheGroundAndClearItInSwing) {
   }
 }
 
-// Velocity of the root at the first or the last frame, from three frames.
+// Returns the velocity of the root at the first or the last frame, computed from three frames.
 DVec3 RootVelocity(const RawExample& example, bool at_end) {
   const auto& p = example.clip.root_positions_m;
   const std::size_t n = p.size() - 1;
@@ -263,7 +265,8 @@ double LargestAngle(ConstPoseSpan a, ConstPoseSpan b) {
   return largest;
 }
 
-// Angular velocity of a joint at the first or the last keytime, degrees a second, from three frames.
+// Returns the angular velocity of a joint at the first or the last keytime in degrees per second,
+// from three frames.
 DVec3 JointVelocity(const RawExample& example, std::size_t joint, bool at_end) {
   const auto turn = [&](int from) {
     const DQuat a(example.clip.frame(from).rotations[joint]);
@@ -275,7 +278,7 @@ DVec3 JointVelocity(const RawExample& example, std::size_t joint, bool at_end) {
   return at_end ? 1.5 * turn(last - 1) - 0.5 * turn(last - 2) : 1.5 * turn(0) - 0.5 * turn(1);
 }
 
-TEST(BuiltinLibrary, StepsJoinWhereOneEndsAndTheNextBegins) {
+TEST(BuiltinLibrary, StepsJoinContinuously) {
   for (const RawExample& left : Library().groups[0].examples) {
     for (const RawExample& right : Library().groups[1].examples) {
       if (left.parameters[1] != -right.parameters[0]) continue;
@@ -293,7 +296,7 @@ TEST(BuiltinLibrary, StepsJoinWhereOneEndsAndTheNextBegins) {
   }
 }
 
-TEST(BuiltinLibrary, BeginsAndEndsStanding) {
+TEST(BuiltinLibrary, StartsAndEndsStanding) {
   const Pose& stand = Library().stand_pose;
   EXPECT_EQ(stand.root_position_m.x, 0.0f);
   EXPECT_EQ(stand.root_position_m.z, 0.0f);
@@ -314,7 +317,7 @@ TEST(BuiltinLibrary, BeginsAndEndsStanding) {
   }
 }
 
-TEST(BuiltinLibrary, RightStepsAreLeftStepsInTheMirror) {
+TEST(BuiltinLibrary, RightStepsMirrorLeftSteps) {
   const RawLibrary& library = Library();
   for (std::size_t e = 0; e < 15; ++e) {
     const RawExample& left = library.groups[0].examples[e];
@@ -340,14 +343,15 @@ TEST(BuiltinLibrary, RightStepsAreLeftStepsInTheMirror) {
   }
 }
 
-// Normal sagittal angles of a natural walk, degrees, by percent of the cycle from heel-strike:
+// Normal sagittal angles of walking in degrees, by percent of the cycle since heel-strike:
 // hip flexion, knee flexion, ankle dorsiflexion. Rounded textbook figures after Winter,
 // Biomechanics and Motor Control of Human Movement, and Perry and Burnfield, Gait Analysis (+-5).
 constexpr double kNormalAngles[][4] = {
     {0, 22, 4, 0},     {12, 18, 18, -4}, {30, 3, 10, 6},  {40, -6, 6, 9},  {50, -11, 11, 7},
     {62, -6, 38, -18}, {72, 9, 63, -8},  {80, 19, 53, 0}, {90, 23, 20, 1}, {97, 22, 2, 0}};
 
-// The leg's angles over one cycle of steady walking: the fixed foot's step, then the moving foot's.
+// Returns the angles of a leg over one cycle of steady walking: as the fixed foot, then as the
+// moving foot.
 std::array<double, 3> AnglesAt(const RawExample& step, double cycle_percent) {
   const double step_s = step.keytimes_s[3], support_s = step.keytimes_s[3] - step.keytimes_s[2];
   double t = cycle_percent / 100.0 * 2.0 * step_s - support_s;
@@ -374,7 +378,7 @@ TEST(BuiltinLibrary, WalksWithNormalAngles) {
   EXPECT_LE(rms(1), 10.0) << "knee";
   EXPECT_LE(rms(2), 8.0) << "ankle";
 
-  // Two flexion waves of the knee: one under load, one in swing.
+  // The knee flexes twice: under load and in swing.
   std::vector<double> maxima;
   double before = AnglesAt(step, 98.0)[1], now = AnglesAt(step, 99.0)[1];
   for (int percent = 0; percent < 100; ++percent) {
@@ -388,7 +392,7 @@ TEST(BuiltinLibrary, WalksWithNormalAngles) {
   EXPECT_NEAR(maxima[1], 73.0, 6.0);
 }
 
-// Segment masses and centres after Winter's table, as the generator does not share with the test.
+// Segment masses and centres of Winter's table, independent of the code of the generator.
 DVec3 BodyCentre(const Figure& figure) {
   const Skeleton& skeleton = Library().skeleton;
   const auto at = [&](const std::string& name) { return figure.At(skeleton.FindJoint(name)); };
@@ -407,7 +411,7 @@ DVec3 BodyCentre(const Figure& figure) {
   return sum;
 }
 
-TEST(BuiltinLibrary, BodyCentreFliesAlongAParabola) {
+TEST(BuiltinLibrary, CentreOfMassFollowsAParabolaInFlight) {
   for (const RawExample& jump : Library().groups[2].examples) {
     SCOPED_TRACE(jump.source);
     const int toe_off = FrameAt(jump, jump.keytimes_s[2]),
@@ -442,7 +446,7 @@ std::uint64_t HashOf(const RawLibrary& library) {
   return hash;
 }
 
-TEST(BuiltinLibrary, IsTheSameEveryTime) {
+TEST(BuiltinLibrary, IsDeterministic) {
   EXPECT_EQ(HashOf(GenerateBuiltinLibrary()), HashOf(GenerateBuiltinLibrary()));
 }
 

@@ -59,12 +59,12 @@ void ExpectSame(const Capture& a, const Skeleton& skeleton, const Clip& clip) {
   EXPECT_LT(WorstAngle(a.clip, clip), 0.001 * kDegree);
 }
 
-TEST(WriteBvh, ReadsBackWhatItWrote) {
+TEST(WriteBvh, RoundTripsWithTheReader) {
   const Capture figure = Figure();
   ExpectSame(ReadInMetres(Written(figure.skeleton, figure.clip)), figure.skeleton, figure.clip);
 }
 
-TEST(WriteBvh, ReadsBackAnyRotation) {
+TEST(WriteBvh, RoundTripsAnyRotation) {
   const std::uint64_t seed = std::random_device{}();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
   std::mt19937_64 random(seed);
@@ -77,7 +77,7 @@ TEST(WriteBvh, ReadsBackAnyRotation) {
   for (Quat& q : figure.clip.rotations) {
     q = Normalise(Quat(normal(random), normal(random), normal(random), normal(random)));
   }
-  // Root upright, so that reading does not turn the figure.
+  // The root is upright, so that the reader does not turn the figure.
   for (int f = 0; f < 500; ++f) figure.clip.frame(f).rotations[0] = YawRotation(0.05 * f);
   ExpectSame(ReadInMetres(Written(figure.skeleton, figure.clip)), figure.skeleton, figure.clip);
 }
@@ -108,8 +108,8 @@ TEST(WriteBvh, KeepsRotationsAtAndNearGimbalLock) {
   ExpectSame(ReadInMetres(Written(figure.skeleton, figure.clip)), figure.skeleton, figure.clip);
 }
 
-// Three full turns about a slanting axis and a root spinning on: no angle may jump by 360 degrees.
-TEST(WriteBvh, AnglesRunOn) {
+// Three full turns about an oblique axis and a spinning root: no angle may jump by 360 degrees.
+TEST(WriteBvh, AnglesAreContinuous) {
   Capture figure = Figure();
   const int frames = 360;
   figure.clip.Resize(frames, figure.skeleton.joint_count());
@@ -137,11 +137,11 @@ TEST(WriteBvh, AnglesRunOn) {
     }
     before = now;
   }
-  EXPECT_LT(largest, 5.0);  // Three degrees a frame, somewhat more off the axis.
+  EXPECT_LT(largest, 5.0);  // Three degrees per frame, slightly more for the oblique axis.
   EXPECT_GT(furthest, 1000.0);
 }
 
-TEST(WriteBvh, ReadsBackEveryCapture) {
+TEST(WriteBvh, RoundTripsEveryCapture) {
   std::vector<std::filesystem::path> paths = test::SharedCaptures();
   if (paths.empty()) paths = test::PackagedCaptures();
   if (paths.empty())
@@ -163,17 +163,17 @@ TEST(WriteBvh, ReadsBackEveryCapture) {
   }
 }
 
-TEST(WriteBvh, GivesLeavesAnEndSiteAndMendsNames) {
+TEST(WriteBvh, AddsEndSitesAndReplacesInvalidCharacters) {
   Capture figure = Figure();
   figure.skeleton.end_sites.clear();
   figure.skeleton.joints[1].name = "Left {Up} Leg";
   const Capture again = ReadInMetres(Written(figure.skeleton, figure.clip));
-  EXPECT_EQ(again.skeleton.end_sites.size(), 5u);  // Two toes, head, two arms.
+  EXPECT_EQ(again.skeleton.end_sites.size(), 5u);  // Two toes, the head and two arms.
   EXPECT_GE(again.skeleton.FindJoint("Left__Up__Leg"), 0);
 }
 
-// Joints that stand parents first, but not depth first.
-TEST(WriteBvh, PutsJointsDepthFirst) {
+// A skeleton whose joints are sorted parents first, but not depth first.
+TEST(WriteBvh, WritesJointsDepthFirst) {
   Skeleton skeleton;
   skeleton.joints = {{"root", -1, Vec3(0.0f)},
                      {"a", 0, Vec3(1, 0, 0)},
@@ -191,7 +191,7 @@ TEST(WriteBvh, PutsJointsDepthFirst) {
   EXPECT_LT(text.find(" 30.0000", row), text.find(" 20.0000", row));
 }
 
-TEST(WriteBvh, RefusesWhatMakesNoClip) {
+TEST(WriteBvh, RejectsInvalidClips) {
   const Capture figure = Figure();
   std::ostringstream out;
   Clip shorter = figure.clip;
@@ -208,7 +208,7 @@ TEST(WriteBvh, RefusesWhatMakesNoClip) {
   EXPECT_EQ(WriteBvh(figure.skeleton, figure.clip, out).error().code, ErrorCode::kIo);
 }
 
-TEST(WriteBvh, AFileIsWholeOrUntouched) {
+TEST(WriteBvh, FileIsCompleteOrUnchanged) {
   const Capture figure = Figure();
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
                                        ("stridewire_bvh_" + std::to_string(std::random_device{}()));
@@ -227,7 +227,7 @@ TEST(WriteBvh, AFileIsWholeOrUntouched) {
   const Status nowhere = WriteBvh(figure.skeleton, figure.clip, folder / "no" / "walk.bvh");
   ASSERT_FALSE(nowhere.has_value());
   EXPECT_EQ(nowhere.error().code, ErrorCode::kIo);
-  // A folder stands where the file should go: the text written beside it is taken away again.
+  // The path is a folder, so the writer must remove its temporary file.
   std::filesystem::create_directory(folder / "taken.bvh");
   EXPECT_EQ(WriteBvh(figure.skeleton, figure.clip, folder / "taken.bvh").error().code,
             ErrorCode::kIo);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kFps = 120.0;
 
-// Tracks of a standing figure; tests then move a foot.
+// Returns tracks of a standing figure, in which tests then move a foot.
 BodyTracks StandingTracks(int frames) {
   BodyTracks tracks;
   tracks.frames = {0, frames};
@@ -36,7 +36,7 @@ void Move(BodyTracks::FootTrajectory& foot, Offset offset) {
   }
 }
 
-// 0.6 m ahead at constant speed during [begin, end), lifted by `lift_m`.
+// Moves a foot 0.6 m ahead at constant speed during [begin, end), lifted by `lift_m`.
 auto Swing(int begin, int end, double lift_m) {
   return [=](int i) {
     const double u = std::clamp(static_cast<double>(i - begin) / (end - begin), 0.0, 1.0);
@@ -44,7 +44,7 @@ auto Swing(int begin, int end, double lift_m) {
   };
 }
 
-TEST(FindContacts, SplitsAStandAtASwing) {
+TEST(FindContacts, SplitsContactsAtASwing) {
   BodyTracks tracks = StandingTracks(240);
   Move(tracks.feet[0], Swing(100, 150, 0.1));
   const FootContacts contacts = FindContacts(tracks);
@@ -59,8 +59,8 @@ TEST(FindContacts, SplitsAStandAtASwing) {
   EXPECT_EQ(contacts.foot(Foot::kRight)[0].frames, (FrameRange{0, 240}));
 }
 
-TEST(FindContacts, OnePointIsEnough) {
-  // The foot rolls over the toes: ankle and ball rise and move, the tip stays.
+TEST(FindContacts, DetectsContactOfASinglePoint) {
+  // The foot rolls over the toes: ankle and ball rise and move, but the toe tip rests.
   BodyTracks tracks = StandingTracks(120);
   for (std::size_t i = 60; i < 120; ++i) {
     const double moved = (static_cast<double>(i) - 60.0) / kFps * 2.0;
@@ -72,8 +72,8 @@ TEST(FindContacts, OnePointIsEnough) {
   EXPECT_EQ(contacts.foot(Foot::kRight)[0].frames, (FrameRange{0, 120}));
 }
 
-TEST(FindContacts, SlowButHighIsNoContactOnASingleFloor) {
-  // Held still 20 cm up for a quarter of a second: lifted, not standing.
+TEST(FindContacts, IgnoresSlowRaisedFeetOnASingleFloor) {
+  // The foot is held 20 cm above the floor for a quarter of a second.
   BodyTracks tracks = StandingTracks(360);
   Move(tracks.feet[0], [](int i) {
     if (i < 100 || i >= 170) return DVec3(0.0);
@@ -85,8 +85,8 @@ TEST(FindContacts, SlowButHighIsNoContactOnASingleFloor) {
   ASSERT_EQ(contacts.foot(Foot::kLeft).size(), 2u);
 }
 
-TEST(FindContacts, DropsTheHeightTestOnBlocks) {
-  // Steps onto a block of 30 cm and stays there.
+TEST(FindContacts, IgnoresTheHeightOnBlocks) {
+  // The foot steps onto a block of 30 cm and stays there.
   BodyTracks tracks = StandingTracks(360);
   Move(tracks.feet[0], [](int i) {
     const double u = std::clamp((i - 100) / 40.0, 0.0, 1.0);
@@ -100,8 +100,8 @@ TEST(FindContacts, DropsTheHeightTestOnBlocks) {
 }
 
 TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {
-  // A marker jumps for three frames while the foot stands (25 ms): no gap. The foot rests for five
-  // frames (42 ms) in a long swing: no contact.
+  // A marker jumps for three frames (25 ms) while the foot stands, which is not a gap. The foot
+  // rests for five frames (42 ms) in a long swing, which is not a contact.
   BodyTracks tracks = StandingTracks(400);
   Move(tracks.feet[0], [](int i) { return DVec3(0.0, 0.0, i >= 50 && i < 53 ? 0.05 : 0.0); });
   Move(tracks.feet[1], [](int i) {
@@ -117,13 +117,13 @@ TEST(FindContacts, FillsShortGapsAndDropsShortContacts) {
   EXPECT_NEAR(contacts.foot(Foot::kRight)[1].frames.begin, 285, 2);
 }
 
-TEST(FindContacts, ThereIsNoneWithoutFrames) {
+TEST(FindContacts, IsEmptyWithoutFrames) {
   const FootContacts contacts = FindContacts(StandingTracks(0));
   EXPECT_TRUE(contacts.foot(Foot::kLeft).empty());
   EXPECT_TRUE(contacts.foot(Foot::kRight).empty());
 }
 
-TEST(SmoothPath, KeepsLinesAndLengths) {
+TEST(SmoothPath, PreservesLinesAndTheNumberOfPoints) {
   std::vector<DVec3> line;
   for (int i = 0; i < 20; ++i) line.emplace_back(i, 2.0 * i, -i);
   const std::vector<DVec3> smooth = SmoothPath(line, 5);

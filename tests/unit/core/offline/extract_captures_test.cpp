@@ -1,5 +1,5 @@
-// What is found in real recordings, against an independent reading of them (a throw-away script,
-// balls measured at the middle of double support).
+// Compares extraction from real recordings with an independent analysis, in which the balls were
+// measured in the middle of double support.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -40,10 +40,10 @@ TEST(ExtractCaptures, FindsTheTenJumpsOf01_01) {
                              DoubleNear(0.93, 0.04), DoubleNear(0.95, 0.04), DoubleNear(1.06, 0.04),
                              DoubleNear(0.95, 0.04), DoubleNear(0.86, 0.04), DoubleNear(1.10, 0.04),
                              DoubleNear(0.97, 0.04)));
-  EXPECT_GE(extraction.steps_left + extraction.steps_right, 3);  // two turns with small steps
+  EXPECT_GE(extraction.steps_left + extraction.steps_right, 3);  // Two turns with small steps.
 }
 
-TEST(ExtractCaptures, FindsTheStepsOf01_03ButNotTheHanging) {
+TEST(ExtractCaptures, RejectsHangingIn01_03) {
   const std::filesystem::path file = ModelFile("01_03.bvh");
   STRIDEWIRE_SKIP_WITHOUT(file);
   const Extraction extraction = ExtractFile(file);
@@ -51,7 +51,7 @@ TEST(ExtractCaptures, FindsTheStepsOf01_03ButNotTheHanging) {
   EXPECT_NEAR(extraction.steps_right, 17, 3);
   EXPECT_GE(extraction.steps_left + extraction.steps_right, 26);
   EXPECT_EQ(extraction.jumps, 0);
-  // On the bar both feet are off the floor around these times.
+  // Around these times the subject hangs on a bar with both feet off the floor.
   for (const double hanging_s : {15.6, 16.4, 33.0, 33.8}) {
     for (const ExtractedExample& step : extraction.general_steps) {
       double from = 0.0;
@@ -97,7 +97,7 @@ struct Counts {
   int right;
 };
 
-TEST(ExtractCaptures, AgreesWithTheIndependentReadingOfTheOtherFiles) {
+TEST(ExtractCaptures, AgreesWithAnIndependentAnalysis) {
   const std::vector<std::filesystem::path> files = MocapFiles("cmu/03");
   STRIDEWIRE_SKIP_WITHOUT(files);
   for (const Counts& expected : {Counts{"03/03_01.bvh", 2, 2},
@@ -116,7 +116,7 @@ TEST(ExtractCaptures, AgreesWithTheIndependentReadingOfTheOtherFiles) {
   }
 }
 
-// Straight takes: initial and final lengths as read independently (smallest and largest, m).
+// Straight takes with independently measured initial and final lengths (smallest and largest, m).
 TEST(ExtractCaptures, MeasuresTheLengthsOfStraightTakes) {
   struct Range {
     const char* file;
@@ -145,8 +145,8 @@ TEST(ExtractCaptures, MeasuresTheLengthsOfStraightTakes) {
   }
 }
 
-// The known flips of single joints do not get into examples.
-TEST(ExtractCaptures, MendsKnownFlips) {
+// The examples must not contain the known flips of single joints.
+TEST(ExtractCaptures, RepairsKnownFlips) {
   STRIDEWIRE_SKIP_WITHOUT(MocapFiles("cmu/16"));
   for (const auto& [file, joint, degrees] : {std::tuple{"16_15", "LeftArm", "94"},
                                              {"16_23", "RightArm", "88"},
@@ -170,13 +170,13 @@ TEST(ExtractCaptures, MendsKnownFlips) {
   }
 }
 
-TEST(ExtractCaptures, ReadsUnlikeFiles) {
+TEST(ExtractCaptures, HandlesFilesOfOtherPrograms) {
   STRIDEWIRE_SKIP_WITHOUT(MocapFiles("other/daz"));
   const std::filesystem::path other = MocapDir() / "other";
   const Extraction jump = ExtractFile(other / "daz/13_13.bvh");
   ASSERT_EQ(jump.jumps, 1);
   EXPECT_NEAR(JumpLengths(jump)[0], 1.22, 0.04);
-  // The header says 30 frames a second, the take has 120: then the fall is far too slow.
+  // The header declares 30 frames per second, but the take has 120. The fall is then too slow.
   const Extraction slow = ExtractFile(other / "amc2bvh/16_02.bvh");
   EXPECT_EQ(slow.jumps, 0);
   ASSERT_EQ(slow.rejected.size(), 1u);

@@ -1,4 +1,4 @@
-// Extraction from a synthetic figure whose contacts, lengths and headings are known.
+// Extraction from a synthetic figure with known contacts, lengths and headings.
 #include "offline/extract/extract.h"
 
 #include <gmock/gmock.h>
@@ -24,7 +24,7 @@ std::vector<WalkerStep> StartWalkStop() {
           {Foot::kLeft, 0.0}};
 }
 
-TEST(Extract, FindsKnownStepsTheirLengthsAndTimes) {
+TEST(Extract, FindsStepsWithTheirLengthsAndTimes) {
   SyntheticWalker walker;
   walker.heading_rad = 0.7;
   walker.start_m = DVec3(3.0, 0.0, -2.0);
@@ -44,14 +44,14 @@ TEST(Extract, FindsKnownStepsTheirLengthsAndTimes) {
     EXPECT_NEAR(step.example.parameters[1], end[i], 0.01) << i;
     ASSERT_EQ(step.example.keytimes_s.size(), 4u);
     EXPECT_TRUE(ValidateKeytimes(step.example.keytimes_s).has_value());
-    // The foot sets off from rest, so it takes 40 to 70 ms to be faster than a standing one.
+    // The foot accelerates from rest and needs 40 to 70 ms to exceed the speed limit of contacts.
     double from = 0.0;
     ASSERT_EQ(std::sscanf(step.example.source.c_str(), "synthetic.bvh %lf-", &from), 1);
     EXPECT_NEAR(from + step.example.keytimes_s[1], walker.truth.toe_off_s[i], 0.08) << i;
     EXPECT_NEAR(from + step.example.keytimes_s[2], walker.truth.heel_strike_s[i], 0.08) << i;
     EXPECT_DOUBLE_EQ(step.example.clip.duration_s(), step.example.keytimes_s[3]);
   }
-  // Steps begin where the last one ended: the middle of double support.
+  // Each step starts where the previous one ended, in the middle of double support.
   for (std::size_t i = 1; i + 2 < 5; ++i) {
     EXPECT_NEAR(found.straight_steps[i].example.keytimes_s[1], 0.1, 0.05);
   }
@@ -73,14 +73,14 @@ TEST(Extract, NormalisesPositionHeadingAndHeight) {
       ASSERT_TRUE(HeadingOf(first.rotations[0], yaw));
       EXPECT_NEAR(yaw, 0.0, 0.01) << heading;
       const ConstPoseSpan last = step.example.clip.frame(step.example.clip.frame_count() - 1);
-      EXPECT_NEAR(last.root_position_m.x, 0.0, 0.002) << "veers aside";
+      EXPECT_NEAR(last.root_position_m.x, 0.0, 0.002) << "the step veers";
       EXPECT_GT(last.root_position_m.z, 0.2);
       EXPECT_NEAR(BallPosition(found.skeleton, last, Foot::kLeft).y, kWalkerBallHeightM, 0.002);
     }
   }
 }
 
-TEST(Extract, HeadingIgnoresTheSwingOfThePelvis) {
+TEST(Extract, HeadingIgnoresPelvisOscillation) {
   SyntheticWalker walker;
   walker.pelvis_swing_rad = 10.0 * kDegree;
   std::vector<WalkerStep> steps;
@@ -109,7 +109,7 @@ TEST(Extract, GeneralParametersAreTheFootVectorsOfTheClip) {
   }
 }
 
-TEST(Extract, StepsOntoBlocksAreGeneralNotStraight) {
+TEST(Extract, StepsOntoBlocksAreNotStraight) {
   SyntheticWalker walker;
   const Extraction found = Extract(walker.Walk({{Foot::kLeft, 0.4},
                                                 {Foot::kRight, 0.4, 0.2},
@@ -126,13 +126,14 @@ TEST(Extract, StepsOntoBlocksAreGeneralNotStraight) {
   for (std::size_t i = 0; i < 8; ++i) {
     const RawExample& example = found.general_steps[i].example;
     EXPECT_NEAR(example.parameters[4], rise[i], 0.01) << i;
-    // The fixed foot is on the ground y = 0, whatever block that is.
+    // The fixed foot is at y = 0, on whichever block it stands.
     const Foot fixed = OtherFoot(MovingFoot(found.general_steps[i].kind));
     EXPECT_NEAR(BallPosition(found.skeleton, example.clip.frame(0), fixed).y,
                 found.ball_height_m[static_cast<int>(fixed)], 0.005)
         << i;
   }
-  EXPECT_EQ(found.straight_steps.size(), 2u);  // The first and, back down, the last.
+  EXPECT_EQ(found.straight_steps.size(),
+            2u);  // The first step, and the last step after climbing down.
 }
 
 TEST(Extract, FindsAStandingJump) {
@@ -158,10 +159,10 @@ TEST(Extract, FindsAStandingJump) {
   }
 }
 
-TEST(Extract, HangingIsNoJump) {
+TEST(Extract, RejectsHanging) {
   SyntheticWalker walker;
   Capture capture = walker.Jump(0.5);
-  // Drawn up at constant speed and let down again, instead of thrown.
+  // The figure moves up and down at constant speed instead of following a parabola.
   Clip& clip = capture.clip;
   const int from = static_cast<int>(walker.truth.toe_off_s[0] * walker.fps);
   const int to = static_cast<int>(walker.truth.heel_strike_s[0] * walker.fps);
@@ -178,7 +179,7 @@ TEST(Extract, HangingIsNoJump) {
   EXPECT_NEAR(found.rejected[0].from_s, walker.truth.toe_off_s[0], 0.05);
 }
 
-TEST(Extract, AFigureThatNeverMovesHasNoMovements) {
+TEST(Extract, FindsNoMovementsInAStandingFigure) {
   SyntheticWalker walker;
   const Extraction found = Extract(walker.Stand(3.0));
   EXPECT_EQ(found.error, "");
@@ -189,7 +190,7 @@ TEST(Extract, AFigureThatNeverMovesHasNoMovements) {
   EXPECT_NEAR(found.stand->pose.root_position_m.y, 0.86, 0.005);
 }
 
-TEST(Extract, TheStandPoseIsTheQuietUprightOne) {
+TEST(Extract, StandPoseIsTheStillestUprightPose) {
   SyntheticWalker walker;
   walker.heading_rad = 2.0;
   walker.start_m = DVec3(1.0, 0.0, 1.0);
@@ -203,10 +204,10 @@ TEST(Extract, TheStandPoseIsTheQuietUprightOne) {
   EXPECT_NEAR(apart.x, 0.18, 0.01);
 }
 
-TEST(Extract, ARecordingCutInsideAStepGivesItsWholeStepsOnly) {
+TEST(Extract, IgnoresStepsCutOffAtTheEnds) {
   SyntheticWalker walker;
   Capture capture = walker.Walk(StartWalkStop());
-  // From the middle of the second swing to the middle of the fourth.
+  // Cuts from the middle of the second swing to the middle of the fourth.
   const auto middle = [&](std::size_t i) {
     return static_cast<int>(0.5 * (walker.truth.toe_off_s[i] + walker.truth.heel_strike_s[i]) *
                             walker.fps);
@@ -229,17 +230,17 @@ TEST(Extract, ARecordingCutInsideAStepGivesItsWholeStepsOnly) {
   EXPECT_NEAR(found.straight_steps[0].example.parameters[1], 0.55, 0.01);
 }
 
-TEST(Extract, AnEmptyCaptureIsAnErrorNotACrash) {
+TEST(Extract, RejectsEmptyCaptures) {
   SyntheticWalker walker;
   Capture capture = walker.Stand(1.0);
   capture.clip = Clip{};
   capture.clip.fps = 120.0;
   const Extraction empty = Extract(capture);
-  EXPECT_THAT(empty.error, ::testing::HasSubstr("no frame"));
+  EXPECT_THAT(empty.error, ::testing::HasSubstr("no usable frame"));
   EXPECT_EQ(empty.steps_left + empty.steps_right + empty.jumps, 0);
 }
 
-TEST(Extract, AFewFramesAreEnoughNotToCrash) {
+TEST(Extract, HandlesVeryShortCaptures) {
   SyntheticWalker walker;
   const Capture whole = walker.Walk(StartWalkStop());
   for (const int frames : {1, 2, 3, 5, 9, 70, 90}) {
@@ -251,7 +252,7 @@ TEST(Extract, AFewFramesAreEnoughNotToCrash) {
   }
 }
 
-TEST(Extract, AnotherFrameRateGivesTheSameSteps) {
+TEST(Extract, IsIndependentOfTheFrameRate) {
   for (const double fps : {30.0, 60.0, 240.0}) {
     SyntheticWalker walker;
     walker.fps = fps;
@@ -263,7 +264,7 @@ TEST(Extract, AnotherFrameRateGivesTheSameSteps) {
   }
 }
 
-TEST(Extract, AStepWithAFlipThatCannotBeMendedIsRejectedWithTheReason) {
+TEST(Extract, RejectsStepsWithUnrepairedFlips) {
   SyntheticWalker walker;
   Capture capture = walker.Walk(StartWalkStop());
   const int arm = capture.skeleton.FindJoint("LeftArm");
@@ -280,7 +281,7 @@ TEST(Extract, AStepWithAFlipThatCannotBeMendedIsRejectedWithTheReason) {
   EXPECT_GT(found.rejected[0].to_s, from / walker.fps);
 }
 
-TEST(Extract, FitsExamplesToAFigureWithOtherBones) {
+TEST(Extract, RetargetsToOtherBoneLengths) {
   SyntheticWalker tall;
   tall.leg_scale = 1.1;
   SyntheticWalker plain;

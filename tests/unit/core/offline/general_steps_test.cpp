@@ -1,4 +1,4 @@
-// The generated library's general steps: backward, turning, aside, up and down.
+// General steps of the generated library: backward, turning, sideways, up and down.
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ namespace {
 
 using enum ParameterName;
 
-constexpr std::size_t kFirstGeneralGroup = 3;  // after the straight steps and the jump
+constexpr std::size_t kFirstGeneralGroup = 3;  // After the straight steps and the jump.
 
 const RawLibrary& Library() {
   static const RawLibrary library = GenerateBuiltinLibrary();
@@ -46,7 +46,7 @@ int FrameAt(const RawExample& example, std::size_t keytime) {
   return static_cast<int>(std::lround(example.keytimes_s[keytime] * example.clip.fps));
 }
 
-TEST(GeneralSteps, StandBesideTheStraightOnes) {
+TEST(GeneralSteps, FollowTheStraightSteps) {
   ASSERT_EQ(Library().groups.size(), 13u);
   const std::vector<std::vector<ParameterName>> expected = {
       {kStartZ, kEndZ},
@@ -63,7 +63,7 @@ TEST(GeneralSteps, StandBesideTheStraightOnes) {
     for (const RawExample& example : groups[g]->examples) {
       SCOPED_TRACE(example.source);
       EXPECT_TRUE(example.clip.Validate());
-      EXPECT_TRUE(sources.insert(example.source).second) << "stands twice";
+      EXPECT_TRUE(sources.insert(example.source).second) << "duplicate source";
       EXPECT_EQ(example.keytimes_s.size(), 4u);
       EXPECT_EQ(example.mirrored, g % 2 == 1);
       for (std::size_t i = 1; i < example.keytimes_s.size(); ++i) {
@@ -73,7 +73,7 @@ TEST(GeneralSteps, StandBesideTheStraightOnes) {
   }
 }
 
-TEST(GeneralSteps, ParametersAreWhereTheBallsAre) {
+TEST(GeneralSteps, ParametersEqualThePositionsOfTheBalls) {
   for (const RawGroup* group : GeneralGroups()) {
     const Foot moving = MovingFoot(group->kind);
     for (const RawExample& example : group->examples) {
@@ -100,7 +100,7 @@ TEST(GeneralSteps, ParametersAreWhereTheBallsAre) {
   }
 }
 
-TEST(GeneralSteps, WhatTouchesTheGroundStaysThere) {
+TEST(GeneralSteps, ContactPointsDoNotSlide) {
   enum Point { kHeel, kBall, kTip };
   LegGeometry legs = Legs();
   for (const RawGroup* group : GeneralGroups()) {
@@ -118,7 +118,7 @@ TEST(GeneralSteps, WhatTouchesTheGroundStaysThere) {
         }
         return most;
       };
-      // Backward the rockers turn the other way round: ball, then heel.
+      // Steps backwards roll in reverse order: over the ball, then over the heel.
       EXPECT_LE(drift(fixed, backward ? kBall : kHeel, 0, 1), 1e-4);
       EXPECT_LE(drift(fixed, backward ? kHeel : kBall, 2, 3), 1e-4);
       EXPECT_LE(drift(moving, backward ? kHeel : kTip, 0, 1), 1e-4);
@@ -146,7 +146,7 @@ TEST(GeneralSteps, KneesBendForwardAndLegsStayApart) {
         nearest_here = std::min(nearest_here, legs.LegDistance());
       }
       EXPECT_GE(least_knee, 3.5);
-      EXPECT_LE(most_knee, 140.0);  // two risers of 25 cm over a tread of 28
+      EXPECT_LE(most_knee, 140.0);  // Two risers of 25 cm over a tread of 28 cm.
       EXPECT_GE(nearest_here, 0.07);
       widest_knee = std::max(widest_knee, most_knee);
       nearest = std::min(nearest, nearest_here);
@@ -159,7 +159,7 @@ TEST(GeneralSteps, KneesBendForwardAndLegsStayApart) {
 TEST(GeneralSteps, ClearTheGroundInSwing) {
   LegGeometry legs = Legs();
   for (const RawGroup* group : GeneralGroups()) {
-    if (IndexOf(*group, kEndY) >= 0) continue;  // ClearStairs has those
+    if (IndexOf(*group, kEndY) >= 0) continue;  // Tested by ClearStairs.
     const Foot moving = MovingFoot(group->kind);
     for (const RawExample& example : group->examples) {
       SCOPED_TRACE(example.source);
@@ -178,8 +178,8 @@ TEST(GeneralSteps, ClearTheGroundInSwing) {
   }
 }
 
-// A tread begins 14 cm behind the ball of whoever lands on it from below, and ends 2 cm ahead of the
-// ball of whoever leaves it downward.
+// A tread begins 14 cm behind the ball of a foot that lands on it from below, and ends 2 cm ahead
+// of the ball of a foot that leaves it downwards.
 double StairsAt(double z, const DVec3& rear_ball, const DVec3& front_ball) {
   const double edge = rear_ball.y < front_ball.y ? front_ball.z - 0.14 : rear_ball.z + 0.02;
   return z < edge ? rear_ball.y : front_ball.y;
@@ -192,7 +192,7 @@ TEST(GeneralSteps, ClearStairs) {
     if (end_y < 0) continue;
     const Foot moving = MovingFoot(group->kind), fixed = OtherFoot(moving);
     for (const RawExample& example : group->examples) {
-      if (example.heading_change_rad != 0.0) continue;  // their stairs are not along z
+      if (example.heading_change_rad != 0.0) continue;  // Their stairs are not parallel to z.
       SCOPED_TRACE(example.source);
       const auto ball = [&](int frame, Foot foot) {
         legs.Set(example.clip.frame(frame));
@@ -214,7 +214,7 @@ TEST(GeneralSteps, ClearStairs) {
   }
 }
 
-TEST(GeneralSteps, RightStepsAreLeftStepsInTheMirror) {
+TEST(GeneralSteps, RightStepsMirrorLeftSteps) {
   const auto groups = GeneralGroups();
   for (std::size_t g = 0; g + 1 < groups.size(); g += 2) {
     for (std::size_t e = 0; e < groups[g]->examples.size(); ++e) {
@@ -236,9 +236,9 @@ TEST(GeneralSteps, RightStepsAreLeftStepsInTheMirror) {
   }
 }
 
-// A step that ends as another begins ends in that one's first pose, unless it has turned: then the
-// rear foot still points where it stood.
-TEST(GeneralSteps, JoinWhereOneEndsAndTheNextBegins) {
+// If one step ends in the state in which another starts, its last pose equals the first pose of
+// that step. After a turn this does not hold, since the rear foot keeps its direction.
+TEST(GeneralSteps, JoinContinuously) {
   const auto groups = GeneralGroups();
   int joins = 0;
   for (std::size_t g = 0; g + 1 < groups.size(); g += 2) {
@@ -254,7 +254,7 @@ TEST(GeneralSteps, JoinWhereOneEndsAndTheNextBegins) {
         SCOPED_TRACE(before.source + ", then " + after.source);
         ++joins;
         EXPECT_LE(LargestJointAngle(before.clip.frame(last), after.clip.frame(0)), 0.003);
-        // Heights are from the ground below the fixed foot, which is the other one afterwards.
+        // Heights are relative to the fixed foot, which is the other foot in the next step.
         const double rise = IndexOf(left, kEndY) >= 0 ? end.y : 0.0;
         EXPECT_NEAR(before.clip.root_positions_m[static_cast<std::size_t>(last)].y - rise,
                     after.clip.root_positions_m[0].y, 0.001);

@@ -8,7 +8,7 @@
 namespace stridewire {
 namespace {
 
-// A walking figure and one of its joints. The true motion is smooth.
+// A walking figure with smooth motion, and one of its joints.
 struct Figure {
   Capture capture = SyntheticWalker{}.Walk({{Foot::kLeft, 0.5}, {Foot::kRight, 0.6}});
   int joint = 0;
@@ -22,7 +22,7 @@ struct Figure {
   }
 };
 
-TEST(RepairGlitches, LeavesSmoothMotionAlone) {
+TEST(RepairGlitches, KeepsSmoothMotion) {
   Figure figure("LeftLeg");
   const Clip before = figure.capture.clip;
   const GlitchReport report = figure.Repair();
@@ -31,7 +31,7 @@ TEST(RepairGlitches, LeavesSmoothMotionAlone) {
   EXPECT_TRUE(before.rotations == figure.capture.clip.rotations);
 }
 
-TEST(RepairGlitches, InterpolatesOverAFlipOfAFrameOrTwo) {
+TEST(RepairGlitches, InterpolatesOverShortFlips) {
   for (const int bad : {1, 2, 3}) {
     Figure figure("LeftLeg");
     const Clip truth = figure.capture.clip;
@@ -58,15 +58,15 @@ TEST(RepairGlitches, ReplacesBadFramesAtTheEnds) {
   for (int f = 0; f < end; ++f) EXPECT_LT(AngleBetween(figure.At(f), kIdentityQuat), 1e-3) << f;
 }
 
-TEST(RepairGlitches, DoesNotLookBeforeTheFirstFrame) {
+TEST(RepairGlitches, IgnoresFramesBeforeTheFirst) {
   Figure figure("LeftArm");
   figure.capture.first_frame = 1;
-  figure.At(0) = YawRotation(1.6);  // As the artificial T-pose of a recording
+  figure.At(0) = YawRotation(1.6);  // Like the artificial T-pose of a recording.
   EXPECT_TRUE(figure.Repair().repaired.empty());
   EXPECT_NEAR(AngleBetween(figure.At(0), YawRotation(1.6)), 0.0, 1e-3);
 }
 
-TEST(RepairGlitches, SpreadsALastingSmallJump) {
+TEST(RepairGlitches, SpreadsSmallLastingJumps) {
   Figure figure("LeftArm");
   for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(0.6);
   const GlitchReport report = figure.Repair();
@@ -79,7 +79,7 @@ TEST(RepairGlitches, SpreadsALastingSmallJump) {
   EXPECT_LT(AngleBetween(figure.At(110), YawRotation(0.6)), 1e-3);
 }
 
-TEST(RepairGlitches, SpreadsAnyJumpAtTheEndOfALimb) {
+TEST(RepairGlitches, SpreadsLargeJumpsOfLimbEnds) {
   Figure figure("LeftToeBase");
   for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(2.5);
   const GlitchReport report = figure.Repair();
@@ -87,8 +87,8 @@ TEST(RepairGlitches, SpreadsAnyJumpAtTheEndOfALimb) {
   EXPECT_TRUE(report.left.empty());
 }
 
-TEST(RepairGlitches, ReportsALastingLargeJumpOfALimb) {
-  Figure figure("LeftArm");  // 60 cm of arm hang on it
+TEST(RepairGlitches, ReportsLargeLastingJumps) {
+  Figure figure("LeftArm");  // The arm below it is 60 cm long.
   for (int f = 100; f < figure.capture.clip.frame_count(); ++f) figure.At(f) = YawRotation(1.6);
   const GlitchReport report = figure.Repair();
   EXPECT_TRUE(report.repaired.empty());
@@ -97,7 +97,7 @@ TEST(RepairGlitches, ReportsALastingLargeJumpOfALimb) {
             "LeftArm turns 92 degrees in one frame at 0.83 s");
 }
 
-TEST(RepairGlitches, BringsTheRootBackOnItsPath) {
+TEST(RepairGlitches, RepairsThePathOfTheRoot) {
   for (const int bad : {1, 2}) {
     Figure figure("Hips");
     const std::vector<Vec3> truth = figure.capture.clip.root_positions_m;
@@ -116,17 +116,17 @@ TEST(RepairGlitches, BringsTheRootBackOnItsPath) {
   }
 }
 
-TEST(RepairGlitches, TellsOncePerJoint) {
+TEST(RepairGlitches, DescribesEachJointOnce) {
   Figure figure("LeftLeg");
   for (const int f : {60, 90, 130}) figure.At(f) = figure.At(f) * YawRotation(f == 90 ? 1.2 : 0.8);
   const GlitchReport report = figure.Repair();
   EXPECT_EQ(report.repaired.size(), 3u);
-  const std::vector<std::string> told =
+  const std::vector<std::string> sentences =
       DescribeRepairs(figure.capture.skeleton, report, figure.capture.clip.fps);
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_THAT(told[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
+  ASSERT_EQ(sentences.size(), 1u);
+  EXPECT_THAT(sentences[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
                                         ::testing::HasSubstr("0.75 s"),
-                                        ::testing::EndsWith("as 2 smaller flips of it")));
+                                        ::testing::EndsWith("with 2 smaller flips")));
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kFps = 120.0;
 constexpr int kStepFrames = 66;
 
-// A walk whose feet strike every 66 frames in turn; the pelvis yaws by `swing_rad` once a stride
-// around a heading that turns by `turn_rad_s`.
+// A walk with a heel-strike every 66 frames. The pelvis yaws by `swing_rad` once per stride, around
+// a heading that turns with `turn_rad_s`.
 struct Walk {
   BodyTracks tracks;
   FootContacts contacts;
@@ -39,7 +39,7 @@ Walk MakeWalk(int steps, double swing_rad, double turn_rad_s) {
   return walk;
 }
 
-TEST(StrideHeading, AveragesTheSwingOfThePelvisAway) {
+TEST(StrideHeading, RemovesPelvisOscillation) {
   const Walk walk = MakeWalk(8, 10.0 * kDegree, 0.0);
   const std::vector<double> heading = StrideHeading(walk.tracks, walk.contacts);
   ASSERT_EQ(heading.size(), static_cast<std::size_t>(walk.tracks.size()));
@@ -48,16 +48,16 @@ TEST(StrideHeading, AveragesTheSwingOfThePelvisAway) {
   }
 }
 
-TEST(StrideHeading, FollowsATurnUnwrapped) {
+TEST(StrideHeading, FollowsTurnsWithoutWrapping) {
   const Walk walk = MakeWalk(24, 8.0 * kDegree, 40.0 * kDegree);
   const std::vector<double> heading = StrideHeading(walk.tracks, walk.contacts);
   for (int i = kStepFrames; i < walk.tracks.size() - kStepFrames; ++i) {
     EXPECT_NEAR(heading[static_cast<std::size_t>(i)], walk.TrueHeading(i), 0.5 * kDegree) << i;
   }
-  EXPECT_GT(heading.back() - heading.front(), 7.0);  // more than a full turn
+  EXPECT_GT(heading.back() - heading.front(), 7.0);  // More than a full turn.
 }
 
-TEST(StrideHeading, IsBetterThanThePelvisNearTheEnds) {
+TEST(StrideHeading, IsMoreAccurateThanThePelvisNearTheEnds) {
   const Walk walk = MakeWalk(8, 10.0 * kDegree, 20.0 * kDegree);
   const std::vector<double> heading = StrideHeading(walk.tracks, walk.contacts);
   for (const int from_end : {kStepFrames / 2, 3 * kStepFrames / 4}) {
@@ -67,7 +67,7 @@ TEST(StrideHeading, IsBetterThanThePelvisNearTheEnds) {
   }
 }
 
-TEST(StrideHeading, OfAStandingFigureIsItsYaw) {
+TEST(StrideHeading, EqualsTheYawOfAStandingFigure) {
   BodyTracks tracks;
   tracks.fps = kFps;
   tracks.frames = {0, 50};

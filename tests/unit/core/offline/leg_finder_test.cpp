@@ -5,7 +5,7 @@
 namespace stridewire {
 namespace {
 
-TEST(LegFinder, ReadsTheNamesOfManyPrograms) {
+TEST(LegFinder, RecognizesNamesOfManyPrograms) {
   struct Case {
     const char* name;
     Side side;
@@ -58,8 +58,8 @@ TEST(LegFinder, ReadsTheNamesOfManyPrograms) {
   }
 }
 
-// A hip joint of no length above the thigh, and a twist joint inside it.
-TEST(LegFinder, TakesTheThighAndNotItsHelpers) {
+// A hip joint of length zero above the thigh, and a twist joint inside the thigh.
+TEST(LegFinder, IgnoresHelperJointsOfTheThigh) {
   std::vector<Joint> joints = {{"Hips", -1, Vec3(0.0f)}};
   for (const std::string side : {"Left", "Right"}) {
     const float x = side == "Left" ? 0.1f : -0.1f;
@@ -83,8 +83,8 @@ TEST(LegFinder, TakesTheThighAndNotItsHelpers) {
   }
 }
 
-// Without names: arms are as equal a pair as legs, but hang farther from the root.
-TEST(LegFinder, TellsLegsFromArmsByShape) {
+// Without names, arms are also a pair of equal chains, but farther from the root than legs.
+TEST(LegFinder, DistinguishesLegsFromArmsByShape) {
   std::vector<Joint> joints = {{"0", -1, Vec3(0.0f)}};
   const auto add = [&](int parent, Vec3 offset) {
     joints.push_back({std::to_string(joints.size()), parent, offset});
@@ -105,9 +105,9 @@ TEST(LegFinder, TellsLegsFromArmsByShape) {
   EXPECT_EQ(legs.legs[0].ball, first_leg + 3);
   EXPECT_EQ(legs.legs[1].hip, first_leg + 4);
 
-  // One leg alone is no pair.
+  // A single leg is not a pair.
   joints.resize(static_cast<std::size_t>(first_leg) + 4);
-  joints.erase(joints.begin() + 6, joints.begin() + 10);  // and one arm less
+  joints.erase(joints.begin() + 6, joints.begin() + 10);  // Removes an arm as well.
   for (Joint& joint : joints) {
     if (joint.parent >= 6) joint.parent -= 4;
   }

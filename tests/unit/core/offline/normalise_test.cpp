@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-TEST(NormaliseClip, IsARigidMotionThatStartsAtTheOrigin) {
+TEST(NormaliseClip, MovesTheStartRigidlyToTheOrigin) {
   const std::uint32_t seed = std::random_device{}();
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937 random(seed);
@@ -46,7 +46,7 @@ TEST(NormaliseClip, TurnsTheFigureToItsHeading) {
   double yaw = 1.0;
   ASSERT_TRUE(HeadingOf(clip.frame(0).rotations[0], yaw));
   EXPECT_NEAR(yaw, 0.0, 1e-6);
-  // The feet stand left and right of it, +x left.
+  // The feet are to the left (+x) and right of it.
   EXPECT_GT(BallPosition(capture.skeleton, clip.frame(0), Foot::kLeft).x, 0.05f);
   EXPECT_LT(BallPosition(capture.skeleton, clip.frame(0), Foot::kRight).x, -0.05f);
 }

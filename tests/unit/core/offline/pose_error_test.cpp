@@ -19,7 +19,7 @@ std::vector<std::string> JointsOf(BodyPart part, const Skeleton& skeleton) {
   return names;
 }
 
-// As the CMU figures are built, with a joint that carries a leg only and no names that tell sides.
+// Like the CMU figures, with joints that carry only a leg, but without names that identify sides.
 Skeleton SpreadFigure() {
   Skeleton figure;
   const auto add = [&](const char* name, int parent, Vec3 offset_m) {
@@ -46,7 +46,7 @@ Skeleton SpreadFigure() {
   return figure;
 }
 
-TEST(FindBodyParts, TellsLegsArmsHeadAndTrunk) {
+TEST(FindBodyParts, DistinguishesLegsArmsHeadAndTrunk) {
   using Names = std::vector<std::string>;
   const Skeleton figure = SpreadFigure();
   ASSERT_TRUE(figure.Validate().has_value());
@@ -56,7 +56,7 @@ TEST(FindBodyParts, TellsLegsArmsHeadAndTrunk) {
   EXPECT_EQ(JointsOf(BodyPart::kTrunk, figure), (Names{"root", "a0", "b0", "back", "chest"}));
 }
 
-TEST(FindBodyParts, KnowsTheGeneratedFigure) {
+TEST(FindBodyParts, HandlesTheGeneratedFigure) {
   const RawLibrary library = GenerateBuiltinLibrary();
   for (const BodyPart part :
        {BodyPart::kTrunk, BodyPart::kHead, BodyPart::kArms, BodyPart::kLegs}) {
@@ -65,7 +65,7 @@ TEST(FindBodyParts, KnowsTheGeneratedFigure) {
   EXPECT_EQ(JointsOf(BodyPart::kLegs, library.skeleton).size(), 8u);
 }
 
-TEST(PoseComparison, AShiftOfTheRootIsTheErrorOfEveryPart) {
+TEST(PoseComparison, RootShiftIsTheErrorOfEveryPart) {
   const Skeleton figure = SpreadFigure();
   PoseComparison comparison(figure);
   const std::vector<Pose> truth(3, Pose(figure.joint_count()));
@@ -77,7 +77,7 @@ TEST(PoseComparison, AShiftOfTheRootIsTheErrorOfEveryPart) {
   for (const double part_m : error.part_m) EXPECT_NEAR(part_m, 0.05, 1e-7);
 }
 
-TEST(PoseComparison, ABentKneeIsAnErrorOfTheLegsAlone) {
+TEST(PoseComparison, BentKneeIsAnErrorOfTheLegsOnly) {
   const Skeleton figure = SpreadFigure();
   PoseComparison comparison(figure);
   const std::vector<Pose> truth(2, Pose(figure.joint_count()));
@@ -87,7 +87,7 @@ TEST(PoseComparison, ABentKneeIsAnErrorOfTheLegsAlone) {
   const auto knee = static_cast<std::size_t>(figure.legs[0].knee);
   other[1].rotations[knee] = Quat(std::cos(half), std::sin(half), 0.0f, 0.0f);
   const PoseError error = comparison.Measure(truth, other).value();
-  const double ankle_m = 2.0 * 0.45 * std::sin(angle_rad / 2.0);  // in one of two poses
+  const double ankle_m = 2.0 * 0.45 * std::sin(angle_rad / 2.0);  // In one of two poses.
   EXPECT_NEAR(error.max_m, ankle_m, 1e-6);
   EXPECT_NEAR(error.mean_m, ankle_m / 2.0 / figure.joint_count(), 1e-6);
   EXPECT_NEAR(error.part_m[static_cast<std::size_t>(BodyPart::kLegs)], ankle_m / 2.0 / 6.0, 1e-6);
@@ -95,7 +95,7 @@ TEST(PoseComparison, ABentKneeIsAnErrorOfTheLegsAlone) {
   EXPECT_EQ(error.part_m[static_cast<std::size_t>(BodyPart::kHead)], 0.0);
 }
 
-TEST(PoseComparison, RefusesUnlikeMovements) {
+TEST(PoseComparison, RejectsMovementsOfDifferentShape) {
   const Skeleton figure = SpreadFigure();
   PoseComparison comparison(figure);
   const std::vector<Pose> two(2, Pose(figure.joint_count()));
@@ -106,7 +106,7 @@ TEST(PoseComparison, RefusesUnlikeMovements) {
   EXPECT_EQ(comparison.Measure({}, {}).error().code, ErrorCode::kShapeMismatch);
 }
 
-TEST(PosesAtGridPoints, ABlendOfOneExampleIsTheExample) {
+TEST(PosesAtGridPoints, BlendOfOneExampleEqualsTheExample) {
   const RawLibrary raw = GenerateBuiltinLibrary();
   const auto library = LibraryBuilder().Build(raw).value();
   PoseComparison comparison(library->skeleton());

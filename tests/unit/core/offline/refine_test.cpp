@@ -9,9 +9,9 @@
 
 #include "distorted_library.h"
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
+#include "stridewire/offline/library_builder.h"
 #include "test_library.h"
 #include "runtime/pose/evaluate_poses.h"
 
@@ -24,7 +24,7 @@ std::vector<std::byte> BytesOf(const MotionLibrary& library) {
   return {library.bytes().begin(), library.bytes().end()};
 }
 
-// e(p) and the sum of |w(p)|, by what an avatar uses.
+// Computes e(p) and the sum of |w(p)| with the code that avatars use.
 struct Measured {
   double error_m = 0.0;
   double weight_sum = 0.0;
@@ -59,7 +59,7 @@ double LargestError(const MotionLibrary& library, std::uint32_t seed, int points
 
 class RefineInDimensions : public testing::TestWithParam<int> {};
 
-TEST_P(RefineInDimensions, MakesTheLargestErrorSmallerAndKeepsItsBounds) {
+TEST_P(RefineInDimensions, ReducesTheLargestErrorWithinItsBounds) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -81,12 +81,13 @@ TEST_P(RefineInDimensions, MakesTheLargestErrorSmallerAndKeepsItsBounds) {
   if (pseudoexamples > 0) {
     EXPECT_LT(report.max_error_curve_m.back(), report.max_error_curve_m.front());
   }
-  // Points it has not seen: samples miss some of a narrow peak.
+  // Checks other points than those of the refinement, whose samples may miss a part of a narrow
+  // peak.
   EXPECT_LE(LargestError(*refined->library, seed + 1), 1.5 * report.after.max_error_m + 1e-5);
   EXPECT_LE(LargestError(*library, seed + 1), 1.5 * report.before.max_error_m + 1e-5);
 }
 
-TEST_P(RefineInDimensions, WeightsSumToOneAndExamplesAndPseudoexamplesAreMet) {
+TEST_P(RefineInDimensions, WeightsSumToOneAndReproduceAllSites) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -105,7 +106,7 @@ TEST_P(RefineInDimensions, WeightsSumToOneAndExamplesAndPseudoexamplesAreMet) {
       std::copy(group.site(s).begin(), group.site(s).end(), p.values.begin());
       const Measured measured = MeasureAt(*refined->library, 0, p);
       EXPECT_LT(measured.error_m, 1e-5) << "site " << s;
-      // Far enough from all others to be a site of its own.
+      // Sites keep a minimum distance.
       for (int t = std::max(s + 1, group.example_count); t < group.site_count; ++t) {
         double squared = 0.0;
         for (std::size_t l = 0; l < group.parameters.size(); ++l) {
@@ -122,8 +123,8 @@ TEST_P(RefineInDimensions, WeightsSumToOneAndExamplesAndPseudoexamplesAreMet) {
   }
 }
 
-// What remains after refinement is corrected when a movement starts, as before it.
-TEST_P(RefineInDimensions, LeavesRunTimeCorrectionWhatItWas) {
+// The run-time correction must work as well after refinement as before it.
+TEST_P(RefineInDimensions, KeepsTheAccuracyOfRunTimeCorrection) {
   const int d = GetParam();
   const std::uint32_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -144,7 +145,7 @@ TEST_P(RefineInDimensions, LeavesRunTimeCorrectionWhatItWas) {
 
 INSTANTIATE_TEST_SUITE_P(Refine, RefineInDimensions, testing::Range(1, 8));
 
-TEST(Refine, GivesTheSameBytesWithAnyNumberOfThreads) {
+TEST(Refine, IsIndependentOfTheNumberOfThreads) {
   const auto library = MakeDistortedLibrary(2, 13, 0.7, 11);
   std::vector<std::byte> first;
   for (const int threads : {1, 2, 5, 2}) {
@@ -156,7 +157,7 @@ TEST(Refine, GivesTheSameBytesWithAnyNumberOfThreads) {
   }
 }
 
-TEST(Refine, ReplacesPseudoexamplesThatAreThere) {
+TEST(Refine, ReplacesExistingPseudoexamples) {
   const auto library = MakeDistortedLibrary(2, 12, 0.7, 12);
   const RefineOptions options{.max_error_m = 1e-3, .samples = 500};
   const auto once = Refine(library, options);
@@ -170,7 +171,7 @@ TEST(Refine, ReplacesPseudoexamplesThatAreThere) {
   EXPECT_TRUE(BytesOf(*none->library) == BytesOf(*library));
 }
 
-TEST(Refine, LeavesAGoodLibraryAsItIs) {
+TEST(Refine, KeepsAccurateLibraries) {
   const auto library = LibraryBuilder{}.Build(GenerateBuiltinLibrary());
   ASSERT_TRUE(library.has_value());
   const auto refined = Refine(*library, {.max_error_m = 0.1, .samples = 100});
@@ -181,14 +182,14 @@ TEST(Refine, LeavesAGoodLibraryAsItIs) {
   }
 }
 
-TEST(Refine, StandsOneExample) {
+TEST(Refine, HandlesASingleExample) {
   const auto library = MakeDistortedLibrary(2, 1, 0.6, 13);
   const auto refined = Refine(library, {.max_error_m = 0.0, .samples = 10});
   ASSERT_TRUE(refined.has_value()) << Describe(refined.error());
   EXPECT_EQ(refined->library->group(0).site_count, 1);
 }
 
-TEST(Refine, StopsWhenTold) {
+TEST(Refine, StopsIfProgressReturnsFalse) {
   const auto library = MakeDistortedLibrary(2, 12, 0.7, 12);
   int told = 0;
   double last = -1.0;
@@ -205,7 +206,7 @@ TEST(Refine, StopsWhenTold) {
   EXPECT_EQ(told, 3);
 }
 
-TEST(Refine, RefusesOptionsThatMakeNoSense) {
+TEST(Refine, RejectsInvalidOptions) {
   const auto library = MakeTestLibrary();
   for (const RefineOptions& options :
        {RefineOptions{.max_error_m = -1.0}, RefineOptions{.max_error_m = NAN},
@@ -215,8 +216,8 @@ TEST(Refine, RefusesOptionsThatMakeNoSense) {
   }
 }
 
-// Why the amended rule is the default: the bare one's largest error now and then grows.
-TEST(Refine, TheBareRuleIsNotMonotone) {
+// The reason why the amended rule is the default: with the bare rule the error sometimes grows.
+TEST(Refine, BareRuleIsNotMonotone) {
   int grown = 0;
   for (std::uint32_t seed = 1; seed <= 5; ++seed) {
     const auto library = MakeDistortedLibrary(2, 12, 0.7, seed);

@@ -8,19 +8,20 @@
 #include <vector>
 
 #include "offline/build/grid_example.h"
-#include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/build/library_writer.h"
+#include "offline/builtin/builtin_library.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/measure.h"
+#include "stridewire/offline/library_builder.h"
 
 namespace stridewire {
 namespace {
 
-constexpr int kStraight = 0;  // 15 examples, 2 parameters
-constexpr int kGeneral = 9;   // 30 examples, 5 parameters
+constexpr int kStraight = 0;  // 15 examples with 2 parameters.
+constexpr int kGeneral = 9;   // 30 examples with 5 parameters.
 
-// Generated steps, each with a manner of its own: the root that much higher or lower all along.
+// Generated steps with individual variation: the root of each step is raised or lowered by a
+// constant.
 class SmoothExamples : public testing::Test {
  protected:
   void SetUp() override {
@@ -35,7 +36,7 @@ class SmoothExamples : public testing::Test {
   [[nodiscard]] const Skeleton& skeleton() const { return library_->skeleton(); }
   [[nodiscard]] const MotionGroup& clean() const { return library_->group(kStraight); }
 
-  MotionGroup WithManner(double deviation_m) {
+  MotionGroup WithVariation(double deviation_m) {
     std::normal_distribution<double> height(0.0, deviation_m);
     MotionGroup group = clean();
     grid_.assign(group.grid.begin(), group.grid.end());
@@ -86,7 +87,7 @@ class SmoothExamples : public testing::Test {
   std::vector<double> manner_m_;
 };
 
-TEST_F(SmoothExamples, WeightsSumToOneAndAreRightInTheParameters) {
+TEST_F(SmoothExamples, WeightsSumToOneAndReproduceParameters) {
   SCOPED_TRACE(seed_);
   const MotionGroup& group = clean();
   std::vector<int> used = All(group);
@@ -113,11 +114,12 @@ TEST_F(SmoothExamples, WeightsSumToOneAndAreRightInTheParameters) {
   }
 }
 
-// What ChooseSmoothness reads off one inverse is what leaving each out and solving again gives.
-TEST_F(SmoothExamples, AreAsSmoothAsMakesLeftOutExamplesBest) {
+// ChooseSmoothness derives leave-one-out errors from one inverse. They must equal the errors found
+// by actually leaving out each example.
+TEST_F(SmoothExamples, MinimizeTheLeaveOneOutError) {
   SCOPED_TRACE(seed_);
   for (const double deviation_m : {0.0, 0.005, 0.05}) {
-    const MotionGroup group = WithManner(deviation_m);
+    const MotionGroup group = WithVariation(deviation_m);
     const std::vector<int> all = All(group);
     const std::vector<double> products = MovementProducts(group, layout(), skeleton());
     const auto chosen = ChooseSmoothness(group, all, products);
@@ -158,9 +160,9 @@ TEST_F(SmoothExamples, AreAsSmoothAsMakesLeftOutExamplesBest) {
   }
 }
 
-TEST_F(SmoothExamples, LoseTheirMannerAndKeepTheirParameters) {
+TEST_F(SmoothExamples, LoseIndividualVariationAndKeepParameters) {
   SCOPED_TRACE(seed_);
-  const MotionGroup group = WithManner(0.05);
+  const MotionGroup group = WithVariation(0.05);
   std::vector<GridExample> examples = Stored(group);
   ASSERT_TRUE(stridewire::SmoothExamples(group, layout(), skeleton(), examples).has_value());
   const std::vector<GridExample> were = Stored(clean());
@@ -180,17 +182,17 @@ TEST_F(SmoothExamples, LoseTheirMannerAndKeepTheirParameters) {
   EXPECT_LT(after, 0.8 * before);
 }
 
-TEST_F(SmoothExamples, AreLeftAloneWhereThereAreTooFew) {
-  const MotionGroup group = WithManner(0.05);
+TEST_F(SmoothExamples, AreUnchangedIfThereAreTooFew) {
+  const MotionGroup group = WithVariation(0.05);
   const std::vector<double> products = MovementProducts(group, layout(), skeleton());
   std::vector<int> few = All(group);
-  few.resize(12);  // four for each number of a linear function of two parameters
+  few.resize(12);  // Four per coefficient of a linear function of two parameters.
   EXPECT_TRUE(ChooseSmoothness(group, few, products).has_value());
   few.pop_back();
   EXPECT_FALSE(ChooseSmoothness(group, few, products).has_value());
 }
 
-TEST_F(SmoothExamples, HaveWiderRadiiInManyDimensionsAndSaneWeights) {
+TEST_F(SmoothExamples, HaveWiderRadiiAndBoundedWeightsInManyDimensions) {
   SCOPED_TRACE(seed_);
   for (const int g : {kStraight, kGeneral}) {
     const MotionGroup& group = library_->group(g);
@@ -210,7 +212,7 @@ TEST_F(SmoothExamples, HaveWiderRadiiInManyDimensionsAndSaneWeights) {
   }
 }
 
-TEST_F(SmoothExamples, TheRadiusFactorIsPartOfTheFile) {
+TEST_F(SmoothExamples, RadiusFactorIsStoredInTheFile) {
   std::vector<MotionGroup> groups(library_->groups().begin(), library_->groups().end());
   const auto written = [&](double factor) {
     groups[0].radius_factor = factor;
@@ -227,7 +229,7 @@ TEST_F(SmoothExamples, TheRadiusFactorIsPartOfTheFile) {
   }
 }
 
-// One joint that turns about one axis: to `end_rad` over the grid, from 0.
+// One joint that turns about one axis, from 0 to `end_rad` over the grid.
 GridExample Turning(const GridLayout& layout, int points, double parameter, double end_rad) {
   GridExample example;
   example.parameters = {parameter};
@@ -242,17 +244,17 @@ GridExample Turning(const GridLayout& layout, int points, double parameter, doub
   return example;
 }
 
-TEST(AlignHemispheres, KeepsTracksContinuousHoweverFarTheyTurnFromTheReference) {
+TEST(AlignHemispheres, KeepsTracksContinuous) {
   const GridLayout layout(1);
   constexpr int kPoints = 9;
-  // The one in the middle is the reference; the last passes half a turn from it on its way.
+  // The middle example is the reference. The last one passes an angle of 180 degrees from it.
   std::vector<GridExample> examples = {Turning(layout, kPoints, 0.0, -0.4),
                                        Turning(layout, kPoints, 1.0, 0.2),
                                        Turning(layout, kPoints, 2.0, 4.5)};
   const auto quat = [&](const GridExample& example, int p) {
     return GridLayout::RotationOf(example.rows.data() + p * layout.row_floats, 0);
   };
-  // As captures come: signs at random.
+  // Random signs, as in captures.
   for (std::size_t e = 0; e < examples.size(); ++e) {
     for (int p = 0; p < kPoints; ++p) {
       if ((static_cast<std::size_t>(p) * 7 + e * 3) % 5 < 2) continue;

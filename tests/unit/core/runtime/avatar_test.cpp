@@ -204,7 +204,7 @@ TEST_F(AvatarTest, CancelQueueKeepsTheCurrentMovement) {
 }
 
 TEST_F(AvatarTest, RejectsKindsThatTheLibraryLacks) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.groups.pop_back();
   raw.groups.pop_back();
   LibraryBuilder builder;
@@ -263,7 +263,7 @@ TEST_F(AvatarTest, StartDelayAppliesOnlyWhileStanding) {
 // The feet of this library cannot be planted, so they stay where the blend puts them. Under
 // sanitizers, the test also checks that no uninitialized data is read.
 TEST_F(AvatarTest, DoesNotPlantFeetIfTheLegsShareAnAnkle) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   raw.skeleton.legs[0].ankle = raw.skeleton.legs[1].ankle;
   LibraryBuilder builder;
   const auto library = builder.Build(raw);

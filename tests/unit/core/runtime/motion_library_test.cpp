@@ -84,7 +84,7 @@ TEST(MotionLibrary, ReportsDamagedTruncatedAndForeignFiles) {
 
 TEST(LibraryBuilder, NamesInvalidExamples) {
   const auto refused = [](const auto& spoil) {
-    RawLibrary raw = MakeToyRawLibrary();
+    RawLibrary raw = MakeTestRawLibrary();
     spoil(raw);
     LibraryBuilder builder;
     const auto library = builder.Build(raw);
@@ -105,7 +105,7 @@ TEST(LibraryBuilder, NamesInvalidExamples) {
 }
 
 TEST(LibraryBuilder, AveragesNearDuplicates) {
-  RawLibrary raw = MakeToyRawLibrary();
+  RawLibrary raw = MakeTestRawLibrary();
   RawExample twin = raw.groups[0].examples[5];
   twin.parameters[0] += 0.00005;
   raw.groups[0].examples.push_back(twin);
@@ -118,7 +118,7 @@ TEST(LibraryBuilder, AveragesNearDuplicates) {
 }
 
 TEST(LibraryBuilder, StoresTheClips) {
-  const RawLibrary raw = MakeToyRawLibrary();
+  const RawLibrary raw = MakeTestRawLibrary();
   const auto library = MakeTestLibrary();
   double largest_rad = 0.0;
   for (int g = 0; g < 3; ++g) {
