@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "frame_builder.h"
 #include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
+#include "frame_builder.h"
 #include "stridewire/protocol/check.h"
 
 namespace stridewire::protocol {

@@ -10,13 +10,13 @@
 #include <vector>
 
 #include "bench_libraries.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/pose_quantization.h"
+#include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/reference_evaluation.h"
+#include "runtime/weights/correction.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
-#include "runtime/weights/correction.h"
-#include "runtime/library/pose_quantization.h"
-#include "runtime/pose/reference_evaluation.h"
-#include "runtime/pose/evaluation_batcher.h"
 #include "world/encoded_pose_cache.h"
 
 namespace stridewire {

@@ -20,15 +20,18 @@
 
 #include "bench_libraries.h"
 #include "instruction_sets.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/library/pose_quantization.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/weights/correction.h"
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
-#include "runtime/weights/correction.h"
-#include "stridewire/runtime/movement.h"
-#include "runtime/library/pose_quantization.h"
 
 namespace stridewire {
 namespace {

@@ -7,8 +7,9 @@
 
 #include "base/check.h"
 #include "offline/builtin/builtin_library.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 namespace {

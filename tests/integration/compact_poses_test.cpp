@@ -15,11 +15,11 @@
 #include "random.h"
 #include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/pose_quantization.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
-#include "stridewire/runtime/avatar.h"
 
 namespace stridewire {
 namespace {

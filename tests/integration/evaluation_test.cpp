@@ -16,13 +16,16 @@
 #include "random.h"
 #include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/plan/foot_sampler.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/evaluation_batcher.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
 #include "runtime/pose/reference_evaluation.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
 
 namespace stridewire {
 namespace {

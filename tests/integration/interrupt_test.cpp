@@ -11,7 +11,7 @@
 #include "captured_library.h"
 #include "random.h"
 #include "random_walker.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "velocity_steps.h"
 
 namespace stridewire {

@@ -17,9 +17,10 @@
 #include "offline/build/refine.h"
 #include "offline/builtin/builtin_library.h"
 #include "random.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/terrain.h"
 
 namespace stridewire {

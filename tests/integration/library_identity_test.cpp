@@ -15,7 +15,9 @@
 #include "captured_library.h"
 #include "offline/builtin/builtin_library.h"
 #include "runtime/library/cardinal_basis.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

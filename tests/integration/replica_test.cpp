@@ -17,6 +17,7 @@
 #include "random_requests.h"
 #include "rough_ground.h"
 #include "runtime/avatar/avatar_replica.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
 #include "stridewire/runtime/avatar.h"
 

@@ -1,6 +1,8 @@
 // Transitions between movements: the table in a library, and the steps that an avatar inserts
 // because of it.
 
+#include "runtime/library/transition.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,11 +18,11 @@
 #include "counted_memory.h"
 #include "motion_library_generated.h"
 #include "random.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/library_file.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/avatar.h"
 #include "test_library.h"
 #include "velocity_steps.h"
 

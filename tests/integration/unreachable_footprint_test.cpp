@@ -11,7 +11,10 @@
 #include "captured_library.h"
 #include "counted_memory.h"
 #include "random.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/foot_vector.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/synthesis.h"
 
 namespace stridewire {

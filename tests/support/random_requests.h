@@ -8,7 +8,7 @@
 
 #include "random.h"
 #include "rough_ground.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 
 namespace stridewire {
 

@@ -5,7 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 

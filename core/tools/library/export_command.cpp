@@ -4,9 +4,10 @@
 
 #include "command_line.h"
 #include "commands.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/open_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 namespace {

@@ -7,6 +7,8 @@
 
 #include "offline/build/interpolation_error.h"
 #include "offline/build/refine.h"
+#include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

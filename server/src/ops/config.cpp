@@ -10,8 +10,8 @@
 #include <thread>
 
 #include "net/origin_policy.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/limits.h"
-#include "stridewire/runtime/avatar.h"
 
 namespace stridewire::server {
 namespace {
@@ -224,7 +224,8 @@ std::vector<ConfigKey> MakeKeys() {
   limit("max_avatars", "Avatars in all worlds", &Limits::max_avatars, 1, 10'000'000);
   limit("max_avatars_per_world", "Avatars in one world", &Limits::max_avatars_per_world, 1,
         10'000'000);
-  limit("max_queue", "Requests waiting for one avatar", &Limits::max_queue, 1, AvatarSimulation::kMaxQueue);
+  limit("max_queue", "Requests waiting for one avatar", &Limits::max_queue, 1,
+        AvatarSimulation::kMaxQueue);
   limit("requests_per_s", "Items of commands one session may send a second",
         &Limits::requests_per_s, 1, 100'000'000);
   limit("request_burst", "Items one session may send at once", &Limits::request_burst, 1,

@@ -8,12 +8,13 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/base/error.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/request_plan.h"
+#include "stridewire/base/error.h"
 
 namespace stridewire::server {
 namespace {

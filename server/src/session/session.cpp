@@ -7,8 +7,9 @@
 #include <string>
 #include <utility>
 
-#include "session/encode_frame.h"
 #include "base/check.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "session/encode_frame.h"
 #include "stridewire/base/version.h"
 #include "world/convert.h"
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/check.h"
-#include "stridewire/base/prefetch.h"
+#include "base/prefetch.h"
 #include "stridewire/protocol/pose_codec.h"
 
 namespace stridewire::server {
@@ -28,7 +28,8 @@ PoseScratch::PoseScratch(std::shared_ptr<const MotionLibrary> of_library)
       taken(library->skeleton().joint_count()),
       pose(library->skeleton().joint_count()) {}
 
-EncodedPoseCache::EncodedPoseCache(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs)
+EncodedPoseCache::EncodedPoseCache(std::shared_ptr<PoseScratch> scratch,
+                                   const protocol::CompactCodecs* codecs)
     : scratch_(std::move(scratch)),
       codecs_(codecs),
       pose_bytes_(kRootBytes),
@@ -105,7 +106,8 @@ void EncodedPoseCache::MakePlace(Place& place) {
   free_.pop_back();
 }
 
-void EncodedPoseCache::Start(std::uint32_t place, std::uint64_t revision, std::size_t count, bool stays) {
+void EncodedPoseCache::Start(std::uint32_t place, std::uint64_t revision, std::size_t count,
+                             bool stays) {
   Kept& kept = kept_[place];
   if (kept.is_any_other) others_.erase(place);
   kept = {.first_step = step_,
@@ -139,7 +141,8 @@ void EncodedPoseCache::Ask(Place& place, AvatarSimulation& avatar) {
   Take(place, avatar.revision(), avatar.pose(), !has_layers);
 }
 
-void EncodedPoseCache::Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s) {
+void EncodedPoseCache::Want(Place& place, std::uint64_t revision, const Movement& movement,
+                            double time_s) {
   MakePlace(place);
   Kept& kept = kept_[place.index_];
   kept.cuts = CutsAfter(kept, revision);
@@ -172,7 +175,7 @@ void EncodedPoseCache::Finish() {
     const std::size_t most = std::min(left, ring_ >> kept_[wanted.place].cuts);
     wanted.is_its_turn = left == turns;
     wanted.count = SampleRunCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
-                                ticks_apart_, static_cast<int>(most));
+                                  ticks_apart_, static_cast<int>(most));
     poses += static_cast<std::size_t>(wanted.count);
   }
   // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it was sent elsewhere,
@@ -180,7 +183,8 @@ void EncodedPoseCache::Finish() {
   const bool is_crowd_new = poses > 2 * shown_ + kLanes * kMost;
   for (Wanted& wanted : wanted_) {
     if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
-    Start(wanted.place, kept_[wanted.place].revision, static_cast<std::size_t>(wanted.count), false);
+    Start(wanted.place, kept_[wanted.place].revision, static_cast<std::size_t>(wanted.count),
+          false);
     scratch_->queue.Add(wanted.stretch, wanted.count, wanted.place);
   }
   wanted_.clear();
@@ -195,7 +199,7 @@ void EncodedPoseCache::Finish() {
 }
 
 void EncodedPoseCache::Keep(const SoaPose& lanes, std::span<const std::uint32_t> places,
-                      std::size_t pose) {
+                            std::size_t pose) {
   for (std::size_t m = 0; m < modes_.size(); ++m) {
     modes_[m].codec->Encode({.roots_m = lanes.roots_m(),
                              .rotations = lanes.rotations(),
@@ -221,7 +225,7 @@ void EncodedPoseCache::Keep(const SoaPose& lanes, std::span<const std::uint32_t>
 }
 
 void EncodedPoseCache::KeepWide(const SoaPose& lanes, std::size_t lane, std::uint32_t place,
-                          std::size_t pose, std::size_t mode) {
+                                std::size_t pose, std::size_t mode) {
   lanes.Get(lane, scratch_->pose);
   kept_[place].is_any_other = 1;
   Others& others = others_[place];
@@ -252,7 +256,7 @@ EncodedPoseCache::Encoded EncodedPoseCache::Of(const Place& place, PoseMode mode
 }
 
 EncodedPoseCache::Encoded EncodedPoseCache::OtherOf(std::uint32_t place, std::size_t pose,
-                                        std::size_t mode) const {
+                                                    std::size_t mode) const {
   const Others& others = others_.at(place);
   const unsigned flags = others.flags[pose];
   if ((flags >> (mode + kModes) & 1u) != 0) return {};

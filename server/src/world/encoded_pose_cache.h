@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/base/prefetch.h"
-#include "stridewire/protocol/compact_codecs.h"
-#include "stridewire/runtime/avatar.h"
+#include "base/prefetch.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluation_batcher.h"
+#include "stridewire/protocol/compact_codecs.h"
 
 namespace stridewire::server {
 
@@ -136,7 +136,7 @@ class EncodedPoseCache {
   // What every tick asks of the poses of one place.
   struct Kept {
     std::uint64_t first_step = 0;  // of the world
-    std::uint32_t revision = 0;      // they follow from, the low bits
+    std::uint32_t revision = 0;    // they follow from, the low bits
     std::uint16_t layout = 0;      // 0: nothing is kept
     std::uint8_t count = 0;
     std::uint8_t first_plane : 4 = 0;

@@ -5,11 +5,11 @@
 #include <memory>
 #include <string>
 
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/messages.h"
-#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/motion_library.h"
-#include "world/world_terrain.h"
 #include "world/pose_quantizations.h"
+#include "world/world_terrain.h"
 
 namespace stridewire::server {
 
@@ -28,7 +28,7 @@ struct World {
   double interest_cell_m = 8.0;  ///< Of the grid that regions are looked up in.
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Living and about to be spawned.
-  std::atomic<AvatarId> last_number{0};   ///< Largest avatar number ever asked for.
+  std::atomic<AvatarId> last_number{0};       ///< Largest avatar number ever asked for.
   TerrainSlot ground;  ///< As last set; a shard's avatars have it from a tick on.
 };
 

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include "ops/metrics.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/encoder.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "stridewire/runtime/avatar.h"
-#include "world/shard_messages.h"
-#include "world/pose_frames.h"
 #include "world/encoded_pose_cache.h"
+#include "world/pose_frames.h"
+#include "world/shard_messages.h"
 #include "world/tick_clock.h"
 #include "world/world.h"
 
@@ -115,7 +115,8 @@ class WorldShard {
   void KeepPoses(std::span<const std::uint32_t> rows);
   void ShowPoses(std::span<const std::uint32_t> rows);
   std::shared_ptr<const SpatialGrid> PlacesAt(std::uint64_t tick);
-  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode, const SpatialGrid& places);
+  std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode,
+                                                  const SpatialGrid& places);
   void TellMovements();
   [[nodiscard]] protocol::Movements EmptyMovements() const;
   [[nodiscard]] bool IsFull(const protocol::Movements& message) const;
@@ -128,7 +129,7 @@ class WorldShard {
   TickClock clock_;
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
-  EncodedPoseCache ahead_;                       // before the avatars, whose places are in it
+  EncodedPoseCache ahead_;             // before the avatars, whose places are in it
   std::map<AvatarId, Entry> avatars_;  // in order, so that batches and events are
   // The same for who goes through all of them, made anew when there are others.
   std::vector<InOrder> in_order_;
@@ -142,8 +143,8 @@ class WorldShard {
   // By mode: rows of avatars that are named by any shard, worked out when they or the order change.
   std::array<std::vector<std::uint32_t>, kSentModes.size()> named_rows_;
   bool are_named_rows_known_ = false;
-  std::vector<std::uint32_t> near_rows_;  // those last asked for, by any mode
-  std::vector<std::uint8_t> is_near_;     // by row, all 0 between
+  std::vector<std::uint32_t> near_rows_;       // those last asked for, by any mode
+  std::vector<std::uint8_t> is_near_;          // by row, all 0 between
   std::shared_ptr<const SpatialGrid> places_;  // of places_tick_
   std::uint64_t places_tick_ = 0;
   std::uint16_t max_every_ = 1;
@@ -156,11 +157,11 @@ class WorldShard {
   std::uint64_t tick_ = 0;  // to which they go on
   std::uint16_t more_steps_ = 0;
   std::size_t max_bulk_bytes_;
-  std::vector<AvatarId> gone_;              // since the last step
+  std::vector<AvatarId> gone_;                  // since the last step
   std::vector<protocol::Movements> movements_;  // of steps not taken yet
-  std::shared_ptr<const WorldTerrain> ground_;        // null: flat
-  std::deque<TerrainPart> grounds_;              // from later ticks on
-  std::vector<AvatarSimulation*> shown_;                  // scratch
+  std::shared_ptr<const WorldTerrain> ground_;  // null: flat
+  std::deque<TerrainPart> grounds_;             // from later ticks on
+  std::vector<AvatarSimulation*> shown_;        // scratch
   // By mode.
   std::array<bool, kSentModes.size()> last_had_poses_{};
   std::array<RowsPool, kSentModes.size()> rows_;

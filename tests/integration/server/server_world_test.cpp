@@ -11,11 +11,11 @@
 #include <set>
 
 #include "counted_memory.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/compact_codecs.h"
 #include "stridewire/protocol/pose_batch_reader.h"
-#include "stridewire/runtime/avatar.h"
-#include "test_server.h"
 #include "test_library.h"
+#include "test_server.h"
 
 namespace stridewire {
 namespace {
@@ -192,8 +192,7 @@ TEST(ServerWorld, ALargeCommandSetsACrowdGoingOverSomeTicks) {
   EXPECT_EQ(held(), 0u);
   EXPECT_EQ(ask(48, 1), 48u);
   std::uint64_t expected = 0;
-  for (AvatarId avatar = 1; avatar <= 48; ++avatar)
-    expected += server::StartTickOf(avatar, 3) > 0;
+  for (AvatarId avatar = 1; avatar <= 48; ++avatar) expected += server::StartTickOf(avatar, 3) > 0;
   EXPECT_EQ(held(), expected);
 }
 
@@ -205,8 +204,7 @@ TEST(ServerWorld, MakesACrowdOverSomeTicks) {
   auto [crowd, world] = server.Enter("crowd");
   auto [other, same_world] = server.Enter("other");
   std::vector<protocol::SpawnItem> spawns;
-  for (AvatarId avatar = 1; avatar <= kCrowd; ++avatar)
-    spawns.push_back({avatar, Start(avatar)});
+  for (AvatarId avatar = 1; avatar <= kCrowd; ++avatar) spawns.push_back({avatar, Start(avatar)});
   spawns.push_back({7, Start(7)});  // lives already
   const protocol::Seq spawn_seq = crowd.NextSeq();
   crowd.Send(protocol::Spawn{.seq = spawn_seq, .world = world->world, .items = spawns});

@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
 #include "test_library.h"
 
@@ -19,8 +19,7 @@ using protocol::Movements;
 constexpr double kTickS = 1.0 / 60.0;
 
 struct Screen : PoseSink {
-  void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp,
-            ConstPoseSpan pose) override {
+  void Show(AvatarId avatar, std::uint16_t, const PoseStamp& stamp, ConstPoseSpan pose) override {
     Pose& kept = shown[avatar];
     kept.root_position_m = pose.root_position_m;
     kept.rotations.assign(pose.rotations.begin(), pose.rotations.end());

@@ -6,11 +6,24 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/offline/capture.h"
+#include "stridewire/runtime/clip.h"
+#include "stridewire/runtime/skeleton.h"
 
 namespace stridewire {
+
+/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y up,
+/// facing +Z at identity rotations.
+struct Capture {
+  std::string path;   ///< As the caller gave it.
+  Skeleton skeleton;  ///< With both legs identified.
+  Clip clip;
+  double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
+  int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
+  std::vector<std::string> notes;  ///< What the reader assumed or repaired, one sentence each.
+};
 
 /// Limits on a BVH file; beyond one of them reading ends with kLimitExceeded. Joints are limited by
 /// kMaxJoints. Memory follows what the file really holds, never what it announces.

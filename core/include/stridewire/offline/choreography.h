@@ -8,7 +8,7 @@
 
 #include "stridewire/base/error.h"
 #include "stridewire/offline/synthesis.h"
-#include "stridewire/runtime/movement.h"
+#include "stridewire/runtime/avatar.h"
 #include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/terrain.h"
 

@@ -1,16 +1,66 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stridewire/base/error.h"
 #include "stridewire/offline/raw_library.h"
-#include "stridewire/offline/selection.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
+
+/// Which of the extracted examples LibraryBuilder keeps.
+struct SelectionOptions {
+  /// Upper bound on the error of a step that is left out: the mean distance between its joints and
+  /// those of the step blended from the kept examples, at equal generic times. It also bounds how far
+  /// the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres; one
+  /// radian counts as 0.5 m. 0 keeps every step.
+  double max_pose_error_m = 0.0;
+  /// A step is an outlier if its pose or duration differs from what all other steps predict for its
+  /// parameters by this many deviations (1.4826 MAD) more than usual. Only steps inside the hull of
+  /// the others are tested, in groups of at least eight, and at most one in ten is removed: steps at
+  /// the edge of the hull are rare, not wrong. 0 disables the test.
+  double outlier_deviations = 0.0;
+};
+
+/// What LibraryBuilder did with an extracted example.
+enum class ExampleFate : std::uint8_t {
+  kKept,       ///< Stored as an example of its own.
+  kAveraged,   ///< Stored as part of an average.
+  kRedundant,  ///< Left out because the kept examples reproduce it.
+  kOutlier     ///< Left out because it differs from all other examples.
+};
+
+/// "kept", "averaged", "redundant" or "outlier".
+[[nodiscard]] std::string_view ExampleFateName(ExampleFate fate);
+
+/// What LibraryBuilder did with one extracted example, and why.
+struct SelectedExample {
+  std::string source;  ///< RawExample::source.
+  bool mirrored = false;
+  ExampleFate fate = ExampleFate::kKept;
+  int example = -1;      ///< Index in the library's group; -1 if left out.
+  double error_m = 0.0;  ///< If left out: distance to the step blended with its parameters, metres.
+  std::string reason;    ///< One sentence.
+};
+
+/// The selection of one group, in the order of RawGroup::examples.
+struct GroupSelection {
+  int group = 0;  ///< Index in MotionLibrary::groups().
+  MovementKind kind = MovementKind::kStepLeft;
+  std::vector<SelectedExample> examples;
+  /// Ridge factor with which the stored examples were smoothed (LibraryBuilder::smooths); 0 if they
+  /// are stored as captured.
+  double ridge = 0.0;
+  double ridge_radius = 0.0;  ///< Radius of the radial functions, in spreads of the parameters.
+
+  /// Number of examples with this fate.
+  [[nodiscard]] int Count(ExampleFate fate) const;
+};
 
 /// Turns a RawLibrary into library bytes: one generic-time grid a group, examples resampled on it,
 /// hemispheres aligned, near duplicates averaged, weights solved.

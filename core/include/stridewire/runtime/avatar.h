@@ -1,289 +1,163 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/base/prefetch.h"
-#include "stridewire/runtime/avatar_body.h"
-#include "stridewire/runtime/layer_stack.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/soa_pose_evaluator.h"
-#include "stridewire/runtime/request_plan.h"
-#include "stridewire/runtime/walk_planner.h"
-#include "stridewire/runtime/transition_path.h"
+#include "stridewire/runtime/pose.h"
+#include "stridewire/runtime/terrain.h"
 
 namespace stridewire {
 
 enum class AvatarEventType : std::uint8_t {
   kStarted,     ///< A movement began: group, requested and applied parameters.
-  kFootStrike,  ///< A foot landed: foot and where its ball is.
-  kFinished,    ///< A movement ended: the new base frame. The commit point.
-  kIdle,        ///< Queue empty and standing still.
-  /// A request turned out impossible: code and reason; for a footprint that had to be met also the nearest in
-  /// reach and the foot. What is queued behind it goes on.
+  kFootStrike,  ///< A foot touched the ground: which foot, and where its ball is.
+  kFinished,    ///< A movement ended: the new base frame.
+  kIdle,        ///< The avatar stands still and its queue is empty.
+  /// A request could not be carried out: code and reason. If the request was a step that had to hit a
+  /// footprint exactly, also the nearest footprint in reach. The requests queued after it are played.
   kRejected,
 };
 
-/// What has become of an avatar's movement in a call of Advance, for who shows the avatar elsewhere (MovementRecord).
-struct AvatarChange {
-  bool is_any = false;             ///< More than the rest tells: only the whole state does
-  bool has_left = false;           ///< The movement before ended or gave way
-  bool has_begun = false;          ///< One began, and goes on
-  bool has_layers = false;         ///< Layers were asked for
-  bool is_idle_other = false;      ///< idle() is not what it was
-  bool is_left_at_end = false;     ///< The one before ended, and did not give way
-  bool is_redirected = false;      ///< The other began in mid-swing of the one before
-  bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::CaptureBlendSource)
-  bool begun_keeps_speed = false;  ///< How the other was joined (AvatarBody::BlendIn)
-  double left_s = 0.0;             ///< When the one before was left, its own time
-
-  bool operator==(const AvatarChange&) const = default;
-};
-
-/// By what a step would have missed the footprint it had to meet.
+/// How far a step would have missed a footprint that it had to hit exactly.
 struct FootprintError {
-  Footprint nearest;  ///< What it would have landed on, less what the other foot had given way
-  double distance_m = 0.0;  ///< From it to the one asked for
-  double turn_rad = 0.0;    ///< The same of the heading, 0 or more
+  Footprint nearest;        ///< Nearest footprint in reach.
+  double distance_m = 0.0;  ///< From `nearest` to the requested footprint, >= 0.
+  double turn_rad = 0.0;    ///< Difference of their headings, >= 0.
 };
 
+/// Something that happened to an avatar during Advance. The type says which fields are set.
 struct AvatarEvent {
   AvatarEventType type = AvatarEventType::kIdle;
-  std::uint64_t request_id = 0;  ///< 0: the avatar's own doing (inserted step).
+  std::uint64_t request_id = 0;  ///< 0 for a step that the avatar inserted itself.
   MovementKind kind = MovementKind::kStand;
-  int group = -1;
-  double time_s = 0.0;           ///< Avatar time (seconds since it was made) at which it happened.
-  ParameterValues requested;     ///< kStarted
-  ParameterValues applied;       ///< kStarted: after clamping to what the examples span
-  bool extrapolated = false;     ///< kStarted: applied lies outside the hull of the examples
-  bool clamped = false;          ///< kStarted: not as asked, since the examples do not reach it
-  bool is_cut_short = false;     ///< kFinished: another request took over before its end
-  Foot foot = Foot::kLeft;       ///< kFootStrike
-  Vec3 position_m = Vec3(0.0f);  ///< kFootStrike
-  BaseFrame base;                ///< kFinished: base frame after the movement
+  int group = -1;                ///< Index in MotionLibrary::groups(); -1 for a stand.
+  double time_s = 0.0;           ///< Seconds from the construction of the avatar to the event.
+  ParameterValues requested;     ///< kStarted: parameters as requested.
+  ParameterValues applied;       ///< kStarted: after clamping to what the examples span.
+  bool extrapolated = false;     ///< kStarted: `applied` lies outside the hull of the examples.
+  bool clamped = false;          ///< kStarted: `applied` differs from `requested`.
+  bool is_cut_short = false;     ///< kFinished: another request interrupted the movement.
+  Foot foot = Foot::kLeft;       ///< kFootStrike: the foot that landed.
+  Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
+  BaseFrame base;                ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
-  const char* reason = "";                   ///< kRejected: a sentence, static storage
-  std::optional<FootprintError> missed;       ///< kRejected: of a footprint that had to be met
+  const char* reason = "";                   ///< kRejected: one sentence, static storage.
+  std::optional<FootprintError> missed;      ///< kRejected: set for footprints only.
 };
 
-/// Why a request was rejected: the reason, for a footprint followed by the nearest, as in "the footprint is out of
-/// reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off". At most 200 bytes.
+/// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is out
+/// of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off".
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
+/// How a movement that begins takes over from the pose displayed before it.
+enum class BlendKind : std::uint8_t {
+  /// The difference pose fades out from rest (Semancik et al., Eq. (5)). Joint velocities may jump.
+  kCubic,
+  /// The difference pose fades out from its current velocity, so joint velocities are continuous
+  /// (Bollo, "Inertialization", GDC 2018).
+  kInertialization,
+};
+
 struct AvatarOptions {
-  /// Movements start with corrected weights (CorrectWeights), so that they have those applied.
+  /// Correct the weights of a movement when it starts, so that the parameters measured on it equal
+  /// those applied (Section 4 of the paper).
   bool run_time_correction = true;
-  /// Feet stand still where they land (PlanFeet); off, they are where the blend has them. See SetFootPlanting.
+  /// Hold feet still where they land. If false, feet follow the blended pose and may slide.
   bool foot_planting = true;
-  /// How movements begin.
   BlendKind blend = BlendKind::kInertialization;
-  /// The ground feet land on; null: level, at the height an avatar is put at, and rising only as
-  /// requests say.
+  /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a height
+  /// then raise or lower it.
   std::shared_ptr<const Terrain> terrain;
 };
 
-/// An avatar: base frame, queue of requests, current movement, displayed pose.
+class AvatarSimulation;
+
+/// A character that plays requests one after the other: base frame, queue of requests, movement under
+/// way, displayed pose.
 ///
-/// Time is an argument; `Advance` is the only thing that moves it. Given library, start, requests
-/// and the sizes of the steps in time, the poses are the same bytes on every machine. Not
-/// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries) and
-/// `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
-class AvatarSimulation {
+/// Time is an argument: only Advance moves the avatar. The same library, start, requests and time
+/// steps give the same pose bytes on every machine. Not thread-safe; avatars share nothing but the
+/// library and the terrain, so different avatars may be advanced by different threads.
+class Avatar {
  public:
   static constexpr int kMaxQueue = 1024;
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
-  /// Stands at `start` in the library's stand pose.
-  AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
+  /// The avatar stands at `start` in the library's stand pose. `library` must not be null.
+  Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
          const AvatarOptions& options = {});
+  ~Avatar();
+  Avatar(Avatar&&) noexcept;
+  Avatar& operator=(Avatar&&) noexcept;
 
-  /// A swing less than this part of which is left is not sent elsewhere.
-  static constexpr double kLeastSwingLeft = 0.4;
-
-  /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
-  /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
+  /// Validates and queues a request. A request that interrupts empties the queue first.
   ///
-  /// `start_delay_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
-  /// before. What goes on from a movement is never held. One who is held already is not held longer.
-  [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
+  /// Errors: those of ValidateRequest; kUnsupported: an exact footprint was requested while feet are
+  /// not planted; kLimitExceeded: the queue holds kMaxQueue requests.
+  [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
-  /// Drops what has not started; the current movement goes on to its end. Returns how many.
+  /// Drops the requests that have not started and returns their number.
   int CancelQueue();
 
-  /// Plays a layer over the movement, or ends it, from the next Advance on. Legs, root and all that
-  /// movements do are bit by bit what they are without. Errors as LayerStack::Set.
+  /// Starts, changes or ends a layer with the next Advance. kNotFound: no such layer; kOutOfRange: a
+  /// number is not finite or out of its range; kLimitExceeded: four layers are playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
+  /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without a jump. A swing is
-  /// not sent elsewhere meanwhile, and what waits in the queue for a footprint that must be met is rejected while it
-  /// is off. kUnsupported: to be on, but the library's legs are not such as can be planted.
-  [[nodiscard]] Status SetFootPlanting(bool is_on);
-  /// As last set; false where the library's legs can not.
-  [[nodiscard]] bool foot_planting() const {
-    return options_.foot_planting && body_.library->leg_rig().is_usable;
-  }
+  /// Turns foot planting on or off, from the next movement on. kUnsupported: the skeleton of the
+  /// library does not support foot planting.
+  [[nodiscard]] Status SetFootPlanting(bool enabled);
 
-  /// Changes the ground. Feet that stand stay where they are until their next step.
-  void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
+  /// Replaces the ground. Feet that stand keep their place until their next step.
+  void SetTerrain(std::shared_ptr<const Terrain> terrain);
 
-  /// Goes on by `dt_s` (> 0, at most 1 s): finishes and starts movements, updates the pose.
-  /// Events of this call are in `events()` until the next.
+  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
   void Advance(double dt_s);
 
-  /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
-  /// bit of any pose depends on who else is there.
-  static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                         SoaPoseEvaluator& evaluator);
-
-  /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none of now until
-  /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
-  static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                            std::vector<std::uint32_t>* eventful = nullptr);
-  /// Evaluates pose().
-  void ShowPose();
-  /// The same for many avatars of one library together.
-  static void ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
-
-  /// Displayed, in the world.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
-  [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
-  /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or SetLayer it is that of
-  /// pose().
-  [[nodiscard]] const AvatarBody& body() const { return body_; }
-  /// What changed in the last Advance, and by Teleport and SetLayer before it.
-  [[nodiscard]] const AvatarChange& change() const { return change_; }
-  /// Of who stands: what begins next may keep the speed there was, if it begins at once.
-  [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }
-  [[nodiscard]] std::span<const AvatarEvent> events() const { return events_; }
-  [[nodiscard]] const BaseFrame& base() const { return base_; }
-  [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
-  /// Standing, nothing queued.
-  [[nodiscard]] bool idle() const { return !is_moving_ && !is_in_stand_ && queue_size() == 0; }
-  [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
-
-  /// The movement under way, null while standing; valid until the next Advance.
-  [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
-  [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
-  /// Seconds since it was made.
-  [[nodiscard]] double time_s() const { return time_s_; }
-  /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as it stays, all that is
-  /// displayed but layers follows from movement() and its time, or stands still.
-  [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// Moving without layers, and nothing has happened in the last Advance: events() and change() tell nothing. Of who is
-  /// quiet, time_s(), revision(), movement_time_s() and idle() lie in one cache line.
-  [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
-  /// For who asks many: that line is read soon.
-  void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
-  /// The kStarted event of the movement or requested stand under way, null while just standing.
-  [[nodiscard]] const AvatarEvent* started() const {
-    return is_moving_ || is_in_stand_ ? &started_ : nullptr;
-  }
-  /// What has not started, in order.
-  [[nodiscard]] std::span<const MovementRequest> queue() const {
-    return std::span(queue_).subspan(queue_head_);
-  }
+  /// Displayed pose in world space. Valid until the next call that is not const.
+  [[nodiscard]] ConstPoseSpan pose() const;
+  /// Events of the last Advance, in order. Valid until the next Advance.
+  [[nodiscard]] std::span<const AvatarEvent> events() const;
+  /// Base frame of the movement under way, or of the stand.
+  [[nodiscard]] const BaseFrame& base() const;
+  /// Number of requests that have not started.
+  [[nodiscard]] int queue_size() const;
+  /// True if the avatar stands still and its queue is empty.
+  [[nodiscard]] bool idle() const;
+  [[nodiscard]] bool foot_planting() const;
+  [[nodiscard]] const MotionLibrary& library() const;
+  /// Seconds since construction.
+  [[nodiscard]] double time_s() const;
 
  private:
-  static constexpr const char* kNotPlanted = "feet are not planted: no footprint is sure to be met";
+  friend class AvatarCrowd;
+  std::unique_ptr<AvatarSimulation> simulation_;
+};
 
-  void AddEvent(const AvatarEvent& event);
-  // Times are sums of ticks: a hold of whole ticks ends with the last of them.
-  [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
-  [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
-  [[nodiscard]] FootState MeasureFeet() const;
-  void AdvanceState(double dt_s);
-  // Nothing happens in an Advance: it moves time only.
-  [[nodiscard]] bool StaysEventFree(double dt_s) const {
-    return movement_time_s_ + dt_s < next_event_s_;
-  }
-  [[nodiscard]] double NextEventTime() const;
-  void AdvanceEventfully(double dt_s);
-  void PrefetchState() const;
-  [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
-  [[nodiscard]] bool StartNext();
-  void GoOnWalking();
-  void StartTransitionPath();
-  void StartInserted(const RequestPlan& plan);
-  std::uint64_t PopQueue();
-  [[nodiscard]] double RiseAhead(const StepRequest& step) const;
-  [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
-  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
-  void PlanMovement(const RequestPlan& plan, double swing_part);
-  void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
-  [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                   double swing_part);
-  [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
-                                             double swing_part);
-  [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
-  [[nodiscard]] double EndOfMovement() const;
-  [[nodiscard]] double Landed() const;
-  [[nodiscard]] bool RedirectsSwing() const;
-  void RedirectSwing();
-  void SwitchPlanting();
-  void CaptureBlendSource(double time_s);
-  void Leave(double time_s, bool is_redirected);
-  void FinishMovement(double at_s);
-  void KeepToLine(const DVec3& line_m);
-  void FinishStand();
-  [[nodiscard]] DVec3 StandsAt(Foot foot) const;
-  [[nodiscard]] Vec3 LandingBall(Foot foot) const;
-  [[nodiscard]] double StrikeTime() const;
-  void ReportFootStrikes(double before_s, double after_s);
+/// Advances many avatars of one library together, several times as fast as one by one. Every pose has
+/// the same bytes as if the avatar had been advanced alone. Owns scratch memory only.
+class AvatarCrowd {
+ public:
+  explicit AvatarCrowd(std::shared_ptr<const MotionLibrary> library);
+  ~AvatarCrowd();
+  AvatarCrowd(AvatarCrowd&&) noexcept;
+  AvatarCrowd& operator=(AvatarCrowd&&) noexcept;
 
-  // All that an uneventful tick asks, in one cache line.
-  alignas(kCacheLineBytes) double time_s_ = 0.0;  // avatar time
-  double movement_time_s_ = 0.0;
-  double next_event_s_ = -1.0;  // movement time; until then nothing happens
-  std::uint64_t revision_ = 0;
-  // One of: a movement under way, a requested stand, or just standing.
-  bool is_moving_ = false;
-  bool is_in_stand_ = false;
-  bool is_idle_reported_ = false;
-  bool was_idle_ = false;        // after the Advance before
-  bool is_walking_ = false;      // a step left the feet apart: close before standing
-  bool interrupts_ = false;      // the request at the queue's head does not wait for the end
-  bool is_exact_ = false;        // the step under way lands where it was sent
-  int closing_steps_ = 0;        // of our own in a row, the movement under way included
-  double start_not_before_s_ = 0.0;    // avatar time
-  double moved_until_s_ = -1.0;  // avatar time
+  /// As Avatar::Advance for each avatar. All of them must use the library given to the constructor,
+  /// and each may be listed once only.
+  void Advance(std::span<Avatar* const> avatars, double dt_s);
 
-  AvatarOptions options_;
-  BaseFrame base_;
-  AvatarBody body_;
-  AvatarChange change_;           // of the last Advance
-  AvatarChange next_change_;      // told with the next
-  std::uint64_t request_id_ = 0;  // of the movement or stand under way
-  double stand_left_s_ = 0.0;
-  AvatarEvent started_;
-  double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
-  // What is put back when a movement that was planned is not played. Has its size from the first request on
-  // that may be refused.
-  struct Kept {
-    Movement movement;
-    Pose pose;
-  };
-  std::vector<Kept> kept_;  // one, or none before; an avatar can be copied
-
-  FootState stand_feet_;  // of the library's stand pose
-  FootState feet_;
-  Foot last_moved_ = Foot::kRight;
-  std::size_t last_group_ = 0;  // of the movement before; as many as there are groups: a stand
-  WalkProgress walk_;           // of the walk at the queue's head
-  std::vector<MovementRequest> queue_;  // live from queue_head_ on
-  std::size_t queue_head_ = 0;
-  std::vector<AvatarEvent> events_;
+ private:
+  struct Scratch;
+  std::unique_ptr<Scratch> scratch_;
 };
 
 }  // namespace stridewire

@@ -10,15 +10,15 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/keytimes.h"
-#include "stridewire/runtime/layer_clip.h"
-#include "stridewire/runtime/leg_rig.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
-#include "stridewire/runtime/transition.h"
-#include "stridewire/runtime/locomotion_profile.h"
 
 namespace stridewire {
+
+struct LayerClip;
+struct LegRig;
+struct LocomotionProfile;
+struct Transition;
 
 enum class MovementKind : std::uint8_t {
   kStepLeft = 0,   ///< The left foot moves.
@@ -170,23 +170,21 @@ class MotionLibrary {
     return groups_[static_cast<std::size_t>(index)];
   }
   /// Clips to be played over the movement, names all different; kMaxLayerClips at most.
-  [[nodiscard]] std::span<const LayerClip> layers() const { return layers_; }
+  [[nodiscard]] std::span<const LayerClip> layers() const;
   /// Index of the layer of that name, -1 if there is none.
   [[nodiscard]] int FindLayer(std::string_view name) const;
   /// How movements go on where others ended: [from][to] of all groups and, behind them, the stand. Empty in a
   /// library made before there were any.
-  [[nodiscard]] std::span<const Transition> transitions() const { return transitions_; }
+  [[nodiscard]] std::span<const Transition> transitions() const;
   /// One of them; `from` and `to` are groups, or as many as there are groups: the stand. Null if the library
   /// has none.
-  [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const {
-    return transitions_.empty() ? nullptr : &transitions_[from * (groups_.size() + 1) + to];
-  }
+  [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
   /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
   /// The skeleton's legs, for planting.
-  [[nodiscard]] const LegRig& leg_rig() const { return leg_rig_; }
+  [[nodiscard]] const LegRig& leg_rig() const { return *leg_rig_; }
   /// How its examples walk, for walks to a place.
-  [[nodiscard]] const LocomotionProfile& locomotion_profile() const { return locomotion_profile_; }
+  [[nodiscard]] const LocomotionProfile& locomotion_profile() const { return *locomotion_profile_; }
   /// 32 lower-case hex digits: XXH3-128 of the payload.
   [[nodiscard]] const std::string& hash() const { return hash_; }
   /// The whole file, header included: what `Open` read and what may be written elsewhere.
@@ -195,7 +193,7 @@ class MotionLibrary {
   [[nodiscard]] int max_example_count() const { return max_example_count_; }
 
  private:
-  MotionLibrary() = default;
+  MotionLibrary();
   [[nodiscard]] Status Load();
   [[nodiscard]] Status LoadTransitions(const std::vector<Transition>& transitions);
 
@@ -205,8 +203,8 @@ class MotionLibrary {
   std::vector<LayerClip> layers_;
   std::vector<Transition> transitions_;
   Pose stand_pose_;
-  LegRig leg_rig_;
-  LocomotionProfile locomotion_profile_;
+  std::unique_ptr<const LegRig> leg_rig_;
+  std::unique_ptr<const LocomotionProfile> locomotion_profile_;
   std::string hash_;
   int max_example_count_ = 0;
   std::span<const std::byte> bytes_;  // mapped or allocated, 64-byte aligned

@@ -7,10 +7,23 @@
 #include <vector>
 
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/footprint.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
+
+/// Where a movement starts: a point on the ground that carries the avatar and a heading. The poses of
+/// a movement are relative to it: world = position_m + R_y(heading_rad) * local.
+struct BaseFrame {
+  DVec3 position_m = DVec3(0.0);
+  double heading_rad = 0.0;  ///< Not wrapped: 2 pi is one full turn to the left.
+};
+
+/// The place where a foot stands: the point of the ground below the ball of the foot.
+struct Footprint {
+  DVec3 position_m = DVec3(0.0);
+  /// Direction from heel to ball, minus the toe-out of that foot in the stand pose.
+  double heading_rad = 0.0;
+};
 
 /// A footprint asked for. Without a heading: that of the avatar when the step begins.
 struct FootprintRequest {
@@ -67,6 +80,18 @@ struct MovementRequest {
   std::variant<StepRequest, JumpRequest, StandRequest, WalkRequest> movement;
   Interrupt interrupt = Interrupt::kNone;
 };
+
+/// Starts, changes or ends one of the library's layer clips on top of the movement.
+struct LayerRequest {
+  int layer = 0;         ///< Index in MotionLibrary::layers().
+  bool is_on = true;     ///< False ends the layer; weight and speed are then ignored.
+  double weight = 1.0;   ///< (0, 1]; multiplies the joint mask of the clip.
+  double blend_s = 0.3;  ///< Seconds until weight and speed are reached, [0, kMaxLayerBlendS].
+  double speed = 1.0;    ///< Playback speed, [kMinLayerSpeed, kMaxLayerSpeed]; 1 is as recorded.
+};
+inline constexpr double kMaxLayerBlendS = 10.0;
+inline constexpr double kMinLayerSpeed = 0.1;
+inline constexpr double kMaxLayerSpeed = 4.0;
 
 /// Limits on what may be asked for, far outside what any library spans: meaning, not taste.
 inline constexpr double kMaxRequestLengthM = 10.0;  ///< Lengths, sides and heights, either sign.

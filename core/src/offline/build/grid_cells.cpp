@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "offline/build/grid_example.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 namespace {

@@ -5,9 +5,10 @@
 #include <span>
 #include <vector>
 
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 

@@ -5,8 +5,9 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "offline/extract/assemble.h"
 #include "offline/build/library_writer.h"
+#include "offline/extract/assemble.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

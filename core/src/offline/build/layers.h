@@ -7,10 +7,10 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/base/error.h"
-#include "stridewire/offline/capture.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
-#include "stridewire/runtime/layer_clip.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {

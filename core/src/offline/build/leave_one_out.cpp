@@ -5,15 +5,16 @@
 #include <memory>
 #include <utility>
 
-#include "offline/build/example_clusters.h"
 #include "offline/base/parallel.h"
+#include "offline/build/example_clusters.h"
 #include "offline/build/parameter_scales.h"
 #include "offline/build/smooth_examples.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "runtime/library/convex_hull.h"
+#include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/pose.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {

@@ -6,9 +6,11 @@
 #include <cstddef>
 #include <vector>
 
-#include "runtime/library/library_file.h"
 #include "motion_library_generated.h"
 #include "offline/build/transitions.h"
+#include "runtime/library/library_file.h"
+#include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

@@ -3,6 +3,7 @@
 #include <memory>
 #include <span>
 
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
 

@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "offline/extract/mirror.h"
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -5,9 +5,9 @@
 #include <string_view>
 #include <vector>
 
+#include "runtime/movement/movement.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/clip.h"
-#include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/pose.h"
 #include "stridewire/runtime/skeleton.h"
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "offline/build/grid_example.h"
+#include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/raw_library.h"
-#include "stridewire/offline/selection.h"
 
 namespace stridewire {
 

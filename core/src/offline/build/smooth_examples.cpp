@@ -10,10 +10,11 @@
 #include "offline/build/parameter_scales.h"
 #include "offline/build/pose_error.h"
 #include "runtime/library/convex_hull.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
-#include "stridewire/runtime/keytimes.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 namespace {

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "offline/build/grid_example.h"
-#include "stridewire/base/error.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/movement/movement.h"
+#include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/library/transition.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {

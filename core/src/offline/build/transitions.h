@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "offline/build/library_writer.h"
-#include "stridewire/runtime/transition.h"
+#include "runtime/library/transition.h"
 
 namespace stridewire {
 

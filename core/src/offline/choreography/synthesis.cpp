@@ -5,7 +5,11 @@
 #include <optional>
 #include <set>
 
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/contact_keytimes.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {

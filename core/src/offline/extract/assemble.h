@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/base/error.h"
-#include "stridewire/offline/capture.h"
 #include "offline/extract/extract.h"
+#include "stridewire/base/error.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {

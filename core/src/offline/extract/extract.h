@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/offline/capture.h"
 #include "offline/extract/contacts.h"
-#include "stridewire/offline/raw_library.h"
 #include "offline/extract/segment.h"
+#include "stridewire/offline/bvh_reader.h"
+#include "stridewire/offline/raw_library.h"
 
 namespace stridewire {
 

@@ -1,7 +1,10 @@
-#include "stridewire/runtime/avatar_body.h"
+#include "runtime/avatar/avatar_body.h"
 
 #include <algorithm>
 #include <utility>
+
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 
 namespace stridewire {
 

@@ -4,7 +4,10 @@
 #include <cmath>
 #include <cstdio>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

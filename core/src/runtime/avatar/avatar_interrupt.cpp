@@ -3,8 +3,10 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/contact_keytimes.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 

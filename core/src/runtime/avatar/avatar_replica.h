@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/avatar_body.h"
-#include "stridewire/runtime/soa_pose_evaluator.h"
 
 namespace stridewire {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 

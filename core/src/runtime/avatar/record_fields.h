@@ -8,7 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stridewire/runtime/avatar_body.h"
+#include "runtime/avatar/avatar_body.h"
+#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire::record {
 

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/keytimes.h"
+#include "runtime/library/keytimes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/locomotion_profile.h"
+#include "runtime/library/locomotion_profile.h"
 
 #include <algorithm>
 #include <cmath>

@@ -14,7 +14,12 @@
 #include <string>
 
 #include "motion_library_generated.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/library/library_file.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/library/transition.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
@@ -403,6 +408,15 @@ std::string_view ParameterText(ParameterName name) {
   return "unknown";
 }
 
+MotionLibrary::MotionLibrary() = default;
+
+std::span<const LayerClip> MotionLibrary::layers() const { return layers_; }
+std::span<const Transition> MotionLibrary::transitions() const { return transitions_; }
+
+const Transition* MotionLibrary::FindTransition(std::size_t from, std::size_t to) const {
+  return transitions_.empty() ? nullptr : &transitions_[from * (groups_.size() + 1) + to];
+}
+
 int MotionLibrary::FindLayer(std::string_view name) const {
   for (std::size_t i = 0; i < layers_.size(); ++i) {
     if (layers_[i].name == name) return static_cast<int>(i);
@@ -534,7 +548,7 @@ Status MotionLibrary::Load() {
         std::fabs(stand.z) <= kMaxRootM)) {
     return Fail(ErrorCode::kMalformed, "the stand pose's root is out of range");
   }
-  leg_rig_ = MakeLegRig(skeleton_, stand_pose_);
+  leg_rig_ = std::make_unique<const LegRig>(MakeLegRig(skeleton_, stand_pose_));
 
   if (root.groups()->size() < 1 || root.groups()->size() > static_cast<std::size_t>(kMaxGroups)) {
     return Fail(ErrorCode::kMalformed, "the group count is out of range", root.groups()->size());
@@ -545,7 +559,7 @@ Status MotionLibrary::Load() {
     max_example_count_ = std::max(max_example_count_, group->example_count);
     groups_.push_back(std::move(*group));
   }
-  locomotion_profile_ = MakeLocomotionProfile(*this);
+  locomotion_profile_ = std::make_unique<const LocomotionProfile>(MakeLocomotionProfile(*this));
   if (const auto* from = root.transitions()) {
     std::vector<Transition> transitions;
     for (const fb::Transition* t : *from) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/check.h"
+#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

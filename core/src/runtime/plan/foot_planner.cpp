@@ -1,10 +1,13 @@
-#include "stridewire/runtime/foot_planner.h"
+#include "runtime/plan/foot_planner.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/plan/foot_sampler.h"
+#include "runtime/library/keytimes.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

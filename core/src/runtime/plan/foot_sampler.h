@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <span>
 
+#include "runtime/movement/foot_plan.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/foot_plan.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 

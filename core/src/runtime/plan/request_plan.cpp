@@ -1,4 +1,4 @@
-#include "stridewire/runtime/request_plan.h"
+#include "runtime/plan/request_plan.h"
 
 #include <algorithm>
 #include <array>

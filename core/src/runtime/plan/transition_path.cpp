@@ -1,9 +1,10 @@
-#include "stridewire/runtime/transition_path.h"
+#include "runtime/plan/transition_path.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "runtime/library/transition.h"
 #include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {

@@ -1,11 +1,12 @@
-#include "stridewire/runtime/walk_planner.h"
+#include "runtime/plan/walk_planner.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "base/trig.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/plan/foot_planner.h"
 #include "runtime/plan/walk_steering.h"
-#include "stridewire/runtime/foot_planner.h"
 
 namespace stridewire {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/trig.h"
+#include "runtime/library/locomotion_profile.h"
 
 namespace stridewire {
 namespace {

@@ -4,7 +4,8 @@
 #include <cstddef>
 #include <span>
 
-#include "stridewire/runtime/walk_planner.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/plan/walk_planner.h"
 
 namespace stridewire {
 

@@ -1,14 +1,46 @@
-// Evaluates single poses of a movement. soa_pose_evaluator.cpp evaluates many poses at once.
+#include "runtime/pose/evaluate_poses.h"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "runtime/pose/cell_weights.h"
 #include "runtime/pose/grid_blend.h"
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
+namespace {
+
+// Limits on the speed of a difference pose; no body moves faster. They bound the overshoot of a
+// blend to 4/27 of this speed times the length of the blend.
+constexpr float kMaxJointRadPerS = 20.0f;
+constexpr float kMaxRootMPerS = 4.0f;
+
+Vec3 NoFaster(const Vec3& velocity, float most) {
+  const float speed = std::sqrt(glm::dot(velocity, velocity));
+  return speed > most ? velocity * (most / speed) : velocity;
+}
+
+// A small rotation as a rotation vector. The length is approximate (2 sin(angle / 2)), which avoids
+// trigonometry that differs between machines.
+Vec3 RotationVector(const Quat& q) {
+  const float sign = q.w < 0.0f ? -2.0f : 2.0f;
+  return sign * Vec3(q.x, q.y, q.z);
+}
+
+}  // namespace
+
+std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const float> weights,
+                                      int point) {
+  const std::size_t slot = static_cast<std::size_t>(point) & (slot_count_ - 1);
+  const std::span<float> row = std::span(rows_).subspan(slot * row_floats_, row_floats_);
+  if (points_[slot] == point) return row;
+  points_[slot] = point;
+  const std::size_t n = weights.size();
+  const float* examples = &group.grid[static_cast<std::size_t>(point) * n * row_floats_];
+  kernels::SumRows(examples, weights.data(), n, row_floats_, row.data());
+  return row;
+}
 
 void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                  const GridPlace& place, float* row) {
@@ -125,6 +157,33 @@ void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Mov
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out) {
   EvaluateAt(group, layout, movement, PlaceAt(group, movement, time_s), cache, out);
+}
+
+void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
+                           ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
+                           Movement& movement) {
+  // Before its start, a movement is extrapolated by reflecting its first moments.
+  const bool is_reflected = movement.start_offset_s < kBlendStepS;
+  EvaluateBlend(group, layout, movement,
+                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,
+                scratch);
+  const auto per_s = static_cast<float>(1.0 / kBlendStepS);
+  const Pose& difference = movement.difference;
+  const Vec3 entered_m = before.root_position_m - difference.root_position_m;
+  const Vec3 blend_m =
+      is_reflected ? 2.0f * entered_m - scratch.root_position_m : scratch.root_position_m;
+  movement.difference_velocity.root_m_s = NoFaster(
+      per_s * (difference.root_position_m - (earlier.root_position_m - blend_m)), kMaxRootMPerS);
+  movement.difference_velocity.joints_rad_s.resize(before.rotations.size());
+  for (std::size_t j = 0; j < before.rotations.size(); ++j) {
+    const Quat entered = before.rotations[j] * glm::conjugate(difference.rotations[j]);
+    const Quat blend = is_reflected ? entered * (glm::conjugate(scratch.rotations[j]) * entered)
+                                    : scratch.rotations[j];
+    const Quat was = glm::conjugate(blend) * earlier.rotations[j];
+    movement.difference_velocity.joints_rad_s[j] = NoFaster(
+        per_s * RotationVector(glm::conjugate(was) * difference.rotations[j]), kMaxJointRadPerS);
+  }
+  movement.is_inertial = true;
 }
 
 }  // namespace stridewire

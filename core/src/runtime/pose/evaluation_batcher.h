@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {
 

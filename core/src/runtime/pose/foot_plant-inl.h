@@ -8,8 +8,9 @@
 #define STRIDEWIRE_FOOT_PLANT_INL_H
 #endif
 
+#include "runtime/pose/plant_feet.h"
 #include "runtime/pose/simd_math-inl.h"
-#include "runtime/skeleton/foot_plant_constants.h"
+#include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {

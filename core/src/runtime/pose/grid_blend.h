@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 
+#include "runtime/library/keytimes.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 

@@ -1,8 +1,9 @@
-#include "stridewire/runtime/layer_stack.h"
+#include "runtime/pose/layer_stack.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {

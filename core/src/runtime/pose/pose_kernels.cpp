@@ -2,8 +2,8 @@
 
 #include <cstring>
 
+#include "runtime/movement/foot_plan.h"
 #include "runtime/skeleton/foot_plant_constants.h"
-#include "stridewire/runtime/foot_plan.h"
 
 #undef HWY_TARGET_INCLUDE
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
@@ -14,6 +14,7 @@
 #include "runtime/pose/foot_plant-inl.h"
 #include "runtime/pose/simd_math-inl.h"
 #include "runtime/pose/soa_pose-inl.h"
+#include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace stridewire::kernels::HWY_NAMESPACE {

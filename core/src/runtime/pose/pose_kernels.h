@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire::kernels {
 

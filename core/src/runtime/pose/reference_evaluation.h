@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 namespace stridewire {
 

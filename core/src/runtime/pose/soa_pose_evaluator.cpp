@@ -1,12 +1,13 @@
-#include "stridewire/runtime/soa_pose_evaluator.h"
+#include "runtime/pose/soa_pose_evaluator.h"
 
 #include <algorithm>
 #include <array>
 
 #include "base/check.h"
+#include "base/prefetch.h"
 #include "runtime/pose/grid_blend.h"
+#include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
-#include "stridewire/base/prefetch.h"
 
 namespace stridewire {
 

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/layer_clip.h"
+#include "runtime/skeleton/layer_clip.h"
 
 #include <algorithm>
 #include <array>

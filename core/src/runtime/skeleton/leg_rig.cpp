@@ -1,4 +1,4 @@
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/terrain/foot_support.h"
 
 #include <algorithm>
 #include <array>

@@ -3,8 +3,8 @@
 #include <array>
 #include <span>
 
+#include "runtime/movement/movement.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {

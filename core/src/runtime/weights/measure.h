@@ -2,7 +2,8 @@
 
 #include <span>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {

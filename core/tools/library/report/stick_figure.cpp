@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "gnuplot.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 
 namespace stridewire {

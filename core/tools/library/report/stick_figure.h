@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {

@@ -9,11 +9,11 @@
 
 #include "capture_files.h"
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/extract/mirror.h"
-#include "stridewire/runtime/avatar.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/skeleton/foot_vector.h"
-#include "stridewire/runtime/keytimes.h"
+#include "stridewire/offline/library_builder.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {

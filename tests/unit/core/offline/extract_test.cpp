@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "runtime/library/keytimes.h"
 #include "runtime/skeleton/foot_vector.h"
-#include "stridewire/runtime/keytimes.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {

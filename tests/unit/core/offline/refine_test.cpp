@@ -9,9 +9,10 @@
 
 #include "distorted_library.h"
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
+#include "stridewire/offline/library_builder.h"
 #include "test_library.h"
 
 namespace stridewire {

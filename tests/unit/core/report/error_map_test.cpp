@@ -6,9 +6,10 @@
 #include <limits>
 
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/open_library.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/movement.h"
+#include "stridewire/offline/open_library.h"
 
 namespace stridewire {
 namespace {

@@ -1,11 +1,10 @@
-#include "stridewire/runtime/avatar.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"

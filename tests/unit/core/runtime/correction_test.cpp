@@ -11,10 +11,11 @@
 
 #include "counted_memory.h"
 #include "distorted_library.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/terrain/foot_support.h"
 #include "runtime/weights/end_poses.h"
 #include "runtime/weights/measure.h"
-#include "stridewire/runtime/avatar.h"
-#include "stridewire/runtime/foot_support.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
 

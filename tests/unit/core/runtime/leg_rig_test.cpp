@@ -1,6 +1,6 @@
 // Compares the inverse kinematics of a leg with its forward kinematics for random targets in reach.
 
-#include "stridewire/runtime/leg_rig.h"
+#include "runtime/skeleton/leg_rig.h"
 
 #include <gtest/gtest.h>
 

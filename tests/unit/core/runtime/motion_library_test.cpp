@@ -9,8 +9,8 @@
 #include <fstream>
 
 #include "runtime/library/cardinal_basis.h"
-#include "stridewire/offline/library_builder.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "test_library.h"
 
 namespace stridewire {

@@ -1,4 +1,4 @@
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +8,7 @@
 #include <numeric>
 #include <random>
 
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
 

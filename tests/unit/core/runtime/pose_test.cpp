@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "stridewire/runtime/movement.h"
+#include "runtime/movement/movement.h"
 
 namespace stridewire {
 namespace {

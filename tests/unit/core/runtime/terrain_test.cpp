@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/terrain/foot_support.h"
 
 namespace stridewire {
 namespace {

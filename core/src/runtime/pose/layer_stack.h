@@ -4,25 +4,13 @@
 #include <span>
 #include <vector>
 
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/base/error.h"
-#include "stridewire/runtime/layer_clip.h"
+#include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
 class MotionLibrary;
-
-/// Asks for one of a library's layer clips over the movement, or for its end.
-struct LayerRequest {
-  int layer = 0;  ///< Index in MotionLibrary::layers().
-  bool is_on = true;
-  double weight = 1.0;   ///< In (0, 1], on top of the clip's mask. Unused when off.
-  double blend_s = 0.3;  ///< How long weight and speed take to get there: [0, kMaxLayerBlendS].
-  double speed = 1.0;    ///< [kMinLayerSpeed, kMaxLayerSpeed]; 1: as recorded. Unused when off.
-};
-
-inline constexpr double kMaxLayerBlendS = 10.0;
-inline constexpr double kMinLayerSpeed = 0.1;
-inline constexpr double kMaxLayerSpeed = 4.0;
 
 /// The layers one avatar plays. Weights ease in and out with a continuous derivative, also when a
 /// request comes while one is on its way. Later layers lie over earlier ones. The first that is set or restored

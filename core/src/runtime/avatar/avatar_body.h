@@ -4,10 +4,11 @@
 #include <memory>
 #include <optional>
 
-#include "stridewire/runtime/foot_planner.h"
-#include "stridewire/runtime/layer_stack.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/foot_planner.h"
+#include "runtime/pose/layer_stack.h"
+#include "runtime/pose/plant_feet.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
 
 namespace stridewire {
 

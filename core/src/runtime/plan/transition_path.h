@@ -3,9 +3,9 @@
 #include <cstddef>
 #include <optional>
 
+#include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 
@@ -43,10 +43,12 @@ struct TransitionPath {
 /// - Footprints are met as they are, by the foot that they are for.
 ///
 /// Searched in breadth: at most 14 calls of PlanStep and 14 more for the request. Never allocates.
-[[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
-                          const std::optional<RequestPlan>& direct, const Stance& stance);
+[[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
+                                                const MovementRequest& request,
+                                                const std::optional<RequestPlan>& direct,
+                                                const Stance& stance);
 
-/// Why there is none: "no way leads from step_left to jump in this library". Static storage.
+/// Why there is none: "this library has no transition path from step_left to jump". Static storage.
 [[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire

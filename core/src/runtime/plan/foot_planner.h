@@ -2,10 +2,13 @@
 
 #include <optional>
 
-#include "stridewire/runtime/foot_support.h"
+#include "runtime/movement/movement.h"
+#include "runtime/plan/request_plan.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/leg_rig.h"
+#include "runtime/terrain/foot_support.h"
 #include "stridewire/runtime/motion_library.h"
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/request_plan.h"
 
 namespace stridewire {
 
@@ -21,7 +24,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< Indexed by Foot.
 
 /// Feet as the unplanted pose has them, on the ground below them or, without terrain, at height `ground_m`.
 [[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
-                                double ground_m, const Terrain* terrain);
+                                    double ground_m, const Terrain* terrain);
 
 /// How a foot would stand at a place.
 [[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
@@ -40,8 +43,9 @@ struct LandingTarget {
 
 /// What a movement goes on from.
 struct BlendSource {
-  ConstPoseSpan before;                  ///< Blended and eased, without planting
-  std::optional<ConstPoseSpan> earlier;  ///< The same kBlendStepS before, if its speed is to be kept
+  ConstPoseSpan before;  ///< Blended and eased, without planting
+  std::optional<ConstPoseSpan>
+      earlier;  ///< The same kBlendStepS before, if its speed is to be kept
 };
 
 /// A footprint further from where the library's step ends than the request says is approached so far
@@ -58,8 +62,8 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
 /// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingTarget& wish, const BlendSource& source, GridCache& cache,
-                               PoseSpan pose, Movement& movement);
+                               const LandingTarget& wish, const BlendSource& source,
+                               GridCache& cache, PoseSpan pose, Movement& movement);
 
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
 /// needed to make it again.
@@ -82,12 +86,12 @@ struct LandingDecision {
 /// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
 /// change is not needed.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingDecision& choice, const BlendSource& source, GridCache& cache,
-                               PoseSpan pose, Movement& movement);
+                               const LandingDecision& choice, const BlendSource& source,
+                               GridCache& cache, PoseSpan pose, Movement& movement);
 
 /// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
-                                double time_s, ConstPoseSpan pose);
+                                    double time_s, ConstPoseSpan pose);
 
 /// When the feet that a movement moves leave the ground and stand again, planted or not.
 struct SwingTimes {

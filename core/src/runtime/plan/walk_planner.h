@@ -5,10 +5,9 @@
 #include <limits>
 #include <optional>
 
-#include "stridewire/runtime/footprint.h"
+#include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/request_plan.h"
 #include "stridewire/runtime/terrain.h"
 
 namespace stridewire {

@@ -1,11 +1,12 @@
-#include "stridewire/runtime/foot_plan.h"
+#include "runtime/pose/plant_feet.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/pose_kernels.h"
-#include "runtime/skeleton/foot_plant_constants.h"
-#include "stridewire/runtime/movement.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {

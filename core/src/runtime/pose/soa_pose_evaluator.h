@@ -4,8 +4,8 @@
 #include <memory>
 #include <span>
 
-#include "stridewire/runtime/movement.h"
-#include "stridewire/runtime/soa_pose.h"
+#include "runtime/movement/movement.h"
+#include "runtime/skeleton/soa_pose.h"
 
 namespace stridewire {
 

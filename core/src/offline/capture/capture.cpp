@@ -1,1 +1,0 @@
-#include "stridewire/offline/capture.h"

@@ -1,0 +1,578 @@
+#include "runtime/avatar/avatar_simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/check.h"
+#include "base/prefetch.h"
+#include "runtime/library/contact_keytimes.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/foot_vector.h"
+#include "runtime/weights/correction.h"
+
+namespace stridewire {
+namespace {
+
+// After a long stride, one step may not suffice to bring the feet together. A second step must bring
+// them closer by at least this much.
+constexpr double kClosingGainM = 0.03;
+
+// A movement can add up to this many events in one tick: started, two foot strikes, finished, the end
+// of a walk or a rejection, and the start of the next movement.
+constexpr std::size_t kEventReserve = 7;
+// A tick usually has at most three events: finished, started and foot strike. The list grows if there
+// are more.
+constexpr std::size_t kUsualEvents = 3;
+// A queue keeps memory for this many requests.
+constexpr std::size_t kUsualQueue = 8;
+
+}  // namespace
+
+AvatarSimulation::AvatarSimulation(std::shared_ptr<const MotionLibrary> library,
+                                   const BaseFrame& start, const AvatarOptions& options)
+    : options_(options), body_(std::move(library)) {
+  events_.reserve(kUsualEvents);
+  stand_feet_.left_from_right_m =
+      FootVector(body_.library->skeleton(), body_.library->stand_pose(), Foot::kLeft, 0.0);
+  Teleport(start);
+}
+
+void AvatarSimulation::Teleport(const BaseFrame& start) {
+  base_ = start;
+  ++revision_;
+  const Pose& stand = body_.library->stand_pose();
+  body_.pose = stand;
+  body_.pose.root_position_m =
+      Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
+  body_.pose.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
+  is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
+  closing_steps_ = 0;
+  body_.blended_pose = body_.pose;
+  moved_until_s_ = next_event_s_ = -1.0;
+  body_.plants_feet = foot_planting();
+  body_.begins_planting = false;
+  if (body_.plants_feet) {
+    body_.locks = FootLocksOf(body_.library->skeleton(), body_.library->leg_rig(), body_.pose,
+                              start.position_m.y, options_.terrain.get());
+    StandOn(body_.locks, body_.movement);
+    body_.earlier_feet[0] = CorrectFeet(body_.library->skeleton(), body_.library->leg_rig(),
+                                        body_.movement, 0.0, body_.blended_pose);
+    PlantFeet(body_.library->leg_rig(), body_.movement, 0.0, body_.pose);
+  }
+  feet_ = stand_feet_;
+  last_group_ = body_.library->groups().size();
+  last_moved_ = Foot::kRight;
+  CancelQueue();
+  body_.ShowLayers();
+  next_change_.is_any = true;
+}
+
+Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_delay_s) {
+  STRIDEWIRE_CHECK(start_delay_s >= 0.0);
+  if (Status status = ValidateRequest(*body_.library, request); !status) return status;
+  if (queue_size() >= kMaxQueue) {
+    return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
+  }
+  if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->exact_only) {
+    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
+    if (kept_.empty()) {
+      kept_.resize(1);
+      kept_.front().pose = Pose(body_.library->skeleton().joint_count());
+      MakeRoom(*body_.library, kept_.front().movement);
+      events_.reserve(kMaxEventsPerAdvance);  // One tick may reject many requests.
+    }
+  }
+  const double earlier_start_s = start_not_before_s_;
+  if (request.interrupt != Interrupt::kNone) {
+    CancelQueue();
+    next_event_s_ = -1.0;
+    interrupts_ = request.interrupt == Interrupt::kNow && is_moving_ &&
+                  !std::holds_alternative<StandRequest>(request.movement);
+    if (is_in_stand_) stand_left_s_ = 0.0;
+  }
+  if (queue_size() == 0) {
+    start_not_before_s_ = time_s_ + start_delay_s;
+    if (earlier_start_s > time_s_)
+      start_not_before_s_ = std::min(start_not_before_s_, earlier_start_s);
+  }
+  if (queue_head_ >= 4 && queue_head_ * 2 > queue_.size()) {
+    queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
+    queue_head_ = 0;
+  }
+  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole crowd
+  // tend to be long at the same time, but only briefly.
+  if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
+  if (queue_.size() == queue_.capacity()) {
+    queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
+  }
+  queue_.push_back(request);
+  return {};
+}
+
+Status AvatarSimulation::SetLayer(const LayerRequest& request) {
+  if (Status status = body_.layers.Set(*body_.library, request); !status) return status;
+  body_.layered_pose.rotations.resize(body_.pose.rotations.size());
+  next_change_.has_layers = true;
+  next_event_s_ = -1.0;
+  return {};
+}
+
+Status AvatarSimulation::SetFootPlanting(bool is_on) {
+  if (is_on && !body_.library->leg_rig().is_usable) {
+    return Fail(ErrorCode::kUnsupported, "this skeleton does not support foot planting");
+  }
+  options_.foot_planting = is_on;
+  return {};
+}
+
+int AvatarSimulation::CancelQueue() {
+  const int dropped = queue_size();
+  queue_.clear();
+  queue_head_ = 0;
+  walk_ = {};
+  interrupts_ = false;
+  start_not_before_s_ = 0.0;
+  return dropped;
+}
+
+void AvatarSimulation::AddEvent(const AvatarEvent& event) {
+  STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
+  events_.push_back(event);
+  events_.back().time_s = time_s_;
+  if (event.type == AvatarEventType::kStarted) started_ = events_.back();
+}
+
+FootState AvatarSimulation::MeasureFeet() const {
+  return {FootVector(body_.library->skeleton(), body_.pose, Foot::kLeft, base_.heading_rad)};
+}
+
+void AvatarSimulation::Advance(double dt_s) {
+  AdvanceState(dt_s);
+  ShowPose();
+}
+
+void AvatarSimulation::ShowPose() {
+  if (is_moving_) body_.Evaluate(movement_time_s_);
+  body_.ShowLayers();
+}
+
+void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
+                                     std::vector<std::uint32_t>* eventful) {
+  if (eventful != nullptr) eventful->clear();
+  constexpr std::size_t kAhead = 16;
+  for (std::size_t i = 0; i < avatars.size(); ++i) {
+    if (i + 2 * kAhead < avatars.size()) avatars[i + 2 * kAhead]->PrefetchTickState();
+    if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysEventFree(dt_s)) {
+      avatars[i + kAhead]->PrefetchState();
+    }
+    avatars[i]->AdvanceState(dt_s);
+    if (eventful != nullptr && !avatars[i]->is_event_free()) {
+      eventful->push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+}
+
+void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
+                                 SoaPoseEvaluator& evaluator) {
+  std::array<PoseJob, SoaPose::kLanes> jobs;
+  while (!avatars.empty()) {
+    const std::span<AvatarSimulation* const> block =
+        avatars.first(std::min(avatars.size(), jobs.size()));
+    std::size_t moving = 0;
+    for (AvatarSimulation* avatar : block) {
+      if (!avatar->is_moving_) continue;
+      jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
+    }
+    EvaluatePoses(evaluator, std::span(jobs).first(moving));
+    for (AvatarSimulation* avatar : block) avatar->body_.ShowLayers();
+    avatars = avatars.subspan(block.size());
+  }
+}
+
+void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
+                                  SoaPoseEvaluator& evaluator) {
+  AdvanceStates(avatars, dt_s);
+  ShowPoses(avatars, evaluator);
+}
+
+// Prefetches what AdvanceEventfully reads of a walking avatar.
+void AvatarSimulation::PrefetchState() const {
+  PrefetchBytes(&change_, sizeof(change_) + sizeof(next_change_));
+  PrefetchBytes(&events_, 1);
+  PrefetchBytes(&body_.layers, sizeof(body_.layers));
+  PrefetchBytes(&body_.movement, kCacheLineBytes);
+  PrefetchBytes(&body_.movement.warp, 2 * kCacheLineBytes);
+  PrefetchBytes(&body_.movement.feet.is_active, 1);
+}
+
+// Advances everything except the pose.
+void AvatarSimulation::AdvanceState(double dt_s) {
+  STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
+  if (StaysEventFree(dt_s)) {
+    movement_time_s_ += dt_s;
+    time_s_ += dt_s;
+    return;
+  }
+  AdvanceEventfully(dt_s);
+  body_.layers.Advance(*body_.library, dt_s);
+  next_event_s_ = NextEventTime();
+}
+
+// Movement time of the next event. Returns -1 if the last Advance was not event-free.
+double AvatarSimulation::NextEventTime() const {
+  const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() &&
+                             events_.empty() && change_ == AvatarChange{};
+  if (!is_event_free) return -1.0;
+  const double strike_s = StrikeTime();
+  return movement_time_s_ < strike_s ? std::min(strike_s, body_.movement.duration_s())
+                                     : body_.movement.duration_s();
+}
+
+void AvatarSimulation::AdvanceEventfully(double dt_s) {
+  events_.clear();
+  change_ = std::exchange(next_change_, {});
+  const double end_s = time_s_ + dt_s;
+  double left_s = dt_s;
+  for (;;) {
+    // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
+    // full, nothing more starts or ends in this tick.
+    const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
+    if (is_moving_) {
+      const double before_s = movement_time_s_;
+      if (may_change && RedirectsSwing()) {
+        RedirectSwing();
+        continue;
+      }
+      const double duration_s = EndOfMovement();
+      if (before_s + left_s < duration_s || !may_change) {
+        movement_time_s_ = before_s + left_s;
+        time_s_ = end_s;
+        if (may_change) ReportFootStrikes(before_s, movement_time_s_);
+        break;
+      }
+      left_s = before_s + left_s - duration_s;
+      time_s_ = end_s - left_s;
+      ReportFootStrikes(before_s, duration_s);
+      FinishMovement(duration_s);
+    } else if (is_in_stand_) {
+      if (stand_left_s_ > left_s || !may_change) {
+        stand_left_s_ -= left_s;
+        break;
+      }
+      left_s -= stand_left_s_;
+      time_s_ = end_s - left_s;
+      FinishStand();
+    }
+    if (!may_change || !StartNext()) break;
+  }
+  time_s_ = end_s;
+  change_.is_idle_other = idle() != std::exchange(was_idle_, idle());
+}
+
+bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
+  const int end_z = body_.library->group(plan.group).FindParameter(ParameterName::kEndZ);
+  if (end_z < 0) return false;
+  return std::fabs(plan.applied.values[static_cast<std::size_t>(end_z)]) <
+         std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
+}
+
+bool AvatarSimulation::StartNext() {
+  interrupts_ = false;
+  const bool is_empty = queue_size() == 0;
+  const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
+  if (is_walking_ && (is_empty || stand != nullptr)) {
+    // The walk ends here. Bring the feet together, so that the avatar does not stop in mid-stride.
+    is_walking_ = false;
+    SwitchPlanting();
+    const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
+    if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
+      StartInserted(*plan);
+      return true;
+    }
+  }
+  if (is_empty) {
+    if (!std::exchange(is_idle_reported_, true)) {
+      AddEvent({.type = AvatarEventType::kIdle, .base = base_});
+    }
+    last_group_ = body_.library->groups().size();
+    return false;
+  }
+
+  if (IsStartDelayed() && last_group_ == body_.library->groups().size()) return false;
+  start_not_before_s_ = 0.0;
+  is_idle_reported_ = false;
+  if (stand == nullptr) SwitchPlanting();
+  if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
+    GoOnWalking();
+    return true;
+  }
+  if (stand != nullptr) {
+    is_in_stand_ = true;
+    stand_left_s_ = stand->seconds;
+    request_id_ = PopQueue();
+    AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
+    return true;
+  }
+  StartTransitionPath();
+  return true;
+}
+
+// Starts the step or jump at the head of the queue, or a step that must come before it.
+void AvatarSimulation::StartTransitionPath() {
+  const MovementRequest& request = queue_[queue_head_];
+  const auto direct = PlanRequest(request);
+  STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
+  const TransitionPath way = FindTransitionPath(*body_.library, request, direct,
+                                                {feet_, last_moved_, last_group_, closing_steps_});
+  if (way.is_inserted) {
+    StartInserted(*way.plan);
+  } else if (way.plan) {
+    const MovementRequest taken = request;
+    PopQueue();
+    if (PlanRequested(taken, *way.plan, 0.0)) BeginMovement(*way.plan, taken.id);
+  } else {
+    AddEvent({.type = AvatarEventType::kRejected,
+              .request_id = PopQueue(),
+              .base = base_,
+              .reason = NoPathReason(group().kind, body_.library->group(direct->group).kind)});
+  }
+}
+
+void AvatarSimulation::StartInserted(const RequestPlan& plan) {
+  const int inserted = closing_steps_ + 1;
+  StartPlan(plan, 0);
+  closing_steps_ = inserted;
+}
+
+// Removes the request at the head of the queue and returns its id.
+std::uint64_t AvatarSimulation::PopQueue() {
+  const std::uint64_t id = queue_[queue_head_++].id;
+  if (queue_size() == 0) CancelQueue();
+  return id;
+}
+
+// Starts the next step of the walk at the head of the queue. The request stays in the queue until the
+// walk has arrived or is rejected.
+void AvatarSimulation::GoOnWalking() {
+  WalkStance stance;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const auto f = static_cast<std::size_t>(foot);
+    stance.feet[f] =
+        body_.plants_feet ? body_.locks[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+  }
+  stance.heading_rad = base_.heading_rad;
+  stance.last_moved = last_moved_;
+  stance.vector = feet_;
+  stance.last_step_s = is_walking_ ? body_.movement.duration_s() : 0.0;
+  stance.is_exact = body_.plants_feet;
+  const WalkDecision decision =
+      PlanWalkStep(*body_.library, options_.terrain.get(),
+                   std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
+  if (decision.outcome == WalkOutcome::kStep) {
+    StartPlan(decision.plan, queue_[queue_head_].id);
+    return;
+  }
+  const std::uint64_t id = PopQueue();
+  walk_ = {};
+  if (decision.outcome == WalkOutcome::kArrived) {
+    AddEvent({.type = AvatarEventType::kFinished, .request_id = id, .base = base_});
+  } else {
+    AddEvent({.type = AvatarEventType::kRejected,
+              .request_id = id,
+              .base = base_,
+              .reason = decision.reason});
+  }
+}
+
+// Position of a foot between two movements: its footprint, or the ball if feet are not planted.
+DVec3 AvatarSimulation::StandsAt(Foot foot) const {
+  return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
+                           : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
+}
+
+// Height of the ground where a step would land above the ground at the standing foot, in metres.
+double AvatarSimulation::RiseAhead(const StepRequest& step) const {
+  const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
+  const auto f = static_cast<std::size_t>(foot);
+  const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
+  const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
+  const DVec3 stands = body_.locks[1 - f].print.position_m;
+  const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
+                                         DVec3(outward * side_m, 0.0, step.length_m));
+  return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
+}
+
+std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& request) const {
+  if (const auto* jump = std::get_if<JumpRequest>(&request.movement)) {
+    return PlanJump(*body_.library, *jump);
+  }
+  StepRequest step = std::get<StepRequest>(request.movement);
+  if (!step.at) {
+    if (options_.terrain != nullptr && body_.plants_feet) step.height_m = RiseAhead(step);
+    return PlanStep(*body_.library, step, feet_, last_moved_, !is_walking_);
+  }
+
+  // A step to a footprint is planned relative to the foot that stays.
+  Footprint exact{step.at->position_m, step.at->heading_rad.value_or(base_.heading_rad)};
+  exact.heading_rad = UnwrapAngle(exact.heading_rad, base_.heading_rad);
+  if (options_.terrain != nullptr) {
+    exact.position_m.y = options_.terrain->HeightAt(exact.position_m.x, exact.position_m.z);
+  }
+  Foot foot = step.foot.value_or(OtherFoot(last_moved_));
+  if (!step.foot && !is_walking_) {
+    const DVec3 centre = 0.5 * (StandsAt(Foot::kLeft) + StandsAt(Foot::kRight));
+    const double aside_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
+    foot = aside_m >= 0.0 ? Foot::kLeft : Foot::kRight;
+  }
+  return PlanFootprint(*body_.library, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad,
+                       feet_);
+}
+
+void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
+  PlanMovement(plan, 0.0);
+  BeginMovement(plan, request_id);
+}
+
+// Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the same
+// fraction `swing_part` of its own swing.
+void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
+  const MotionGroup& next = body_.library->group(plan.group);
+  // Only the first elements are used, one per example of the group.
+  std::array<double, MotionLibrary::kMaxExamples> weights;
+  if (options_.run_time_correction) {
+    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next), weights,
+                   body_.movement);
+  } else {
+    SetWeights(next, plan.group,
+               std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
+               weights, body_.movement);
+  }
+  body_.StartWeighted(base_);
+  if (swing_part > 0.0) {
+    const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
+    body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
+  }
+  // An avatar that was standing has no speed to keep.
+  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
+}
+
+// Starts the movement that was just planned.
+void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
+  const MotionGroup& next = group();
+  // If planting reaches the requested footprint, the step is not clamped, even if its parameters are.
+  const bool is_met = plan.exact && body_.movement.feet.is_active &&
+                      body_.movement.feet.missed_m == DVec3(0.0) &&
+                      body_.movement.feet.missed_rad == 0.0;
+
+  ++revision_;
+  change_.has_begun = true;
+  change_.begun_keeps_speed = keeps_speed();
+  is_moving_ = true;
+  body_.begins_planting = false;
+  is_exact_ = plan.exact.has_value();
+  closing_steps_ = 0;
+  is_idle_reported_ = false;
+  movement_time_s_ = body_.movement.start_offset_s;
+  request_id_ = request_id;
+  const int rise =
+      next.FindParameter(IsStep(next.kind) ? ParameterName::kEndY : ParameterName::kHeight);
+  ground_rise_m_ =
+      rise >= 0 ? GroundRise(plan.applied.values[static_cast<std::size_t>(rise)]) : 0.0;
+  AddEvent({.type = AvatarEventType::kStarted,
+            .request_id = request_id,
+            .kind = next.kind,
+            .group = plan.group,
+            .requested = plan.requested,
+            .applied = plan.applied,
+            .extrapolated = plan.extrapolated,
+            .clamped = is_met ? false : plan.clamped});
+}
+
+// Keeps straight steps on the line of the walk. Groups without a sideways parameter determine the
+// position of the base only along the walking direction. Sideways, it follows the body.
+void AvatarSimulation::KeepToLine(const DVec3& line_m) {
+  if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
+  const double heading_rad = body_.movement.base.heading_rad;
+  const DVec3 root = DVec3(body_.blended_pose.root_position_m);
+  const double aside_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
+                         RotateYaw(-heading_rad, line_m - base_.position_m).x;
+  base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
+}
+
+void AvatarSimulation::FinishMovement(double at_s) {
+  const MotionGroup& finished = group();
+  const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
+  CaptureBlendSource(at_s);
+  Leave(at_s, false);
+  movement_time_s_ = at_s;
+  ++revision_;
+  // Without planting, the base frame follows the root, and its height changes by the movement's own
+  // rise.
+  const BaseFrame before = base_;
+  base_ = BaseAfter(body_.movement, body_.pose);
+  base_.position_m.y = before.position_m.y + (has_moved ? ground_rise_m_ : 0.0);
+  if (!has_moved) base_.heading_rad = before.heading_rad;
+  if (body_.movement.feet.is_active) {
+    if (!is_exact_) KeepToLine(before.position_m);
+    body_.CaptureFootLocks(at_s);
+    const auto& left = body_.locks[0].print.position_m;
+    const auto& right = body_.locks[1].print.position_m;
+    if (IsStep(finished.kind)) {
+      const Foot landed = has_moved ? MovingFoot(finished.kind) : last_moved_;
+      base_.position_m.y = (landed == Foot::kLeft ? left : right).y;
+    } else {
+      base_.position_m.y = 0.5 * (left.y + right.y);
+    }
+  }
+  feet_ = MeasureFeet();
+  last_group_ = static_cast<std::size_t>(body_.movement.group);
+  is_moving_ = false;
+  is_walking_ = false;
+  if (IsStep(finished.kind)) {
+    if (has_moved) last_moved_ = MovingFoot(finished.kind);
+    is_walking_ = closing_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
+  }
+  AddEvent({.type = AvatarEventType::kFinished,
+            .request_id = request_id_,
+            .kind = finished.kind,
+            .group = body_.movement.group,
+            .is_cut_short = at_s < body_.movement.duration_s(),
+            .base = base_});
+}
+
+void AvatarSimulation::FinishStand() {
+  is_in_stand_ = false;
+  last_group_ = body_.library->groups().size();
+  AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});
+}
+
+Vec3 AvatarSimulation::LandingBall(Foot foot) const {
+  if (!body_.movement.feet.is_active)
+    return BallPosition(body_.library->skeleton(), body_.pose, foot);
+  const DVec3 print = body_.movement.feet.foot(foot).to.position_m;
+  return Vec3(print.x, print.y + body_.library->leg_rig().side(foot).ball_height_m, print.z);
+}
+
+double AvatarSimulation::StrikeTime() const {
+  return body_.movement.warp.keytime_s(
+      ContactKeytimesOf(group().kind, group().interval_count()).landing);
+}
+
+void AvatarSimulation::ReportFootStrikes(double before_s, double after_s) {
+  const MotionGroup& moving = group();
+  const double strike_s = StrikeTime();
+  if (!(before_s < strike_s && strike_s <= after_s)) return;
+  if (!body_.movement.feet.is_active) body_.Evaluate(strike_s);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    if (IsStep(moving.kind) && foot != MovingFoot(moving.kind)) continue;
+    AddEvent({.type = AvatarEventType::kFootStrike,
+              .request_id = request_id_,
+              .kind = moving.kind,
+              .group = body_.movement.group,
+              .foot = foot,
+              .position_m = LandingBall(foot)});
+  }
+}
+
+}  // namespace stridewire
