@@ -18,9 +18,12 @@
 
 #include "offline/build/interpolation_error.h"
 #include "offline/build/refine.h"
+#include "offline/builtin/builtin_library.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/library_file.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "stridewire/offline/library_builder.h"
 #include "test_library.h"
 
 namespace stridewire {

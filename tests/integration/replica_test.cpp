@@ -19,7 +19,6 @@
 #include "runtime/avatar/avatar_replica.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
-#include "stridewire/runtime/avatar.h"
 
 namespace stridewire {
 namespace {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/check.h"
+#include "runtime/avatar/record_fields.h"
 #include "runtime/pose/plant_feet.h"
 
 namespace stridewire {

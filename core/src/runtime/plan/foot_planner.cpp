@@ -5,6 +5,7 @@
 
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/keytimes.h"
+#include "runtime/plan/foot_sampler.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/leg_rig.h"

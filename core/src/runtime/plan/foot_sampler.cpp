@@ -6,6 +6,7 @@
 
 #include "base/check.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/grid_blend.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/skeleton/leg_rig.h"
 

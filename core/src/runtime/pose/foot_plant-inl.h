@@ -10,6 +10,7 @@
 
 #include "runtime/pose/plant_feet.h"
 #include "runtime/pose/simd_math-inl.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/skeleton/leg_rig.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -6,6 +6,7 @@
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/pose_kernels.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
