@@ -1,5 +1,6 @@
-// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there are. Beside them the
-// floor of this machine and this run, the plain reference, and sampling every example by itself.
+// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there
+// are. Beside them the floor of this machine and this run, the plain reference, and sampling every
+// example by itself.
 
 #include <benchmark/benchmark.h>
 
@@ -89,7 +90,8 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
-// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and not kept.
+// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and
+// not kept.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
   // Spread over shards: threads that share nothing but the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
@@ -128,7 +130,8 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   Count(state, steps, count);
 }
 
-// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that observers share.
+// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that
+// observers share.
 void WholePose(benchmark::State& state, const Library& library) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, true);
@@ -187,7 +190,8 @@ void WholePose(benchmark::State& state, const Library& library) {
   Count(state, steps, count);
 }
 
-// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty frames.
+// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty
+// frames.
 void MakeSteps(benchmark::State& state, const Library& library) {
   constexpr std::size_t kSteps = 16;
   constexpr int kFrames = 30;
@@ -209,16 +213,16 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   std::vector<Movement> movements(kSteps);
   for (Movement& movement : movements) movement.difference = measured;
   SoaPoseEvaluator evaluator(*library, kFrames);
-  std::array<SampleRun, kSteps> stretches;
+  std::array<SampleRun, kSteps> runs;
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
       CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
                      movements[i]);
       StartWeighted(group, {}, movements[i]);
-      stretches[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
+      runs[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
     }
-    evaluator.Begin(stretches, kFrames);
+    evaluator.Begin(runs, kFrames);
     for (int frame = 0; frame < kFrames; ++frame) {
       benchmark::DoNotOptimize(evaluator.Next().roots_m());
     }
@@ -233,7 +237,8 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   for (std::size_t i = 0; i < count; ++i) y[i] += w * x[i];
 }
 
-// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts them.
+// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts
+// them.
 class LineAligned {
  public:
   explicit LineAligned(std::size_t count) : floats_(count + kLineFloats) {
@@ -250,9 +255,10 @@ class LineAligned {
   float* begin_;
 };
 
-// The floor: the bytes that poses can not do without when as many of a movement's are made at once, each read and given
-// one multiply-add. At 30 cells a second a stretch of eight passes seven grid points, one of sixteen eleven, each with a
-// row of all examples; each pose is of four of their sums and, quantised, takes a quarter of a row; plan and difference are read once.
+// The floor: the bytes that poses can not do without when as many of a movement's are made at once,
+// each read and given one multiply-add. At 30 cells a second a stretch of eight passes seven grid
+// points, one of sixteen eleven, each with a row of all examples; each pose is of four of their
+// sums and, quantised, takes a quarter of a row; plan and difference are read once.
 void Floor(benchmark::State& state, const Library& library) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::size_t poses = server::EncodedPoseCache::TurnsOf(count);

@@ -1,11 +1,11 @@
-// What movements, poses and messages cost on one core, on `builtin` and on every library named after
-// the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
+// What movements, poses and messages cost on one core, on `builtin` and on every library named
+// after the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
 //
-// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those named. Floors are always
-// as fast as the machine can be.
+// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those
+// named. Floors are always as fast as the machine can be.
 //
-// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole length,
-// here 30 of them.
+// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole
+// length, here 30 of them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -167,7 +167,7 @@ class Crowd {
 
   void Advance() {
     AdvanceStates();
-    AvatarSimulation::ShowPoses(all_, evaluator_);
+    AvatarSimulation::UpdatePoses(all_, evaluator_);
   }
   /// Without poses.
   void AdvanceStates() {
@@ -380,8 +380,8 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(frame.size()));
 }
 
-/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such observers
-/// take turns, so that the rows are as cold as in a tick.
+/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such
+/// observers take turns, so that the rows are as cold as in a tick.
 void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   constexpr std::size_t kRows = 10'000;
   constexpr std::size_t kPicked = 100;
@@ -483,7 +483,8 @@ void RegisterAll(const std::string& path, const Library& library) {
   Register(name + "/decode_pose/compact", DecodeCompactPose, library);
 }
 
-/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this machine has none.
+/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this
+/// machine has none.
 std::string_view ChooseInstructionSet(std::string_view name) {
   for (const InstructionSet& set : kInstructionSets) {
     if ((hwy::SupportedTargets() & set.target) == 0 || (!name.empty() && name != set.name))

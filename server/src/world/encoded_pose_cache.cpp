@@ -137,7 +137,7 @@ void EncodedPoseCache::Ask(Place& place, AvatarSimulation& avatar) {
     Want(place, avatar.revision(), *movement, avatar.movement_time_s());
     return;
   }
-  avatar.ShowPose();
+  avatar.UpdatePose();
   Take(place, avatar.revision(), avatar.pose(), !has_layers);
 }
 
@@ -174,18 +174,19 @@ void EncodedPoseCache::Finish() {
     const std::size_t left = turns - (plane_ + turn) % turns;
     const std::size_t most = std::min(left, ring_ >> kept_[wanted.place].cuts);
     wanted.is_its_turn = left == turns;
-    wanted.count = SampleRunCount(*wanted.stretch.movement, wanted.stretch.time_s, step_s_,
-                                  ticks_apart_, static_cast<int>(most));
+    wanted.count = SampleRunCount(*wanted.run.movement, wanted.run.time_s, step_s_, ticks_apart_,
+                                  static_cast<int>(most));
     poses += static_cast<std::size_t>(wanted.count);
   }
-  // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it was sent elsewhere,
-  // those whose turn it is not get one only: a tick makes hardly more than two poses an avatar.
+  // Where a whole crowd wants poses at once, since somebody looks at it for the first time or it
+  // was sent elsewhere, those whose turn it is not get one only: a tick makes hardly more than two
+  // poses an avatar.
   const bool is_crowd_new = poses > 2 * shown_ + kLanes * kMost;
   for (Wanted& wanted : wanted_) {
     if (is_crowd_new && !wanted.is_its_turn) wanted.count = 1;
     Start(wanted.place, kept_[wanted.place].revision, static_cast<std::size_t>(wanted.count),
           false);
-    scratch_->queue.Add(wanted.stretch, wanted.count, wanted.place);
+    scratch_->queue.Add(wanted.run, wanted.count, wanted.place);
   }
   wanted_.clear();
   std::array<std::uint32_t, kLanes> places;
@@ -246,7 +247,8 @@ EncodedPoseCache::Encoded EncodedPoseCache::Of(const Place& place, PoseMode mode
   std::size_t m = 0;
   while (m < modes_.size() && modes_[m].mode != mode) ++m;
   STRIDEWIRE_CHECK(m < modes_.size() && pose < kept.count);
-  // Planes are read one place after the other, and page by page: the processor does not ask ahead over the end of one.
+  // Planes are read one place after the other, and page by page: the processor does not ask ahead
+  // over the end of one.
   constexpr std::size_t kReadAhead = 8;
   if (const std::size_t next = place.index_ + kReadAhead; next < kept_.size()) {
     PrefetchBytes(BytesIn(plane_, next) + modes_[m].at, modes_[m].codec->pose_bytes());

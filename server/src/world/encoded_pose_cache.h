@@ -28,10 +28,10 @@ struct PoseScratch {
   std::array<protocol::CompactCodec::Block, kModes> blocks;
 };
 
-/// Encodes compact poses for several ticks at once. What an avatar shows is settled when its movement begins, so what it
-/// is made of is brought into the cache, blended and unpacked once in kMost ticks; in each tick its turn is other
-/// avatars'. Who is sent elsewhere meanwhile is evaluated anew, and less far ahead the next time. One a world and shard;
-/// not thread-safe.
+/// Encodes compact poses for several ticks at once. What an avatar shows is settled when its
+/// movement begins, so what it is made of is brought into the cache, blended and unpacked once in
+/// kMost ticks; in each tick its turn is other avatars'. Who is sent elsewhere meanwhile is
+/// evaluated anew, and less far ahead the next time. One a world and shard; not thread-safe.
 ///
 ///   ahead.Begin(step, step_s, avatars);
 ///   for each avatar: ahead.Ask(place, avatar)
@@ -45,19 +45,21 @@ struct PoseScratch {
 ///   …
 ///   standing  [ avatar 0 ][ avatar 1 ] …                      of who stands, for all ticks
 ///
-/// It is more than caches hold: each avatar has cache lines of its own, which are written whole and past the caches, and
-/// are asked for before they are read.
+/// It is more than caches hold: each avatar has cache lines of its own, which are written whole and
+/// past the caches, and are asked for before they are read.
 class EncodedPoseCache {
  public:
   static constexpr std::size_t kMost = 16;
-  /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would not fill the lanes.
+  /// In how many ticks each of so many avatars has its turn. Of few, those whose turn it is would
+  /// not fill the lanes.
   [[nodiscard]] static constexpr std::size_t TurnsOf(std::size_t shown) {
     return shown < 2048 || shown > kMany ? kMost / 2 : kMost;
   }
   /// Of more avatars there are planes of kMost / 2 ticks only, for their memory.
   static constexpr std::size_t kMany = 32'768;
 
-  /// Where an avatar's poses are kept. Given back when the avatar goes, before EncodedPoseCache does.
+  /// Where an avatar's poses are kept. Given back when the avatar goes, before EncodedPoseCache
+  /// does.
   class Place {
    public:
     Place() = default;
@@ -77,19 +79,22 @@ class EncodedPoseCache {
     std::uint32_t index_ = 0;
   };
 
-  /// `codecs` may be null: of a world without compact poses only roots are kept, as without modes. They outlive it.
+  /// `codecs` may be null: of a world without compact poses only roots are kept, as without modes.
+  /// They outlive it.
   EncodedPoseCache(std::shared_ptr<PoseScratch> scratch, const protocol::CompactCodecs* codecs);
   EncodedPoseCache(const EncodedPoseCache&) = delete;
   EncodedPoseCache& operator=(const EncodedPoseCache&) = delete;
 
-  /// In which modes poses are told, and every how many ticks. What was kept for others is nothing any more.
+  /// In which modes poses are told, and every how many ticks. What was kept for others is nothing
+  /// any more.
   void SetModes(std::span<const protocol::PoseMode> compact_modes, int ticks_apart);
 
-  /// The step that poses are asked for from now on, how long steps are, and how many avatars are shown in this one: those
-  /// that have their poses among them.
+  /// The step that poses are asked for from now on, how long steps are, and how many avatars are
+  /// shown in this one: those that have their poses among them.
   void Begin(std::uint64_t step, double step_s, std::size_t shown);
 
-  /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is until then.
+  /// Asks for an avatar's pose of this step, which is there after Finish; the avatar stays as it is
+  /// until then.
   void Ask(Place& place, AvatarSimulation& avatar);
 
   // What Ask does, for who has no avatar.
@@ -100,9 +105,11 @@ class EncodedPoseCache {
     return kept.revision == static_cast<std::uint32_t>(revision) && kept.layout == layout_ &&
            (kept.stays || PoseOf(kept) < kept.count);
   }
-  /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where it is until Finish.
+  /// Those of this step and of some to come are wanted of a movement at `time_s`, which stays where
+  /// it is until Finish.
   void Want(Place& place, std::uint64_t revision, const Movement& movement, double time_s);
-  /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at any more.
+  /// The pose of this step; if it `stays`, of all steps to come. The pose itself is not looked at
+  /// any more.
   void Take(Place& place, std::uint64_t revision, ConstPoseSpan pose, bool stays);
 
   /// Now they are there.
@@ -153,7 +160,7 @@ class EncodedPoseCache {
   struct Wanted {
     std::uint32_t place;
     int count;
-    SampleRun stretch;
+    SampleRun run;
     bool is_its_turn;
   };
 

@@ -8,8 +8,8 @@
 #include "base/check.h"
 #include "runtime/avatar/movement_record.h"
 #include "world/convert.h"
-#include "world/inspect.h"
 #include "world/id_set.h"
+#include "world/inspect.h"
 
 namespace stridewire::server {
 
@@ -422,11 +422,12 @@ void WorldShard::TellMovements() {
   for (const std::uint32_t row : eventful_) {
     const auto& [number, entry] = in_order[row];
     if (!AppendChange(entry->avatar, movements_.back().records)) continue;
-    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().is_any;
+    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().needs_state;
     add(number, is_new ? protocol::kPoseDiscontinuity : 0);
   }
   const std::size_t parts = movements_.size() - first;
-  // Only a frame limit far below the default lets it come to that: who is told sees a gap, and knows of nobody.
+  // Only a frame limit far below the default lets it come to that: who is told sees a gap, and
+  // knows of nobody.
   if (parts > protocol::kMaxBatchParts) {
     metrics_.pose_errors.Add(in_order.size());
     movements_.resize(first);
@@ -550,7 +551,8 @@ bool WorldShard::HasRegionsOfSeveral(PoseMode mode) const {
   });
 }
 
-// Sees to it that these rows' avatars have their encoded poses of this step, and perhaps of some to come.
+// Sees to it that these rows' avatars have their encoded poses of this step, and perhaps of some to
+// come.
 void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
   constexpr std::size_t kAhead = 16;
   const std::span<const InOrder> in_order = AvatarsInOrder();
@@ -566,11 +568,11 @@ void WorldShard::KeepPoses(std::span<const std::uint32_t> rows) {
 }
 
 // Evaluates the poses of these rows' avatars.
-void WorldShard::ShowPoses(std::span<const std::uint32_t> rows) {
+void WorldShard::UpdatePoses(std::span<const std::uint32_t> rows) {
   const std::span<const InOrder> in_order = AvatarsInOrder();
   shown_.clear();
   for (const std::uint32_t row : rows) shown_.push_back(&in_order[row].entry->avatar);
-  AvatarSimulation::ShowPoses(shown_, ahead_.evaluator());
+  AvatarSimulation::UpdatePoses(shown_, ahead_.evaluator());
 }
 
 std::shared_ptr<const SpatialGrid> WorldShard::PlacesAt(std::uint64_t tick) {
@@ -589,7 +591,8 @@ std::shared_ptr<const SpatialGrid> WorldShard::PlacesAt(std::uint64_t tick) {
   return places_;
 }
 
-std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode, const SpatialGrid& places) {
+std::span<const std::uint32_t> WorldShard::NamedAndNearRows(PoseMode mode,
+                                                            const SpatialGrid& places) {
   is_near_.resize(numbers_->size());
   near_rows_.clear();
   const auto take = [&](std::uint32_t row) {
@@ -641,7 +644,7 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool whole,
   if (is_compact) {
     KeepPoses(wanted);
   } else {
-    ShowPoses(wanted);
+    UpdatePoses(wanted);
   }
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < wanted.size(); ++i) {

@@ -29,7 +29,8 @@ inline constexpr double kMaxSpawnHeadingRad = 10'000.0;
 /// An avatar takes about 8 KB and its queue (docs/SERVER.md, "Memory").
 class WorldShard {
  public:
-  /// Borrows budget and metrics. `scratch` is of the world's library and this thread's; null: one of its own.
+  /// Borrows budget and metrics. `scratch` is of the world's library and this thread's; null: one
+  /// of its own.
   WorldShard(std::shared_ptr<World> world, int shard, int shard_count, int max_queue,
              const TickClock& clock, AvatarBudget& budget, ThreadMetrics& metrics,
              std::size_t max_bulk_bytes = protocol::kMaxBulkBytes,
@@ -58,8 +59,8 @@ class WorldShard {
   /// Events since this was last called, null if there were none.
   [[nodiscard]] std::shared_ptr<const std::vector<protocol::Event>> TakeEvents();
 
-  /// The poses of `tick`: of all avatars and with a whole batch, or of those that are named. False when
-  /// nobody would miss it: no poses, and none in the delivery before.
+  /// The poses of `tick`: of all avatars and with a whole batch, or of those that are named. False
+  /// when nobody would miss it: no poses, and none in the delivery before.
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool whole,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
@@ -113,7 +114,7 @@ class WorldShard {
   bool HasRegions(protocol::PoseMode mode) const;
   bool HasRegionsOfSeveral(protocol::PoseMode mode) const;
   void KeepPoses(std::span<const std::uint32_t> rows);
-  void ShowPoses(std::span<const std::uint32_t> rows);
+  void UpdatePoses(std::span<const std::uint32_t> rows);
   std::shared_ptr<const SpatialGrid> PlacesAt(std::uint64_t tick);
   std::span<const std::uint32_t> NamedAndNearRows(protocol::PoseMode mode,
                                                   const SpatialGrid& places);

@@ -40,7 +40,7 @@ class AvatarReplica {
   /// True if the replica has received a state and no error occurred since.
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
+  [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
@@ -59,8 +59,8 @@ class AvatarReplica {
   bool is_idle_ = false;
   // The last record set the movement time (or the layers) for the next tick, so AdvanceAll must not
   // advance it.
-  bool is_told_ = false;
-  bool are_layers_told_ = false;
+  bool is_time_set_ = false;
+  bool are_layers_set_ = false;
 };
 
 }  // namespace stridewire

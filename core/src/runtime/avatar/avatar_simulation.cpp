@@ -14,15 +14,15 @@
 namespace stridewire {
 namespace {
 
-// After a long stride, one step may not suffice to bring the feet together. A second step must bring
-// them closer by at least this much.
+// After a long stride, one step may not suffice to bring the feet together. A second step must
+// bring them closer by at least this much.
 constexpr double kClosingGainM = 0.03;
 
-// A movement can add up to this many events in one tick: started, two foot strikes, finished, the end
-// of a walk or a rejection, and the start of the next movement.
+// A movement can add up to this many events in one tick: started, two foot strikes, finished, the
+// end of a walk or a rejection, and the start of the next movement.
 constexpr std::size_t kEventReserve = 7;
-// A tick usually has at most three events: finished, started and foot strike. The list grows if there
-// are more.
+// A tick usually has at most three events: finished, started and foot strike. The list grows if
+// there are more.
 constexpr std::size_t kUsualEvents = 3;
 // A queue keeps memory for this many requests.
 constexpr std::size_t kUsualQueue = 8;
@@ -47,7 +47,7 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
       Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
   body_.pose.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
-  closing_steps_ = 0;
+  inserted_steps_ = 0;
   body_.blended_pose = body_.pose;
   moved_until_s_ = next_event_s_ = -1.0;
   body_.plants_feet = foot_planting();
@@ -64,8 +64,8 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   last_group_ = body_.library->groups().size();
   last_moved_ = Foot::kRight;
   CancelQueue();
-  body_.ShowLayers();
-  next_change_.is_any = true;
+  body_.ApplyLayers();
+  next_change_.needs_state = true;
 }
 
 Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_delay_s) {
@@ -75,11 +75,11 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
   }
   if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->exact_only) {
-    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
-    if (kept_.empty()) {
-      kept_.resize(1);
-      kept_.front().pose = Pose(body_.library->skeleton().joint_count());
-      MakeRoom(*body_.library, kept_.front().movement);
+    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNeedsPlanting);
+    if (saved_.empty()) {
+      saved_.resize(1);
+      saved_.front().pose = Pose(body_.library->skeleton().joint_count());
+      Reserve(*body_.library, saved_.front().movement);
       events_.reserve(kMaxEventsPerAdvance);  // One tick may reject many requests.
     }
   }
@@ -100,8 +100,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.erase(queue_.begin(), queue_.begin() + static_cast<std::ptrdiff_t>(queue_head_));
     queue_head_ = 0;
   }
-  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole crowd
-  // tend to be long at the same time, but only briefly.
+  // Grow the queue in small steps and release its memory when it is empty. The queues of a whole
+  // crowd tend to be long at the same time, but only briefly.
   if (queue_.empty() && queue_.capacity() > kUsualQueue) queue_.shrink_to_fit();
   if (queue_.size() == queue_.capacity()) {
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
@@ -149,12 +149,12 @@ FootState AvatarSimulation::MeasureFeet() const {
 
 void AvatarSimulation::Advance(double dt_s) {
   AdvanceState(dt_s);
-  ShowPose();
+  UpdatePose();
 }
 
-void AvatarSimulation::ShowPose() {
+void AvatarSimulation::UpdatePose() {
   if (is_moving_) body_.Evaluate(movement_time_s_);
-  body_.ShowLayers();
+  body_.ApplyLayers();
 }
 
 void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
@@ -173,8 +173,8 @@ void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars,
   }
 }
 
-void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
-                                 SoaPoseEvaluator& evaluator) {
+void AvatarSimulation::UpdatePoses(std::span<AvatarSimulation* const> avatars,
+                                   SoaPoseEvaluator& evaluator) {
   std::array<PoseJob, SoaPose::kLanes> jobs;
   while (!avatars.empty()) {
     const std::span<AvatarSimulation* const> block =
@@ -185,7 +185,7 @@ void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
       jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
     }
     EvaluatePoses(evaluator, std::span(jobs).first(moving));
-    for (AvatarSimulation* avatar : block) avatar->body_.ShowLayers();
+    for (AvatarSimulation* avatar : block) avatar->body_.ApplyLayers();
     avatars = avatars.subspan(block.size());
   }
 }
@@ -193,7 +193,7 @@ void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
 void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                                   SoaPoseEvaluator& evaluator) {
   AdvanceStates(avatars, dt_s);
-  ShowPoses(avatars, evaluator);
+  UpdatePoses(avatars, evaluator);
 }
 
 // Prefetches what AdvanceEventfully reads of a walking avatar.
@@ -244,7 +244,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
         RedirectSwing();
         continue;
       }
-      const double duration_s = EndOfMovement();
+      const double duration_s = MovementEnd();
       if (before_s + left_s < duration_s || !may_change) {
         movement_time_s_ = before_s + left_s;
         time_s_ = end_s;
@@ -267,7 +267,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
     if (!may_change || !StartNext()) break;
   }
   time_s_ = end_s;
-  change_.is_idle_other = idle() != std::exchange(was_idle_, idle());
+  change_.idle_changed = idle() != std::exchange(was_idle_, idle());
 }
 
 bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
@@ -286,7 +286,7 @@ bool AvatarSimulation::StartNext() {
     is_walking_ = false;
     SwitchPlanting();
     const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
-    if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
+    if (plan && (inserted_steps_ == 0 || BringsFeetTogether(*plan))) {
       StartInserted(*plan);
       return true;
     }
@@ -304,7 +304,7 @@ bool AvatarSimulation::StartNext() {
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
-    GoOnWalking();
+    StartWalkStep();
     return true;
   }
   if (stand != nullptr) {
@@ -323,14 +323,14 @@ void AvatarSimulation::StartTransitionPath() {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
-  const TransitionPath way = FindTransitionPath(*body_.library, request, direct,
-                                                {feet_, last_moved_, last_group_, closing_steps_});
-  if (way.is_inserted) {
-    StartInserted(*way.plan);
-  } else if (way.plan) {
+  const TransitionPath path = FindTransitionPath(
+      *body_.library, request, direct, {feet_, last_moved_, last_group_, inserted_steps_});
+  if (path.is_inserted) {
+    StartInserted(*path.plan);
+  } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    if (PlanRequested(taken, *way.plan, 0.0)) BeginMovement(*way.plan, taken.id);
+    if (PlanRequested(taken, *path.plan, 0.0)) BeginMovement(*path.plan, taken.id);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -340,9 +340,9 @@ void AvatarSimulation::StartTransitionPath() {
 }
 
 void AvatarSimulation::StartInserted(const RequestPlan& plan) {
-  const int inserted = closing_steps_ + 1;
+  const int inserted = inserted_steps_ + 1;
   StartPlan(plan, 0);
-  closing_steps_ = inserted;
+  inserted_steps_ = inserted;
 }
 
 // Removes the request at the head of the queue and returns its id.
@@ -352,14 +352,14 @@ std::uint64_t AvatarSimulation::PopQueue() {
   return id;
 }
 
-// Starts the next step of the walk at the head of the queue. The request stays in the queue until the
-// walk has arrived or is rejected.
-void AvatarSimulation::GoOnWalking() {
+// Starts the next step of the walk at the head of the queue. The request stays in the queue until
+// the walk has arrived or is rejected.
+void AvatarSimulation::StartWalkStep() {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    stance.feet[f] =
-        body_.plants_feet ? body_.locks[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+    stance.feet[f] = body_.plants_feet ? body_.locks[f].print
+                                       : Footprint{StandingPosition(foot), base_.heading_rad};
   }
   stance.heading_rad = base_.heading_rad;
   stance.last_moved = last_moved_;
@@ -386,7 +386,7 @@ void AvatarSimulation::GoOnWalking() {
 }
 
 // Position of a foot between two movements: its footprint, or the ball if feet are not planted.
-DVec3 AvatarSimulation::StandsAt(Foot foot) const {
+DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
   return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
@@ -398,9 +398,9 @@ double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
   const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
   const DVec3 stands = body_.locks[1 - f].print.position_m;
-  const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
-                                         DVec3(outward * side_m, 0.0, step.length_m));
-  return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
+  const DVec3 planted = stands + RotateYaw(base_.heading_rad + step.turn_rad,
+                                           DVec3(outward * side_m, 0.0, step.length_m));
+  return GroundRise(options_.terrain->HeightAt(planted.x, planted.z) - stands.y);
 }
 
 std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& request) const {
@@ -421,12 +421,12 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   }
   Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   if (!step.foot && !is_walking_) {
-    const DVec3 centre = 0.5 * (StandsAt(Foot::kLeft) + StandsAt(Foot::kRight));
-    const double aside_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
-    foot = aside_m >= 0.0 ? Foot::kLeft : Foot::kRight;
+    const DVec3 centre = 0.5 * (StandingPosition(Foot::kLeft) + StandingPosition(Foot::kRight));
+    const double side_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
+    foot = side_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
-  return PlanFootprint(*body_.library, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad,
-                       feet_);
+  return PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
+                       base_.heading_rad, feet_);
 }
 
 void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
@@ -434,8 +434,8 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
   BeginMovement(plan, request_id);
 }
 
-// Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the same
-// fraction `swing_part` of its own swing.
+// Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the
+// same fraction `swing_part` of its own swing.
 void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
   const MotionGroup& next = body_.library->group(plan.group);
   // Only the first elements are used, one per example of the group.
@@ -451,7 +451,7 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) 
   body_.StartWeighted(base_);
   if (swing_part > 0.0) {
     const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
-    body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
+    body_.SetStartOffset(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // An avatar that was standing has no speed to keep.
   body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
@@ -460,7 +460,8 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) 
 // Starts the movement that was just planned.
 void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t request_id) {
   const MotionGroup& next = group();
-  // If planting reaches the requested footprint, the step is not clamped, even if its parameters are.
+  // If planting reaches the requested footprint, the step is not clamped, even if its parameters
+  // are.
   const bool is_met = plan.exact && body_.movement.feet.is_active &&
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
@@ -471,7 +472,7 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
   is_moving_ = true;
   body_.begins_planting = false;
   is_exact_ = plan.exact.has_value();
-  closing_steps_ = 0;
+  inserted_steps_ = 0;
   is_idle_reported_ = false;
   movement_time_s_ = body_.movement.start_offset_s;
   request_id_ = request_id;
@@ -495,16 +496,16 @@ void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;
   const DVec3 root = DVec3(body_.blended_pose.root_position_m);
-  const double aside_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
-                         RotateYaw(-heading_rad, line_m - base_.position_m).x;
-  base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
+  const double side_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
+                        RotateYaw(-heading_rad, line_m - base_.position_m).x;
+  base_.position_m += RotateYaw(heading_rad, DVec3(side_m, 0.0, 0.0));
 }
 
 void AvatarSimulation::FinishMovement(double at_s) {
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
   CaptureBlendSource(at_s);
-  Leave(at_s, false);
+  RecordLeaving(at_s, false);
   movement_time_s_ = at_s;
   ++revision_;
   // Without planting, the base frame follows the root, and its height changes by the movement's own
@@ -531,7 +532,7 @@ void AvatarSimulation::FinishMovement(double at_s) {
   is_walking_ = false;
   if (IsStep(finished.kind)) {
     if (has_moved) last_moved_ = MovingFoot(finished.kind);
-    is_walking_ = closing_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
+    is_walking_ = inserted_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,

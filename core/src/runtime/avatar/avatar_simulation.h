@@ -24,13 +24,14 @@
 
 namespace stridewire {
 
-/// What has become of an avatar's movement in a call of Advance, for who shows the avatar elsewhere (MovementRecord).
+/// What has become of an avatar's movement in a call of Advance, for who shows the avatar elsewhere
+/// (MovementRecord).
 struct AvatarChange {
-  bool is_any = false;             ///< More than the rest tells: only the whole state does
+  bool needs_state = false;        ///< More than the rest tells: only the whole state does
   bool has_left = false;           ///< The movement before ended or gave way
   bool has_begun = false;          ///< One began, and goes on
   bool has_layers = false;         ///< Layers were asked for
-  bool is_idle_other = false;      ///< idle() is not what it was
+  bool idle_changed = false;       ///< idle() is not what it was
   bool is_left_at_end = false;     ///< The one before ended, and did not give way
   bool is_redirected = false;      ///< The other began in mid-swing of the one before
   bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::CaptureBlendSource)
@@ -44,8 +45,8 @@ struct AvatarChange {
 ///
 /// Time is an argument; `Advance` is the only thing that moves it. Given library, start, requests
 /// and the sizes of the steps in time, the poses are the same bytes on every machine. Not
-/// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries) and
-/// `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
+/// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries)
+/// and `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
@@ -58,11 +59,13 @@ class AvatarSimulation {
   /// A swing less than this part of which is left is not sent elsewhere.
   static constexpr double kLeastSwingLeft = 0.4;
 
-  /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
-  /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
+  /// Checks and queues a request; one that takes over empties the queue first. Errors as
+  /// ValidateRequest; kUnsupported also for a footprint that must be met where feet are not
+  /// planted; kLimitExceeded: queue full.
   ///
-  /// `start_delay_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
-  /// before. What goes on from a movement is never held. One who is held already is not held longer.
+  /// `start_delay_s` (0 or more): who just stands begins it no sooner than that from now, and who
+  /// moves is not taken over before. What goes on from a movement is never held. One who is held
+  /// already is not held longer.
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
   /// Drops what has not started; the current movement goes on to its end. Returns how many.
@@ -75,9 +78,10 @@ class AvatarSimulation {
   /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
   void Teleport(const BaseFrame& start);
 
-  /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without a jump. A swing is
-  /// not sent elsewhere meanwhile, and what waits in the queue for a footprint that must be met is rejected while it
-  /// is off. kUnsupported: to be on, but this skeleton does not support foot planting.
+  /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without
+  /// a jump. A swing is not sent elsewhere meanwhile, and what waits in the queue for a footprint
+  /// that must be met is rejected while it is off. kUnsupported: to be on, but this skeleton does
+  /// not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool is_on);
   /// As last set; false where the library's legs can not.
   [[nodiscard]] bool foot_planting() const {
@@ -91,25 +95,26 @@ class AvatarSimulation {
   /// Events of this call are in `events()` until the next.
   void Advance(double dt_s);
 
-  /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
-  /// bit of any pose depends on who else is there.
+  /// The same for many avatars of one library, whose poses are evaluated together: several times as
+  /// fast, and not a bit of any pose depends on who else is there.
   static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
                          SoaPoseEvaluator& evaluator);
 
-  /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none of now until
-  /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
+  /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none
+  /// of now until UpdatePose. `eventful`: the places in `avatars` of those that are not quiet after
+  /// it, growing.
   static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
                             std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
-  void ShowPose();
+  void UpdatePose();
   /// The same for many avatars of one library together.
-  static void ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
+  static void UpdatePoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
 
   /// Displayed, in the world.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
+  [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
   [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
-  /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or SetLayer it is that of
-  /// pose().
+  /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or
+  /// SetLayer it is that of pose().
   [[nodiscard]] const AvatarBody& body() const { return body_; }
   /// What changed in the last Advance, and by Teleport and SetLayer before it.
   [[nodiscard]] const AvatarChange& change() const { return change_; }
@@ -127,11 +132,13 @@ class AvatarSimulation {
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
   /// Seconds since it was made.
   [[nodiscard]] double time_s() const { return time_s_; }
-  /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as it stays, all that is
-  /// displayed but layers follows from movement() and its time, or stands still.
+  /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as
+  /// it stays, all that is displayed but layers follows from movement() and its time, or stands
+  /// still.
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// Moving without layers, and nothing has happened in the last Advance: events() and change() tell nothing. Of who is
-  /// quiet, time_s(), revision(), movement_time_s() and idle() lie in one cache line.
+  /// Moving without layers, and nothing has happened in the last Advance: events() and change()
+  /// tell nothing. Of who is quiet, time_s(), revision(), movement_time_s() and idle() lie in one
+  /// cache line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
   /// For who asks many: that line is read soon.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
@@ -145,7 +152,7 @@ class AvatarSimulation {
   }
 
  private:
-  static constexpr const char* kNotPlanted = "exact placement requires foot planting";
+  static constexpr const char* kNeedsPlanting = "exact placement requires foot planting";
 
   void AddEvent(const AvatarEvent& event);
   // Times are sums of ticks: a hold of whole ticks ends with the last of them.
@@ -162,7 +169,7 @@ class AvatarSimulation {
   void PrefetchState() const;
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
   [[nodiscard]] bool StartNext();
-  void GoOnWalking();
+  void StartWalkStep();
   void StartTransitionPath();
   void StartInserted(const RequestPlan& plan);
   std::uint64_t PopQueue();
@@ -176,17 +183,17 @@ class AvatarSimulation {
   [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
                                               double swing_part);
   [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
-  [[nodiscard]] double EndOfMovement() const;
-  [[nodiscard]] double Landed() const;
+  [[nodiscard]] double MovementEnd() const;
+  [[nodiscard]] double LandingTime() const;
   [[nodiscard]] bool RedirectsSwing() const;
   void RedirectSwing();
   void SwitchPlanting();
   void CaptureBlendSource(double time_s);
-  void Leave(double time_s, bool is_redirected);
+  void RecordLeaving(double time_s, bool is_redirected);
   void FinishMovement(double at_s);
   void KeepToLine(const DVec3& line_m);
   void FinishStand();
-  [[nodiscard]] DVec3 StandsAt(Foot foot) const;
+  [[nodiscard]] DVec3 StandingPosition(Foot foot) const;
   [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   [[nodiscard]] double StrikeTime() const;
   void ReportFootStrikes(double before_s, double after_s);
@@ -204,7 +211,7 @@ class AvatarSimulation {
   bool is_walking_ = false;          // a step left the feet apart: close before standing
   bool interrupts_ = false;          // the request at the queue's head does not wait for the end
   bool is_exact_ = false;            // the step under way lands where it was sent
-  int closing_steps_ = 0;            // of our own in a row, the movement under way included
+  int inserted_steps_ = 0;           // of our own in a row, the movement under way included
   double start_not_before_s_ = 0.0;  // avatar time
   double moved_until_s_ = -1.0;      // avatar time
 
@@ -217,13 +224,13 @@ class AvatarSimulation {
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
   double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
-  // What is put back when a movement that was planned is not played. Has its size from the first request on
-  // that may be refused.
-  struct Kept {
+  // What is put back when a movement that was planned is not played. Has its size from the first
+  // request on that may be refused.
+  struct SavedState {
     Movement movement;
     Pose pose;
   };
-  std::vector<Kept> kept_;  // one, or none before; an avatar can be copied
+  std::vector<SavedState> saved_;  // one, or none before; an avatar can be copied
 
   FootState stand_feet_;  // of the library's stand pose
   FootState feet_;

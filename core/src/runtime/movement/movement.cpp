@@ -40,10 +40,10 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
                      group.dilations, group.linear, group.radial},
                     parameters, weights);
   }
-  TakeWeights(group, weights, movement);
+  ApplyWeights(group, weights, movement);
 }
 
-void TakeWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
+void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
   movement.weights.resize(weights.size());
   movement.heading_change_rad = 0.0;
   for (std::size_t e = 0; e < weights.size(); ++e) {

@@ -55,12 +55,13 @@ struct Movement {
 void StartMovement(const MotionGroup& group, int group_index, std::span<const double> parameters,
                    const BaseFrame& base, std::span<double> weight_scratch, Movement& movement);
 
-/// The part of StartMovement that decides the poses at both ends: group, weights and heading change.
+/// The part of StartMovement that decides the poses at both ends: group, weights and heading
+/// change.
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement);
 
 /// Gives the movement other weights [n] of its group, and the heading change that follows.
-void TakeWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
+void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
 
 /// The rest of StartMovement, for a movement that has group, parameters and weights.
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement);
@@ -68,11 +69,12 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
 /// f(s) = 3(1-s)^2 - 2(1-s)^3, 1 at 0, 0 from 1 on.
 [[nodiscard]] double EaseOut(double s);
 
-/// h(s) = s (1-s)^2: 0 at both ends, of slope 1 at 0; with f the cubic through any value and slope at 0.
+/// h(s) = s (1-s)^2: 0 at both ends, of slope 1 at 0; with f the cubic through any value and slope
+/// at 0.
 [[nodiscard]] double EaseOutSlope(double s);
 
-/// Base frame after the movement: below the displayed root at its end, heading turned by the blended
-/// change (the paper takes the displayed heading, which swings with the pelvis and veers).
+/// Base frame after the movement: below the displayed root at its end, heading turned by the
+/// blended change (the paper takes the displayed heading, which swings with the pelvis and veers).
 [[nodiscard]] BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose);
 
 }  // namespace stridewire

@@ -22,7 +22,8 @@ struct FootLock {
 };
 using FootLocks = std::array<FootLock, 2>;  ///< Indexed by Foot.
 
-/// Feet as the unplanted pose has them, on the ground below them or, without terrain, at height `ground_m`.
+/// Feet as the unplanted pose has them, on the ground below them or, without terrain, at height
+/// `ground_m`.
 [[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
                                     double ground_m, const Terrain* terrain);
 
@@ -37,7 +38,8 @@ void StandOn(const FootLocks& locks, Movement& movement);
 struct LandingTarget {
   const RequestPlan& request;  ///< Its applied ends are kept exactly, the footprint if there is one
   const Terrain* terrain;      ///< Null: level where the library and the request say
-  /// A point of the line the body goes along, which groups that say nothing of where feet stand aside keep to.
+  /// A point of the line the body goes along, which groups that say nothing of where feet stand
+  /// aside keep to.
   DVec3 line_m;
 };
 
@@ -48,25 +50,25 @@ struct BlendSource {
       earlier;  ///< The same kBlendStepS before, if its speed is to be kept
 };
 
-/// A footprint further from where the library's step ends than the request says is approached so far
-/// only. A heading is met as far as this.
+/// A footprint further from where the library's step ends than the request says is approached so
+/// far only. A heading is met as far as this.
 inline constexpr double kMaxFootTurnRad = 0.35;
 /// The root goes no further from where its steps have it, for who is to stand in a place.
 inline constexpr double kMaxRootShiftM = 0.4;
 
-/// Plans the feet of a movement that StartMovement has filled, heading and all, and that goes on from
-/// `join`. Sets the movement's base position, so that the
-/// foot that stays (for a jump: the middle of both) is where it stands and nothing drifts; its
-/// difference pose; and `movement.feet`.
+/// Plans the feet of a movement that StartMovement has filled, heading and all, and that goes on
+/// from `join`. Sets the movement's base position, so that the foot that stays (for a jump: the
+/// middle of both) is where it stands and nothing drifts; its difference pose; and `movement.feet`.
 ///
-/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never allocates. Returns
-/// where the blended and eased pose has the feet when the movement is entered, and kBlendStepS later.
+/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never
+/// allocates. Returns where the blended and eased pose has the feet when the movement is entered,
+/// and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingTarget& wish, const BlendSource& source,
+                               const LandingTarget& target, const BlendSource& source,
                                GridCache& cache, PoseSpan pose, Movement& movement);
 
-/// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither request nor ground are
-/// needed to make it again.
+/// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither
+/// request nor ground are needed to make it again.
 struct LandingDecision {
   double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
   bool is_on_terrain = false;
@@ -83,13 +85,14 @@ struct LandingDecision {
 /// What was chosen for a movement whose feet are planned.
 [[nodiscard]] LandingDecision DecisionOf(MovementKind kind, const Movement& movement);
 
-/// The same plan, bit by bit, from what was chosen for it. The movement has its weights and heading; the heading
-/// change is not needed.
+/// The same plan, bit by bit, from what was chosen for it. The movement has its weights and
+/// heading; the heading change is not needed.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingDecision& choice, const BlendSource& source,
+                               const LandingDecision& decision, const BlendSource& source,
                                GridCache& cache, PoseSpan pose, Movement& movement);
 
-/// The holds at a time of a planned movement when both feet stand; the pose then, eased but not planted, is `pose`.
+/// The holds at a time of a planned movement when both feet stand; the pose then, eased but not
+/// planted, is `pose`.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                     double time_s, ConstPoseSpan pose);
 

@@ -17,7 +17,7 @@ namespace stridewire {
 /// by side and only the joints of the legs.
 class FootSampler {
  public:
-  static constexpr std::size_t kMost = kernels::kBlock;  ///< Largest number of times per call.
+  static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Largest number of times per call.
 
   /// Borrows all arguments. The library's leg rig must be usable. `scratch` is a pose of its
   /// skeleton.
@@ -38,16 +38,16 @@ class FootSampler {
   [[nodiscard]] bool SampleTogether(const Movement& movement, std::span<const double> times_s,
                                     std::size_t eased);
   void SampleOne(const Movement& movement, double time_s, bool is_eased, std::size_t i);
-  [[nodiscard]] Vec3 At(const float (&of)[3][kMost], std::size_t i) const {
+  [[nodiscard]] Vec3 At(const float (&of)[3][kMaxTimes], std::size_t i) const {
     return {of[0][i], of[1][i], of[2][i]};
   }
 
   const MotionLibrary& library_;
   GridCache& cache_;
   PoseSpan scratch_;
-  alignas(64) float roots_m_[3][kMost];      // In world space.
-  alignas(64) float balls_m_[2][3][kMost];   // [foot]: relative to the root.
-  alignas(64) float ankles_m_[2][3][kMost];  // [foot]: relative to the root.
+  alignas(64) float roots_m_[3][kMaxTimes];      // In world space.
+  alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: relative to the root.
+  alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: relative to the root.
 };
 
 }  // namespace stridewire

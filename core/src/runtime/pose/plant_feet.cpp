@@ -27,17 +27,17 @@ double SmoothMax(double a, double b, double soft_m) {
 }
 
 // Elapsed fraction of the foot's swing, 0 before release and 1 after landing.
-double SwingAt(const FootTrajectory& track, double time_s) {
-  if (time_s <= track.release_s) return 0.0;
-  if (time_s >= track.land_s) return 1.0;
-  return (time_s - track.release_s) / (track.land_s - track.release_s);
+double SwingAt(const FootTrajectory& trajectory, double time_s) {
+  if (time_s <= trajectory.release_s) return 0.0;
+  if (time_s >= trajectory.land_s) return 1.0;
+  return (time_s - trajectory.release_s) / (trajectory.land_s - trajectory.release_s);
 }
 
 // Fraction of the change in height that is complete, eased from 0 to 1. A foot that steps up rises
 // early in the swing; a foot that steps down descends late.
 double RiseAt(double swing, double rise_m) {
-  const double from = rise_m > 0.0 ? 0.0 : kSinkFrom;
-  return 1.0 - EaseOut((swing - from) / (1.0 - kSinkFrom));
+  const double from = rise_m > 0.0 ? 0.0 : kSinkStart;
+  return 1.0 - EaseOut((swing - from) / (1.0 - kSinkStart));
 }
 
 // How strongly the heading of a standing foot is locked: fully while the sole is on the ground, not
@@ -73,7 +73,7 @@ DVec3 RootResidual(const Movement& movement, double time_s) {
 }  // namespace
 
 double LiftShare(double swing) {
-  return (1.0 - EaseOut(swing / kLiftEnds)) * EaseOut((swing - (1.0 - kLiftEnds)) / kLiftEnds);
+  return (1.0 - EaseOut(swing / kLiftFade)) * EaseOut((swing - (1.0 - kLiftFade)) / kLiftFade);
 }
 
 Quat TurnOf(const FootCorrection& correction) {
@@ -87,56 +87,58 @@ BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m, const LegP
 
 FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                            const BlendedFoot& blended) {
-  const FootTrajectory& track = movement.feet.foot(foot);
+  const FootTrajectory& trajectory = movement.feet.foot(foot);
   const double duration_s = movement.duration_s();
-  const double swing = SwingAt(track, time_s);
-  const bool has_landed = time_s >= track.land_s;
-  const bool is_planted = track.IsPlanted(time_s);
-  const Footprint& print = has_landed ? track.to : track.from;
+  const double swing = SwingAt(trajectory, time_s);
+  const bool has_landed = time_s >= trajectory.land_s;
+  const bool is_planted = trajectory.IsPlanted(time_s);
+  const Footprint& print = has_landed ? trajectory.to : trajectory.from;
 
   FootCorrection correction;
   if (is_planted) {
     correction.offset_m = print.position_m - blended.ball_m;
   } else {
     correction.offset_m =
-        Hermite(track.release_offset_m, track.release_velocity_m_s, track.land_offset_m,
-                track.land_velocity_m_s, track.land_s - track.release_s, time_s - track.release_s) +
-        AsideAt(swing) * track.aside_m;
+        Hermite(trajectory.release_offset_m, trajectory.release_velocity_m_s,
+                trajectory.land_offset_m, trajectory.land_velocity_m_s,
+                trajectory.land_s - trajectory.release_s, time_s - trajectory.release_s) +
+        AsideAt(swing) * trajectory.aside_m;
   }
   const double since_s = time_s - movement.start_offset_s;
   const double settled = 1.0 - EaseOut(since_s / movement.ease_out_s);
-  const auto& height = track.height_m;
+  const auto& height = trajectory.height_m;
   const double rise = height[2] - height[1];
   correction.offset_m.y = height[0] + settled * (height[1] - height[0]) +
-                          rise * RiseAt(swing, rise) + track.lift_m * LiftShare(swing);
+                          rise * RiseAt(swing, rise) + trajectory.lift_m * LiftShare(swing);
 
-  const auto& turn = track.turn_rad;
+  const auto& turn = trajectory.turn_rad;
   const double turned = 1.0 - EaseOut(swing);
   double free_rad = turn[0] + settled * (turn[1] - turn[0]) + turned * (turn[2] - turn[1]);
   // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
   // up with the turn that the body will have made by the time it lands.
-  const auto steered = [&](double at_s) {
+  const auto extra_turn_at = [&](double at_s) {
     return movement.extra_turn_rad * (1.0 - EaseOut(at_s / duration_s));
   };
-  free_rad += steered(std::min(track.land_s, duration_s)) * turned - steered(time_s);
-  const FootResidual& rest = movement.feet.residuals[static_cast<std::size_t>(foot)];
-  const double value = EaseOut(since_s / rest.over_s);
-  const double slope = rest.over_s * EaseOutSlope(since_s / rest.over_s);
-  correction.offset_m += value * rest.offset_m + slope * rest.offset_m_s;
-  free_rad += value * rest.turn_rad + slope * rest.turn_rad_s;
+  free_rad +=
+      extra_turn_at(std::min(trajectory.land_s, duration_s)) * turned - extra_turn_at(time_s);
+  const FootResidual& residual = movement.feet.residuals[static_cast<std::size_t>(foot)];
+  const double value = EaseOut(since_s / residual.over_s);
+  const double slope = residual.over_s * EaseOutSlope(since_s / residual.over_s);
+  correction.offset_m += value * residual.offset_m + slope * residual.offset_m_s;
+  free_rad += value * residual.turn_rad + slope * residual.turn_rad_s;
   correction.free_turn_rad = free_rad;
   if (is_planted) {
-    const double held_rad = WrapAngle(print.heading_rad - blended.heading_rad - free_rad);
-    correction.turn_rad = free_rad + HeadingLockShare(blended.flatness) * held_rad;
+    const double lock_rad = WrapAngle(print.heading_rad - blended.heading_rad - free_rad);
+    correction.turn_rad = free_rad + HeadingLockShare(blended.flatness) * lock_rad;
   } else {
-    correction.turn_rad = free_rad + (1.0 - turned) * track.release_turn_rad;
+    correction.turn_rad = free_rad + (1.0 - turned) * trajectory.release_turn_rad;
   }
 
   const auto tilted = static_cast<float>(turned);
-  const Vec3 normal = (1.0f - tilted) * track.normals[0] + tilted * track.normals[1];
+  const Vec3 normal = (1.0f - tilted) * trajectory.normals[0] + tilted * trajectory.normals[1];
   correction.normal = normal / std::sqrt(glm::dot(normal, normal));
-  correction.root_weight = track.root_weight;
-  correction.root_shift_m = (1.0 - EaseOut(time_s / duration_s)) * track.root_shift_m;
+  correction.root_weight = trajectory.root_weight;
+  correction.root_shift_m = (1.0 - EaseOut(time_s / duration_s)) * trajectory.root_shift_m;
   return correction;
 }
 
@@ -167,33 +169,34 @@ void ContinueFrom(const std::array<FeetCorrection, 2>& before,
   FootPlan& plan = movement.feet;
   const double per_s = 1.0 / kBlendStepS;
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootTrajectory& track = plan.feet[f];
-    const bool is_planted = track.IsPlanted(movement.start_offset_s);
+    const FootTrajectory& trajectory = plan.feet[f];
+    const bool is_planted = trajectory.IsPlanted(movement.start_offset_s);
     const auto turn_of = [&](const FeetCorrection& correction) {
       return is_planted ? correction.feet[f].free_turn_rad : correction.feet[f].turn_rad;
     };
-    FootResidual& rest = plan.residuals[f];
-    rest.offset_m = before[0].feet[f].offset_m - planned[0].feet[f].offset_m;
-    rest.offset_m_s = per_s * ((before[0].feet[f].offset_m - before[1].feet[f].offset_m) -
-                               (planned[1].feet[f].offset_m - planned[0].feet[f].offset_m));
-    rest.turn_rad = WrapAngle(turn_of(before[0]) - turn_of(planned[0]));
-    rest.turn_rad_s = per_s * (WrapAngle(turn_of(before[0]) - turn_of(before[1])) -
-                               WrapAngle(turn_of(planned[1]) - turn_of(planned[0])));
-    rest.over_s = movement.ease_out_s;
+    FootResidual& residual = plan.residuals[f];
+    residual.offset_m = before[0].feet[f].offset_m - planned[0].feet[f].offset_m;
+    residual.offset_m_s = per_s * ((before[0].feet[f].offset_m - before[1].feet[f].offset_m) -
+                                   (planned[1].feet[f].offset_m - planned[0].feet[f].offset_m));
+    residual.turn_rad = WrapAngle(turn_of(before[0]) - turn_of(planned[0]));
+    residual.turn_rad_s = per_s * (WrapAngle(turn_of(before[0]) - turn_of(before[1])) -
+                                   WrapAngle(turn_of(planned[1]) - turn_of(planned[0])));
+    residual.over_s = movement.ease_out_s;
     if (is_planted) {
       // A standing foot keeps only its height and the turn it has while its heel is up.
-      rest.offset_m.x = rest.offset_m.z = rest.offset_m_s.x = rest.offset_m_s.z = 0.0;
+      residual.offset_m.x = residual.offset_m.z = residual.offset_m_s.x = residual.offset_m_s.z =
+          0.0;
     } else {
-      rest.over_s = track.land_s - movement.start_offset_s;
+      residual.over_s = trajectory.land_s - movement.start_offset_s;
     }
   }
   // The root follows the residuals of the feet. Its own residual is only the remaining difference.
   std::array<DVec3, 2> root{planned[0].root_m, planned[1].root_m};
   for (std::size_t i = 0; i < 2; ++i) {
     for (std::size_t f = 0; f < 2; ++f) {
-      const FootResidual& rest = plan.residuals[f];
+      const FootResidual& residual = plan.residuals[f];
       root[i] += planned[i].feet[f].root_weight *
-                 (rest.offset_m + static_cast<double>(i) * kBlendStepS * rest.offset_m_s);
+                 (residual.offset_m + static_cast<double>(i) * kBlendStepS * residual.offset_m_s);
     }
   }
   plan.root_residual_m = before[0].root_m - root[0];
@@ -204,9 +207,9 @@ namespace {
 
 // Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
 // between the foot and the footprint.
-double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Side& side,
+double DepthBelow(const Footprint& footprint, const Vec3& normal, const LegRig::Side& side,
                   const LegPose& leg, const DVec3& ball, const Quat& turn) {
-  const DVec3 print = stands.position_m;
+  const DVec3 print = footprint.position_m;
   const double away_m =
       std::sqrt((ball.x - print.x) * (ball.x - print.x) + (ball.z - print.z) * (ball.z - print.z));
   const double near = EaseOut((away_m - kNearPrintM) / (kFarFromPrintM - kNearPrintM));
@@ -225,15 +228,17 @@ double DepthBelow(const Footprint& stands, const Vec3& normal, const LegRig::Sid
 
 // Height by which to raise a foot so that its sole stays above the ground that it leaves and the
 // ground that it lands on.
-double LiftOutOfGround(const FootTrajectory& track, double time_s, const LegRig::Side& side,
+double LiftOutOfGround(const FootTrajectory& trajectory, double time_s, const LegRig::Side& side,
                        const LegPose& leg, const DVec3& ball, const Quat& turn) {
-  const double second = 1.0 - EaseOut((SwingAt(track, time_s) - kGroundFrom) / kGroundOver);
+  const double second =
+      1.0 - EaseOut((SwingAt(trajectory, time_s) - kGroundBlendStart) / kGroundBlendLength);
   double lift_m = 0.0;
   if (second < 1.0) {
-    lift_m += (1.0 - second) * DepthBelow(track.from, track.normals[0], side, leg, ball, turn);
+    lift_m +=
+        (1.0 - second) * DepthBelow(trajectory.from, trajectory.normals[0], side, leg, ball, turn);
   }
   if (second > 0.0)
-    lift_m += second * DepthBelow(track.to, track.normals[1], side, leg, ball, turn);
+    lift_m += second * DepthBelow(trajectory.to, trajectory.normals[1], side, leg, ball, turn);
   return lift_m;
 }
 
@@ -356,22 +361,23 @@ PackedFootPlan PackFootPlan(const Movement& movement) {
     for (const double value : {v.x, v.y, v.z, w}) packed[at++] = static_cast<float>(value);
   };
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootTrajectory& track = plan.feet[f];
-    const FootResidual& rest = plan.residuals[f];
-    add(track.from.position_m - base, WrapAngle(track.from.heading_rad));
-    add(track.to.position_m - base, WrapAngle(track.to.heading_rad));
-    add(track.release_offset_m, track.release_turn_rad);
-    add(track.release_velocity_m_s, track.root_weight);
-    add(track.land_offset_m, track.lift_m);
-    add(track.land_velocity_m_s, rest.turn_rad);
-    add(track.aside_m, rest.turn_rad_s);
-    add({track.height_m[0], track.height_m[1], track.height_m[2]}, rest.over_s);
-    add({track.turn_rad[0], track.turn_rad[1], track.turn_rad[2]}, track.release_s);
-    add(DVec3(track.normals[0]), track.land_s);
-    add(DVec3(track.normals[1]), 0.0);
-    add(rest.offset_m, 0.0);
-    add(rest.offset_m_s, 0.0);
-    add(track.root_shift_m, 0.0);
+    const FootTrajectory& trajectory = plan.feet[f];
+    const FootResidual& residual = plan.residuals[f];
+    add(trajectory.from.position_m - base, WrapAngle(trajectory.from.heading_rad));
+    add(trajectory.to.position_m - base, WrapAngle(trajectory.to.heading_rad));
+    add(trajectory.release_offset_m, trajectory.release_turn_rad);
+    add(trajectory.release_velocity_m_s, trajectory.root_weight);
+    add(trajectory.land_offset_m, trajectory.lift_m);
+    add(trajectory.land_velocity_m_s, residual.turn_rad);
+    add(trajectory.aside_m, residual.turn_rad_s);
+    add({trajectory.height_m[0], trajectory.height_m[1], trajectory.height_m[2]}, residual.over_s);
+    add({trajectory.turn_rad[0], trajectory.turn_rad[1], trajectory.turn_rad[2]},
+        trajectory.release_s);
+    add(DVec3(trajectory.normals[0]), trajectory.land_s);
+    add(DVec3(trajectory.normals[1]), 0.0);
+    add(residual.offset_m, 0.0);
+    add(residual.offset_m_s, 0.0);
+    add(trajectory.root_shift_m, 0.0);
   }
   add(plan.root_residual_m, movement.extra_turn_rad);
   add(plan.root_residual_m_s, movement.duration_s());
@@ -384,11 +390,11 @@ void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseS
   if (!movement.feet.is_active) return;
   const PackedFootPlan plan = PackFootPlan(movement);
   const DVec3& base = movement.base.position_m;
-  kernels::PlantOne(rig, {.plan = plan.data(),
-                          .time_s = time_s,
-                          .base_m = {base.x, base.y, base.z},
-                          .root_m = &pose.root_position_m.x,
-                          .rotations = &pose.rotations[0].x});
+  kernels::PlantPose(rig, {.plan = plan.data(),
+                           .time_s = time_s,
+                           .base_m = {base.x, base.y, base.z},
+                           .root_m = &pose.root_position_m.x,
+                           .rotations = &pose.rotations[0].x});
   ApplyPlantFade(rig, movement, time_s, pose);
 }
 

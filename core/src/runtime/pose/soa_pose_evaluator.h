@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// Poses of one movement that follow each other. All that can be seen of a movement is settled when it begins, so a
-/// server need not come back to it for every tick: what a pose is made of is brought into the cache, blended and
-/// unpacked once for several of them.
+/// Poses of one movement that follow each other. All that can be seen of a movement is settled when
+/// it begins, so a server need not come back to it for every tick: what a pose is made of is
+/// brought into the cache, blended and unpacked once for several of them.
 struct SampleRun {
   const Movement* movement = nullptr;  ///< Its feet, if planted, packed (FootPlan::packed)
   double time_s = 0.0;                 ///< Of the first pose; clamped to the movement
@@ -19,8 +19,9 @@ struct SampleRun {
   int ticks_apart = 1;  ///< From one pose to the next
 };
 
-/// Evaluates stretches, up to SoaPose::kLanes side by side: EvaluateMovement's poses with the feet planted, the same
-/// bytes whatever else is evaluated with them. Not thread-safe; allocates when it is made and never again.
+/// Evaluates stretches, up to SoaPose::kLanes side by side: EvaluateMovement's poses with the feet
+/// planted, the same bytes whatever else is evaluated with them. Not thread-safe; allocates when it
+/// is made and never again.
 ///
 ///   evaluator.Begin(stretches, count);
 ///   for (int i = 0; i < count; ++i) Use(evaluator.Next());
@@ -34,17 +35,17 @@ class SoaPoseEvaluator {
 
   [[nodiscard]] int max_count() const;
 
-  /// Whose `count` poses come next, at least one stretch; either all of them have their feet planted or none. What they
-  /// point to lives until the last of them came.
-  void Begin(std::span<const SampleRun> stretches, int count);
+  /// Whose `count` poses come next, at least one stretch; either all of them have their feet
+  /// planted or none. What they point to lives until the last of them came.
+  void Begin(std::span<const SampleRun> runs, int count);
   /// The next pose of each stretch, in its lane. Other lanes mean nothing.
   [[nodiscard]] const SoaPose& Next();
 
-  /// Asks for the memory that is read of a movement: what SampleRunCount and EvaluationBatcher::Add look at, then what Begin
-  /// does, and at last what lies elsewhere.
+  /// Asks for the memory that is read of a movement: what SampleRunCount and EvaluationBatcher::Add
+  /// look at, then what Begin does, and at last what lies elsewhere.
   static void PrefetchTimes(const Movement& movement);
-  static void PrefetchPlaces(const Movement& movement);
-  static void Prefetch(const SampleRun& stretch);
+  static void PrefetchMovement(const Movement& movement);
+  static void Prefetch(const SampleRun& run);
 
  private:
   struct Work;
@@ -55,7 +56,7 @@ class SoaPoseEvaluator {
 struct PoseJob {
   const Movement* movement = nullptr;  ///< Its feet, if planted, packed
   double time_s = 0.0;                 ///< Clamped to the movement
-  Pose* shown = nullptr;               ///< With the feet planted
+  Pose* pose = nullptr;                ///< With the feet planted
 };
 
 /// Single poses, as many side by side as there are lanes. Never allocates.

@@ -28,11 +28,11 @@ struct LegRig {
   };
   /// A side and its skeleton's offsets laid out flat, for the vectors that plant a crowd.
   struct Bones {
-    std::size_t count = 0;               ///< Joints of the chain
-    std::size_t joints[kMaxLegChain]{};  ///< [place in chain]
-    std::size_t among[kMaxLegChain]{};   ///< The same, as places in LegRig::joints
-    float offsets_m[kMaxLegChain][3]{};  ///< [place in chain]: in the frame of the one before
-    std::size_t hip = 0;                 ///< Places in the chain
+    std::size_t count = 0;                   ///< Joints of the chain
+    std::size_t joints[kMaxLegChain]{};      ///< [place in chain]
+    std::size_t rig_joints[kMaxLegChain]{};  ///< The same, as places in LegRig::joints
+    float offsets_m[kMaxLegChain][3]{};      ///< [place in chain]: in the frame of the one before
+    std::size_t hip = 0;                     ///< Places in the chain
     std::size_t knee = 0;
     std::size_t ankle = 0;
     float ball_m[3]{};     ///< In the frame of the last
@@ -50,7 +50,8 @@ struct LegRig {
   std::array<Bones, 2> bones;  ///< Indexed by Foot; of a usable rig.
   static constexpr std::size_t kMaxJointsOfLegs = 2 * kMaxLegChain - 1;
   std::vector<int> joints;  ///< Of both chains, growing: the root is the first. Of a usable rig.
-  /// Whether each leg is a chain hip, knee, ankle, ball with lengths to bend. If not, feet are not planted.
+  /// Whether each leg is a chain hip, knee, ankle, ball with lengths to bend. If not, feet are not
+  /// planted.
   bool is_usable = false;
 
   [[nodiscard]] const Side& side(Foot foot) const { return sides[static_cast<std::size_t>(foot)]; }

@@ -17,7 +17,7 @@ class EndPoses {
  public:
   EndPoses(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group);
 
-  /// Blends both poses with the weights and the heading change of a movement (see TakeWeights).
+  /// Blends both poses with the weights and the heading change of a movement (see ApplyWeights).
   void Blend(const Movement& movement);
 
   /// The parameters of the blend, as MeasureMovement returns them.

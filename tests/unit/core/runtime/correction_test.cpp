@@ -149,7 +149,7 @@ TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
   for (int i = 0; i < 5; ++i) {
     static_cast<void>(scratch.Measure(*library, PointInHull(group, random)));
     std::copy_n(scratch.weights.begin(), n, weights.begin());
-    TakeWeights(group, weights, scratch.movement);
+    ApplyWeights(group, weights, scratch.movement);
     EndPoses ends(library->skeleton(), library->layout(), group);
     ends.Blend(scratch.movement);
     ends.MeasureSlopes(slopes);
@@ -159,7 +159,7 @@ TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
         std::vector<double> w = weights;
         w[e] += by;
         w[0] -= by;
-        TakeWeights(group, w, scratch.movement);
+        ApplyWeights(group, w, scratch.movement);
         return scratch.MeasureAsIs(*library);
       };
       const ParameterValues more = measured(kStep);
