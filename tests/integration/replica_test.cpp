@@ -135,7 +135,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
       if (AppendChange(avatar, record)) {
         ++figures.records;
         EXPECT_LE(record.size(), MaxRecordBytes(*library_));
-        figures.states += avatar.change().is_any;
+        figures.states += avatar.change().needs_state;
         ASSERT_EQ(Refusal(first, record), "") << "tick " << tick << " of " << round;
         if (late) {
           ASSERT_EQ(Refusal(*late, record), "") << "tick " << tick << " of " << round;
