@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "bench_libraries.h"
+#include "reference_evaluation.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/pose_quantization.h"
 #include "runtime/pose/evaluation_batcher.h"
-#include "runtime/pose/reference_evaluation.h"
 #include "runtime/weights/correction.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"

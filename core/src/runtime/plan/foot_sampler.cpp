@@ -39,16 +39,10 @@ struct Lanes {
 
 void SampleGrids(const MotionGroup& group, const Movement& movement,
                  std::span<const double> times_s, Lanes& lanes) {
-  kernels::GridTimes& t = lanes.times;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    t.time_s[i] = times_s[i];
-    SetWarpPiece(movement.warp.PieceAt(times_s[i]), i, t);
+    SetGridTime(group, movement, times_s[i], i, lanes.times);
   }
-  Fill<double>(t.last_cell, group.grid_point_count - 2);
-  Fill(t.duration_s, movement.warp.duration_s());
-  Fill(t.start_offset_s, movement.start_offset_s);
-  Fill(t.ease_out_s, movement.ease_out_s);
-  kernels::ComputeGridSamples(times_s.size(), t, lanes.samples);
+  kernels::ComputeGridSamples(times_s.size(), lanes.times, lanes.samples);
 }
 
 // Collects the difference pose for the joints of the legs.
@@ -109,11 +103,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   rows.fill(lanes.rows[0]);
   std::array<float, kMaxRowFloats> row;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const kernels::GridSamples& at = lanes.samples;
-    BlendRow(group, layout, movement,
-             {at.first_point[i],
-              {at.weights[0][i], at.weights[1][i], at.weights[2][i], at.weights[3][i]}},
-             cache_, row.data());
+    BlendRow(group, layout, movement, GridSampleOf(lanes.samples, i), cache_, row.data());
     float* to = lanes.rows[i];
     rows[i] = to;
     for (const int joint : joints) {

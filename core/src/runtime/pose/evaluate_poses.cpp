@@ -72,7 +72,7 @@ struct PoseSample {
   GridSample grid;
   float fraction;         // Remaining fraction of the difference.
   float slope_s;          // Seconds by which the velocity of the difference is multiplied.
-  double remaining_turn;  // EaseOut of the elapsed fraction of the movement.
+  double remaining_turn;  // Fraction of Movement::extra_turn_rad that is still to come.
   bool is_eased;          // True while part of the difference remains.
 };
 
@@ -115,6 +115,7 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   }
 }
 
+// The same operations as kernels::ComputeGridSamples. For a single time they are faster in scalars.
 PoseSample SampleAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);

@@ -1,6 +1,6 @@
-// Plants the feet of several avatars at once. The formulas are those of PlantFeetByReference in
-// foot_plan.cpp, where they are explained; a test compares the two. Positions are relative to the
-// base of each movement, so that single precision suffices.
+// Plants the feet of several avatars at once (see PlantFeet). A test compares the result with a
+// plain implementation in double precision, tests/support/reference_evaluation.cpp. Positions are
+// relative to the base of each movement, so that single precision suffices.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
 #undef STRIDEWIRE_FOOT_PLANT_INL_H
@@ -35,16 +35,24 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// A FootTrajectory and its FootResidual, in the layout of PackFootPlan.
-struct SoaTrajectory {
-  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height,
-      turn;
+template <typename Number>
+HWY_INLINE Number Constant(double value) {
+  return Number(static_cast<float>(value));
+}
+HWY_INLINE Float OnePlusTwice(Float x) { return Float(1.0f) + x + x; }
+template <typename T>
+HWY_INLINE T AddBoth(T base, T a, T b) {
+  return base + a + b;
+}
+#define STRIDEWIRE_INLINE HWY_INLINE
+#include "runtime/pose/foot_correction-inl.h"
+#undef STRIDEWIRE_INLINE
+
+struct SoaTrajectory : TrajectoryOf<Float, SoaVec3> {
   SoaVec3 normals[2];
-  SoaVec3 residual_offset, residual_velocity, root_shift;
-  Float from_heading, to_heading, release_turn, root_weight, lift, residual_turn, residual_turn_s;
-  Float residual_over_s, release_s, land_s;
 };
 
+// Loads a trajectory in the layout of PackFootPlan.
 HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   SoaTrajectory t;
   const auto next = [&]() HWY_ATTR {
@@ -67,9 +75,9 @@ HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
   q = next();
   t.aside = XyzOf(q), t.residual_turn_s = q.w;
   q = next();
-  t.height = XyzOf(q), t.residual_over_s = q.w;
+  t.height[0] = q.x, t.height[1] = q.y, t.height[2] = q.z, t.residual_over_s = q.w;
   q = next();
-  t.turn = XyzOf(q), t.release_s = q.w;
+  t.turn[0] = q.x, t.turn[1] = q.y, t.turn[2] = q.z, t.release_s = q.w;
   q = next();
   t.normals[0] = XyzOf(q), t.land_s = q.w;
   t.normals[1] = XyzOf(next());
@@ -84,7 +92,10 @@ struct PlanCommon {
   SoaVec3 root_residual, root_residual_velocity;
   Float extra_turn, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
-  Float per_duration, per_ease_out;  // 1 / s
+  Float per_duration, per_ease_out;  // 1 / duration_s and 1 / ease_out_s.
+
+  HWY_INLINE Float OfDuration(Float x) const { return x * per_duration; }
+  HWY_INLINE Float OfEaseOut(Float x) const { return x * per_ease_out; }
 };
 
 // Result of forward kinematics of a leg. Positions are relative to the root, in world axes.
@@ -156,66 +167,20 @@ struct SoaCorrection {
   SoaVec3 root;  // Part of the correction by which the root moves as well.
 };
 
-HWY_INLINE Float ExtraTurnAt(const PlanCommon& common, Float at_s) {
-  return common.extra_turn * (Float(1.0f) - EaseOut(at_s * common.per_duration));
-}
-
 HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajectory& trajectory,
                                      SoaVec3 ball, Float heading, Float flatness) {
+  const auto correction =
+      CorrectTrajectory<Float, SoaVec3>(common, trajectory, ball, heading, flatness);
   const Float one = 1.0f;
-  const Float zero = 0.0f;
-  const Float t = common.time_s;
-  const Mask has_landed = t >= trajectory.land_s;
-  const Mask is_planted = (t <= trajectory.release_s) || has_landed;
-  const Float length = Select(is_planted, one, trajectory.land_s - trajectory.release_s);
-  const Float s =
-      Select(has_landed, one, Select(is_planted, zero, (t - trajectory.release_s) / length));
-  const Float r = one - s;
-
-  SoaCorrection c;
-  c.swing = s;
-  const SoaVec3 print = Select(has_landed, trajectory.to, trajectory.from);
-  const Float print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
-  const Float across = Float(4.0f) * s * r;
-  const SoaVec3 flying =
-      trajectory.release_offset * ((one + s + s) * r * r) +
-      trajectory.land_offset * (s * s * (one + r + r)) +
-      (trajectory.release_velocity * r - trajectory.land_velocity * s) * (length * s * r) +
-      trajectory.aside * (across * across);
-  c.offset = Select(is_planted, print - ball, flying);
-  const Float since_s = t - common.start_offset_s;
-  const Float settled = one - EaseOut(since_s * common.per_ease_out);
-  const Float rise = trajectory.height.z - trajectory.height.y;
-  const Float rise_from = Select(rise > zero, zero, Float(static_cast<float>(kSinkStart)));
-  const Float risen = one - EaseOut(DivideBy(s - rise_from, 1.0 - kSinkStart));
-  const Float ends = static_cast<float>(kLiftFade);
-  const Float lifted =
-      (one - EaseOut(DivideBy(s, kLiftFade))) * EaseOut(DivideBy(s - (one - ends), kLiftFade));
-  c.offset.y = trajectory.height.x + settled * (trajectory.height.y - trajectory.height.x) +
-               rise * risen + trajectory.lift * lifted;
-
-  const Float turned = one - EaseOut(s);
-  Float free = trajectory.turn.x + settled * (trajectory.turn.y - trajectory.turn.x) +
-               turned * (trajectory.turn.z - trajectory.turn.y);
-  free = free + (ExtraTurnAt(common, Min(trajectory.land_s, common.duration_s)) * turned -
-                 ExtraTurnAt(common, t));
-  const Float faded = since_s / trajectory.residual_over_s;
-  const Float value = EaseOut(faded);
-  const Float slope = trajectory.residual_over_s * EaseOutSlope(faded);
-  c.offset = c.offset + trajectory.residual_offset * value + trajectory.residual_velocity * slope;
-  free = free + value * trajectory.residual_turn + slope * trajectory.residual_turn_s;
-  const Float held = WrapAngle(print_heading - heading - free);
-  const Float lock =
-      one - EaseOut(DivideBy(flatness - Float(static_cast<float>(kHeelUp)), kSoleDown - kHeelUp));
-  const Float turn =
-      Select(is_planted, free + lock * held, free + (one - turned) * trajectory.release_turn);
-
-  const SoaVec3 tilt = trajectory.normals[0] * (one - turned) + trajectory.normals[1] * turned;
+  const SoaVec3 tilt =
+      trajectory.normals[0] * (one - correction.turned) + trajectory.normals[1] * correction.turned;
   const SoaVec3 normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
-  c.turn = Multiply(Normalise({normal.z, zero, -normal.x, one + normal.y}),
-                    YawRotation(WrapAngle(turn)));
-  c.root = c.offset * trajectory.root_weight +
-           trajectory.root_shift * (one - EaseOut(t * common.per_duration));
+  SoaCorrection c;
+  c.offset = correction.offset;
+  c.swing = correction.swing;
+  c.turn = Multiply(Normalise({normal.z, Float(0.0f), -normal.x, one + normal.y}),
+                    YawRotation(WrapAngle(correction.turn)));
+  c.root = c.offset * trajectory.root_weight + correction.root_shift;
   return c;
 }
 
@@ -411,16 +376,8 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
     ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
   });
-  const Float since_s = common.time_s - common.start_offset_s;
-  const Float flat = EaseOut(DivideBy(since_s, kRootShiftS));
-  const Float rise =
-      EaseOut(since_s / Max(Float(static_cast<float>(kRootShiftS)),
-                            Float(static_cast<float>(kRootRisePart)) * common.duration_s));
-  const Float speed = common.ease_out_s * EaseOutSlope(since_s * common.per_ease_out);
-  shift = shift +
-          SoaVec3{flat * common.root_residual.x, rise * common.root_residual.y,
-                  flat * common.root_residual.z} +
-          common.root_residual_velocity * speed;
+  shift =
+      AddRootResidual<Float>(shift, common, common.root_residual, common.root_residual_velocity);
 
   Float lower = 0.0f;
   for (std::size_t f = 0; f < 2; ++f) {

@@ -16,7 +16,7 @@ struct GridSample {
   std::array<float, 4> weights;  ///< Weight of each point.
 };
 
-/// Index of point `k` of a place. Indices beyond the last grid point return that point: their
+/// Index of point `k` of a sample. Indices beyond the last grid point return that point: their
 /// weight is zero, but the row is still read.
 [[nodiscard]] inline int GridPointOf(const MotionGroup& group, const GridSample& sample, int k) {
   return std::min(sample.first_point + k, group.grid_point_count - 1);
@@ -31,6 +31,25 @@ inline void SetWarpPiece(const TimeWarp::Piece& piece, std::size_t lane,
   times.end[lane] = piece.end;
   times.begin_slope[lane] = piece.begin_slope;
   times.end_slope[lane] = piece.end_slope;
+}
+
+/// Sets a lane to a time of a movement.
+inline void SetGridTime(const MotionGroup& group, const Movement& movement, double time_s,
+                        std::size_t lane, kernels::GridTimes& times) {
+  times.time_s[lane] = time_s;
+  SetWarpPiece(movement.warp.PieceAt(time_s), lane, times);
+  times.last_cell[lane] = group.grid_point_count - 2;
+  times.duration_s[lane] = movement.warp.duration_s();
+  times.start_offset_s[lane] = movement.start_offset_s;
+  times.ease_out_s[lane] = movement.ease_out_s;
+}
+
+/// The sample of one lane.
+[[nodiscard]] inline GridSample GridSampleOf(const kernels::GridSamples& samples,
+                                             std::size_t lane) {
+  return {samples.first_point[lane],
+          {samples.weights[0][lane], samples.weights[1][lane], samples.weights[2][lane],
+           samples.weights[3][lane]}};
 }
 
 /// Writes the blended row at `sample` to `row`. Its rotations are not normalized.

@@ -10,7 +10,8 @@ namespace stridewire {
 
 /// The root takes this long to come to where the feet of a movement have it.
 inline constexpr double kRootShiftS = 0.25;
-/// In height this part of a movement, where that is longer: a body climbs as long as its leg stretches.
+/// In height this part of a movement, where that is longer: a body climbs as long as its leg
+/// stretches.
 inline constexpr double kRootRisePart = 0.75;
 
 /// Where the blend has a foot.
@@ -33,7 +34,8 @@ struct FootCorrection {
   DVec3 root_shift_m = DVec3(0.0);
 };
 
-/// How much of `lift_m` is added at a part of the swing: up soon, down late, as who steps over an edge does.
+/// How much of `lift_m` is added at a part of the swing: up soon, down late, as who steps over an
+/// edge does.
 [[nodiscard]] double LiftShare(double swing);
 
 /// The rotation a correction gives the foot, about its ball and in world axes.
@@ -54,17 +56,19 @@ struct FeetCorrection {
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);
 
-/// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kBlendStepS
-/// earlier. `planned` is what the plan itself corrects when the movement is entered, and kBlendStepS later. The
-/// same twice: from rest.
+/// Makes a movement's plan go on from what the one before corrected when the movement was entered
+/// and (second) kBlendStepS earlier. `planned` is what the plan itself corrects when the movement
+/// is entered, and kBlendStepS later. The same twice: from rest.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
                   const std::array<FeetCorrection, 2>& planned, Movement& movement);
 
-/// Makes a movement whose feet are planned set in from a pose that was displayed when it was entered and had no feet
-/// planted, the blended and eased one of that time. `pose` is scratch of its size.
+/// Makes a movement whose feet are planned set in from a pose that was displayed when it was
+/// entered and had no feet planted, the blended and eased one of that time. `pose` is scratch of
+/// its size.
 void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
-/// The last of planting: gives a pose whose feet are planted back what has not set in yet (FootPlan::plant_fade_s).
+/// The last of planting: gives a pose whose feet are planted back what has not set in yet
+/// (FootPlan::plant_fade_s).
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
 /// A foot of a pose with its root at `root_m`.
@@ -74,12 +78,9 @@ void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, 
 /// A movement's plan for FootPlan::packed.
 [[nodiscard]] PackedFootPlan PackFootPlan(const Movement& movement);
 
-/// Plants the feet of a movement's blended and eased pose: moves the root by the feet's weighted offsets, lowers it
-/// until both legs reach, bends the legs for what remains. Never allocates; same bytes everywhere.
+/// Plants the feet of a movement's blended and eased pose: moves the root by the feet's weighted
+/// offsets, lowers it until both legs reach, bends the legs for what remains. Never allocates; same
+/// bytes everywhere.
 void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
-
-/// The same in plain doubles, for tests and measurements: PlantFeet is within 2e-5 m and rad of it.
-void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
-                          double time_s, PoseSpan pose);
 
 }  // namespace stridewire

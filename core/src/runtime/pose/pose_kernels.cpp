@@ -203,7 +203,9 @@ void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& 
     u = hn::IfThenElse(hn::Ge(time, end_s), end, u);
     u = hn::IfThenElse(hn::Gt(time, begin_s), u, begin);
 
-    // Weights with the operations of CellWeightsAt.
+    // Catmull-Rom weights. Beyond an end, a missing neighbour is extrapolated as
+    // p_-1 = 3 p_0 - 3 p_1 + p_2. The tangent at the end then is the one-sided second-order
+    // difference.
     const auto last = hn::Load(d, times.last_cell + i);
     const auto cell = hn::Min(hn::Max(hn::Trunc(u), zero), last);
     const auto f = hn::Min(hn::Max(hn::Sub(u, cell), zero), one);

@@ -40,13 +40,15 @@ struct GridTimes {
 struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
   alignas(64) float weights[4][kBlock];          ///< Of these points; 0 beyond the last point
-  alignas(64) double remaining_turn[kBlock];  ///< EaseOut of the elapsed fraction of the movement
+  alignas(64) double remaining_turn[kBlock];     ///< Fraction of the extra turn still to come
   alignas(64) float is_eased[kBlock];  ///< 1 while part of the difference pose remains, else 0
   alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
   alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
 };
-/// Finds the places of `count` times. Uses doubles and the operations of TimeWarp::GridPosition,
-/// CellWeightsAt and EaseOut, in the same order.
+/// Finds the samples of `count` times: Catmull-Rom weights of the four grid points around the
+/// position that the time warp gives. Points beyond the ends of the grid are extrapolated
+/// quadratically. Uses doubles and the operations of TimeWarp::GridPosition and EaseOut, in the
+/// same order.
 void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples);
 
 /// A job that blends the poses of several movements of one group: those in the lanes from `lane`

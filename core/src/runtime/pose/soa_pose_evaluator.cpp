@@ -73,11 +73,6 @@ struct SoaPoseEvaluator::Work {
   [[nodiscard]] float* RowOf(std::size_t pose, std::size_t lane) {
     return FloatsOf(rows) + (pose * kBlock + lane) * row_floats;
   }
-  [[nodiscard]] GridSample SampleOf(std::size_t pose, std::size_t lane) const {
-    const kernels::GridSamples& of = samples[pose];
-    return {of.first_point[lane],
-            {of.weights[0][lane], of.weights[1][lane], of.weights[2][lane], of.weights[3][lane]}};
-  }
   [[nodiscard]] const Movement& movement(std::size_t lane) const { return *runs[lane].movement; }
   [[nodiscard]] const MotionGroup& group(std::size_t lane) const {
     return library.group(movement(lane).group);
@@ -124,13 +119,7 @@ void SoaPoseEvaluator::Work::SampleGrids() {
     SetWarpPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
   };
   for (std::size_t i = 0; i < lanes; ++i) {
-    const Movement& of = movement(i);
-    t.time_s[i] = runs[i].time_s;
-    take_piece(i);
-    t.last_cell[i] = group(i).grid_point_count - 2;
-    t.duration_s[i] = of.warp.duration_s();
-    t.start_offset_s[i] = of.start_offset_s;
-    t.ease_out_s[i] = of.ease_out_s;
+    SetGridTime(group(i), movement(i), runs[i].time_s, i, t);
   }
   for (std::size_t pose = 0; pose < count; ++pose) {
     if (pose > 0) {
@@ -234,7 +223,8 @@ void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
       .is_inertial = is_inertial_lane.of};
   if (kernels::FinishPoses(blend, poses.roots_m(), poses.rotations())) return;
   for (std::size_t i = 0; i < lanes; ++i) {
-    UseLargestExample(group(i), library.layout(), movement(i), SampleOf(pose, i), RowOf(pose, i));
+    UseLargestExample(group(i), library.layout(), movement(i), GridSampleOf(samples[pose], i),
+                      RowOf(pose, i));
   }
   (void)kernels::FinishPoses(blend, poses.roots_m(), poses.rotations());
 }
