@@ -5,11 +5,12 @@
 namespace stridewire::client {
 
 ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s,
-                           std::size_t max_avatars)
+                       std::size_t max_avatars)
     : library_(std::move(library)),
       tick_s_(tick_s),
       max_avatars_(max_avatars),
-      evaluator_(*library_, 1) {}
+      evaluator_(*library_, 1),
+      plan_scratch_(*library_) {}
 
 std::size_t ReplicaSet::avatar_count() const {
   std::size_t count = 0;
@@ -18,7 +19,7 @@ std::size_t ReplicaSet::avatar_count() const {
 }
 
 Status ReplicaSet::Apply(const protocol::Movements& message, std::size_t i, Shard& shard,
-                           PoseSink& screen) {
+                         PoseSink& screen) {
   const protocol::AvatarId avatar = message.avatars[i];
   if ((message.flags[i] & protocol::kMovementGone) != 0) {
     if (shard.avatars.erase(avatar) > 0) screen.Gone(avatar);
@@ -34,11 +35,11 @@ Status ReplicaSet::Apply(const protocol::Movements& message, std::size_t i, Shar
     told = shard.avatars.emplace(avatar, Told{std::make_unique<AvatarReplica>(library_)}).first;
   }
   if ((message.flags[i] & protocol::kPoseDiscontinuity) != 0) told->second.is_new = true;
-  return told->second.replica->Apply(message.record(i));
+  return told->second.replica->Apply(message.record(i), plan_scratch_);
 }
 
-void ReplicaSet::Show(const protocol::Movements& message, protocol::AvatarId avatar,
-                        Told& told, PoseSink& screen) {
+void ReplicaSet::Show(const protocol::Movements& message, protocol::AvatarId avatar, Told& told,
+                      PoseSink& screen) {
   const PoseStamp stamp{.tick = message.tick,
                         .time_s = message.server_time_s,
                         .discontinuity = std::exchange(told.is_new, false),

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "pose_history.h"
-#include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_replica.h"
+#include "stridewire/protocol/messages.h"
 
 namespace stridewire::client {
 
@@ -23,20 +23,19 @@ class PoseSink {
   [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
 };
 
-/// The avatars of a world, evaluated here from what they are told to begin (protocol/STANDARD.md, "Movement records"): bit by
-/// bit the server's poses of its ticks. Where a message is missing nothing is known of a shard's avatars until their
-/// states come.
+/// The avatars of a world, evaluated here from what they are told to begin (protocol/STANDARD.md,
+/// "Movement records"): bit by bit the server's poses of its ticks. Where a message is missing
+/// nothing is known of a shard's avatars until their states come.
 class ReplicaSet {
  public:
   /// More shards than this in one world are refused.
   static constexpr std::size_t kMaxShards = 1024;
 
   /// At most `max_avatars`, others are left out; each takes some 10 KB.
-  ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s,
-               std::size_t max_avatars);
+  ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick_s, std::size_t max_avatars);
 
-  /// Takes in one message and shows what it makes known. kMalformed and others: a record that is none, or of
-  /// another library.
+  /// Takes in one message and shows what it makes known. kMalformed and others: a record that is
+  /// none, or of another library.
   [[nodiscard]] Status Take(const protocol::Movements& message, PoseSink& screen);
 
   [[nodiscard]] const MotionLibrary& library() const { return *library_; }
@@ -65,6 +64,7 @@ class ReplicaSet {
   std::map<std::uint16_t, Shard> shards_;
   std::vector<AvatarReplica*> scratch_;
   SoaPoseEvaluator evaluator_;
+  FootPlanScratch plan_scratch_;
 };
 
 }  // namespace stridewire::client

@@ -208,7 +208,7 @@ void MakeSteps(benchmark::State& state, const Library& library) {
       for (std::size_t l = 0; l < d; ++l) parameters.values[l] += 0.5 * site[l];
     }
   }
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  CorrectionScratch scratch(*library);
   Pose measured(library->skeleton().joint_count());
   std::vector<Movement> movements(kSteps);
   for (Movement& movement : movements) movement.difference = measured;
@@ -217,8 +217,9 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
-      CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
+      CorrectWeights(group, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
                      movements[i]);
+      movements[i].group = 0;
       StartWeighted(group, {}, movements[i]);
       runs[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
     }

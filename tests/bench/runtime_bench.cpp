@@ -86,7 +86,7 @@ void StartMovementAlone(benchmark::State& state, const Library& library, int gro
 void StartCorrected(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  CorrectionScratch scratch(*library);
   Movement movement;
   Pose pose(library->skeleton().joint_count());
   GridCache cache(library->layout());
@@ -96,8 +96,9 @@ void StartCorrected(benchmark::State& state, const Library& library, int group_i
     const std::vector<double>& wanted = parameters[i++ % kVariations];
     ParameterValues values{.count = group.parameter_count()};
     std::copy(wanted.begin(), wanted.end(), values.values.begin());
-    const Correction correction = CorrectWeights(*library, group_index, values,
-                                                 DefaultCorrectionLimits(group), scratch, movement);
+    const Correction correction =
+        CorrectWeights(group, values, DefaultCorrectionLimits(group), scratch, movement);
+    movement.group = group_index;
     StartWeighted(group, {}, movement);
     iterations += correction.iterations;
     benchmark::DoNotOptimize(movement.weights.data());
@@ -156,7 +157,7 @@ void EvaluatePose(benchmark::State& state, const Library& library, int group_ind
 class Crowd {
  public:
   Crowd(const Library& library, int size, const AvatarOptions& options = {})
-      : evaluator_(*library, 1) {
+      : evaluator_(*library, 1), plan_scratch_(*library) {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
@@ -176,7 +177,7 @@ class Crowd {
     }
     all_.clear();
     for (AvatarSimulation& avatar : avatars_) all_.push_back(&avatar);
-    AvatarSimulation::AdvanceStates(all_, kTickS);
+    AvatarSimulation::AdvanceStates(all_, kTickS, plan_scratch_);
   }
 
   [[nodiscard]] const std::vector<AvatarSimulation>& avatars() const { return avatars_; }
@@ -193,6 +194,7 @@ class Crowd {
   std::vector<AvatarSimulation> avatars_;
   std::vector<AvatarSimulation*> all_;
   SoaPoseEvaluator evaluator_;
+  PlanScratch plan_scratch_;
 };
 
 void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {

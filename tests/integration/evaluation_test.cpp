@@ -90,6 +90,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   Random random(kSeed);
   Pose pose(library->skeleton().joint_count());
   Pose scratch = pose;
+  FootPlanScratch plan_scratch(*library);
   int sampled = 0;
   for (int walk = 0; walk < 40; ++walk) {
     AvatarSimulation avatar(library,
@@ -123,8 +124,8 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
         const OnlyInstructionSet only(set);
         SCOPED_TRACE(::testing::Message() << "seed " << kSeed << ", walk " << walk << ", look "
                                           << look << ", " << hwy::TargetName(set));
-        GridCache cache(library->layout());
-        FootSampler sampler(*library, cache, scratch);
+        plan_scratch.cache().Clear();
+        FootSampler sampler(plan_scratch, scratch);
         sampler.Sample(movement, times_s, eased);
         GridCache own(library->layout());
         for (std::size_t i = 0; i < times_s.size(); ++i) {

@@ -113,7 +113,7 @@ class Bench {
       : library_(library),
         group_index_(group_index),
         group_(library.group(group_index)),
-        scratch_(static_cast<std::size_t>(library.max_example_count())),
+        scratch_(library),
         cache_(library.layout()),
         pose_(library.skeleton().joint_count()) {
     metric_.fill(1.0);
@@ -135,11 +135,12 @@ class Bench {
   // Weighs the movement by its parameters, or corrects that as an avatar does. Iterations it took.
   int Weigh(const ParameterValues& p, bool is_corrected) {
     if (is_corrected) {
-      return CorrectWeights(library_, group_index_, p, DefaultCorrectionLimits(group_), scratch_,
-                            movement_)
-          .iterations;
+      const stridewire::Correction correction =
+          CorrectWeights(group_, p, DefaultCorrectionLimits(group_), scratch_, movement_);
+      movement_.group = group_index_;
+      return correction.iterations;
     }
-    SetWeights(group_, group_index_, Span(p), scratch_, movement_);
+    SetWeights(group_, group_index_, Span(p), scratch_.weights(group_), movement_);
     return 0;
   }
 
@@ -188,7 +189,7 @@ class Bench {
   const MotionLibrary& library_;
   int group_index_;
   const MotionGroup& group_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
   GridCache cache_;
   Pose pose_;
   Movement movement_;

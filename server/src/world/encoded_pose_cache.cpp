@@ -25,6 +25,7 @@ static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMostBehi
 PoseScratch::PoseScratch(std::shared_ptr<const MotionLibrary> of_library)
     : library(std::move(of_library)),
       evaluator(*library, static_cast<int>(EncodedPoseCache::kMost)),
+      plan(*library),
       taken(library->skeleton().joint_count()),
       pose(library->skeleton().joint_count()) {}
 

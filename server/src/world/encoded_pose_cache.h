@@ -21,6 +21,7 @@ struct PoseScratch {
 
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;  ///< Of EncodedPoseCache::kMost
+  PlanScratch plan;
   EvaluationBatcher queue;
   SoaPose taken;
   Pose pose;
@@ -125,6 +126,7 @@ class EncodedPoseCache {
   [[nodiscard]] Vec3 RootOf(const Place& place) const;
 
   [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }
+  [[nodiscard]] PlanScratch& plan_scratch() { return scratch_->plan; }
 
  private:
   static constexpr std::size_t kLanes = SoaPose::kLanes;

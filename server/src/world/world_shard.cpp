@@ -294,7 +294,7 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   const std::span<const InOrder> in_order = AvatarsInOrder();
   for (int step = 1; step <= steps; ++step) {
-    AvatarSimulation::AdvanceStates(advancing_, step_s, &eventful_);
+    AvatarSimulation::AdvanceStates(advancing_, step_s, ahead_.plan_scratch(), &eventful_);
     ++step_;
     --more_steps_;
     if (movements_wanted_) TellMovements();

@@ -78,8 +78,9 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   }
   std::vector<double> share(n);
   for (int s = 0; s < samples; ++s) {
-    // Few examples carry most of a sample (Dirichlet, alpha = 1/2). Every other sample mixes but two to
-    // d + 1 of them: else edges, where errors are often largest, would hardly be met among many.
+    // Few examples carry most of a sample (Dirichlet, alpha = 1/2). Every other sample mixes but
+    // two to d + 1 of them: else edges, where errors are often largest, would hardly be met among
+    // many.
     std::fill(share.begin(), share.end(), 0.0);
     const bool takes_all = s % 2 == 0;
     const std::size_t count = takes_all ? n : 2 + static_cast<std::size_t>(s / 2) % d;
@@ -110,10 +111,11 @@ GroupProbe::GroupProbe(const Skeleton& skeleton, int max_example_count)
       layout_(skeleton.joint_count()),
       cache_(layout_),
       pose_(skeleton.joint_count()),
-      scratch_(static_cast<std::size_t>(max_example_count)) {}
+      scratch_(skeleton, layout_, max_example_count) {}
 
 HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
-  SetWeights(group, -1, std::span(p.values).first(group.parameters.size()), scratch_, movement_);
+  SetWeights(group, -1, std::span(p.values).first(group.parameters.size()), scratch_.weights(group),
+             movement_);
   cache_.Clear();
   HullPoint point{.p = p};
   for (const float weight : movement_.weights) {
@@ -126,7 +128,7 @@ HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
 
 Correction GroupProbe::Correct(const MotionGroup& group, const ParameterValues& wanted,
                                const CorrectionLimits& limits) {
-  return CorrectWeights(skeleton_, layout_, group, wanted, limits, scratch_, movement_);
+  return CorrectWeights(group, wanted, limits, scratch_, movement_);
 }
 
 std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {

@@ -12,8 +12,8 @@
 
 namespace stridewire {
 
-// Points in the hull of a group's examples: convex combinations of them, half of all and half of but a
-// few, so that faces and corners are met as well; the examples themselves come first.
+// Points in the hull of a group's examples: convex combinations of them, half of all and half of
+// but a few, so that faces and corners are met as well; the examples themselves come first.
 [[nodiscard]] std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples,
                                                       std::uint32_t seed);
 
@@ -35,8 +35,8 @@ class GroupProbe {
                                    const CorrectionLimits& limits);
 
   // Of the last that was corrected [n].
-  [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) const {
-    return std::span(scratch_).first(static_cast<std::size_t>(group.example_count));
+  [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) {
+    return scratch_.weights(group);
   }
 
  private:
@@ -45,7 +45,7 @@ class GroupProbe {
   GridCache cache_;
   Pose pose_;
   Movement movement_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
 };
 
 // One a thread. `threads` 0: one a processor.
@@ -61,8 +61,8 @@ struct HullSurvey {
   std::vector<HullPoint> peaks;   // local maxima found from the worst of them, worst first
 };
 
-// Evaluates all samples, then climbs from the worst of them, apart from each other, by steepest ascent
-// inside the hull. One probe a thread; the result is the same for any number of them.
+// Evaluates all samples, then climbs from the worst of them, apart from each other, by steepest
+// ascent inside the hull. One probe a thread; the result is the same for any number of them.
 [[nodiscard]] HullSurvey SurveyHull(const MotionGroup& group,
                                     std::span<const ParameterValues> samples,
                                     std::span<GroupProbe> probes);

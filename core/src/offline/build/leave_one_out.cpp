@@ -52,8 +52,8 @@ Others AllBut(const MotionGroup& group, int left_out, double cluster_diameter_m)
   return others;
 }
 
-// The group with the others' sites: the same motion, weights of the left out one 0. What a site stands for is a
-// blend of examples: a blend of sites is one of them as well.
+// The group with the others' sites: the same motion, weights of the left out one 0. What a site
+// stands for is a blend of examples: a blend of sites is one of them as well.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
@@ -168,7 +168,7 @@ class Comparer {
     const auto smooth = smoothness ? FitSmooth(group_, others.examples, *smoothness) : nullptr;
     const auto n = static_cast<std::size_t>(group_.example_count);
     std::vector<double> shares(others.clusters.size() * n);
-    std::vector<double> scratch(n);
+    CorrectionScratch scratch(library_.skeleton(), library_.layout(), group_.example_count);
     for (std::size_t c = 0; c < others.clusters.size(); ++c) {
       const std::span<double> share = std::span(shares).subspan(c * n, n);
       const std::vector<int>& cluster = others.clusters[c];
@@ -178,9 +178,8 @@ class Comparer {
       if (smooth == nullptr) continue;
       const std::span<const double> site =
           std::span(others.sites).subspan(c * wanted.size(), wanted.size());
-      if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch,
-                           movement_)) {
-        std::copy_n(scratch.begin(), n, share.begin());
+      if (SetSmoothWeights(*smooth, site, scratch, movement_)) {
+        std::ranges::copy(scratch.weights(group_), share.begin());
       }
     }
     const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
@@ -191,8 +190,7 @@ class Comparer {
     applied.count = group_.parameter_count();
     ProjectOntoHull(others.sites, metric, kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
-    CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
-                   DefaultCorrectionLimits(group_), scratch, movement_);
+    CorrectWeights(fitted->group, applied, DefaultCorrectionLimits(group_), scratch, movement_);
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 

@@ -96,8 +96,8 @@ struct Kriging {
     return functions;
   }
 
-  // Weights [site] at p as if site `left_out` were not there: the inverse without its row and column is that of
-  // the smaller matrix less a product of the two (block inversion).
+  // Weights [site] at p as if site `left_out` were not there: the inverse without its row and
+  // column is that of the smaller matrix less a product of the two (block inversion).
   [[nodiscard]] Eigen::VectorXd WeightsWithout(Eigen::Index left_out,
                                                std::span<const double> p) const {
     Eigen::VectorXd functions = Functions(p);
@@ -145,14 +145,13 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
   return smooth;
 }
 
-bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const Skeleton& skeleton,
-                      std::span<const double> parameters, std::span<double> scratch,
-                      Movement& movement) {
+bool SetSmoothWeights(const SmoothGroup& smooth, std::span<const double> parameters,
+                      CorrectionScratch& scratch, Movement& movement) {
   ParameterValues wanted;
   wanted.count = static_cast<int>(parameters.size());
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
-  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, wanted,
-                                           {.max_iterations = kSolveIterations}, scratch, movement);
+  const Correction solved =
+      CorrectWeights(smooth.group, wanted, {.max_iterations = kSolveIterations}, scratch, movement);
   return solved.error_m <= kMaxMissM;
 }
 
@@ -244,13 +243,13 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   const auto smoothness = ChooseSmoothness(group, all, MovementProducts(group, layout, skeleton));
   const auto smooth = smoothness ? FitSmooth(group, all, *smoothness) : nullptr;
   if (smooth == nullptr) return std::nullopt;
-  std::vector<double> scratch(all.size());
+  CorrectionScratch scratch(skeleton, layout, group.example_count);
   GridCache cache(layout);
   Pose pose(skeleton.joint_count());
   Movement movement;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   for (GridExample& example : examples) {
-    if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, movement)) {
+    if (!SetSmoothWeights(*smooth, example.parameters, scratch, movement)) {
       continue;
     }
     cache.Clear();

@@ -76,12 +76,13 @@ void AvatarBody::SetStartOffset(double time_s) {
 }
 
 template <typename Landing>
-void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
+void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch) {
   std::optional<ConstPoseSpan> earlier;
   if (keeps_speed) earlier.emplace(earlier_pose);
-  GridCache cache(library->layout());
+  GridCache& cache = scratch.cache();
+  cache.Clear();
   if (plants_feet) {
-    ContinueFeet(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, cache,
+    ContinueFeet(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, scratch,
                                        pose, movement));
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
@@ -98,12 +99,13 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   }
 }
 
-void AvatarBody::BlendIn(const LandingTarget& target, bool keeps_speed) {
-  BlendInAt(target, keeps_speed);
+void AvatarBody::BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch) {
+  BlendInAt(target, keeps_speed, scratch);
 }
 
-void AvatarBody::BlendIn(const LandingDecision& decision, bool keeps_speed) {
-  BlendInAt(decision, keeps_speed);
+void AvatarBody::BlendIn(const LandingDecision& decision, bool keeps_speed,
+                         FootPlanScratch& scratch) {
+  BlendInAt(decision, keeps_speed, scratch);
 }
 
 // Makes the foot corrections of the planned movement continue smoothly from the previous ones.

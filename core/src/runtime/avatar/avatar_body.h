@@ -59,8 +59,8 @@ struct AvatarBody {
 
   /// Plans the feet of the movement just started, if they are planted, and what of the pose before
   /// is eased out.
-  void BlendIn(const LandingTarget& target, bool keeps_speed);
-  void BlendIn(const LandingDecision& decision, bool keeps_speed);
+  void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
+  void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 
   /// Lays the layers over the pose.
   void ApplyLayers();
@@ -68,7 +68,7 @@ struct AvatarBody {
  private:
   void ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& blended);
   template <typename Landing>
-  void BlendInAt(const Landing& landing, bool keeps_speed);
+  void BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch);
 };
 
 /// Room for any movement of a library.

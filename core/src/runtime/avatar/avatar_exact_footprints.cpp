@@ -53,10 +53,10 @@ std::string DescribeRejection(const AvatarEvent& event) {
 // Plans the movement of a request. If the request needs exact placement and would miss its
 // footprint, rejects it, restores the previous state and returns false.
 bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                     double swing_part) {
+                                     double swing_part, PlanScratch& scratch) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
-    PlanMovement(plan, swing_part);
+    PlanMovement(plan, swing_part, scratch);
     return true;
   }
   if (!body_.plants_feet) {
@@ -68,10 +68,10 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   }
   saved_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
   std::swap(body_.movement, saved_.front().movement);
-  PlanMovement(plan, swing_part);
+  PlanMovement(plan, swing_part, scratch);
   FootprintError missed = LandingErrorFrom(*plan.exact);
   if (IsMet(missed)) return true;
-  missed = NearestInReach(*plan.exact, missed, swing_part);
+  missed = NearestInReach(*plan.exact, missed, swing_part, scratch);
   AddEvent({.type = AvatarEventType::kRejected,
             .request_id = request.id,
             .kind = group().kind,
@@ -87,7 +87,8 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
 
 // Finds a footprint close to one that was missed that the avatar's step can meet exactly.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
-                                                const FootprintError& missed, double swing_part) {
+                                                const FootprintError& missed, double swing_part,
+                                                PlanScratch& scratch) {
   const Foot moving = MovingFoot(group().kind);
   Footprint aim = asked;
   FootprintError error = missed;
@@ -98,7 +99,7 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
     const auto plan =
         PlanRequest({.movement = StepRequest{
                          .foot = moving, .at = FootprintRequest{aim.position_m, aim.heading_rad}}});
-    PlanMovement(*plan, swing_part);
+    PlanMovement(*plan, swing_part, scratch);
     error = LandingErrorFrom(*plan->exact);
   }
   const DVec3 away_m = asked.position_m - error.nearest.position_m;

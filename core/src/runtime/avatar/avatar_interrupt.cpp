@@ -66,7 +66,7 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
 
 // Replaces the current step by a step of the same foot, at the same fraction of the swing. If the
 // new step is rejected, the current step continues.
-void AvatarSimulation::RedirectSwing() {
+void AvatarSimulation::RedirectSwing(PlanScratch& scratch) {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
   MovementRequest request = queue_[queue_head_];
@@ -82,7 +82,7 @@ void AvatarSimulation::RedirectSwing() {
                          .group = body_.movement.group,
                          .is_cut_short = true,
                          .base = base_};
-  if (!PlanRequested(request, *plan, part)) return;
+  if (!PlanRequested(request, *plan, part, scratch)) return;
   AddEvent(left);
   RecordLeaving(movement_time_s_, true);
   BeginMovement(*plan, request.id);

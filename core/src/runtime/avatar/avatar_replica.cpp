@@ -154,7 +154,7 @@ bool AvatarReplica::IsState(std::span<const std::byte> record) {
   return !record.empty() && (std::to_integer<unsigned>(record[0]) & record::kIsState) != 0;
 }
 
-Status AvatarReplica::Apply(std::span<const std::byte> record) {
+Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& scratch) {
   Reader reader(record);
   const unsigned flags = reader.Flags();
   if ((flags & record::kIsState) != 0) {
@@ -162,14 +162,14 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
   } else if (!is_known_) {
     return Fail(ErrorCode::kNotFound, "a change record arrived before the first state record");
   } else {
-    ReadChange(flags, reader);
+    ReadChange(flags, reader, scratch);
   }
   is_known_ = reader.ok();
   is_idle_ = (flags & record::kIsIdle) != 0;
   return reader.status();
 }
 
-void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
+void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch) {
   // Check each part of the record before applying it, because the steps cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
@@ -221,7 +221,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
       return;
     }
     body_.SetStartOffset(start_offset_s);
-    body_.BlendIn(decision, (flags & record::kKeepsSpeed) != 0);
+    body_.BlendIn(decision, (flags & record::kKeepsSpeed) != 0, scratch);
     body_.begins_planting = false;
     movement_time_s_ = time_s;
     is_moving_ = is_time_set_ = true;

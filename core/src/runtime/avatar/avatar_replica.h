@@ -30,7 +30,7 @@ class AvatarReplica {
   /// kMalformed: the record is invalid, or does not fit the library or the current state.
   /// kNotFound: a change arrived before any state. The index of an error is the offset in the
   /// record. After an error the replica is unknown until the next state.
-  [[nodiscard]] Status Apply(std::span<const std::byte> record);
+  [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
   /// Advances replicas by one tick and evaluates their poses. All must have the same library.
   /// Unknown replicas are skipped.
@@ -49,7 +49,7 @@ class AvatarReplica {
 
  private:
   class Reader;
-  void ReadChange(unsigned flags, Reader& reader);
+  void ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch);
   void ReadState(unsigned flags, Reader& reader);
 
   AvatarBody body_;

@@ -147,8 +147,13 @@ FootState AvatarSimulation::MeasureFeet() const {
   return {FootVector(body_.library->skeleton(), body_.pose, Foot::kLeft, base_.heading_rad)};
 }
 
+PlanScratch& AvatarSimulation::OwnScratch::Get(const MotionLibrary& library) {
+  if (scratch_ == nullptr) scratch_ = std::make_unique<PlanScratch>(library);
+  return *scratch_;
+}
+
 void AvatarSimulation::Advance(double dt_s) {
-  AdvanceState(dt_s);
+  AdvanceState(dt_s, own_scratch_.Get(*body_.library));
   UpdatePose();
 }
 
@@ -158,7 +163,7 @@ void AvatarSimulation::UpdatePose() {
 }
 
 void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                                     std::vector<std::uint32_t>* eventful) {
+                                     PlanScratch& scratch, std::vector<std::uint32_t>* eventful) {
   if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
@@ -166,7 +171,7 @@ void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars,
     if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysEventFree(dt_s)) {
       avatars[i + kAhead]->PrefetchState();
     }
-    avatars[i]->AdvanceState(dt_s);
+    avatars[i]->AdvanceState(dt_s, scratch);
     if (eventful != nullptr && !avatars[i]->is_event_free()) {
       eventful->push_back(static_cast<std::uint32_t>(i));
     }
@@ -191,8 +196,8 @@ void AvatarSimulation::UpdatePoses(std::span<AvatarSimulation* const> avatars,
 }
 
 void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                                  SoaPoseEvaluator& evaluator) {
-  AdvanceStates(avatars, dt_s);
+                                  PlanScratch& scratch, SoaPoseEvaluator& evaluator) {
+  AdvanceStates(avatars, dt_s, scratch);
   UpdatePoses(avatars, evaluator);
 }
 
@@ -207,14 +212,14 @@ void AvatarSimulation::PrefetchState() const {
 }
 
 // Advances everything except the pose.
-void AvatarSimulation::AdvanceState(double dt_s) {
+void AvatarSimulation::AdvanceState(double dt_s, PlanScratch& scratch) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   if (StaysEventFree(dt_s)) {
     movement_time_s_ += dt_s;
     time_s_ += dt_s;
     return;
   }
-  AdvanceEventfully(dt_s);
+  AdvanceEventfully(dt_s, scratch);
   body_.layers.Advance(*body_.library, dt_s);
   next_event_s_ = NextEventTime();
 }
@@ -229,7 +234,7 @@ double AvatarSimulation::NextEventTime() const {
                                      : body_.movement.duration_s();
 }
 
-void AvatarSimulation::AdvanceEventfully(double dt_s) {
+void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   events_.clear();
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
@@ -241,7 +246,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
     if (is_moving_) {
       const double before_s = movement_time_s_;
       if (may_change && RedirectsSwing()) {
-        RedirectSwing();
+        RedirectSwing(scratch);
         continue;
       }
       const double duration_s = MovementEnd();
@@ -264,7 +269,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
       time_s_ = end_s - left_s;
       FinishStand();
     }
-    if (!may_change || !StartNext()) break;
+    if (!may_change || !StartNext(scratch)) break;
   }
   time_s_ = end_s;
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
@@ -277,7 +282,7 @@ bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
          std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
 }
 
-bool AvatarSimulation::StartNext() {
+bool AvatarSimulation::StartNext(PlanScratch& scratch) {
   interrupts_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
@@ -287,7 +292,7 @@ bool AvatarSimulation::StartNext() {
     SwitchPlanting();
     const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
     if (plan && (inserted_steps_ == 0 || BringsFeetTogether(*plan))) {
-      StartInserted(*plan);
+      StartInserted(*plan, scratch);
       return true;
     }
   }
@@ -304,7 +309,7 @@ bool AvatarSimulation::StartNext() {
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
-    StartWalkStep();
+    StartWalkStep(scratch);
     return true;
   }
   if (stand != nullptr) {
@@ -314,23 +319,23 @@ bool AvatarSimulation::StartNext() {
     AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
     return true;
   }
-  StartTransitionPath();
+  StartTransitionPath(scratch);
   return true;
 }
 
 // Starts the step or jump at the head of the queue, or a step that must come before it.
-void AvatarSimulation::StartTransitionPath() {
+void AvatarSimulation::StartTransitionPath(PlanScratch& scratch) {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
   const TransitionPath path = FindTransitionPath(
       *body_.library, request, direct, {feet_, last_moved_, last_group_, inserted_steps_});
   if (path.is_inserted) {
-    StartInserted(*path.plan);
+    StartInserted(*path.plan, scratch);
   } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    if (PlanRequested(taken, *path.plan, 0.0)) BeginMovement(*path.plan, taken.id);
+    if (PlanRequested(taken, *path.plan, 0.0, scratch)) BeginMovement(*path.plan, taken.id);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -339,9 +344,9 @@ void AvatarSimulation::StartTransitionPath() {
   }
 }
 
-void AvatarSimulation::StartInserted(const RequestPlan& plan) {
+void AvatarSimulation::StartInserted(const RequestPlan& plan, PlanScratch& scratch) {
   const int inserted = inserted_steps_ + 1;
-  StartPlan(plan, 0);
+  StartPlan(plan, 0, scratch);
   inserted_steps_ = inserted;
 }
 
@@ -354,7 +359,7 @@ std::uint64_t AvatarSimulation::PopQueue() {
 
 // Starts the next step of the walk at the head of the queue. The request stays in the queue until
 // the walk has arrived or is rejected.
-void AvatarSimulation::StartWalkStep() {
+void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
@@ -370,7 +375,7 @@ void AvatarSimulation::StartWalkStep() {
       PlanWalkStep(*body_.library, options_.terrain.get(),
                    std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
   if (decision.outcome == WalkOutcome::kStep) {
-    StartPlan(decision.plan, queue_[queue_head_].id);
+    StartPlan(decision.plan, queue_[queue_head_].id, scratch);
     return;
   }
   const std::uint64_t id = PopQueue();
@@ -429,24 +434,25 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
                        base_.heading_rad, feet_);
 }
 
-void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
-  PlanMovement(plan, 0.0);
+void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id,
+                                 PlanScratch& scratch) {
+  PlanMovement(plan, 0.0, scratch);
   BeginMovement(plan, request_id);
 }
 
 // Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the
 // same fraction `swing_part` of its own swing.
-void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
+void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part,
+                                    PlanScratch& scratch) {
   const MotionGroup& next = body_.library->group(plan.group);
-  // Only the first elements are used, one per example of the group.
-  std::array<double, MotionLibrary::kMaxExamples> weights;
   if (options_.run_time_correction) {
-    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next), weights,
+    CorrectWeights(next, plan.applied, DefaultCorrectionLimits(next), scratch.correction,
                    body_.movement);
+    body_.movement.group = plan.group;
   } else {
     SetWeights(next, plan.group,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
-               weights, body_.movement);
+               scratch.correction.weights(next), body_.movement);
   }
   body_.StartWeighted(base_);
   if (swing_part > 0.0) {
@@ -454,7 +460,8 @@ void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) 
     body_.SetStartOffset(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // An avatar that was standing has no speed to keep.
-  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
+  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed(),
+                scratch.feet);
 }
 
 // Starts the movement that was just planned.

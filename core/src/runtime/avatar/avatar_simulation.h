@@ -98,13 +98,13 @@ class AvatarSimulation {
   /// The same for many avatars of one library, whose poses are evaluated together: several times as
   /// fast, and not a bit of any pose depends on who else is there.
   static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                         SoaPoseEvaluator& evaluator);
+                         PlanScratch& scratch, SoaPoseEvaluator& evaluator);
 
   /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none
   /// of now until UpdatePose. `eventful`: the places in `avatars` of those that are not quiet after
   /// it, growing.
   static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                            std::vector<std::uint32_t>* eventful = nullptr);
+                            PlanScratch& scratch, std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
   void UpdatePose();
   /// The same for many avatars of one library together.
@@ -154,39 +154,55 @@ class AvatarSimulation {
  private:
   static constexpr const char* kNeedsPlanting = "exact placement requires foot planting";
 
+  // Scratch memory for Advance, which handles a single avatar. The first call allocates it. Copies
+  // of the avatar allocate their own.
+  class OwnScratch {
+   public:
+    OwnScratch() = default;
+    OwnScratch(const OwnScratch&) {}
+    OwnScratch(OwnScratch&&) noexcept = default;
+    OwnScratch& operator=(const OwnScratch&) { return *this; }
+    OwnScratch& operator=(OwnScratch&&) noexcept = default;
+    ~OwnScratch() = default;
+    [[nodiscard]] PlanScratch& Get(const MotionLibrary& library);
+
+   private:
+    std::unique_ptr<PlanScratch> scratch_;
+  };
+
   void AddEvent(const AvatarEvent& event);
   // Times are sums of ticks: a hold of whole ticks ends with the last of them.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
   [[nodiscard]] FootState MeasureFeet() const;
-  void AdvanceState(double dt_s);
+  void AdvanceState(double dt_s, PlanScratch& scratch);
   // Nothing happens in an Advance: it moves time only.
   [[nodiscard]] bool StaysEventFree(double dt_s) const {
     return movement_time_s_ + dt_s < next_event_s_;
   }
   [[nodiscard]] double NextEventTime() const;
-  void AdvanceEventfully(double dt_s);
+  void AdvanceEventfully(double dt_s, PlanScratch& scratch);
   void PrefetchState() const;
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
-  [[nodiscard]] bool StartNext();
-  void StartWalkStep();
-  void StartTransitionPath();
-  void StartInserted(const RequestPlan& plan);
+  [[nodiscard]] bool StartNext(PlanScratch& scratch);
+  void StartWalkStep(PlanScratch& scratch);
+  void StartTransitionPath(PlanScratch& scratch);
+  void StartInserted(const RequestPlan& plan, PlanScratch& scratch);
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
-  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
-  void PlanMovement(const RequestPlan& plan, double swing_part);
+  void StartPlan(const RequestPlan& plan, std::uint64_t request_id, PlanScratch& scratch);
+  void PlanMovement(const RequestPlan& plan, double swing_part, PlanScratch& scratch);
   void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
   [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                   double swing_part);
+                                   double swing_part, PlanScratch& scratch);
   [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
-                                              double swing_part);
+                                              double swing_part, PlanScratch& scratch);
   [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
   [[nodiscard]] double MovementEnd() const;
   [[nodiscard]] double LandingTime() const;
   [[nodiscard]] bool RedirectsSwing() const;
-  void RedirectSwing();
+  void RedirectSwing(PlanScratch& scratch);
   void SwitchPlanting();
   void CaptureBlendSource(double time_s);
   void RecordLeaving(double time_s, bool is_redirected);
@@ -240,6 +256,7 @@ class AvatarSimulation {
   std::vector<MovementRequest> queue_;  // live from queue_head_ on
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
+  OwnScratch own_scratch_;
 };
 
 }  // namespace stridewire

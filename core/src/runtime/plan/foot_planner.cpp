@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/plan/foot_sampler.h"
@@ -73,15 +74,15 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
 
 class Planner {
  public:
-  Planner(const MotionLibrary& library, GridCache& cache, PoseSpan pose, Movement& movement)
+  Planner(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose, Movement& movement)
       : library_(library),
         skeleton_(library.skeleton()),
         rig_(library.leg_rig()),
         group_(library.group(movement.group)),
-        cache_(cache),
+        cache_(scratch.cache()),
         pose_(pose),
         movement_(movement),
-        sampler_(library, cache, pose) {}
+        sampler_(scratch, pose) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -396,10 +397,12 @@ namespace {
 // decision computes the same plan.
 std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
                            const LandingTarget* target, const LandingDecision& decision,
-                           const BlendSource& source, GridCache& cache, PoseSpan pose,
+                           const BlendSource& source, FootPlanScratch& scratch, PoseSpan pose,
                            Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
-  Planner planner(library, cache, pose, movement);
+  STRIDEWIRE_CHECK(&scratch.library() == &library);
+  GridCache& cache = scratch.cache();
+  Planner planner(library, scratch, pose, movement);
   const bool is_step = IsStep(group.kind);
   const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
   const Foot fixed = OtherFoot(moving);
@@ -509,14 +512,14 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingTarget& target, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, &target, {}, source, cache, pose, movement);
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, &target, {}, source, scratch, pose, movement);
 }
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingDecision& decision, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, nullptr, decision, source, cache, pose, movement);
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, nullptr, decision, source, scratch, pose, movement);
 }
 
 LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "runtime/movement/movement.h"
+#include "runtime/plan/plan_scratch.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
@@ -60,12 +61,12 @@ inline constexpr double kMaxRootShiftM = 0.4;
 /// from `join`. Sets the movement's base position, so that the foot that stays (for a jump: the
 /// middle of both) is where it stands and nothing drifts; its difference pose; and `movement.feet`.
 ///
-/// `pose` is scratch with one rotation a joint; `cache` holds rows of this movement or none. Never
-/// allocates. Returns where the blended and eased pose has the feet when the movement is entered,
-/// and kBlendStepS later.
+/// `pose` is scratch with one rotation per joint. The cache of `scratch` may only hold rows of this
+/// movement. Never allocates. Returns where the blended and eased pose has the feet when the
+/// movement is entered, and kBlendStepS later.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingTarget& target, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement);
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement);
 
 /// What PlanFeet chose for a movement, in terms of which the rest of the plan follows: neither
 /// request nor ground are needed to make it again.
@@ -89,7 +90,7 @@ struct LandingDecision {
 /// heading; the heading change is not needed.
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
                                const LandingDecision& decision, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement);
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement);
 
 /// The holds at a time of a planned movement when both feet stand; the pose then, eased but not
 /// planted, is `pose`.

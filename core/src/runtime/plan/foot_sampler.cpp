@@ -12,17 +12,11 @@
 
 namespace stridewire {
 namespace {
-
 constexpr std::size_t kBlock = kernels::kBlock;
-
-// Sets all lanes to the same number.
-template <typename Number>
-void Fill(Number* lanes, Number number) {
-  std::fill_n(lanes, kBlock, number);
 }
 
 // Arrays for evaluating one movement at several times, one time per lane.
-struct Lanes {
+struct FootSamplerLanes {
   static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
   kernels::GridTimes times{};
   kernels::GridSamples samples;
@@ -37,8 +31,24 @@ struct Lanes {
   alignas(64) float rotations[kJoints * 4 * kBlock];
 };
 
+FootPlanScratch::FootPlanScratch(const MotionLibrary& library)
+    : library_(&library),
+      cache_(std::make_unique<GridCache>(library.layout())),
+      lanes_(std::make_unique<FootSamplerLanes>()) {}
+FootPlanScratch::~FootPlanScratch() = default;
+FootPlanScratch::FootPlanScratch(FootPlanScratch&&) noexcept = default;
+FootPlanScratch& FootPlanScratch::operator=(FootPlanScratch&&) noexcept = default;
+
+namespace {
+
+// Sets all lanes to the same number.
+template <typename Number>
+void Fill(Number* lanes, Number number) {
+  std::fill_n(lanes, kBlock, number);
+}
+
 void SampleGrids(const MotionGroup& group, const Movement& movement,
-                 std::span<const double> times_s, Lanes& lanes) {
+                 std::span<const double> times_s, FootSamplerLanes& lanes) {
   for (std::size_t i = 0; i < times_s.size(); ++i) {
     SetGridTime(group, movement, times_s[i], i, lanes.times);
   }
@@ -47,7 +57,7 @@ void SampleGrids(const MotionGroup& group, const Movement& movement,
 
 // Collects the difference pose for the joints of the legs.
 void CollectDifferences(const Movement& movement, std::span<const int> joints, std::size_t count,
-                        Lanes& lanes) {
+                        FootSamplerLanes& lanes) {
   const Pose& difference = movement.difference;
   const auto& velocity = movement.difference_velocity;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -92,7 +102,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   const GridLayout& layout = library_.layout();
   const LegRig& rig = library_.leg_rig();
   const std::span<const int> joints = rig.joints;
-  Lanes lanes;
+  FootSamplerLanes& lanes = scratch_.lanes();
   SampleGrids(group, movement, times_s, lanes);
   std::fill(lanes.samples.is_eased + eased, lanes.samples.is_eased + kBlock, 0.0f);
   const bool is_eased = std::ranges::any_of(std::span(lanes.samples.is_eased).first(eased),
@@ -103,7 +113,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   rows.fill(lanes.rows[0]);
   std::array<float, kMaxRowFloats> row;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    BlendRow(group, layout, movement, GridSampleOf(lanes.samples, i), cache_, row.data());
+    BlendRow(group, layout, movement, GridSampleOf(lanes.samples, i), scratch_.cache(), row.data());
     float* to = lanes.rows[i];
     rows[i] = to;
     for (const int joint : joints) {
@@ -147,15 +157,15 @@ void FootSampler::SampleOne(const Movement& movement, double time_s, bool is_eas
   const MotionGroup& group = library_.group(movement.group);
   const LegRig& rig = library_.leg_rig();
   const auto evaluate = is_eased ? EvaluateMovement : EvaluateBlend;
-  evaluate(group, library_.layout(), movement, time_s, cache_, scratch_);
+  evaluate(group, library_.layout(), movement, time_s, scratch_.cache(), pose_);
   const auto put = [i](const Vec3& from, float(&to)[3][kMaxTimes]) {
     for (std::size_t c = 0; c < 3; ++c) to[c][i] = from[static_cast<int>(c)];
   };
-  put(scratch_.root_position_m, roots_m_);
+  put(pose_.root_position_m, roots_m_);
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    EvaluateLeg(library_.skeleton(), rig, scratch_, foot, leg);
+    EvaluateLeg(library_.skeleton(), rig, pose_, foot, leg);
     put(leg.ball_m, balls_m_[f]);
     put(leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)], ankles_m_[f]);
   }

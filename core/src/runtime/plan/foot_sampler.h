@@ -5,6 +5,7 @@
 
 #include "runtime/movement/foot_plan.h"
 #include "runtime/movement/movement.h"
+#include "runtime/plan/plan_scratch.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
@@ -19,14 +20,14 @@ class FootSampler {
  public:
   static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Largest number of times per call.
 
-  /// Borrows all arguments. The library's leg rig must be usable. `scratch` is a pose of its
-  /// skeleton.
-  FootSampler(const MotionLibrary& library, GridCache& cache, PoseSpan scratch)
-      : library_(library), cache_(cache), scratch_(scratch) {}
+  /// Borrows both arguments. The leg rig of the scratch's library must be usable. `pose` is scratch
+  /// as well: a pose of its skeleton.
+  FootSampler(FootPlanScratch& scratch, PoseSpan pose)
+      : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
-  /// Samples up to kMost times of a movement: the first `eased` of them with the difference pose,
-  /// as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache may only
-  /// contain rows of this movement.
+  /// Samples up to kMaxTimes times of a movement: the first `eased` of them with the difference
+  /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache
+  /// may only contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
   /// The ball of a foot at the `i`th time, in world space.
@@ -43,8 +44,8 @@ class FootSampler {
   }
 
   const MotionLibrary& library_;
-  GridCache& cache_;
-  PoseSpan scratch_;
+  FootPlanScratch& scratch_;
+  PoseSpan pose_;
   alignas(64) float roots_m_[3][kMaxTimes];      // In world space.
   alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: relative to the root.
   alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: relative to the root.

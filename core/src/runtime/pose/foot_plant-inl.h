@@ -115,10 +115,12 @@ HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[1], std::size_t{1});
 }
 
-// `joints` maps places in a leg's chain to joints in `rotations`.
-HWY_INLINE void EvaluateLegs(
-    const LegRig& rig, const float* rotations, SoaQuat root, SoaLeg* legs,
-    const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
+// Maps places in a leg's chain to joints in an array of rotations: those of the skeleton, or those
+// of LegRig::joints alone.
+using JointMap = std::size_t (LegRig::Bones::*)[kMaxLegChain];
+
+HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, SoaQuat root, SoaLeg* legs,
+                             JointMap joints) {
   std::size_t longest = 0;
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     legs[f].positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
@@ -243,7 +245,7 @@ struct AnkleTarget {
 // Solves both legs for the given ankle targets and stores the changed rotations (hips, knees and
 // ankles).
 HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarget* targets,
-                          float* rotations) {
+                          float* rotations, JointMap joints) {
   struct Work {
     SoaVec3 thigh, shank, towards, new_thigh, new_shank;
     Float distance;
@@ -288,7 +290,7 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarg
     const Work& w = work[f];
     const auto store = [&](std::size_t place, SoaQuat before, SoaQuat rotation) HWY_ATTR {
       StoreQuat(Renormalize(Multiply(Conjugate(before), rotation)),
-                rotations + bones.joints[place] * 4 * kBlock);
+                rotations + (bones.*joints)[place] * 4 * kBlock);
     };
     store(bones.hip, leg.rotations[bones.hip - 1],
           Multiply(w.turn_thigh, leg.rotations[bones.hip]));
@@ -299,7 +301,7 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarg
 }
 
 // Plants the feet of one vector of poses, starting at `lane`.
-void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane) {
+void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane, JointMap joints) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
   const std::size_t doubles = hn::Lanes(d);
@@ -339,7 +341,7 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   SoaVec3 shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
   Float headings[2];
   Float flatnesses[2];
-  EvaluateLegs(rig, rotations, root_rotation, legs);
+  EvaluateLegs(rig, rotations, root_rotation, legs, joints);
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const SoaVec3 sole = legs[f].ball - legs[f].positions[bones.ankle];
     headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
@@ -420,12 +422,12 @@ void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     targets[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
   });
-  SolveLegs(rig, legs, targets, rotations);
+  SolveLegs(rig, legs, targets, rotations, joints);
 }
 
 void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count) {
   for (std::size_t lane = 0; lane < count; lane += hn::Lanes(FloatTag())) {
-    PlantVector(rig, block, lane);
+    PlantVector(rig, block, lane, &LegRig::Bones::joints);
   }
 }
 
@@ -438,7 +440,7 @@ HWY_INLINE void BroadcastAll(const float* from, std::size_t count, float* to) {
 // Plants the feet of one pose: evaluates the same pose in all lanes of a vector and uses the first.
 void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
   HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
-  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // Only the joints of the legs are used.
+  HWY_ALIGN float rotations[LegRig::kMaxJointsOfLegs * 4 * kBlock];
   HWY_ALIGN double time_s[kBlock];
   HWY_ALIGN double base_m[3 * kBlock];
   HWY_ALIGN float root_m[3 * kBlock];
@@ -446,21 +448,21 @@ void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
   BroadcastAll(job.root_m, 3, root_m);
   for (const LegRig::Bones& bones : rig.bones) {
     for (std::size_t i = 0; i < bones.count; ++i) {
-      const std::size_t joint = bones.joints[i];
-      BroadcastAll(job.rotations + 4 * joint, 4, rotations + joint * 4 * kBlock);
+      BroadcastAll(job.rotations + 4 * bones.joints[i], 4,
+                   rotations + bones.rig_joints[i] * 4 * kBlock);
     }
   }
   for (std::size_t i = 0; i < hn::Lanes(FloatTag()); ++i) {
     time_s[i] = job.time_s;
     for (std::size_t c = 0; c < 3; ++c) base_m[c * kBlock + i] = job.base_m[c];
   }
-  PlantVector(rig, {plan, time_s, base_m, root_m, rotations}, 0);
+  PlantVector(rig, {plan, time_s, base_m, root_m, rotations}, 0, &LegRig::Bones::rig_joints);
   for (std::size_t c = 0; c < 3; ++c) job.root_m[c] = root_m[c * kBlock];
   for (const LegRig::Bones& bones : rig.bones) {
     for (const std::size_t place : {bones.hip, bones.knee, bones.ankle}) {
-      const std::size_t joint = bones.joints[place];
       for (std::size_t c = 0; c < 4; ++c) {
-        job.rotations[4 * joint + c] = rotations[(joint * 4 + c) * kBlock];
+        job.rotations[4 * bones.joints[place] + c] =
+            rotations[(bones.rig_joints[place] * 4 + c) * kBlock];
       }
     }
   }

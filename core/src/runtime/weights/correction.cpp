@@ -4,13 +4,12 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/weights/end_poses.h"
+#include "base/check.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {
 
-constexpr auto kMaxExamples = static_cast<std::size_t>(MotionLibrary::kMaxExamples);
 constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
 using Vector = std::array<double, kMaxRows>;  // In metres; a radian counts kMetresPerRadian.
 using Matrix = std::array<Vector, kMaxRows>;
@@ -132,35 +131,36 @@ CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
   return {.max_iterations = group.parameter_count() <= 2 ? 3 : 8};
 }
 
-Correction CorrectWeights(const MotionLibrary& library, int group_index,
-                          const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weight_scratch, Movement& movement) {
-  const Correction correction =
-      CorrectWeights(library.skeleton(), library.layout(), library.group(group_index), wanted,
-                     limits, weight_scratch, movement);
-  movement.group = group_index;
-  return correction;
+CorrectionScratch::CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout,
+                                     int max_example_count)
+    : ends_(skeleton, layout) {
+  STRIDEWIRE_CHECK(max_example_count >= 0 && max_example_count <= MotionLibrary::kMaxExamples);
+  const auto n = static_cast<std::size_t>(max_example_count);
+  weights_.resize(n);
+  next_.resize(n);
+  halved_.resize(n);
+  slopes_.resize(n * kMaxParameters);
 }
 
-Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
-                          const MotionGroup& group, const ParameterValues& wanted,
-                          const CorrectionLimits& limits, std::span<double> weight_scratch,
+CorrectionScratch::CorrectionScratch(const MotionLibrary& library)
+    : CorrectionScratch(library.skeleton(), library.layout(), library.max_example_count()) {}
+
+Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
+                          const CorrectionLimits& limits, CorrectionScratch& scratch,
                           Movement& movement) {
   const std::size_t d = group.parameters.size();
   const auto n = static_cast<std::size_t>(group.example_count);
-  const std::span<double> weights = weight_scratch.first(n);
-  // Only the first n elements of each are used.
-  std::array<double, kMaxExamples> next_room;
-  std::array<double, kMaxExamples> halved_room;
-  std::array<double, kMaxParameters * kMaxExamples> slopes_room;
-  const std::span<double> next = std::span(next_room).first(n);
-  const std::span<double> halved = std::span(halved_room).first(n);
-  const std::span<double> slopes = std::span(slopes_room).first(d * n);
+  STRIDEWIRE_CHECK(n <= scratch.weights_.size() && d <= kMaxParameters);
+  const std::span<double> weights = scratch.weights(group);
+  const std::span<double> next = std::span(scratch.next_).first(n);
+  const std::span<double> halved = std::span(scratch.halved_).first(n);
+  const std::span<double> slopes = std::span(scratch.slopes_).first(d * n);
+  EndPoses& ends = scratch.ends_;
+  ends.SetGroup(group);
   Vector unit{};
   for (std::size_t l = 0; l < d; ++l) {
     unit[l] = group.parameters[l].name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
   }
-  EndPoses ends(skeleton, layout, group);
 
   struct ParameterError {
     Vector missing{};  // p^ - a(w).

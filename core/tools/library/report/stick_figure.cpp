@@ -66,7 +66,7 @@ const char* StickFigure::PlotCommand() {
 MovementPlayer::MovementPlayer(const MotionLibrary& library, int group_index)
     : library_(library),
       group_index_(group_index),
-      scratch_(static_cast<std::size_t>(library.max_example_count())),
+      scratch_(library),
       cache_(library.layout()),
       pose_(library.skeleton().joint_count()) {}
 
@@ -76,10 +76,10 @@ void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   wanted.count = group.parameter_count();
   std::copy(parameters.begin(), parameters.end(), wanted.values.begin());
   if (corrected) {
-    CorrectWeights(library_, group_index_, wanted, DefaultCorrectionLimits(group), scratch_,
-                   movement_);
+    CorrectWeights(group, wanted, DefaultCorrectionLimits(group), scratch_, movement_);
+    movement_.group = group_index_;
   } else {
-    SetWeights(group, group_index_, parameters, scratch_, movement_);
+    SetWeights(group, group_index_, parameters, scratch_.weights(group), movement_);
   }
   StartWeighted(group, {}, movement_);
   cache_.Clear();

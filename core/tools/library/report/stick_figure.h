@@ -6,6 +6,7 @@
 
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
@@ -24,8 +25,8 @@ class StickFigure {
   // World positions of all joints, then of the end sites.
   [[nodiscard]] std::vector<Vec3> Place(ConstPoseSpan pose) const;
 
-  // Adds the lines of a pose moved on by `shift_m`, seen from its right side (ahead is right) or from
-  // the front (its left is right).
+  // Adds the lines of a pose moved on by `shift_m`, seen from its right side (ahead is right) or
+  // from the front (its left is right).
   void Draw(ConstPoseSpan pose, double shift_m, bool from_front = false);
 
   // gnuplot data blocks $left, $right and $middle with all that was drawn, and what plots them.
@@ -52,7 +53,7 @@ class MovementPlayer {
  private:
   const MotionLibrary& library_;
   int group_index_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
   GridCache cache_;
   Pose pose_;
   Movement movement_;

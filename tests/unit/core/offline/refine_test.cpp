@@ -133,11 +133,11 @@ TEST_P(RefineInDimensions, LeavesRunTimeCorrectionWhatItWas) {
   ASSERT_TRUE(refined.has_value()) << Describe(refined.error());
   const MotionGroup& group = refined->library->group(0);
   std::mt19937 random(seed);
-  std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
+  CorrectionScratch scratch(*refined->library);
   Movement movement;
   for (int i = 0; i < 100; ++i) {
-    const Correction correction = CorrectWeights(*refined->library, 0, PointInHull(group, random),
-                                                 {.max_iterations = 8}, scratch, movement);
+    const Correction correction =
+        CorrectWeights(group, PointInHull(group, random), {.max_iterations = 8}, scratch, movement);
     EXPECT_LT(correction.error_m, 1e-4) << i;
   }
 }

@@ -25,14 +25,19 @@ namespace {
 // Scratch objects for corrections and measurements.
 struct Scratch {
   explicit Scratch(const MotionLibrary& library)
-      : weights(static_cast<std::size_t>(library.max_example_count())),
+      : correction(library),
+        weights(static_cast<std::size_t>(library.max_example_count())),
         cache(library.layout()),
         pose(library.skeleton().joint_count()) {
     movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
   }
   Correction Correct(const MotionLibrary& library, const ParameterValues& wanted,
                      const CorrectionLimits& limits) {
-    return CorrectWeights(library, 0, wanted, limits, weights, movement);
+    const Correction result =
+        CorrectWeights(library.group(0), wanted, limits, correction, movement);
+    movement.group = 0;
+    std::ranges::copy(correction.weights(library.group(0)), weights.begin());
+    return result;
   }
   // Measures a movement with these parameters independently of the correction.
   ParameterValues Measure(const MotionLibrary& library, const ParameterValues& parameters,
@@ -64,6 +69,7 @@ struct Scratch {
     return sum;
   }
 
+  CorrectionScratch correction;
   std::vector<double> weights;
   GridCache cache;
   Pose pose;
@@ -150,7 +156,8 @@ TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
     static_cast<void>(scratch.Measure(*library, PointInHull(group, random)));
     std::copy_n(scratch.weights.begin(), n, weights.begin());
     ApplyWeights(group, weights, scratch.movement);
-    EndPoses ends(library->skeleton(), library->layout(), group);
+    EndPoses ends(library->skeleton(), library->layout());
+    ends.SetGroup(group);
     ends.Blend(scratch.movement);
     ends.MeasureSlopes(slopes);
     for (std::size_t e = 1; e < n; ++e) {
