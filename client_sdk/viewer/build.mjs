@@ -1,5 +1,5 @@
-// Bundles the viewer: node build.mjs --out DIR  writes index.html, library.html and
-// assets/NAME-HASH.{js,css,svg}.
+// Bundles the viewer. Usage: node build.mjs --out DIR
+// Writes index.html, library.html and assets/NAME-HASH.{js,css,svg} to DIR.
 
 import {createHash} from 'node:crypto';
 import {mkdir, readFile, readdir, rm, writeFile} from 'node:fs/promises';
@@ -47,6 +47,6 @@ for (const [placeholder, [name, extension, contents]] of Object.entries(files)) 
   pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `/assets/${file}`)));
 }
 for (const file of await readdir(assets)) {
-  if (!written.has(file)) await rm(join(assets, file));  // Of an earlier build.
+  if (!written.has(file)) await rm(join(assets, file));  // From an earlier build.
 }
 await Promise.all(names.map((name, i) => writeFile(join(out, name), pages[i])));

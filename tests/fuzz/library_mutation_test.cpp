@@ -261,7 +261,7 @@ void Walk(const std::shared_ptr<const MotionLibrary>& library, Mutator& mutator)
     if (!library->layers().empty() && mutator.Below(20) == 0) {
       static_cast<void>(
           avatar.SetLayer({.layer = static_cast<int>(mutator.Below(library->layers().size())),
-                           .is_on = mutator.Below(3) != 0,
+                           .enabled = mutator.Below(3) != 0,
                            .weight = mutator.Uniform(),
                            .blend_s = mutator.Uniform(),
                            .speed = 0.1 + 3.0 * mutator.Uniform()}));

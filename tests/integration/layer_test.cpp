@@ -105,10 +105,10 @@ TEST_P(Layers, PlayTheClipAndKeepTheBitsOfLegsAndRoot) {
     }
     if (ticks % 150 == 60) {
       ASSERT_TRUE(layered.SetLayer({.layer = carry, .weight = 0.7, .blend_s = 0.2}).has_value());
-      ASSERT_TRUE(layered.SetLayer({.layer = wave, .is_on = false, .blend_s = 0.5}).has_value());
+      ASSERT_TRUE(layered.SetLayer({.layer = wave, .enabled = false, .blend_s = 0.5}).has_value());
     }
     if (ticks % 150 == 100) {
-      ASSERT_TRUE(layered.SetLayer({.layer = carry, .is_on = false}).has_value());
+      ASSERT_TRUE(layered.SetLayer({.layer = carry, .enabled = false}).has_value());
     }
     plain.Advance(kTickS);
     layered.Advance(kTickS);
@@ -158,7 +158,7 @@ TEST(LayerWeights, HaveContinuousSlopeUnderInterruptions) {
     if (i % 170 == 0) {
       ASSERT_TRUE(stack
                       .Set(*library, {.layer = 0,
-                                      .is_on = random.Draw(0.0, 1.0) < 0.7,
+                                      .enabled = random.Draw(0.0, 1.0) < 0.7,
                                       .weight = random.Draw(0.2, 1.0),
                                       .blend_s = random.Draw(0.2, 0.6),
                                       .speed = random.Draw(0.5, 2.0)})
@@ -217,12 +217,12 @@ TEST(LayerRequests, InvalidRequestsAreRejectedWithoutEffect) {
   EXPECT_EQ(code({.weight = NAN}), ErrorCode::kOutOfRange);
   EXPECT_EQ(code({.blend_s = -0.1}), ErrorCode::kOutOfRange);
   EXPECT_EQ(code({.blend_s = INFINITY}), ErrorCode::kOutOfRange);
-  EXPECT_EQ(code({.is_on = false, .blend_s = NAN}), ErrorCode::kOutOfRange);
+  EXPECT_EQ(code({.enabled = false, .blend_s = NAN}), ErrorCode::kOutOfRange);
   EXPECT_EQ(code({.speed = 0.05}), ErrorCode::kOutOfRange);
   EXPECT_EQ(code({.speed = NAN}), ErrorCode::kOutOfRange);
   EXPECT_TRUE(stack.empty());
   // The layer is not playing, so this has no effect.
-  EXPECT_EQ(code({.layer = 3, .is_on = false}), std::nullopt);
+  EXPECT_EQ(code({.layer = 3, .enabled = false}), std::nullopt);
   EXPECT_TRUE(stack.empty());
   for (int i = 0; i < 4; ++i) EXPECT_EQ(code({.layer = i}), std::nullopt);
   EXPECT_EQ(code({.layer = 4}), ErrorCode::kLimitExceeded);
@@ -242,7 +242,7 @@ TEST(LayerRequests, TicksDoNotAllocate) {
   counted_memory::ResetPeak();
   for (int i = 0; i < 200; ++i) {
     if (i % 20 == 0) static_cast<void>(avatar.SetLayer({.layer = i / 20 % 2}));
-    if (i % 50 == 0) static_cast<void>(avatar.SetLayer({.layer = 0, .is_on = false}));
+    if (i % 50 == 0) static_cast<void>(avatar.SetLayer({.layer = 0, .enabled = false}));
     avatar.Advance(kTickS);
   }
   EXPECT_LE(counted_memory::PeakBytes(), before);
@@ -358,7 +358,7 @@ TEST(LayersInChoreographies, BeginAndEndWithMovementsAndKeepTheLegs) {
                                                  {6, StepRequest{.length_m = 0.5}}};
   const std::vector<LayerCue> cues = {
       {.before = 1, .layer = "wave", .blend_s = 0.1},
-      {.before = 3, .layer = "wave", .is_off = true, .blend_s = 0.1}};
+      {.before = 3, .layer = "wave", .enabled = false, .blend_s = 0.1}};
   const auto plain = Synthesize(library, {}, requests, 60.0).value();
   const auto waving = Synthesize(library, {}, requests, 60.0, {}, cues).value();
   ASSERT_EQ(plain.clip.frame_count(), waving.clip.frame_count());

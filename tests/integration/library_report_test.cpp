@@ -1,4 +1,4 @@
-// stridewire-library report as a program: what it draws, leaves behind and refuses.
+// Runs `stridewire-library report` as a program and checks its figures, files and errors.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ std::set<std::string> FilesIn(const std::filesystem::path& folder) {
   return names;
 }
 
-// Every tag opened is closed in order; no bare & or < in the text between.
+// Checks that tags are closed in order.
 testing::AssertionResult IsWellFormed(const std::string& xml,
                                       std::set<std::string> void_tags = {}) {
   std::vector<std::string> open;
@@ -58,15 +58,17 @@ testing::AssertionResult IsWellFormed(const std::string& xml,
       continue;
     }
     if (open.empty() || "/" + open.back() != name) {
-      return testing::AssertionFailure() << "<" << name << "> closes what is not open, at " << at;
+      return testing::AssertionFailure()
+             << "<" << name << "> closes a tag that is not open, at " << at;
     }
     open.pop_back();
   }
-  if (!open.empty()) return testing::AssertionFailure() << "<" << open.back() << "> stays open";
+  if (!open.empty())
+    return testing::AssertionFailure() << "<" << open.back() << "> is never closed";
   return testing::AssertionSuccess();
 }
 
-// Small enough to be drawn in seconds: steps of one capture.
+// Uses the steps of one capture, whose figures take only seconds to draw.
 class LibraryReport : public testing::Test {
  protected:
   void SetUp() override {
@@ -80,18 +82,18 @@ class LibraryReport : public testing::Test {
   const std::string library_ = folder_.File("a & b.swl");
 };
 
-TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
+TEST_F(LibraryReport, IsDeterministic) {
   const std::string out = folder_.File("report");
   const ProgramResult result =
       Report({library_, "--out", out, "--max-pseudoexamples", "3", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(result.err, "");
-  const json told = json::parse(result.out);
+  const json output = json::parse(result.out);
   std::set<std::string> files;
-  for (const json& file : told["files"]) files.insert(file.get<std::string>());
+  for (const json& file : output["files"]) files.insert(file.get<std::string>());
   EXPECT_EQ(FilesIn(out), files);
-  for (std::size_t g = 0; g < told["groups"].size(); ++g) {
-    const json& group = told["groups"][g];
+  for (std::size_t g = 0; g < output["groups"].size(); ++g) {
+    const json& group = output["groups"][g];
     EXPECT_LE(group["after"]["error_m"]["max"], group["before"]["error_m"]["max"]);
     EXPECT_LE(group["corrected_error_m"]["mean"], group["before"]["error_m"]["mean"]);
     const std::string prefix = std::to_string(g) + "_" + group["kind"].get<std::string>() + "_";
@@ -103,7 +105,7 @@ TEST_F(LibraryReport, DrawsOnePageAndItsPicturesTheSameEveryTime) {
   const std::string page = ReadWhole(std::filesystem::path(out) / "index.html");
   EXPECT_TRUE(IsWellFormed(page, {"meta", "img"}));
   EXPECT_THAT(page, HasSubstr("a &amp; b.swl"));
-  EXPECT_THAT(page, Not(HasSubstr("http")));  // nothing is fetched
+  EXPECT_THAT(page, Not(HasSubstr("http")));  // The page is self-contained.
   std::size_t pictures = 0;
   for (std::size_t at = 0; (at = page.find("<img ", at)) != std::string::npos; ++at) ++pictures;
   EXPECT_EQ(pictures + 1, files.size());
@@ -130,9 +132,9 @@ TEST_F(LibraryReport, MeasuresRealismOnCaptures) {
       Report({library_, "--out", folder_.File("report"), "--max-pseudoexamples", "0", "--captures",
               "/usr/share/assimp/models/BVH/01_01.bvh", "--json"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const json told = json::parse(result.out);
+  const json output = json::parse(result.out);
   bool has_jumps = false;
-  for (const json& group : told["realism"]) {
+  for (const json& group : output["realism"]) {
     if (group["kind"] != "jump") continue;
     has_jumps = true;
     EXPECT_GT(group["movements"], 5);
@@ -147,7 +149,7 @@ TEST_F(LibraryReport, MeasuresRealismOnCaptures) {
   EXPECT_THAT(ReadWhole(folder_.path() / "report" / "index.html"), HasSubstr("Realism"));
 }
 
-TEST_F(LibraryReport, SaysThatGnuplotIsMissing) {
+TEST_F(LibraryReport, ReportsMissingGnuplot) {
   const std::string path = std::getenv("PATH");
   ASSERT_EQ(setenv("PATH", folder_.path().c_str(), 1), 0);
   const ProgramResult result = Report({library_, "--out", folder_.File("report")});
@@ -160,7 +162,7 @@ TEST_F(LibraryReport, SaysThatGnuplotIsMissing) {
   EXPECT_FALSE(std::filesystem::exists(folder_.File("report")));
 }
 
-TEST_F(LibraryReport, RefusesBadOptionsAndWritesNothing) {
+TEST_F(LibraryReport, RejectsInvalidOptionsAndWritesNothing) {
   const auto fails = [&](const std::vector<std::string>& arguments, int exit_code,
                          const std::string& named) {
     const ProgramResult result = Report(arguments);
@@ -175,16 +177,16 @@ TEST_F(LibraryReport, RefusesBadOptionsAndWritesNothing) {
   fails({library_, "--out", out, "--max-error-m", "-1"}, 2, "--max-error-m");
   fails({library_, "--out", out, "--max-pseudoexamples", "1025"}, 2, "--max-pseudoexamples");
   fails({library_, "--out", out, "--captures", "missing.bvh"}, 2, "missing.bvh");
-  fails({library_, "--out", library_}, 1, "no folder");
+  fails({library_, "--out", library_}, 1, "not a folder");
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 
-TEST_F(LibraryReport, LeavesNothingWhenInterrupted) {
+TEST_F(LibraryReport, WritesNothingWhenInterrupted) {
   const std::string out = folder_.File("report");
   test::ChildProcess drawing(
       STRIDEWIRE_LIBRARY_TOOL,
       {"report", "builtin", "--out", out, "--max-error-m", "0", "--max-pseudoexamples", "1024"});
-  // Interrupted when it is about to catch that, well before it could be done.
+  // Waits until the program catches SIGINT, which happens long before it can finish.
   const std::string status = "/proc/" + std::to_string(drawing.pid()) + "/status";
   const auto catches = [&] {
     std::ifstream file(status);

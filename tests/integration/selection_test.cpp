@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "captured_library.h"
+#include "offline/base/statistics.h"
 #include "offline/build/example_clusters.h"
 #include "offline/build/grid_cells.h"
 #include "offline/build/left_out_error.h"
 #include "offline/build/select_examples.h"
-#include "offline/base/statistics.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
@@ -41,7 +41,7 @@ struct Steps {
   }
 
   [[nodiscard]] Selected Select(const SelectionOptions& options, double diameter_m) const {
-    return SelectExamples(examples, units, diameter_m, options, layout, skeleton, group);
+    return SelectExamplesJob{examples, units, diameter_m, options, layout, skeleton, group}.Run();
   }
 
   // Mean over all examples of how far each is from what the stored ones make of its parameters, when it

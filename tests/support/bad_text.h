@@ -8,16 +8,16 @@
 
 namespace stridewire {
 
-/// A text that a parser refuses: the error's code and the whole sentence a person reads.
+/// A text that a parser must reject, with the expected error code and message.
 struct BadText {
   const char* text;
   ErrorCode code;
   const char* described;
 };
 
-/// `parse` takes a text and returns an Expected.
+/// Expects `parse`, which takes a text and returns an Expected, to reject every text.
 template <typename Parse>
-void ExpectRefused(std::span<const BadText> bad_texts, Parse&& parse) {
+void ExpectErrors(std::span<const BadText> bad_texts, Parse&& parse) {
   for (const BadText& bad : bad_texts) {
     SCOPED_TRACE(bad.text);
     const auto read = parse(bad.text);

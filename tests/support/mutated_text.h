@@ -12,9 +12,10 @@
 
 namespace stridewire {
 
-/// Parses `rounds` versions of a JSON text with one to three bytes, words or lengths changed, and tells the seed where
-/// something fails. `parse` takes a text and returns an Expected, `check` what it reads. Every error names
-/// `file` and says in one line what is wrong; some versions are read, others refused.
+/// Fuzzes a JSON parser with `rounds` versions of a text that have one to three random changes each,
+/// and prints the seed on failure. `parse` takes a text and returns an Expected; `check` receives the
+/// parsed value. Expects every error to name `file` and to have a message of one line. At least one
+/// version must parse and one must fail.
 template <typename Parse, typename Check>
 void ParseMutated(const std::string& original, int rounds, const std::string& file, Parse&& parse,
                   Check&& check) {
@@ -25,8 +26,8 @@ void ParseMutated(const std::string& original, int rounds, const std::string& fi
   constexpr std::array kPieces = {"{",     "}",    "[",        "]",        ",",          ":",
                                   "\"",    "null", "-1e308",   "1e9",      "10.0000001", "\\u0000",
                                   "false", "\xc3", "\"step\"", "\"at_m\"", "[[[[[[[[",   "0"};
-  int read_count = 0;
-  int refused_count = 0;
+  int parsed_count = 0;
+  int rejected_count = 0;
   for (int round = 0; round < rounds && !testing::Test::HasFailure(); ++round) {
     std::string text = original;
     for (std::size_t change = 0, changes = 1 + below(3); change < changes; ++change) {
@@ -40,17 +41,17 @@ void ParseMutated(const std::string& original, int rounds, const std::string& fi
     }
     const auto read = parse(text);
     if (read) {
-      ++read_count;
+      ++parsed_count;
       check(*read);
       continue;
     }
-    ++refused_count;
+    ++rejected_count;
     EXPECT_TRUE(read.error().where.starts_with(file)) << text;
     EXPECT_NE(std::string(read.error().text), "") << text;
     EXPECT_EQ(Describe(read.error()).find_first_of("\r\n"), std::string::npos) << text;
   }
-  EXPECT_GT(read_count, 0);  // White space and digits are mutated, too.
-  EXPECT_GT(refused_count, 0);
+  EXPECT_GT(parsed_count, 0);  // Some mutations only change white space or digits.
+  EXPECT_GT(rejected_count, 0);
 }
 
 }  // namespace stridewire

@@ -59,7 +59,7 @@ inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
   const auto layers = static_cast<double>(avatar.library().layers().size());
   if (layers == 0.0) return;
   (void)avatar.SetLayer({.layer = static_cast<int>(random.Draw(0.0, layers)),
-                         .is_on = Draws(random, 0.6),
+                         .enabled = Draws(random, 0.6),
                          .weight = random.Draw(0.1, 1.0),
                          .blend_s = random.Draw(0.0, 1.0),
                          .speed = random.Draw(0.2, 3.0)});

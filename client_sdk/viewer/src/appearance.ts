@@ -1,73 +1,74 @@
-// What the scene is drawn as: what somebody chose, or what the machine keeps up with.
+// Drawing options of the scene: the user's choices, or what the quality level selects.
 
-import type {Asked} from './address.js';
+import type {UrlOptions} from './url_options.js';
 import {Quality} from './quality.js';
 import type {FigureStyle, QualityChoice} from './quality.js';
-import {basePixelRatio} from './renderer.js';
+import {fullPixelRatio} from './renderer.js';
 import type {RendererInfo} from './renderer.js';
 import type {ViewOptions} from './scene/world_view.js';
 
 export class Appearance {
   readonly quality: Quality;
-  /** The views draw by these. */
+  /** Shared by all views, which read it every frame. */
   readonly options: ViewOptions;
-  /** Canvas pixels a CSS pixel. */
+  /** Canvas pixels per CSS pixel. */
   pixelRatio: number;
   private figures: 'auto' | FigureStyle;
+  /** The user's choice; null: the quality level decides. */
   private shadows: boolean | null = null;
   private level = -1;
 
-  constructor(private readonly info: RendererInfo, asked: Asked, leastFrameMs: number) {
-    this.quality = new Quality(info.software, leastFrameMs);
-    this.quality.choice = asked.quality;
-    this.figures = asked.figures;
-    this.pixelRatio = basePixelRatio(info);
+  constructor(private readonly info: RendererInfo, urlOptions: UrlOptions, minFrameMs: number) {
+    this.quality = new Quality(info.software, minFrameMs);
+    this.quality.choice = urlOptions.quality;
+    this.figures = urlOptions.figures;
+    this.pixelRatio = fullPixelRatio(info);
     this.options = {
-      style: 'bodies', coarse: false, shadows: true, simple: false, prints: true, plants: true,
-      plainGround: info.software,
-      mostPrints: this.quality.detail.prints,
+      style: 'bodies', coarse: false, shadows: true, simplified: false, footprints: true,
+      plantedFeet: true, software: info.software,
+      maxFootprints: this.quality.settings.maxFootprints,
     };
   }
 
-  chooseFigures(choice: 'auto' | FigureStyle): void {
+  setFigureStyle(choice: 'auto' | FigureStyle): void {
     this.figures = choice;
     this.level = -1;
   }
-  chooseQuality(choice: QualityChoice): void {
+  setQuality(choice: QualityChoice): void {
     this.quality.choice = choice;
     this.shadows = null;
     this.level = -1;
   }
-  toggle(name: 'shadows' | 'prints' | 'plants', on: boolean): void {
+  toggle(name: 'shadows' | 'footprints' | 'plantedFeet', on: boolean): void {
     this.options[name] = on;
     if (name === 'shadows') this.shadows = on;
   }
 
-  /** Takes up what the quality has come to; whether that is another. Cheap while it is not. */
+  /** Call once per frame. Applies the quality level and returns whether it has changed. */
   adapt(ms: number, avatars: number): boolean {
-    this.quality.frame(ms, avatars);
-    const {level, detail} = this.quality;
+    this.quality.onFrame(ms, avatars);
+    const {level, settings} = this.quality;
     if (level === this.level) return false;
     this.level = level;
     const {options} = this;
-    options.style = this.figures === 'auto' ? detail.style : this.figures;
-    options.coarse = detail.coarse;
-    options.simple = detail.simple;
-    options.mostPrints = detail.prints;
-    options.shadows = this.shadows ?? detail.shadows;
-    this.pixelRatio = basePixelRatio(this.info) * detail.scale;
+    options.style = this.figures === 'auto' ? settings.style : this.figures;
+    options.coarse = settings.coarse;
+    options.simplified = settings.simplified;
+    options.maxFootprints = settings.maxFootprints;
+    options.shadows = this.shadows ?? settings.shadows;
+    this.pixelRatio = fullPixelRatio(this.info) * settings.scale;
     return true;
   }
 
-  /** "lines at 60 % of the resolution" */
+  /** For example "lines at 60 % resolution". */
   describe(): string {
-    const {options, quality: {detail}} = this;
-    return `${options.coarse && options.style === 'bodies' ? 'plain ' : ''}${options.style}` +
-      (detail.scale < 1 ? ` at ${(detail.scale * 100).toFixed(0)} % of the resolution` : '');
+    const {options, quality: {settings}} = this;
+    return `${options.coarse && options.style === 'bodies' ? 'simplified ' : ''}${options.style}` +
+      (settings.scale < 1 ? ` at ${(settings.scale * 100).toFixed(0)} % resolution` : '');
   }
-  /** Why it is not the best there is; empty: it is. */
-  whyLowered(): string {
+  /** Why the quality is lowered; empty if it is not. */
+  loweredReason(): string {
     if (!this.quality.lowered) return '';
-    return this.info.software ? 'the processor draws, there is no graphics card' : 'this machine is slower otherwise';
+    return this.info.software ? 'the browser renders in software' : 'frames took too long';
   }
 }

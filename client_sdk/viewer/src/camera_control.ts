@@ -1,74 +1,81 @@
-// Where the page looks from: at everybody, at the one followed, or where somebody turned it to.
+// The cameras of all panes: they frame all avatars, follow one, or stay where the user moved them.
 
 import {Orbit} from './scene/camera.js';
-import type {Chosen, Shown} from './shown.js';
+import type {AvatarSelection, WorldPane} from './world_pane.js';
 
 const followDistanceM = 5.2;
 
-/** One orbit for all views; each has its own centre. */
+/** All panes share the camera's angles and distance, but each has its own camera target. */
 export class CameraControl {
   readonly orbit = new Orbit();
-  /** Keeps everybody in sight, till somebody pans, zooms or follows. */
-  framing = true;
+  /** Whether the cameras keep all avatars in view. Panning, zooming and following end it. */
+  framesAll = true;
 
-  constructor(private readonly shown: readonly Shown[]) {}
+  constructor(private readonly panes: readonly WorldPane[]) {}
 
   get following(): boolean {
-    return this.shown.some(({view}) => view.following !== 0);
+    return this.panes.some(({view}) => view.followedAvatar !== 0);
   }
   frameAll(): void {
-    this.framing = true;
+    this.framesAll = true;
     this.unfollow();
   }
   unfollow(): void {
-    for (const {view} of this.shown) view.following = 0;
+    for (const {view} of this.panes) view.followedAvatar = 0;
   }
-  /** Follows that one, or no longer. */
-  toggleFollow({shown, avatar}: Chosen): void {
-    const on = shown.view.following !== avatar;
+  /** Follows the avatar, or stops if it is followed already. */
+  toggleFollow({pane, avatar}: AvatarSelection): void {
+    const on = pane.view.followedAvatar !== avatar;
     this.unfollow();
     if (!on) return;
-    shown.view.following = avatar;
-    this.framing = false;
+    pane.view.followedAvatar = avatar;
+    this.framesAll = false;
     this.orbit.setDistance(followDistanceM);
   }
   zoom(factor: number): void {
-    this.framing = false;
+    this.framesAll = false;
     this.orbit.zoom(factor);
   }
-  /** By pixels; all views where there is none below the pointer. */
-  pan(dx: number, dy: number, below: Shown | null): void {
-    this.framing = false;
-    for (const each of this.shown) {
-      if (each !== below && this.shown.length > 1) continue;
-      each.view.following = 0;
-      const scale = 1 / Math.max(1, each.view.free.height);
-      each.view.view.pan(this.orbit, -dx * scale, dy * scale);
+  /**
+   * Pans by a pointer movement in CSS pixels. If there are several panes, only the one beneath the
+   * pointer moves.
+   */
+  pan(dx: number, dy: number, below: WorldPane | null): void {
+    this.framesAll = false;
+    for (const each of this.panes) {
+      if (each !== below && this.panes.length > 1) continue;
+      each.view.followedAvatar = 0;
+      const scale = 1 / Math.max(1, each.view.freeArea.height);
+      each.view.viewCamera.pan(this.orbit, -dx * scale, dy * scale);
     }
   }
+  /** Call once per frame, after the views have been updated. */
   advance(dtS: number): void {
     let nearest = Infinity;
-    for (const {view} of this.shown) {
-      view.follow();
-      view.view.wantScale = 1;
-      if (view.following) continue;
-      const extent = view.extent();
+    for (const {view} of this.panes) {
+      view.aimAtFollowed();
+      view.viewCamera.desiredScale = 1;
+      if (view.followedAvatar) continue;
+      const extent = view.bounds();
       if (!extent) continue;
-      if (this.framing || !view.framed) {
-        view.view.moveTo(extent.x, 0.8, extent.z, !view.framed);
-        view.framed = true;
-        // Views that are higher than wide see as much sideways as square ones, see ViewCamera.
-        const aspect = Math.min(1.7, Math.max(1, view.free.width / Math.max(1, view.free.height)));
-        view.wantDistanceM = Math.min(
+      if (this.framesAll || !view.wasFramed) {
+        view.viewCamera.moveTo(extent.x, 0.8, extent.z, !view.wasFramed);
+        view.wasFramed = true;
+        // A view that is taller than wide shows as much sideways as a square one, see ViewCamera.
+        const {width, height} = view.freeArea;
+        const aspect = Math.min(1.7, Math.max(1, width / Math.max(1, height)));
+        view.desiredDistanceM = Math.min(
           110, Math.max(4.4, (extent.radius + 0.7) / (0.384 * aspect) + 0.3 * extent.radius));
-        nearest = Math.min(nearest, view.wantDistanceM);
+        nearest = Math.min(nearest, view.desiredDistanceM);
       }
     }
-    if (this.framing && nearest < Infinity) {
+    if (this.framesAll && nearest < Infinity) {
       this.orbit.setDistance(nearest);
-      for (const {view} of this.shown) view.view.wantScale = view.wantDistanceM / nearest;
+      for (const {view} of this.panes) {
+        view.viewCamera.desiredScale = view.desiredDistanceM / nearest;
+      }
     }
     this.orbit.advance(dtS);
-    for (const {view} of this.shown) view.aim(this.orbit, dtS);
+    for (const {view} of this.panes) view.updateCamera(this.orbit, dtS);
   }
 }

@@ -1,40 +1,47 @@
-// Whether there is a server, in a word, and in a sentence where there is something to do about it.
+// Shows the state of the connection in a word, and problems in a sentence that says what to do.
 
 import {h, setText} from './dom.js';
 import type {Client} from './sdk.js';
-import type {Shown} from './shown.js';
+import type {WorldPane} from './world_pane.js';
 
 export class ConnectionStatus {
-  private readonly word = h('span', {});
-  private readonly rate = h('span', {class: 'rate'});
-  readonly element = h('span', {class: 'status', role: 'status'}, this.word, this.rate);
+  private readonly stateText = h('span', {});
+  private readonly rateText = h('span', {class: 'rate'});
+  readonly element = h('span', {class: 'status', role: 'status'}, this.stateText, this.rateText);
   private readonly noticeText = h('p', {});
   readonly notice = h('div', {class: 'notice', role: 'alert'}, this.noticeText);
 
   constructor(
-    private readonly client: Client, private readonly host: string, private readonly shown: readonly Shown[]) {
+    private readonly client: Client, private readonly host: string,
+    private readonly panes: readonly WorldPane[]) {
     this.notice.hidden = true;
   }
 
-  show(): void {
+  update(): void {
     const {state} = this.client;
     const ready = state === 'ready';
-    setText(this.word, ready ? 'Connected' : state === 'closed' ? 'Closed' : 'Connecting…');
-    setText(this.rate, ready ? `, ${this.client.tickHz.toFixed(0)} Hz` : '');
+    setText(this.stateText,
+      ready ? 'Connected' : state === 'closed' ? 'Disconnected' : 'Connecting…');
+    setText(this.rateText, ready ? `, ${this.client.tickHz.toFixed(0)} Hz` : '');
     this.element.classList.toggle('ready', ready);
-    const text = this.toDo();
+    const text = this.problemText();
     this.notice.hidden = text === '';
     setText(this.noticeText, text);
   }
 
-  private toDo(): string {
+  /** Empty if there is no problem. */
+  private problemText(): string {
     const {state, lastError} = this.client;
     if (state === 'waiting' || (state === 'connecting' && lastError !== '')) {
-      return `No server answers at ${this.host}: start one with ./deploy/demo.sh, and this page connects ` +
-        'by itself.';
+      return `No server responds at ${this.host}. Start one, for example with ./deploy/demo.sh; ` +
+        'this page then connects automatically.';
     }
-    if (state === 'closed') return `The server let this page go (${lastError}): reload the page to try again.`;
-    const refused = state === 'ready' && this.shown.find(({world}) => world.state === 'refused');
-    return refused ? `World ${refused.world.name} cannot be joined here: choose another above.` : '';
+    if (state === 'closed') {
+      return `The server closed the connection: ${lastError}. Reload the page to try again.`;
+    }
+    const refused = state === 'ready' && this.panes.find(({world}) => world.state === 'refused');
+    if (!refused) return '';
+    return `Cannot join world ${refused.world.name}: the server refused it. ` +
+      'Select another world above.';
   }
 }

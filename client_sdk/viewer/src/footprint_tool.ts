@@ -1,197 +1,230 @@
-// Steps to places: clicked on the ground, outlined there while they wait, dragged elsewhere.
+// The footprint tool: a click on the ground requests a step to that point. Outlines show where feet
+// will land, and the outline of a queued step can be dragged to another point.
 
+import {pointText} from './dom.js';
 import type {Inspector} from './panels/inspector.js';
 import {nextRequestId} from './request_ids.js';
 import type {MovementRequest, QueuedRequest, Vec3, WorldEvent} from './sdk.js';
-import type {Chosen, Shown} from './shown.js';
+import type {AvatarSelection, WorldPane} from './world_pane.js';
 
-/** What the tool needs of the page. */
+/** The parts of the page that the tool uses. */
 export interface FootprintHost {
-  readonly shown: readonly Shown[];
-  chosen(): Chosen | null;
-  /** Whether what is drawn is what is now. */
+  readonly panes: readonly WorldPane[];
+  selection(): AvatarSelection | null;
+  /** Whether the page shows the present, not the recording. */
   live(): boolean;
+  /** The last state of the selected avatar that the server reported. */
   inspected(): Inspector['state'];
-  /** Whether the server tells where feet are about to land. */
-  tellsLandings(): boolean;
-  driven(): Shown | null;
-  drivenAvatars(): number[];
-  /** Whether a step is to land where it is asked to or not to begin. */
-  mustBeMet(): boolean;
-  viewAt(x: number, y: number): Shown | null;
+  /** Whether the server reports where the feet of the current movement will land. */
+  reportsLandings(): boolean;
+  /** The world that receives commands. */
+  commandedPane(): WorldPane | null;
+  /** The avatars that receive commands. */
+  targets(): number[];
+  /** Whether a step is rejected if the foot cannot reach the exact point. */
+  exactOnly(): boolean;
+  /** The pane at a point of the page. */
+  paneAt(x: number, y: number): WorldPane | null;
   goLive(): void;
-  say(text: string): void;
+  /** Shows a message to the user. */
+  notify(text: string): void;
 }
 
-/** How near to an outline's middle it is grabbed, in CSS pixels. */
+interface Footprint {
+  readonly atM: Vec3;
+  readonly headingRad: number;
+}
+
+/** Radius around an outline's centre within which it can be dragged, in CSS pixels. */
 const grabPx = 18;
-/** Places of steps that are remembered until their feet are there. */
-const mostRemembered = 64;
-/** How long the nearest in reach of a footprint that was refused is marked. */
-const nearestMs = 8000;
+const maxKnownTargets = 64;
+/** How long the nearest reachable footprint of a rejected step is outlined. */
+const nearestShownMs = 8000;
 
 export class FootprintTool {
-  private placingNow = false;
-  /** Where steps lead that have been seen waiting, or were asked for here: a movement under way does not tell. */
-  private readonly remembered = new Map<bigint, {readonly atM: Vec3; readonly headingRad: number}>();
-  /** The footprint that is dragged to another place. */
+  private active_ = false;
+  /**
+   * Footprints of steps that this page has requested or seen in a queue, by request id. Needed for
+   * servers that do not report the landings of the current movement.
+   */
+  private readonly knownTargets = new Map<bigint, Footprint>();
+  /** The queued step whose outline the user is dragging. */
   private dragged: {
-    readonly shown: Shown; readonly avatar: number; readonly requestId: bigint;
+    readonly pane: WorldPane; readonly avatar: number; readonly requestId: bigint;
     atM: readonly [number, number, number]; moved: boolean;
   } | null = null;
-
-  /** The nearest in reach of the last that was refused here. */
-  private nearest: {readonly shown: Shown; readonly atM: Vec3; readonly headingRad: number; readonly untilMs: number} | null =
-    null;
-  /** Asked for here, and to be met. */
-  private readonly strict = new Set<bigint>();
+  /** The nearest reachable footprint of the last exact step that was rejected. */
+  private nearestReachable:
+    Footprint & {readonly pane: WorldPane; readonly untilMs: number} | null = null;
+  /** Requests of this page that require the exact point. */
+  private readonly exactRequests = new Set<bigint>();
 
   constructor(private readonly host: FootprintHost) {}
 
-  /** Whether clicks on the ground are footprints. */
-  get placing(): boolean {
-    return this.placingNow;
+  /** Whether clicks on the ground request steps. */
+  get active(): boolean {
+    return this.active_;
   }
 
-  setPlacing(on: boolean): void {
-    this.placingNow = on;
-    if (on) this.host.say(this.host.chosen() ? 'Click where the next foot is to land.' :
-      'Choose a figure, then click where its next foot is to land.');
+  setActive(on: boolean): void {
+    this.active_ = on;
+    if (!on) return;
+    this.host.notify(this.host.selection() ? 'Click where the next foot should land.' :
+      'Select an avatar, then click where its next foot should land.');
   }
 
-  /** Asks the chosen avatar for a step to a place of the page. */
-  place(shown: Shown, x: number, y: number): void {
-    const atM = shown.view.groundAt(x, y);
-    const avatars = this.host.drivenAvatars();
+  /** Requests a step of the selected avatar to a point of the page. */
+  requestStep(pane: WorldPane, x: number, y: number): void {
+    const atM = pane.view.terrainPointAt(x, y);
+    const avatars = this.host.targets();
     if (atM === null) return;
-    if (avatars.length !== 1 || this.host.driven() !== shown) {
-      this.host.say('A footprint is for one: choose a figure of this world.');
+    if (avatars.length !== 1 || this.host.commandedPane() !== pane) {
+      this.host.notify('Select one avatar of this world to place a footprint.');
       return;
     }
     const avatar = avatars[0]!;
     this.host.goLive();
-    const from = shown.view.place(avatar);
+    const from = pane.view.locate(avatar);
     const requestId = nextRequestId();
-    this.remember(requestId, atM, from ? Math.atan2(atM[0] - from.x, atM[2] - from.z) : 0);
-    this.nearest = null;
-    const mustBeMet = this.host.mustBeMet();
-    if (mustBeMet) this.strict.add(requestId);
-    void shown.world.request([
-      {avatar, type: 'step', requestId, foot: 'auto', atM, ...(mustBeMet ? {mustBeMet} : {})},
+    this.rememberTarget(
+      requestId, atM, from ? Math.atan2(atM[0] - from.x, atM[2] - from.z) : 0);
+    this.nearestReachable = null;
+    const exact = this.host.exactOnly();
+    if (exact) this.exactRequests.add(requestId);
+    void pane.world.request([
+      {avatar, type: 'step', requestId, foot: 'auto', atM, ...(exact ? {mustBeMet: true} : {})},
     ]).then((reply) => {
-      const [dx, dz] = [atM[0].toFixed(2), atM[2].toFixed(2)];
-      this.host.say(reply.ok ? `Asked for a foot at x ${dx}, z ${dz} m.` :
+      this.host.notify(reply.ok ? `Requested a step to ${pointText(atM)}.` :
         `Refused: ${reply.items[0]?.text || reply.text}`);
     });
   }
 
-  /** One that had to be met and is not: the nearest in reach is marked for a while. */
-  onEvent(shown: Shown, event: WorldEvent): void {
-    if (event.type === 'finished') this.strict.delete(event.requestId);
-    if (event.type !== 'rejected' || !this.strict.delete(event.requestId)) return;
-    if (event.positionM.every((x) => x === 0)) return;  // None is told, as where feet are not planted.
-    // Asked for without a heading: the body's.
-    this.nearest = {shown, atM: event.positionM, headingRad: event.baseHeadingRad,
-                    untilMs: performance.now() + nearestMs};
-    this.show();
+  /** If the server rejects an exact step, outlines the nearest reachable footprint for a while. */
+  onEvent(pane: WorldPane, event: WorldEvent): void {
+    if (event.type === 'finished') this.exactRequests.delete(event.requestId);
+    if (event.type !== 'rejected' || !this.exactRequests.delete(event.requestId)) return;
+    // The server reports no nearest footprint, for example if foot planting is off.
+    if (event.positionM.every((x) => x === 0)) return;
+    // The request had no heading, so the outline shows the heading of the base frame.
+    this.nearestReachable = {
+      pane, atM: event.positionM, headingRad: event.baseHeadingRad,
+      untilMs: performance.now() + nearestShownMs};
+    this.update();
   }
 
-  private remember(requestId: bigint, atM: Vec3, headingRad: number): void {
-    this.remembered.delete(requestId);
-    this.remembered.set(requestId, {atM, headingRad});
-    if (this.remembered.size > mostRemembered) this.remembered.delete(this.remembered.keys().next().value!);
+  private rememberTarget(requestId: bigint, atM: Vec3, headingRad: number): void {
+    this.knownTargets.delete(requestId);
+    this.knownTargets.set(requestId, {atM, headingRad});
+    if (this.knownTargets.size <= maxKnownTargets) return;
+    this.knownTargets.delete(this.knownTargets.keys().next().value!);
   }
 
-  /** The footprints that feet of the one looked at are on their way to: as planned, or as asked for where nobody tells. */
-  private underWay(shown: Shown): {readonly atM: Vec3; readonly headingRad: number}[] {
-    const chosen = this.host.chosen();
-    const state = chosen?.shown === shown && this.host.live() ? this.host.inspected() : null;
-    if (!state?.movement || state.avatar !== chosen!.avatar) return [];
-    if (this.host.tellsLandings()) {
-      return state.movement.landings.map(({positionM, headingRad}) => ({atM: positionM, headingRad}));
+  /**
+   * Where the feet of the inspected avatar's current movement will land: as the server plans it, or
+   * as requested if the server does not report plans.
+   */
+  private upcomingLandings(pane: WorldPane): Footprint[] {
+    const selection = this.host.selection();
+    const state = selection?.pane === pane && this.host.live() ? this.host.inspected() : null;
+    if (!state?.movement || state.avatar !== selection!.avatar) return [];
+    if (this.host.reportsLandings()) {
+      return state.movement.landings.map(
+        ({positionM, headingRad}) => ({atM: positionM, headingRad}));
     }
-    const asked = this.remembered.get(state.movement.requestId);
-    return asked ? [asked] : [];
+    const target = this.knownTargets.get(state.movement.requestId);
+    return target ? [target] : [];
   }
 
-  /** Footprints that wait in the queue of the one looked at. */
-  private waiting(shown: Shown): QueuedRequest[] {
-    const chosen = this.host.chosen();
-    const state = chosen?.shown === shown && this.host.live() ? this.host.inspected() : null;
-    return state && state.avatar === chosen!.avatar ?
+  /** Steps with a footprint in the queue of the inspected avatar. */
+  private queuedFootprints(pane: WorldPane): QueuedRequest[] {
+    const selection = this.host.selection();
+    const state = selection?.pane === pane && this.host.live() ? this.host.inspected() : null;
+    return state && state.avatar === selection!.avatar ?
       state.queue.filter(({type, atM}) => type === 'step' && atM !== null) : [];
   }
 
-  /** Marks for them and the one under way; the one that is dragged lies where it is held. */
-  show(): void {
-    for (const shown of this.host.shown) {
-      const {x = 0, z = 0} = shown.view.place(shown.view.chosen) ?? {};
-      const next = this.underWay(shown);
-      const last = next.at(-1);
+  /** Updates the outlines. A dragged outline is drawn beneath the pointer. */
+  update(): void {
+    for (const pane of this.host.panes) {
+      const {x = 0, z = 0} = pane.view.locate(pane.view.selectedAvatar) ?? {};
+      const upcoming = this.upcomingLandings(pane);
+      const last = upcoming.at(-1);
       let from = last ? [last.atM[0], last.atM[2]] : [x, z];
-      const waiting = this.waiting(shown).map(({atM, headingRad, requestId}) => {
-        const held = this.dragged?.shown === shown && this.dragged.requestId === requestId;
-        const place = held ? this.dragged!.atM : atM!;
-        const heading = headingRad ?? Math.atan2(place[0] - from[0]!, place[2] - from[1]!);
-        from = [place[0], place[2]];
-        if (!held) this.remember(requestId, place, heading);
-        return {atM: place, headingRad: heading};
+      const queued = this.queuedFootprints(pane).map(({atM, headingRad, requestId}) => {
+        const isDragged = this.dragged?.pane === pane && this.dragged.requestId === requestId;
+        const at = isDragged ? this.dragged!.atM : atM!;
+        const heading = headingRad ?? Math.atan2(at[0] - from[0]!, at[2] - from[1]!);
+        from = [at[0], at[2]];
+        if (!isDragged) this.rememberTarget(requestId, at, heading);
+        return {atM: at, headingRad: heading};
       });
-      if (this.nearest && performance.now() > this.nearest.untilMs) this.nearest = null;
-      shown.view.plan([...next, ...waiting, ...(this.nearest?.shown === shown ? [this.nearest] : [])]);
+      if (this.nearestReachable && performance.now() > this.nearestReachable.untilMs) {
+        this.nearestReachable = null;
+      }
+      const nearest = this.nearestReachable?.pane === pane ? [this.nearestReachable] : [];
+      pane.view.showPlannedFootprints([...upcoming, ...queued, ...nearest]);
     }
   }
 
-  /** Whether there is one to drag at this place of the page. */
+  /**
+   * If there is a queued step's outline at this point of the page, starts a drag and returns true.
+   */
   grab(x: number, y: number): boolean {
-    const chosen = this.host.chosen();
-    const shown = this.host.viewAt(x, y);
-    if (!shown || !chosen) return false;
-    for (const {atM, requestId} of this.waiting(shown)) {
-      const on = shown.view.onPage([atM![0], shown.view.ground.heightAt(atM![0], atM![2]), atM![2]]);
-      if (!on || Math.hypot(on.x - x, on.y - y) > grabPx) continue;
-      this.dragged = {shown, avatar: chosen.avatar, requestId, atM: atM!, moved: false};
+    const selection = this.host.selection();
+    const pane = this.host.paneAt(x, y);
+    if (!pane || !selection) return false;
+    const {view} = pane;
+    for (const {atM, requestId} of this.queuedFootprints(pane)) {
+      const at = atM!;
+      const onPage = view.projectToPage([at[0], view.terrain.heightAt(at[0], at[2]), at[2]]);
+      if (!onPage || Math.hypot(onPage.x - x, onPage.y - y) > grabPx) continue;
+      this.dragged = {pane, avatar: selection.avatar, requestId, atM: at, moved: false};
       return true;
     }
     return false;
   }
 
   drag(x: number, y: number): void {
-    const at = this.dragged?.shown.view.groundAt(x, y);
+    const at = this.dragged?.pane.view.terrainPointAt(x, y);
     if (!at) return;
     this.dragged!.atM = at;
     this.dragged!.moved = true;
-    this.show();
+    this.update();
   }
 
-  /** It stays where it was. */
-  release(): void {
+  /** Ends the drag without moving the step. */
+  cancelDrag(): void {
     this.dragged = null;
-    this.show();
+    this.update();
   }
 
-  /** The queue is asked for once more, with that footprint elsewhere. */
+  /**
+   * Moves the dragged step. The protocol cannot change a queued request, so this clears the queue
+   * and requests all its movements again.
+   */
   async drop(): Promise<void> {
     const dragged = this.dragged;
     this.dragged = null;
     if (!dragged?.moved) return;
-    const {shown: {world}, avatar, requestId, atM} = dragged;
+    const {pane: {world}, avatar, requestId, atM} = dragged;
     try {
       const {queue, queueSize} = await world.inspect(avatar);
       if (!queue.some((item) => item.requestId === requestId)) {
-        this.host.say('Too late: that step has begun.');
+        this.host.notify('Too late: the step has already started.');
         return;
       }
+      // The server reports only the first 16 requests; the others would be lost.
       if (queueSize > queue.length) {
-        this.host.say('Too many movements wait to change one.');
+        this.host.notify('The queue is too long to move a footprint.');
         return;
       }
       const items = queue.map((item): MovementRequest => {
         const {type, foot, lengthM, heightM, turnRad, seconds, waypointsM} = item;
-        const place = item.requestId === requestId ? atM : item.atM;
+        const target = item.requestId === requestId ? atM : item.atM;
         return {
-          avatar, requestId: item.requestId, type, foot, lengthM, heightM, turnRad, seconds, waypointsM,
-          ...(place === null ? {} : {atM: place}),
+          avatar, requestId: item.requestId, type, foot, lengthM, heightM, turnRad, seconds,
+          waypointsM,
+          ...(target === null ? {} : {atM: target}),
           ...(item.mustBeMet ? {mustBeMet: true} : {}),
           ...(item.sideM === null ? {} : {sideM: item.sideM}),
           ...(item.headingRad === null ? {} : {headingRad: item.headingRad}),
@@ -200,10 +233,10 @@ export class FootprintTool {
       });
       await world.cancel([avatar]);
       const reply = await world.request(items);
-      this.host.say(reply.ok ? `Moved the footprint to x ${atM[0].toFixed(2)}, z ${atM[2].toFixed(2)} m.` :
+      this.host.notify(reply.ok ? `Moved the footprint to ${pointText(atM)}.` :
         `Refused: ${reply.items[0]?.text || reply.text}`);
     } catch {
-      this.host.say('The server told nothing about that avatar.');
+      this.host.notify('The server did not report the state of that avatar.');
     }
   }
 }

@@ -1,27 +1,43 @@
 import {button, h} from './dom.js';
 
-/** What keys, clicks and drags do, by key. */
+/** The dialog that lists keys, clicks and drags. */
 export function makeHelp(): HTMLDialogElement {
   const dialog = h('dialog', {class: 'help', 'aria-labelledby': 'help-title'});
   const rows: [string, string][] = [
-    ['Drag, arrow keys', 'orbit'], ['Wheel, pinch, + −', 'zoom'],
-    ['Shift or right drag, two fingers', 'move the view'], ['F', 'frame all'],
-    ['C, double click', 'follow'], ['Click, N, P', 'choose a figure'], ['Esc', 'deselect'],
-    ['Space', 'pause'], ['[ ]', 'slower, faster'], [', .', 'a moment back, on'], ['L', 'live'],
-    ['W, A, D', 'step: next foot, left, right'], ['Q, E', 'turn more left, right'],
-    ['R, V', 'longer, shorter steps'], ['Drag an outlined print', 'moves that step'],
-    ['T', 'clicks on the ground are footprints'], ['M', 'clicks on the ground send there'],
-    ['M, then drag', 'the way to look there'], ['M, then Shift click, long touch', 'a place to pass first'],
-    ['K', 'feet stand still, or slide'], ['J', 'jump'], ['S', 'stand'], ['X', 'clear the queue'],
-    ['B, Delete', 'spawn, remove'], ['G', 'let them wander'],
+    ['Drag, arrow keys', 'Orbit'],
+    ['Wheel, pinch, + −', 'Zoom'],
+    ['Shift drag, right drag, two fingers', 'Pan'],
+    ['F', 'Frame all avatars'],
+    ['Click, N, P', 'Select an avatar'],
+    ['C, double click', 'Follow the avatar'],
+    ['Esc', 'Cancel or deselect'],
+    ['Space', 'Pause or play'],
+    ['[ ]', 'Slower, faster'],
+    [', .', 'Step back, forward in time'],
+    ['L', 'Go live'],
+    ['W, A, D', 'Step: next foot, left, right'],
+    ['Q, E', 'Turn further left, right'],
+    ['R, V', 'Longer, shorter steps'],
+    ['T', 'Toggle “Step there”'],
+    ['Drag an outlined footprint', 'Move that step'],
+    ['M', 'Toggle “Walk there”'],
+    ['M, then drag', 'Set the heading at the goal'],
+    ['M, then Shift click or long touch', 'Add a waypoint'],
+    ['K', 'Toggle foot planting'],
+    ['J', 'Jump'],
+    ['S', 'Stand'],
+    ['X', 'Clear the queue'],
+    ['B, Delete', 'Spawn, remove'],
+    ['G', 'Toggle random walk'],
   ];
   const close = button('Close', {class: 'primary'}, () => dialog.close());
   dialog.append(
-    // What is focused is scrolled to: the beginning.
-    h('h2', {id: 'help-title', tabindex: -1, autofocus: true}, 'Keys'),
-    h('p', {class: 'hint'}, 'Rings mark feet that carry: green the left, orange the right; ' +
-      'footprints fade after 14 s. Lines on the ground are a metre apart, strong ones five.'),
-    h('dl', {class: 'keys'}, ...rows.flatMap(([key, what]) => [h('dt', {}, key), h('dd', {}, what)])),
+    // The browser scrolls to the focused element; focusing the title shows the dialog from its top.
+    h('h2', {id: 'help-title', tabindex: -1, autofocus: true}, 'Keyboard and mouse'),
+    h('p', {class: 'hint'}, 'Rings mark planted feet: green left, orange right. Footprints fade ' +
+      'after 14\u00a0s. Grid lines are 1\u00a0m apart; every fifth is bold.'),
+    h('dl', {class: 'keys'},
+      ...rows.flatMap(([key, what]) => [h('dt', {}, key), h('dd', {}, what)])),
     close);
   return dialog;
 }

@@ -1,19 +1,19 @@
-// Starts the page and hands browser tests what they look at.
+// Starts the viewer page, and defines `window.stridewire` for browser tests, see README.md.
 
 import {App} from './app.js';
 import {h} from './dom.js';
-import {probe} from './renderer.js';
+import {detectRenderer} from './renderer.js';
 
 const root = document.getElementById('app')!;
-const info = probe();
+const info = detectRenderer();
 if (!info) {
   root.replaceChildren(h('p', {class: 'fatal'},
-    'This browser draws no WebGL 2: switch on hardware acceleration, or open the page in another one.'));
+    'This page needs WebGL 2. Enable hardware acceleration, or use another browser.'));
 } else {
-  // ?server=host:port looks at another server than the one this page came from.
-  const asked = new URLSearchParams(location.search).get('server');
+  // ?server=host:port connects to a server other than the one that served this page.
+  const server = new URLSearchParams(location.search).get('server');
   const app = new App(root, info, {
-    host: asked && /^[\w.\-[\]:]+$/.test(asked) ? asked : location.host,
+    host: server && /^[\w.\-[\]:]+$/.test(server) ? server : location.host,
     secure: location.protocol === 'https:',
   });
   app.start();
@@ -22,7 +22,7 @@ if (!info) {
       app,
       client: app.client,
       get worlds() {
-        return app.shown.map(({world, view}) => ({name: world.name, world, view}));
+        return app.panes.map(({world, view}) => ({name: world.name, world, view}));
       },
       renderer: info,
       get draw() {
@@ -30,7 +30,7 @@ if (!info) {
       },
       get stats() {
         return {
-          ...app.client.statistics, ...app.liveFigures, framesDrawn: app.framesDrawn,
+          ...app.client.statistics, ...app.liveStatistics, framesDrawn: app.framesDrawn,
           frameMs: app.frameMs, firstFigureMs: app.firstFigureMs};
       },
       get playback() {
@@ -42,20 +42,20 @@ if (!info) {
       get inspected() {
         return app.inspected;
       },
-      /** Where an avatar's root is on the page, to click it; null when it is not seen. */
+      /** Position of an avatar's root in CSS pixels, or null if it is not visible. */
       place(world: string, avatar: number) {
-        return app.onPage(world, avatar);
+        return app.avatarOnPage(world, avatar);
       },
-      /** Poses as drawn in the last frame: a copy, by world. */
+      /** Copies of the poses that the last frame shows, one entry per world. */
       sampled() {
-        return app.shown.map(({world, view}) => ({
+        return app.panes.map(({world, view}) => ({
           world: world.name,
           timeS: app.drawnTimeS,
           avatars: [...view.pose.avatars.subarray(0, view.pose.count)],
           rootsM: [...view.pose.rootsM.subarray(0, view.pose.count * 3)],
           jointsM: view.crowd ? [...view.crowd.positions.subarray(
             0, view.crowd.count * view.crowd.skeleton.jointCount * 3)] : [],
-          footprints: view.footprints.laid,
+          footprints: view.footprints.addedCount,
           planned: view.plannedCount,
           goals: view.goalCount,
           waypoints: view.waypointCount,

@@ -1,15 +1,15 @@
-// The time that is shown: live, slower, paused, or further back in what was recorded.
+// The time that the page shows: live, slow motion, paused, or an earlier part of the recording.
 
-export interface Span {
+export interface TimeRange {
   readonly firstS: number;
   readonly lastS: number;
 }
 
-/** Within this of the newest pose, going at full speed is called live. */
+/** Playback at full speed becomes live when it is less than this behind the live time. */
 const liveMarginS = 0.02;
 
 export class Playback {
-  /** 0 to 1; live only counts at 1. */
+  /** Speed, 0.01 to 1. Live playback has speed 1. */
   rate = 1;
   paused = false;
   private live_ = true;
@@ -23,10 +23,10 @@ export class Playback {
   }
 
   /**
-   * The time to show, `dtS` after the last. `renderS` is what a live view shows, `recorded` what can
-   * be gone back to (null: nothing yet).
+   * Advances by `dtS` seconds of real time and returns the server time to show. `renderS` is the
+   * time that a live view shows; `recorded` is the range of the recording, or null if it is empty.
    */
-  advance(dtS: number, renderS: number, recorded: Span | null): number {
+  advance(dtS: number, renderS: number, recorded: TimeRange | null): number {
     if (this.live_) {
       this.timeS_ = renderS;
       return this.timeS_;
@@ -51,7 +51,7 @@ export class Playback {
     this.paused = true;
     this.live_ = false;
   }
-  /** Goes on from where it stands. */
+  /** Continues at the current time, without becoming live. */
   resume(): void {
     this.paused = false;
   }

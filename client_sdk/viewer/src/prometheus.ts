@@ -1,6 +1,9 @@
-// The server's figures, out of Prometheus' text format.
+// Reads metrics in Prometheus' text format.
 
-/** Values by name, samples of one name summed, as shards and labels are one server. */
+/**
+ * Values by metric name. Samples with different labels are summed, because the page shows totals of
+ * all shards. Histogram buckets and values that are not finite are skipped.
+ */
 export function parseMetrics(text: string): Map<string, number> {
   const values = new Map<string, number>();
   for (const line of text.split('\n')) {
@@ -13,9 +16,12 @@ export function parseMetrics(text: string): Map<string, number> {
   return values;
 }
 
-/** Mean of a histogram's new observations since an older scrape; null when there were none. */
+/**
+ * Mean of the observations that a histogram counted between two scrapes; null if there are none.
+ */
 export function meanSince(
-  now: ReadonlyMap<string, number>, before: ReadonlyMap<string, number>, name: string): number | null {
+  now: ReadonlyMap<string, number>, before: ReadonlyMap<string, number>,
+  name: string): number | null {
   const count = (now.get(`${name}_count`) ?? 0) - (before.get(`${name}_count`) ?? 0);
   const sum = (now.get(`${name}_sum`) ?? 0) - (before.get(`${name}_sum`) ?? 0);
   return count > 0 && sum >= 0 ? sum / count : null;

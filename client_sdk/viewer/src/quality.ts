@@ -1,158 +1,175 @@
-// How finely things are drawn: from how long frames take, unless somebody says it.
+// Chooses how much detail to draw, from measured frame times or by the user's choice.
 
 export type FigureStyle = 'bodies' | 'lines';
 export type QualityChoice = 'auto' | 'high' | 'low';
 
-/** What one level of quality draws. */
-export interface Detail {
+/** What is drawn at one quality level. */
+export interface QualityLevel {
   readonly style: FigureStyle;
-  /** Share of the page's own resolution, along each axis. */
+  /** Resolution along each axis, relative to full resolution. */
   readonly scale: number;
-  /** Shadows of bodies; else soft blobs only. */
+  /** Whether bodies cast shadows. Without them, each avatar has soft blobs on the ground. */
   readonly shadows: boolean;
-  /** Tubes of few sides, lit once a vertex. */
+  /** Bodies with fewer faces and lighting per vertex instead of per pixel. */
   readonly coarse: boolean;
-  /** One blob beneath the body and none beneath each foot, half the lines. */
-  readonly simple: boolean;
-  /** Footprints kept at most. */
-  readonly prints: number;
+  /** No shadow blobs beneath the feet, and stick figures with half as many lines. */
+  readonly simplified: boolean;
+  /** Upper limit of footprints drawn. */
+  readonly maxFootprints: number;
 }
 
-export const mostPrints = 6000;
+export const maxFootprints = 6000;
 
-const fine = {scale: 1, shadows: true, coarse: false, simple: false, prints: mostPrints};
-const plain = {scale: 0.8, shadows: false, coarse: true, simple: false, prints: 2000};
-const least = {scale: 0.6, shadows: false, coarse: true, simple: true, prints: 1500};
+const fineDetail = {scale: 1, shadows: true, coarse: false, simplified: false, maxFootprints};
+const coarseDetail =
+  {scale: 0.8, shadows: false, coarse: true, simplified: false, maxFootprints: 2000};
+const minimalDetail =
+  {scale: 0.6, shadows: false, coarse: true, simplified: true, maxFootprints: 1500};
 
-/** From the finest on; each is cheaper than the one before. */
-const hardwareLevels: readonly Detail[] = [
-  {style: 'bodies', ...fine},
-  {style: 'bodies', ...fine, scale: 0.8},
-  {style: 'bodies', ...plain},
-  {style: 'bodies', ...least},
-  {style: 'lines', ...plain},
-  {style: 'lines', ...least},
-  {style: 'lines', ...least, scale: 0.5, prints: 500},
+/** Sorted from the finest level to the cheapest. */
+const hardwareLevels: readonly QualityLevel[] = [
+  {style: 'bodies', ...fineDetail},
+  {style: 'bodies', ...fineDetail, scale: 0.8},
+  {style: 'bodies', ...coarseDetail},
+  {style: 'bodies', ...minimalDetail},
+  {style: 'lines', ...coarseDetail},
+  {style: 'lines', ...minimalDetail},
+  {style: 'lines', ...minimalDetail, scale: 0.5, maxFootprints: 500},
 ];
-/** To a processor fewer pixels are no relief: what it saves in drawing goes into enlarging them. */
-const softwareLevels: readonly Detail[] = hardwareLevels.map((level) => ({...level, scale: 1}));
+/**
+ * With a software renderer, a lower resolution does not help: scaling the image up costs as much as
+ * it saves.
+ */
+const softwareLevels: readonly QualityLevel[] =
+  hardwareLevels.map((level) => ({...level, scale: 1}));
 export const levelCount = hardwareLevels.length;
 
-/** Frames are wanted this often; a graphics card manages more than a processor. */
-const wantedMs = {software: 40, hardware: 19};
+/** Desired time per frame. A software renderer cannot reach the rate of a GPU. */
+const targetFrameMs = {software: 40, hardware: 19};
 const windowMs = 1000;
-const fewestFrames = 4;
-/** Slow windows in a row before a level is given up. */
-const slowWindows = 2;
-/** A finer level is tried after this long, and twice as long each time it proves too slow. */
+const minFramesPerWindow = 4;
+/** After this many slow measuring windows in a row, quality is lowered. */
+const slowWindowsToLower = 2;
+/**
+ * After this long without slow frames, a finer level is tried again. The wait doubles each time
+ * that level is too slow.
+ */
 const firstRetryMs = 8000;
 const longestRetryMs = 240_000;
 
-/** Where a crowd of this size starts when a processor draws. */
-export function softwareLevel(avatars: number): number {
-  return avatars <= 3 ? 1 : avatars <= fewAvatars ? 2 : avatars <= 120 ? 4 : 5;
+/**
+ * Up to this many avatars, a software renderer spends most of its time on the rest of the page.
+ * Drawing lines would not help, so that level 3 (bodies) is the coarsest.
+ */
+const smallCrowd = 24;
+const coarsestForSmallCrowd = 3;
+
+/** The level that a software renderer starts with, which is also the finest that it uses. */
+export function initialSoftwareLevel(avatars: number): number {
+  return avatars <= 3 ? 1 : avatars <= smallCrowd ? 2 : avatars <= 120 ? 4 : 5;
 }
 
-/** With few figures the rest of the page takes a processor's time: lines would be no relief. */
-const fewAvatars = 24;
-const leastForFew = 3;
 
-/** Chooses the level; tell it of every frame. */
+/** Chooses the quality level. Call `onFrame` for every frame. */
 export class Quality {
   choice: QualityChoice = 'auto';
   private level_ = 0;
-  private finest = 0;
-  private coarsest = levelCount - 1;
-  private startMs = -1;
-  private frames = 0;
-  private slow = 0;
-  private calmMs = 0;
+  private finestLevel = 0;
+  private coarsestLevel = levelCount - 1;
+  private windowStartMs = -1;
+  private windowFrames = 0;
+  private slowWindows = 0;
+  private fastMs = 0;
   private retryMs = firstRetryMs;
-  private tried = -1;
-  private slowAtMs = 0;
-  private vain = false;
+  private retriedLevel = -1;
+  private slowFrameMs = 0;
+  private loweringFailed = false;
 
-  private readonly wantedMs: number;
+  private readonly targetMs: number;
 
-  /** `leastMs` is what a frame takes at least, because no more are asked for. */
-  constructor(private readonly software: boolean, leastMs = 0) {
-    this.wantedMs = Math.max(software ? wantedMs.software : wantedMs.hardware, 1.1 * leastMs);
+  /** `minFrameMs` is the shortest frame time that a frame rate limit allows; 0 without a limit. */
+  constructor(private readonly software: boolean, minFrameMs = 0) {
+    this.targetMs = Math.max(
+      software ? targetFrameMs.software : targetFrameMs.hardware, 1.1 * minFrameMs);
   }
 
   get level(): number {
     return this.choice === 'high' ? 0 : this.choice === 'low' ? levelCount - 1 : this.level_;
   }
-  get detail(): Detail {
+  get settings(): QualityLevel {
     return (this.software ? softwareLevels : hardwareLevels)[this.level]!;
   }
-  /** Whether it draws less than it could, by its own choice. */
+  /** True if slow frames have reduced the quality. */
   get lowered(): boolean {
     return this.choice === 'auto' && this.level_ > 0;
   }
 
-  /** Once a frame; `nowMs` is a clock, `avatars` how many there are to draw. */
-  frame(nowMs: number, avatars: number): void {
-    const finest = this.software ? softwareLevel(avatars) : 0;
-    if (finest !== this.finest) {
-      // Another crowd: judged anew from where such a crowd starts.
-      this.finest = finest;
-      this.coarsest = this.software && avatars <= fewAvatars ? leastForFew : levelCount - 1;
+  /** Call once per frame, with a monotonic clock and the number of avatars drawn. */
+  onFrame(nowMs: number, avatars: number): void {
+    const finest = this.software ? initialSoftwareLevel(avatars) : 0;
+    if (finest !== this.finestLevel) {
+      // The size of the crowd has changed so much that another initial level applies.
+      this.finestLevel = finest;
+      this.coarsestLevel =
+        this.software && avatars <= smallCrowd ? coarsestForSmallCrowd : levelCount - 1;
       this.level_ = finest;
-      this.forget(nowMs);
+      this.reset(nowMs);
       return;
     }
     if (this.choice !== 'auto') {
-      this.startMs = -1;
+      this.windowStartMs = -1;
       return;
     }
-    if (this.startMs < 0) {
-      this.forget(nowMs);
+    if (this.windowStartMs < 0) {
+      this.reset(nowMs);
       return;
     }
-    ++this.frames;
-    const spanMs = nowMs - this.startMs;
-    if (spanMs < windowMs || this.frames < fewestFrames) return;
-    // A page in the background is drawn rarely or never: that says nothing.
-    if (spanMs < 6 * windowMs) this.judge(spanMs / this.frames, spanMs);
-    this.startMs = nowMs;
-    this.frames = 0;
+    ++this.windowFrames;
+    const spanMs = nowMs - this.windowStartMs;
+    if (spanMs < windowMs || this.windowFrames < minFramesPerWindow) return;
+    // Browsers draw background tabs rarely or never, so long windows are not evaluated.
+    if (spanMs < 6 * windowMs) this.evaluateWindow(spanMs / this.windowFrames, spanMs);
+    this.windowStartMs = nowMs;
+    this.windowFrames = 0;
   }
 
-  private judge(frameMs: number, spanMs: number): void {
-    if (this.vain) return;
-    this.slow = frameMs > this.wantedMs * 1.2 ? this.slow + 1 : 0;
-    if (this.slow >= slowWindows) {
-      if (this.level_ === this.coarsest) {
-        // What is drawn was not what took the time: a slow display, or a browser that saves power.
-        if (frameMs > 0.8 * this.slowAtMs) {
-          this.level_ = this.finest;
-          this.vain = true;
+  private evaluateWindow(frameMs: number, spanMs: number): void {
+    if (this.loweringFailed) return;
+    this.slowWindows = frameMs > this.targetMs * 1.2 ? this.slowWindows + 1 : 0;
+    if (this.slowWindows >= slowWindowsToLower) {
+      if (this.level_ === this.coarsestLevel) {
+        // Lower levels did not make frames faster: the display is slow, or the browser saves power.
+        if (frameMs > 0.8 * this.slowFrameMs) {
+          this.level_ = this.finestLevel;
+          this.loweringFailed = true;
         }
         return;
       }
-      if (this.level_ === this.finest) this.slowAtMs = frameMs;
-      if (this.tried === this.level_) this.retryMs = Math.min(longestRetryMs, this.retryMs * 2);
+      if (this.level_ === this.finestLevel) this.slowFrameMs = frameMs;
+      if (this.retriedLevel === this.level_) {
+        this.retryMs = Math.min(longestRetryMs, this.retryMs * 2);
+      }
       ++this.level_;
-      this.slow = 0;
-      this.calmMs = 0;
+      this.slowWindows = 0;
+      this.fastMs = 0;
       return;
     }
-    this.calmMs = frameMs < this.wantedMs ? this.calmMs + spanMs : 0;
-    if (this.calmMs >= this.retryMs && this.level_ > this.finest) {
+    this.fastMs = frameMs < this.targetMs ? this.fastMs + spanMs : 0;
+    if (this.fastMs >= this.retryMs && this.level_ > this.finestLevel) {
       --this.level_;
-      this.tried = this.level_;
-      this.calmMs = 0;
+      this.retriedLevel = this.level_;
+      this.fastMs = 0;
     }
   }
 
-  private forget(nowMs: number): void {
-    this.startMs = nowMs;
-    this.frames = 0;
-    this.slow = 0;
-    this.calmMs = 0;
+  private reset(nowMs: number): void {
+    this.windowStartMs = nowMs;
+    this.windowFrames = 0;
+    this.slowWindows = 0;
+    this.fastMs = 0;
     this.retryMs = firstRetryMs;
-    this.tried = -1;
-    this.slowAtMs = 0;
-    this.vain = false;
+    this.retriedLevel = -1;
+    this.slowFrameMs = 0;
+    this.loweringFailed = false;
   }
 }

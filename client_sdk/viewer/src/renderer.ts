@@ -1,16 +1,21 @@
-// The WebGL renderer, and whether a processor or a graphics card does its work.
+// Creates the WebGL renderer, and detects whether a GPU or the CPU draws.
 
 import * as THREE from 'three';
 
-THREE.ColorManagement.enabled = false;  // Colours are given, and written, as they are displayed.
+// All colours are in display space; three.js must not convert them.
+THREE.ColorManagement.enabled = false;
 
 export interface RendererInfo {
   readonly name: string;
+  /** True if the CPU draws, for example SwiftShader or llvmpipe. */
   readonly software: boolean;
 }
 
-/** Asks a context of its own: the real one is made to suit the answer. Null without WebGL 2. */
-export function probe(): RendererInfo | null {
+/**
+ * Uses a temporary WebGL context, because options of the real one depend on the result. Returns
+ * null if the browser has no WebGL 2.
+ */
+export function detectRenderer(): RendererInfo | null {
   const context = document.createElement('canvas').getContext('webgl2');
   if (!context) return null;
   const extension = context.getExtension('WEBGL_debug_renderer_info');
@@ -20,8 +25,8 @@ export function probe(): RendererInfo | null {
   return {name, software: /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name)};
 }
 
-/** Canvas pixels a CSS pixel at the finest. */
-export function basePixelRatio(info: RendererInfo): number {
+/** Canvas pixels per CSS pixel at full resolution. */
+export function fullPixelRatio(info: RendererInfo): number {
   return info.software ? 1 : Math.min(devicePixelRatio || 1, 2);
 }
 
@@ -30,7 +35,7 @@ export function makeRenderer(canvas: HTMLCanvasElement, info: RendererInfo): THR
     canvas, antialias: !info.software, stencil: true, powerPreference: 'high-performance',
   });
   renderer.autoClear = false;
-  canvas.classList.toggle('exact', info.software);
-  renderer.setPixelRatio(basePixelRatio(info));
+  canvas.classList.toggle('software', info.software);
+  renderer.setPixelRatio(fullPixelRatio(info));
   return renderer;
 }

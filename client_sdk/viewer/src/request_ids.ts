@@ -1,4 +1,5 @@
-// Numbers of this page's own requests. Pages that command the same avatar do not take each other's for theirs.
+// Ids of this page's movement requests. They start at a random number, so that two pages that
+// command the same avatar do not mistake each other's requests for their own.
 
 let next = (BigInt(Math.floor(Math.random() * 2 ** 40)) << 20n) + (1n << 62n);
 

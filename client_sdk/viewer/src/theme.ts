@@ -1,4 +1,5 @@
-// Colours of page and scene, dark and light: the system's choice until somebody makes one.
+// Dark and light colours of the page and the scene. The system's preference applies until the user
+// selects a theme.
 
 import * as THREE from 'three';
 
@@ -6,7 +7,7 @@ import type {ViewColours} from './scene/world_view.js';
 
 export type ThemeName = 'dark' | 'light';
 
-const scene = {
+const palettes = {
   dark: {
     near: '#232c3a', far: '#0f141d', line: '#3b4a60', strong: '#5b7190', sky: '#8d9db8',
     earth: '#3a3f4c', accent: '#7cc4ff', shade: '#05080d', left: '#57d0a6', right: '#ffb35c',
@@ -26,7 +27,7 @@ export function makeColours(): ViewColours {
       groundLight: new THREE.Color(), fogColour: new THREE.Color(), accent: new THREE.Color(),
       shade: new THREE.Vector4(),
     },
-    ground: {
+    terrain: {
       near: new THREE.Color(), far: new THREE.Color(), line: new THREE.Color(),
       strong: new THREE.Color(),
     },
@@ -35,13 +36,16 @@ export function makeColours(): ViewColours {
   };
 }
 
-/** Sets every colour of the scene in place; materials share them. */
+/**
+ * Changes the scene's colours in place, because materials share the objects. Returns the background
+ * colour.
+ */
 export function applyTheme(name: ThemeName, colours: ViewColours): THREE.Color {
-  const c = scene[name];
-  colours.ground.near.set(c.near);
-  colours.ground.far.set(c.far);
-  colours.ground.line.set(c.line);
-  colours.ground.strong.set(c.strong);
+  const c = palettes[name];
+  colours.terrain.near.set(c.near);
+  colours.terrain.far.set(c.far);
+  colours.terrain.line.set(c.line);
+  colours.terrain.strong.set(c.strong);
   colours.lights.skyLight.set(c.sky);
   colours.lights.groundLight.set(c.earth);
   colours.lights.fogColour.set(c.far);
@@ -56,8 +60,8 @@ export function applyTheme(name: ThemeName, colours: ViewColours): THREE.Color {
 }
 
 export function preferredTheme(): ThemeName {
-  const asked = new URLSearchParams(location.search).get('theme') ?? read('stridewire.theme');
-  if (asked === 'dark' || asked === 'light') return asked;
+  const requested = new URLSearchParams(location.search).get('theme') ?? read('stridewire.theme');
+  if (requested === 'dark' || requested === 'light') return requested;
   return matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark';
 }
 
@@ -65,7 +69,7 @@ export function rememberTheme(name: ThemeName): void {
   try {
     localStorage.setItem('stridewire.theme', name);
   } catch {
-    // Storage may be switched off; then the choice lasts as long as the page.
+    // The browser may forbid storage. The choice is then lost when the page closes.
   }
 }
 

@@ -1,263 +1,284 @@
-// Walks to places: clicked on the ground, dragged for the heading, marked there until they end.
+// The walk tool: a click on the ground sends the selected avatar there, a drag also sets the
+// heading at the goal. Goals, headings and waypoints are drawn on the ground until the walk ends.
 
-import {nextRequestId} from './request_ids.js';
-import type {Vec3, WorldEvent} from './sdk.js';
-import type {Chosen, Shown} from './shown.js';
+import {pointText} from './dom.js';
 import type {FootprintHost} from './footprint_tool.js';
-import type {GoalMark} from './scene/world_view.js';
+import {nextRequestId} from './request_ids.js';
+import type {GoalDecal} from './scene/world_view.js';
+import type {Vec3, WorldEvent} from './sdk.js';
+import type {AvatarSelection, WorldPane} from './world_pane.js';
 
-/** What the tool needs of the page. */
+/** The parts of the page that the tool uses. */
 export interface WalkHost extends FootprintHost {
-  /** A walk that is asked for now, to be looked at and changed by hand. */
+  /** Copies the goal of a new walk to the fields of the panel, where the user can edit it. */
   showGoal(atM: Vec3, headingRad: number | null): void;
 }
 
 interface Goal {
   readonly atM: Vec3;
-  /** Null: not chosen. */
+  /** Heading at the goal; null if the request has none. */
   readonly headingRad: number | null;
   readonly waypointsM: readonly Vec3[];
 }
 
-/** A walk that this page has asked for. */
+/** A walk that this page has requested and that has not ended. */
 interface Walk extends Goal {
-  readonly shown: Shown;
+  readonly pane: WorldPane;
   readonly avatar: number;
   readonly requestId: bigint;
+  /** Whether the server has accepted the request. */
   accepted: boolean;
-  askedMs: number;
-  /** How often in a row it waited no more when asked. */
-  missed: number;
+  polledMs: number;
+  /** Number of polls in a row that did not find the walk in the queue. */
+  missedPolls: number;
 }
 
-const mostWaypoints = 64;
-/** Walks whose ends are waited for; of more the oldest are marked no longer. */
-const mostWalks = 64;
-/** A press that moves less has no heading; in CSS pixels. */
+const maxWaypoints = 64;
+/** The page tracks this many walks. If there are more, it forgets the oldest. */
+const maxWalks = 64;
+/** A drag that is shorter than this sets no heading, in CSS pixels. */
 const dragPx = 8;
-/** A finger that rests so long means a place to pass. */
-const restMs = 600;
-/** Nearer goals keep the heading there is. */
-const nearM = 0.5;
-/** Whether a walk still waits is asked so often: somebody else may have cancelled it. */
-const askEveryMs = 500;
-/** Its end may have been told by then: answers overtake events. */
-const mostMissed = 3;
+/** A touch that rests longer than this sets a waypoint. */
+const longPressMs = 600;
+/** For goals closer than this, the avatar keeps its heading. */
+const minHeadingDistanceM = 0.5;
+/** How often to check that a walk is still queued, because another client may have cancelled it. */
+const pollIntervalMs = 500;
+/** An inspection reply may overtake events, so one missed poll does not prove that a walk ended. */
+const maxMissedPolls = 3;
 
 export class WalkTool {
-  sending = false;
+  /** Whether clicks on the ground request walks. */
+  active = false;
   private readonly walks: Walk[] = [];
-  /** Ended, though what was inspected last may have them yet. */
-  private readonly ended: bigint[] = [];
-  /** Places to pass, of the walk that is asked for next. */
-  private passing: (Chosen & {readonly waypointsM: Vec3[]}) | null = null;
-  /** The goal that is held. */
-  private held: {
-    readonly shown: Shown; readonly atM: Vec3; headingRad: number | null;
+  /** Walks that have ended, although the last inspected queue may still contain them. */
+  private readonly endedRequests: bigint[] = [];
+  /** Waypoints for the next walk of an avatar. */
+  private pendingWaypoints: (AvatarSelection & {readonly waypointsM: Vec3[]}) | null = null;
+  /** The press that is choosing a goal and its heading. */
+  private press: {
+    readonly pane: WorldPane; readonly atM: Vec3; headingRad: number | null;
     readonly x: number; readonly y: number; readonly touch: boolean;
   } | null = null;
 
   constructor(private readonly host: WalkHost) {}
 
-  setSending(on: boolean): void {
-    this.sending = on;
-    if (!on) this.held = this.passing = null;
-    this.show();
-    if (on) this.host.say(this.host.chosen() ? 'Click where it is to go; drag for the way it looks there.' :
-      'Choose a figure, then click where it is to go.');
+  setActive(on: boolean): void {
+    this.active = on;
+    if (!on) this.press = this.pendingWaypoints = null;
+    this.update();
+    if (!on) return;
+    this.host.notify(this.host.selection() ?
+      'Click the destination; drag to set the heading there.' :
+      'Select an avatar, then click its destination.');
   }
 
-  // ---- the pointer
+  // ---- pointer
 
-  /** Whether a press there is a goal. */
+  /** If the press can choose a goal, starts to track it and returns true. */
   grab(x: number, y: number, touch: boolean): boolean {
-    const shown = this.sending ? this.host.viewAt(x, y) : null;
-    if (!shown || this.whom(shown) === 0) return false;
-    const atM = shown.view.groundAt(x, y);
+    const pane = this.active ? this.host.paneAt(x, y) : null;
+    if (!pane || this.target(pane) === 0) return false;
+    const atM = pane.view.terrainPointAt(x, y);
     if (atM === null) return false;
-    this.held = {shown, atM, headingRad: null, x, y, touch};
-    this.show();
+    this.press = {pane, atM, headingRad: null, x, y, touch};
+    this.update();
     return true;
   }
 
   drag(x: number, y: number): void {
-    const {held} = this;
-    if (!held) return;
-    const at = held.shown.view.groundAt(x, y);
-    if (Math.hypot(x - held.x, y - held.y) < dragPx) held.headingRad = null;
-    else if (at) held.headingRad = Math.atan2(at[0] - held.atM[0], at[2] - held.atM[2]);
-    this.show();
+    const {press} = this;
+    if (!press) return;
+    const at = press.pane.view.terrainPointAt(x, y);
+    if (Math.hypot(x - press.x, y - press.y) < dragPx) press.headingRad = null;
+    else if (at) press.headingRad = Math.atan2(at[0] - press.atM[0], at[2] - press.atM[2]);
+    this.update();
   }
 
-  drop(heldMs: number): void {
-    const {held} = this;
-    this.held = null;
-    if (!held) return;
-    if (held.touch && held.headingRad === null && heldMs > restMs) this.pass(held.shown, held.atM);
-    else this.send(held.shown, held.atM, held.headingRad);
+  drop(pressedMs: number): void {
+    const {press} = this;
+    this.press = null;
+    if (!press) return;
+    if (press.touch && press.headingRad === null && pressedMs > longPressMs) {
+      this.addWaypoint(press.pane, press.atM);
+    } else {
+      this.send(press.pane, press.atM, press.headingRad);
+    }
   }
 
-  /** Forgets a press, or else the places to pass; false: there was nothing. */
-  letGo(): boolean {
-    const had = this.held !== null || this.passing !== null;
-    if (this.held) this.held = null;
-    else this.passing = null;
-    this.show();
+  /** Discards the press, or else the waypoints. Returns false if there was nothing to discard. */
+  discardInput(): boolean {
+    const had = this.press !== null || this.pendingWaypoints !== null;
+    if (this.press) this.press = null;
+    else this.pendingWaypoints = null;
+    this.update();
     return had;
   }
 
-  /** The press that holds a goal is something else after all. */
-  release(): void {
-    this.held = null;
-    this.show();
+  /** Discards the press, because it has become another gesture, for example a pinch. */
+  cancelDrag(): void {
+    this.press = null;
+    this.update();
   }
 
   // ---- goals
 
-  /** Whom a walk in this world is for; 0: it is not clear. */
-  private whom(shown: Shown): number {
-    const avatars = this.host.drivenAvatars();
-    return avatars.length === 1 && this.host.driven() === shown ? avatars[0]! : 0;
+  /** The avatar that a walk in this world is for; 0 if there is not exactly one. */
+  private target(pane: WorldPane): number {
+    const avatars = this.host.targets();
+    return avatars.length === 1 && this.host.commandedPane() === pane ? avatars[0]! : 0;
   }
 
-  private whomOrSay(shown: Shown): number {
-    const avatar = this.whom(shown);
-    if (avatar === 0) this.host.say('A walk is for one: choose a figure of this world.');
+  private targetOrNotify(pane: WorldPane): number {
+    const avatar = this.target(pane);
+    if (avatar === 0) this.host.notify('Select one avatar of this world to send it somewhere.');
     return avatar;
   }
 
-  /** A place to pass on the way to the goal that comes. */
-  pass(shown: Shown, atM: Vec3): void {
-    const avatar = this.whomOrSay(shown);
+  /** Adds a waypoint to the next walk. */
+  addWaypoint(pane: WorldPane, atM: Vec3): void {
+    const avatar = this.targetOrNotify(pane);
     if (avatar === 0) return;
-    if (this.passing?.shown !== shown || this.passing.avatar !== avatar) {
-      this.passing = {shown, avatar, waypointsM: []};
+    if (this.pendingWaypoints?.pane !== pane || this.pendingWaypoints.avatar !== avatar) {
+      this.pendingWaypoints = {pane, avatar, waypointsM: []};
     }
-    const {waypointsM} = this.passing;
-    if (waypointsM.length >= mostWaypoints) {
-      this.host.say(`A walk passes ${mostWaypoints} places at most.`);
+    const {waypointsM} = this.pendingWaypoints;
+    if (waypointsM.length >= maxWaypoints) {
+      this.host.notify(`A walk can have at most ${maxWaypoints} waypoints.`);
       return;
     }
     waypointsM.push(atM);
-    this.host.say(`${waypointsM.length === 1 ? 'One place' : `${waypointsM.length} places`} to pass; ` +
-      'the goal is next.');
-    this.show();
+    const count = waypointsM.length === 1 ? '1 waypoint' : `${waypointsM.length} waypoints`;
+    this.host.notify(`${count} set. Choose the destination next.`);
+    this.update();
   }
 
-  /** Instead of whatever the avatar still has to do. */
-  send(shown: Shown, atM: Vec3, chosenRad: number | null): void {
-    const avatar = this.whomOrSay(shown);
+  /** Clears the avatar's queue and requests a walk. */
+  send(pane: WorldPane, atM: Vec3, chosenRad: number | null): void {
+    const avatar = this.targetOrNotify(pane);
     if (avatar === 0) return;
-    const {passing} = this;
-    this.passing = null;
-    const waypointsM = passing?.shown === shown && passing.avatar === avatar ? passing.waypointsM : [];
-    const headingRad = chosenRad ?? this.headingFor(shown, avatar, atM, waypointsM);
+    const pending = this.pendingWaypoints;
+    this.pendingWaypoints = null;
+    const waypointsM =
+      pending?.pane === pane && pending.avatar === avatar ? pending.waypointsM : [];
+    const headingRad = chosenRad ?? this.defaultHeading(pane, avatar, atM, waypointsM);
     const walk: Walk = {
-      shown, avatar, requestId: nextRequestId(), atM, headingRad, waypointsM, accepted: false,
-      askedMs: performance.now(), missed: 0};
+      pane, avatar, requestId: nextRequestId(), atM, headingRad, waypointsM, accepted: false,
+      polledMs: performance.now(), missedPolls: 0};
     this.host.goLive();
     this.host.showGoal(atM, chosenRad);
-    this.forget((other) => other.shown === shown && other.avatar === avatar);
-    if (this.walks.length === mostWalks) this.walks.shift();
+    this.removeWalks((other) => other.pane === pane && other.avatar === avatar);
+    if (this.walks.length === maxWalks) this.walks.shift();
     this.walks.push(walk);
-    this.show();
-    shown.wander?.drop(avatar);
-    // One right after the other, so that two goals in a row do not come in between one another.
-    void shown.world.cancel([avatar]);
+    this.update();
+    pane.randomWalkers?.remove(avatar);
+    // Both commands are sent without waiting, so that those of two quick clicks cannot interleave.
+    void pane.world.cancel([avatar]);
     const {requestId} = walk;
-    void shown.world.request([{avatar, type: 'walk', requestId, atM, headingRad, waypointsM}]).then((reply) => {
+    void pane.world.request([
+      {avatar, type: 'walk', requestId, atM, headingRad, waypointsM},
+    ]).then((reply) => {
       walk.accepted = reply.ok;
       if (!this.walks.includes(walk)) return;
-      if (!reply.ok) this.forget((other) => other === walk);
-      this.host.say(reply.ok ? `Sent to x ${atM[0].toFixed(2)}, z ${atM[2].toFixed(2)} m.` :
+      if (!reply.ok) this.removeWalks((other) => other === walk);
+      this.host.notify(reply.ok ? `Walking to ${pointText(atM)}.` :
         `Refused: ${reply.items[0]?.text || reply.text}`);
     });
   }
 
-  /** The way it comes; where it stands nearly there, the way it looks. */
-  private headingFor(shown: Shown, avatar: number, atM: Vec3, waypointsM: readonly Vec3[]): number {
-    const place = shown.view.place(avatar);
+  /** The direction of arrival, or the present heading if the goal is very close. */
+  private defaultHeading(
+    pane: WorldPane, avatar: number, atM: Vec3, waypointsM: readonly Vec3[]): number {
+    const location = pane.view.locate(avatar);
     const last = waypointsM.at(-1);
-    const [fromX, fromZ] = last ? [last[0], last[2]] : [place?.x ?? atM[0], place?.z ?? atM[2]];
+    const [fromX, fromZ] =
+      last ? [last[0], last[2]] : [location?.x ?? atM[0], location?.z ?? atM[2]];
     const [x, z] = [atM[0] - fromX, atM[2] - fromZ];
-    if (Math.hypot(x, z) > nearM) return Math.atan2(x, z);
+    if (Math.hypot(x, z) > minHeadingDistanceM) return Math.atan2(x, z);
     const state = this.host.inspected();
-    return state?.avatar === avatar && this.host.chosen()?.shown === shown ? state.baseHeadingRad :
-      place?.headingRad ?? 0;
+    return state?.avatar === avatar && this.host.selection()?.pane === pane ? state.baseHeadingRad :
+      location?.headingRad ?? 0;
   }
 
-  // ---- their ends
+  // ---- ends of walks
 
-  private forget(gone: (walk: Walk) => boolean): void {
+  private removeWalks(matches: (walk: Walk) => boolean): void {
     for (let i = this.walks.length - 1; i >= 0; --i) {
-      if (!gone(this.walks[i]!)) continue;
-      this.ended.push(this.walks[i]!.requestId);
+      if (!matches(this.walks[i]!)) continue;
+      this.endedRequests.push(this.walks[i]!.requestId);
       this.walks.splice(i, 1);
     }
-    if (this.ended.length > mostWalks) this.ended.splice(0, this.ended.length - mostWalks);
+    if (this.endedRequests.length > maxWalks) {
+      this.endedRequests.splice(0, this.endedRequests.length - maxWalks);
+    }
   }
 
-  /** Whatever these avatars still had to do is theirs no more. */
-  cancelled(shown: Shown, avatars: readonly number[]): void {
-    this.forget((walk) => walk.shown === shown && avatars.includes(walk.avatar));
-    this.show();
+  /** Call after the queues of these avatars have been cleared. */
+  onCancelled(pane: WorldPane, avatars: readonly number[]): void {
+    this.removeWalks((walk) => walk.pane === pane && avatars.includes(walk.avatar));
+    this.update();
   }
 
-  /** A world is shown no longer; null: the server knows nothing of us any more. */
-  clear(shown: Shown | null): void {
-    this.forget((walk) => shown === null || walk.shown === shown);
-    if (shown === null || this.held?.shown === shown) this.held = null;
-    if (shown === null || this.passing?.shown === shown) this.passing = null;
-    this.show();
+  /** Call when the pane closes. Null: the session is lost, so all walks have ended. */
+  clear(pane: WorldPane | null): void {
+    this.removeWalks((walk) => pane === null || walk.pane === pane);
+    if (pane === null || this.press?.pane === pane) this.press = null;
+    if (pane === null || this.pendingWaypoints?.pane === pane) this.pendingWaypoints = null;
+    this.update();
   }
 
-  /** Whether it was about one of our walks, and has been said. */
-  onEvent(shown: Shown, event: WorldEvent): boolean {
+  /** Returns true if the event ended one of the walks and the user has been notified. */
+  onEvent(pane: WorldPane, event: WorldEvent): boolean {
     const {type, avatar} = event;
     if (type === 'removed') {
-      this.cancelled(shown, [avatar]);
-      if (this.passing?.shown === shown && this.passing.avatar === avatar) this.passing = null;
+      this.onCancelled(pane, [avatar]);
+      if (this.pendingWaypoints?.pane === pane && this.pendingWaypoints.avatar === avatar) {
+        this.pendingWaypoints = null;
+      }
       return false;
     }
     if (type !== 'rejected' && !(type === 'finished' && event.kind === 'stand')) return false;
-    const walk = this.walks.find(
-      (each) => each.shown === shown && each.avatar === avatar && each.requestId === event.requestId);
+    const walk = this.walks.find((each) =>
+      each.pane === pane && each.avatar === avatar && each.requestId === event.requestId);
     if (!walk) return false;
-    this.forget((each) => each === walk);
-    this.show();
-    this.host.say(type === 'finished' ? `Avatar ${avatar} has arrived.` :
-      `Avatar ${avatar} goes no further: ${event.reason}.`);
+    this.removeWalks((each) => each === walk);
+    this.update();
+    this.host.notify(type === 'finished' ? `Avatar ${avatar} has arrived.` :
+      `Avatar ${avatar} stopped: ${event.reason}.`);
     return true;
   }
 
-  /** Asks after walks that may have been cancelled by others. */
-  private ask(): void {
+  /** Finds walks that other clients have cancelled; the server sends no event for them. */
+  private pollWalks(): void {
     const nowMs = performance.now();
     if (!this.host.live()) return;
     for (const walk of this.walks) {
-      if (!walk.accepted || nowMs - walk.askedMs < askEveryMs) continue;
-      walk.askedMs = nowMs;
-      void walk.shown.world.inspect(walk.avatar).then(({queue, queueSize}) => {
-        const waits = queueSize > queue.length || queue.some(({requestId}) => requestId === walk.requestId);
-        walk.missed = waits ? 0 : walk.missed + 1;
-        if (walk.missed < mostMissed) return;
-        this.forget((each) => each === walk);
-        this.show();
+      if (!walk.accepted || nowMs - walk.polledMs < pollIntervalMs) continue;
+      walk.polledMs = nowMs;
+      void walk.pane.world.inspect(walk.avatar).then(({queue, queueSize}) => {
+        const queued = queueSize > queue.length ||
+          queue.some(({requestId}) => requestId === walk.requestId);
+        walk.missedPolls = queued ? 0 : walk.missedPolls + 1;
+        if (walk.missedPolls < maxMissedPolls) return;
+        this.removeWalks((each) => each === walk);
+        this.update();
       }, () => {});
     }
   }
 
-  // ---- marks
+  // ---- decals
 
-  /** Of all that is on its way, and of what the one chosen was sent to by others. */
-  private goalsOf(shown: Shown): Goal[] {
+  /**
+   * Goals of this page's walks, and of walks that other clients requested for the inspected avatar.
+   */
+  private goalsIn(pane: WorldPane): Goal[] {
     if (!this.host.live()) return [];
-    const goals: Goal[] = this.walks.filter((walk) => walk.shown === shown);
-    const chosen = this.host.chosen();
-    const state = chosen?.shown === shown ? this.host.inspected() : null;
-    if (state?.avatar !== undefined && state.avatar === chosen!.avatar) {
+    const goals: Goal[] = this.walks.filter((walk) => walk.pane === pane);
+    const selection = this.host.selection();
+    const state = selection?.pane === pane ? this.host.inspected() : null;
+    if (state?.avatar !== undefined && state.avatar === selection!.avatar) {
       for (const {type, requestId, atM, headingRad, waypointsM} of state.queue) {
-        if (type !== 'walk' || atM === null || this.ended.includes(requestId) ||
+        if (type !== 'walk' || atM === null || this.endedRequests.includes(requestId) ||
             this.walks.some((walk) => walk.requestId === requestId)) continue;
         goals.push({atM, headingRad, waypointsM});
       }
@@ -265,27 +286,29 @@ export class WalkTool {
     return goals;
   }
 
-  /** Often: ends that nobody tells of are found here, too. */
-  show(): void {
-    this.ask();
-    if (this.passing && this.whom(this.passing.shown) !== this.passing.avatar) this.passing = null;
-    for (const shown of this.host.shown) {
-      const marks: GoalMark[] = [];
-      const goals = this.goalsOf(shown);
-      if (this.passing?.shown === shown) {
-        for (const atM of this.passing.waypointsM) marks.push({kind: 'waypoint', atM, headingRad: 0});
+  /** Call several times per second: polls the walks and updates the decals. */
+  update(): void {
+    this.pollWalks();
+    const pending = this.pendingWaypoints;
+    if (pending && this.target(pending.pane) !== pending.avatar) this.pendingWaypoints = null;
+    for (const pane of this.host.panes) {
+      const decals: GoalDecal[] = [];
+      if (this.pendingWaypoints?.pane === pane) {
+        for (const atM of this.pendingWaypoints.waypointsM) {
+          decals.push({kind: 'waypoint', atM, headingRad: 0});
+        }
       }
-      for (const {atM, headingRad, waypointsM} of goals) {
-        for (const point of waypointsM) marks.push({kind: 'waypoint', atM: point, headingRad: 0});
-        marks.push({kind: 'goal', atM, headingRad: 0});
-        if (headingRad !== null) marks.push({kind: 'heading', atM, headingRad});
+      for (const {atM, headingRad, waypointsM} of this.goalsIn(pane)) {
+        for (const point of waypointsM) decals.push({kind: 'waypoint', atM: point, headingRad: 0});
+        decals.push({kind: 'goal', atM, headingRad: 0});
+        if (headingRad !== null) decals.push({kind: 'heading', atM, headingRad});
       }
-      if (this.held?.shown === shown) {
-        const {atM, headingRad} = this.held;
-        marks.push({kind: 'goal', atM, headingRad: 0});
-        if (headingRad !== null) marks.push({kind: 'turning', atM, headingRad});
+      if (this.press?.pane === pane) {
+        const {atM, headingRad} = this.press;
+        decals.push({kind: 'goal', atM, headingRad: 0});
+        if (headingRad !== null) decals.push({kind: 'draggedHeading', atM, headingRad});
       }
-      shown.view.showGoals(marks);
+      pane.view.showGoals(decals);
     }
   }
 }

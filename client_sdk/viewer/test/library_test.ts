@@ -1,10 +1,10 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {matchingTime, samplePose, timeOf} from '../src/library/clip_pose.js';
-import {niceTop, widest} from '../src/library/library_page.js';
-import {Latest} from '../src/library/library_source.js';
-import type {Clip} from '../src/library/library_source.js';
+import {matchingTime, samplePose, timeAtGenericTime} from '../src/library/clip_pose.js';
+import {roundScaleTop, widestParameters} from '../src/library/library_page.js';
+import {LatestRequest} from '../src/library/library_client.js';
+import type {Clip} from '../src/library/library_client.js';
 import {scaleColour} from '../src/library/parameter_plane.js';
 
 function clip(keytimesS: number[], timesS: number[], roots: number[], rotations: number[]): Clip {
@@ -14,19 +14,19 @@ function clip(keytimesS: number[], timesS: number[], roots: number[], rotations:
   };
 }
 
-test('times of two movements belong together by generic time', () => {
+test('matches times of two movements by generic time', () => {
   const a = clip([0, 0.2, 1], [0, 1], [0, 0, 0, 0, 0, 1], [0, 0, 0, 1, 0, 0, 0, 1]);
   const b = clip([0, 0.6, 0.8], [0, 0.8], [0, 0, 0, 0, 0, 1], [0, 0, 0, 1, 0, 0, 0, 1]);
-  assert.equal(timeOf(b.keytimes_s, 1.5), 0.7);
+  assert.equal(timeAtGenericTime(b.keytimes_s, 1.5), 0.7);
   assert.ok(Math.abs(matchingTime(a, b, 0.1) - 0.3) < 1e-12);
   assert.ok(Math.abs(matchingTime(a, b, 0.6) - 0.7) < 1e-12);
   assert.equal(matchingTime(a, b, 1), 0.8);
   assert.equal(matchingTime(a, b, 9), 0.8);
 });
 
-test('poses between frames go the short way and stay of unit length', () => {
+test('interpolates rotations along the shorter arc, with unit length', () => {
   const s = Math.SQRT1_2;
-  // The second frame has the other sign of a quarter turn.
+  // The second frame is a quarter turn with the opposite sign.
   const it = clip([0, 1], [0, 0.5, 1], [0, 1, 0, 0, 1, 1, 0, 1, 2],
     [0, 0, 0, 1, 0, -s, 0, -s, 0, 1, 0, 0]);
   const roots = new Float32Array(6);
@@ -40,7 +40,7 @@ test('poses between frames go the short way and stay of unit length', () => {
   assert.equal(roots[2], 2);
 });
 
-test('colours go from dark to light, tops are round', () => {
+test('colours become lighter with the value, and the scale ends at a round number', () => {
   let last = -1;
   for (let i = 0; i <= 20; ++i) {
     const [r, g, b] = scaleColour(i / 20);
@@ -50,36 +50,38 @@ test('colours go from dark to light, tops are round', () => {
   }
   assert.deepEqual(scaleColour(-3), scaleColour(0));
   assert.deepEqual(scaleColour(3), scaleColour(1));
-  assert.equal(niceTop(2.8), 3);
-  assert.equal(niceTop(0.013), 0.015);
-  assert.ok(niceTop(0) > 0);
+  assert.equal(roundScaleTop(2.8), 3);
+  assert.equal(roundScaleTop(0.013), 0.015);
+  assert.ok(roundScaleTop(0) > 0);
 });
 
-test('the axes are the parameters that are spread most', () => {
+test('selects the parameters with the widest range as axes', () => {
   const parameter = (name: string, min: number, max: number) => ({name, min, max});
-  const group = (parameters: ReturnType<typeof parameter>[]) => ({kind: 'jump', parameters, sites: []});
-  assert.deepEqual(widest(group([parameter('length_m', 0, 1)])), [0, 0]);
-  assert.deepEqual(widest(group([
-    parameter('start_x_m', 0, 0.1), parameter('end_z_m', 0, 0.7), parameter('turn_rad', -1, 1)])), [1, 2]);
+  const group = (parameters: ReturnType<typeof parameter>[]) =>
+    ({kind: 'jump', parameters, sites: []});
+  assert.deepEqual(widestParameters(group([parameter('length_m', 0, 1)])), [0, 0]);
+  assert.deepEqual(widestParameters(group([
+    parameter('start_x_m', 0, 0.1), parameter('end_z_m', 0, 0.7), parameter('turn_rad', -1, 1)])),
+    [1, 2]);
 });
 
-test('only the newest wish is worked at after the present one', async () => {
+test('executes only the newest of the requests that wait', async () => {
   const done: number[] = [];
   const failed: string[] = [];
   let release = (): void => {};
-  const latest = new Latest<number>(async (wish) => {
+  const latest = new LatestRequest<number>(async (request) => {
     await new Promise<void>((resolve) => (release = resolve));
-    if (wish === 3) throw new Error('three');
-    done.push(wish);
+    if (request === 3) throw new Error('three');
+    done.push(request);
   }, (error) => failed.push(error.message));
-  latest.want(1);
-  latest.want(2);
-  latest.want(3);
+  latest.submit(1);
+  latest.submit(2);
+  latest.submit(3);
   release();
   await new Promise((resolve) => setTimeout(resolve));
   release();
   await new Promise((resolve) => setTimeout(resolve));
-  latest.want(4);
+  latest.submit(4);
   release();
   await new Promise((resolve) => setTimeout(resolve));
   assert.deepEqual(done, [1, 4]);

@@ -1,25 +1,29 @@
-// Takes the pictures of docs/pictures from a running demonstration:
-//   node test/pictures.mjs http://127.0.0.1:7421/ ../../docs/pictures [PART OF A NAME]
+// Takes the viewer screenshots of docs/pictures from a running demo server:
+//
+//   node test/pictures.mjs http://127.0.0.1:7421/ ../../docs/pictures [NAME]
+//
+// With NAME, takes only pictures whose names contain it.
 
 import {join} from 'node:path';
 
 import {launch} from './browser.mjs';
 
-const [link, folder, part = ''] = process.argv.slice(2);
-if (!link || !folder) {
-  console.error('usage: pictures.mjs LINK FOLDER [PART OF A NAME]');
+const [url, folder, part = ''] = process.argv.slice(2);
+if (!url || !folder) {
+  console.error('usage: pictures.mjs URL FOLDER [NAME]');
   process.exit(2);
 }
 const sizes = [[1280, 720], [1920, 1080], [390, 844]];
-// As a graphics card draws it, however long that takes here.
-const both = 'world=generated&world=captured&quality=high';
+// The finest quality, as with a GPU, although frames take long in software.
+const bothWorlds = 'world=generated&world=captured&quality=high';
 const browser = await launch();
 
 async function picture(name, width, height, colorScheme, query, prepare) {
   if (!name.includes(part)) return;
-  const page = await browser.newPage({viewport: {width, height}, colorScheme, hasTouch: width < 500});
+  const page = await browser.newPage({viewport: {width, height}, colorScheme,
+    hasTouch: width < 500});
   page.on('pageerror', (error) => console.error(name, error.message));
-  await page.goto(`${link}?${query}`);
+  await page.goto(`${url}?${query}`);
   await page.waitForFunction(() => window.stridewire?.worlds[0]?.world.skeleton);
   if (!query.includes('slabs')) {
     await page.waitForFunction(() => window.stridewire.stats.firstFigureMs > 0);
@@ -34,52 +38,57 @@ async function picture(name, width, height, colorScheme, query, prepare) {
 
 for (const [width, height] of sizes) {
   for (const theme of ['dark', 'light']) {
-    await picture(`viewer_${width}x${height}_${theme}`, width, height, theme, both);
+    await picture(`viewer_${width}x${height}_${theme}`, width, height, theme, bothWorlds);
   }
 }
 const inspect = async (page) => {
   await page.keyboard.press('n');
   await page.keyboard.press('c');
   await page.waitForTimeout(2500);
-  // Till a step is on its way, then hold it.
+  // Pauses during a step.
   await page.waitForFunction(() => {
     const movement = window.stridewire.inspected?.movement;
-    return movement?.kind.startsWith('step') && movement.weights.length > 0 && !movement.extrapolated;
+    return movement?.kind.startsWith('step') && movement.weights.length > 0 &&
+      !movement.extrapolated;
   });
-  await page.locator('.scene').focus();  // On a button the space bar would press that.
+  await page.locator('.scene').focus();  // The space bar would press a focused button.
   await page.keyboard.press('Space');
   await page.waitForTimeout(800);
 };
 await picture('viewer_inspect', 1280, 720, 'dark', 'world=captured&quality=high', inspect);
-await picture('viewer_inspect_phone', 390, 844, 'light', 'world=generated&quality=high', async (page) => {
+await picture('viewer_inspect_phone', 390, 844, 'light', 'world=generated&quality=high', async (
+  page) => {
   await page.click('button[aria-controls=panel-inspect]');
   await inspect(page);
   await page.waitForTimeout(1500);
 });
-// What the ways cost that poses can travel; at last few joints of them.
-await picture('viewer_streams', 1280, 720, 'light', both, async (page) => {
-  await page.click('button[aria-controls=panel-drive]');
+// The table with the costs of several pose formats.
+await picture('viewer_streams', 1280, 720, 'light', bothWorlds, async (page) => {
+  await page.click('button[aria-controls=panel-commands]');
   await page.click('button[aria-controls=panel-view]');
-  for (const id of ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-fewer']) {
+  const choices =
+    ['mode-full', 'mode-quantised', 'rate-4', 'rate-1', 'detail-root', 'detail-fewer'];
+  for (const id of choices) {
     await page.click(`label[for=${id}]`);
     await page.waitForTimeout(4000);
   }
   await page.evaluate(() => document.querySelector('.costs').scrollIntoView({block: 'end'}));
   await page.waitForTimeout(1500);
 });
-// Footprints along the ladder of slabs, the middle one's still to come outlined.
+// Three avatars on slabs; the queued footprints of the selected one are outlined.
 await picture('viewer_slabs', 1280, 720, 'dark', 'world=slabs&quality=high', async (page) => {
-  await page.selectOption('#drive-ground', 'stones');
-  await page.waitForFunction(() => !window.stridewire.worlds[0].view.ground.flat);
+  await page.selectOption('#command-terrain', 'slabs');
+  await page.waitForFunction(() => !window.stridewire.worlds[0].view.terrain.isFlat);
   await page.evaluate(async () => {
     const {world, view} = window.stridewire.worlds[0];
     const lanes = [-0.75, 0, 0.75];
-    const {items} = await world.spawn(lanes.map((x) => ({positionM: [x, 0, 0.2], headingRad: 0})));
+    const {items} =
+      await world.spawn(lanes.map((x) => ({positionM: [x, 0, 0.2], headingRad: 0})));
     const centres = world.terrain.boxes.map(({minM, maxM}) => (minM[1] + maxM[1]) / 2);
     await world.request(items.flatMap(({avatar}, lane) => centres.slice(0, 14).map((z, i) => {
       const x = lanes[lane] + (i % 2 === 0 ? 0.1 : -0.1);
       return {avatar, type: 'step', foot: i % 2 === 0 ? 'left' : 'right',
-        atM: [x, view.ground.heightAt(x, z), z], headingRad: 0};
+        atM: [x, view.terrain.heightAt(x, z), z], headingRad: 0};
     })));
   });
   await page.waitForTimeout(4500);

@@ -1,7 +1,7 @@
-// Time a pose and a call, memory, and bytes a second against a real server.
+// Measures bytes per second, time per pose and per call, and memory against a real server.
 import WebSocket from 'ws';
 import {Client} from '../src/client';
-import {createCrowdPose} from '../src/room';
+import {createCrowdPose} from '../src/pose_buffers';
 import type {CrowdPose, PoseMode} from '../src/types';
 import {decodeFrame} from '../src/wire/decode';
 import {ServerProcess, until} from '../test/support/server_process';
@@ -11,7 +11,7 @@ function median(values: number[]): number {
   return values[values.length >> 1]!;
 }
 
-/** Microseconds a call of `call`, median of `rounds`. */
+/** Returns the median time per call in microseconds. Each round has `calls` calls. */
 function time(rounds: number, calls: number, call: (i: number) => void): number {
   const us: number[] = [];
   for (let round = 0; round < rounds; ++round) {
@@ -32,7 +32,7 @@ function memory(): number {
 async function measure(mode: PoseMode, count: number): Promise<void> {
   const server = await ServerProcess.start();
   const frames: ArrayBuffer[] = [];
-  class Listening extends WebSocket {
+  class RecordingSocket extends WebSocket {
     constructor(url: string) {
       super(url);
       this.on('message', (data) => {
@@ -44,7 +44,7 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
     }
   }
   const before = memory();
-  const client = new Client({url: server.url, webSocket: Listening as never});
+  const client = new Client({url: server.url, webSocket: RecordingSocket});
   client.connect();
   const world = client.joinWorld('plaza');
   const side = Math.ceil(Math.sqrt(count));
@@ -57,7 +57,7 @@ async function measure(mode: PoseMode, count: number): Promise<void> {
       avatar: event.avatar, type: 'step' as const, lengthM: 0.5, turnRad: 0.1})));
   });
   void world.observe({mode});
-  await until('all are seen', () => world.avatars().length === count);
+  await until('poses of all avatars have arrived', () => world.avatars().length === count);
   await new Promise((resolve) => setTimeout(resolve, 3000));
   const first = client.statistics;
   const firstMs = performance.now();

@@ -1,4 +1,4 @@
-// Measures what docs/measurements.md tells of the web client: node scripts/bench.mjs.
+// Prints the measurements of the web client in docs/measurements.md. Requires STRIDEWIRE_BIN.
 import {spawnSync} from 'node:child_process';
 import {fileURLToPath} from 'node:url';
 import {build} from 'esbuild';

@@ -1,6 +1,6 @@
-// dist/: the package's module with its dependencies outside, and its types.
+// Builds dist/: the bundled module, with dependencies left external, and its type declarations.
 import {execFileSync} from 'node:child_process';
-import {cpSync, rmSync} from 'node:fs';
+import {mkdirSync, readFileSync, rmSync, writeFileSync} from 'node:fs';
 import {createRequire} from 'node:module';
 import {fileURLToPath} from 'node:url';
 import {build} from 'esbuild';
@@ -9,15 +9,31 @@ const folder = fileURLToPath(new URL('..', import.meta.url));
 const tsc = createRequire(import.meta.url).resolve('typescript/bin/tsc');
 
 rmSync(`${folder}/dist`, {recursive: true, force: true});
+rmSync(`${folder}/build/types`, {recursive: true, force: true});
 try {
   execFileSync(process.execPath, [tsc, '-p', `${folder}/tsconfig.types.json`], {stdio: 'inherit'});
 } catch {
-  process.exit(1);  // tsc has said what is wrong.
+  process.exit(1);  // tsc has printed the errors.
 }
-// What users see; the rest is this package's own affair.
-for (const name of ['client', 'error', 'index', 'room', 'status', 'types']) {
-  cpSync(`${folder}/build/types/src/${name}.d.ts`, `${folder}/dist/types/${name}.d.ts`);
+
+const copied = new Set();
+/**
+ * Copies the declarations of a module and of the modules that it imports to dist/types. Sources
+ * import modules without extension, but module resolution `nodenext` requires one.
+ */
+function copyTypes(name) {
+  if (copied.has(name)) return;
+  copied.add(name);
+  const text = readFileSync(`${folder}/build/types/src/${name}.d.ts`, 'utf8');
+  writeFileSync(`${folder}/dist/types/${name}.d.ts`,
+                text.replace(/(\bfrom |\bimport\()'\.\/([\w/]+)'/g, (_, keyword, module) => {
+                  copyTypes(module);
+                  return `${keyword}'./${module}.js'`;
+                }));
 }
+mkdirSync(`${folder}/dist/types`, {recursive: true});
+copyTypes('index');
+
 await build({
   entryPoints: [`${folder}/src/index.ts`],
   outfile: `${folder}/dist/index.js`,

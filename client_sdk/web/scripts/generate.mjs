@@ -1,4 +1,5 @@
-// Messages from the schema: generated/. FLATC names another flatc.
+// Generates generated/ from the protocol's schema. The environment variable FLATC overrides the
+// path of flatc.
 import {execFileSync} from 'node:child_process';
 import {
   existsSync, mkdirSync, readFileSync, readdirSync, rmSync, statSync, writeFileSync
@@ -20,11 +21,12 @@ if (!existsSync(last) || statSync(last).mtimeMs < newest) {
   try {
     execFileSync(flatc, ['--ts', '-o', out, schema], {stdio: 'inherit'});
   } catch (error) {
-    console.error(`generate: ${flatc} did not run (${error.message}); Debian has it as ` +
-                  'flatbuffers-compiler, FLATC names another');
+    console.error(`generate: could not run ${flatc} (${error.message}). Install flatc (package ` +
+                  'flatbuffers-compiler on Debian) or set FLATC to its path.');
     process.exit(1);
   }
-  // flatc 2.0.8's own list leaves out tables that nothing refers to, which messages are.
+  // The index that flatc 2.0.8 generates omits tables without references, which includes all
+  // messages.
   const modules = readdirSync(`${out}/stridewire/wire`).sort();
   writeFileSync(`${out}/wire.ts`, modules.map((file) =>
       `export * from './stridewire/wire/${file.replace(/\.ts$/, '')}';\n`).join(''));

@@ -1,4 +1,5 @@
-// Checks types, and runs the tests of test/NAME.test.ts that are named, or all.
+// Usage: node scripts/test.mjs [NAME...]. Runs test/NAME.test.ts. Without names it checks types and
+// runs all tests.
 import {execFileSync, spawnSync} from 'node:child_process';
 import {readdirSync, rmSync} from 'node:fs';
 import {createRequire} from 'node:module';
@@ -12,17 +13,15 @@ const all = names.length === 0;
 const files = readdirSync(`${folder}/test`).filter((file) => file.endsWith('.test.ts')).sort()
                   .filter((file) => all || names.includes(file.replace('.test.ts', '')));
 if (files.length === 0 || (!all && files.length !== names.length)) {
-  console.error(`test: no such test among ${names.join(', ')}`);
+  console.error(`test: expected names of test/NAME.test.ts, got ${names.join(', ')}`);
   process.exit(2);
 }
 
 const out = `${folder}/build/test-${all ? 'all' : names.join('-')}`;
 try {
-  if (all || names.includes('types')) {
-    execFileSync(process.execPath, [tsc, '-p', folder], {stdio: 'inherit'});
-  }
+  if (all) execFileSync(process.execPath, [tsc, '-p', folder], {stdio: 'inherit'});
 } catch {
-  process.exit(1);  // tsc has said what is wrong.
+  process.exit(1);  // tsc has printed the errors.
 }
 rmSync(out, {recursive: true, force: true});
 await build({

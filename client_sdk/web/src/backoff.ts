@@ -1,6 +1,8 @@
-/** How long to wait before the next attempt: `firstS`, doubled with every attempt up to `longestS`,
- * each shortened at random by up to `jitter` of itself, so that the clients of a server that went
- * away do not all come back in the same instant. */
+/**
+ * Delays between connection attempts. The first delay is `firstS`, and each one is twice as long as
+ * the one before, up to `longestS`. Each delay is shortened at random by a fraction of up to
+ * `jitter`, so that the clients of a restarted server do not reconnect all at once.
+ */
 export class Backoff {
   static readonly firstS = 0.1;
   static readonly longestS = 5;
@@ -13,19 +15,19 @@ export class Backoff {
     this.random = seed >>> 0;
   }
 
-  /** In [(1 - jitter) d, d]. */
+  /** Returns the next delay in seconds, in [(1 - jitter) d, d] for the unshortened delay d. */
   next(): number {
     const waitS = this.waitS;
     this.waitS = Math.min(2 * waitS, Backoff.longestS);
     return waitS * (1 - Backoff.jitter * this.uniform());
   }
 
-  /** An attempt has succeeded. */
+  /** Starts again with `firstS`, after a successful attempt. */
   reset(): void {
     this.waitS = Backoff.firstS;
   }
 
-  /** SplitMix32, [0, 1). */
+  /** Returns a random number in [0, 1) (SplitMix32). */
   private uniform(): number {
     this.random = (this.random + 0x9e3779b9) >>> 0;
     let z = this.random;

@@ -1,38 +1,50 @@
 import {Session, defaultOptions} from './session';
 import {Status} from './status';
 import type {
-  ClientListeners, ClientOptions, ClientState, Feature, Role, Statistics, World
-} from './types';
+  ClientListeners, ClientOptions, ClientState, Feature, Statistics, WebSocketLike
+} from './client_types';
+import type {Role, World} from './types';
 
-/** Between two looks at the clock while connected; also what a browser's hidden page is given. */
-const longestWaitMs = 500;
+/** Longest timer interval. Browsers delay timers of hidden pages, so long ones are not reliable. */
+const maxTimerMs = 500;
 
 /**
- * A connection to a server, kept up for as long as it is wanted.
+ * A connection to a server.
  *
- * It connects, and connects again, by itself: 0.1 s after a failure, doubled up to 5 s, each
- * shortened at random by up to half; until the server refuses it for good or `close` is called.
- * Commands given meanwhile wait. If the server still holds the session, commands without an answer
- * are sent again and done once; if it does not (restarted, or away for too long), they are answered
- * `session_lost`, and worlds and subscriptions are asked for again.
+ * After `connect` the client reconnects automatically until `close` is called or the server refuses
+ * it. The first attempt after a failure follows within 0.1 s. The delay doubles up to 5 s, and each
+ * delay is shortened at random by up to half.
  *
- * Nothing is thrown after the constructor, and promises of commands are never rejected.
+ * While the connection is down, new commands wait. After a reconnect the server usually still has
+ * the session. The client then sends commands without a reply again, and the server carries out
+ * each command once. If the session is lost, because the server restarted or the outage was too
+ * long, these commands fail with `session_lost`. The client then joins its worlds and starts its
+ * subscriptions again.
+ *
+ * Only the constructor throws. Promises of commands are never rejected.
  */
 export class Client {
   private readonly session: Session;
   private readonly now: () => number;
-  private readonly webSocket: new(url: string) => WebSocket;
+  private readonly webSocket: new (url: string) => WebSocketLike;
   private readonly url: string;
-  private socket: WebSocket | null = null;
+  private socket: WebSocketLike | null = null;
+  /** `Session.connectionNumber` for which the socket was opened. */
   private socketNumber = 0;
   private timer: ReturnType<typeof setTimeout> | null = null;
   private timerAtS = Infinity;
   private working = false;
 
-  /** @throws RangeError, TypeError, SyntaxError: an option makes no sense. */
+  /**
+   * Creates a client that is not connected yet.
+   * @throws RangeError an option is out of range
+   * @throws SyntaxError `url` does not start with ws:// or wss://
+   * @throws TypeError an option has the wrong type, there is no WebSocket class, or the machine is
+   *     big-endian
+   */
   constructor(options: ClientOptions) {
     if (new Uint8Array(new Uint16Array([1]).buffer)[0] !== 1) {
-      throw new TypeError('poses are read in place, which needs a little-endian machine');
+      throw new TypeError('big-endian machines are not supported');
     }
     const {url, webSocket, now, ...others} = options;
     const given = Object.fromEntries(
@@ -40,11 +52,12 @@ export class Client {
     this.url = url;
     const protocol = new URL(url).protocol;
     if (protocol !== 'ws:' && protocol !== 'wss:') {
-      throw new SyntaxError(`url: ${url} does not begin with ws:// or wss://`);
+      throw new SyntaxError(`url: expected ws://... or wss://..., got ${url}`);
     }
     const socketClass = webSocket ?? globalThis.WebSocket;
     if (socketClass === undefined) {
-      throw new TypeError('webSocket: there is none here; pass one, such as that of package ws');
+      throw new TypeError(
+          'webSocket: this environment has no WebSocket; pass that of the package ws');
     }
     this.webSocket = socketClass;
     this.now = now ?? (() => performance.now());
@@ -59,12 +72,12 @@ export class Client {
     return this.session.state;
   }
 
-  /** Why the connection last failed or was lost; empty: it did not. */
+  /** Why the connection last failed or was lost; empty if it never did. */
   get lastError(): string {
     return this.session.lastError;
   }
 
-  /** Of the server; 60 before it is known. */
+  /** Ticks per second of the server; 60 before the first connection. */
   get tickHz(): number {
     return this.session.tickHz;
   }
@@ -73,42 +86,53 @@ export class Client {
     return this.session.statistics();
   }
 
-  /** Time now on the server's clock as poses arrive: the smallest delay of the last seconds is
-   * counted as none. Null until the first pose or pong. */
+  /**
+   * Estimates the current server time; null until the first message with a server time. The
+   * estimate lags by the smallest delay of recent messages. It is the time stamp of a pose that
+   * arrives now with this smallest delay.
+   */
   serverTimeS(): number | null {
     const {clock} = this.session;
     return clock.ready ? clock.serverTimeS(this.nowS()) : null;
   }
 
-  /** The time to show poses at: server time minus `renderDelayS`. Moves evenly, never back but when
-   * the clock itself was set anew (a new session, a jump of more than 0.25 s). */
+  /**
+   * Returns the server time at which to sample poses: `serverTimeS()` minus `renderDelayS`. It
+   * advances evenly. It runs backwards only after a new session or if the server's clock jumps by
+   * more than 0.25 s.
+   */
   renderTimeS(): number | null {
     const timeS = this.serverTimeS();
     return timeS === null ? null : timeS - this.session.renderDelayS;
   }
 
-  /** Nothing if it is connected or about to. */
+  /** Starts to connect and returns at once. Does nothing if already connected or connecting. */
   connect(): void {
     this.session.open(this.nowS());
   }
 
-  /** Ends the session and with it our avatars (but in persistent worlds). Worlds and subscriptions
-   * are asked for again at the next `connect`. */
+  /**
+   * Ends the session. The server removes this client's avatars, except in persistent worlds. The
+   * next `connect` joins the worlds and starts the subscriptions again.
+   */
   close(): void {
     this.session.close(this.nowS());
   }
 
-  /** Whether the server we are connected to can do that; false while we are not. */
+  /** True if the client is connected to a server with this feature. */
   serverHas(feature: Feature): boolean {
     return this.session.has(feature);
   }
 
-  /** May be called at any time; the world is joined as soon as there is a connection. A name that is
-   * joined already, or is none, gives a world that is refused. */
+  /**
+   * Joins a world as soon as the client is connected, and returns it at once. If the name is
+   * invalid or already joined, or if 256 worlds are joined, the state of the result is `refused`.
+   */
   joinWorld(name: string, role: Role = 'controller'): World {
     return this.session.joinWorld(name, role);
   }
 
+  /** Calls `listener` for each event of that name. Returns a function that removes it. */
   on<K extends keyof ClientListeners>(name: K, listener: ClientListeners[K]): () => void {
     return this.session.listeners.on(name, listener);
   }
@@ -117,7 +141,7 @@ export class Client {
     return this.now() / 1000;
   }
 
-  /** Does what the session's state asks for. */
+  /** Opens, feeds or closes the socket as the state of the session requires. */
   private work(): void {
     if (this.working) return;
     this.working = true;
@@ -132,7 +156,7 @@ export class Client {
     }
     if (this.socket !== null && this.socket.readyState === 1) {
       for (const frame of session.takeOutput()) this.socket.send(frame);
-      // A WebSocket that is closed sends first what it was given.
+      // A closed WebSocket still sends what it has buffered.
       if (session.state === 'closing') {
         this.dropSocket();
         session.onOutputWritten();
@@ -150,7 +174,7 @@ export class Client {
       this.dropSocket();
       session.onLost(code, text, this.nowS());
     };
-    let socket: WebSocket;
+    let socket: WebSocketLike;
     try {
       socket = new this.webSocket(this.url);
     } catch (error) {
@@ -169,15 +193,15 @@ export class Client {
       if (data instanceof ArrayBuffer) {
         session.onFrame(data, this.nowS());
       } else {
-        session.onInvalid('The server sent a text.', this.nowS());
+        session.onInvalid('The server sent a text message.', this.nowS());
       }
-      if (this.nowS() >= this.timerAtS) this.tick();  // Timers of hidden pages come late.
+      if (this.nowS() >= this.timerAtS) this.tick();  // Browsers delay timers of hidden pages.
     };
     socket.onclose = ({reason}: {reason?: string}) => {
       const connected = session.state !== 'connecting';
       lost(connected ? Status.connection_lost : Status.connect_failed, reason ?? '');
     };
-    socket.onerror = () => {};  // A close follows, which says as much.
+    socket.onerror = () => {};  // A close event follows.
   }
 
   private dropSocket(): void {
@@ -191,7 +215,7 @@ export class Client {
     try {
       socket.close();
     } catch {
-      // It was none any more.
+      // The socket was closed already.
     }
   }
 
@@ -202,7 +226,7 @@ export class Client {
     this.timer = null;
     this.timerAtS = nextS;
     if (nextS === Infinity) return;
-    const waitMs = Math.min(Math.max(0, 1000 * nextS - this.now()), longestWaitMs);
+    const waitMs = Math.min(Math.max(0, 1000 * nextS - this.now()), maxTimerMs);
     this.timer = setTimeout(() => this.tick(), waitMs);
   }
 

@@ -1,6 +1,7 @@
-/** Stridewire in a browser: spawn figures, command them, show their poses. */
+/** Client for Stridewire servers: spawns avatars, requests movements and samples received poses. */
+export * from './client_types';
 export * from './types';
 export {Client} from './client';
 export {StridewireError} from './error';
 export {Status, statusName, statusText} from './status';
-export {createCrowdPose, createPose} from './room';
+export {createCrowdPose, createPose} from './pose_buffers';

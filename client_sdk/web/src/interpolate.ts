@@ -1,10 +1,12 @@
-/** Poses before, at the start of, at the end of, and beyond an interval, by place in their arrays.
- * A missing neighbour is the interval's own end. */
+/**
+ * Four poses for cubic interpolation in an interval: before it, at its start, at its end, and after
+ * it. If there is no pose before or after the interval, use the start or the end again.
+ */
 export interface Keys {
-  /** Arrays of the four: they may lie in different ones. */
+  /** Array that contains each of the four poses. */
   readonly roots: [Float32Array, Float32Array, Float32Array, Float32Array];
   readonly rotations: [Float32Array, Float32Array, Float32Array, Float32Array];
-  /** Place of the pose in each: in poses. */
+  /** Index of each pose in its array, in poses. */
   readonly places: [number, number, number, number];
   readonly timesS: [number, number, number, number];
 }
@@ -21,15 +23,18 @@ export function createKeys(): Keys {
 }
 
 /**
- * The pose at `timeS` inside the interval: cubic through the four (C1, and exact at each), rotations
- * in one hemisphere and then made unit.
+ * Computes the pose at `timeS` inside the interval by cubic Hermite interpolation. The result is
+ * continuous with its first derivative and exact at the keys. Quaternions are interpolated in one
+ * hemisphere and then normalised. Writes the root's position at `rootOut[rootAt]` and the
+ * rotations of all joints at `out[outAt]`.
  */
 export function interpolate(keys: Keys, timeS: number, jointCount: number, rootOut: Float32Array,
                             rootAt: number, out: Float32Array, outAt: number): void {
   const [beforeS, startS, endS, beyondS] = keys.timesS;
   const lengthS = endS - startS;
   const u = (timeS - startS) / lengthS;
-  // Hermite basis; slopes are the neighbours' secants, in units of the interval.
+  // Hermite basis. The slope at a key is the secant through its neighbours, in units of the
+  // interval.
   const value = u * u * (3 - 2 * u);
   const slope0 = u * (1 - u) * (1 - u) * (lengthS / (endS - beforeS));
   const slope1 = u * u * (u - 1) * (lengthS / (beyondS - startS));
@@ -72,7 +77,7 @@ export function interpolate(keys: Keys, timeS: number, jointCount: number, rootO
       out[outAt + 1] = y * scale;
       out[outAt + 2] = z * scale;
       out[outAt + 3] = w * scale;
-    } else {  // Neighbours that are nothing alike.
+    } else {  // The quaternions cancel out, so keep the one at the start.
       out[outAt] = x1;
       out[outAt + 1] = y1;
       out[outAt + 2] = z1;
@@ -81,7 +86,7 @@ export function interpolate(keys: Keys, timeS: number, jointCount: number, rootO
   }
 }
 
-/** A pose as it is. */
+/** Copies the pose with index `place`. The output is as in `interpolate`. */
 export function copyPose(roots: Float32Array, rotations: Float32Array, place: number,
                          jointCount: number, rootOut: Float32Array, rootAt: number,
                          out: Float32Array, outAt: number): void {

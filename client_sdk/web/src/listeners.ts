@@ -1,9 +1,9 @@
-/** Who listens to what. What a listener throws is its own affair: it is reported as uncaught, and
- * neither other listeners nor the caller see it. */
+/** Lists of listeners, by event name. An exception in a listener is reported as uncaught. It
+ * affects neither other listeners nor the caller of `emit`. */
 export class Listeners<L extends {[K in keyof L]: (...args: never[]) => void}> {
   private readonly lists = new Map<keyof L, Set<L[keyof L]>>();
 
-  /** Returns what ends it. */
+  /** Adds a listener and returns a function that removes it. */
   on<K extends keyof L>(name: K, listener: L[K]): () => void {
     let list = this.lists.get(name);
     if (list === undefined) this.lists.set(name, list = new Set());

@@ -1,18 +1,18 @@
 import {PoseFlag, type PoseDetail} from './types';
 import type {BatchMode} from './wire/messages';
 
-const flagOfDetail = {all: 0, fewer: PoseFlag.fewerJoints, root: PoseFlag.rootOnly};
-const detailFlags = flagOfDetail.fewer | flagOfDetail.root;
+const flagOfDetail = {all: 0, reduced: PoseFlag.reducedJoints, root: PoseFlag.rootOnly};
+const detailFlags = flagOfDetail.reduced | flagOfDetail.root;
 
-/** What is true of an avatar until something else is told, unlike a discontinuity. */
+/** Flags that stay true between two received poses, unlike `discontinuity`. */
 export const lastingFlags = PoseFlag.standing | detailFlags;
 
-/** The detail of which a batch's poses are. */
+/** Returns the detail of poses that arrive in batches of this mode. */
 export function detailOf(mode: BatchMode): PoseDetail {
-  return mode === 'compactFewer' ? 'fewer' : mode === 'compactRoot' ? 'root' : 'all';
+  return mode === 'compactFewer' ? 'reduced' : mode === 'compactRoot' ? 'root' : 'all';
 }
 
-/** What a pose's flags say of it: `sent` in a batch of that mode. */
+/** Converts the flags of a pose in a batch of this mode to `PoseFlag` bits. */
 export function flagsOf(sent: number, mode: BatchMode): number {
   return (sent & (PoseFlag.discontinuity | PoseFlag.standing)) | flagOfDetail[detailOf(mode)];
 }

@@ -3,8 +3,8 @@ import {PoseFlag} from './types';
 
 const keys = createKeys();
 
-/** The last poses of one avatar, oldest first: the jitter buffer. A ring that takes its memory when
- * it is made and none later; a full ring forgets its oldest pose. */
+/** Ring buffer of the last poses of one avatar, oldest first. It allocates only in the constructor.
+ * A full buffer overwrites its oldest pose. */
 export class PoseHistory {
   readonly roots: Float32Array;
   readonly rotations: Float32Array;
@@ -13,10 +13,10 @@ export class PoseHistory {
   private readonly flags: Uint8Array;
   private first = 0;
   private count = 0;
-  /** What `sample` found: slot of the pose at or before the time. */
+  /** Slot of the pose at or before the last sampled time. Set by `sample`. */
   sampledSlot = 0;
 
-  /** Both above 0. */
+  /** `capacity`, in poses, and `jointCount` must be above 0. */
   constructor(private readonly capacity: number, readonly jointCount: number) {
     this.roots = new Float32Array(3 * capacity);
     this.rotations = new Float32Array(4 * jointCount * capacity);
@@ -25,7 +25,7 @@ export class PoseHistory {
     this.flags = new Uint8Array(capacity);
   }
 
-  /** Memory that such a history takes. */
+  /** Returns the memory of a history in bytes. */
   static bytes(capacity: number, jointCount: number): number {
     return 512 + capacity * (12 + 16 * jointCount + 8 + 8 + 1);
   }
@@ -33,7 +33,7 @@ export class PoseHistory {
   get size(): number {
     return this.count;
   }
-  /** Of the newest pose; only if there is one. */
+  /** Tick of the newest pose. Valid only if `size` is above 0. */
   get newestTick(): number {
     return this.ticks[this.slot(this.count - 1)]!;
   }
@@ -50,13 +50,13 @@ export class PoseHistory {
     return this.flags[slot]!;
   }
 
-  /** Whether a pose of then would be taken. */
+  /** True if a pose of this tick and time is newer than all stored poses. */
   accepts(tick: number, timeS: number): boolean {
     return this.count === 0 || (tick > this.newestTick && timeS > this.newestTimeS);
   }
 
-  /** Makes room for the next pose, in place of the oldest if need be. Write it to that place of
-   * `roots` and `rotations`, then `commit`; without that it is not there. */
+  /** Returns the slot for the next pose, and drops the oldest pose if the buffer is full. Write the
+   * pose to this slot of `roots` and `rotations`, then call `commit` to add it. */
   nextSlot(): number {
     if (this.count === this.capacity) {
       this.first = (this.first + 1) % this.capacity;
@@ -73,9 +73,9 @@ export class PoseHistory {
   }
 
   /**
-   * Pose at `timeS`: cubic through the poses around it. Never across a discontinuity, not beyond
-   * the newest pose: there the last one is held. 0: before the oldest one, nothing was written; 1:
-   * interpolated; 2: held.
+   * Computes the pose at `timeS` by cubic interpolation. The last pose is held before a
+   * discontinuity and after the newest pose. Returns 1 if interpolated and 2 if held. Returns 0 and
+   * writes nothing if `timeS` is before the oldest pose.
    */
   sample(timeS: number, rootOut: Float32Array, rootAt: number, out: Float32Array,
          outAt: number): 0 | 1 | 2 {

@@ -1,20 +1,23 @@
 import {Backoff} from './backoff';
+import type {
+  ClientListeners, ClientOptions, ClientState, Feature, Statistics
+} from './client_types';
 import {ClockMap} from './clock_map';
 import {StridewireError} from './error';
 import {Listeners} from './listeners';
 import {WorldRecording} from './recording';
 import {Status, statusName, statusText} from './status';
 import type {
-  AvatarState, ClientListeners, ClientOptions, ClientState, Feature, Observation, Region, Reply, Role,
-  Statistics, Subscription, WorldEvent
+  AvatarState, Observation, Region, Reply, Role, Subscription, WorldEvent
 } from './types';
 import * as check from './wire/check';
 import {decodeFrame} from './wire/decode';
 import {Encoder} from './wire/encode';
 import {
-  featureCompact, featureDetail, featureEventReplay, featureFootprints, featureInspect, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
-  featureLayers, featureTakeovers, featureTerrain, featureWalks, maxBulkBytes, maxControlBytes, maxItems, maxReplyMemory,
-  maxAvatarNumber, maxNameBytes, maxAuthTokenBytes, protocolVersion
+  featureCompact, featureDetail, featureEventReplay, featureFootprints, featureInspect,
+  featureLayers, featurePlanting, featureQuantised, featureRefusals, featureRegions, featureResume,
+  featureTakeovers, featureTerrain, featureWalks, maxAuthTokenBytes, maxAvatarNumber, maxBulkBytes,
+  maxControlBytes, maxItems, maxNameBytes, maxReplyMemory, protocolVersion
 } from './wire/limits';
 import {Malformed} from './wire/malformed';
 import type {
@@ -26,12 +29,13 @@ import {WorldHandle} from './world';
 import {WorldView, type PoseBudget, type PoseCounts} from './world_view';
 
 const featureBits: Record<Feature, bigint> = {
-  inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints, walks: featureWalks,
-  takeovers: featureTakeovers, layers: featureLayers, refusals: featureRefusals,
+  inspect: featureInspect, terrain: featureTerrain, footprints: featureFootprints,
+  walks: featureWalks, interrupts: featureTakeovers, layers: featureLayers,
+  exactOnly: featureRefusals,
   planting: featurePlanting, regions: featureRegions, detail: featureDetail | featureCompact,
 };
 
-/** What the caller may set, filled in. */
+/** Options of the client that the session uses, with defaults filled in. */
 export type SessionOptions = Required<Omit<ClientOptions, 'url' | 'webSocket' | 'now'>>;
 
 export const defaultOptions: Omit<SessionOptions, 'seed'> = {
@@ -49,13 +53,13 @@ export const defaultOptions: Omit<SessionOptions, 'seed'> = {
   pingIntervalS: 1,
 };
 
-/** Bytes waiting for the socket above which no further command is encoded. */
+/** While more bytes than this wait to be sent, no further command is encoded. */
 const maxOutputBytes = 1 << 20;
 const maxWorlds = 256;
-const maxSubscriptions = 256;  // Of one world.
+const maxSubscriptions = 256;  // Per world.
 const maxInspections = 64;
 const maxRtts = 16;
-/** A connection that was ready for this long starts the back-off afresh. */
+/** A connection that was ready for at least this long resets the backoff. */
 const stableS = 2;
 const goodbyeS = 1;
 const inspectTimeoutS = 10;
@@ -63,7 +67,7 @@ const inspectTimeoutS = 10;
 export interface Command {
   readonly world: WorldHandle;
   readonly message: CommandMessage;
-  /** Null: given by the session itself, after it was lost. */
+  /** Null for commands that the session itself sends after a lost session. */
   answer: ((reply: Reply) => void) | null;
 }
 
@@ -87,28 +91,28 @@ function makeReply(code: number, text: string, message?: ReplyMessage): Reply {
 }
 
 /**
- * The client's side of protocol/STATE_MACHINE.md, without socket, clock or timer: frames and times
- * are arguments, so tests replay any order of things.
+ * The client's side of protocol/STATE_MACHINE.md. It has no socket, clock or timer: frames and
+ * times are arguments, so that tests can replay any sequence of events.
  *
- *   idle --open--> waiting --startConnecting--> connecting --onConnected--> greeting
+ *   idle --open--> waiting --startConnecting--> connecting --onConnected--> handshake
  *                    ^  ^                           |                          | Welcome
  *                    |  +---------- failed ---------+                          v
  *                    +------------ lost, or the server ends the session ----- ready --close-->
- *   closed: refused for good.                                              closing --> idle
+ *   closed: refused by the server.                                         closing --> idle
  *
- * A command passes through three places: `unsent` of its world (until WorldInfo told the server's
- * number of that world, and while too much is under way), `unanswered` in order of seq, and its
- * answer. A lost session gives worlds and subscriptions their commands anew, ahead of what had not
- * been sent. Worlds and subscriptions outlive `close`, too: they are asked for at the next `open`.
+ * A command is first in `unsent` of its world, until WorldInfo has arrived and while too many
+ * commands are unanswered. After it was sent, it is in `unanswered` in order of seq until its reply
+ * arrives. After a lost session, the commands that restore worlds and subscriptions go in front of
+ * the unsent ones. Worlds and subscriptions also survive `close`; the next `open` restores them.
  *
- * What listeners and promises are told waits until the session has done with what it was at.
+ * Listeners and promises are called only after the session has finished processing.
  */
 export class Session {
   readonly listeners = new Listeners<ClientListeners>();
   readonly clock = new ClockMap();
-  /** Bytes that the socket has not sent yet. */
+  /** Returns the number of bytes that the socket has not sent yet. */
   socketBytes: () => number = () => 0;
-  /** The network has something to do: output, or another state. */
+  /** Called when there is output to send or the state has changed. */
   wake: () => void = () => {};
 
   private stateNow: ClientState = 'idle';
@@ -116,27 +120,28 @@ export class Session {
   private readonly backoff: Backoff;
   private readonly budget: PoseBudget;
   private readonly counts: PoseCounts =
-      {batches: 0, poses: 0, refused: 0, missing: 0, starved: 0, decodeMs: 0};
+      {batches: 0, poses: 0, refused: 0, missing: 0, held: 0, decodeMs: 0};
   private readonly worlds = new Set<WorldHandle>();
   private nextSubscription = 1;
   private nextRequestId = 1n;
   private readonly unanswered = new Map<bigint, Command>();
-  /** Unanswered ones from here on have to go out again; 0: none. */
+  /** Unanswered commands from this seq on must be sent again; 0: none. */
   private resendFrom = 0n;
   private commandCount = 0;
   private readonly inspections = new Map<bigint, Inspection>();
   private nextNonce = 1n;
 
-  // The session as the server knows it.
+  // State of the session.
   private hadSession = false;
-  private resumeToken: Uint8Array = new Uint8Array(0);  // Empty once the server has ended the session.
+  /** Empty if there is no session to resume. */
+  private resumeToken: Uint8Array = new Uint8Array(0);
   private nextSeq = 1n;
   private lastEventsNumber = 0n;
   private features = 0n;
   private limits: ServerLimits | null = null;
   private tickHzNow = 60;
 
-  // The connection.
+  // State of the connection.
   private connection = 0;
   private nextAttemptS = 0;
   private deadlineS = 0;
@@ -152,15 +157,18 @@ export class Session {
   private readonly rttsS: number[] = [];
   private readonly total = {
     bytesReceived: 0, poseBytesReceived: 0, bytesSent: 0, framesReceived: 0, batchesDropped: 0,
-    eventsDropped: 0, eventsReceived: 0, invalidFrames: 0, commandsSent: 0, commandsResent: 0, connects: 0,
-    resumes: 0, connectFailures: 0,
+    eventsDropped: 0, eventsReceived: 0, invalidFrames: 0, commandsSent: 0, commandsResent: 0,
+    connects: 0, resumes: 0, connectFailures: 0,
   };
   private jitterS = 0;
   private worstJitterS = 0;
   private worstAtS = 0;
   private interpolationDelayS = 0;
 
-  /** @throws RangeError, TypeError: an option makes no sense. */
+  /**
+   * @throws RangeError a number among the options is out of range
+   * @throws TypeError a text among the options is invalid
+   */
   constructor(private readonly options: SessionOptions,
               private readonly precisionNowMs: () => number) {
     checkOptions(options);
@@ -168,7 +176,7 @@ export class Session {
     this.budget = {limitBytes: options.maxPoseBytes, usedBytes: 0};
   }
 
-  // ---- the caller's side
+  // ---- Calls of the user.
 
   get state(): ClientState {
     return this.stateNow;
@@ -186,7 +194,7 @@ export class Session {
     return this.nextRequestId++;
   }
 
-  /** Nothing if it is open already. */
+  /** Starts to connect. Does nothing if already open. */
   open(nowS: number): void {
     if (this.isOpen()) return;
     this.dropConnection();
@@ -197,7 +205,7 @@ export class Session {
     this.tell();
   }
 
-  /** Says goodbye; commands without an answer are answered `cancelled`. */
+  /** Ends the session with Goodbye. Commands without a reply fail with `cancelled`. */
   close(nowS: number): void {
     if (this.stateNow === 'idle' || this.stateNow === 'closing') return;
     const sayGoodbye = this.stateNow === 'ready';
@@ -229,7 +237,7 @@ export class Session {
       check.joinWorld(name, role);
       for (const other of this.worlds) {
         if (other.name !== name) continue;
-        // A refused world makes room for trying again.
+        // A refused world is replaced, so that the user can try again.
         if (other.state === 'refused') {
           this.worlds.delete(other);
         } else {
@@ -249,7 +257,7 @@ export class Session {
     return world;
   }
 
-  /** A command; `make` checks what the caller passed. */
+  /** Queues the command that `make` returns. `make` throws if an argument is invalid. */
   command(world: WorldHandle, make: () => CommandMessage): Promise<Reply> {
     return new Promise((resolve) => {
       try {
@@ -268,7 +276,7 @@ export class Session {
     const reply = new Promise<Reply>((resolve) => {
       try {
         if (world.subscriptions.size >= maxSubscriptions) {
-          throw new StridewireError(Status.limit_reached, 'Too many subscriptions of one world.');
+          throw new StridewireError(Status.limit_reached, 'Too many subscriptions to this world.');
         }
         const message = {...check.observe(observation), subscription: id};
         this.enqueue(world, message, resolve);
@@ -293,7 +301,7 @@ export class Session {
       try {
         const wanted = world.subscriptions.get(id);
         if (wanted === undefined || wanted.message.region === null) {
-          throw new StridewireError(Status.no_such_subscription, 'No region has this number.');
+          throw new StridewireError(Status.no_such_subscription, 'The subscription has no region.');
         }
         const {mode, detail} = wanted.message;
         const entry = check.region(region, mode, detail);
@@ -313,7 +321,7 @@ export class Session {
         const wanted = world.subscriptions.get(id);
         if (wanted === undefined) throw new StridewireError(Status.no_such_subscription, '');
         if (wanted.unsent) {
-          // The server never heard of it: neither shall it.
+          // The command was never sent, so remove it instead of sending StopObserving.
           const mine = (command: Command): boolean => command.message.type === 'Observe' &&
               command.message.subscription === id;
           for (const command of world.unsent.filter(mine)) {
@@ -339,10 +347,10 @@ export class Session {
     return new Promise((resolve) => {
       try {
         if (!this.worlds.has(world)) throw new StridewireError(Status.not_joined, '');
-        if (world.serverId === 0 && world.state === 'wanted') {
+        if (world.serverId === 0 && world.state === 'pending') {
           this.worlds.delete(world);
           this.failWorld(world, Status.not_joined, 'The world was left.');
-          world.forget();
+          world.reset();
           this.later(() => resolve(makeReply(0, '')));
         } else {
           this.enqueue(world, {type: 'LeaveWorld', seq: 0n, world: 0}, resolve);
@@ -360,11 +368,12 @@ export class Session {
     return new Promise((resolve, reject) => {
       const refuse = (code: number, text = ''): void => reject(new StridewireError(code, text));
       if (!Number.isInteger(avatar) || avatar < 1 || avatar > maxAvatarNumber) {
-        return refuse(Status.invalid_argument, 'avatar: is not a whole number from 1 on');
+        return refuse(Status.invalid_argument,
+                      `avatar: expected an integer from 1 to ${maxAvatarNumber}, got ${avatar}`);
       }
       if (this.stateNow !== 'ready' || world.serverId === 0) return refuse(Status.not_ready);
       if ((this.features & featureInspect) === 0n) {
-        return refuse(Status.unsupported, 'This server does not tell what avatars do.');
+        return refuse(Status.unsupported, 'The server does not support inspect.');
       }
       if (this.inspections.size >= maxInspections) return refuse(Status.commands_full);
       const nonce = this.nextNonce++;
@@ -376,7 +385,7 @@ export class Session {
   }
 
   statistics(): Statistics {
-    const {decodeMs, batches, poses, refused, missing, starved} = this.counts;
+    const {decodeMs, batches, poses, refused, missing, held} = this.counts;
     let recorded = 0;
     for (const world of this.worlds) recorded += world.record.bytes;
     return {
@@ -391,37 +400,37 @@ export class Session {
       jitterS: this.jitterS,
       worstJitterS: this.worstJitterS,
       interpolationDelayS: this.interpolationDelayS,
-      posesMissed: starved,
+      heldSamples: held,
       decodeNsPerPose: poses === 0 ? 0 : 1e6 * decodeMs / poses,
       bufferedBytes: this.budget.usedBytes + recorded + this.outputBytes + this.socketBytes(),
     };
   }
 
-  // ---- the network's side. Times do not go back.
+  // ---- Calls of the network. Times must not decrease.
 
-  /** Whether an attempt is due; then call startConnecting. */
+  /** True if a connection attempt is due; then call startConnecting. */
   connectDue(nowS: number): boolean {
     return this.stateNow === 'waiting' && nowS >= this.nextAttemptS;
   }
 
-  /** Grows with every connection, so that late frames of an old one are told apart. */
+  /** Increases with every connection, to recognise late frames of an old one. */
   get connectionNumber(): number {
     return this.connection;
   }
 
-  /** Whether a socket belongs to this state; if not any more, the network closes it. */
+  /** True if this state needs a socket. Otherwise the network closes it. */
   get needsSocket(): boolean {
-    return this.stateNow === 'connecting' || this.stateNow === 'greeting' ||
+    return this.stateNow === 'connecting' || this.stateNow === 'handshake' ||
         this.stateNow === 'ready' || this.stateNow === 'closing';
   }
 
-  /** When advanceTime or connectDue has something to do next; Infinity: never. */
+  /** Next time at which to call advanceTime or connectDue; Infinity: never. */
   get nextTimeS(): number {
     switch (this.stateNow) {
       case 'waiting': return this.nextAttemptS;
       case 'ready': return Math.min(this.nextPingS, this.heardS + (this.idleTimeoutS || Infinity));
       case 'connecting':
-      case 'greeting':
+      case 'handshake':
       case 'closing': return this.deadlineS;
       default: return Infinity;
     }
@@ -440,7 +449,7 @@ export class Session {
     this.heardS = nowS;
     this.encoder = new Encoder();
     this.clearOutput();
-    this.setState('greeting');
+    this.setState('handshake');
     this.send({
       type: 'Hello',
       protocolMin: protocolVersion,
@@ -456,9 +465,9 @@ export class Session {
     this.tell();
   }
 
-  /** One message of the socket. Whatever it holds, nothing is thrown. */
+  /** Processes a received frame. Never throws, whatever the frame contains. */
   onFrame(frame: ArrayBuffer, nowS: number): void {
-    if (this.stateNow !== 'greeting' && this.stateNow !== 'ready') return;
+    if (this.stateNow !== 'handshake' && this.stateNow !== 'ready') return;
     this.heardS = nowS;
     this.total.bytesReceived += frame.byteLength;
     ++this.total.framesReceived;
@@ -472,27 +481,27 @@ export class Session {
     this.tell();
   }
 
-  /** The server sent what is no frame, such as text. */
+  /** Call it if the server sent something other than a binary message. */
   onInvalid(text: string, nowS: number): void {
-    if (this.stateNow !== 'greeting' && this.stateNow !== 'ready') return;
+    if (this.stateNow !== 'handshake' && this.stateNow !== 'ready') return;
     ++this.total.invalidFrames;
     this.breakOff(Status.protocol_error, text, nowS);
     this.tell();
   }
 
-  /** The attempt failed or the connection broke. */
+  /** Call it if the connection attempt failed or the connection was lost. */
   onLost(code: number, text: string, nowS: number): void {
     if (this.stateNow === 'closing') {
       this.dropConnection();
       this.setState('idle');
-    } else if (this.stateNow === 'connecting' || this.stateNow === 'greeting' ||
+    } else if (this.stateNow === 'connecting' || this.stateNow === 'handshake' ||
                this.stateNow === 'ready') {
       this.breakOff(code, text, nowS);
     }
     this.tell();
   }
 
-  /** Time-outs and pings. */
+  /** Handles timeouts and sends pings. */
   advanceTime(nowS: number): void {
     switch (this.stateNow) {
       case 'connecting':
@@ -500,9 +509,9 @@ export class Session {
           this.breakOff(Status.timeout, 'Connecting took too long.', nowS);
         }
         break;
-      case 'greeting':
+      case 'handshake':
         if (nowS >= this.deadlineS) {
-          this.breakOff(Status.timeout, 'The server did not answer the greeting in time.', nowS);
+          this.breakOff(Status.timeout, 'The server did not complete the handshake in time.', nowS);
         }
         break;
       case 'ready':
@@ -512,7 +521,7 @@ export class Session {
           this.later(() => inspection.reject(new StridewireError(Status.timeout, '')));
         }
         if (this.idleTimeoutS > 0 && nowS - this.heardS > this.idleTimeoutS) {
-          this.breakOff(Status.timeout, 'Nothing was heard from the server for too long.', nowS);
+          this.breakOff(Status.timeout, 'The server did not respond in time.', nowS);
         } else if (nowS >= this.nextPingS) {
           this.sendPing(nowS);
         }
@@ -529,7 +538,7 @@ export class Session {
     this.tell();
   }
 
-  /** Takes what is to be written. */
+  /** Returns the frames to send and removes them from the output. */
   takeOutput(): ArrayBuffer[] {
     this.pump();
     const output = this.output;
@@ -538,7 +547,7 @@ export class Session {
     return output;
   }
 
-  /** All that was taken has left. */
+  /** Call it when all frames of takeOutput have been passed to the socket. */
   onOutputWritten(): void {
     if (this.stateNow === 'closing' && this.output.length === 0) {
       this.dropConnection();
@@ -547,7 +556,7 @@ export class Session {
     }
   }
 
-  // ---- commands
+  // ---- Commands.
 
   private get idleTimeoutS(): number {
     return this.limits?.idleTimeoutS ?? 0;
@@ -555,7 +564,7 @@ export class Session {
 
   private isOpen(): boolean {
     return this.stateNow === 'waiting' || this.stateNow === 'connecting' ||
-        this.stateNow === 'greeting' || this.stateNow === 'ready';
+        this.stateNow === 'handshake' || this.stateNow === 'ready';
   }
 
   private enqueue(world: WorldHandle, message: CommandMessage,
@@ -579,11 +588,11 @@ export class Session {
     return this.pending < maxOutputBytes && this.unanswered.size < memory;
   }
 
-  /** Encodes what may go out now. */
+  /** Encodes the commands that may be sent now. */
   private pump(): void {
     if (this.stateNow !== 'ready') return;
 
-    // First what the server may have heard already, in order.
+    // First the commands that the server may have received already, in order.
     while (this.resendFrom !== 0n && this.pending < maxOutputBytes) {
       let next: Command | undefined;
       for (const [seq, command] of this.unanswered) {  // In order of seq.
@@ -595,15 +604,15 @@ export class Session {
       if (next === undefined) {
         this.resendFrom = 0n;
       } else if (this.send(next.message)) {
-        // It could be encoded before; a server that has lowered its limits since gets a gap and
-        // says so.
+        // Encoding fails only if the server has lowered its limits since. The server then reports
+        // a gap in the sequence.
         ++this.total.commandsResent;
       }
     }
     if (this.resendFrom !== 0n) return;
 
     for (const world of this.worlds) {
-      if (world.state === 'wanted' && this.maySend()) {
+      if (world.state === 'pending' && this.maySend()) {
         this.setWorldState(world, 'joining');
         this.sendCommand({
           world,
@@ -629,7 +638,7 @@ export class Session {
     message.seq = this.nextSeq;
     if ('world' in message) message.world = world.serverId;
     if (!this.send(message)) {
-      // Larger than this server takes: its number was not used.
+      // The message exceeds the server's limit. Its seq was not used.
       if (message.type === 'Observe') {
         world.subscriptions.delete(message.subscription);
         world.updateFilter();
@@ -645,7 +654,7 @@ export class Session {
     this.unanswered.set(this.nextSeq++, command);
   }
 
-  /** Of the connection that is ready; false while none is. */
+  /** True if the connection is ready and the server has this feature. */
   has(feature: Feature): boolean {
     return this.state === 'ready' && this.hasAll(featureBits[feature]);
   }
@@ -654,7 +663,7 @@ export class Session {
     return (this.features & bits) === bits;
   }
 
-  /** Whether this server knows what it is asked. */
+  /** True if the server has all features that the message uses. */
   private understands(message: CommandMessage): boolean {
     switch (message.type) {
       case 'SetTerrain': return (this.features & featureTerrain) !== 0n;
@@ -667,13 +676,13 @@ export class Session {
       case 'Request':
         return message.items.every((item) => (item.atM === null ||
             (this.features & (item.type === 'walk' ? featureWalks : featureFootprints)) !== 0n) &&
-            (item.takeover === 'none' || (this.features & featureTakeovers) !== 0n) &&
-            (!item.mustBeMet || (this.features & featureRefusals) !== 0n));
+            (item.interrupt === 'none' || (this.features & featureTakeovers) !== 0n) &&
+            (!item.exactOnly || (this.features & featureRefusals) !== 0n));
       default: return true;
     }
   }
 
-  /** False: it is larger than the server takes; `lastError` says so. */
+  /** Returns false and sets `lastError` if the message exceeds the server's limit. */
   private send(message: ClientMessage): boolean {
     try {
       this.push(this.encoder.encode(message));
@@ -699,7 +708,7 @@ export class Session {
         (idleS > 0 ? Math.min(this.options.pingIntervalS, idleS / 3) : this.options.pingIntervalS);
   }
 
-  /** Ends a command: its caller hears, and its place is free. */
+  /** Completes a command with a reply. */
   private answer(command: Command, code: number, text: string, message?: ReplyMessage): void {
     const {answer} = command;
     if (answer === null) {
@@ -745,14 +754,14 @@ export class Session {
     for (const world of this.worlds) this.failWorld(world, code, text);
   }
 
-  // ---- messages
+  // ---- Messages from the server.
 
   private handle(frame: ArrayBuffer, nowS: number): void {
     const message = decodeFrame(frame, 'server');
     if (message.type === 'Welcome') return this.onWelcome(message, nowS);
     if (message.type === 'Error') return this.onError(message, nowS);
     if (message.type === 'Goodbye') return this.onGoodbye(message, nowS);
-    if (this.stateNow !== 'ready') throw new Malformed('came before the welcome', message.type);
+    if (this.stateNow !== 'ready') throw new Malformed('arrived before Welcome', message.type);
     switch (message.type) {
       case 'WorldInfo': return this.onWorldInfo(message);
       case 'Reply': return this.onReply(message);
@@ -765,18 +774,20 @@ export class Session {
       case 'AvatarState': return this.onAvatarState(message);
       case 'WorldTerrain': return this.onTerrain(message);
       case 'Movements':
-      case 'LibraryPiece': throw new Malformed('was not agreed on', message.type);
-      default: throw new Malformed("is a client's message", message.type);
+      case 'LibraryPiece':
+        throw new Malformed('belongs to a feature that was not requested', message.type);
+      default: throw new Malformed('may only be sent by clients', message.type);
     }
   }
 
   private onWelcome(message: Welcome, nowS: number): void {
-    if (this.stateNow !== 'greeting') throw new Malformed('came twice', 'Welcome');
+    if (this.stateNow !== 'handshake') throw new Malformed('arrived twice', 'Welcome');
     if (message.resumed && this.resumeToken.length === 0) {
-      throw new Malformed('resumes a session that was none', 'Welcome');
+      throw new Malformed('resumes a session although none was requested', 'Welcome');
     }
     if (message.protocol !== protocolVersion) {
-      return this.closeForGood(Status.version_mismatch, 'The server speaks another version.');
+      return this.closeForGood(Status.version_mismatch,
+                               'The server uses another protocol version.');
     }
     this.readyS = nowS;
     this.limits = message.limits;
@@ -795,7 +806,7 @@ export class Session {
         this.resendFrom = seq;
         break;
       }
-      for (const world of this.worlds) world.view.breakOff();
+      for (const world of this.worlds) world.view.startNewEpoch();
     } else {
       const lost = this.hadSession;
       if (lost) this.later(() => this.listeners.emit('sessionLost'));
@@ -805,14 +816,14 @@ export class Session {
     this.sendPing(nowS);
   }
 
-  /** The server knows nothing of us: what is wanted gets its commands anew. */
+  /** Restores worlds and subscriptions in a new session. */
   private startAnew(): void {
     this.nextSeq = 1n;
     this.resendFrom = 0n;
     this.lastEventsNumber = 0n;
     this.clock.reset();
 
-    // Observe keeps the answer its caller waits for.
+    // An unanswered Observe is sent again, and its caller gets the reply to that.
     const observing = new Map<number, Command>();
     const unanswered = [...this.unanswered.values()];
     this.unanswered.clear();
@@ -821,9 +832,9 @@ export class Session {
       switch (message.type) {
         case 'JoinWorld': break;
         case 'LeaveWorld':
-        case 'StopObserving': this.answer(command, Status.ok, ''); break;  // Nothing to leave.
+        case 'StopObserving': this.answer(command, Status.ok, ''); break;
         case 'Observe':
-          if (message.replace) {  // What is observed anew is there already.
+          if (message.replace) {  // The subscription already has the new region.
             this.answer(command, Status.ok, '');
             break;
           }
@@ -846,32 +857,32 @@ export class Session {
         }
         world.unsent = [];
         this.failWorld(world, Status.session_lost, '');
-        world.forget();
+        world.reset();
         this.worlds.delete(world);
         continue;
       }
       if (world.state === 'refused') continue;
-      world.forget();
-      this.setWorldState(world, 'wanted');
+      world.reset();
+      this.setWorldState(world, 'pending');
       this.wantAgain(world, observing);
     }
   }
 
-  /** Puts the commands that a world's subscriptions and avatars need ahead of what waits. */
+  /** Puts commands that restore a world's subscriptions and avatars in front of unsent commands. */
   private wantAgain(world: WorldHandle, observing: ReadonlyMap<number, Command>): void {
     const first: Command[] = [];
     for (const [id, wanted] of world.subscriptions) {
-      if (wanted.unsent) continue;  // Still waiting in its place.
+      if (wanted.unsent) continue;  // Its Observe is among the unsent commands.
       wanted.unsent = true;
-      const asked = observing.get(id);  // Its region may have moved since.
+      const asked = observing.get(id);
       first.push({world, message: {...wanted.message}, answer: asked?.answer ?? null});
     }
-    // An own command that was still unsent when the session was lost again is among those anew.
+    // Drops the session's own Spawn commands of an earlier loss. They are added again below.
     world.unsent = world.unsent.filter(
         (command) => command.answer !== null || command.message.type !== 'Spawn');
     if (this.options.respawn) {
       const most = Math.min(Math.max(this.limits?.maxItems || maxItems, 1), maxItems);
-      const items = [...world.spawned.values()].map((item) => ({...item}));  // As sent.
+      const items = [...world.spawned.values()].map((item) => ({...item}));
       for (let i = 0; i < items.length; i += most) {
         first.push({
           world,
@@ -891,7 +902,7 @@ export class Session {
       const command = this.unanswered.get(message.seq);
       if (command === undefined) return;
       if (command.message.type !== 'JoinWorld') {
-        throw new Malformed('answers another command', 'WorldInfo');
+        throw new Malformed('belongs to another command', 'WorldInfo');
       }
       world = command.world;
     } else {
@@ -901,14 +912,14 @@ export class Session {
     }
     if (world === undefined) return;
     world.serverId = message.world;
-    world.describe(message);
+    world.setInfo(message);
     const told = world;
     this.later(() => told.listeners.emit('state', told.state));
   }
 
   private onReply(message: ReplyMessage): void {
     const command = this.unanswered.get(message.seq);
-    if (command === undefined) return;  // Answered twice, before and after a resume.
+    if (command === undefined) return;  // A second reply, after a resume.
     this.unanswered.delete(message.seq);
     const {world, message: asked} = command;
     if (asked.type === 'JoinWorld') return this.onJoinReply(world, message);
@@ -934,19 +945,19 @@ export class Session {
           world.subscriptions.delete(asked.subscription);
           world.updateFilter();
         } else if (world.subscriptions.size === 1) {
-          // Poses that came before, if any, belong to a subscription that has ended; the server
-          // cannot tell it in a batch that others get too.
-          world.view.breakOff();
+          // Older poses belong to a subscription that has ended. The server cannot mark the new
+          // ones as discontinuous, because other clients receive the same batch.
+          world.view.startNewEpoch();
         }
         break;
       case 'StopObserving':
-        // Not observing is what was wanted.
+        // The subscription does not exist, which is what the caller wants.
         if (code === Status.no_such_subscription) code = Status.ok;
         break;
       case 'LeaveWorld':
         this.worlds.delete(world);
         this.failWorld(world, Status.not_joined, 'The world was left.');
-        world.forget();
+        world.reset();
         break;
       default: break;
     }
@@ -962,7 +973,7 @@ export class Session {
           world.spawned.set(item.avatar, {...asked, avatar: item.avatar});
         }
       } else if (command.answer === null && item.code !== Status.avatar_exists) {
-        // What we spawn anew may still be there: the server lost the session, not the world.
+        // An avatar may still exist if the server lost only the session. That is not an error.
         this.later(() => this.listeners.emit('notice', item.code,
                                              item.text || statusText(item.code)));
       }
@@ -972,12 +983,12 @@ export class Session {
   private onJoinReply(world: WorldHandle, message: ReplyMessage): void {
     const joined = message.code === Status.ok;
     if (joined && world.serverId === 0) {
-      throw new Malformed('says that a world was joined, which was not described', 'Reply');
+      throw new Malformed('confirms a join that has no WorldInfo', 'Reply');
     }
     if (joined) {
       if (world.state === 'joining') this.setWorldState(world, 'joined');
     } else {
-      world.forget();
+      world.reset();
       if (world.state !== 'left') this.setWorldState(world, 'refused');
       this.failUnsent(world, Status.not_joined, message.text);
       world.subscriptions.clear();
@@ -998,8 +1009,9 @@ export class Session {
     if (world === undefined || world.skeleton === null || world.subscriptions.size === 0) return;
     this.clock.addSample(nowS, message.serverTimeS);
     this.followJitter(nowS);
-    message.codec = world.codecs[message.mode] ?? null;  // Recorded with it: a later server may tell others.
-    world.view.take(message, world.everyNTicks(message.mode));
+    // Stored in the message, because recorded batches may outlive the world's current codecs.
+    message.codec = world.codecs[message.mode] ?? null;
+    world.view.addBatch(message, world.everyNTicks(message.mode));
     world.record.addBatch(message, world.view.epoch);
   }
 
@@ -1012,7 +1024,7 @@ export class Session {
     }
   }
 
-  /** Poses of a world were sampled for `timeS`: how far behind the newest one is that? */
+  /** Updates `interpolationDelayS` after poses of a world were sampled for `timeS`. */
   noteSampled(world: WorldHandle, timeS: number): void {
     const newestS = world.view.newestTimeS;
     if (newestS === -Infinity) return;
@@ -1022,7 +1034,7 @@ export class Session {
 
   private onEvents(message: Events): void {
     if (message.number !== 0n) {
-      if (message.number <= this.lastEventsNumber) return;  // Sent again, and heard before.
+      if (message.number <= this.lastEventsNumber) return;  // Sent again after a resume.
       this.lastEventsNumber = message.number;
     }
     const world = this.findWorld(message.world);
@@ -1062,10 +1074,10 @@ export class Session {
     const world = this.findWorld(message.world);
     if (world === undefined) return;
     const {droppedBatches, droppedEvents} = message;
-    this.total.batchesDropped += Math.max(0, droppedBatches - world.toldDroppedBatches);
-    this.total.eventsDropped += Math.max(0, droppedEvents - world.toldDroppedEvents);
-    world.toldDroppedBatches = Math.max(world.toldDroppedBatches, droppedBatches);
-    world.toldDroppedEvents = Math.max(world.toldDroppedEvents, droppedEvents);
+    this.total.batchesDropped += Math.max(0, droppedBatches - world.reportedDroppedBatches);
+    this.total.eventsDropped += Math.max(0, droppedEvents - world.reportedDroppedEvents);
+    world.reportedDroppedBatches = Math.max(world.reportedDroppedBatches, droppedBatches);
+    world.reportedDroppedEvents = Math.max(world.reportedDroppedEvents, droppedEvents);
     this.later(() => world.listeners.emit('lagging', droppedBatches, droppedEvents));
   }
 
@@ -1110,7 +1122,7 @@ export class Session {
     this.breakOff(message.code, message.text, nowS);
   }
 
-  // ---- ends
+  // ---- Ends of connections.
 
   private breakOff(code: number, text: string, nowS: number): void {
     const sentence = text || statusText(code);
@@ -1137,7 +1149,7 @@ export class Session {
     this.later(() => this.listeners.emit('error', code, sentence));
   }
 
-  /** Whatever socket there is, it is no longer ours. */
+  /** Detaches the session from its socket. */
   private dropConnection(): void {
     ++this.connection;
     this.clearOutput();
@@ -1162,10 +1174,10 @@ export class Session {
         continue;
       }
       if (world.state === 'refused') continue;
-      world.forget();
+      world.reset();
       world.spawned.clear();
       for (const wanted of world.subscriptions.values()) wanted.unsent = false;
-      this.setWorldState(world, 'wanted');
+      this.setWorldState(world, 'pending');
       this.wantAgain(world, new Map());
     }
   }
@@ -1175,7 +1187,7 @@ export class Session {
     this.outputBytes = 0;
   }
 
-  // ---- telling
+  // ---- Notifications.
 
   private setState(state: ClientState): void {
     if (this.stateNow === state) return;
@@ -1193,18 +1205,18 @@ export class Session {
     this.told.push(tell);
   }
 
-  /** At the end of each call from outside. A listener's own calls are done when they are made, and
-   * what they tell comes after. */
+  /** Calls listeners and promises. Every public method ends with it. If a listener calls the
+   * session again, notifications of that call follow after the current ones. */
   private tell(): void {
     if (this.telling) return;
     this.telling = true;
     for (const world of this.worlds) {
-      if (world.view.version !== world.toldVersion) {
-        world.toldVersion = world.view.version;
+      if (world.view.version !== world.notifiedVersion) {
+        world.notifiedVersion = world.view.version;
         this.later(() => world.listeners.emit('avatars', world.view.avatars()));
       }
-      if (world.terrain !== world.toldTerrain) {
-        world.toldTerrain = world.terrain;
+      if (world.terrain !== world.notifiedTerrain) {
+        world.notifiedTerrain = world.terrain;
         this.later(() => world.listeners.emit('terrain', world.terrain));
       }
     }
@@ -1231,7 +1243,7 @@ function checkOptions(options: SessionOptions): void {
   const range = (name: keyof SessionOptions, least: number, most: number): void => {
     const value = options[name];
     if (typeof value !== 'number' || !(value >= least && value <= most)) {
-      throw new RangeError(`${name}: is not a number from ${least} to ${most}`);
+      throw new RangeError(`${name}: expected a number from ${least} to ${most}, got ${value}`);
     }
   };
   range('renderDelayS', 0, 60);

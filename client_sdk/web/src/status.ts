@@ -1,5 +1,8 @@
-/** Status codes: of the protocol (x00 to x49), and of this package (x50 to x99), the same as in
- * stridewire/client.h. */
+/**
+ * Status codes, the same as in stridewire/client.h. The hundreds say who can act: 1xx the caller,
+ * 2xx the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49
+ * belong to the protocol; codes x50 to x99 come only from client libraries.
+ */
 export const Status = {
   ok: 0,
   invalid_argument: 100,
@@ -38,53 +41,57 @@ export const Status = {
   replaced: 404,
 } as const;
 
-const sentences: {readonly [code: number]: string} = {
-  100: 'An argument makes no sense.',
-  101: 'A number is outside its range or not finite.',
-  102: 'This is not supported yet.',
-  103: 'The two sides have no version in common.',
-  104: 'The token is missing or does not allow this.',
-  105: 'Only a controller may do this.',
-  106: 'The world was not joined, or was left.',
+const texts: {readonly [code: number]: string} = {
+  100: 'An argument is invalid.',
+  101: 'A number is out of range or not finite.',
+  102: 'The server does not support this.',
+  103: 'Client and server have no protocol version in common.',
+  104: 'The token is missing or does not permit this.',
+  105: 'Only controllers may do this.',
+  106: 'The world is not joined.',
   107: 'There is no such world.',
   108: 'There is no such avatar in this world.',
-  109: 'An avatar with this number exists already.',
+  109: 'An avatar with this id exists already.',
   110: 'There is no such subscription.',
-  113: 'The answer to this command is no longer kept.',
-  115: 'This world was joined already.',
-  151: 'Too many commands are without an answer.',
-  152: 'The client is not connected and not about to be.',
-  154: 'The client was disconnected before the answer came.',
-  200: 'The bytes do not follow the standard.',
-  201: 'The library has no movement of that kind.',
-  250: 'The server sent what it may not send.',
-  300: 'Nothing was heard for too long.',
-  301: 'What the server sent was not read.',
-  351: 'No connection could be made.',
+  111: 'A subscription with this number exists already.',
+  112: 'A command has the wrong sequence number.',
+  113: 'The server no longer has the reply to this command.',
+  114: 'The message is not allowed in this state.',
+  115: 'The world is already joined.',
+  151: 'Too many commands are waiting for a reply.',
+  152: 'The client is closed.',
+  153: 'The client is already connected.',
+  154: 'The client was closed before the reply arrived.',
+  200: 'The message does not follow the protocol.',
+  201: 'The motion library has no such movement.',
+  250: 'The server violated the protocol.',
+  300: 'The peer did not respond in time.',
+  301: 'The peer reads too slowly.',
+  351: 'The connection could not be established.',
   352: 'The connection was lost.',
-  353: 'The session was lost before the answer came; whether it was done is not known.',
+  353: 'The session was lost before the reply arrived; the command may have been carried out.',
+  354: 'The client or the world is not ready yet.',
   400: 'A limit was reached.',
   401: "The avatar's queue is full.",
   402: 'The server is shutting down.',
-  403: 'Something broke inside the server.',
-  404: 'The session went on over another connection.',
+  403: 'The server has an internal error.',
+  404: 'The session continues on another connection.',
 };
 
-const byHundred = [
-  '', 'The caller asked for something that cannot be.', 'The data is not as it should be.',
-  'Something went wrong in the network.', 'Something went wrong on the server.'
+const textByHundred = [
+  '', 'The caller made an error.', 'The data is invalid.', 'The network has an error.',
+  'The server has an error.'
 ];
 
 const names = new Map<number, string>(Object.entries(Status).map(([name, code]) => [code, name]));
 
-/** Stable lower-case name, e.g. `no_such_avatar`; `unknown` for a code this package does not know. */
+/** Returns the stable name of a code, for example `no_such_avatar`; `unknown` for other codes. */
 export function statusName(code: number): string {
   return names.get(code) ?? 'unknown';
 }
 
-/** A sentence for people; empty for 0. */
+/** Returns a readable sentence for a code; empty for 0. */
 export function statusText(code: number): string {
   if (code === 0) return '';
-  return sentences[code] ?? byHundred[Math.floor(code / 100)] ??
-      'A status that this package does not know.';
+  return texts[code] ?? textByHundred[Math.floor(code / 100)] ?? `Unknown status ${code}.`;
 }

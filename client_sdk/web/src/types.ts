@@ -1,553 +1,583 @@
 /**
- * What the package's users see. Units stand in names: metres, seconds, radians. Right-handed, +Y up;
- * heading 0 looks along +Z, turning left is positive; quaternions are unit, x, y, z, w.
+ * Public types for worlds, avatars, commands and poses. Those of the connection are in
+ * `client_types.ts`.
+ *
+ * Names carry their units: M is metres, S is seconds, Rad is radians. The coordinate system is
+ * right-handed with +Y up. Heading 0 faces +Z, and turning left is positive. Quaternions have unit
+ * length and are stored as x, y, z, w.
  */
 
-/** May command avatars and hears all events of the world, or only watches. */
+/** A `controller` may send commands and receives all events of the world. An `observer` may only
+ * observe. */
 export type Role = 'controller' | 'observer';
-/** `full`: float32, as the server has them. `quantised`: a quarter of it, nothing off by more than 1 mm; from servers
- * of before compact poses 2.5 times smaller. */
+/**
+ * Precision of received poses.
+ * - `full`: float32 values, exactly as the server computed them.
+ * - `quantised`: about a quarter of the bytes; no joint or end site is off by more than 1 mm.
+ *   Older servers send quantised poses of 40 % of the bytes of `full`.
+ */
 export type PoseMode = 'full' | 'quantised';
-/** How much of a pose is told. The joints that are not come as the references of the server's codes: about as the
- * library's figures mostly hold them. `fewer`: without those that move nothing by more than 0.12 m (hands, toes, the head).
- * `root`: where the figure is and how it is turned. */
-export type PoseDetail = 'all' | 'fewer' | 'root';
+/**
+ * Which joints a quantised pose contains.
+ * - `all`: all joints.
+ * - `reduced`: without joints that move no point of the figure by more than 0.12 m, for example
+ *   hands, toes and head.
+ * - `root`: the root joint only.
+ *
+ * The client sets a joint that was left out to its reference rotation, which is typical for it.
+ */
+export type PoseDetail = 'all' | 'reduced' | 'root';
+/** Type of a requested movement. A walk is carried out as a series of steps. */
 export type MovementType = 'step' | 'jump' | 'stand' | 'walk';
-/** When a movement begins: after all that is queued; after the one under way, or as soon as feet allow, and
- * then what was queued is dropped. */
-export type Takeover = 'none' | 'afterMovement' | 'now';
-/** What servers may or may not know of. */
-export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'takeovers' | 'layers' | 'refusals' |
-  'planting' | 'regions' | 'detail';
-export type FootChoice = 'auto' | 'left' | 'right';
-export type Foot = 'left' | 'right';
+/** Kind of a movement that an avatar carries out. */
 export type MovementKind = 'stepLeft' | 'stepRight' | 'jump' | 'stand';
+/**
+ * When a requested movement starts.
+ * - `none`: after all queued movements.
+ * - `afterMovement`: after the current movement. Clears the queue and ends a stand or walk.
+ * - `now`: as soon as the feet allow it. Clears the queue and ends a stand or walk.
+ */
+export type Interrupt = 'none' | 'afterMovement' | 'now';
+export type Foot = 'left' | 'right';
+/** `entered` and `left` occur only if a region is observed. They report that an avatar entered the
+ * region, or left the region or the world. */
 export type WorldEventType = 'accepted' | 'started' | 'footStrike' | 'finished' | 'idle' |
     'rejected' | 'spawned' | 'removed' | 'entered' | 'left';
 export type ParameterName = 'startX' | 'startY' | 'startZ' | 'endX' | 'endY' | 'endZ' | 'turn' |
     'length' | 'height';
-/** `waiting`: for the next attempt; `greeting`: connected, not welcomed yet; `closed`: refused for
- * good, see `lastError`. */
-export type ClientState =
-    'idle' | 'waiting' | 'connecting' | 'greeting' | 'ready' | 'closing' | 'closed';
-/** `wanted`: will be joined as soon as there is a connection. */
-export type WorldState = 'wanted' | 'joining' | 'joined' | 'refused' | 'left';
+/**
+ * State of a world.
+ * - `pending`: the client will join the world as soon as it is connected.
+ * - `joining`: the client has asked to join and waits for the reply.
+ * - `joined`: the client receives data and may send commands.
+ * - `refused`: the server did not let the client join.
+ * - `left`: `World.leave` was called.
+ */
+export type WorldState = 'pending' | 'joining' | 'joined' | 'refused' | 'left';
 export type Vec3 = readonly [number, number, number];
 
-/** Metres; `turn` in radians. Moving foot minus fixed foot, in the base frame. */
+/**
+ * Parameters of a movement: `turn` in radians, all others in metres. Positions and distances are
+ * those of the moving foot relative to the fixed foot, in the base frame.
+ */
 export type Parameters = {readonly [name in ParameterName]?: number};
 
-/** What came of a command. Commands never throw and their promises are never rejected. */
+/** Result of a command. Commands never throw, and their promises are never rejected. */
 export interface Reply {
+  /** True if the command was carried out. Single items may still have failed, see `items`. */
   readonly ok: boolean;
-  /** 0 when ok; else by hundred: 1xx the caller, 2xx the data, 3xx the network, 4xx the server. */
+  /** One of `Status`, 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server. */
   readonly code: number;
-  /** The code's name, such as `no_such_avatar`. */
+  /** Name of the code, for example `no_such_avatar`. */
   readonly status: string;
-  /** A sentence for people; empty when ok. */
+  /** Readable explanation; empty if ok. */
   readonly text: string;
-  /** How many items of the command were done. */
+  /** Number of items that succeeded. */
   readonly accepted: number;
-  /** Of a spawn all, in order; of other commands those that were refused. */
+  /** For a spawn: all items, in order. For other commands: the items that failed. */
   readonly items: readonly ReplyItem[];
 }
 
+/** Result of one item of a command. */
 export interface ReplyItem {
-  /** Position in the command's list. */
+  /** Position of the item in the command's list, from 0. */
   readonly index: number;
+  /** Id of the avatar. For a spawn without an id this is the id chosen by the server. */
   readonly avatar: number;
+  /** 0n unless the item is a movement request. */
   readonly requestId: bigint;
+  /** One of `Status`, 0 if the item succeeded. */
   readonly code: number;
   readonly status: string;
   readonly text: string;
 }
 
-/** Heights at the corners of a grid, bilinear between them. */
+/** Grid of ground heights, interpolated bilinearly. */
 export interface HeightField {
-  /** x and z of the first. */
+  /** World x and z of the first sample. */
   readonly originM: readonly [number, number];
+  /** Distance between neighbouring samples, 0.01 to 1000. */
   readonly cellM: number;
-  /** Along x, 2 to 1024. */
+  /** Number of samples along x, 2 to 1024. */
   readonly columns: number;
-  /** Along z, 2 to 1024. */
+  /** Number of samples along z, 2 to 1024. */
   readonly rows: number;
-  /** Row by row, x fastest. */
+  /** columns * rows heights in [-10000, 10000], row by row; x varies fastest. */
   readonly heightsM: Float32Array;
 }
 
-/** A block with upright sides and a flat top. */
+/** Axis-aligned block with vertical sides and a flat top. */
 export interface TerrainBox {
-  /** x and z. */
+  /** Smallest x and z. */
   readonly minM: readonly [number, number];
+  /** Largest x and z; each must be greater than in `minM`. */
   readonly maxM: readonly [number, number];
+  /** Height of the top, in [-10000, 10000]. */
   readonly heightM: number;
 }
 
-/** The ground: the highest of the height field (0 beside it) and the boxes there. */
+/**
+ * The ground of a world. Its height at a point is the largest of the height field and the boxes
+ * there. The height field counts as 0 outside its grid, and if it is null.
+ */
 export interface Terrain {
   readonly heightField: HeightField | null;
+  /** At most 65536. */
   readonly boxes: readonly TerrainBox[];
 }
 
+/** An avatar to spawn. */
 export interface SpawnItem {
-  /** Its number in the world, up to 2^32 - 1; absent or 0: the server chooses. */
+  /** Id of the avatar in its world, 1 to 2^32 - 1. Absent or 0: the server chooses. */
   avatar?: number;
+  /** Where the avatar stands. */
   positionM: Vec3;
   headingRad: number;
 }
 
-/** A clip of the library over what an avatar does; legs do what they do without. */
+/**
+ * Starts, changes or ends a layer: a clip of the motion library that is blended over an avatar's
+ * movements, for example waving. Layers do not change the legs and the root.
+ */
 export interface LayerRequest {
   readonly avatar: number;
-  /** One of World.layers. */
+  /** One of `World.layers`. */
   readonly layer: string;
-  /** Eases it out and ends it; weight and speed then mean nothing. */
-  readonly off?: boolean;
-  /** Above 0, up to 1 (the default). */
+  /** False fades the layer out and ends it; `weight` and `speed` are then ignored. Default true. */
+  readonly enabled?: boolean;
+  /** Above 0, at most 1. Default 1. */
   readonly weight?: number;
-  /** How long weight and speed take to get there, 0 to 10; 0.3. */
+  /** Time over which weight and speed change, 0 to 10. Default 0.3. */
   readonly blendS?: number;
-  /** 0.1 to 4; 1: as recorded. */
+  /** Playback rate, 0.1 to 4. Default 1, the speed of the recording. */
   readonly speed?: number;
 }
 
-/** A movement to do. Numbers that a type does not have are ignored; absent ones are 0. */
+/**
+ * A movement to add to an avatar's queue. Fields name the types that use them; other types ignore
+ * them. Absent numbers are 0 unless stated otherwise. If a step or jump is beyond what the motion
+ * library can do, the avatar does the closest possible one, see `WorldEvent.applied`.
+ */
 export interface MovementRequest {
   avatar: number;
-  /** Not 0; comes back in events. Absent: the client counts, from 1. */
+  /** Identifies the request in events, 1 to 2^64 - 1. Absent: the client counts from 1. */
   requestId?: number | bigint;
   type: MovementType;
-  /** Step. `auto` (default): the other foot than last time. */
-  foot?: FootChoice;
-  /** Step: where the ball of the foot lands, in the world; then length, side, height and turn are
-   * ignored. Refused (`unsupported`) by a server that knows no footprints. Walk: where it ends, on the
-   * ground; needed. Its steps carry its id in events; then `finished` of kind `stand` says that it has
-   * arrived, `rejected` why it goes no further. */
+  /** Step: which foot moves. Default `auto`: the one that did not move in the last step. */
+  foot?: Foot | 'auto';
+  /**
+   * Step: world position where the ball of the foot lands. If present, the step ignores `lengthM`,
+   * `sideM`, `heightM` and `turnRad`. Requires the feature `footprints`.
+   *
+   * Walk: destination on the ground; required. Events of all its steps contain the walk's request
+   * id. The walk ends with an event `finished` of kind `stand`, or with `rejected` if the avatar
+   * cannot continue. Requires the feature `walks`.
+   */
   atM?: Vec3;
-  /** Step with `atM`: where the foot looks. Absent: the server chooses. Walk: the heading at its end. */
+  /** Step with `atM`: heading of the foot; absent: the server chooses. Walk: final heading;
+   * required. */
   headingRad?: number;
-  /** Step, only with `atM`: when it is out of reach as the step is about to start, it is `rejected` with the
-   * nearest place in reach, instead of landing there. Refused (`unsupported`) by a server that knows no refusals. */
-  mustBeMet?: boolean;
-  /** Walk: places to pass, at most 64. */
+  /**
+   * Step with `atM`: what happens if the position is out of reach when the step is about to start.
+   * True: the step is rejected, and the event contains the nearest reachable position. False (the
+   * default): the foot lands at that nearest position. Requires the feature `exactOnly`.
+   */
+  exactOnly?: boolean;
+  /** Walk: positions to pass on the way, at most 64. */
   waypointsM?: readonly Vec3[];
-  /** Walk: 0.05 to 5, as near as the library's steps come. Absent: as is comfortable. */
+  /** Walk: speed, 0.05 to 5. The avatar walks as close to it as the motion library allows. Absent:
+   * a comfortable speed. */
   speedMPerS?: number;
-  /** Absent: none. Another is refused (`unsupported`) by a server that knows no takeovers. */
-  takeover?: Takeover;
-  /** Step: forward distance between the feet at its end. Jump. */
+  /** Default `none`. Other values require the feature `interrupts`. */
+  interrupt?: Interrupt;
+  /** Step: forward distance between the feet at the end. Jump: forward distance. */
   lengthM?: number;
-  /** Step: sideways, towards the moving foot's side. Absent: as the library has it. */
+  /** Step: sideways distance between the feet at the end, positive towards the moving foot's side.
+   * Absent: the usual distance of the motion library. */
   sideM?: number;
-  /** Step, jump. */
+  /** Step: height of the moving foot above the other foot at the end. Jump: height of the end above
+   * the start. */
   heightM?: number;
-  /** Step, jump. */
+  /** Step, jump: change of heading. */
   turnRad?: number;
-  /** Stand. */
+  /** Stand: duration. */
   seconds?: number;
 }
 
-/** A movement that waits in an avatar's queue. */
+/** A request that waits in an avatar's queue. Fields are as in `MovementRequest`. */
 export interface QueuedRequest {
   readonly avatar: number;
   readonly requestId: bigint;
   readonly type: MovementType;
-  readonly foot: FootChoice;
-  /** Null: no walk, nor a step to a place. */
+  readonly foot: Foot | 'auto';
+  /** Null unless the request is a walk or a step to a position. */
   readonly atM: Vec3 | null;
   /** Null: the server chooses. */
   readonly headingRad: number | null;
   readonly lengthM: number;
-  /** Null: as the library has it. */
+  /** Null: the usual distance of the motion library. */
   readonly sideM: number | null;
   readonly heightM: number;
   readonly turnRad: number;
   readonly seconds: number;
   readonly waypointsM: readonly Vec3[];
-  /** Null: as is comfortable. */
+  /** Null: a comfortable speed. */
   readonly speedMPerS: number | null;
-  readonly takeover: Takeover;
-  readonly mustBeMet: boolean;
+  readonly interrupt: Interrupt;
+  readonly exactOnly: boolean;
 }
 
-/** What an avatar does: the answer to `World.inspect`. */
+/** What an avatar is doing at a tick: the result of `World.inspect`. */
 export interface AvatarState {
   readonly avatar: number;
   readonly tick: number;
-  /** On the server's clock. */
+  /** Server time of the tick. */
   readonly timeS: number;
+  /** Base frame: position and heading where the current movement started. */
   readonly basePositionM: Vec3;
   readonly baseHeadingRad: number;
-  /** Null: just standing. */
+  /** Null if the avatar is idle. */
   readonly movement: CurrentMovement | null;
-  /** How many requests wait ... */
+  /** Number of requests in the queue, without the current movement. */
   readonly queueSize: number;
-  /** ... and the first 16 of them. */
+  /** The first 16 requests of the queue. */
   readonly queue: readonly QueuedRequest[];
-  /** Feet are not planted, as `World.setPlanting` left it. */
-  readonly plantingOff: boolean;
-  /** Those in play, later ones over earlier; at most four. */
+  /** Whether foot planting is enabled, see `World.setPlanting`. */
+  readonly plantingEnabled: boolean;
+  /** Active layers, at most four. Later ones are blended over earlier ones. */
   readonly layers: readonly PlayingLayer[];
 }
 
+/** A layer that is active on an avatar. */
 export interface PlayingLayer {
-  /** One of World.layers. */
+  /** One of `World.layers`. */
   readonly layer: string;
-  /** Now. */
+  /** Current weight, 0 to 1. */
   readonly weight: number;
-  /** In its clip. */
+  /** Current time in the layer's clip. */
   readonly timeS: number;
+  /** Current playback rate; 1 is the speed of the recording. */
   readonly speed: number;
-  /** On its way out. */
+  /** True while the layer fades out. */
   readonly ending: boolean;
 }
 
-/** Where a foot of a movement under way is about to stand. */
+/** Where a foot of the current movement will land. */
 export interface Landing {
   readonly foot: Foot;
-  /** Of its ball, on the ground. */
+  /** World position of the ball of the foot, on the ground. */
   readonly positionM: Vec3;
   readonly headingRad: number;
 }
 
-/** A requested stand has no group, keytimes or weights. */
+/** The movement that an avatar carries out. A stand has no group, keytimes or weights. */
 export interface CurrentMovement {
-  /** 0n: the avatar's own doing. */
+  /** 0n if the server inserted the movement, for example a step between two requests. */
   readonly requestId: bigint;
   readonly kind: MovementKind;
+  /** Index of the group of examples in the motion library; -1: none. */
   readonly group: number;
-  /** On the server's clock. */
+  /** Server time at which the movement started. */
   readonly startTimeS: number;
-  /** `startTimeS` and the last keytime. */
+  /** Server time of the last keytime. */
   readonly endTimeS: number;
-  /** From the movement's start: 0, and growing. */
+  /** Keytimes in seconds from the start of the movement, ascending; the first is 0. */
   readonly keytimesS: Float64Array;
-  /** 0 to the number of keytimes less 1. */
+  /** Keytime index plus fraction, 0 to the number of keytimes less 1. */
   readonly genericTime: number;
-  readonly easeS: number;
+  /** Duration from the start over which the transition from the previous movement fades out. */
+  readonly easeOutS: number;
+  /** Parameters as requested. */
   readonly requested: Parameters;
+  /** Parameters that the avatar carries out. */
   readonly applied: Parameters;
+  /** True if the applied parameters lie outside the range of the recorded examples. */
   readonly extrapolated: boolean;
+  /** True if the requested parameters were limited to what is possible. */
   readonly clamped: boolean;
-  /** One an example of the group; they sum to 1. */
+  /** Blend weights, one per example of the group. They sum to 1. */
   readonly weights: Float32Array;
+  /** Names of the columns of `exampleParameters`. */
   readonly parameterNames: readonly ParameterName[];
-  /** Parameters of the examples: a row of `parameterNames.length` for each weight, or empty. */
-  readonly sites: Float32Array;
-  /** Of feet that are not there yet; none while feet are not planted. */
+  /** Parameters of the group's examples: one row of `parameterNames.length` numbers per weight.
+   * May be empty. */
+  readonly exampleParameters: Float32Array;
+  /** Landing positions of feet in the air. Empty if foot planting is disabled. */
   readonly landings: readonly Landing[];
 }
 
+/** Rate and detail of poses within a distance from the centre of a region. */
 export interface RegionRing {
-  toM: number;
-  /** 1 to 3600. */
+  /** Distance from the centre up to which the ring applies. It must increase from ring to ring. */
+  outerRadiusM: number;
+  /** The server sends one pose per this many ticks, 1 to 3600. */
   everyNTicks: number;
-  /** As `Observation.detail`. */
+  /** Absent: the detail of the observation. Requires mode `quantised`. */
   detail?: PoseDetail;
 }
 
-/** A circle on the ground; who comes within its radius enters. */
+/** A circle on the ground. Avatars enter the region when their root is within its radius. */
 export interface Region {
-  /** Its centre. */
+  /** World x of the centre, in metres. */
   x: number;
+  /** World z of the centre, in metres. */
   z: number;
   /** Above 0. */
   radiusM: number;
-  /** Who is inside leaves when further than radius and this; absent: the server chooses. */
-  leaveM?: number;
-  /** Within `toM` of the centre poses come every so many ticks and in that detail; beyond the last, and in the detail
-   * where a ring names none, as the observation has it. At most 4, growing. */
+  /** Avatars leave the region at `radiusM + leaveMarginM` from the centre. At least 0. Absent: the
+   * server chooses. */
+  leaveMarginM?: number;
+  /** At most 4, from the inside out. Beyond the last ring, rate and detail of the observation
+   * apply. */
   rings?: readonly RegionRing[];
 }
 
+/** What to receive of a world: the argument of `World.observe`. */
 export interface Observation {
   mode: PoseMode;
-  /** Absent or empty: all. Poses of others are not kept. */
+  /** Ids of the avatars to observe. Absent or empty: all avatars of the world. */
   avatars?: readonly number[];
-  /** Who is in it instead of a list; 'entered' and 'left' tell who. A region is all that is observed of a world.
-   * A recording has of each tick those that were due at it. */
+  /**
+   * Observes the avatars inside a region instead of a list; `avatars` must then be empty. Events
+   * `entered` and `left` report changes. A session that observes a region of a world cannot have
+   * other subscriptions to that world. Requires the feature `regions`.
+   */
   region?: Region;
-  /** 1 (default) to 3600. */
+  /** The server sends one pose per this many ticks, 1 to 3600. Default 1. */
   everyNTicks?: number;
-  /** Events of the world, too. Controllers get them anyway. */
+  /** Whether to receive the world's events. Default false; controllers always receive them. */
   withEvents?: boolean;
-  /** 'all' (default); others of quantised poses only, from servers that have them: `Client.serverHas('detail')`. */
+  /** Default `all`. Other values require mode `quantised` and the feature `detail`. */
   detail?: PoseDetail;
 }
 
+/** A running observation. It survives reconnects and lost sessions. */
 export interface Subscription {
+  /** Unique within the client. */
   readonly id: number;
-  /** The server's answer to it. */
+  /** The server's reply to the observation. */
   readonly reply: Promise<Reply>;
-  /** Puts another region in the place of the one observed. Who is in both neither leaves nor enters. */
+  /** Replaces the observed region. Avatars that are inside both regions neither leave nor enter.
+   * Fails with `no_such_subscription` if the subscription has no region. */
   moveRegion(region: Region): Promise<Reply>;
+  /** Ends the subscription. */
   stop(): Promise<Reply>;
 }
 
-/** Something that happened to an avatar. Fields that a type does not name are 0, empty or null. */
+/** Something that happened to an avatar. Fields that the type does not use are 0, empty or null. */
 export interface WorldEvent {
   readonly type: WorldEventType;
   readonly avatar: number;
-  /** 0n: the avatar's own doing. */
+  /** 0n if the event belongs to no request, for example a step that the server inserted. */
   readonly requestId: bigint;
   readonly tick: number;
-  /** On the server's clock, as poses have it. */
+  /** Server time, on the same clock as poses. */
   readonly timeS: number;
-  /** Started, finished. */
+  /** Started, finished: the kind of the movement. */
   readonly kind: MovementKind;
-  /** Group of the library's examples; -1: none. */
+  /** Started: index of the group of examples in the motion library; -1: none. */
   readonly group: number;
-  /** Started. */
+  /** Started: parameters as requested. */
   readonly requested: Parameters;
-  /** Started. */
+  /** Started: parameters that the avatar carries out. */
   readonly applied: Parameters;
+  /** Started: the applied parameters lie outside the range of the recorded examples. */
   readonly extrapolated: boolean;
+  /** Started: the requested parameters were limited to what is possible. */
   readonly clamped: boolean;
-  /** Finished: another movement took over before its end. */
+  /** Finished: another request interrupted the movement before its end. */
   readonly cutShort: boolean;
-  /** Foot strike. */
+  /** Foot strike: the foot that landed. */
   readonly foot: Foot | null;
-  /** Foot strike; a step rejected as out of reach: where the nearest footprint is. */
+  /** Foot strike: where the foot landed. Rejected because of `exactOnly`: the nearest reachable
+   * position. */
   readonly positionM: Vec3;
-  /** Finished, idle, spawned: the new base frame. */
+  /** Finished, idle, spawned: the avatar's new base frame. */
   readonly basePositionM: Vec3;
   readonly baseHeadingRad: number;
-  /** Rejected: why, as a code and a sentence. */
+  /** Rejected: the cause, one of `Status`. */
   readonly code: number;
+  /** Rejected: readable explanation. */
   readonly reason: string;
 }
 
+/** Tip of a chain of joints, for example of the head or a toe. */
 export interface EndSite {
+  /** Index of the joint that the end site belongs to. */
   readonly joint: number;
+  /** Relative to the joint, in the joint's frame. */
   readonly offsetM: Vec3;
 }
 
-/** Joints by index; -1: not known. */
+/** Joints of a leg, as indices into the skeleton; -1: unknown. */
 export interface Leg {
   readonly hip: number;
   readonly knee: number;
   readonly ankle: number;
   readonly ball: number;
+  /** Ball of the foot, in the frame of the joint `ball`. */
   readonly ballOffsetM: Vec3;
+  /** Tip of the toes, in the frame of the joint `ball`. */
   readonly toeTipOffsetM: Vec3;
 }
 
+/** The skeleton shared by all avatars of a world. */
 export interface Skeleton {
+  /** 1 to 256. */
   readonly jointCount: number;
   readonly names: readonly string[];
-  /** -1 for the root, which comes first; else smaller than the joint's own index. */
+  /** Index of each joint's parent, smaller than the joint's own index; -1 for the root, joint 0. */
   readonly parents: Int16Array;
-  /** 3 a joint: from its parent, in the parent's frame. */
+  /** Three numbers per joint: offset from the parent, in the parent's frame. */
   readonly offsetsM: Float32Array;
   readonly endSites: readonly EndSite[];
   readonly leftLeg: Leg;
   readonly rightLeg: Leg;
 }
 
-/** `interpolated`: between two received poses, or exactly one. `held`: the last pose before that
- * time, with nothing continuous to go on to. `missing`: nothing is known; nothing was written. */
+/**
+ * Where a sampled pose comes from.
+ * - `interpolated`: from the received poses around the sampled time, or exactly a received one.
+ * - `held`: the last pose before the sampled time, because no continuous pose follows.
+ * - `missing`: no pose is known for that time, and the output is not valid.
+ */
 export type PoseKind = 'interpolated' | 'held' | 'missing';
 
-/** Room for one pose, for `World.sample`; make it with `createPose`. */
+/** Output buffer of `World.sample`. Create it with `createPose`. */
 export interface Pose {
-  /** Grown when the figure has more joints. */
+  /** Four numbers per joint: the root in world space, other joints relative to their parent.
+   * Replaced by a larger array if the skeleton has more joints. */
   rotations: Float32Array;
+  /** World position of the root. */
   readonly rootM: Float32Array;
   jointCount: number;
-  /** Of the received pose at or before the time. */
+  /** Tick of the received pose at or before the sampled time. */
   tick: number;
-  /** Standing, nothing queued. */
+  /** True if the avatar stands and its queue is empty. */
   standing: boolean;
-  /** With which it was sent. */
+  /** Detail in which the server sent the pose. */
   detail: PoseDetail;
-  /** Held: how long after its last received pose. */
+  /** If the pose is held: time since the last received pose. Otherwise 0. */
   heldS: number;
 }
 
 /** Bits of `CrowdPose.flags`. */
 export const PoseFlag = {
-  /** This is a received pose that does not continue the one before it. */
+  /** This is a received pose that does not continue the previous one. */
   discontinuity: 1,
+  /** The avatar stands and its queue is empty. */
   standing: 2,
-  /** Not interpolated: nothing continuous came after it. */
+  /** The pose is held instead of interpolated. */
   held: 4,
-  /** It was sent with the detail 'fewer'. */
-  fewerJoints: 8,
-  /** It was sent with the detail 'root'. */
+  /** The server sent the pose with detail `reduced`. */
+  reducedJoints: 8,
+  /** The server sent the pose with detail `root`. */
   rootOnly: 16,
 } as const;
 
-/** Room for the poses of a crowd, for `sampleAll`; make it with `createCrowdPose`. Arrays are only
- * replaced by larger ones; the first `count` avatars in them count, in growing order of number. */
+/**
+ * Output buffer of `sampleAll`. Create it with `createCrowdPose`. Only the first `count` avatars
+ * are valid, sorted by ascending id. Arrays that are too small are replaced by larger ones.
+ */
 export interface CrowdPose {
+  /** Number of valid avatars. */
   count: number;
+  /** Joints per avatar. */
   jointCount: number;
+  /** One id per avatar. */
   avatars: Uint32Array;
+  /** One set of `PoseFlag` bits per avatar. */
   flags: Uint8Array;
-  /** 3 an avatar. */
+  /** Three numbers per avatar: world position of the root. */
   rootsM: Float32Array;
-  /** 4 * jointCount an avatar; the root's in the world, the others relative to their parent. */
+  /** 4 * jointCount numbers per avatar: the root in world space, other joints relative to their
+   * parent. */
   rotations: Float32Array;
 }
 
+/** The last seconds of a world as received, for replay. */
 export interface Recording {
-  /** NaN while empty. */
+  /** Server time of the oldest recorded pose; NaN if the recording is empty. */
   readonly firstTimeS: number;
+  /** Server time of the newest recorded pose; NaN if the recording is empty. */
   readonly lastTimeS: number;
-  /** Memory of what is kept. */
+  /** Memory in use. Events count with an estimated size. */
   readonly bytes: number;
-  /** Poses at a time of the server's clock, as `World.sampleAll`. 0 outside what is kept. */
+  /** Same as `World.sampleAll`, but from the recording. Returns 0 outside the recorded time. */
   sampleAll(timeS: number, out: CrowdPose): number;
-  /** Events of that time, in order of arrival. */
+  /** Returns recorded events with server times in [fromS, toS], in order of arrival. */
   events(fromS: number, toS: number): WorldEvent[];
   clear(): void;
 }
 
-
-/** A world joined, or to be joined: lives through reconnects. */
+/** A world that the client has joined or wants to join. It survives reconnects. */
 export interface World {
   readonly name: string;
   readonly role: Role;
   readonly state: WorldState;
-  /** Null until the server has described it. */
+  /** Null until the server has sent it. */
   readonly skeleton: Skeleton | null;
+  /** Hash of the world's motion library; empty until the server has sent it. */
   readonly libraryHash: string;
-  /** Names of the library's clips that setLayers plays; empty where the server has no such feature. */
+  /** Names of the motion library's layers, for `setLayers`. Empty without the feature `layers`. */
   readonly layers: readonly string[];
   readonly recording: Recording;
-  /** The ground; null: flat at 0. Replaced as a whole when it changes. */
+  /** The ground. Null if it is flat at height 0. A change replaces the object. */
   readonly terrain: Terrain | null;
-  /** The server's answer to joining, the first time. */
+  /** The server's first reply to joining. */
   readonly joined: Promise<Reply>;
+
+  // Commands wait until the world is joined. They fail with `closed` while the client is `idle` or
+  // `closed`, and with `invalid_argument` if an argument is invalid. Lists have 1 to 65536 items.
 
   spawn(items: readonly SpawnItem[]): Promise<Reply>;
   remove(avatars: readonly number[]): Promise<Reply>;
-  /** Drops what these avatars have not started yet. */
+  /** Clears the queues of these avatars. Current movements continue. */
   cancel(avatars: readonly number[]): Promise<Reply>;
-  /** Queues movements; an avatar may stand in the list several times. */
+  /** Queues movements. The list may contain several requests per avatar. */
   request(items: readonly MovementRequest[]): Promise<Reply>;
-  /** Gives the world another ground, for all its avatars; null: flat at 0. */
+  /** Replaces the ground of the world for all avatars; null: flat at height 0. Copies the argument.
+   * Requires the feature `terrain`. */
   setTerrain(terrain: Terrain | null): Promise<Reply>;
-  /** Starts or ends layers (see `layers`) over what avatars do; at most four at a time for one. */
+  /** Starts, changes or ends layers, at most four per avatar. Requires the feature `layers`. */
   setLayers(items: readonly LayerRequest[]): Promise<Reply>;
-  /** Feet stand still where they land (as at first), or are where the examples have them: from the next
-   * movement on that each avatar begins. */
-  setPlanting(avatars: readonly number[], on: boolean): Promise<Reply>;
+  /** Enables or disables foot planting from the next movement on. Planted feet do not slide;
+   * otherwise feet move as in the examples. Initially enabled. Requires the feature `planting`. */
+  setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply>;
+  /** Starts to receive poses, and events if requested. At most 256 subscriptions per world. */
   observe(observation: Observation): Subscription;
-  /** What an avatar does right now, about a tick later. Rejected with a StridewireError when there is
-   * no such avatar, no connection, or a server that does not tell. */
+  /**
+   * Returns what an avatar is doing, about one tick later. Rejects with a `StridewireError` if the
+   * avatar does not exist, the client is not connected, the feature `inspect` is missing, the reply
+   * takes longer than 10 s, or 64 calls are waiting already.
+   */
   inspect(avatar: number): Promise<AvatarState>;
+  /** Leaves the world. The object cannot be used afterwards; join the world again instead. */
   leave(): Promise<Reply>;
 
+  /** Calls `listener` for each event of that name. Returns a function that removes it. */
   on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void;
 
-  /** Avatars whose poses arrive, in growing order. The array is replaced when the set changes. */
+  /** Ids of the avatars whose poses arrive, ascending. A change replaces the array. */
   avatars(): Uint32Array;
-  /** Pose of an avatar at a time of the server's clock (`Client.renderTimeS`). */
+  /** Computes the pose of an avatar at a server time, usually `Client.renderTimeS()`. */
   sample(avatar: number, timeS: number, out: Pose): PoseKind;
-  /** Poses of all avatars seen; returns their number. No garbage once `out` is large enough. */
+  /** Computes the poses of all visible avatars at a server time and returns their number. Allocates
+   * nothing once `out` is large enough. */
   sampleAll(timeS: number, out: CrowdPose): number;
 }
 
+/** Arguments of the listeners that `World.on` accepts. */
 export interface WorldListeners {
   /** Something happened to an avatar. */
   event: (event: WorldEvent) => void;
-  /** The set of avatars seen has changed. */
+  /** `World.avatars()` has changed. */
   avatars: (avatars: Uint32Array) => void;
-  /** `terrain` has changed. */
+  /** `World.terrain` has changed. */
   terrain: (terrain: Terrain | null) => void;
-  /** `state` or `skeleton` has changed. */
+  /** `World.state` or `World.skeleton` has changed. */
   state: (state: WorldState) => void;
-  /** We read too slowly: totals since joining. */
+  /** The server dropped data because the client reads too slowly. Both numbers are totals since
+   * joining. */
   lagging: (droppedBatches: number, droppedEvents: number) => void;
-}
-
-export interface ClientListeners {
-  state: (state: ClientState) => void;
-  /** Welcomed; `resumed`: the session went on, else a new one has begun. */
-  connected: (resumed: boolean) => void;
-  /** The server knows nothing of us any more: commands are answered `session_lost`, worlds and
-   * subscriptions are asked for again. */
-  sessionLost: () => void;
-  /** Something the server has to say, or a command of our own after a lost session that failed. */
-  notice: (code: number, text: string) => void;
-  /** The connection failed or was lost; `state` tells whether attempts follow. */
-  error: (code: number, text: string) => void;
-}
-
-export interface ClientOptions {
-  /** `ws://host:port/stream` */
-  url: string;
-  /** 1 to 64 bytes. */
-  clientName?: string;
-  authToken?: string;
-  /** Default: the global one. */
-  webSocket?: new(url: string) => WebSocket;
-  /** How far behind the server's time poses are shown: 0.1 s. */
-  renderDelayS?: number;
-  /** A clock in milliseconds that does not go back; default: performance.now. */
-  now?: () => number;
-  /** After a lost session put our avatars where they last were: false. */
-  respawn?: boolean;
-  /** Commands without an answer: 4096. */
-  maxCommands?: number;
-  /** Poses kept of an avatar to interpolate between: 32. */
-  poseHistory?: number;
-  /** Memory for them, of all worlds: 256 MiB. */
-  maxPoseBytes?: number;
-  /** What `World.recording` keeps: 20 s, 0 turns it off. */
-  recordingS?: number;
-  /** ... and at most, of one world: 192 MiB. */
-  maxRecordingBytes?: number;
-  /** Events a recording keeps: 65,536. */
-  maxRecordedEvents?: number;
-  connectTimeoutS?: number;
-  pingIntervalS?: number;
-  /** Seed of the back-off's jitter; default: random. */
-  seed?: number;
-}
-
-/** Counted since the client was made. */
-export interface Statistics {
-  bytesReceived: number;
-  /** Of them those of poses, with their numbers and headers. */
-  poseBytesReceived: number;
-  bytesSent: number;
-  framesReceived: number;
-  batchesReceived: number;
-  posesReceived: number;
-  /** For there was no memory left for that avatar, or its tick was old. */
-  posesRefused: number;
-  /** Batches that did not come, by gaps in the ticks of a shard. */
-  batchesMissing: number;
-  /** By the server, because we read too slowly, as it told. */
-  batchesDropped: number;
-  eventsDropped: number;
-  eventsReceived: number;
-  /** Frames that were refused; each ends its connection. */
-  invalidFrames: number;
-  commandsSent: number;
-  commandsResent: number;
-  /** Without an answer now. */
-  commandsWaiting: number;
-  connects: number;
-  resumes: number;
-  /** Connections after the first. */
-  reconnects: number;
-  connectFailures: number;
-  /** Smallest round trip of the last pings; 0 before the first. */
-  rttS: number;
-  /** How much later than the quickest of the last seconds batches arrive: mean of the last, and
-   * the worst of the last 4 s. */
-  jitterS: number;
-  worstJitterS: number;
-  /** How far what is shown lies behind the newest pose's time, smoothed; below 0: nothing newer has
-   * come, figures are held. */
-  interpolationDelayS: number;
-  /** Poses sampled beyond the newest received one, so held. */
-  posesMissed: number;
-  /** Mean, with the frame's checks, since the start. */
-  decodeNsPerPose: number;
-  /** Memory of poses, recordings and commands now. */
-  bufferedBytes: number;
 }

@@ -3,46 +3,51 @@ import {detailOf} from './pose_flags';
 import type {WorldRecording} from './recording';
 import type {Command, Session} from './session';
 import type {
-  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseDetail, PoseKind, PoseMode, Recording, Reply,
-  Role, Skeleton, SpawnItem, Subscription, Terrain, World, WorldListeners, WorldState
+  AvatarState, CrowdPose, LayerRequest, MovementRequest, Observation, Pose, PoseDetail, PoseKind,
+  PoseMode, Recording, Reply, Role, Skeleton, SpawnItem, Subscription, Terrain, World,
+  WorldListeners, WorldState
 } from './types';
 import * as check from './wire/check';
 import {CompactCodec} from './wire/compact_codec';
 import type {BatchMode, Observe, SpawnEntry, WorldInfo} from './wire/messages';
 import type {WorldView} from './world_view';
 
-/** A subscription as it is wanted. */
-export interface Wanted {
+/** A subscription that the client keeps up across lost sessions. */
+export interface ActiveSubscription {
   readonly message: Observe;
-  /** Its command waits to be sent. */
+  /** True while `message` waits to be sent. */
   unsent: boolean;
 }
 
-/** A world as its callers see it, and what its session knows of it. */
+/** A world, with the state that the session keeps for it. Users see the interface `World` only. */
 export class WorldHandle implements World {
-  state: WorldState = 'wanted';
+  state: WorldState = 'pending';
   skeleton: Skeleton | null = null;
   libraryHash = '';
   layers: readonly string[] = [];
-  /** Of compact poses, if the server tells them. */
+  /** Decoders of compact poses, by mode. Empty if the server sends no compact poses. */
   codecs: Partial<Record<BatchMode, CompactCodec>> = {};
   terrain: Terrain | null = null;
   readonly joined: Promise<Reply>;
 
-  // The session's part.
+  // The fields below belong to the session.
   readonly listeners = new Listeners<WorldListeners>();
-  /** The server's number of it; 0: not known. */
+  /** The world's number in messages; 0 until the server has sent it. */
   serverId = 0;
+  /** Resolves `joined`; null after the first reply. */
   answerJoin: ((reply: Reply) => void) | null = null;
+  /** Commands that have not been sent, in order. */
   unsent: Command[] = [];
-  readonly subscriptions = new Map<number, Wanted>();
-  /** Ours, and where they are. */
+  /** By subscription number. */
+  readonly subscriptions = new Map<number, ActiveSubscription>();
+  /** Avatars that this client has spawned, with their last known base frames. */
   readonly spawned = new Map<number, SpawnEntry>();
-  toldDroppedBatches = 0;
-  toldDroppedEvents = 0;
-  /** Of the view, whose avatars listeners know. */
-  toldVersion = 0;
-  toldTerrain: Terrain | null = null;
+  /** Totals of the last Lagging message. */
+  reportedDroppedBatches = 0;
+  reportedDroppedEvents = 0;
+  /** `view.version` and `terrain` of the last notification to listeners. */
+  notifiedVersion = 0;
+  notifiedTerrain: Terrain | null = null;
 
   constructor(private readonly session: Session, readonly name: string, readonly role: Role,
               readonly view: WorldView, readonly record: WorldRecording) {
@@ -77,8 +82,8 @@ export class WorldHandle implements World {
     return this.session.command(this, () => check.setLayers(items));
   }
 
-  setPlanting(avatars: readonly number[], on: boolean): Promise<Reply> {
-    return this.session.command(this, () => check.setPlanting(avatars, on));
+  setPlanting(avatars: readonly number[], enabled: boolean): Promise<Reply> {
+    return this.session.command(this, () => check.setPlanting(avatars, enabled));
   }
 
   observe(observation: Observation): Subscription {
@@ -111,10 +116,10 @@ export class WorldHandle implements World {
     return this.view.sampleAll(timeS, out);
   }
 
-  /** What the server says of it. Another figure than before clears the poses. */
-  describe(info: WorldInfo): void {
+  /** Applies a WorldInfo message. A different skeleton clears all poses. */
+  setInfo(info: WorldInfo): void {
     const skeleton = toSkeleton(info);
-    if (this.skeleton === null || !sameFigure(this.skeleton, skeleton)) {
+    if (this.skeleton === null || !sameSkeleton(this.skeleton, skeleton)) {
       this.view.reset(skeleton.jointCount);
       this.record.clear();
       this.skeleton = skeleton;
@@ -129,13 +134,13 @@ export class WorldHandle implements World {
     };
   }
 
-  /** Nothing of it is known any more. */
-  forget(): void {
+  /** Discards everything that the server has sent about the world. Keeps the subscriptions. */
+  reset(): void {
     this.serverId = 0;
-    this.toldDroppedBatches = 0;
-    this.toldDroppedEvents = 0;
+    this.reportedDroppedBatches = 0;
+    this.reportedDroppedEvents = 0;
     this.view.reset(0);
-    this.view.breakOff();
+    this.view.startNewEpoch();
     this.record.clear();
     this.skeleton = null;
     this.libraryHash = '';
@@ -144,30 +149,32 @@ export class WorldHandle implements World {
     this.terrain = null;
   }
 
-  /** Poses of whom are kept follows from what is observed. */
+  /** Restricts stored poses to the avatars of the subscriptions. Call it when these change. */
   updateFilter(): void {
-    const wanted = new Set<number>();
+    const observed = new Set<number>();
     for (const {message} of this.subscriptions.values()) {
       if (message.avatars.length === 0) return this.view.setFilter(null);
-      for (const avatar of message.avatars) wanted.add(avatar);
+      for (const avatar of message.avatars) observed.add(avatar);
     }
-    this.view.setFilter(wanted.size === 0 ? null : wanted);
+    this.view.setFilter(observed.size === 0 ? null : observed);
   }
 
-  /** The rate asked for; 0: none of this mode. */
+  /** Returns the smallest number of ticks per pose that subscriptions request for batches of this
+   * mode; 0 if none requests this mode. */
   everyNTicks(batchMode: BatchMode): number {
     const mode: PoseMode = batchMode === 'full' ? 'full' : 'quantised';
     const detail = detailOf(batchMode);
-    let every = 0;
-    const add = (of: PoseDetail | undefined, n: number): void => {
-      if (of === detail) every = every === 0 ? n : Math.min(every, n);
+    let smallest = 0;
+    const add = (requested: PoseDetail | undefined, n: number): void => {
+      if (requested === detail) smallest = smallest === 0 ? n : Math.min(smallest, n);
     };
     for (const {message} of this.subscriptions.values()) {
       if (message.mode !== mode) continue;
       add(message.detail, message.everyNTicks);
-      message.region?.ringDetails.forEach((of, i) => add(of, message.region!.rings[i]!.everyNTicks));
+      message.region?.ringDetails.forEach(
+          (requested, i) => add(requested, message.region!.rings[i]!.everyNTicks));
     }
-    return every;
+    return smallest;
   }
 }
 
@@ -186,8 +193,8 @@ function toSkeleton(info: WorldInfo): Skeleton {
   };
 }
 
-function sameFigure(a: Skeleton, b: Skeleton): boolean {
-  const plain = (s: Skeleton): string =>
+function sameSkeleton(a: Skeleton, b: Skeleton): boolean {
+  const serialise = (s: Skeleton): string =>
       JSON.stringify([s.names, [...s.parents], [...s.offsetsM], s.endSites, s.leftLeg, s.rightLeg]);
-  return plain(a) === plain(b);
+  return serialise(a) === serialise(b);
 }

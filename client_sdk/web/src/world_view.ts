@@ -1,20 +1,20 @@
+import {streamOf} from './batch_stream';
+import {reserve} from './pose_buffers';
 import {flagsOf, lastingFlags} from './pose_flags';
 import {PoseHistory} from './pose_history';
-import {reserve} from './room';
-import {streamOf} from './stream_of';
 import {PoseFlag, type CrowdPose, type Pose, type PoseKind} from './types';
 import {maxItems} from './wire/limits';
 import {Malformed} from './wire/malformed';
 import type {PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
-/** Poses of an avatar that is gone can still be sampled for this long. */
-const keepGoneS = 2;
-/** How long it is remembered that an avatar has left: batches wait for a few ticks at most. */
+/** How long the poses of a removed avatar can still be sampled. */
+const keepRemovedS = 2;
+/** How long to remember that an avatar left the region. Late poses arrive within a few ticks. */
 const keepLeftTicks = 600;
-const maxShards = 1024;
+const maxStreams = 1024;
 
-/** Memory that all pose histories of a client share. */
+/** Memory for the pose histories of all worlds of a client. */
 export interface PoseBudget {
   limitBytes: number;
   usedBytes: number;
@@ -25,78 +25,85 @@ export interface PoseCounts {
   poses: number;
   refused: number;
   missing: number;
-  /** Sampled beyond the newest received pose. */
-  starved: number;
+  /** Samples for times after the newest received pose of their avatar. */
+  held: number;
   decodeMs: number;
 }
 
 interface Track {
   readonly avatar: number;
   history: PoseHistory;
-  /** Which shard and mode it was last seen in. */
+  /** Stream of the avatar's last batch, see `streamOf`. */
   stream: number;
-  seenTick: number;
+  /** Tick of the avatar's last batch. */
+  lastTick: number;
+  /** Epoch of the avatar's last pose. */
   epoch: number;
-  gone: boolean;
+  removed: boolean;
 }
 
-interface Shard {
+/** Progress of a stream, see `streamOf`. */
+interface StreamState {
   tick: number;
-  partsSeen: number;
+  /** Number of parts of the tick's batch that have arrived. */
+  partCount: number;
   epoch: number;
 }
 
-/** What is seen of a world: the poses of its avatars. */
+/** The avatars of a world and their received poses. */
 export class WorldView {
-  /** Joints of the figure; 0: not known yet. */
+  /** Joints of the skeleton; 0 until it is known. */
   jointCount = 0;
   private readonly tracks = new Map<number, Track>();
-  private readonly shards = new Map<number, Shard>();
+  private readonly streams = new Map<number, StreamState>();
   private filter: ReadonlySet<number> | null = null;
   private epochNumber = 1;
   private list = new Uint32Array(0);
   private sorted: Track[] = [];
-  private listIsOld = false;
-  /** Grows when `avatars` gives another list. */
+  private listIsOutdated = false;
+  /** Changes whenever the result of `avatars` changes. */
   version = 0;
   private newestS = -Infinity;
-  /** Who has left the region observed, and since which tick; forgotten after a while. */
+  /** Tick at which each avatar left the observed region. Entries expire after `keepLeftTicks`. */
   private readonly left = new Map<number, number>();
 
   constructor(private readonly poseHistory: number, private readonly budget: PoseBudget,
               private readonly counts: PoseCounts, private readonly now: () => number) {}
 
-  /** Grows with every break. */
+  /** Poses of different epochs are not interpolated, see `startNewEpoch`. */
   get epoch(): number {
     return this.epochNumber;
   }
-  /** Of the newest pose received; -Infinity: none. */
+  /** Server time of the newest received batch; -Infinity if there is none. */
   get newestTimeS(): number {
     return this.newestS;
   }
 
-  /** Forgets the poses, and that of a figure with another number of joints none will be taken. */
+  /** Discards all poses. From now on, poses must have `jointCount` joints. */
   reset(jointCount: number): void {
     this.clearPoses();
     this.jointCount = jointCount;
   }
 
+  /** Discards all poses. */
   clearPoses(): void {
-    if (this.tracks.size > 0) this.changeList();
+    if (this.tracks.size > 0) this.markListOutdated();
     for (const track of this.tracks.values()) this.release(track);
     this.tracks.clear();
-    this.shards.clear();
+    this.streams.clear();
     this.left.clear();
     this.newestS = -Infinity;
   }
 
-  /** What comes next does not continue what was there before (a connection resumed, a subscription
-   * begun), though the server cannot say so in a shared batch. */
-  breakOff(): void {
+  /**
+   * Marks the next pose of each avatar as discontinuous, for example after a reconnect or a new
+   * subscription. The server cannot set this flag, because other clients receive the same batch.
+   */
+  startNewEpoch(): void {
     ++this.epochNumber;
   }
 
-  /** Which avatars' poses to keep; null: all. */
+  /** Restricts stored poses to these avatars and discards others; null: all avatars. */
   setFilter(filter: ReadonlySet<number> | null): void {
     this.filter = filter;
     if (filter === null) return;
@@ -105,22 +112,24 @@ export class WorldView {
     }
   }
 
+  /** True if the filter admits the avatar. */
   wants(avatar: number): boolean {
     return this.filter === null || this.filter.has(avatar);
   }
 
   /**
-   * Takes in one batch; `everyNTicks` is the rate asked for, to count gaps.
-   * @throws Malformed: a pose that is none, or another figure than announced; what came before it is
-   *     kept.
+   * Decodes and stores the poses of a batch. `everyNTicks` is the requested number of ticks per
+   * pose, for counting missing batches; 0 disables the count.
+   * @throws Malformed a pose is invalid or has the wrong number of joints. Earlier poses of the
+   *     batch stay stored.
    */
-  take(batch: PoseBatch, everyNTicks: number): void {
+  addBatch(batch: PoseBatch, everyNTicks: number): void {
     if (batch.jointCount !== this.jointCount) {
-      throw new Malformed('is not that of the figure', 'PoseBatch.jointCount');
+      throw new Malformed('differs from the skeleton', 'PoseBatch.jointCount');
     }
     ++this.counts.batches;
     const stream = streamOf(batch);
-    const shard = this.followShard(batch, everyNTicks);
+    const {partCount} = this.updateStream(batch, everyNTicks);
     this.newestS = Math.max(this.newestS, batch.serverTimeS);
 
     const startedMs = this.now();
@@ -130,7 +139,7 @@ export class WorldView {
       if (this.filter !== null && !this.filter.has(avatar)) continue;
       const leftTick = this.left.get(avatar);
       if (leftTick !== undefined && batch.tick < leftTick) continue;
-      const track = this.tracks.get(avatar) ?? this.begin(avatar, stream);
+      const track = this.tracks.get(avatar) ?? this.addTrack(avatar, stream);
       if (track === null) {
         ++this.counts.refused;
         continue;
@@ -140,59 +149,61 @@ export class WorldView {
         const slot = history.nextSlot();
         if (!reader.read(i, history.roots, 3 * slot, history.rotations,
                          4 * slot * this.jointCount)) {
-          throw new Malformed('is no pose', 'PoseBatch.poses', i);
+          throw new Malformed('is not a valid pose', 'PoseBatch.poses', i);
         }
         let flags = flagsOf(batch.flags[i]!, batch.mode);
         if (track.epoch !== this.epochNumber) flags |= PoseFlag.discontinuity;
         history.commit(batch.tick, batch.serverTimeS, flags);
         ++this.counts.poses;
         track.epoch = this.epochNumber;
-        if (track.gone) {
-          track.gone = false;
-          this.changeList();
+        if (track.removed) {
+          track.removed = false;
+          this.markListOutdated();
         }
-      } else if (batch.tick !== track.seenTick) {  // Equal ticks are a second subscription's.
+      } else if (batch.tick !== track.lastTick) {
+        // Not counted at the same tick: two subscriptions may contain the same avatar.
         ++this.counts.refused;
       }
       track.stream = stream;
-      track.seenTick = batch.tick;
+      track.lastTick = batch.tick;
     }
     this.counts.decodeMs += this.now() - startedMs;
-    if (shard.partsSeen >= batch.parts) this.sweep(stream, batch);
+    if (partCount >= batch.parts) this.removeAbsent(stream, batch);
   }
 
-  /** It has left the region observed at that tick; poses from before it that are still on their way do not bring it
-   * back. */
+  /** Removes an avatar that left the observed region at this tick. Older poses that arrive later do
+   * not add it again. */
   leave(avatar: number, tick: number): void {
     this.remove(avatar);
     if (this.left.has(avatar) || this.left.size < maxItems) this.left.set(avatar, tick);
   }
 
-  /** The server said that the avatar is gone. */
+  /** Removes an avatar from `avatars`. Its poses can still be sampled for a while. */
   remove(avatar: number): void {
     const track = this.tracks.get(avatar);
-    if (track !== undefined && !track.gone) {
-      track.gone = true;
-      this.changeList();
+    if (track !== undefined && !track.removed) {
+      track.removed = true;
+      this.markListOutdated();
     }
   }
 
-  /** Those that are there, in growing order. */
+  /** Returns the ids of the current avatars, ascending. A change replaces the array. */
   avatars(): Uint32Array {
-    if (this.listIsOld) {
-      this.listIsOld = false;
+    if (this.listIsOutdated) {
+      this.listIsOutdated = false;
       this.sorted = [...this.tracks.values()].sort((a, b) => a.avatar - b.avatar);
       this.list = Uint32Array.from(
-          this.sorted.filter((track) => !track.gone), (track) => track.avatar);
+          this.sorted.filter((track) => !track.removed), (track) => track.avatar);
     }
     return this.list;
   }
 
+  /** See `World.sample`. */
   sample(avatar: number, timeS: number, out: Pose): PoseKind {
     const track = this.tracks.get(avatar);
     if (track === undefined || track.history.size === 0) return 'missing';
     const history = track.history;
-    if (track.gone && timeS > history.newestTimeS) return 'missing';
+    if (track.removed && timeS > history.newestTimeS) return 'missing';
     if (out.rotations.length < 4 * history.jointCount) {
       out.rotations = new Float32Array(4 * history.jointCount);
     }
@@ -203,12 +214,14 @@ export class WorldView {
     out.tick = history.tickOf(slot);
     const flags = history.flagsOf(slot);
     out.standing = (flags & PoseFlag.standing) !== 0;
-    out.detail = (flags & PoseFlag.fewerJoints) !== 0 ? 'fewer' : (flags & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
+    out.detail = (flags & PoseFlag.reducedJoints) !== 0 ? 'reduced'
+        : (flags & PoseFlag.rootOnly) !== 0 ? 'root' : 'all';
     out.heldS = found === 2 ? timeS - history.timeOf(slot) : 0;
-    if (found === 2 && timeS > history.newestTimeS) ++this.counts.starved;
+    if (found === 2 && timeS > history.newestTimeS) ++this.counts.held;
     return found === 1 ? 'interpolated' : 'held';
   }
 
+  /** See `World.sampleAll`. */
   sampleAll(timeS: number, out: CrowdPose): number {
     this.avatars();
     const jointCount = this.jointCount;
@@ -216,7 +229,7 @@ export class WorldView {
     let count = 0;
     for (const track of this.sorted) {
       const history = track.history;
-      if (history.size === 0 || (track.gone && timeS > history.newestTimeS)) continue;
+      if (history.size === 0 || (track.removed && timeS > history.newestTimeS)) continue;
       const found = history.sample(timeS, out.rootsM, 3 * count, out.rotations,
                                    4 * jointCount * count);
       if (found === 0) continue;
@@ -226,7 +239,7 @@ export class WorldView {
       out.flags[count] = found === 2
           ? lasting | PoseFlag.held
           : lasting | (history.timeOf(slot) === timeS ? history.flagsOf(slot) : 0);
-      if (found === 2 && timeS > history.newestTimeS) ++this.counts.starved;
+      if (found === 2 && timeS > history.newestTimeS) ++this.counts.held;
       ++count;
     }
     out.count = count;
@@ -234,71 +247,74 @@ export class WorldView {
     return count;
   }
 
-  private followShard(batch: PoseBatch, everyNTicks: number): Shard {
+  private updateStream(batch: PoseBatch, everyNTicks: number): StreamState {
     const key = streamOf(batch);
-    let shard = this.shards.get(key);
-    if (shard === undefined) {
-      if (this.shards.size === maxShards) {
+    let stream = this.streams.get(key);
+    if (stream === undefined) {
+      if (this.streams.size === maxStreams) {
         throw new Malformed('poses come from too many shards', 'PoseBatch.shard');
       }
-      shard = {tick: 0, partsSeen: 0, epoch: 0};
-      this.shards.set(key, shard);
+      stream = {tick: 0, partCount: 0, epoch: 0};
+      this.streams.set(key, stream);
     }
-    if (shard.epoch !== this.epochNumber) {
-      shard.tick = batch.tick;
-      shard.partsSeen = 0;
-      shard.epoch = this.epochNumber;
-    } else if (batch.tick > shard.tick) {
-      // Of a region nothing comes at ticks at which nobody is due.
-      if (!batch.partial && everyNTicks > 0 && batch.tick - shard.tick > everyNTicks) {
-        this.counts.missing += Math.floor((batch.tick - shard.tick - 1) / everyNTicks);
+    if (stream.epoch !== this.epochNumber) {
+      stream.tick = batch.tick;
+      stream.partCount = 0;
+      stream.epoch = this.epochNumber;
+    } else if (batch.tick > stream.tick) {
+      // For a region, the server sends no batch at a tick at which no avatar is due.
+      if (!batch.partial && everyNTicks > 0 && batch.tick - stream.tick > everyNTicks) {
+        this.counts.missing += Math.floor((batch.tick - stream.tick - 1) / everyNTicks);
       }
-      shard.tick = batch.tick;
-      shard.partsSeen = 0;
-    } else if (batch.tick < shard.tick) {
+      stream.tick = batch.tick;
+      stream.partCount = 0;
+    } else if (batch.tick < stream.tick) {
       throw new Malformed('ticks of a shard run backwards', 'PoseBatch.tick');
     }
-    ++shard.partsSeen;
-    return shard;
+    ++stream.partCount;
+    return stream;
   }
 
-  private begin(avatar: number, stream: number): Track | null {
+  /** Returns null if the memory limit is reached. */
+  private addTrack(avatar: number, stream: number): Track | null {
     const bytes = PoseHistory.bytes(this.poseHistory, this.jointCount);
     if (this.budget.usedBytes + bytes > this.budget.limitBytes) return null;
     this.budget.usedBytes += bytes;
     const history = new PoseHistory(this.poseHistory, this.jointCount);
-    const track = {avatar, history, stream, seenTick: -1, epoch: 0, gone: false};
+    const track = {avatar, history, stream, lastTick: -1, epoch: 0, removed: false};
     this.tracks.set(avatar, track);
-    this.changeList();
+    this.markListOutdated();
     return track;
   }
 
-  /** After the last part of a shard's batch: who was not in it, but in one before, is gone. */
-  private sweep(stream: number, {tick, serverTimeS: timeS, partial}: PoseBatch): void {
+  /** Removes avatars that are missing from the complete batch of their stream. Erases avatars that
+   * were removed more than `keepRemovedS` ago. */
+  private removeAbsent(stream: number, {tick, serverTimeS: timeS, partial}: PoseBatch): void {
     for (const [avatar, leftTick] of partial ? this.left : []) {
       if (leftTick + keepLeftTicks < tick) this.left.delete(avatar);
     }
     for (const track of this.tracks.values()) {
-      if (!partial && track.stream === stream && track.seenTick < tick && !track.gone) {
-        track.gone = true;
-        this.changeList();
+      if (!partial && track.stream === stream && track.lastTick < tick && !track.removed) {
+        track.removed = true;
+        this.markListOutdated();
       }
-      if (track.gone && track.history.size > 0 && timeS - track.history.newestTimeS > keepGoneS) {
+      if (track.removed && track.history.size > 0 &&
+          timeS - track.history.newestTimeS > keepRemovedS) {
         this.erase(track);
       }
     }
   }
 
-  private changeList(): void {
-    this.listIsOld = true;
+  private markListOutdated(): void {
+    this.listIsOutdated = true;
     ++this.version;
   }
 
   private erase(track: Track): void {
     this.release(track);
     this.tracks.delete(track.avatar);
-    this.listIsOld = true;
-    if (!track.gone) ++this.version;
+    this.listIsOutdated = true;
+    if (!track.removed) ++this.version;
   }
 
   private release(track: Track): void {

@@ -10,8 +10,8 @@ import {readVectors} from './support/vectors';
 
 const frames = numberFrom('STRIDEWIRE_MUTATIONS', 5000);
 
-/** Something else in place of a few bytes, words or bits. Half of the frames keep their header, for
- * else little gets past it. */
+/** Returns a copy of a frame with a few bytes, words or bits changed. Half of the copies keep their
+ * header, because most frames with a changed header are rejected at once. */
 function mutate(from: ArrayBuffer, random: Random): ArrayBuffer {
   let frame = from.slice(0);
   const first = random.below(2) === 0 ? 16 : 0;
@@ -29,14 +29,16 @@ function mutate(from: ArrayBuffer, random: Random): ArrayBuffer {
       case 3: view.setUint32(word, random.below(64), true); break;
       case 4: view.setUint32(word, 0xffff_ffff - random.below(4), true); break;
       case 5: view.setUint32(word, view.getUint32(word, true) + random.below(65) - 32, true); break;
-      case 6: view.setFloat32(word, [NaN, Infinity, -Infinity, 1e38][random.below(4)]!, true); break;
-      case 7: {  // Bytes from elsewhere in it.
+      case 6:
+        view.setFloat32(word, [NaN, Infinity, -Infinity, 1e38][random.below(4)]!, true);
+        break;
+      case 7: {  // Copies bytes from elsewhere in the frame.
         const length = Math.min(1 + random.below(32), bytes - at);
         const source = random.below(bytes - length + 1);
         new Uint8Array(frame).copyWithin(at, source, source + length);
         break;
       }
-      default: {  // Cut short, at times with a header that says so.
+      default: {  // Cuts the frame, half of the time with a matching header.
         frame = frame.slice(0, at);
         if (frame.byteLength >= 16 && random.below(2) === 0) {
           frame = frame.slice(0, frame.byteLength & ~7);
@@ -48,10 +50,10 @@ function mutate(from: ArrayBuffer, random: Random): ArrayBuffer {
   return frame;
 }
 
-test(`${frames} mutated frames are refused or hold only what is known`, () => {
+test(`${frames} mutated frames are rejected or decode to valid messages`, () => {
   const random = new Random('mutated frames');
   const vectors = readVectors().filter(({frame}) => frame.byteLength < 1 << 16);
-  const count = {refused: 0, known: 0, 'refused pose': 0};
+  const count = {rejected: 0, valid: 0, 'invalid pose': 0};
   let slowestMs = 0;
   for (let i = 0; i < frames; ++i) {
     const vector = vectors[random.below(vectors.length)]!;
@@ -65,22 +67,22 @@ test(`${frames} mutated frames are refused or hold only what is known`, () => {
         console.log(`frame ${i}, from ${vector.name}: ${Buffer.from(frame).toString('hex')}`);
         throw error;
       }
-      ++count.refused;
+      ++count.rejected;
     }
     slowestMs = Math.max(slowestMs, performance.now() - startedMs);
   }
   console.log(`${JSON.stringify(count)}, slowest ${slowestMs.toFixed(1)} ms`);
-  assert.equal(count.refused + count.known + count['refused pose'], frames);
-  // Neither all nor none: else the mutations say nothing.
-  assert.ok(count.refused > frames / 4 && count.known > frames / 50, JSON.stringify(count));
+  assert.equal(count.rejected + count.valid + count['invalid pose'], frames);
+  // If nearly all or no mutations were rejected, this test would prove nothing.
+  assert.ok(count.rejected > frames / 4 && count.valid > frames / 50, JSON.stringify(count));
 });
 
 const skip = globalThis.gc === undefined &&
-  'memory cannot be measured: run node with --expose-gc, as scripts/test.mjs does';
-if (skip) console.log(`a test of mutated.test.ts is skipped: ${skip}`);
+  'measuring memory requires node --expose-gc, as in scripts/test.mjs';
+if (skip) console.log(`mutated.test.ts skips a test: ${skip}`);
 
-test('refused frames leave no memory behind', {skip}, () => {
-  const random = new Random('memory of refused frames');
+test('rejected frames do not leak memory', {skip}, () => {
+  const random = new Random('memory of rejected frames');
   const vectors = readVectors().filter(({frame}) => frame.byteLength < 1 << 16);
   const round = (): void => {
     for (let i = 0; i < 2000; ++i) {
@@ -99,5 +101,5 @@ test('refused frames leave no memory behind', {skip}, () => {
   for (let i = 0; i < 5; ++i) round();
   const after = process.memoryUsage();
   const grown = after.heapUsed + after.arrayBuffers - before.heapUsed - before.arrayBuffers;
-  assert.ok(grown < 4 << 20, `${grown} bytes more`);
+  assert.ok(grown < 4 << 20, `${grown} bytes leaked`);
 });

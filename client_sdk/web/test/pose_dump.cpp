@@ -1,5 +1,6 @@
-// web_pose_dump HOST PORT WORLD AVATAR POSES MODE: poses as the C++ library has them, one a line: tick,
-// time, root, rotations. What the web client's must equal.
+// web_pose_dump HOST PORT WORLD AVATAR POSES MODE
+// Prints the poses that the C++ client receives, for comparison with those of the web client. Each
+// line has tick, time in seconds, root position in metres and rotations.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -26,7 +27,8 @@ int main(int argc, char** argv) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(120);
   for (int count = 0; count < wanted;) {
     if (std::chrono::steady_clock::now() > end) {
-      std::fprintf(stderr, "web_pose_dump: %d of %d poses came within 120 s\n", count, wanted);
+      std::fprintf(stderr, "web_pose_dump: received only %d of %d poses within 120 s\n", count,
+                   wanted);
       return 1;
     }
     if (!client->NextPose(world, avatar, tick, pose) || pose.missing()) {

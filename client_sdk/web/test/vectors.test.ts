@@ -9,7 +9,7 @@ import {PoseReader} from '../src/wire/pose_codec';
 import {toJson} from './support/to_json';
 import {readVectors, vectorCodec} from './support/vectors';
 
-const tolerance = 1e-6;  // Of quantised rotations; all else is exact.
+const tolerance = 1e-6;  // For quantised rotations. Everything else is exact.
 
 function sameValues(actual: unknown, expected: unknown, where: string): void {
   if (Array.isArray(expected)) {
@@ -26,7 +26,7 @@ function sameValues(actual: unknown, expected: unknown, where: string): void {
     assert.equal(typeof actual, 'number', where);
     assert.ok(Math.abs(actual as number - expected) <= tolerance, `${where}: ${actual}`);
   } else if (typeof expected === 'number' && !Number.isInteger(expected)) {
-    // float32 fields stand in the JSON with as many digits as they need.
+    // The JSON has the shortest decimal that identifies a float32.
     assert.ok(actual === expected || Math.fround(expected) === actual, `${where}: ${actual}`);
   } else {
     assert.equal(actual, expected, where);
@@ -36,7 +36,7 @@ function sameValues(actual: unknown, expected: unknown, where: string): void {
 const vectors = readVectors();
 const fromServer = (typeNumber: number): boolean => typeNumber >= MessageType.Goodbye;
 
-test('there are vectors of every message type', () => {
+test('every message type has a vector', () => {
   assert.deepEqual([...new Set(vectors.map((vector) => vector.typeNumber))].sort((a, b) => a - b),
                    Object.values(MessageType).sort((a, b) => a - b));
 });
@@ -58,7 +58,7 @@ for (const vector of vectors) {
   }
 }
 
-test('a side of 0 is not an absent one', () => {
+test('encodes a side of 0 differently from an absent side', () => {
   const vector = vectors.find(({name}) => name === 'request')!;
   const message = decodeFrame(vector.frame, 'client');
   assert.ok(message.type === 'Request');
@@ -71,10 +71,11 @@ test('a side of 0 is not an absent one', () => {
   }
 });
 
-test('compact poses are read in any order, and not without their codes', () => {
-  const batch = decodeFrame(vectors.find(({name}) => name === 'pose_batch_compact')!.frame, 'server');
+test('decodes compact poses in any order, and only with their codec', () => {
+  const {frame} = vectors.find(({name}) => name === 'pose_batch_compact')!;
+  const batch = decodeFrame(frame, 'server');
   assert.ok(batch.type === 'PoseBatch');
-  assert.equal(batch.flags[1]! & 4, 4, 'the second is wide');
+  assert.equal(batch.flags[1]! & 4, 4, 'the second pose is wide');
   const read = (codec: CompactCodec | null, order: number[]): (number[] | null)[] => {
     const reader = new PoseReader({...batch, codec});
     const poses: (number[] | null)[] = [];
@@ -88,11 +89,11 @@ test('compact poses are read in any order, and not without their codes', () => {
   const inOrder = read(vectorCodec('compact'), [0, 1, 2]);
   assert.ok(inOrder.every((pose) => pose !== null));
   assert.deepEqual(read(vectorCodec('compact'), [2, 0, 1]), inOrder);
-  // A wide one means the same whatever the codes are.
+  // A wide pose does not depend on the codec.
   assert.deepEqual(read(null, [0, 1, 2]), [null, inOrder[1], null]);
 });
 
-test('what a detail leaves out is the reference, the rest as it was', () => {
+test('sets joints that a detail leaves out to their references', () => {
   const info = decodeFrame(vectors.find(({name}) => name === 'world_info_detail')!.frame, 'server');
   assert.ok(info.type === 'WorldInfo');
   const read = (name: string): Float32Array => {
@@ -104,11 +105,13 @@ test('what a detail leaves out is the reference, the rest as it was', () => {
     return rotations;
   };
   const all = read('pose_batch_compact');
-  for (const [name, told] of [['pose_batch_fewer', info.fewerJoints], ['pose_batch_root', [0]]] as const) {
+  const batches: [string, readonly number[]][] =
+      [['pose_batch_fewer', info.fewerJoints], ['pose_batch_root', [0]]];
+  for (const [name, joints] of batches) {
     const rotations = read(name);
     info.rotationCodes.forEach(({reference}, j) => {
-      const isTold = (told as readonly number[]).includes(j);
-      const expected = isTold ? all.subarray(4 * j, 4 * j + 4) : Float32Array.from(reference);
+      const expected =
+          joints.includes(j) ? all.subarray(4 * j, 4 * j + 4) : Float32Array.from(reference);
       assert.deepEqual(rotations.subarray(4 * j, 4 * j + 4), expected, `${name}, joint ${j}`);
     });
   }

@@ -11,7 +11,7 @@ import {verify} from '../src/wire/verify';
 import {root} from './support/environment';
 import {readVectors} from './support/vectors';
 
-/** What flatc's own readers say of a table: number of each field and the bytes read for it. */
+/** Extracts from flatc's generated reader of a table the expressions that read each field. */
 function readersOf(table: string): {reads: string}[] {
   const folder = `${root}client_sdk/web/generated/stridewire/wire`;
   const file = readdirSync(folder).find((name) =>
@@ -26,7 +26,7 @@ function readersOf(table: string): {reads: string}[] {
   return fields;
 }
 
-test('the layout of each table agrees with what flatc reads', () => {
+test('the layout of each table agrees with the generated readers', () => {
   const bytes: {[read: string]: number} = {
     readInt8: 1, readUint8: 1, readInt16: 2, readUint16: 2, readInt32: 4, readUint32: 4,
     readFloat32: 4, readInt64: 8, readUint64: 8, readFloat64: 8,
@@ -67,19 +67,19 @@ test('the layout of each table agrees with what flatc reads', () => {
   }
 });
 
-test('every vector is well-formed, and no part of one is', () => {
+test('accepts every vector and rejects truncated ones', () => {
   for (const {name, frame, type} of readVectors()) {
     const table = tableNumbers[type as MessageName];
     assert.ok(verify(new DataView(frame, 16), table, 1 << 20), name);
     if (frame.byteLength > 4096) continue;
-    // What the last bytes hold must be missed, up to the padding.
+    // Each of these lengths cuts off more than padding.
     for (const bytes of [0, 4, 8, (frame.byteLength - 16) >> 1]) {
       assert.ok(!verify(new DataView(frame, 16, bytes), table, 1 << 20), `${name}, ${bytes}`);
     }
   }
 });
 
-function refused(frame: ArrayBuffer, sender: Sender, why: RegExp): void {
+function assertRejected(frame: ArrayBuffer, sender: Sender, why: RegExp): void {
   assert.throws(() => decodeFrame(frame, sender),
                 (error) => error instanceof Malformed && why.test(error.message), `${why}`);
 }
@@ -90,26 +90,27 @@ function withHeader(change: (view: DataView) => void): ArrayBuffer {
   return frame;
 }
 
-test('headers are refused in the order of the standard', () => {
+test('checks headers in the order of the standard', () => {
   const spoilAfter = [
     (view: DataView) => view.setUint32(0, 0), (view: DataView) => view.setUint16(4, 2, true),
-    (view: DataView) => view.setUint16(6, 999, true), (view: DataView) => view.setUint16(6, 1, true),
+    (view: DataView) => view.setUint16(6, 999, true),
+    (view: DataView) => view.setUint16(6, 1, true),
     (view: DataView) => view.setUint32(12, 1, true),
     (view: DataView) => view.setUint32(8, (1 << 20) + 8, true),
     (view: DataView) => view.setUint32(8, 12, true), (view: DataView) => view.setUint32(8, 8, true),
   ];
   const why = [
-    /magic/, /version 2/, /type 999/, /other way/, /flags/, /longer than/, /multiple of 8/,
-    /not as long as/
+    /magic/, /version 2/, /type 999/, /this side/, /flags/, /longer than/, /multiple of 8/,
+    /length differs/
   ];
   why.forEach((sentence, i) => {
-    // What comes later in the order is wrong, too, and is not what is told.
-    refused(withHeader((view) => {
+    // Later checks would fail as well, but the first failure is reported.
+    assertRejected(withHeader((view) => {
       for (let k = spoilAfter.length - 1; k >= i; --k) spoilAfter[k]!(view);
     }), 'server', sentence);
   });
-  refused(new ArrayBuffer(0), 'server', /shorter/);
-  refused(new ArrayBuffer(15), 'server', /shorter/);
+  assertRejected(new ArrayBuffer(0), 'server', /shorter/);
+  assertRejected(new ArrayBuffer(15), 'server', /shorter/);
 });
 
 function message(name: MessageName, build: (b: Builder) => number): ArrayBuffer {
@@ -118,18 +119,18 @@ function message(name: MessageName, build: (b: Builder) => number): ArrayBuffer 
   return makeFrame(name, b.asUint8Array());
 }
 
-test('lists and texts that are too long are refused before they are copied', () => {
-  refused(message('Goodbye', (b) => wire.Goodbye.createGoodbye(
+test('rejects lists and texts that are too long before copying them', () => {
+  assertRejected(message('Goodbye', (b) => wire.Goodbye.createGoodbye(
       b, 0, b.createString('x'.repeat(1025)))), 'server', /too long/);
-  // 65,537 events, all the same one: small on the wire.
-  refused(message('Events', (b) => {
+  // 65,537 references to one event make a small frame.
+  assertRejected(message('Events', (b) => {
     wire.Event.startEvent(b);
     wire.Event.addAvatar(b, 1);
     const event = wire.Event.endEvent(b);
     const list = wire.Events.createEventsVector(b, new Array(65_537).fill(event));
     return wire.Events.createEvents(b, 1, 1n, 1n, list);
   }), 'server', /too long/);
-  refused(message('Reply', (b) => {
+  assertRejected(message('Reply', (b) => {
     wire.ReplyItem.startReplyItem(b);
     const item = wire.ReplyItem.endReplyItem(b);
     const list = wire.Reply.createItemsVector(b, new Array(70_000).fill(item));
@@ -137,17 +138,17 @@ test('lists and texts that are too long are refused before they are copied', () 
   }), 'server', /well-formed/);
 });
 
-test('texts are UTF-8 without control characters', () => {
+test('accepts texts only as UTF-8 without control characters', () => {
   const goodbye = (bytes: number[]): ArrayBuffer =>
       message('Goodbye', (b) => wire.Goodbye.createGoodbye(
           b, 0, b.createString(Uint8Array.from(bytes))));
   for (const bytes of [
     [0xc0, 0x80], [0xed, 0xa0, 0x80], [0xf4, 0x90, 0x80, 0x80], [0xe2, 0x82], [0x80], [0xff]
   ]) {
-    refused(goodbye(bytes), 'server', /UTF-8/);
+    assertRejected(goodbye(bytes), 'server', /UTF-8/);
   }
   for (const bytes of [[10], [0x7f], [0xc2, 0x85], [0]]) {
-    refused(goodbye(bytes), 'server', /control/);
+    assertRejected(goodbye(bytes), 'server', /control/);
   }
   const marked = decodeFrame(goodbye([0xef, 0xbb, 0xbf, 0x61]), 'server');
   assert.ok(marked.type === 'Goodbye' && marked.text === '\ufeffa');

@@ -8,8 +8,8 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
-#include "stridewire/offline/bvh_reader.h"
 #include "offline/build/layers.h"
+#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/open_library.h"
 
 namespace stridewire {
@@ -20,7 +20,7 @@ struct LayerSource {
   std::string path;
 };
 
-// Takes ":number" off the end of `text`.
+// Removes ":number" from the end of `text` and returns the number.
 std::optional<double> TakeTime(std::string_view& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string_view::npos) return std::nullopt;
@@ -32,7 +32,8 @@ std::optional<double> TakeTime(std::string_view& text) {
   return value;
 }
 
-// "wave=file.bvh:1.5:3": times belong together, and a file may have colons in its name.
+// Parses "wave=file.bvh:1.5:3". The two times are optional together. The file name may contain
+// colons.
 std::optional<LayerSource> ParseSource(std::string_view text) {
   const std::size_t equals = text.find('=');
   if (equals == std::string_view::npos || equals == 0) return std::nullopt;
@@ -56,24 +57,27 @@ std::optional<LayerSource> ParseSource(std::string_view text) {
 
 int RunAddLayers(const AddLayersCommand& command) {
   if (command.loops.empty() && command.once.empty()) {
-    return PrintError("add-layers: names no layer; give --layer or --layer-once");
+    return PrintError("add-layers: expected at least one --layer or --layer-once");
   }
   std::vector<LayerSource> sources;
   for (const auto* texts : {&command.loops, &command.once}) {
     for (const std::string& text : *texts) {
       auto source = ParseSource(text);
       if (!source) {
-        return PrintError("\"" + text + "\" is not NAME=FILE or NAME=FILE:FROM_S:TO_S");
+        return PrintError((texts == &command.loops ? "--layer" : "--layer-once") +
+                          (": expected NAME=FILE or NAME=FILE:FROM_S:TO_S, got \"" + text + "\""));
       }
       if (IsSameFile(command.out, source->path)) {
-        return PrintError("--out: " + command.out + " is a file to read from");
+        return PrintError("--out: " + command.out +
+                          " is also an input file; choose another output path");
       }
       source->cut.is_looping = texts == &command.loops;
       sources.push_back(*std::move(source));
     }
   }
   if (IsSameFile(command.out, command.library)) {
-    return PrintError("--out: " + command.out + " is the library to add to");
+    return PrintError("--out: " + command.out +
+                      " is the input library; choose another output path");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
     return PrintOutputError(status.error());
@@ -110,11 +114,11 @@ int RunAddLayers(const AddLayersCommand& command) {
                               {"hash", (*made)->hash()},
                               {"bytes", (*made)->bytes().size()}})
                             .c_str());
-    return kExitDone;
+    return kExitSuccess;
   }
   PrintLayers(**made);
   std::printf("%s: %zu bytes\n", command.out.c_str(), (*made)->bytes().size());
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

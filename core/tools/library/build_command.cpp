@@ -9,8 +9,8 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
-#include "progress.h"
 #include "offline/extract/assemble.h"
+#include "progress.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 
@@ -77,19 +77,19 @@ Json SelectionToJson(const std::vector<GroupSelection>& selections) {
 
 void PrintFile(const Extraction& extraction) {
   if (!extraction.error.empty()) {
-    std::printf("%s: left out\n", extraction.path.c_str());  // why is on stderr
+    std::printf("%s: left out\n", extraction.path.c_str());  // The reason is on stderr.
     return;
   }
-  std::printf("%s: %d frames at %.0f a second; %d left and %d right steps, %d jumps\n",
+  std::printf("%s: %d frames at %.0f per second; %d left and %d right steps, %d jumps\n",
               extraction.path.c_str(), extraction.frames, extraction.fps, extraction.steps_left,
               extraction.steps_right, extraction.jumps);
   for (const std::string& note : extraction.notes) std::printf("  note: %s\n", note.c_str());
   for (const RejectedTime& time : extraction.rejected) {
-    std::printf("  left out %.2f-%.2f s: %s\n", time.from_s, time.to_s, time.reason.c_str());
+    std::printf("  rejected %.2f-%.2f s: %s\n", time.from_s, time.to_s, time.reason.c_str());
   }
 }
 
-// The reader names options by their fields: unit_m is --unit-m here.
+// Translates an option name of the BVH reader to that of the command line: unit_m to --unit-m.
 Error NameOption(Error error) {
   for (const char* field :
        {"unit_m", "fps", "left_ankle", "right_ankle", "left_ball", "right_ball"}) {
@@ -102,13 +102,13 @@ Error NameOption(Error error) {
   return error;
 }
 
-// Why a file was left out, as a sentence that names it.
+// Returns why a file was left out, in a sentence that begins with its path.
 std::string WithPath(const Extraction& extraction) {
   return extraction.error.starts_with(extraction.path) ? extraction.error
                                                        : extraction.path + ": " + extraction.error;
 }
 
-// "step,jump" into the assembler's switches; empty when fine, else what is wrong.
+// Parses "step,jump". Returns an error message, or an empty string on success.
 std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
   options.steps = options.jumps = false;
   std::istringstream list(kinds);
@@ -118,10 +118,10 @@ std::string ParseKinds(const std::string& kinds, AssembleOptions& options) {
     } else if (kind == "jump") {
       options.jumps = true;
     } else {
-      return "--kinds: \"" + kind + "\" is not a kind; there are step and jump";
+      return "--kinds: expected step, jump or both separated by a comma, got \"" + kind + "\"";
     }
   }
-  return options.steps || options.jumps ? "" : "--kinds: names no kind";
+  return options.steps || options.jumps ? "" : "--kinds: expected step or jump, got nothing";
 }
 
 }  // namespace
@@ -135,7 +135,8 @@ int RunBuild(const BuildCommand& command) {
   }
   for (const std::string& path : command.files) {
     if (IsSameFile(command.out, path)) {
-      return PrintError("--out: " + command.out + " is a file to read from");
+      return PrintError("--out: " + command.out +
+                        " is also an input file; choose another output path");
     }
   }
   if (Status status = CheckOutputFile(command.out); !status) {
@@ -146,9 +147,9 @@ int RunBuild(const BuildCommand& command) {
   read.fps = command.fps;
   if (!command.up.empty()) {
     read.up = ParseAxis(command.up);
-    if (!read.up)
-      return PrintError("--up: \"" + command.up +
-                      "\" is not an axis; there are x, y, z, -x, -y and -z");
+    if (!read.up) {
+      return PrintError("--up: expected x, y, z, -x, -y or -z, got \"" + command.up + "\"");
+    }
   }
   read.left_ankle = command.left_ankle;
   read.right_ankle = command.right_ankle;
@@ -156,15 +157,15 @@ int RunBuild(const BuildCommand& command) {
   read.right_ball = command.right_ball;
 
   if (command.left_ankle.empty() != command.right_ankle.empty()) {
-    return PrintError("--left-ankle and --right-ankle belong together: give both or none");
+    return PrintError("--left-ankle and --right-ankle: set both options or neither");
   }
 
   const InterruptSignal interrupt_signal;
   Progress progress("building");
-  const char* const stopped = "stopped; nothing was written";
+  const char* const stopped = "interrupted; no file written";
   LibraryAssembler assembler(options);
   Json files = Json::array();
-  // The next file is read while movements are sought in this one.
+  // Reads the next file while the assembler extracts movements from the current one.
   const auto start_reading = [&](std::size_t i) {
     return i < command.files.size()
                ? std::async(
@@ -175,10 +176,10 @@ int RunBuild(const BuildCommand& command) {
   std::future<Expected<Capture>> reading = start_reading(0);
   for (std::size_t i = 0; i < command.files.size(); ++i) {
     const std::string& path = command.files[i];
-    progress.Show(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
+    progress.Update(static_cast<double>(i) / static_cast<double>(command.files.size() + 1));
     const auto capture = reading.get();
     reading = start_reading(i + 1);
-    if (InterruptSignal::IsAsked()) return PrintError(stopped, kExitFailure);
+    if (InterruptSignal::IsRaised()) return PrintError(stopped, kExitFailure);
     Extraction unreadable;
     if (!capture) {
       unreadable.path = path;
@@ -186,23 +187,23 @@ int RunBuild(const BuildCommand& command) {
     }
     const Extraction& extraction = capture ? assembler.Add(*capture) : unreadable;
     files.push_back(FileToJson(extraction));
-    progress.Hide();
+    progress.Clear();
     if (!command.json) PrintFile(extraction);
     if (!extraction.error.empty()) {
       PrintError(WithPath(extraction));
     }
   }
 
-  progress.Show(static_cast<double>(command.files.size()) /
-                static_cast<double>(command.files.size() + 1));
+  progress.Update(static_cast<double>(command.files.size()) /
+                  static_cast<double>(command.files.size() + 1));
   const auto raw = assembler.Assemble();
   if (!raw) return PrintInputError(raw.error());
   LibraryBuilder builder = command.all ? LibraryBuilder() : LibraryBuilder::Selecting();
   if (!command.all) builder.selection.max_pose_error_m = command.max_pose_error_m;
   const auto library = builder.Build(*raw);
-  progress.Hide();
+  progress.Clear();
   if (!library) return PrintInputError(library.error());
-  if (InterruptSignal::IsAsked()) return PrintError(stopped, kExitFailure);
+  if (InterruptSignal::IsRaised()) return PrintError(stopped, kExitFailure);
   if (Status status = WriteFile(command.out, (*library)->bytes()); !status) {
     return PrintOutputError(status.error());
   }
@@ -212,7 +213,7 @@ int RunBuild(const BuildCommand& command) {
     json["selection"] = SelectionToJson(builder.selections);
     json["library"] = LibraryToJson(**library, false);
     std::printf("%s\n", Dump(json).c_str());
-    return kExitDone;
+    return kExitSuccess;
   }
   std::printf("\n%s: %zu bytes\n", command.out.c_str(), (*library)->bytes().size());
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
@@ -227,7 +228,7 @@ int RunBuild(const BuildCommand& command) {
   for (const LibraryBuilder::Note& note : builder.notes) {
     std::printf("  group %d: %s\n", note.group, note.text.c_str());
   }
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

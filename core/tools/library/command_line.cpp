@@ -21,14 +21,14 @@ Status CheckOutputFile(const std::filesystem::path& path) {
   std::error_code ignored;
   const std::filesystem::file_status status = std::filesystem::status(path, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    return Fail(ErrorCode::kIo, "is there already and no plain file", path.string());
+    return Fail(ErrorCode::kIo, "exists and is not a regular file", path.string());
   }
   const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
   if (!std::filesystem::is_directory(folder, ignored)) {
-    return Fail(ErrorCode::kIo, "its folder is not there", path.string());
+    return Fail(ErrorCode::kIo, "the folder does not exist", path.string());
   }
   if (::access(folder.c_str(), W_OK | X_OK) != 0) {
-    return Fail(ErrorCode::kIo, "its folder cannot be written to", path.string());
+    return Fail(ErrorCode::kIo, "the folder is not writable", path.string());
   }
   return {};
 }
@@ -48,7 +48,7 @@ Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> b
     if (!out) {
       std::error_code ignored;
       std::filesystem::remove(partial, ignored);
-      return Fail(ErrorCode::kIo, "the file cannot be written", path.string());
+      return Fail(ErrorCode::kIo, "cannot write the file", path.string());
     }
   }
   std::error_code failed;
@@ -56,7 +56,7 @@ Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> b
   if (failed) {
     std::error_code ignored;
     std::filesystem::remove(partial, ignored);
-    return Fail(ErrorCode::kIo, "the file cannot be put in its place", path.string());
+    return Fail(ErrorCode::kIo, "cannot rename the temporary file to this path", path.string());
   }
   return {};
 }

@@ -8,28 +8,28 @@
 
 namespace stridewire {
 
-// Exit codes every Stridewire program uses.
-inline constexpr int kExitDone = 0;
-inline constexpr int kExitFailure = 1;
-inline constexpr int kExitBadInput = 2;
+// Exit codes; all Stridewire programs use the same.
+inline constexpr int kExitSuccess = 0;
+inline constexpr int kExitFailure = 1;   // The environment failed, for example a full disk.
+inline constexpr int kExitBadInput = 2;  // An option, a file or one of its fields is wrong.
 
-// Prints one sentence on stderr. Returns the exit code.
+// Prints one line on stderr and returns `exit_code`.
 int PrintError(const std::string& sentence, int exit_code = kExitBadInput);
 
-// What was given (files, options, fields) is wrong: kExitBadInput, unreadable files included.
+// For errors in options and input files, including files that cannot be read.
 int PrintInputError(const Error& error);
 
-// What was to be made cannot be: kExitFailure.
+// For errors while writing output.
 int PrintOutputError(const Error& error);
 
-// Whether a file could be put at `path`: found out before the work, not after it. Only plain files
-// are replaced: a rename would turn /dev/null into one.
+// Checks before the work starts whether a file can be written at `path`. Rejects anything but a
+// regular file, since renaming over /dev/null would replace the device.
 [[nodiscard]] Status CheckOutputFile(const std::filesystem::path& path);
 
-// Whether both name the same existing file.
+// Returns true if both paths name the same existing file.
 [[nodiscard]] bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
-// Writes beside the path and renames, so that no half file is ever seen.
+// Writes a temporary file next to `path` and renames it, so that a partial file is never visible.
 [[nodiscard]] Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace stridewire

@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-// One subcommand each: options as the command line gave them. Run* returns the exit code.
+// One struct of command line options per command. The Run functions return the exit code.
 
 struct BuildCommand {
   std::vector<std::string> files;
@@ -16,10 +16,10 @@ struct BuildCommand {
   bool all = false;
   double max_pose_error_m = 0.025;
   bool json = false;
-  std::optional<double> unit_m;  // else found
+  std::optional<double> unit_m;  // Empty: detected.
   std::string left_ankle, right_ankle, left_ball, right_ball;
   std::string up;
-  std::optional<double> fps;  // else the file's
+  std::optional<double> fps;  // Empty: the Frame Time of each file.
 };
 int RunBuild(const BuildCommand& command);
 
@@ -66,8 +66,8 @@ struct AddLayersCommand {
   std::string library;
   std::string out;
   std::vector<std::string> loops;   // NAME=FILE[:FROM_S:TO_S]
-  std::vector<std::string> once;    // likewise
-  std::vector<std::string> joints;  // empty: the upper body
+  std::vector<std::string> once;    // Same format.
+  std::vector<std::string> joints;  // Empty: the upper body.
   bool json = false;
 };
 int RunAddLayers(const AddLayersCommand& command);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kExportFps = 120.0;
 
-// An example as stored: the movement with all weight on it, from its first to its last keytime.
+// Samples a stored example: the movement with weight 1 for it, from its first to its last keytime.
 Clip ExampleClip(const MotionLibrary& library, int group_index, int example) {
   const MotionGroup& group = library.group(group_index);
   const int joint_count = library.skeleton().joint_count();
@@ -39,7 +39,7 @@ int RunExport(const ExportCommand& command) {
   if (!library) return PrintInputError(library.error());
   std::error_code failed;
   std::filesystem::create_directories(command.out, failed);
-  if (failed) return PrintError(command.out + ": the folder cannot be made", kExitFailure);
+  if (failed) return PrintError(command.out + ": cannot create the folder", kExitFailure);
   int count = 0;
   for (std::size_t g = 0; g < (*library)->groups().size(); ++g) {
     const MotionGroup& group = (*library)->groups()[g];
@@ -56,7 +56,7 @@ int RunExport(const ExportCommand& command) {
     }
   }
   std::printf("%s: %d examples\n", command.out.c_str(), count);
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

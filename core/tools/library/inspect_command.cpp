@@ -13,7 +13,7 @@ int RunInspect(const InspectCommand& command) {
   const nlohmann::ordered_json json = LibraryToJson(**library, command.examples);
   if (command.json) {
     std::printf("%s\n", Dump(json).c_str());
-    return kExitDone;
+    return kExitSuccess;
   }
   std::printf("%s: format %d, %zu bytes, hash %s\n", command.library.c_str(),
               MotionLibrary::kFormatVersion, (*library)->bytes().size(),
@@ -32,17 +32,16 @@ int RunInspect(const InspectCommand& command) {
       std::printf("  %-10s %7.3f to %7.3f\n", std::string(ParameterText(parameter.name)).c_str(),
                   parameter.min, parameter.max);
     }
-    std::printf(
-        "  misses what is asked by %.1f mm at most, %.1f mm in the mean (%d samples); %.2f mm "
-        "at most after correction\n",
-        1000.0 * entry["error_m"]["max"].get<double>(),
-        1000.0 * entry["error_m"]["mean"].get<double>(), entry["error_m"]["samples"].get<int>(),
-        1000.0 * entry["corrected_error_m"]["max"].get<double>());
-    std::printf("  |w| sum to %.2f at most; condition %.1f\n",
+    std::printf("  error %.1f mm max, %.1f mm mean (%d samples); %.2f mm max after correction\n",
+                1000.0 * entry["error_m"]["max"].get<double>(),
+                1000.0 * entry["error_m"]["mean"].get<double>(),
+                entry["error_m"]["samples"].get<int>(),
+                1000.0 * entry["corrected_error_m"]["max"].get<double>());
+    std::printf("  sum of |w| %.2f max; condition %.1f\n",
                 entry["weights"]["sum_max"].get<double>(),
                 entry["weights"]["condition"].get<double>());
     if (entry.contains("unrefined_error_m")) {
-      std::printf("  %d pseudoexamples; without them %.1f mm at most, %.1f mm in the mean\n",
+      std::printf("  %d pseudoexamples; without them error %.1f mm max, %.1f mm mean\n",
                   group.site_count - group.example_count,
                   1000.0 * entry["unrefined_error_m"]["max"].get<double>(),
                   1000.0 * entry["unrefined_error_m"]["mean"].get<double>());
@@ -60,7 +59,7 @@ int RunInspect(const InspectCommand& command) {
     }
   }
   PrintTransitions(**library, command.examples);
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

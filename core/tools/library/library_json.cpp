@@ -134,7 +134,7 @@ Json LibraryToJson(const MotionLibrary& library, bool examples) {
 
 namespace {
 
-// "group 4, 16_01.bvh 0.93-1.47 s" or "stand".
+// Returns "group 4, 16_01.bvh 0.93-1.47 s" or "stand".
 std::string ExampleText(const MotionLibrary& library, std::size_t node, int example) {
   if (node == library.groups().size()) return "stand";
   const MotionGroup& group = library.groups()[node];
@@ -171,14 +171,14 @@ Json TransitionsToJson(const MotionLibrary& library) {
 
 void PrintTransitions(const MotionLibrary& library, bool examples) {
   if (library.transitions().empty()) {
-    std::printf("\nno transitions: made before there were any\n");
+    std::printf("\nno transitions (the library was built by an older version)\n");
     return;
   }
-  // Of the groups of a kind the ones that meet best.
+  // Several groups may have the same kind: print the best transition between any of them.
   const std::size_t nodes = library.groups().size() + 1;
   constexpr std::array kKinds{MovementKind::kStepLeft, MovementKind::kStepRight,
                               MovementKind::kJump, MovementKind::kStand};
-  std::printf("\ntransitions, where ends and starts meet best:\n");
+  std::printf("\nbest transition between each two kinds, distance of the poses in metres:\n");
   for (const MovementKind from : kKinds) {
     for (const MovementKind to : kKinds) {
       if (from == to && from == MovementKind::kStand) continue;
@@ -227,8 +227,8 @@ Json LayersToJson(const MotionLibrary& library) {
 void PrintLayers(const MotionLibrary& library) {
   for (const LayerClip& layer : library.layers()) {
     std::printf(
-        "layer %s: %.2f s, %s, %zu joints from %s on, %s\n", std::string(layer.name).c_str(),
-        layer.duration_s(), layer.is_looping ? "a loop" : "once", layer.joints.size(),
+        "layer %s: %.2f s, %s, %zu joints from %s on, from %s\n", std::string(layer.name).c_str(),
+        layer.duration_s(), layer.is_looping ? "looping" : "plays once", layer.joints.size(),
         library.skeleton().joints[static_cast<std::size_t>(layer.joints.front())].name.c_str(),
         std::string(layer.source).c_str());
   }

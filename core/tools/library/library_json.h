@@ -8,23 +8,24 @@
 
 namespace stridewire {
 
-// `inspect --json`; with `examples` every site, so that anyone can recompute every weight.
+// The output of `inspect --json`. With `examples` it contains all sites and weights, so that other
+// programs can recompute the interpolation.
 [[nodiscard]] nlohmann::ordered_json LibraryToJson(const MotionLibrary& library, bool examples);
 
-// {"start_z_m": …, "end_z_m": …}
+// {"start_z_m": ..., "end_z_m": ...}
 [[nodiscard]] nlohmann::ordered_json ParametersToJson(const MotionGroup& group,
                                                       const ParameterValues& values);
 [[nodiscard]] nlohmann::ordered_json BaseToJson(const BaseFrame& base);
 
-// Text that came from a file, safe to print as JSON: bytes that are not UTF-8 are replaced.
+// Serializes JSON that may contain text from a file; invalid UTF-8 is replaced.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json);
 
-// What layers a library has, for reading by programs and by people.
+// The layers of a library, as JSON and as text on stdout.
 [[nodiscard]] nlohmann::ordered_json LayersToJson(const MotionLibrary& library);
 void PrintLayers(const MotionLibrary& library);
 
-// How its movements go on where others end: of every two groups; people see the best of every two
-// kinds, with `examples` between which.
+// The transitions of a library. The JSON has one entry per pair of groups. The text has the best
+// transition per pair of movement kinds, and with `examples` the examples it connects.
 [[nodiscard]] nlohmann::ordered_json TransitionsToJson(const MotionLibrary& library);
 void PrintTransitions(const MotionLibrary& library, bool examples);
 

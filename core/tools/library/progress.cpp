@@ -10,21 +10,21 @@
 namespace stridewire {
 namespace {
 
-volatile std::sig_atomic_t g_is_asked = 0;
+volatile std::sig_atomic_t g_is_raised = 0;
 
-void Ask(int) { g_is_asked = 1; }
+void Raise(int) { g_is_raised = 1; }
 
-constexpr auto kEvery = std::chrono::milliseconds(200);
-// Before this the time left is a guess at best.
-constexpr auto kSilence = std::chrono::milliseconds(500);
+constexpr auto kUpdateInterval = std::chrono::milliseconds(200);
+// Before this, the estimate of the time left is too uncertain to print.
+constexpr auto kFirstUpdate = std::chrono::milliseconds(500);
 
 }  // namespace
 
 InterruptSignal::InterruptSignal() {
-  g_is_asked = 0;
+  g_is_raised = 0;
   struct sigaction action{};
-  action.sa_handler = Ask;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // the second one is not caught
+  action.sa_handler = Raise;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);  // The second signal has its default effect.
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
@@ -35,7 +35,7 @@ InterruptSignal::~InterruptSignal() {
   std::signal(SIGTERM, SIG_DFL);
 }
 
-bool InterruptSignal::IsAsked() { return g_is_asked != 0; }
+bool InterruptSignal::IsRaised() { return g_is_raised != 0; }
 
 Progress::Progress(std::string what)
     : what_(std::move(what)),
@@ -43,13 +43,13 @@ Progress::Progress(std::string what)
       start_(Clock::now()),
       last_(start_) {}
 
-Progress::~Progress() { Hide(); }
+Progress::~Progress() { Clear(); }
 
-void Progress::Show(double done) {
+void Progress::Update(double done) {
   const Clock::time_point now = Clock::now();
-  if (!is_terminal_ || now - last_ < kEvery || now - start_ < kSilence) return;
+  if (!is_terminal_ || now - last_ < kUpdateInterval || now - start_ < kFirstUpdate) return;
   last_ = now;
-  is_shown_ = true;
+  is_visible_ = true;
   const double elapsed_s = std::chrono::duration<double>(now - start_).count();
   done = std::clamp(done, 0.0, 1.0);
   std::fprintf(stderr, "\r\033[K%s: %.0f %%", what_.c_str(), 100.0 * done);
@@ -57,8 +57,8 @@ void Progress::Show(double done) {
   std::fflush(stderr);
 }
 
-void Progress::Hide() {
-  if (!std::exchange(is_shown_, false)) return;
+void Progress::Clear() {
+  if (!std::exchange(is_visible_, false)) return;
   std::fprintf(stderr, "\r\033[K");
   std::fflush(stderr);
 }

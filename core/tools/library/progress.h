@@ -5,8 +5,8 @@
 
 namespace stridewire {
 
-// While it lives, Ctrl-C and SIGTERM only ask the work to stop, so that it can leave no half file; a
-// second one ends the program at once. One at a time.
+// Catches SIGINT and SIGTERM during its lifetime, so that a command can stop without leaving a
+// partial file. A second signal ends the program at once. At most one instance may exist.
 class InterruptSignal {
  public:
   InterruptSignal();
@@ -14,11 +14,11 @@ class InterruptSignal {
   InterruptSignal(const InterruptSignal&) = delete;
   InterruptSignal& operator=(const InterruptSignal&) = delete;
 
-  [[nodiscard]] static bool IsAsked();
+  [[nodiscard]] static bool IsRaised();
 };
 
-// A line on stderr that says how far some work is and how long it may still take: "refining: 45 %, 3 s
-// left". Only if stderr is a terminal; gone when this goes.
+// A progress line on stderr with the estimated time left: "refining: 45 %, 3 s left". Prints only
+// if stderr is a terminal. The destructor removes the line.
 class Progress {
  public:
   explicit Progress(std::string what);
@@ -26,18 +26,18 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  // `done` from 0 to 1.
-  void Show(double done);
+  // `done` is in [0, 1].
+  void Update(double done);
 
-  // Takes the line away, so that something else can be printed.
-  void Hide();
+  // Removes the line, so that the program can print something else.
+  void Clear();
 
  private:
   using Clock = std::chrono::steady_clock;
 
   std::string what_;
   bool is_terminal_ = false;
-  bool is_shown_ = false;
+  bool is_visible_ = false;
   Clock::time_point start_;
   Clock::time_point last_;
 };

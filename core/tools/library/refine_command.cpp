@@ -3,10 +3,10 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
+#include "offline/build/refine.h"
 #include "progress.h"
 #include "refinement_json.h"
 #include "stridewire/offline/open_library.h"
-#include "offline/build/refine.h"
 
 namespace stridewire {
 namespace {
@@ -15,12 +15,12 @@ void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefineme
   std::printf("group %zu: %s, %d examples, %d parameters, %d pseudoexamples (%s)\n", index,
               std::string(MovementKindName(group.kind)).c_str(), group.example_count,
               group.parameter_count(), group.site_count - group.example_count,
-              refined.end == RefineEnd::kErrorReached   ? "error reached"
-              : refined.end == RefineEnd::kCountReached ? "no more allowed"
-                                                        : "no further one helps");
+              refined.end == RefineEnd::kErrorReached   ? "target error reached"
+              : refined.end == RefineEnd::kCountReached ? "maximum number reached"
+                                                        : "no further improvement");
   const auto print = [](const char* when, const GroupQuality& quality) {
     std::printf(
-        "  %-7s misses by %.2f mm at most, %.2f mm in the mean; |w| sum to %.2f at most, "
+        "  %-7s error %.2f mm max, %.2f mm mean; sum of |w| %.2f max; "
         "condition %.1f\n",
         when, 1000.0 * quality.max_error_m, 1000.0 * quality.mean_error_m, quality.weight_sum_max,
         quality.condition);
@@ -28,7 +28,7 @@ void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefineme
   print("before", refined.before);
   print("after", refined.after);
   if (group.site_count > group.example_count) {
-    std::printf("  at pseudoexamples by %.5f mm\n", 1000.0 * refined.pseudoexample_error_m);
+    std::printf("  at pseudoexamples: error %.5f mm\n", 1000.0 * refined.pseudoexample_error_m);
   }
 }
 
@@ -37,7 +37,8 @@ void PrintGroup(std::size_t index, const MotionGroup& group, const GroupRefineme
 int RunRefine(const RefineCommand& command) {
   const InterruptSignal interrupt_signal;
   if (IsSameFile(command.out, command.library)) {
-    return PrintError("--out: " + command.out + " is the library to refine");
+    return PrintError("--out: " + command.out +
+                      " is the input library; choose another output path");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
     return PrintOutputError(status.error());
@@ -51,12 +52,12 @@ int RunRefine(const RefineCommand& command) {
   options.max_error_m = command.max_error_m;
   options.max_pseudoexamples = command.max_pseudoexamples;
   options.progress = [&](double done) {
-    progress.Show(done);
-    return !InterruptSignal::IsAsked();
+    progress.Update(done);
+    return !InterruptSignal::IsRaised();
   };
   const auto refined = Refine(*library, options);
-  progress.Hide();
-  if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
+  progress.Clear();
+  if (InterruptSignal::IsRaised()) return PrintError("interrupted; no file written", kExitFailure);
   if (!refined) return PrintInputError(refined.error());
   if (Status status = WriteFile(command.out, refined->library->bytes()); !status) {
     return PrintOutputError(status.error());
@@ -73,13 +74,13 @@ int RunRefine(const RefineCommand& command) {
     }
     json["library"] = LibraryToJson(*refined->library, false);
     std::printf("%s\n", Dump(json).c_str());
-    return kExitDone;
+    return kExitSuccess;
   }
   for (std::size_t g = 0; g < refined->groups.size(); ++g) {
     PrintGroup(g, refined->library->groups()[g], refined->groups[g]);
   }
   std::printf("%s: %zu bytes\n", command.out.c_str(), refined->library->bytes().size());
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

@@ -6,7 +6,8 @@
 
 namespace stridewire {
 
-// What `refine --json` and `report --json` say of a group. `samples`: of the hull, examples not counted.
+// The JSON of one group in `refine --json` and `report --json`. `samples`: number of points sampled
+// in the hull, without the examples.
 [[nodiscard]] nlohmann::ordered_json RefinementToJson(const MotionGroup& group,
                                                       const GroupRefinement& refined, int samples);
 

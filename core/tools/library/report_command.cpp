@@ -6,10 +6,10 @@
 #include "command_line.h"
 #include "commands.h"
 #include "library_json.h"
+#include "offline/extract/assemble.h"
 #include "progress.h"
 #include "refinement_json.h"
 #include "report/report.h"
-#include "offline/extract/assemble.h"
 #include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
@@ -18,6 +18,8 @@ namespace stridewire {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kInterrupted = "interrupted; no file written";
 
 Json ReportToJson(const Report& report, const ReportCommand& command) {
   Json json;
@@ -62,12 +64,12 @@ Json RealismToJson(const MotionLibrary& captured, const std::vector<LeaveOneOut>
   return json;
 }
 
-// Every usable movement of the captures. Null: one of them or all could not be used, which has been
-// said; or it was interrupted.
+// Reads every usable movement of the captures. Returns null if it printed an error or was
+// interrupted.
 std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>& paths) {
   LibraryAssembler assembler;
   for (const std::string& path : paths) {
-    if (InterruptSignal::IsAsked()) return nullptr;
+    if (InterruptSignal::IsRaised()) return nullptr;
     const auto capture = ReadBvh(path);
     if (!capture) {
       PrintInputError(capture.error());
@@ -92,7 +94,7 @@ std::shared_ptr<const MotionLibrary> ReadCaptures(const std::vector<std::string>
   return *library;
 }
 
-// The page comes last: where it is, its pictures are as well.
+// Writes the page last: if it exists, its pictures exist as well.
 Status WriteReport(const Report& report, const std::filesystem::path& folder) {
   for (const ReportPicture& picture : report.pictures) {
     const auto bytes = std::as_bytes(std::span(picture.svg));
@@ -108,7 +110,7 @@ int RunReport(const ReportCommand& command) {
   std::error_code failed;
   const std::filesystem::path folder = command.out;
   if (std::filesystem::exists(folder, failed) && !std::filesystem::is_directory(folder, failed)) {
-    return PrintError(command.out + ": is there already and no folder", kExitFailure);
+    return PrintError(command.out + ": exists and is not a folder", kExitFailure);
   }
   const auto library = OpenLibrary(command.library);
   if (!library) return PrintInputError(library.error());
@@ -116,7 +118,7 @@ int RunReport(const ReportCommand& command) {
   std::shared_ptr<const MotionLibrary> captured;
   if (!command.captures.empty()) {
     captured = ReadCaptures(command.captures);
-    if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
+    if (InterruptSignal::IsRaised()) return PrintError(kInterrupted, kExitFailure);
     if (captured == nullptr) return kExitBadInput;
   }
 
@@ -128,17 +130,17 @@ int RunReport(const ReportCommand& command) {
                             .max_pseudoexamples = command.max_pseudoexamples,
                             .captured = captured,
                             .progress = [&](double done) {
-                              progress.Show(done);
-                              return !InterruptSignal::IsAsked();
+                              progress.Update(done);
+                              return !InterruptSignal::IsRaised();
                             }});
-  progress.Hide();
-  if (InterruptSignal::IsAsked()) return PrintError("stopped; nothing was written", kExitFailure);
+  progress.Clear();
+  if (InterruptSignal::IsRaised()) return PrintError(kInterrupted, kExitFailure);
   if (!report) {
     return report.error().code == ErrorCode::kOutOfRange ? PrintInputError(report.error())
                                                          : PrintOutputError(report.error());
   }
   std::filesystem::create_directories(folder, failed);
-  if (failed) return PrintError(command.out + ": the folder cannot be made", kExitFailure);
+  if (failed) return PrintError(command.out + ": cannot create the folder", kExitFailure);
   if (Status status = WriteReport(*report, folder); !status) {
     return PrintOutputError(status.error());
   }
@@ -149,7 +151,7 @@ int RunReport(const ReportCommand& command) {
   } else {
     std::printf("%s: index.html and %zu pictures\n", command.out.c_str(), report->pictures.size());
   }
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

@@ -52,7 +52,8 @@ Json RecordToJson(const MotionLibrary& library, const MovementRecord& record) {
 
 int RunSynthesize(const SynthesizeCommand& command) {
   if (IsSameFile(command.out, command.choreography) || IsSameFile(command.out, command.library)) {
-    return PrintError("--out: " + command.out + " is a file to read from");
+    return PrintError("--out: " + command.out +
+                      " is also an input file; choose another output path");
   }
   if (Status status = CheckOutputFile(command.out); !status) {
     return PrintOutputError(status.error());
@@ -96,39 +97,40 @@ int RunSynthesize(const SynthesizeCommand& command) {
                                {"end_s", walk.end_s},
                                {"base", BaseToJson(walk.base)}});
     }
-    json["refusals"] = Json::array();
-    for (const UnreachableFootprint& refusal : synthesis->unreachable_footprints) {
-      const Footprint& nearest = refusal.missed.nearest;
-      json["refusals"].push_back(
-          {{"request", refusal.request_id - 1},
-           {"reason", refusal.reason},
-           {"time_s", refusal.time_s},
+    json["unreachable_footprints"] = Json::array();
+    for (const UnreachableFootprint& unreachable : synthesis->unreachable_footprints) {
+      const Footprint& nearest = unreachable.missed.nearest;
+      json["unreachable_footprints"].push_back(
+          {{"request", unreachable.request_id - 1},
+           {"reason", unreachable.reason},
+           {"time_s", unreachable.time_s},
            {"nearest",
             {{"at_m", {nearest.position_m.x, nearest.position_m.y, nearest.position_m.z}},
              {"heading_rad", nearest.heading_rad}}},
-           {"missed_m", refusal.missed.distance_m},
-           {"missed_rad", refusal.missed.turn_rad}});
+           {"missed_m", unreachable.missed.distance_m},
+           {"missed_rad", unreachable.missed.turn_rad}});
     }
     std::printf("%s\n", Dump(json).c_str());
-    return kExitDone;
+    return kExitSuccess;
   }
   int clamped = 0;
   for (const MovementRecord& record : synthesis->movements) clamped += record.clamped ? 1 : 0;
   std::printf("%s: %d frames, %.1f s, %zu movements", command.out.c_str(),
               synthesis->clip.frame_count(), synthesis->clip.duration_s(),
               synthesis->movements.size());
-  if (clamped > 0) std::printf(", %d of them not as asked (see --json)", clamped);
+  if (clamped > 0) std::printf(", %d of them clamped (use --json for details)", clamped);
   for (const WalkRecord& walk : synthesis->walks) {
     if (walk.arrived) continue;
-    std::printf("; movements[%llu] does not arrive: %s",
+    std::printf("; movements[%llu] did not arrive: %s",
                 static_cast<unsigned long long>(walk.request_id - 1), walk.reason.c_str());
   }
-  for (const UnreachableFootprint& refusal : synthesis->unreachable_footprints) {
-    std::printf("; movements[%llu] is left out: %s",
-                static_cast<unsigned long long>(refusal.request_id - 1), refusal.reason.c_str());
+  for (const UnreachableFootprint& unreachable : synthesis->unreachable_footprints) {
+    std::printf("; movements[%llu] was skipped: %s",
+                static_cast<unsigned long long>(unreachable.request_id - 1),
+                unreachable.reason.c_str());
   }
   std::printf("\n");
-  return kExitDone;
+  return kExitSuccess;
 }
 
 }  // namespace stridewire

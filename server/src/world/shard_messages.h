@@ -51,7 +51,7 @@ struct CancelPart {
 };
 struct PlantingPart {
   std::vector<AvatarRef> avatars;
-  bool is_on = true;
+  bool enabled = true;
 };
 /// Removes what a session spawned: it has ended, or left the world.
 struct ReleasePart {};
@@ -111,7 +111,7 @@ struct StatesQuestion {
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarId first = 0;
-  std::size_t enough_bytes = 0;                            ///< Of states; the last may go beyond.
+  std::size_t enough_bytes = 0;                        ///< Of states; the last may go beyond.
   std::shared_ptr<const std::vector<AvatarId>> named;  ///< Whose, growing; null: all.
 };
 struct StatesAnswer {
@@ -120,7 +120,7 @@ struct StatesAnswer {
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarId next = 0;  ///< Where to go on; 0: these were all.
-  SharedFrame frame;      ///< Null: none.
+  SharedFrame frame;  ///< Null: none.
 };
 
 /// Modes in which poses are sent, in the order of their numbers.

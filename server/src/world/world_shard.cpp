@@ -194,7 +194,7 @@ void WorldShard::SetLayers(const LayerPart& part, CommandResult& result) {
     }
     const Status status =
         it->second.avatar.SetLayer({.layer = world_->library->FindLayer(asked.layer),
-                                    .is_on = !asked.is_off,
+                                    .enabled = !asked.is_off,
                                     .weight = asked.weight,
                                     .blend_s = asked.blend_s,
                                     .speed = asked.speed});
@@ -219,7 +219,7 @@ void WorldShard::SetPlanting(const PlantingPart& part, CommandResult& result) {
     const auto it = avatars_.find(ref.avatar);
     if (it == avatars_.end()) {
       result.items.push_back(NoSuchAvatar(ref.index, ref.avatar));
-    } else if (const Status status = it->second.avatar.SetFootPlanting(part.is_on); !status) {
+    } else if (const Status status = it->second.avatar.SetFootPlanting(part.enabled); !status) {
       result.items.push_back({.index = ref.index,
                               .avatar = ref.avatar,
                               .code = ToStatusCode(status.error().code),

@@ -1,27 +1,30 @@
-// Poses between a clip's frames, and times of two clips that belong together.
+// Samples poses of a clip, and maps times between clips by generic time.
 
-import type {Clip} from './library_source.js';
-import {genericTime} from '../time_line.js';
+import type {Clip} from './library_client.js';
+import {genericTime} from '../timeline.js';
 
-/** The time at which a movement has this generic time. */
-export function timeOf(keytimesS: readonly number[], generic: number): number {
+/** The time in seconds at which a movement reaches a generic time. */
+export function timeAtGenericTime(keytimesS: readonly number[], generic: number): number {
   const last = keytimesS.length - 1;
   const i = Math.max(0, Math.min(last - 1, Math.floor(generic)));
   const share = Math.max(0, Math.min(1, generic - i));
   return keytimesS[i]! + share * (keytimesS[i + 1]! - keytimesS[i]!);
 }
 
-/** The time of `to` that is at the same generic time as `timeS` of `from`. */
+/** The time of `to` that has the same generic time as `timeS` of `from`. */
 export function matchingTime(from: Clip, to: Clip, timeS: number): number {
   if (from.keytimes_s.length !== to.keytimes_s.length) return timeS;
-  return timeOf(to.keytimes_s, genericTime(from.keytimes_s, timeS));
+  return timeAtGenericTime(to.keytimes_s, genericTime(from.keytimes_s, timeS));
 }
 
 export function durationOf(clip: Clip): number {
   return clip.keytimes_s[clip.keytimes_s.length - 1]!;
 }
 
-/** Root and rotations at a time, put aside by `offsetX`: rootM[3 at], rotations[4 jointCount at]. */
+/**
+ * Writes the pose at `timeS` as pose `at` of the arrays: 3 root coordinates, shifted by `offsetX`
+ * metres sideways, and `jointCount` quaternions.
+ */
 export function samplePose(
   clip: Clip, jointCount: number, timeS: number, offsetX: number, rootsM: Float32Array,
   rotations: Float32Array, at: number): void {

@@ -1,26 +1,32 @@
-// The animator's page: what a library's groups span, how well, and the step of any parameters at once.
+// The library page: shows which parameters a library's groups of examples cover and how accurately,
+// and synthesizes the step for any parameters.
 
-import {Slider, button, degrees, h, press, setText} from '../dom.js';
+import {Slider, button, degrees, h, setPressed, setText} from '../dom.js';
 import type {RendererInfo} from '../renderer.js';
 import {applyTheme, makeColours, preferredTheme, rememberTheme} from '../theme.js';
 import type {ThemeName} from '../theme.js';
-import {genericTime} from '../time_line.js';
-import {Latest} from './library_source.js';
-import type {Clip, Group, GroupEntry, LibraryEntry, LibrarySource, Step} from './library_source.js';
-import {ParameterPlane, label, scaleColour} from './parameter_plane.js';
-import {StepStage} from './step_stage.js';
+import {genericTime} from '../timeline.js';
+import {LatestRequest} from './library_client.js';
+import type {Clip, Group, GroupEntry, LibraryEntry, LibraryClient, Step} from './library_client.js';
+import {ParameterPlane, parameterLabel, scaleColour} from './parameter_plane.js';
+import {StepPreview} from './step_preview.js';
 
+/** Cells per side of the error map. */
 const mapCells = 48;
-/** Between one showing of the movement and the next. */
-const restS = 0.45;
+/** Pause at the end of the movement, before it repeats. */
+const loopPauseS = 0.45;
 
-interface Wish {
+/** Requests a step with parameters `p`, from a group of the library with this hash. */
+interface StepRequest {
   readonly hash: string;
   readonly group: number;
   readonly p: readonly number[];
   readonly corrected: boolean;
 }
-interface MapWish extends Wish {
+/**
+ * Requests an error map over parameters `x` and `y` (indices); the others keep their values in `p`.
+ */
+interface ErrorMapRequest extends StepRequest {
   readonly x: number;
   readonly y: number;
 }
@@ -30,105 +36,115 @@ export class LibraryPage {
   library: LibraryEntry | null = null;
   group: Group | null = null;
   groupIndex = 0;
-  wanted: number[] = [];
+  /** Parameters of the step that was requested last. */
+  requested: number[] = [];
   step: Step | null = null;
-  example = -1;
   readonly plane: ParameterPlane;
-  readonly stage: StepStage;
+  readonly preview: StepPreview;
+  /** Number of steps received, for browser tests. */
   stepsShown = 0;
   private playing = true;
   private timeS = 0;
   private speed = 1;
   private lastMs = 0;
   private theme: ThemeName;
-  private exampleNumber = 0;  // of the choice whose frames are waited for
+  /** Counts requested examples, so that outdated responses are ignored. */
+  private exampleRequest = 0;
   private readonly colours = makeColours();
   private readonly librarySelect = h('select', {id: 'library', 'aria-label': 'Library'});
   private readonly groupSelect = h('select', {id: 'group', 'aria-label': 'Group'});
-  private readonly xSelect = h('select', {id: 'axis-x', 'aria-label': 'Parameter to the right'});
-  private readonly ySelect = h('select', {id: 'axis-y', 'aria-label': 'Parameter upwards'});
-  private readonly mapSelect = h('select', {id: 'map', 'aria-label': 'Errors shown'},
-    h('option', {value: 'plain'}, 'errors without correction'),
-    h('option', {value: 'corrected'}, 'errors with correction'),
-    h('option', {value: 'none'}, 'no errors'));
+  private readonly xSelect = h('select', {id: 'axis-x', 'aria-label': 'Horizontal axis'});
+  private readonly ySelect = h('select', {id: 'axis-y', 'aria-label': 'Vertical axis'});
+  private readonly mapSelect = h('select', {id: 'map', 'aria-label': 'Error map'},
+    h('option', {value: 'uncorrected'}, 'Errors without correction'),
+    h('option', {value: 'corrected'}, 'Errors with correction'),
+    h('option', {value: 'none'}, 'No error map'));
   private readonly corrected = h('input', {type: 'checkbox', id: 'corrected', checked: true});
   private readonly sliders = h('div', {class: 'sliders'});
-  private readonly facts = h('table', {class: 'parameters'});
-  private readonly verdict = h('p', {class: 'movement', role: 'status'});
+  private readonly valueTable = h('table', {class: 'parameters'});
+  private readonly resultText = h('p', {class: 'movement', role: 'status'});
   private readonly exampleText = h('p', {class: 'hint'});
-  private readonly legend = h('canvas', {class: 'legend', 'aria-hidden': 'true', width: 128, height: 1});
+  private readonly legend = h('canvas',
+    {class: 'legend', 'aria-hidden': 'true', width: 128, height: 1});
   private readonly legendText = h('span', {class: 'hint'});
   private readonly message = h('div', {class: 'notice', role: 'alert'});
-  private readonly scrub = h('input', {type: 'range', id: 'time', min: 0, max: 1, step: 0.001, value: 0,
-    'aria-label': 'Generic time'});
-  private readonly timeText = h('span', {class: 'behind'});
+  private readonly scrub = h('input', {
+    type: 'range', id: 'time', min: 0, max: 1, step: 0.001, value: 0, 'aria-label': 'Time'});
+  private readonly timeText = h('span', {class: 'delay'});
   private readonly playButton: HTMLButtonElement;
-  private readonly names = [h('span', {class: 'name'}, 'synthesized'), h('span', {class: 'name'})];
-  private readonly sliderOf = new Map<number, Slider>();
-  private readonly steps: Latest<Wish>;
-  private readonly maps: Latest<MapWish>;
+  private readonly captions =
+    [h('span', {class: 'name'}, 'Synthesized'), h('span', {class: 'name'})];
+  private readonly sliderByParameter = new Map<number, Slider>();
+  private readonly steps: LatestRequest<StepRequest>;
+  private readonly maps: LatestRequest<ErrorMapRequest>;
 
-  constructor(root: HTMLElement, info: RendererInfo, private readonly source: LibrarySource) {
-    this.steps = new Latest((wish) => this.fetchStep(wish), (error) => this.say(error.message));
-    this.maps = new Latest((wish) => this.fetchMap(wish), (error) => this.say(error.message));
+  constructor(root: HTMLElement, info: RendererInfo, private readonly client: LibraryClient) {
+    const showError = (error: Error): void => this.showMessage(error.message);
+    this.steps = new LatestRequest((request) => this.fetchStep(request), showError);
+    this.maps = new LatestRequest((request) => this.fetchMap(request), showError);
     this.plane = new ParameterPlane({
-      move: (x, y) => {
-        const p = [...this.wanted];
+      onMove: (x, y) => {
+        const p = [...this.requested];
         p[this.plane.y] = y;
         p[this.plane.x] = x;
-        this.want(p);
+        this.requestStep(p);
       },
-      choose: (site) => this.choose(site),
+      onSelect: (site) => this.selectSite(site),
     });
-    const canvas = h('canvas', {class: 'stage', tabindex: 0, role: 'application', 'aria-label':
-      'The synthesized movement and the example. Arrow keys orbit, plus and minus zoom.'});
-    this.stage = new StepStage(canvas, info, this.colours);
+    const canvas = h('canvas', {class: 'preview', tabindex: 0, role: 'application', 'aria-label':
+      '3D view of the synthesized step and the example. Arrow keys orbit, plus and minus zoom.'});
+    this.preview = new StepPreview(canvas, info, this.colours);
     this.playButton = button('Pause', {icon: 'pause', key: 'Space', text: false, class: 'round'},
       () => this.setPlaying(!this.playing));
     const speed = h('select', {id: 'speed', 'aria-label': 'Speed'},
       ...[1, 0.5, 0.25].map((v) => h('option', {value: v}, `${v}×`)));
     speed.addEventListener('change', () => (this.speed = Number(speed.value)));
     this.theme = preferredTheme();
-    const theme = button('Dark or light', {icon: 'sun', text: false, class: 'round'}, () => {
+    const theme = button('Switch theme', {icon: 'sun', text: false, class: 'round'}, () => {
       this.setTheme(this.theme === 'dark' ? 'light' : 'dark');
       rememberTheme(this.theme);
     });
     this.message.hidden = true;
     root.replaceChildren(
-      h('header', {class: 'bar'}, h('h1', {}, 'Library'), this.librarySelect, this.groupSelect,
+      h('header', {class: 'library-header'},
+        h('h1', {}, 'Library'), this.librarySelect, this.groupSelect,
         h('a', {class: 'link', href: `/${location.search}`}, 'Worlds'), theme),
-      h('div', {class: 'laboratory'},
-        h('section', {class: 'space', 'aria-label': 'Parameters'},
-          h('div', {class: 'axes'}, 'Across', this.xSelect, 'up', this.ySelect),
+      h('div', {class: 'library-layout'},
+        h('section', {class: 'parameter-area', 'aria-label': 'Parameters'},
+          h('div', {class: 'axes'}, '→', this.xSelect, '↑', this.ySelect),
           this.plane.element,
           h('div', {class: 'row'}, this.mapSelect, this.legend, this.legendText),
           this.sliders,
           h('div', {class: 'row'},
-            h('label', {class: 'check', for: 'corrected'}, this.corrected, 'Correct the step'),
-            button('Middle', {class: 'small'}, () => this.want(this.middle()))),
-          this.verdict, this.facts, this.exampleText),
-        h('section', {class: 'theatre', 'aria-label': 'Movement'}, canvas, ...this.names,
-          h('div', {class: 'transport'}, this.playButton, this.scrub, this.timeText, speed))),
+            h('label', {class: 'check', for: 'corrected'}, this.corrected, 'Correct errors'),
+            button('Reset to mean', {class: 'small'},
+              () => this.requestStep(this.meanOfExamples()))),
+          this.resultText, this.valueTable, this.exampleText),
+        h('section', {class: 'preview-area', 'aria-label': 'Movement'}, canvas, ...this.captions,
+          h('div', {class: 'playback'}, this.playButton, this.scrub, this.timeText, speed))),
       this.message);
     this.setTheme(this.theme);
     this.librarySelect.addEventListener('change', () => void this.open(
       this.libraries.find(({hash}) => hash === this.librarySelect.value)!));
-    this.groupSelect.addEventListener('change', () => void this.openGroup(Number(this.groupSelect.value)));
+    this.groupSelect.addEventListener('change', () =>
+      void this.openGroup(Number(this.groupSelect.value)));
     for (const [axis, select] of [['x', this.xSelect], ['y', this.ySelect]] as const) {
       select.addEventListener('change', () => {
         this.plane[axis] = Number(select.value);
-        this.wantMap();
+        this.requestMap();
       });
     }
-    this.mapSelect.addEventListener('change', () => this.wantMap());
-    this.corrected.addEventListener('change', () => this.want(this.wanted));
+    this.mapSelect.addEventListener('change', () => this.requestMap());
+    this.corrected.addEventListener('change', () => this.requestStep(this.requested));
     this.scrub.addEventListener('input', () => {
       this.setPlaying(false);
-      this.timeS = Number(this.scrub.value) * this.stage.durationS;
+      this.timeS = Number(this.scrub.value) * this.preview.durationS;
     });
     document.addEventListener('keydown', (e) => {
-      if (e.key !== ' ' || e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement ||
-        e.target instanceof HTMLButtonElement) return;
+      const {target} = e;
+      const isControl = target instanceof HTMLInputElement ||
+        target instanceof HTMLSelectElement || target instanceof HTMLButtonElement;
+      if (e.key !== ' ' || isControl) return;
       e.preventDefault();
       this.setPlaying(!this.playing);
     });
@@ -137,15 +153,15 @@ export class LibraryPage {
   async start(): Promise<void> {
     requestAnimationFrame((ms) => this.frame(ms));
     try {
-      this.libraries = await this.source.libraries();
+      this.libraries = await this.client.libraries();
       this.librarySelect.replaceChildren(...this.libraries.map(({name, hash}) =>
         h('option', {value: hash}, name)));
-      const asked = new URLSearchParams(location.search).get('library');
-      const first = this.libraries.find(({name}) => name === asked) ?? this.libraries[0];
-      if (!first) return this.say('The server has no library.');
+      const requested = new URLSearchParams(location.search).get('library');
+      const first = this.libraries.find(({name}) => name === requested) ?? this.libraries[0];
+      if (!first) return this.showMessage('The server has no libraries.');
       await this.open(first);
     } catch (error) {
-      this.say((error as Error).message);
+      this.showMessage((error as Error).message);
     }
   }
 
@@ -153,151 +169,157 @@ export class LibraryPage {
     this.librarySelect.value = library.hash;
     this.library = library;
     try {
-      const skeleton = await this.source.skeleton(library.hash);
+      const skeleton = await this.client.skeleton(library.hash);
       if (this.library !== library) return;
-      this.stage.setSkeleton(skeleton);
+      this.preview.setSkeleton(skeleton);
       this.groupSelect.replaceChildren(...library.groups.map((group, i) =>
-        h('option', {value: i}, describe(group))));
+        h('option', {value: i}, groupLabel(group))));
       await this.openGroup(0);
     } catch (error) {
-      this.say((error as Error).message);
+      this.showMessage((error as Error).message);
     }
   }
 
   async openGroup(index: number): Promise<void> {
     const library = this.library!;
     try {
-      const group = await this.source.group(library.hash, index);
+      const group = await this.client.group(library.hash, index);
       if (this.library !== library) return;
       this.groupSelect.value = String(index);
       this.groupIndex = index;
       this.group = group;
     } catch (error) {
-      return this.say((error as Error).message);
+      return this.showMessage((error as Error).message);
     }
     const {parameters} = this.group;
     const {plane} = this;
     plane.group = this.group;
     plane.map = null;
-    [plane.x, plane.y] = widest(this.group);
+    [plane.x, plane.y] = widestParameters(this.group);
     for (const [select, value] of [[this.xSelect, plane.x], [this.ySelect, plane.y]] as const) {
-      select.replaceChildren(...parameters.map(({name}, l) => h('option', {value: l}, label(name))));
+      select.replaceChildren(...parameters.map(({name}, l) =>
+        h('option', {value: l}, parameterLabel(name))));
       select.value = String(value);
     }
-    this.sliderOf.clear();
+    this.sliderByParameter.clear();
     this.sliders.replaceChildren(...parameters.map((parameter, l) => {
-      const grown = 0.1 * (parameter.max - parameter.min) || 0.05;
-      const slider = new Slider(`p-${parameter.name}`, label(parameter.name), parameter.min - grown,
-        parameter.max + grown, 0.005, 0,
-        (value) => parameter.name === 'turn_rad' ? degrees(value) : value.toFixed(2), (value) => {
-          const p = [...this.wanted];
+      const {name} = parameter;
+      const [min, max] = plane.rangeOf(parameter);
+      const slider = new Slider(`p-${name}`, parameterLabel(name), min, max, 0.005, 0,
+        (value) => name === 'turn_rad' ? degrees(value) : value.toFixed(2), (value) => {
+          const p = [...this.requested];
           p[l] = value;
-          this.want(p);
+          this.requestStep(p);
         });
       slider.input.step = 'any';
-      this.sliderOf.set(l, slider);
+      this.sliderByParameter.set(l, slider);
       return slider.element;
     }));
-    this.stage.example = null;
-    this.example = plane.example = -1;
-    setText(this.exampleText, 'Drag the cross: the step follows. Choose a point to play that example ' +
-      'beside the step of the same parameters.');
+    this.preview.example = null;
+    plane.selectedExample = -1;
+    setText(this.exampleText, 'Drag the cross to change the parameters. Click a point to play ' +
+      'that example beside the synthesized step.');
     this.timeS = 0;
-    this.want(this.middle());
+    this.requestStep(this.meanOfExamples());
   }
 
-  /** Asks for the step of these parameters, and for a map through them. */
-  want(p: readonly number[]): void {
-    this.wanted = [...p];
-    this.plane.wanted = this.wanted;
-    for (const [l, slider] of this.sliderOf) slider.value = p[l]!;
-    this.steps.want(this.wish());
-    this.wantMap();
+  /** Requests the step for these parameters, and the error map of the plane through them. */
+  requestStep(p: readonly number[]): void {
+    this.requested = [...p];
+    this.plane.requested = this.requested;
+    for (const [l, slider] of this.sliderByParameter) slider.value = p[l]!;
+    this.steps.submit(this.stepRequest());
+    this.requestMap();
   }
 
-  /** Plays an example beside the step of its parameters; a pseudoexample has no movement of its own. */
-  choose(site: number): void {
+  /**
+   * Requests the step for a site's parameters. If the site is an example, plays it beside that
+   * step; a pseudoexample has no movement of its own.
+   */
+  selectSite(index: number): void {
     const {group, library} = this;
-    const chosen = group?.sites[site];
-    if (!group || !library || !chosen) return;
-    this.want(chosen.p);
-    if (!chosen.is_example) {
-      setText(this.exampleText, 'A pseudoexample: a blend of the examples whose parameters are known.');
+    const site = group?.sites[index];
+    if (!group || !library || !site) return;
+    this.requestStep(site.p);
+    if (!site.is_example) {
+      setText(this.exampleText, 'A pseudoexample: a blend of examples with known parameters.');
       return;
     }
-    this.example = this.plane.example = site;
-    const number = ++this.exampleNumber;
-    setText(this.exampleText, `Example ${site}: ${chosen.source ?? ''}${chosen.mirrored ? ', mirrored' : ''}`);
-    this.source.example(library.hash, this.groupIndex, site).then((clip: Clip) => {
-      if (number !== this.exampleNumber || this.group !== group) return;
-      this.stage.example = clip;
-      setText(this.names[1]!, `example ${site}`);
-    }, (error: Error) => this.say(error.message));
+    this.plane.selectedExample = index;
+    const number = ++this.exampleRequest;
+    setText(this.exampleText,
+      `Example ${index}: ${site.source ?? ''}${site.mirrored ? ', mirrored' : ''}`);
+    this.client.example(library.hash, this.groupIndex, index).then((clip: Clip) => {
+      if (number !== this.exampleRequest || this.group !== group) return;
+      this.preview.example = clip;
+      setText(this.captions[1]!, `Example ${index}`);
+    }, (error: Error) => this.showMessage(error.message));
   }
 
-  private wish(): Wish {
+  private stepRequest(): StepRequest {
     return {
-      hash: this.library!.hash, group: this.groupIndex, p: [...this.wanted],
+      hash: this.library!.hash, group: this.groupIndex, p: [...this.requested],
       corrected: this.corrected.checked,
     };
   }
 
-  private wantMap(): void {
+  private requestMap(): void {
     if (this.mapSelect.value === 'none') {
       this.plane.map = null;
       setText(this.legendText, '');
       return;
     }
-    this.maps.want({
-      ...this.wish(), x: this.plane.x, y: this.plane.y,
+    this.maps.submit({
+      ...this.stepRequest(), x: this.plane.x, y: this.plane.y,
       corrected: this.mapSelect.value === 'corrected'});
   }
 
-  private async fetchStep(wish: Wish): Promise<void> {
-    const step = await this.source.step(wish.hash, wish.group, wish.p, wish.corrected);
-    if (wish.hash !== this.library?.hash || wish.group !== this.groupIndex) return;
+  private async fetchStep(request: StepRequest): Promise<void> {
+    const step = await this.client.step(request.hash, request.group, request.p, request.corrected);
+    if (request.hash !== this.library?.hash || request.group !== this.groupIndex) return;
     this.message.hidden = true;
     this.step = step;
-    this.stage.step = step;
+    this.preview.step = step;
     this.plane.applied = step.applied;
     ++this.stepsShown;
-    this.showFacts(step);
+    this.showValues(step);
   }
 
-  private async fetchMap(wish: MapWish): Promise<void> {
-    const map = await this.source.errors(
-      wish.hash, wish.group, wish.x, wish.y, wish.p, mapCells, wish.corrected);
-    if (wish.hash !== this.library?.hash || wish.group !== this.groupIndex ||
+  private async fetchMap(request: ErrorMapRequest): Promise<void> {
+    const map = await this.client.errors(
+      request.hash, request.group, request.x, request.y, request.p, mapCells, request.corrected);
+    if (request.hash !== this.library?.hash || request.group !== this.groupIndex ||
         this.mapSelect.value === 'none') return;
     this.plane.map = map;
     const largest = map.largest_m * 1e3;
-    this.plane.topMm = niceTop(largest);
-    setText(this.legendText, `0 to ${this.plane.topMm} mm (largest ${largest.toPrecision(2)})`);
+    this.plane.topMm = roundScaleTop(largest);
+    setText(this.legendText, `0 to ${this.plane.topMm} mm (largest ${largest.toPrecision(2)} mm)`);
     this.drawLegend();
   }
 
-  private showFacts(step: Step): void {
+  private showValues(step: Step): void {
     const {parameters} = this.group!;
     const value = (l: number, v: number): string =>
       parameters[l]!.name === 'turn_rad' ? `${(v * 180 / Math.PI).toFixed(2)}°` : v.toFixed(4);
-    this.facts.replaceChildren(
-      h('tr', {}, h('th', {}, ''), ...['asked', 'applied', 'measured'].map(
+    this.valueTable.replaceChildren(
+      h('tr', {}, h('th', {}, ''), ...['Requested', 'Applied', 'Measured'].map(
         (text) => h('th', {scope: 'col'}, text))),
-      ...parameters.map(({name}, l) => h('tr', {}, h('th', {scope: 'row'}, label(name)),
+      ...parameters.map(({name}, l) => h('tr', {}, h('th', {scope: 'row'}, parameterLabel(name)),
         h('td', {}, value(l, step.requested[l]!)), h('td', {}, value(l, step.applied[l]!)),
         h('td', {}, value(l, step.measured[l]!)))));
     const clamped = step.requested.some((v, l) => Math.abs(v - step.applied[l]!) > 1e-4);
-    setText(this.verdict, `${(1e3 * step.error_m).toFixed(2)} mm off` +
-      (this.corrected.checked ? ` (${(1e3 * step.uncorrected_error_m).toFixed(2)} uncorrected)` : '') +
-      (clamped ? ', clamped to what the examples span' :
-        step.extrapolated ? ', outside the examples' : '') +
+    const uncorrectedMm = (1e3 * step.uncorrected_error_m).toFixed(2);
+    setText(this.resultText, `Error ${(1e3 * step.error_m).toFixed(2)} mm` +
+      (this.corrected.checked ? ` (${uncorrectedMm} mm uncorrected)` : '') +
+      (clamped ? ', clamped' : step.extrapolated ? ', extrapolated' : '') +
       `, Σ|w| ${step.weight_sum.toFixed(2)}`);
   }
 
-  private middle(): number[] {
+  private meanOfExamples(): number[] {
     const {parameters, sites} = this.group!;
     const examples = sites.filter((site) => site.is_example);
-    return parameters.map((_, l) => examples.reduce((sum, {p}) => sum + p[l]!, 0) / examples.length);
+    return parameters.map((_, l) =>
+      examples.reduce((sum, {p}) => sum + p[l]!, 0) / examples.length);
   }
 
   private drawLegend(): void {
@@ -309,7 +331,7 @@ export class LibraryPage {
 
   private setPlaying(on: boolean): void {
     this.playing = on;
-    press(this.playButton, !on);
+    setPressed(this.playButton, !on);
     const text = on ? 'Pause' : 'Play';
     this.playButton.setAttribute('aria-label', text);
     this.playButton.title = `${text} (Space)`;
@@ -317,10 +339,10 @@ export class LibraryPage {
 
   private setTheme(name: ThemeName): void {
     this.theme = name;
-    this.stage.setBackground(applyTheme(name, this.colours));
+    this.preview.setBackground(applyTheme(name, this.colours));
   }
 
-  private say(text: string): void {
+  private showMessage(text: string): void {
     this.message.replaceChildren(h('p', {}, text));
     this.message.hidden = false;
   }
@@ -329,36 +351,44 @@ export class LibraryPage {
     requestAnimationFrame((next) => this.frame(next));
     const dtS = Math.min(0.1, (ms - this.lastMs) / 1000);
     this.lastMs = ms;
-    const duration = this.stage.durationS;
+    const duration = this.preview.durationS;
     if (this.playing) {
       this.timeS += dtS * this.speed;
-      if (this.timeS > duration + restS) this.timeS = 0;
+      if (this.timeS > duration + loopPauseS) this.timeS = 0;
       this.scrub.value = String(Math.min(1, this.timeS / duration));
     }
     const shownS = Math.min(this.timeS, duration);
     if (this.step) {
-      setText(this.timeText, `g ${genericTime(this.step.keytimes_s, shownS).toFixed(2)}`);
+      const generic = genericTime(this.step.keytimes_s, shownS);
+      setText(this.timeText, `generic time ${generic.toFixed(2)}`);
     }
-    this.stage.draw(shownS, dtS);
+    this.preview.draw(shownS, dtS);
     this.plane.draw();
-    this.names.forEach((name, i) => {
-      const at = this.stage.example ? this.stage.headOf(i) : null;
-      name.hidden = at === null;
-      if (at) name.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -100%)`;
+    this.captions.forEach((caption, i) => {
+      const at = this.preview.example ? this.preview.labelPosition(i) : null;
+      caption.hidden = at === null;
+      if (!at) return;
+      caption.style.transform =
+        `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -100%)`;
     });
   }
 }
 
-function describe(group: GroupEntry): string {
+/** For example "Left step: 14 examples + 20 pseudoexamples, end forward, turn". */
+function groupLabel(group: GroupEntry): string {
   const kinds: Readonly<Record<string, string>> =
-    {step_left: 'left step', step_right: 'right step', jump: 'jump'};
-  const pseudo = group.pseudoexamples > 0 ? ` + ${group.pseudoexamples}` : '';
-  return `${kinds[group.kind] ?? group.kind}, ${group.examples}${pseudo} examples, ` +
-    group.parameters.map((name) => label(name).split(',')[0]).join(' · ');
+    {step_left: 'Left step', step_right: 'Right step', jump: 'Jump'};
+  const pseudo = group.pseudoexamples > 0 ? ` + ${group.pseudoexamples} pseudoexamples` : '';
+  return `${kinds[group.kind] ?? group.kind}: ${group.examples} examples${pseudo}, ` +
+    group.parameters.map((name) => parameterLabel(name).split(' (')[0]!.toLowerCase()).join(' · ');
 }
 
-/** The two parameters the examples spread most over; the one there is twice, if it is the only one. */
-export function widest(group: Group): [number, number] {
+/**
+ * Indices of the two parameters with the widest range over the examples, in ascending order. If
+ * there is only one parameter, its index twice.
+ */
+export function widestParameters(group: Group): [number, number] {
+  // A turn by one radian counts as much as half a metre.
   const spread = group.parameters.map(({min, max, name}, l) =>
     ({l, width: (max - min) * (name === 'turn_rad' ? 0.5 : 1)}));
   spread.sort((a, b) => b.width - a.width);
@@ -366,8 +396,8 @@ export function widest(group: Group): [number, number] {
   return [pair[0]!, pair[1] ?? pair[0]!];
 }
 
-/** A round number of millimetres from the largest error up. */
-export function niceTop(largestMm: number): number {
+/** A round number of millimetres that is not below the largest error. */
+export function roundScaleTop(largestMm: number): number {
   const power = 10 ** Math.floor(Math.log10(Math.max(largestMm, 1e-3)));
   return [1, 1.5, 2, 3, 5, 7.5, 10].map((k) => k * power).find((v) => v >= largestMm * 0.999)!;
 }

@@ -1,17 +1,17 @@
-// Starts the animator's page.
+// Starts the library page.
 
 import {h} from '../dom.js';
-import {probe} from '../renderer.js';
+import {detectRenderer} from '../renderer.js';
 import {LibraryPage} from './library_page.js';
-import {LibrarySource} from './library_source.js';
+import {LibraryClient} from './library_client.js';
 
 const root = document.getElementById('app')!;
-const info = probe();
+const info = detectRenderer();
 if (!info) {
   root.replaceChildren(h('p', {class: 'fatal'},
-    'This browser draws no WebGL 2: switch on hardware acceleration, or open the page in another one.'));
+    'This page needs WebGL 2. Enable hardware acceleration, or use another browser.'));
 } else {
-  const page = new LibraryPage(root, info, new LibrarySource(''));
+  const page = new LibraryPage(root, info, new LibraryClient(''));
   Object.assign(window, {stridewireLibrary: page});
   void page.start();
 }

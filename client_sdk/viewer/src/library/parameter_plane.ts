@@ -1,21 +1,26 @@
-// Two parameters of a group as a plane: the map of errors behind, examples and pseudoexamples as
-// points, and the point that is wanted, which can be dragged.
+// A plot of two parameters of a group. It shows the error map, examples and pseudoexamples as
+// points, and the requested parameters as a cross that the user can drag.
 
 import {h} from '../dom.js';
-import type {ErrorMap, Group} from './library_source.js';
+import type {ErrorMap, Group, Parameter} from './library_client.js';
 
-/** Dark blue to yellow by lightness, so that it reads without colour vision (after cividis). */
-const scale: readonly [number, number, number][] = [
+/**
+ * Colours from dark blue to yellow with increasing lightness, so that people with colour blindness
+ * can read the map. They follow the cividis colour map.
+ */
+const colourScale: readonly [number, number, number][] = [
   [0, 34, 78], [33, 59, 110], [76, 84, 108], [108, 110, 114], [143, 138, 119], [184, 169, 105],
   [228, 203, 76], [254, 232, 56],
 ];
 
+/** Returns red, green and blue, 0 to 255, for a value of 0 (dark) to 1 (light). */
 export function scaleColour(share: number): [number, number, number] {
-  const at = Math.max(0, Math.min(1, share)) * (scale.length - 1);
-  const i = Math.min(scale.length - 2, Math.floor(at));
+  const at = Math.max(0, Math.min(1, share)) * (colourScale.length - 1);
+  const i = Math.min(colourScale.length - 2, Math.floor(at));
   const f = at - i;
-  return [0, 1, 2].map((k) => Math.round(
-    scale[i]![k]! + f * (scale[i + 1]![k]! - scale[i]![k]!))) as [number, number, number];
+  const [a, b] = [colourScale[i]!, colourScale[i + 1]!];
+  const mix = (k: 0 | 1 | 2): number => Math.round(a[k] + f * (b[k] - a[k]));
+  return [mix(0), mix(1), mix(2)];
 }
 
 const margin = {left: 46, right: 14, top: 12, bottom: 38};
@@ -24,23 +29,28 @@ export class ParameterPlane {
   readonly element: HTMLCanvasElement;
   group: Group | null = null;
   map: ErrorMap | null = null;
+  /** Indices of the parameters on the axes. */
   x = 0;
   y = 1;
-  wanted: number[] = [];
+  requested: number[] = [];
+  /** Parameters after clamping by the server. */
   applied: readonly number[] = [];
-  example = -1;
-  /** Errors at the top of the colour scale, mm. */
+  /** Index of the selected example; -1 if there is none. */
+  selectedExample = -1;
+  /** Error in millimetres at the end of the colour scale. */
   topMm = 1;
   private dragging = false;
 
   constructor(private readonly actions: {
-    move(x: number, y: number): void;
-    choose(site: number): void;
+    /** The user has moved the cross to these values of the two parameters. */
+    onMove(x: number, y: number): void;
+    /** The user has clicked the site with this index. */
+    onSelect(site: number): void;
   }) {
     this.element = h('canvas', {
       class: 'plane', tabindex: 0, role: 'application', 'aria-label':
-        'Parameters of the group. Drag the cross, or move it by the arrow keys; click a point to play ' +
-        'that example.'});
+        'Parameters of the group. Drag the cross or move it with the arrow keys. Click a point ' +
+        'to play that example.'});
     this.element.addEventListener('pointerdown', (e) => this.down(e));
     this.element.addEventListener('pointermove', (e) => {
       if (this.dragging) this.drag(e);
@@ -51,26 +61,29 @@ export class ParameterPlane {
     this.element.addEventListener('keydown', (e) => this.key(e));
   }
 
-  /** What the axes go over: the map's, else the examples and 10 % around them. */
+  /** Range of an axis: the range of the examples, extended by 10 % at each end. */
   range(axis: 'x' | 'y'): [number, number] {
     const index = axis === 'x' ? this.x : this.y;
     const parameter = this.group?.parameters[index];
-    if (!parameter) return [0, 1];
-    const grown = 0.1 * (parameter.max - parameter.min) || 0.05;
-    return [parameter.min - grown, parameter.max + grown];
+    return parameter ? this.rangeOf(parameter) : [0, 1];
   }
-  get flat(): boolean {
+  rangeOf({min, max}: Parameter): [number, number] {
+    const margin = 0.1 * (max - min) || 0.05;
+    return [min - margin, max + margin];
+  }
+  /** Whether both axes show the same parameter. */
+  get isOneDimensional(): boolean {
     return this.x === this.y;
   }
 
-  /** CSS pixels within the canvas. */
-  place(p: readonly number[]): {x: number; y: number} {
-    const {width, height} = this.plot();
+  /** Position of parameters in CSS pixels within the canvas. */
+  toPixels(p: readonly number[]): {x: number; y: number} {
+    const {width, height} = this.plotSize();
     const [x0, x1] = this.range('x');
     const [y0, y1] = this.range('y');
     return {
       x: margin.left + (p[this.x]! - x0) / (x1 - x0) * width,
-      y: this.flat ? margin.top + height / 2 :
+      y: this.isOneDimensional ? margin.top + height / 2 :
         margin.top + (1 - (p[this.y]! - y0) / (y1 - y0)) * height,
     };
   }
@@ -91,16 +104,17 @@ export class ParameterPlane {
     context.clearRect(0, 0, clientWidth, clientHeight);
     const style = getComputedStyle(element);
     const colour = (name: string): string => style.getPropertyValue(name).trim();
-    const plot = this.plot();
+    const plot = this.plotSize();
     this.drawMap(context, plot);
     context.strokeStyle = colour('--border');
     context.lineWidth = 1;
     context.strokeRect(margin.left, margin.top, plot.width, plot.height);
     this.drawAxes(context, plot, colour('--soft'));
     group.sites.forEach((site, i) => {
-      const {x, y} = this.place(site.p);
+      const {x, y} = this.toPixels(site.p);
+      const selected = i === this.selectedExample;
       context.beginPath();
-      if (site.is_example) context.arc(x, y, i === this.example ? 6.5 : 4.5, 0, 2 * Math.PI);
+      if (site.is_example) context.arc(x, y, selected ? 6.5 : 4.5, 0, 2 * Math.PI);
       else {
         context.moveTo(x, y - 6);
         context.lineTo(x + 6, y);
@@ -108,16 +122,16 @@ export class ParameterPlane {
         context.lineTo(x - 6, y);
         context.closePath();
       }
-      context.fillStyle = i === this.example ? '#ffffff' : site.is_example ? '#e8eef7' : '#ffb35c';
+      context.fillStyle = selected ? '#ffffff' : site.is_example ? '#e8eef7' : '#ffb35c';
       context.fill();
-      context.lineWidth = i === this.example ? 3 : 1.5;
-      context.strokeStyle = i === this.example ? '#d3303f' : '#101722';
+      context.lineWidth = selected ? 3 : 1.5;
+      context.strokeStyle = selected ? '#d3303f' : '#101722';
       context.stroke();
     });
-    if (this.applied.length > 0 && this.applied.some((v, l) => Math.abs(v - this.wanted[l]!) > 1e-4)) {
-      // Clamped: what is done instead.
-      const from = this.place(this.wanted);
-      const to = this.place(this.applied);
+    if (this.applied.some((v, l) => Math.abs(v - this.requested[l]!) > 1e-4)) {
+      // The server has clamped the parameters: draw a line to the applied ones.
+      const from = this.toPixels(this.requested);
+      const to = this.toPixels(this.applied);
       context.setLineDash([4, 3]);
       context.beginPath();
       context.moveTo(from.x, from.y);
@@ -131,8 +145,8 @@ export class ParameterPlane {
   }
 
   private drawCross(context: CanvasRenderingContext2D): void {
-    if (this.wanted.length === 0) return;
-    const {x, y} = this.place(this.wanted);
+    if (this.requested.length === 0) return;
+    const {x, y} = this.toPixels(this.requested);
     for (const [width, style] of [[5, '#101722'], [2.2, '#ffffff']] as const) {
       context.beginPath();
       context.arc(x, y, 9, 0, 2 * Math.PI);
@@ -182,24 +196,27 @@ export class ParameterPlane {
     context.textAlign = 'center';
     context.textBaseline = 'top';
     for (const v of ticks('x')) {
-      context.fillText(short(v), margin.left + (v - x0) / (x1 - x0) * plot.width, bottom + 5);
+      context.fillText(formatTick(v), margin.left + (v - x0) / (x1 - x0) * plot.width, bottom + 5);
     }
-    context.fillText(label(this.group!.parameters[this.x]!.name), margin.left + plot.width / 2, bottom + 21);
-    if (this.flat) return;
+    context.fillText(
+      parameterLabel(this.group!.parameters[this.x]!.name), margin.left + plot.width / 2,
+      bottom + 21);
+    if (this.isOneDimensional) return;
     context.textAlign = 'right';
     context.textBaseline = 'middle';
     for (const v of ticks('y')) {
-      context.fillText(short(v), margin.left - 6, margin.top + (1 - (v - y0) / (y1 - y0)) * plot.height);
+      context.fillText(
+        formatTick(v), margin.left - 6, margin.top + (1 - (v - y0) / (y1 - y0)) * plot.height);
     }
     context.save();
     context.translate(9, margin.top + plot.height / 2);
     context.rotate(-Math.PI / 2);
     context.textAlign = 'center';
-    context.fillText(label(this.group!.parameters[this.y]!.name), 0, 0);
+    context.fillText(parameterLabel(this.group!.parameters[this.y]!.name), 0, 0);
     context.restore();
   }
 
-  private plot(): {width: number; height: number} {
+  private plotSize(): {width: number; height: number} {
     return {
       width: Math.max(1, this.element.clientWidth - margin.left - margin.right),
       height: Math.max(1, this.element.clientHeight - margin.top - margin.bottom),
@@ -209,20 +226,20 @@ export class ParameterPlane {
   private down(event: PointerEvent): void {
     if (!this.group || event.button !== 0) return;
     this.element.focus();
-    const [x, y] = this.where(event);
+    const [x, y] = this.pointerPosition(event);
     let nearest = -1;
     let reach = 9;
     this.group.sites.forEach((site, i) => {
-      const at = this.place(site.p);
+      const at = this.toPixels(site.p);
       const d = Math.hypot(at.x - x, at.y - y);
       if (d < reach) {
         reach = d;
         nearest = i;
       }
     });
-    const cross = this.place(this.wanted);
+    const cross = this.toPixels(this.requested);
     if (nearest >= 0 && Math.hypot(cross.x - x, cross.y - y) > 9) {
-      this.actions.choose(nearest);
+      this.actions.onSelect(nearest);
       return;
     }
     this.dragging = true;
@@ -231,45 +248,46 @@ export class ParameterPlane {
   }
 
   private drag(event: PointerEvent): void {
-    const [px, py] = this.where(event);
-    const {width, height} = this.plot();
+    const [px, py] = this.pointerPosition(event);
+    const {width, height} = this.plotSize();
     const [x0, x1] = this.range('x');
     const [y0, y1] = this.range('y');
     const clamp = (v: number): number => Math.max(0, Math.min(1, v));
-    this.actions.move(
+    this.actions.onMove(
       x0 + clamp((px - margin.left) / width) * (x1 - x0),
       y0 + clamp(1 - (py - margin.top) / height) * (y1 - y0));
   }
 
   private key(event: KeyboardEvent): void {
-    const step = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
+    const step = {
+      ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
     if (!step || !this.group) return;
     event.preventDefault();
     const [x0, x1] = this.range('x');
     const [y0, y1] = this.range('y');
     const size = event.shiftKey ? 0.1 : 0.02;
     const bound = (v: number, from: number, to: number): number => Math.max(from, Math.min(to, v));
-    this.actions.move(
-      bound(this.wanted[this.x]! + step[0]! * size * (x1 - x0), x0, x1),
-      bound(this.wanted[this.y]! + step[1]! * size * (y1 - y0), y0, y1));
+    this.actions.onMove(
+      bound(this.requested[this.x]! + step[0]! * size * (x1 - x0), x0, x1),
+      bound(this.requested[this.y]! + step[1]! * size * (y1 - y0), y0, y1));
   }
 
-  private where(event: PointerEvent): [number, number] {
+  private pointerPosition(event: PointerEvent): [number, number] {
     const box = this.element.getBoundingClientRect();
     return [event.clientX - box.left, event.clientY - box.top];
   }
 }
 
 const labels: Readonly<Record<string, string>> = {
-  start_x_m: 'start aside, m', start_y_m: 'start up, m', start_z_m: 'start ahead, m',
-  end_x_m: 'end aside, m', end_y_m: 'end up, m', end_z_m: 'end ahead, m', turn_rad: 'turn, rad',
-  length_m: 'length, m', height_m: 'height, m',
+  start_x_m: 'Start sideways (m)', start_y_m: 'Start height (m)', start_z_m: 'Start forward (m)',
+  end_x_m: 'End sideways (m)', end_y_m: 'End height (m)', end_z_m: 'End forward (m)',
+  turn_rad: 'Turn (rad)', length_m: 'Length (m)', height_m: 'Height (m)',
 };
-/** What a parameter is called on the page. */
-export function label(name: string): string {
+/** A parameter's name for users, with its unit in parentheses. */
+export function parameterLabel(name: string): string {
   return labels[name] ?? name;
 }
 
-function short(value: number): string {
+function formatTick(value: number): string {
   return String(Math.round(value * 100) / 100).replace('-', '−');
 }

@@ -1,25 +1,24 @@
-// What one avatar does and why: movement, parameters, weights, examples, time line, base, queue.
+// The inspector: the selected avatar's movement with its parameters, examples and weights, and its
+// base frame, queue and joints.
 
-import {degrees, h, setText, svg} from '../dom.js';
+import {degrees, h, pointText, setText, svg} from '../dom.js';
 import type {AvatarState, MovementState, QueuedRequest, World} from '../sdk.js';
-import {genericTime, stateAt} from '../time_line.js';
+import {genericTime, stateAt} from '../timeline.js';
 
-const everyMs = 200;
-const keptS = 22;
+/** How often the state is requested from the server. */
+const requestIntervalMs = 200;
+/** How long states are kept for playback; slightly longer than the recording. */
+const historyS = 22;
 
 const movementNames: Readonly<Record<string, string>> = {
   stepLeft: 'Step, left foot', stepRight: 'Step, right foot', jump: 'Jump', stand: 'Stand',
   step: 'Step',
 };
 const parameterNames: Readonly<Record<string, string>> = {
-  startX: 'start, sideways', startY: 'start, height', startZ: 'start, ahead',
-  endX: 'end, sideways', endY: 'end, height', endZ: 'end, ahead', turn: 'turn',
-  length: 'length', height: 'height',
+  startX: 'Start sideways', startY: 'Start height', startZ: 'Start forward',
+  endX: 'End sideways', endY: 'End height', endZ: 'End forward', turn: 'Turn',
+  length: 'Length', height: 'Height',
 };
-
-export function movementName(kind: string): string {
-  return movementNames[kind] ?? kind;
-}
 
 function parameterText(name: string, value: number): string {
   return name === 'turn' ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(3)} m`;
@@ -27,22 +26,25 @@ function parameterText(name: string, value: number): string {
 
 export class Inspector {
   readonly element: HTMLElement;
+  /** The state that the panel shows; null if none is known. */
   state: AvatarState | null = null;
-  /** Whether names are drawn at the joints. */
+  /** Whether the scene shows joint names at the selected avatar. */
   labels = false;
 
   private world: World | null = null;
   private avatar = 0;
   private states: AvatarState[] = [];
-  private askedMs = -1e9;
-  private asking = false;
-  private note = '';
-  private shape = '';
+  private requestedMs = -1e9;
+  private requestPending = false;
+  private errorText = '';
+  /** Identifies the movement that the plots show. */
+  private shownMovement = '';
 
   private readonly title = h('h3', {});
   private readonly movement = h('p', {class: 'movement'});
-  private readonly line = svg('svg', {
-    class: 'time-line', viewBox: '0 0 280 46', role: 'img', 'aria-label': 'Time line of the movement'});
+  private readonly timeline = svg('svg', {
+    class: 'timeline', viewBox: '0 0 280 46', role: 'img',
+    'aria-label': 'Timeline of the movement'});
   private readonly parameters = h('table', {class: 'parameters'});
   private readonly scatter = svg('svg', {class: 'scatter', viewBox: '0 0 280 150', role: 'img'});
   private readonly axes = h('div', {class: 'axes'});
@@ -54,7 +56,7 @@ export class Inspector {
   private readonly joints = h('ul', {class: 'joints'});
   private readonly jointsTitle = h('summary', {}, 'Joints');
   private readonly empty = h('p', {class: 'hint'},
-    'Click a figure, or press N for the next one.');
+    'Click an avatar, or press N to select the next one.');
   private readonly content: HTMLElement;
   private readonly moving: HTMLElement;
   private readonly blended: HTMLElement;
@@ -64,38 +66,35 @@ export class Inspector {
   private playhead: SVGElement | null = null;
   private playheadText: SVGElement | null = null;
 
-  constructor(actions: {onLabels: (on: boolean) => void; onFollow: () => void; onClose: () => void}) {
+  constructor(actions: {onFollow: () => void; onDeselect: () => void}) {
     const labels = h('input', {type: 'checkbox', id: 'joint-labels'});
-    labels.addEventListener('change', () => {
-      this.labels = labels.checked;
-      actions.onLabels(labels.checked);
-    });
+    labels.addEventListener('change', () => (this.labels = labels.checked));
     const follow = h('button', {type: 'button', class: 'small'}, 'Follow');
     follow.addEventListener('click', actions.onFollow);
-    const close = h('button', {type: 'button', class: 'small'}, 'Deselect');
-    close.addEventListener('click', actions.onClose);
+    const deselect = h('button', {type: 'button', class: 'small'}, 'Deselect');
+    deselect.addEventListener('click', actions.onDeselect);
     this.blended = h('div', {}, h('h4', {}, 'Parameters'), this.parameters,
       h('h4', {}, 'Examples in parameter space'), this.axes, this.scatter,
       h('h4', {}, 'Weights'), this.bars, this.barsText);
-    this.moving = h('div', {}, this.line, this.blended);
+    this.moving = h('div', {}, this.timeline, this.blended);
     this.content = h('div', {class: 'inspector'},
-      h('div', {class: 'row'}, this.title, follow, close), this.movement, this.moving,
+      h('div', {class: 'row'}, this.title, follow, deselect), this.movement, this.moving,
       h('h4', {}, 'Base frame'), this.base, this.queueTitle, this.queue,
-      h('label', {class: 'check', for: 'joint-labels'}, labels, 'Names at the joints'),
+      h('label', {class: 'check', for: 'joint-labels'}, labels, 'Show joint names'),
       h('details', {}, this.jointsTitle, this.joints));
     this.element = h('div', {class: 'panel-body'}, this.empty, this.content);
     this.content.hidden = true;
   }
 
-  choose(world: World | null, avatar: number): void {
+  setAvatar(world: World | null, avatar: number): void {
     if (world === this.world && avatar === this.avatar) return;
     this.world = world;
     this.avatar = avatar;
     this.states = [];
     this.state = null;
-    this.shape = '';
-    this.note = '';
-    this.askedMs = -1e9;
+    this.shownMovement = '';
+    this.errorText = '';
+    this.requestedMs = -1e9;
     this.content.hidden = avatar === 0;
     this.empty.hidden = avatar !== 0;
     if (!world || avatar === 0) return;
@@ -106,24 +105,25 @@ export class Inspector {
     setText(this.jointsTitle, `${skeleton?.jointCount ?? 0} joints`);
   }
 
-  /** Asks the server now and then, and shows what was so at `timeS`. */
+  /**
+   * Call once per frame. Requests the state from the server at intervals, and shows the state at
+   * `timeS`, or the newest one if playback is live.
+   */
   update(nowMs: number, timeS: number, live: boolean, ready: boolean, visible: boolean): void {
     const world = this.world;
     if (!world || this.avatar === 0) return;
-    if (ready && !this.asking && nowMs - this.askedMs > everyMs && typeof world.inspect === 'function') {
-      this.asking = true;
-      this.askedMs = nowMs;
+    if (ready && !this.requestPending && nowMs - this.requestedMs > requestIntervalMs) {
+      this.requestPending = true;
+      this.requestedMs = nowMs;
       const avatar = this.avatar;
       void world.inspect(avatar).then((state) => {
         if (avatar !== this.avatar || world !== this.world) return;
-        if (state) {
-          this.states.push(state);
-          while (this.states[0]!.timeS < state.timeS - keptS) this.states.shift();
-        }
+        this.states.push(state);
+        while (this.states[0]!.timeS < state.timeS - historyS) this.states.shift();
       }, () => {
-        this.note = 'The server told nothing about it.';
+        this.errorText = 'The server did not report this avatar.';
       }).finally(() => {
-        this.asking = false;
+        this.requestPending = false;
       });
     }
     const state = live ? this.states[this.states.length - 1] ?? null : stateAt(this.states, timeS);
@@ -131,14 +131,14 @@ export class Inspector {
       this.state = state;
       this.show(state);
     } else if (!state && this.movement.textContent === '') {
-      setText(this.movement, this.note || 'Asking…');
+      setText(this.movement, this.errorText || 'Loading…');
     }
-    if (visible) this.moveHead(timeS);
+    if (visible) this.movePlayhead(timeS);
   }
 
   private show(state: AvatarState | null): void {
     if (!state) {
-      setText(this.movement, this.note);
+      setText(this.movement, this.errorText);
       this.moving.hidden = true;
       return;
     }
@@ -147,27 +147,27 @@ export class Inspector {
       (Math.abs(p[1]!) > 0.005 ? `, height ${p[1]!.toFixed(2)} m` : '') +
       `, heading ${degrees(Math.atan2(
         Math.sin(state.baseHeadingRad), Math.cos(state.baseHeadingRad)))}`);
-    setText(this.queueTitle, `Queue: ${state.queueSize === 0 ? 'empty' :
-      `${state.queueSize} waiting`}`);
+    setText(this.queueTitle, `Queue (${state.queueSize === 0 ? 'empty' : state.queueSize})`);
     const items = state.queue.map((item) => h('li', {}, queueText(item)));
-    if (state.queueSize > items.length) items.push(h('li', {}, `and ${state.queueSize - items.length} more`));
+    const unlisted = state.queueSize - items.length;
+    if (unlisted > 0) items.push(h('li', {}, `${unlisted} more`));
     this.queue.replaceChildren(...items);
     const movement = state.movement;
     this.moving.hidden = movement === null;
     if (!movement) {
-      setText(this.movement, 'Stands and waits.');
+      setText(this.movement, 'Standing');
       return;
     }
-    setText(this.movement, `${movementName(movement.kind)}, ` +
+    setText(this.movement, `${movementNames[movement.kind] ?? movement.kind}, ` +
       `${(movement.endTimeS - movement.startTimeS).toFixed(2)} s` +
-      (movement.extrapolated ? '; beyond its examples' : '') +
-      (movement.clamped ? '; limited to what they reach' : ''));
+      (movement.extrapolated ? ', extrapolated' : '') + (movement.clamped ? ', clamped' : ''));
     const shape = `${movement.kind}/${movement.group}/${movement.startTimeS}`;
-    if (shape === this.shape) return;
-    this.shape = shape;
-    this.blended.hidden = movement.weights.length === 0;  // Nothing is blended to stand.
+    if (shape === this.shownMovement) return;
+    this.shownMovement = shape;
+    // A requested stand is not blended from examples.
+    this.blended.hidden = movement.weights.length === 0;
     this.showParameters(movement);
-    this.showLine(movement);
+    this.showTimeline(movement);
     this.showAxes(movement);
     this.showScatter(movement);
     this.showBars(movement);
@@ -181,19 +181,20 @@ export class Inspector {
         h('td', {}, requested[name] === undefined ? '–' : parameterText(name, requested[name]!)),
         h('td', {}, applied[name] === undefined ? '–' : parameterText(name, applied[name]!))));
     this.parameters.replaceChildren(
-      h('thead', {}, h('tr', {}, h('th', {}), h('th', {scope: 'col'}, 'asked'),
-        h('th', {scope: 'col'}, 'applied'))),
+      h('thead', {}, h('tr', {}, h('th', {}), h('th', {scope: 'col'}, 'Requested'),
+        h('th', {scope: 'col'}, 'Applied'))),
       h('tbody', {}, ...rows));
     this.parameters.hidden = rows.length === 0;
   }
 
-  private showLine(movement: MovementState): void {
+  private showTimeline(movement: MovementState): void {
     const keys = movement.keytimesS;
     const span = Math.max(movement.endTimeS - movement.startTimeS, 1e-6);
     const x = (t: number): number => 8 + Math.min(1, Math.max(0, t / span)) * 264;
     const parts: SVGElement[] = [svg('line', {class: 'axis', x1: 8, y1: 20, x2: 272, y2: 20})];
     if (movement.easeS > 0) {
-      parts.push(svg('rect', {class: 'ease', x: 8, y: 16, width: x(movement.easeS) - 8, height: 8}));
+      const width = x(movement.easeS) - 8;
+      parts.push(svg('rect', {class: 'ease', x: 8, y: 16, width, height: 8}));
     }
     let right = -100;
     for (let i = 0; i < keys.length; ++i) {
@@ -205,10 +206,10 @@ export class Inspector {
     }
     this.playhead = svg('path', {class: 'playhead', d: 'M0 3v28M-4 3h8l-4 6z'});
     this.playheadText = svg('text', {class: 'playhead-text', x: 0, y: 9});
-    this.line.replaceChildren(...parts, this.playhead, this.playheadText);
+    this.timeline.replaceChildren(...parts, this.playhead, this.playheadText);
   }
 
-  private moveHead(timeS: number): void {
+  private movePlayhead(timeS: number): void {
     const movement = this.state?.movement;
     if (!movement || !this.playhead || !this.playheadText) return;
     const t = timeS - movement.startTimeS;
@@ -222,11 +223,14 @@ export class Inspector {
     setText(this.playheadText, `generic time ${text}`);
   }
 
-  /** Lets one choose which two parameters are drawn; the two that vary most to begin with. */
+  /**
+   * Lets the user choose the two parameters of the scatter plot. Initially they are the main
+   * parameter (end forward, or length) and the one with the widest range.
+   */
   private showAxes(movement: MovementState): void {
     const names = movement.parameterNames as readonly string[];
     const n = names.length;
-    // What was chosen stays for as long as there is the same to choose from.
+    // The user's choice stays while the parameters are the same.
     if (names.join() === this.axisNames) return;
     this.axisNames = names.join();
     const count = n > 0 ? Math.floor(movement.sites.length / n) : 0;
@@ -256,8 +260,8 @@ export class Inspector {
       });
       return element;
     };
-    this.axes.append('→ ', select('Parameter to the right', this.axisX, (k) => (this.axisX = k)),
-      ' ↑ ', select('Parameter upwards', this.axisY, (k) => (this.axisY = k)));
+    this.axes.append('→ ', select('Horizontal axis', this.axisX, (k) => (this.axisX = k)),
+      ' ↑ ', select('Vertical axis', this.axisY, (k) => (this.axisY = k)));
   }
 
   private showScatter(movement: MovementState): void {
@@ -286,26 +290,28 @@ export class Inspector {
     };
     const x = scale(xs, px, 18, 262);
     const y = scale(ys, py, 122, 18);
-    const parts: SVGElement[] = [svg('rect', {class: 'frame', x: 4, y: 4, width: 272, height: 132})];
+    const parts: SVGElement[] =
+      [svg('rect', {class: 'frame', x: 4, y: 4, width: 272, height: 132})];
     for (let i = 0; i < count; ++i) {
       const w = movement.weights[i] ?? 0;
       const r = 2 + Math.sqrt(Math.min(1, Math.abs(w))) * 10;
       const dot = svg('circle', {
         class: w < 0 ? 'site negative' : Math.abs(w) < 0.01 ? 'site idle' : 'site',
         cx: x(xs[i]!).toFixed(1), cy: y(ys[i]!).toFixed(1), r: r.toFixed(1)});
-      dot.append(svg('title', {}, `example ${i}: weight ${w.toFixed(3)}`));
+      dot.append(svg('title', {}, `Example ${i}: weight ${w.toFixed(3)}`));
       parts.push(dot);
     }
     const cx = x(px);
     const cy = y(py);
-    parts.push(svg('path', {class: 'wanted', d:
+    parts.push(svg('path', {class: 'applied-cross', d:
       `M${cx - 7} ${cy}h14M${cx} ${cy - 7}v14`}));
     const range = (values: number[], k: number): string =>
-      `${parameterText(names[k]!, Math.min(...values))} … ${parameterText(names[k]!, Math.max(...values))}`;
+      `${parameterText(names[k]!, Math.min(...values))} … ` +
+      parameterText(names[k]!, Math.max(...values));
     parts.push(svg('text', {class: 'axis-text', x: 140, y: 147}, range(xs, this.axisX)));
     this.scatter.replaceChildren(...parts);
-    this.scatter.setAttribute('aria-label',
-      `${count} examples; the cross is what is applied, larger dots weigh more`);
+    this.scatter.setAttribute('aria-label', `${count} examples. The cross marks the applied ` +
+      'parameters; larger dots have larger weights.');
   }
 
   private showBars(movement: MovementState): void {
@@ -329,25 +335,25 @@ export class Inspector {
         class: w < 0 ? 'bar negative' : 'bar', x: (4 + i * width).toFixed(2),
         y: (w < 0 ? zero : zero - tall).toFixed(2), width: Math.max(1, width * 0.78).toFixed(2),
         height: tall.toFixed(2)});
-      bar.append(svg('title', {}, `example ${i}: ${w.toFixed(3)}`));
+      bar.append(svg('title', {}, `Example ${i}: weight ${w.toFixed(3)}`));
       parts.push(bar);
     }
     parts.push(svg('line', {class: 'axis', x1: 4, y1: zero, x2: 276, y2: zero}));
     this.bars.replaceChildren(...parts);
     order.sort((a, b) => Math.abs(movement.weights[b]!) - Math.abs(movement.weights[a]!));
-    const text = order.slice(0, 4).map((i) => `#${i} ${movement.weights[i]!.toFixed(2)}`).join(', ');
-    setText(this.barsText, n === 0 ? 'It has no examples.' : `${n} examples; most: ${text}`);
-    this.bars.setAttribute('aria-label', `Weights of ${n} examples; most: ${text}`);
+    const text =
+      order.slice(0, 4).map((i) => `#${i} ${movement.weights[i]!.toFixed(2)}`).join(', ');
+    setText(this.barsText, n === 0 ? 'No examples' : `${n} examples; largest weights: ${text}`);
+    this.bars.setAttribute('aria-label', `Weights of ${n} examples; largest: ${text}`);
   }
 }
 
+/** Formats a request, for example "Step, left foot, 0.60 m" or "Walk to x 1.00 m, z 2.00 m". */
 function queueText(item: QueuedRequest): string {
-  if (item.type === 'stand') return `stand ${item.seconds.toFixed(1)} s`;
-  const foot = item.foot !== 'auto' ? ` ${item.foot}` : '';
-  if (item.type === 'walk') {
-    return `walk to x ${item.atM![0].toFixed(2)}, z ${item.atM![2].toFixed(2)} m`;
-  }
-  if (item.atM) return `step${foot} to x ${item.atM[0].toFixed(2)}, z ${item.atM[2].toFixed(2)} m`;
-  const turn = item.turnRad ? `, ${degrees(item.turnRad)}` : '';
-  return `${item.type}${foot} ${item.lengthM.toFixed(2)} m${turn}`;
+  if (item.type === 'stand') return `Stand, ${item.seconds.toFixed(1)} s`;
+  if (item.type === 'walk') return `Walk to ${pointText(item.atM!)}`;
+  const foot = item.foot !== 'auto' ? `, ${item.foot} foot` : '';
+  if (item.atM) return `Step${foot} to ${pointText(item.atM)}`;
+  const turn = item.turnRad ? `, turn ${degrees(item.turnRad)}` : '';
+  return `${item.type === 'jump' ? 'Jump' : 'Step'}${foot}, ${item.lengthM.toFixed(2)} m${turn}`;
 }

@@ -1,9 +1,11 @@
-// A small plot of the last minute: one line, its newest value, its largest.
-
 import {h, setText} from '../dom.js';
 
-const kept = 120;
+/** One minute, with two values per second. */
+const maxValues = 120;
 
+/**
+ * A line plot of the last minute, with the newest value as text. The axis scales to the largest.
+ */
 export class Plot {
   readonly element: HTMLElement;
   private readonly canvas: HTMLCanvasElement;
@@ -18,13 +20,9 @@ export class Plot {
       this.canvas);
   }
 
-  get last(): number | undefined {
-    return this.values[this.values.length - 1];
-  }
-
   add(value: number): void {
     this.values.push(value);
-    if (this.values.length > kept) this.values.shift();
+    if (this.values.length > maxValues) this.values.shift();
     setText(this.value, this.format(value));
   }
 
@@ -45,8 +43,9 @@ export class Plot {
     let top = 1e-9;
     for (const value of values) top = Math.max(top, value);
     top *= 1.15;
-    const x = (i: number): number => (1 - (values.length - 1 - i) / (kept - 1)) * width;
-    const y = (v: number): number => height - 1.5 * scale - (Math.max(v, 0) / top) * (height - 3 * scale);
+    const x = (i: number): number => (1 - (values.length - 1 - i) / (maxValues - 1)) * width;
+    const y = (v: number): number =>
+      height - 1.5 * scale - (Math.max(v, 0) / top) * (height - 3 * scale);
     context.beginPath();
     values.forEach((v, i) => (i === 0 ? context.moveTo(x(i), y(v)) : context.lineTo(x(i), y(v))));
     context.lineWidth = 1.5 * scale;
@@ -63,6 +62,7 @@ export class Plot {
   }
 }
 
+/** Formats a number of bytes, for example "4.2 KB". 1 KB is 1000 bytes. */
 export function formatBytes(bytes: number): string {
   if (bytes < 1000) return `${bytes.toFixed(0)} B`;
   if (bytes < 1e6) return `${(bytes / 1e3).toFixed(bytes < 1e4 ? 1 : 0)} KB`;

@@ -1,57 +1,62 @@
-// Panels to the left and right of the scene; where the page is narrow one of them at a time.
+// Panels to the left and right of the scene. On narrow pages, only one is open at a time.
 
 import {button, h} from '../dom.js';
 
-export type PanelName = 'drive' | 'view' | 'inspect' | 'figures';
+export type PanelName = 'commands' | 'view' | 'inspect' | 'statistics';
 
 const narrowPx = 900;
 
-/** Too narrow for panels beside the scene: they lie over its lower part. */
-export function narrow(): boolean {
+/**
+ * Whether the page is too narrow for panels beside the scene, so that they cover its lower part.
+ */
+export function isNarrowPage(): boolean {
   return innerWidth < narrowPx;
 }
 
 export class SidePanels {
   readonly left = h('div', {class: 'column left'});
   readonly right = h('div', {class: 'column right'});
-  /** Buttons that open and close them. */
-  readonly tools = h('nav', {class: 'tools', 'aria-label': 'Panels'});
+  /** Buttons that open and close the panels. */
+  readonly toggles = h('nav', {class: 'tools', 'aria-label': 'Panels'});
   private readonly panels = new Map<PanelName, {element: HTMLElement; toggle: HTMLButtonElement}>();
 
-  /** `onChange`: what they leave free is about to change. */
+  /** `onChange` is called before a panel opens or closes. */
   constructor(private readonly onChange: () => void) {}
 
-  add(name: PanelName, title: string, iconName: string, column: 'left' | 'right', body: HTMLElement): void {
+  add(
+    name: PanelName, title: string, iconName: string, column: 'left' | 'right',
+    body: HTMLElement): void {
     const id = `panel-${name}`;
     const toggle = button(title, {icon: iconName, class: 'tool'}, () => {
-      this.set(name, this.panels.get(name)!.element.hidden);
+      this.setOpen(name, this.panels.get(name)!.element.hidden);
     });
     toggle.setAttribute('aria-controls', id);
-    const close = button(`Close ${title}`, {icon: 'close', text: false, class: 'round small'}, () => {
-      this.set(name, false);
-      toggle.focus();
-    });
+    const close = button(
+      `Close ${title}`, {icon: 'close', text: false, class: 'round small'}, () => {
+        this.setOpen(name, false);
+        toggle.focus();
+      });
     const element = h('section', {id, class: `panel ${name}`, 'aria-label': title},
       h('div', {class: 'panel-head'}, h('h2', {}, title), close), body);
     this.panels.set(name, {element, toggle});
-    this.tools.append(toggle);
+    this.toggles.append(toggle);
     this[column].append(element);
   }
 
-  set(name: PanelName, open: boolean): void {
+  setOpen(name: PanelName, open: boolean): void {
     this.onChange();
     for (const [other, {element, toggle}] of this.panels) {
       if (other === name) element.hidden = !open;
-      else if (open && narrow()) element.hidden = true;
+      else if (open && isNarrowPage()) element.hidden = true;
       toggle.setAttribute('aria-expanded', String(!element.hidden));
     }
   }
 
-  open(name: PanelName): boolean {
+  isOpen(name: PanelName): boolean {
     return !this.panels.get(name)!.element.hidden;
   }
 
-  /** The highest of those that are open, where it begins on the page. */
+  /** Top edge of the highest open panel in CSS pixels; Infinity if none is open. */
   highestTop(): number {
     let top = Infinity;
     for (const {element} of this.panels.values()) {

@@ -1,78 +1,89 @@
-// How things are shown: bodies or lines, what is marked, and how poses travel.
+// The view panel: how avatars are drawn, which decals are shown, and how the server sends poses.
 
 import {h, setText} from '../dom.js';
 import type {FigureStyle, QualityChoice} from '../quality.js';
-import type {Cost, Stream} from '../stream.js';
+import type {StreamCost, PoseStream} from '../pose_stream.js';
 import {formatBytes} from './plot.js';
 
-type Choice = 'auto' | FigureStyle;
-type Mark = 'shadows' | 'prints' | 'plants';
+type FigureChoice = 'auto' | FigureStyle;
+type Toggle = 'shadows' | 'footprints' | 'plantedFeet';
+
+interface ViewActions {
+  figures(choice: FigureChoice): void;
+  quality(choice: QualityChoice): void;
+  stream(change: Partial<PoseStream>): void;
+  toggle(name: Toggle, on: boolean): void;
+}
 
 export class ViewPanel {
   readonly element: HTMLElement;
-  private readonly auto = h('p', {class: 'hint'});
-  private readonly marks = new Map<Mark, HTMLInputElement>();
-  private readonly detail: HTMLFieldSetElement;
+  private readonly qualityText = h('p', {class: 'hint'});
+  private readonly checkboxes = new Map<Toggle, HTMLInputElement>();
+  private readonly detailChoice: HTMLFieldSetElement;
   private readonly costs = h('tbody');
 
-  constructor(
-    actions: {
-      figures(choice: Choice): void; quality(choice: QualityChoice): void; stream(change: Partial<Stream>): void;
-      toggle(name: Mark, on: boolean): void;
-    }, now: {figures: Choice; quality: QualityChoice; stream: Stream}) {
-    this.detail = radios('Joints', 'detail', [['all', 'All'], ['fewer', 'Fewer'], ['root', 'Root only']],
-      now.stream.detail, (value) => actions.stream({detail: value as Stream['detail']}));
+  /** `initial`: the values that the controls show initially. */
+  constructor(actions: ViewActions, initial: {
+    figures: FigureChoice; quality: QualityChoice; stream: PoseStream;
+  }) {
+    this.detailChoice = radios(
+      'Joints', 'detail', [['all', 'All'], ['fewer', 'Fewer'], ['root', 'Root only']],
+      initial.stream.detail, (value) => actions.stream({detail: value as PoseStream['detail']}));
     this.element = h('div', {class: 'panel-body'},
-      radios('Figures', 'figures', [['auto', 'Automatic'], ['bodies', 'Bodies'], ['lines', 'Lines']],
-        now.figures, (value) => actions.figures(value as Choice)),
+      radios('Draw avatars as', 'figures',
+        [['auto', 'Automatic'], ['bodies', 'Bodies'], ['lines', 'Lines']],
+        initial.figures, (value) => actions.figures(value as FigureChoice)),
       radios('Quality', 'quality', [['auto', 'Automatic'], ['high', 'High'], ['low', 'Low']],
-        now.quality, (value) => actions.quality(value as QualityChoice)),
-      this.auto,
-      this.check('shadows', 'Shadows', actions), this.check('prints', 'Footprints', actions),
-      this.check('plants', 'Planted feet', actions),
-      radios('Poses travel', 'mode', [['quantised', 'Quantised'], ['full', 'Full']], now.stream.mode,
-        (value) => actions.stream({mode: value as Stream['mode']})),
-      this.detail,
-      radios('Rate', 'rate', [['1', 'Whole'], ['2', 'Half'], ['4', 'Quarter']],
-        String(now.stream.everyNTicks),
-        (value) => actions.stream({everyNTicks: Number(value) as Stream['everyNTicks']})),
+        initial.quality, (value) => actions.quality(value as QualityChoice)),
+      this.qualityText,
+      this.check('shadows', 'Shadows', actions), this.check('footprints', 'Footprints', actions),
+      this.check('plantedFeet', 'Planted feet', actions),
+      radios('Pose format', 'mode', [['quantised', 'Quantised'], ['full', 'Full']],
+        initial.stream.mode, (value) => actions.stream({mode: value as PoseStream['mode']})),
+      this.detailChoice,
+      radios('Pose rate', 'rate', [['1', 'Full'], ['2', 'Half'], ['4', 'Quarter']],
+        String(initial.stream.everyNTicks),
+        (value) => actions.stream({everyNTicks: Number(value) as PoseStream['everyNTicks']})),
       h('table', {class: 'costs'},
-        h('caption', {}, 'Bytes of poses, each way that was on'),
-        h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Sent as'), h('th', {scope: 'col'}, 'a pose'),
-          h('th', {scope: 'col'}, 'a second'))), this.costs));
+        h('caption', {}, 'Measured cost of the formats used'),
+        h('thead', {}, h('tr', {}, h('th', {scope: 'col'}, 'Format'),
+          h('th', {scope: 'col'}, 'Per pose'), h('th', {scope: 'col'}, 'Per second'))),
+        this.costs));
   }
 
-  set(name: Mark, on: boolean): void {
-    this.marks.get(name)!.checked = on;
+  setChecked(name: Toggle, on: boolean): void {
+    this.checkboxes.get(name)!.checked = on;
   }
-  /** Whether there is a choice: the server knows of it, and poses are quantised. */
-  setDetail(on: boolean): void {
-    this.detail.disabled = !on;
+  /** Enables the choice of joints: only for quantised poses and servers that support it. */
+  setDetailEnabled(on: boolean): void {
+    this.detailChoice.disabled = !on;
   }
-  setCosts(costs: readonly Cost[]): void {
-    this.costs.replaceChildren(...costs.map(({name, now, bytesAPose, bytesPerS}) => h('tr',
-      {'aria-current': now && 'true'}, h('th', {scope: 'row'}, name), h('td', {}, `${bytesAPose.toFixed(0)} B`),
-      h('td', {}, formatBytes(bytesPerS)))));
+  setCosts(costs: readonly StreamCost[]): void {
+    this.costs.replaceChildren(...costs.map(({name, active, bytesPerPose, bytesPerS}) => h('tr',
+      {'aria-current': active && 'true'}, h('th', {scope: 'row'}, name),
+      h('td', {}, `${bytesPerPose.toFixed(0)} B`), h('td', {}, formatBytes(bytesPerS)))));
   }
-  setAuto(text: string): void {
-    setText(this.auto, text);
+  /** Text beneath the choice of quality. */
+  setQualityText(text: string): void {
+    setText(this.qualityText, text);
   }
 
-  private check(
-    name: Mark, label: string, actions: {toggle(name: Mark, on: boolean): void}): HTMLElement {
+  private check(name: Toggle, label: string, actions: ViewActions): HTMLElement {
     const input = h('input', {type: 'checkbox', id: `view-${name}`, checked: true});
     input.addEventListener('change', () => actions.toggle(name, input.checked));
-    this.marks.set(name, input);
+    this.checkboxes.set(name, input);
     return h('label', {class: 'check', for: `view-${name}`}, input, label);
   }
 }
 
+/** A group of radio buttons. `options` are pairs of value and label. */
 function radios(
   legend: string, name: string, options: [string, string][], value: string,
   onChange: (value: string) => void): HTMLFieldSetElement {
   const group = h('fieldset', {class: 'segments'}, h('legend', {}, legend));
   for (const [id, label] of options) {
-    const input = h('input', {type: 'radio', name, id: `${name}-${id}`, value: id, checked: id === value});
+    const input = h('input',
+      {type: 'radio', name, id: `${name}-${id}`, value: id, checked: id === value});
     input.addEventListener('change', () => onChange(id));
     group.append(input, h('label', {for: `${name}-${id}`}, label));
   }

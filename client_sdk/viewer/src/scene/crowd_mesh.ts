@@ -1,17 +1,18 @@
-// A crowd of one skeleton in one draw call: the body once an avatar, moved by the joints' matrices,
-// which lie in one texture of floats: three texels a joint, row by row. Or lines, see `LineCrowd`.
+// Draws all avatars of a world, which share one skeleton. Bodies are instances of one mesh, skinned
+// in the vertex shader: a float texture holds the joint matrices, three texels (rows) per joint.
+// Alternatives are CPU skinning (`CpuSkinnedCrowd`) and lines (`StickFigureCrowd`).
 
 import * as THREE from 'three';
 
 import type {CrowdPose} from '../sdk.js';
-import {restPositions} from './figure.js';
-import type {SkeletonLike} from './figure.js';
-import {carry, matrixFloats, solve} from './kinematics.js';
-import {LineCrowd} from './line_crowd.js';
-import {buildBody} from './skeleton_body.js';
-import {SkinnedCrowd} from './skinned_crowd.js';
+import {restPositions} from './body_parts.js';
+import type {SkeletonLike} from './body_parts.js';
+import {transformPoint, floatsPerMatrix, computeJointTransforms} from './kinematics.js';
+import {StickFigureCrowd} from './stick_figure_crowd.js';
+import {buildBodyMesh} from './body_mesh.js';
+import {CpuSkinnedCrowd} from './cpu_skinned_crowd.js';
 import type {FigureStyle} from '../quality.js';
-import type {Ground} from '../terrain.js';
+import type {TerrainSurface} from '../terrain_surface.js';
 
 const textureWidth = 1024;
 
@@ -23,14 +24,14 @@ uniform mat4 viewMatrix;
 uniform mat4 projectionMatrix;
 uniform sampler2D matrices;
 uniform int jointCount;
-uniform vec4 shadow;   // xyz: where light comes from, w: 1 flattens to the ground
+uniform vec4 shadow;   // xyz: direction towards the light; w: 1 projects to the ground
 in vec3 position;
 in vec3 normal;
 in vec2 joints;
 in float blend;
 in float region;
-in vec4 look;          // rgb of the shirt, 1 when chosen
-in float ground;       // height of the ground beneath
+in vec4 shirt;         // colour of the shirt; w is 1 if the avatar is selected
+in float terrainHeight;
 #ifdef COARSE
 uniform vec3 sun;
 uniform vec3 skyLight;
@@ -43,7 +44,7 @@ out vec3 vColour;
 out vec3 vNormal;
 out vec3 vWorld;
 out vec3 vColour;
-out float vChosen;
+out float vSelected;
 #endif
 
 void rows(int joint, out vec4 a, out vec4 b, out vec4 c) {
@@ -69,33 +70,33 @@ void main() {
   vec3 world = vec3(dot(a, p), dot(b, p), dot(c, p));
   vec3 n = vec3(dot(a.xyz, normal), dot(b.xyz, normal), dot(c.xyz, normal));
   if (shadow.w > 0.5) {
-    world -= shadow.xyz * (max(world.y - ground, 0.0) / shadow.y);
-    world.y = ground + 0.004;
+    world -= shadow.xyz * (max(world.y - terrainHeight, 0.0) / shadow.y);
+    world.y = terrainHeight + 0.004;
   }
-  // Trousers and hair differ a little from one avatar to the next, by the shirt's own colour.
-  float tint = fract(look.r * 7.13 + look.g * 3.71 + look.b * 5.37);
+  // The colour of the shirt also selects those of skin, trousers and hair.
+  float tint = fract(shirt.r * 7.13 + shirt.g * 3.71 + shirt.b * 5.37);
   vec3 skin = mix(vec3(0.87, 0.66, 0.53), vec3(0.55, 0.36, 0.26), smoothstep(0.45, 1.0, tint));
   vec3 trousers = mix(vec3(0.16, 0.20, 0.29), vec3(0.33, 0.31, 0.28), fract(tint * 3.3));
   vec3 hair = mix(vec3(0.11, 0.08, 0.06), vec3(0.42, 0.28, 0.15), fract(tint * 5.7));
-  vec3 base = region < 0.5 ? skin : region < 1.5 ? look.rgb : region < 2.5 ? trousers :
+  vec3 base = region < 0.5 ? skin : region < 1.5 ? shirt.rgb : region < 2.5 ? trousers :
     region < 3.5 ? vec3(0.13, 0.13, 0.15) : hair;
   vec4 seen = viewMatrix * vec4(world, 1.0);
 #ifdef COARSE
   vec3 lit = base * (mix(groundLight, skyLight, n.y * 0.5 + 0.5) +
     vec3(1.0, 0.96, 0.9) * max(dot(n, sun), 0.0) * 1.15);
-  lit = mix(lit, accent, look.w * 0.4);
+  lit = mix(lit, accent, shirt.w * 0.4);
   float far = clamp(-seen.z / fogDistance, 0.0, 1.0);
   vColour = mix(lit, fogColour, far * far * far);
 #else
   vNormal = n;
   vWorld = world;
-  vChosen = look.w;
+  vSelected = shirt.w;
   vColour = base;
 #endif
   gl_Position = projectionMatrix * seen;
 }`;
 
-// Lit once a vertex.
+// For coarse bodies, which are lit per vertex.
 const coarseFragment = /* glsl */ `
 precision mediump float;
 in vec3 vColour;
@@ -114,7 +115,7 @@ uniform vec3 accent;
 in vec3 vNormal;
 in vec3 vWorld;
 in vec3 vColour;
-in float vChosen;
+in float vSelected;
 out vec4 colour;
 void main() {
   vec3 n = normalize(vNormal);
@@ -123,10 +124,10 @@ void main() {
   vec3 around = mix(groundLight, skyLight, n.y * 0.5 + 0.5);
   float rim = pow(1.0 - max(dot(n, view), 0.0), 3.0);
   vec3 lit = vColour * (around + vec3(1.0, 0.96, 0.9) * key * 1.15) + skyLight * rim * 0.16;
-  lit = mix(lit, accent, vChosen * (0.1 + 0.75 * rim));
+  lit = mix(lit, accent, vSelected * (0.1 + 0.75 * rim));
   float far = clamp(length(cameraPosition - vWorld) / fogDistance, 0.0, 1.0);
   lit = mix(lit, fogColour, far * far * far);
-  // Display colours: the renderer writes what it is given.
+  // All colours are in display space, so there is no conversion at the end.
   colour = vec4(pow(lit, vec3(1.0 / 1.12)), 1.0);
 }`;
 
@@ -136,7 +137,7 @@ uniform vec4 shade;
 out vec4 colour;
 void main() { colour = shade; }`;
 
-/** Colours and lights that a theme gives; shared by every crowd. */
+/** Lights and colours of the current theme. All crowds share one object. */
 export interface Lights {
   sun: THREE.Vector3;
   skyLight: THREE.Color;
@@ -146,7 +147,7 @@ export interface Lights {
   shade: THREE.Vector4;
 }
 
-/** A hue an avatar keeps, from its number: neighbours differ. */
+/** A colour that depends only on the avatar's id. Consecutive ids have different hues. */
 export function shirtColour(avatar: number, out: THREE.Color): THREE.Color {
   const hue = (avatar * 0.61803398875 + 0.07) % 1;
   const shift = (avatar * 0.754877666) % 1;
@@ -159,11 +160,12 @@ export class CrowdMesh {
   readonly skeleton: SkeletonLike;
   readonly rest: Float32Array;
   readonly heightM: number;
-  /** World positions of all joints: 3 a joint, jointCount joints an avatar. */
+  /** World positions of all joints: 3 numbers per joint, `jointCount` joints per avatar. */
   positions = new Float32Array(0);
+  /** Results of `computeJointTransforms` for all avatars. */
   matrices = new Float32Array(0);
-  /** Balls of the left and right foot: 6 an avatar. */
-  balls = new Float32Array(0);
+  /** World positions of the balls of the left and right foot: 6 numbers per avatar. */
+  footBalls = new Float32Array(0);
   avatars = new Uint32Array(0);
   count = 0;
   style: FigureStyle;
@@ -172,26 +174,28 @@ export class CrowdMesh {
   private readonly uniforms: Record<string, THREE.IUniform>;
   private readonly jointCount: number;
   private readonly colour = new THREE.Color();
-  private readonly lookAvatars: number[] = [];
+  /** For each index, the avatar whose colours have been uploaded there. */
+  private readonly colouredAvatars: number[] = [];
   private geometry: THREE.InstancedBufferGeometry | null = null;
   private mesh: THREE.Mesh | null = null;
-  private lines: LineCrowd | null = null;
-  private skinned: SkinnedCrowd | null = null;
+  private stickFigures: StickFigureCrowd | null = null;
+  private cpuSkinned: CpuSkinnedCrowd | null = null;
   private shadowMesh: THREE.Mesh | null = null;
   private texture: THREE.DataTexture | null = null;
-  private look: THREE.InstancedBufferAttribute | null = null;
-  private floor: THREE.InstancedBufferAttribute | null = null;
-  private onPlane = true;
-  private chosen = 0;
-  private fineness = 0;
+  private shirtAttribute: THREE.InstancedBufferAttribute | null = null;
+  private terrainHeightAttribute: THREE.InstancedBufferAttribute | null = null;
+  private terrainIsFlat = true;
+  private selectedAvatar = 0;
+  private segments = 0;
   private coarse = false;
-  private simple = false;
+  private simplified = false;
   private shadows = true;
   private capacity = 0;
 
-  /** `byScript`: coarse bodies are moved here and not by a shader, see `SkinnedCrowd`. */
+  /** `cpuSkinning`: use `CpuSkinnedCrowd` for coarse bodies without shadows. */
   constructor(
-    skeleton: SkeletonLike, style: FigureStyle, lights: Lights, private readonly byScript = false) {
+    skeleton: SkeletonLike, style: FigureStyle, lights: Lights,
+    private readonly cpuSkinning = false) {
     this.skeleton = skeleton;
     this.jointCount = skeleton.jointCount;
     this.rest = restPositions(skeleton);
@@ -204,82 +208,86 @@ export class CrowdMesh {
       fogColour: {value: lights.fogColour}, fogDistance: {value: 90},
       accent: {value: lights.accent},
     };
-    this.heightM = buildBody(skeleton, 5).heightM;
-    this.grow(16);
+    this.heightM = buildBodyMesh(skeleton, 5).heightM;
+    this.reserve(16);
   }
 
-  /** `coarse`: bodies of few faces, lit once a vertex; `simple`: figures of few lines. */
-  setStyle(style: FigureStyle, coarse: boolean, simple: boolean): void {
-    if (style === this.style && coarse === this.coarse && simple === this.simple) return;
+  /**
+   * `coarse`: bodies with few faces, lit per vertex. `simplified`: stick figures with few lines.
+   */
+  setStyle(style: FigureStyle, coarse: boolean, simplified: boolean): void {
+    if (style === this.style && coarse === this.coarse && simplified === this.simplified) return;
     this.style = style;
     this.coarse = coarse;
-    this.simple = simple;
-    this.build();
+    this.simplified = simplified;
+    this.rebuild();
   }
 
   setShadows(on: boolean): void {
     if (on === this.shadows) return;
     this.shadows = on;
-    // Shadows are the shader's: it moves the bodies, too, then.
-    if (this.byScript && this.coarse && this.style === 'bodies') this.build();
+    // Shadows need the shader, which then also skins the bodies.
+    if (this.cpuSkinning && this.coarse && this.style === 'bodies') this.rebuild();
     if (this.shadowMesh) this.shadowMesh.visible = on;
   }
 
-  choose(avatar: number): void {
-    if (avatar === this.chosen) return;
-    this.chosen = avatar;
-    this.lookAvatars.length = 0;
+  setSelected(avatar: number): void {
+    if (avatar === this.selectedAvatar) return;
+    this.selectedAvatar = avatar;
+    this.colouredAvatars.length = 0;
   }
 
-  /** Colours may have changed. */
-  redress(): void {
-    this.lookAvatars.length = 0;
+  /** Uploads all colours again with the next update. */
+  invalidateColours(): void {
+    this.colouredAvatars.length = 0;
   }
 
-  /** Takes the crowd's poses; allocates only when the crowd has grown. */
-  update(pose: CrowdPose, ground: Ground | null = null): void {
-    if (pose.count * this.jointCount * matrixFloats > this.matrices.length) this.grow(pose.count);
+  /** Draws these poses from now on. Allocates only if the crowd has grown. */
+  update(pose: CrowdPose, terrain: TerrainSurface | null = null): void {
+    const size = pose.count * this.jointCount * floatsPerMatrix;
+    if (size > this.matrices.length) this.reserve(pose.count);
     this.count = pose.count;
     const {jointCount, skeleton} = this;
     const legs = [skeleton.leftLeg, skeleton.rightLeg] as const;
     for (let i = 0; i < pose.count; ++i) {
       this.avatars[i] = pose.avatars[i]!;
-      solve(skeleton, this.rest, pose.rootsM[i * 3]!, pose.rootsM[i * 3 + 1]!,
+      computeJointTransforms(skeleton, this.rest, pose.rootsM[i * 3]!, pose.rootsM[i * 3 + 1]!,
         pose.rootsM[i * 3 + 2]!, pose.rotations, i * jointCount * 4, this.matrices,
-        i * jointCount * matrixFloats, this.positions, i * jointCount * 3);
+        i * jointCount * floatsPerMatrix, this.positions, i * jointCount * 3);
       for (let f = 0; f < 2; ++f) {
         const leg = legs[f]!;
         const ball = leg.ball >= 0 ? leg.ball : Math.max(leg.ankle, 0);
-        carry(this.matrices, (i * jointCount + ball) * matrixFloats, this.positions,
-          (i * jointCount + ball) * 3, leg.ballOffsetM, this.balls, i * 6 + f * 3);
+        transformPoint(this.matrices, (i * jointCount + ball) * floatsPerMatrix, this.positions,
+          (i * jointCount + ball) * 3, leg.ballOffsetM, this.footBalls, i * 6 + f * 3);
       }
     }
-    if (this.style === 'bodies' && this.finenessNow() !== this.fineness) this.build();
-    this.stand(ground);
-    this.dress();
+    if (this.style === 'bodies' && this.desiredSegments() !== this.segments) this.rebuild();
+    this.updateTerrainHeights(terrain);
+    this.updateColours();
     if (this.geometry) this.geometry.instanceCount = pose.count;
-    if (this.lines) this.lines.update(this.matrices, this.positions, pose.count);
-    else if (this.skinned) this.skinned.update(this.matrices, pose.count);
+    if (this.stickFigures) this.stickFigures.update(this.matrices, this.positions, pose.count);
+    else if (this.cpuSkinned) this.cpuSkinned.update(this.matrices, pose.count);
     else if (this.texture) this.texture.needsUpdate = true;
   }
 
-  /** Shadows fall on what the avatar stands on. */
-  private stand(ground: Ground | null): void {
-    const flat = ground === null || ground.flat;
-    if (!this.floor || !this.geometry || (flat && this.onPlane)) return;
-    this.onPlane = flat;
-    const heights = this.floor.array as Float32Array;
+  /** Each avatar's shadow is projected to the terrain height at its root. */
+  private updateTerrainHeights(terrain: TerrainSurface | null): void {
+    const flat = terrain === null || terrain.isFlat;
+    if (!this.terrainHeightAttribute || !this.geometry || (flat && this.terrainIsFlat)) return;
+    this.terrainIsFlat = flat;
+    const heights = this.terrainHeightAttribute.array as Float32Array;
     if (flat) heights.fill(0);
     for (let i = 0; i < this.count && !flat; ++i) {
       const at = i * this.jointCount * 3;
-      heights[i] = ground.heightAt(this.positions[at]!, this.positions[at + 2]!);
+      heights[i] = terrain.heightAt(this.positions[at]!, this.positions[at + 2]!);
     }
-    this.floor.needsUpdate = true;
+    this.terrainHeightAttribute.needsUpdate = true;
   }
 
-  /** Finer tubes while there are few, coarser ones in a crowd. */
-  private finenessNow(): number {
-    return this.coarse ? (this.count > 24 ? 4 : 5) : this.count > 300 ? 6 : this.count > 60 ? 8 : 12;
+  /** Segments of a limb's cross-section: fewer for larger crowds. */
+  private desiredSegments(): number {
+    if (this.coarse) return this.count > 24 ? 4 : 5;
+    return this.count > 300 ? 6 : this.count > 60 ? 8 : 12;
   }
 
   dispose(): void {
@@ -292,68 +300,69 @@ export class CrowdMesh {
     for (const mesh of [this.mesh, this.shadowMesh]) {
       if (mesh) (mesh.material as THREE.Material).dispose();
     }
-    this.lines?.dispose();
-    this.skinned?.dispose();
-    this.geometry = this.mesh = this.shadowMesh = this.lines = this.skinned = null;
+    this.stickFigures?.dispose();
+    this.cpuSkinned?.dispose();
+    this.geometry = this.mesh = this.shadowMesh = this.stickFigures = this.cpuSkinned = null;
     this.group.clear();
   }
 
-  private dress(): void {
-    if (!this.look) return;
+  private updateColours(): void {
+    if (!this.shirtAttribute) return;
     let changed = false;
     for (let i = 0; i < this.count; ++i) {
       const avatar = this.avatars[i]!;
-      if (this.lookAvatars[i] === avatar) continue;
-      this.lookAvatars[i] = avatar;
+      if (this.colouredAvatars[i] === avatar) continue;
+      this.colouredAvatars[i] = avatar;
       shirtColour(avatar, this.colour);
-      this.look.setXYZW(i, this.colour.r, this.colour.g, this.colour.b,
-        avatar === this.chosen ? 1 : 0);
-      this.lines?.dress(i, this.colour, avatar === this.chosen);
-      this.skinned?.dress(i, this.colour, avatar === this.chosen);
+      this.shirtAttribute.setXYZW(i, this.colour.r, this.colour.g, this.colour.b,
+        avatar === this.selectedAvatar ? 1 : 0);
+      this.stickFigures?.setColours(i, this.colour, avatar === this.selectedAvatar);
+      this.cpuSkinned?.setColours(i, this.colour, avatar === this.selectedAvatar);
       changed = true;
     }
-    if (changed) this.look.needsUpdate = true;
+    if (changed) this.shirtAttribute.needsUpdate = true;
   }
 
-  private grow(atLeast: number): void {
+  private reserve(minCapacity: number): void {
     let capacity = 16;
-    while (capacity < atLeast) capacity *= 2;
+    while (capacity < minCapacity) capacity *= 2;
     this.capacity = capacity;
     const texels = capacity * this.jointCount * 3;
     const rows = Math.ceil(texels / textureWidth);
     this.matrices = new Float32Array(rows * textureWidth * 4);
     this.positions = new Float32Array(capacity * this.jointCount * 3);
-    this.balls = new Float32Array(capacity * 6);
+    this.footBalls = new Float32Array(capacity * 6);
     this.avatars = new Uint32Array(capacity);
     this.texture?.dispose();
     this.texture = new THREE.DataTexture(
       this.matrices, textureWidth, rows, THREE.RGBAFormat, THREE.FloatType);
     this.texture.needsUpdate = true;
     this.uniforms['matrices']!.value = this.texture;
-    this.look = new THREE.InstancedBufferAttribute(new Float32Array(capacity * 4), 4);
-    this.look.setUsage(THREE.DynamicDrawUsage);
-    this.floor = new THREE.InstancedBufferAttribute(new Float32Array(capacity), 1);
-    this.floor.setUsage(THREE.DynamicDrawUsage);
-    this.onPlane = true;
-    this.lookAvatars.length = 0;
-    this.build();
+    this.shirtAttribute = new THREE.InstancedBufferAttribute(new Float32Array(capacity * 4), 4);
+    this.shirtAttribute.setUsage(THREE.DynamicDrawUsage);
+    this.terrainHeightAttribute = new THREE.InstancedBufferAttribute(new Float32Array(capacity), 1);
+    this.terrainHeightAttribute.setUsage(THREE.DynamicDrawUsage);
+    this.terrainIsFlat = true;
+    this.colouredAvatars.length = 0;
+    this.rebuild();
   }
 
-  private build(): void {
+  private rebuild(): void {
     this.clear();
-    this.lookAvatars.length = 0;
+    this.colouredAvatars.length = 0;
     if (this.style === 'lines') {
-      this.lines = new LineCrowd(this.skeleton, this.lights, this.capacity, this.simple);
-      this.group.add(this.lines.object);
+      this.stickFigures = new StickFigureCrowd(
+        this.skeleton, this.lights, this.capacity, this.simplified);
+      this.group.add(this.stickFigures.object);
       return;
     }
     const {uniforms, coarse} = this;
     const geometry = new THREE.InstancedBufferGeometry();
-    this.fineness = this.finenessNow();
-    const body = buildBody(this.skeleton, this.fineness, coarse);
-    if (coarse && this.byScript && !this.shadows) {
-      this.skinned = new SkinnedCrowd(body, this.jointCount, this.lights, this.capacity);
-      this.group.add(this.skinned.object);
+    this.segments = this.desiredSegments();
+    const body = buildBodyMesh(this.skeleton, this.segments, coarse);
+    if (coarse && this.cpuSkinning && !this.shadows) {
+      this.cpuSkinned = new CpuSkinnedCrowd(body, this.jointCount, this.lights, this.capacity);
+      this.group.add(this.cpuSkinned.object);
       return;
     }
     geometry.setAttribute('position', new THREE.BufferAttribute(body.positions, 3));
@@ -362,8 +371,8 @@ export class CrowdMesh {
     geometry.setAttribute('blend', new THREE.BufferAttribute(body.blends, 1));
     geometry.setAttribute('region', new THREE.BufferAttribute(body.regions, 1));
     geometry.setIndex(new THREE.BufferAttribute(body.indices, 1));
-    geometry.setAttribute('look', this.look!);
-    geometry.setAttribute('ground', this.floor!);
+    geometry.setAttribute('shirt', this.shirtAttribute!);
+    geometry.setAttribute('terrainHeight', this.terrainHeightAttribute!);
     geometry.instanceCount = this.count;
     this.geometry = geometry;
     this.mesh = new THREE.Mesh(geometry, new THREE.RawShaderMaterial({
@@ -373,7 +382,8 @@ export class CrowdMesh {
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = 3;
     this.group.add(this.mesh);
-    // The same bodies flattened along the light: a shadow, darkened once by the stencil.
+    // Shadows are the same bodies, projected to the ground along the light. The stencil buffer
+    // keeps overlapping shadows from darkening a pixel twice.
     this.shadowMesh = new THREE.Mesh(geometry, new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader, fragmentShader: shadowFragment,
       uniforms: {

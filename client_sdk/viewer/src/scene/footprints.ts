@@ -1,72 +1,75 @@
-// Footprints that are left behind and fade.
+// Footprints that avatars leave on the ground and that fade with time.
 
 import * as THREE from 'three';
 
-import type {Ground} from '../terrain.js';
-import {Marks} from './marks.js';
+import type {TerrainSurface} from '../terrain_surface.js';
+import {GroundDecals} from './ground_decals.js';
 
-const printFragment = /* glsl */ `
+const footprintFragment = /* glsl */ `
 precision highp float;
 uniform float now;
-uniform float lasting;
+uniform float fadeS;
 uniform vec3 left;
 uniform vec3 right;
 in vec2 vAt;
-in vec4 vAbout;    // time, foot, 0, 0
+in vec4 vData;     // time of the foot strike, foot, 0, 0
 out vec4 colour;
 float blot(vec2 p, vec2 c, vec2 r) { return 1.0 - smoothstep(0.8, 1.0, length((p - c) / r)); }
 void main() {
-  float age = now - vAbout.x;
-  float fresh = age < 0.0 ? 0.0 : 1.0 - clamp(age / lasting, 0.0, 1.0);
-  // The ball of the foot is the middle; the heel lies behind it.
+  float age = now - vData.x;
+  float fresh = age < 0.0 ? 0.0 : 1.0 - clamp(age / fadeS, 0.0, 1.0);
+  // The ball of the foot is at the centre, the heel behind it.
   float shape = max(blot(vAt, vec2(0.0, 0.18), vec2(0.3, 0.52)),
                     blot(vAt, vec2(0.0, -0.72), vec2(0.22, 0.26)));
   float a = shape * sqrt(fresh) * 0.75;
   if (a < 0.01) discard;
-  colour = vec4(vAbout.y < 0.5 ? left : right, a);
+  colour = vec4(vData.y < 0.5 ? left : right, a);
 }`;
 
-/** Footprints: the oldest give way to new ones. */
+/** A ring buffer of footprints: new ones replace the oldest. */
 export class Footprints {
-  readonly marks: Marks;
-  /** How many are kept at most; up to the capacity. */
+  readonly decals: GroundDecals;
+  /** Upper limit of footprints, at most the capacity. */
   limit: number;
   private next = 0;
   private total = 0;
-  private unseen = 0;
+  private pendingUploads = 0;
   private readonly uniforms: Record<string, THREE.IUniform>;
 
   constructor(capacity: number, left: THREE.Color, right: THREE.Color) {
     this.limit = capacity;
     this.uniforms = {
-      now: {value: 0}, lasting: {value: 14}, left: {value: left}, right: {value: right}};
-    this.marks = new Marks(capacity, printFragment, 0.008, this.uniforms);
+      now: {value: 0}, fadeS: {value: 14}, left: {value: left}, right: {value: right}};
+    this.decals = new GroundDecals(capacity, footprintFragment, 0.008, this.uniforms);
   }
 
-  add(timeS: number, ground: Ground, x: number, z: number, heading: number, foot: number): void {
-    this.marks.set(this.next % this.limit, ground, x, z, heading, 0.15, timeS, foot, 0, 0);
+  /** `timeS` is server time; `foot` is 0 for left, 1 for right. */
+  add(
+    timeS: number, terrain: TerrainSurface, x: number, z: number, headingRad: number,
+    foot: number): void {
+    this.decals.set(this.next % this.limit, terrain, x, z, headingRad, 0.15, timeS, foot, 0, 0);
     ++this.next;
     ++this.total;
-    ++this.unseen;
+    ++this.pendingUploads;
   }
 
-  /** Another ground: where they were is no place any more. */
+  /** Removes all, for example because the terrain has changed. */
   clear(): void {
     this.next = 0;
-    this.unseen = 0;
-    this.marks.show(0);
+    this.pendingUploads = 0;
+    this.decals.upload(0);
   }
 
-  /** Once a frame. */
-  at(timeS: number): void {
+  /** Call once per frame with the server time that is shown. */
+  update(timeS: number): void {
     this.uniforms['now']!.value = timeS;
-    if (this.unseen === 0 && this.marks.count <= this.limit) return;
-    this.unseen = 0;
-    this.marks.show(Math.min(this.next, this.limit));
+    if (this.pendingUploads === 0 && this.decals.count <= this.limit) return;
+    this.pendingUploads = 0;
+    this.decals.upload(Math.min(this.next, this.limit));
   }
 
-  /** Since the page was opened. */
-  get laid(): number {
+  /** Number of footprints added since the page was opened. */
+  get addedCount(): number {
     return this.total;
   }
 }

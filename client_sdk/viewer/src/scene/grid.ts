@@ -1,13 +1,16 @@
-// The flat ground: a grid of metres that fades into the distance.
+// Flat terrain: a plane with a 1 m grid that fades with distance.
 
 import * as THREE from 'three';
 
 import {gridLines} from './grid_lines.js';
 
-export interface GroundColours {
+export interface TerrainColours {
   near: THREE.Color;
+  /** Colour in the far distance, which is also the background. */
   far: THREE.Color;
+  /** Lines every metre. */
   line: THREE.Color;
+  /** Lines every five metres. */
   strong: THREE.Color;
 }
 
@@ -42,7 +45,7 @@ void main() {
   colour = vec4(mix(c, far, smoothstep(0.12, 1.0, d)), 1.0);
 }`;
 
-// Without a graphics card a plane of one colour and some lines do.
+// For software renderers: a plane of one colour, and line primitives instead of lines per pixel.
 const plainVertex = /* glsl */ `
 precision highp float;
 uniform mat4 viewMatrix;
@@ -55,7 +58,7 @@ uniform vec3 line;
 uniform vec3 strong;
 uniform float fogDistance;
 in vec3 position;
-in float kind;     // 0 ground, 1 line, 2 strong line
+in float kind;     // 0: plane, 1: line, 2: strong line
 out vec4 vColour;
 void main() {
   vec3 world = vec3(position.x + centre.x, 0.0, position.z + centre.z);
@@ -71,29 +74,33 @@ in vec4 vColour;
 out vec4 colour;
 void main() { colour = vColour; }`;
 
-/** An endless plane with lines every metre, stronger every five. */
+/**
+ * A plane around the camera's target with lines every metre, and stronger ones every five metres.
+ */
 export class Grid {
   readonly object: THREE.Object3D;
   private readonly uniforms: Record<string, THREE.IUniform>;
-  private net: THREE.Object3D | null = null;
+  private fineLines: THREE.Object3D | null = null;
 
-  constructor(colours: GroundColours, plain: boolean) {
+  /** `software`: whether the CPU renders. */
+  constructor(colours: TerrainColours, software: boolean) {
     this.uniforms = {
       near: {value: colours.near}, far: {value: colours.far}, line: {value: colours.line},
       strong: {value: colours.strong}, centre: {value: new THREE.Vector3()},
       fogDistance: {value: 90},
     };
-    this.object = plain ? this.plain() : this.fine();
+    this.object = software ? this.makeSimple() : this.makeDetailed();
   }
 
-  /** `distanceM`: from where it is looked at. */
+  /** Centres the plane at x, z. `distanceM` is the camera's distance. */
   follow(x: number, z: number, distanceM: number): void {
-    // From afar lines a metre apart would be a grey of their own.
-    if (this.net) this.net.visible = distanceM < 24;
-    (this.uniforms['centre']!.value as THREE.Vector3).set(Math.round(x / 5) * 5, 0, Math.round(z / 5) * 5);
+    // From far away, lines every metre would merge into a grey area.
+    if (this.fineLines) this.fineLines.visible = distanceM < 24;
+    const centre = this.uniforms['centre']!.value as THREE.Vector3;
+    centre.set(Math.round(x / 5) * 5, 0, Math.round(z / 5) * 5);
   }
 
-  private fine(): THREE.Object3D {
+  private makeDetailed(): THREE.Object3D {
     const plane = new THREE.PlaneGeometry(400, 400, 8, 8).rotateX(-Math.PI / 2);
     const mesh = new THREE.Mesh(plane, new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader: gridVertex, fragmentShader: gridFragment,
@@ -104,12 +111,12 @@ export class Grid {
     return mesh;
   }
 
-  private plain(): THREE.Object3D {
+  private makeSimple(): THREE.Object3D {
     const material = new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3, vertexShader: plainVertex, fragmentShader: plainFragment,
       uniforms: this.uniforms, depthWrite: false, depthTest: false,
     });
-    // Rings that widen outwards: corners lie close where colours change.
+    // Rings of vertices that are closer together near the centre, where colours change most.
     const plane = new THREE.BufferGeometry();
     const places: number[] = [0, 0, 0];
     const index: number[] = [];
@@ -131,22 +138,25 @@ export class Grid {
     plane.setAttribute('kind', new THREE.BufferAttribute(new Float32Array(count), 1));
     const group = new THREE.Group();
     const ground = new THREE.Mesh(plane, material);
-    this.net = new THREE.LineSegments(netOf(20, 1), material);
-    const strong = new THREE.LineSegments(netOf(40, 5), material);
+    this.fineLines = new THREE.LineSegments(gridLineGeometry(20, 1), material);
+    const strong = new THREE.LineSegments(gridLineGeometry(40, 5), material);
     ground.renderOrder = -3;
-    this.net.renderOrder = -2;
+    this.fineLines.renderOrder = -2;
     strong.renderOrder = -1;
-    ground.frustumCulled = this.net.frustumCulled = strong.frustumCulled = false;
-    group.add(ground, this.net, strong);
+    ground.frustumCulled = this.fineLines.frustumCulled = strong.frustumCulled = false;
+    group.add(ground, this.fineLines, strong);
     return group;
   }
 }
 
-/** Lines to `half` metres either way: every metre, or the strong ones every five. */
-function netOf(half: number, every: number): THREE.BufferGeometry {
+/**
+ * Grid lines in a square with sides of 2 * `half` metres. `every` 1: lines every metre except the
+ * strong ones; `every` 5: only the strong lines, every five metres.
+ */
+function gridLineGeometry(half: number, every: number): THREE.BufferGeometry {
   const positions: number[] = [];
   const kinds: number[] = [];
-  const piece = 8;  // Colours change along a line from piece to piece.
+  const piece = 8;  // Lines are split, because colours are computed per vertex.
   for (let i = -half; i <= half; i += every) {
     if (every === 1 && i % 5 === 0) continue;
     for (let from = -half; from < half; from += piece) {

@@ -1,7 +1,8 @@
-// GLSL that both grounds share, the endless plane and the uneven one.
-
-/** `grid(p, width)`: how much of a line lies at p, lines at whole numbers, `width` pixels wide; nothing where they
- * would lie closer than the pixels. */
+/**
+ * GLSL for grid lines, shared by the flat grid and the terrain mesh. `grid(p, width)` returns the
+ * coverage at p, 0 to 1, of lines at whole numbers that are `width` pixels wide. Where lines would
+ * be closer than pixels, it returns 0.
+ */
 export const gridLines = /* glsl */ `
 float grid(vec2 p, float width) {
   vec2 w = fwidth(p);

@@ -1,19 +1,20 @@
-// Forward kinematics in typed arrays: what a crowd's shader needs, for every joint of every avatar.
+// Forward kinematics on typed arrays, for all joints of all avatars of a crowd.
 
-import type {SkeletonLike} from './figure.js';
+import type {SkeletonLike} from './body_parts.js';
 
-/** Floats of a joint's matrix: three rows of four, rotation and translation. */
-export const matrixFloats = 12;
+/** Size of a joint's matrix: three rows of four, rotation and translation. */
+export const floatsPerMatrix = 12;
 
 /**
- * World transforms of one avatar's joints, written twice: as matrices that take a point of the rest
- * pose to the world, and as the joints' world positions.
+ * Computes world transforms of one avatar's joints: matrices that map points of the rest pose to
+ * the world, and world positions of the joints.
  *
- * `rest`: 3 a joint, of `restPositions`. `rotations`: x, y, z, w a joint from `rotationsAt` on, the
- * root's in the world, others relative to their parent. `matrices` takes 12 a joint from
- * `matricesAt` on, `positions` 3 a joint from `positionsAt` on. Allocates nothing.
+ * `rest`: joint positions in the rest pose, 3 numbers per joint, from `restPositions`. `rotations`:
+ * quaternions x, y, z, w, starting at index `rotationsAt`; the root's is in world space, the others
+ * are relative to their parents. Writes 12 numbers per joint to `matrices` from index `matricesAt`,
+ * and 3 per joint to `positions` from `positionsAt`. Never allocates.
  */
-export function solve(
+export function computeJointTransforms(
   skeleton: SkeletonLike, rest: Float32Array, rootX: number, rootY: number, rootZ: number,
   rotations: Float32Array, rotationsAt: number, matrices: Float32Array, matricesAt: number,
   positions: Float32Array, positionsAt: number): void {
@@ -24,7 +25,7 @@ export function solve(
     const y = rotations[q + 1]!;
     const z = rotations[q + 2]!;
     const w = rotations[q + 3]!;
-    // The local rotation's matrix.
+    // Matrix of the local rotation.
     const l00 = 1 - 2 * (y * y + z * z);
     const l01 = 2 * (x * y - z * w);
     const l02 = 2 * (x * z + y * w);
@@ -34,7 +35,7 @@ export function solve(
     const l20 = 2 * (x * z - y * w);
     const l21 = 2 * (y * z + x * w);
     const l22 = 1 - 2 * (x * x + y * y);
-    const m = matricesAt + j * matrixFloats;
+    const m = matricesAt + j * floatsPerMatrix;
     const parent = j === 0 ? -1 : parents[j]!;
     let px = rootX;
     let py = rootY;
@@ -42,7 +43,7 @@ export function solve(
     let r00 = l00, r01 = l01, r02 = l02, r10 = l10, r11 = l11, r12 = l12, r20 = l20, r21 = l21,
       r22 = l22;
     if (parent >= 0) {
-      const p = matricesAt + parent * matrixFloats;
+      const p = matricesAt + parent * floatsPerMatrix;
       const a00 = matrices[p]!, a01 = matrices[p + 1]!, a02 = matrices[p + 2]!;
       const a10 = matrices[p + 4]!, a11 = matrices[p + 5]!, a12 = matrices[p + 6]!;
       const a20 = matrices[p + 8]!, a21 = matrices[p + 9]!, a22 = matrices[p + 10]!;
@@ -85,8 +86,8 @@ export function solve(
   }
 }
 
-/** A point in a joint's frame, in the world: out[at..at+2]. */
-export function carry(
+/** Transforms `offset`, a point in a joint's frame, to the world. Writes out[at] to out[at + 2]. */
+export function transformPoint(
   matrices: Float32Array, matrixAt: number, positions: Float32Array, positionAt: number,
   offset: ArrayLike<number>, out: Float32Array, at: number): void {
   const x = offset[0] ?? 0;

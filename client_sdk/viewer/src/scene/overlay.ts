@@ -1,8 +1,9 @@
-// Text over the scene: names of worlds side by side, the chosen avatar's number, names of joints.
+// Text over the scene: the names of the worlds, and the id and joint names of the selected avatar.
 
 import type {WorldView} from './world_view.js';
 import {projected} from './world_view.js';
 
+/** A joint's name and its position in CSS pixels. */
 interface Joint {
   name: string;
   x: number;
@@ -29,6 +30,7 @@ export class Overlay {
     this.canvas.height = Math.round(height * this.scale);
   }
 
+  /** Reads the theme's colours. */
   restyle(): void {
     const style = getComputedStyle(document.documentElement);
     this.colours = {
@@ -37,40 +39,41 @@ export class Overlay {
     };
   }
 
-  draw(shown: readonly {readonly view: WorldView}[], jointNames: boolean): void {
-    const chosen = shown.find(({view}) => view.chosen !== 0 && view.indexOf(view.chosen) >= 0)?.view;
-    const several = shown.length > 1;
-    // A layer the less for the browser to put over the scene while there is nothing to write.
-    this.canvas.hidden = !chosen && !several;
-    if (!chosen && !several && !this.dirty) return;
+  draw(panes: readonly {readonly view: WorldView}[], jointNames: boolean): void {
+    const selected = panes.find(({view}) => view.indexOf(view.selectedAvatar) >= 0)?.view;
+    const several = panes.length > 1;
+    // While there is no text, hiding the canvas saves the browser from compositing it.
+    this.canvas.hidden = !selected && !several;
+    if (!selected && !several && !this.dirty) return;
     const {context} = this;
     context.setTransform(this.scale, 0, 0, this.scale, 0, 0);
     context.clearRect(0, 0, this.width, this.height);
     this.dirty = false;
     if (several) {
       this.dirty = true;
-      shown.forEach(({view}, i) => {
+      panes.forEach(({view}, i) => {
         if (i > 0) {
           context.strokeStyle = this.colours.line;
           context.lineWidth = 2;
           context.beginPath();
-          if (view.box.x > 0) {
-            context.moveTo(view.box.x, 0);
-            context.lineTo(view.box.x, this.height);
+          if (view.viewport.x > 0) {
+            context.moveTo(view.viewport.x, 0);
+            context.lineTo(view.viewport.x, this.height);
           } else {
-            context.moveTo(0, view.box.y);
-            context.lineTo(this.width, view.box.y);
+            context.moveTo(0, view.viewport.y);
+            context.lineTo(this.width, view.viewport.y);
           }
           context.stroke();
         }
-        this.text(view.name, view.free.x + view.free.width / 2, view.free.y + 20, '600 14px', 'center',
-          this.colours.text);
+        const {freeArea} = view;
+        this.drawText(view.name, freeArea.x + freeArea.width / 2, freeArea.y + 20, '600 14px',
+          'center', this.colours.text);
       });
     }
-    if (!chosen?.crowd) return;
+    if (!selected?.crowd) return;
     this.dirty = true;
-    const crowd = chosen.crowd;
-    const i = chosen.indexOf(chosen.chosen);
+    const crowd = selected.crowd;
+    const i = selected.indexOf(selected.selectedAvatar);
     const n = crowd.skeleton.jointCount;
     let top = Infinity;
     let topX = 0;
@@ -78,7 +81,7 @@ export class Overlay {
     let high = -Infinity;
     const joints: Joint[] = [];
     for (let j = 0; j < n; ++j) {
-      if (!chosen.project(crowd.positions, (i * n + j) * 3)) continue;
+      if (!selected.project(crowd.positions, (i * n + j) * 3)) continue;
       const {x, y} = projected;
       if (y < top) {
         top = y;
@@ -88,15 +91,19 @@ export class Overlay {
       high = Math.max(high, x);
       if (jointNames) joints.push({name: crowd.skeleton.names[j] ?? '', x, y});
     }
-    if (jointNames) this.nameJoints(joints, low - 26, high + 26);
+    if (jointNames) this.drawJointNames(joints, low - 26, high + 26);
     if (top < Infinity) {
-      const lift = Math.max(10, (crowd.heightM * 0.13 * chosen.box.height) / (projected.z || 5) * 0.9);
-      this.text(`${chosen.chosen}`, topX, top - lift, '600 13px', 'center', this.colours.accent);
+      const heightPx = crowd.heightM * selected.viewport.height / (projected.z || 5);
+      const lift = Math.max(10, 0.117 * heightPx);
+      this.drawText(`${selected.selectedAvatar}`, topX, top - lift, '600 13px', 'center',
+        this.colours.accent);
     }
   }
 
-  /** Names in a column on either side of the figure, each with a line to its joint. */
-  private nameJoints(joints: readonly Joint[], left: number, right: number): void {
+  /**
+   * Draws a column of names on each side of the avatar, with a line from each name to its joint.
+   */
+  private drawJointNames(joints: readonly Joint[], left: number, right: number): void {
     const {context} = this;
     const byX = [...joints].sort((a, b) => a.x - b.x);
     const half = Math.floor(byX.length / 2);
@@ -119,14 +126,15 @@ export class Overlay {
         context.beginPath();
         context.arc(joint.x, joint.y, 3, 0, 7);
         context.fill();
-        this.text(joint.name, at, y + 4, '12px', align, this.colours.text);
+        this.drawText(joint.name, at, y + 4, '12px', align, this.colours.text);
         y += space;
       }
     }
   }
 
-  private text(
-    text: string, x: number, y: number, font: string, align: CanvasTextAlign, colour: string): void {
+  private drawText(
+    text: string, x: number, y: number, font: string, align: CanvasTextAlign,
+    colour: string): void {
     const {context} = this;
     context.font = `${font} system-ui, sans-serif`;
     context.textAlign = align;

@@ -1,10 +1,10 @@
-// The ground where it is not flat: the height field and the boxes, with the grid of metres on top.
+// Terrain that is not flat: meshes of the height field and the boxes, with the 1 m grid on top.
 
 import * as THREE from 'three';
 
 import type {HeightField, Terrain} from '../sdk.js';
-import type {Ground} from '../terrain.js';
-import type {GroundColours} from './grid.js';
+import type {TerrainSurface} from '../terrain_surface.js';
+import type {TerrainColours} from './grid.js';
 import {gridLines} from './grid_lines.js';
 
 const vertexShader = /* glsl */ `
@@ -15,7 +15,7 @@ uniform vec3 sun;
 in vec3 position;
 in vec3 normal;
 out vec3 vWorld;
-out vec3 vLight;   // share of light, top or side, and how far away
+out vec3 vLight;   // x: brightness; y: 1 for tops, 0 for sides; z: distance from the camera
 void main() {
   vec4 seen = viewMatrix * vec4(position, 1.0);
   vWorld = position;
@@ -33,12 +33,12 @@ uniform float fogDistance;
 in vec3 vWorld;
 in vec3 vLight;
 out vec4 colour;
-#ifndef PLAIN
+#ifndef NO_GRID
 ${gridLines}
 #endif
 void main() {
   vec3 c = mix(near, line, 0.28) * vLight.x;
-#ifndef PLAIN
+#ifndef NO_GRID
   c = mix(c, line, grid(vWorld.xz, 1.1) * 0.8 * vLight.y);
   c = mix(c, strong, grid(vWorld.xz / 5.0, 1.6) * 0.9 * vLight.y);
 #endif
@@ -67,32 +67,36 @@ in vec3 vColour;
 out vec4 colour;
 void main() { colour = vec4(vColour, 1.0); }`;
 
-/** Cells drawn along each side of a field at most; finer ones are passed over. */
-const mostCells = {plain: 96, fine: 384};
-/** Boxes drawn at most, the largest first. */
-const mostBoxes = {plain: 2000, fine: 20_000};
+/** Upper limit of cells drawn per side of a height field. Finer fields are subsampled. */
+const maxCells = {software: 96, hardware: 384};
+/** Upper limit of boxes drawn. If there are more, the smallest are left out. */
+const maxBoxes = {software: 2000, hardware: 20_000};
+/** Lines are this much above the surface, so that they are not hidden by it. */
 const liftM = 0.004;
 
 export class TerrainMesh {
   readonly object = new THREE.Group();
 
-  constructor(ground: Ground, colours: GroundColours, sun: THREE.Vector3, plain: boolean) {
-    const {terrain} = ground;
-    if (terrain === null) return;
+  /** `software`: whether the CPU renders. */
+  constructor(
+    terrain: TerrainSurface, colours: TerrainColours, sun: THREE.Vector3, software: boolean) {
+    const {source} = terrain;
+    if (source === null) return;
     const uniforms = {
       near: {value: colours.near}, far: {value: colours.far}, line: {value: colours.line},
       strong: {value: colours.strong}, sun: {value: sun}, fogDistance: {value: 90},
     };
-    const surface = new Surface();
+    const surface = new MeshData();
     const lines: number[] = [];
-    const limit = plain ? 'plain' : 'fine';
-    if (terrain.heightField) {
-      addField(surface, terrain.heightField, mostCells[limit]);
-      if (plain) drape(lines, terrain.heightField);
+    const limit = software ? 'software' : 'hardware';
+    if (source.heightField) {
+      addField(surface, source.heightField, maxCells[limit]);
+      if (software) addGridLines(lines, source.heightField);
     }
-    addBoxes(surface, lines, terrain, mostBoxes[limit]);
+    addBoxes(surface, lines, source, maxBoxes[limit]);
     const mesh = new THREE.Mesh(surface.geometry(), new THREE.RawShaderMaterial({
-      glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms, defines: plain ? {PLAIN: 1} : {},
+      glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms,
+      defines: software ? {NO_GRID: 1} : {},
       polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1,
     }));
     const geometry = new THREE.BufferGeometry();
@@ -115,44 +119,48 @@ export class TerrainMesh {
   }
 }
 
-class Surface {
+/** Collects vertices and triangles. */
+class MeshData {
   readonly positions: number[] = [];
   readonly normals: number[] = [];
   readonly indices: number[] = [];
 
-  vertex(x: number, y: number, z: number, nx: number, ny: number, nz: number): number {
+  vertex(x: number, y: number, z: number, nx: number, ny: number, nz: number): void {
     this.positions.push(x, y, z);
     this.normals.push(nx, ny, nz);
-    return this.positions.length / 3 - 1;
   }
-  /** Anticlockwise from outside. */
-  quad(corners: readonly (readonly [number, number, number])[], nx: number, ny: number, nz: number): void {
+  /** Corners are counterclockwise as seen from outside. */
+  quad(
+    corners: readonly (readonly [number, number, number])[], nx: number, ny: number,
+    nz: number): void {
     const first = this.positions.length / 3;
     for (const [x, y, z] of corners) this.vertex(x, y, z, nx, ny, nz);
     this.indices.push(first, first + 1, first + 2, first, first + 2, first + 3);
   }
   geometry(): THREE.BufferGeometry {
     const geometry = new THREE.BufferGeometry();
-    geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(this.positions), 3));
-    geometry.setAttribute('normal', new THREE.BufferAttribute(new Float32Array(this.normals), 3));
+    geometry.setAttribute('position', new THREE.Float32BufferAttribute(this.positions, 3));
+    geometry.setAttribute('normal', new THREE.Float32BufferAttribute(this.normals, 3));
     geometry.setIndex(this.indices);
     return geometry;
   }
 }
 
-/** Samples that are drawn of `count`: every so many, and the last. */
-function samples(count: number, mostCells: number): number[] {
-  const every = Math.max(1, Math.ceil((count - 1) / mostCells));
+/**
+ * Indices of at most `cells` + 1 evenly spaced samples of `count`, including the first and last.
+ */
+function sampledIndices(count: number, cells: number): number[] {
+  const every = Math.max(1, Math.ceil((count - 1) / cells));
   const out: number[] = [];
   for (let i = 0; i < count - 1; i += every) out.push(i);
   out.push(count - 1);
   return out;
 }
 
-function addField(surface: Surface, field: HeightField, mostCells: number): void {
+function addField(surface: MeshData, field: HeightField, cells: number): void {
   const {originM, cellM, columns, rows, heightsM} = field;
-  const across = samples(columns, mostCells);
-  const along = samples(rows, mostCells);
+  const across = sampledIndices(columns, cells);
+  const along = sampledIndices(rows, cells);
   const at = (c: number, r: number): number => heightsM[r * columns + c]!;
   const first = surface.positions.length / 3;
   for (const r of along) {
@@ -175,8 +183,11 @@ function addField(surface: Surface, field: HeightField, mostCells: number): void
   }
 }
 
-/** Lines along the field about every metre, for where the fragment shader draws none. */
-function drape(lines: number[], field: HeightField): void {
+/**
+ * Adds lines along the height field, about one per metre. Used with software renderers, where the
+ * fragment shader draws no grid.
+ */
+function addGridLines(lines: number[], field: HeightField): void {
   const {originM, cellM, columns, rows, heightsM} = field;
   const every = Math.max(1, Math.round(1 / cellM), Math.ceil(Math.max(columns, rows) / 80));
   const step = Math.max(1, Math.ceil(Math.max(columns, rows) / 160));
@@ -197,12 +208,12 @@ function drape(lines: number[], field: HeightField): void {
   }
 }
 
-function addBoxes(surface: Surface, lines: number[], terrain: Terrain, most: number): void {
+function addBoxes(surface: MeshData, lines: number[], terrain: Terrain, limit: number): void {
   const low = Math.min(0, ...(terrain.heightField ? [lowest(terrain.heightField.heightsM)] : []));
   const size = ({minM, maxM}: Terrain['boxes'][number]): number =>
     (maxM[0] - minM[0]) * (maxM[1] - minM[1]);
-  const boxes = terrain.boxes.length <= most ? terrain.boxes :
-    [...terrain.boxes].sort((a, b) => size(b) - size(a)).slice(0, most);
+  const boxes = terrain.boxes.length <= limit ? terrain.boxes :
+    [...terrain.boxes].sort((a, b) => size(b) - size(a)).slice(0, limit);
   for (const {minM: [x0, z0], maxM: [x1, z1], heightM: h} of boxes) {
     if (h <= low) continue;
     surface.quad([[x0, h, z0], [x0, h, z1], [x1, h, z1], [x1, h, z0]], 0, 1, 0);
@@ -211,8 +222,11 @@ function addBoxes(surface: Surface, lines: number[], terrain: Terrain, most: num
     surface.quad([[x1, low, z1], [x1, low, z0], [x1, h, z0], [x1, h, z1]], 1, 0, 0);
     surface.quad([[x0, low, z0], [x0, low, z1], [x0, h, z1], [x0, h, z0]], -1, 0, 0);
     const y = h + liftM;
-    lines.push(x0, y, z0, x0, y, z1, x0, y, z1, x1, y, z1, x1, y, z1, x1, y, z0, x1, y, z0, x0, y, z0);
-    for (const [x, z] of [[x0, z0], [x0, z1], [x1, z0], [x1, z1]] as const) lines.push(x, low, z, x, h, z);
+    lines.push(
+      x0, y, z0, x0, y, z1, x0, y, z1, x1, y, z1, x1, y, z1, x1, y, z0, x1, y, z0, x0, y, z0);
+    for (const [x, z] of [[x0, z0], [x0, z1], [x1, z0], [x1, z1]] as const) {
+      lines.push(x, low, z, x, h, z);
+    }
   }
 }
 

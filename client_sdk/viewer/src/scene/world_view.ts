@@ -1,4 +1,4 @@
-// One world as it is seen: its crowd, the marks on its ground, and a camera's target.
+// The scene of one world: its crowd, its terrain with decals, and its camera.
 
 import * as THREE from 'three';
 
@@ -8,30 +8,32 @@ import type {Orbit} from './camera.js';
 import {ViewCamera} from './camera.js';
 import {CrowdMesh} from './crowd_mesh.js';
 import type {Lights} from './crowd_mesh.js';
-import {mostPrints} from '../quality.js';
+import {maxFootprints} from '../quality.js';
 import type {FigureStyle} from '../quality.js';
-import {matrixFloats} from './kinematics.js';
-import {Ground} from '../terrain.js';
+import {floatsPerMatrix} from './kinematics.js';
+import {TerrainSurface} from '../terrain_surface.js';
 import {Footprints} from './footprints.js';
 import {Grid} from './grid.js';
-import type {GroundColours} from './grid.js';
-import {blobs, goalKinds, goals, planned, rings} from './marks.js';
+import type {TerrainColours} from './grid.js';
+import {
+  goalDecalKinds, makeBlobs, makeGoals, makePlannedFootprints, makeRings,
+} from './ground_decals.js';
 import {TerrainMesh} from './terrain_mesh.js';
 
-const markCapacity = 8192;
-const mostPlanned = 64;
-const mostGoalMarks = 1024;
-/** Half the width of goals and places to pass; arrows lie before their goal, larger while they are turned. */
+const decalCapacity = 8192;
+const maxPlannedFootprints = 64;
+const maxGoalDecals = 1024;
+/** Half the width of a decal. A heading arrow is larger while the user drags it. */
 const goalSizeM = 0.24;
 const waypointSizeM = 0.17;
-const arrowSizeM = {heading: 0.16, turning: 0.26} as const;
-/** A ball of the foot slower and lower than this carries the figure. */
-const plantedSpeedMs = 0.22;
+const arrowSizeM = {heading: 0.16, draggedHeading: 0.26} as const;
+/** A foot counts as planted if its ball moves slower than this and is closer to the ground. */
+const plantedSpeedMPerS = 0.22;
 const plantedHeightM = 0.14;
 
 export interface ViewColours {
   lights: Lights;
-  ground: GroundColours;
+  terrain: TerrainColours;
   shade: THREE.Color;
   left: THREE.Color;
   right: THREE.Color;
@@ -42,135 +44,148 @@ export interface ViewOptions {
   style: FigureStyle;
   coarse: boolean;
   shadows: boolean;
-  simple: boolean;
-  /** Footprints kept at most. */
-  mostPrints: number;
-  prints: boolean;
-  plants: boolean;
-  /** What is quick to draw without a graphics card. */
-  readonly plainGround: boolean;
+  simplified: boolean;
+  /** Upper limit of footprints drawn. */
+  maxFootprints: number;
+  footprints: boolean;
+  plantedFeet: boolean;
+  /** Whether the CPU renders. Terrain and crowd are then drawn in simpler ways. */
+  readonly software: boolean;
 }
 
-/** What a walk ends at, the way it looks there (chosen just now: `turning`), and what it passes. */
-export interface GoalMark {
-  readonly kind: keyof typeof goalKinds;
+/** A decal of a walk: its goal, a waypoint, or the heading at the goal, fixed or being dragged. */
+export interface GoalDecal {
+  readonly kind: keyof typeof goalDecalKinds;
   readonly atM: readonly [number, number, number];
   readonly headingRad: number;
 }
 
 export class WorldView {
   readonly scene = new THREE.Scene();
-  readonly view = new ViewCamera();
+  readonly viewCamera = new ViewCamera();
   readonly pose = createCrowdPose();
   crowd: CrowdMesh | null = null;
   readonly footprints: Footprints;
-  /** What is drawn, in CSS pixels from the top left; `free` is the part no panel covers. */
-  readonly box = {x: 0, y: 0, width: 1, height: 1};
-  readonly free = {x: 0, y: 0, width: 1, height: 1};
-  framed = false;
-  wantDistanceM = 8;
-  /** How many goals and places to pass are marked. */
+  /** The part of the page where the scene is drawn, in CSS pixels from the page's top left. */
+  readonly viewport = {x: 0, y: 0, width: 1, height: 1};
+  /** The part of `viewport` that no panel covers. */
+  readonly freeArea = {x: 0, y: 0, width: 1, height: 1};
+  /** Whether the camera has framed the avatars at least once. */
+  wasFramed = false;
+  desiredDistanceM = 8;
+  /** Numbers of goals and waypoints drawn. */
   goalCount = 0;
   waypointCount = 0;
-  chosen = 0;
-  following = 0;
+  /** Id of the selected avatar; 0 if there is none. */
+  selectedAvatar = 0;
+  /** Id of the avatar that the camera follows; 0 if there is none. */
+  followedAvatar = 0;
 
   private readonly grid: Grid;
-  private readonly blobs = blobs(markCapacity);
-  private readonly rings = rings(markCapacity);
+  private readonly blobs = makeBlobs(decalCapacity);
+  private readonly rings = makeRings(decalCapacity);
   private readonly options: ViewOptions;
   private readonly colours: ViewColours;
-  private previous = new Float32Array(0);
+  /** Foot balls at `previousTimeS`, 6 numbers per avatar. */
+  private previousBalls = new Float32Array(0);
   private previousAvatars = new Uint32Array(0);
+  /** For the left and right foot of each avatar: 1 if it is planted. */
   private planted = new Uint8Array(0);
-  private previousS = 0;
+  private previousTimeS = 0;
   private live = true;
-  private readonly headings = new Map<number, number>();
+  /** By avatar: the heading of its last footprint. */
+  private readonly lastFootHeadings = new Map<number, number>();
   private readonly unsubscribe: (() => void)[];
-  private readonly planned = planned(mostPlanned);
+  private readonly planned = makePlannedFootprints(maxPlannedFootprints);
+  /** Describes what the decals show, to skip uploads without a change. */
   private plannedVersion = '';
-  private readonly goals = goals(mostGoalMarks);
+  private readonly goals = makeGoals(maxGoalDecals);
   private goalsVersion = '';
   private terrainMesh: TerrainMesh | null = null;
-  /** What the world stands on. */
-  ground = new Ground(null);
+  terrain = new TerrainSurface(null);
 
   constructor(readonly world: World, colours: ViewColours, options: ViewOptions) {
     this.colours = colours;
     this.options = options;
-    this.grid = new Grid(colours.ground, options.plainGround);
-    this.footprints = new Footprints(mostPrints, colours.left, colours.right);
-    this.scene.add(this.grid.object, this.blobs.mesh, this.rings.mesh, this.footprints.marks.mesh,
+    this.grid = new Grid(colours.terrain, options.software);
+    this.footprints = new Footprints(maxFootprints, colours.left, colours.right);
+    this.scene.add(this.grid.object, this.blobs.mesh, this.rings.mesh, this.footprints.decals.mesh,
       this.planned.mesh, this.goals.mesh);
     this.unsubscribe = [
-      world.on('event', (event) => this.onEvent(event)), world.on('terrain', () => this.takeTerrain())];
-    this.takeTerrain();
+      world.on('event', (event) => this.onEvent(event)),
+      world.on('terrain', () => this.updateTerrain())];
+    this.updateTerrain();
   }
 
-  private takeTerrain(): void {
-    if (this.world.terrain === this.ground.terrain) return;
+  private updateTerrain(): void {
+    if (this.world.terrain === this.terrain.source) return;
     if (this.terrainMesh) {
       this.scene.remove(this.terrainMesh.object);
       this.terrainMesh.dispose();
       this.terrainMesh = null;
     }
-    this.ground = new Ground(this.world.terrain);
+    this.terrain = new TerrainSurface(this.world.terrain);
     this.footprints.clear();
-    this.plannedVersion = this.goalsVersion = 'as it lay';
-    if (this.ground.flat) return;
+    this.plannedVersion = this.goalsVersion = 'outdated';
+    if (this.terrain.isFlat) return;
     this.terrainMesh = new TerrainMesh(
-      this.ground, this.colours.ground, this.colours.lights.sun, this.options.plainGround);
+      this.terrain, this.colours.terrain, this.colours.lights.sun, this.options.software);
     this.scene.add(this.terrainMesh.object);
   }
 
-  /** Marks where feet are to land. */
-  plan(footprints: readonly {readonly atM: readonly [number, number, number]; readonly headingRad: number}[]): void {
+  /** Draws outlines where feet will land. */
+  showPlannedFootprints(footprints: readonly {
+    readonly atM: readonly [number, number, number]; readonly headingRad: number;
+  }[]): void {
     const {accent} = this.colours;
-    const version = footprints.map(({atM, headingRad}) => `${atM.join()}/${headingRad}`).join(' ') + accent.r;
+    const version =
+      footprints.map(({atM, headingRad}) => `${atM.join()}/${headingRad}`).join(' ') + accent.r;
     if (version === this.plannedVersion) return;
     this.plannedVersion = version;
-    const count = Math.min(footprints.length, mostPlanned);
+    const count = Math.min(footprints.length, maxPlannedFootprints);
     for (let i = 0; i < count; ++i) {
       const {atM, headingRad} = footprints[i]!;
       this.planned.set(
-        i, this.ground, atM[0], atM[2], headingRad, 0.17, accent.r, accent.g, accent.b, 0.95);
+        i, this.terrain, atM[0], atM[2], headingRad, 0.17, accent.r, accent.g, accent.b, 0.95);
     }
-    this.planned.show(count);
+    this.planned.upload(count);
   }
 
-  /** Marks of walks. */
-  showGoals(marks: readonly GoalMark[]): void {
+  /** Draws the goals, headings and waypoints of walks. */
+  showGoals(decals: readonly GoalDecal[]): void {
     const {r, g, b} = this.colours.accent;
-    const version = marks.map(({kind, atM, headingRad}) => `${kind} ${atM.join()}/${headingRad}`).join(' ') + r;
+    const version =
+      decals.map(({kind, atM, headingRad}) => `${kind} ${atM.join()}/${headingRad}`).join(' ') + r;
     if (version === this.goalsVersion) return;
     this.goalsVersion = version;
-    const count = Math.min(marks.length, mostGoalMarks);
+    const count = Math.min(decals.length, maxGoalDecals);
     this.goalCount = this.waypointCount = 0;
     for (let i = 0; i < count; ++i) {
-      const {kind, atM: [x, , z], headingRad} = marks[i]!;
+      const {kind, atM: [x, , z], headingRad} = decals[i]!;
       let [ahead, size] = [0, kind === 'goal' ? goalSizeM : waypointSizeM];
-      if (kind === 'heading' || kind === 'turning') {
+      if (kind === 'heading' || kind === 'draggedHeading') {
         size = arrowSizeM[kind];
         ahead = goalSizeM + 0.02 + size;
       }
       if (kind === 'goal') ++this.goalCount;
       if (kind === 'waypoint') ++this.waypointCount;
-      this.goals.set(i, this.ground, x + Math.sin(headingRad) * ahead, z + Math.cos(headingRad) * ahead,
-        headingRad, size, r, g, b, goalKinds[kind]);
+      this.goals.set(i, this.terrain,
+        x + Math.sin(headingRad) * ahead, z + Math.cos(headingRad) * ahead,
+        headingRad, size, r, g, b, goalDecalKinds[kind]);
     }
-    this.goals.show(count);
+    this.goals.upload(count);
   }
 
-  /** Where a point of the page lies on the ground; null: nowhere near. */
-  groundAt(x: number, y: number): [number, number, number] | null {
-    const {camera} = this.view;
+  /** The terrain beneath a point of the page, or null if there is none within 120 m. */
+  terrainPointAt(x: number, y: number): [number, number, number] | null {
+    const {viewCamera: {camera}, viewport} = this;
     const origin = point.setFromMatrixPosition(camera.matrixWorld);
-    const way = direction.set(
-      (x - this.box.x) / this.box.width * 2 - 1, 1 - (y - this.box.y) / this.box.height * 2, 0.5)
+    const ray = direction.set(
+      (x - viewport.x) / viewport.width * 2 - 1, 1 - (y - viewport.y) / viewport.height * 2, 0.5)
       .unproject(camera).sub(origin).normalize();
     const out = {x: 0, y: 0, z: 0};
-    return this.ground.meet(
-      origin.x, origin.y, origin.z, way.x, way.y, way.z, 120, out) ? [out.x, out.y, out.z] : null;
+    return this.terrain.raycast(
+      origin.x, origin.y, origin.z, ray.x, ray.y, ray.z, 120, out) ? [out.x, out.y, out.z] : null;
   }
 
   get name(): string {
@@ -185,10 +200,13 @@ export class WorldView {
     this.goals.dispose();
     this.blobs.dispose();
     this.rings.dispose();
-    this.footprints.marks.dispose();
+    this.footprints.decals.dispose();
   }
 
-  /** Poses, matrices and marks for time `timeS`; how many avatars there are. */
+  /**
+   * Updates the scene to server time `timeS`, from the recording unless `live`. Returns the number
+   * of avatars.
+   */
   update(timeS: number, live: boolean): number {
     const skeleton = this.world.skeleton;
     if (!skeleton) return 0;
@@ -196,25 +214,26 @@ export class WorldView {
       this.crowd?.dispose();
       if (this.crowd) this.scene.remove(this.crowd.group);
       this.crowd = new CrowdMesh(
-        skeleton, this.options.style, this.colours.lights, this.options.plainGround);
+        skeleton, this.options.style, this.colours.lights, this.options.software);
       this.scene.add(this.crowd.group);
     }
     this.live = live;
     const crowd = this.crowd;
-    crowd.setStyle(this.options.style, this.options.coarse, this.options.simple);
+    crowd.setStyle(this.options.style, this.options.coarse, this.options.simplified);
     crowd.setShadows(this.options.shadows);
-    crowd.choose(this.chosen);
+    crowd.setSelected(this.selectedAvatar);
     if (live) this.world.sampleAll(timeS, this.pose);
     else this.world.recording.sampleAll(timeS, this.pose);
-    crowd.update(this.pose, this.ground);
-    this.mark(timeS);
-    this.footprints.limit = this.options.mostPrints;
-    this.footprints.at(timeS);
-    this.footprints.marks.mesh.visible = this.options.prints;
-    this.rings.mesh.visible = this.options.plants;
+    crowd.update(this.pose, this.terrain);
+    this.updateDecals(timeS);
+    this.footprints.limit = this.options.maxFootprints;
+    this.footprints.update(timeS);
+    this.footprints.decals.mesh.visible = this.options.footprints;
+    this.rings.mesh.visible = this.options.plantedFeet;
     return crowd.count;
   }
 
+  /** Index of an avatar in the crowd's arrays, or -1 if it is not drawn. */
   indexOf(avatar: number): number {
     const crowd = this.crowd;
     if (!crowd || avatar === 0) return -1;
@@ -222,30 +241,30 @@ export class WorldView {
     return -1;
   }
 
-  /** Where an avatar stands and looks; null when it is not seen. */
-  place(avatar: number): {x: number; z: number; headingRad: number} | null {
+  /** Position and heading of an avatar's root, or null if it is not drawn. */
+  locate(avatar: number): {x: number; z: number; headingRad: number} | null {
     const i = this.indexOf(avatar);
     if (i < 0 || !this.crowd) return null;
     const n = this.crowd.skeleton.jointCount;
-    const m = i * n * matrixFloats;
+    const m = i * n * floatsPerMatrix;
     const {matrices, positions} = this.crowd;
     return {
       x: positions[i * n * 3]!, z: positions[i * n * 3 + 2]!,
       headingRad: Math.atan2(matrices[m + 2]!, matrices[m + 10]!)};
   }
 
-  /** Aims at the avatar followed. */
-  follow(): void {
-    const i = this.indexOf(this.following);
+  /** Aims the camera at the followed avatar. */
+  aimAtFollowed(): void {
+    const i = this.indexOf(this.followedAvatar);
     if (i < 0 || !this.crowd) return;
     const at = i * this.crowd.skeleton.jointCount * 3;
     const x = this.crowd.positions[at]!;
     const z = this.crowd.positions[at + 2]!;
-    this.view.moveTo(x, this.ground.heightAt(x, z) + this.crowd.heightM * 0.5, z);
+    this.viewCamera.moveTo(x, this.terrain.heightAt(x, z) + this.crowd.heightM * 0.5, z);
   }
 
-  /** Centre and radius of all that lives here, on the ground; null when nothing does. */
-  extent(): {x: number; z: number; radius: number} | null {
+  /** Centre and radius, in metres, of the area where avatars are; null if there are none. */
+  bounds(): {x: number; z: number; radius: number} | null {
     const crowd = this.crowd;
     if (!crowd || crowd.count === 0) return null;
     const stride = crowd.skeleton.jointCount * 3;
@@ -268,13 +287,16 @@ export class WorldView {
     return {x, z, radius};
   }
 
-  /** Aims the grid and the camera; call after `follow`. */
-  aim(orbit: Orbit, dtS: number): void {
-    this.view.advance(orbit, dtS, this.free, this.box, this.ground);
-    this.grid.follow(this.view.target.x, this.view.target.z, orbit.distanceM * this.view.scale);
+  /** Updates the camera and centres the grid. Call after `aimAtFollowed`. */
+  updateCamera(orbit: Orbit, dtS: number): void {
+    this.viewCamera.advance(orbit, dtS, this.freeArea, this.viewport, this.terrain);
+    const {target, scale} = this.viewCamera;
+    this.grid.follow(target.x, target.z, orbit.distanceM * scale);
   }
 
-  /** The avatar whose joints come nearest to a point of the screen, within `reachPx`; 0: none. */
+  /**
+   * The avatar with the joint nearest to a point of the page within `reachPx`; 0 if there is none.
+   */
   pick(x: number, y: number, reachPx: number): number {
     const crowd = this.crowd;
     if (!crowd) return 0;
@@ -292,7 +314,7 @@ export class WorldView {
           depth = projected.z;
         }
       }
-      // The nearer of two that overlap.
+      // Of two avatars that overlap, the one closer to the camera wins.
       const cost = near + depth * 4;
       if (near <= reachPx && cost < bestCost) {
         bestCost = cost;
@@ -302,116 +324,118 @@ export class WorldView {
     return best;
   }
 
-  /** Where a point of the world is on the screen: `projected`; false behind the camera. */
+  /**
+   * Projects the point at index `at` of `points` (x, y, z) to the page and writes it to
+   * `projected`. Returns false if it is behind the camera.
+   */
   project(points: ArrayLike<number>, at: number): boolean {
     point.set(points[at]!, points[at + 1]!, points[at + 2]!);
-    const depth = -point.applyMatrix4(this.view.camera.matrixWorldInverse).z;
+    const depth = -point.applyMatrix4(this.viewCamera.camera.matrixWorldInverse).z;
     if (depth < 0.05) return false;
-    point.applyMatrix4(this.view.camera.projectionMatrix);
-    projected.x = this.box.x + (point.x * 0.5 + 0.5) * this.box.width;
-    projected.y = this.box.y + (0.5 - point.y * 0.5) * this.box.height;
+    point.applyMatrix4(this.viewCamera.camera.projectionMatrix);
+    projected.x = this.viewport.x + (point.x * 0.5 + 0.5) * this.viewport.width;
+    projected.y = this.viewport.y + (0.5 - point.y * 0.5) * this.viewport.height;
     projected.z = depth;
     return true;
   }
 
-  /** The same for a single point; null behind the camera. */
-  onPage(point: readonly [number, number, number]): {x: number; y: number} | null {
+  /** The position of a world point on the page, or null if it is behind the camera. */
+  projectToPage(point: readonly [number, number, number]): {x: number; y: number} | null {
     return this.project(point, 0) ? {x: projected.x, y: projected.y} : null;
   }
-  /** How many footprints are marked that wait. */
+  /** Number of outlines that `showPlannedFootprints` has drawn. */
   get plannedCount(): number {
     return this.planned.count;
   }
 
   private onEvent(event: WorldEvent): void {
-    if (event.type === 'removed') this.headings.delete(event.avatar);
+    if (event.type === 'removed') this.lastFootHeadings.delete(event.avatar);
     if (event.type !== 'footStrike' || !event.foot) return;
-    // The event says where, the figure which way the foot points: a tenth of a second before it
-    // lands, when live; else as it did last.
-    if (this.live) this.headings.set(event.avatar, this.footHeading(event.avatar, event.foot));
-    this.footprints.add(event.timeS, this.ground, event.positionM[0], event.positionM[2],
-      this.headings.get(event.avatar) ?? 0, event.foot === 'left' ? 0 : 1);
+    // The event has the position, but no heading. While live, the heading comes from the drawn
+    // pose, about 0.1 s before the foot lands; otherwise from the avatar's previous footprint.
+    if (this.live) {
+      this.lastFootHeadings.set(event.avatar, this.footHeading(event.avatar, event.foot));
+    }
+    this.footprints.add(event.timeS, this.terrain, event.positionM[0], event.positionM[2],
+      this.lastFootHeadings.get(event.avatar) ?? 0, event.foot === 'left' ? 0 : 1);
   }
 
   private footHeading(avatar: number, foot: 'left' | 'right'): number {
     const crowd = this.crowd;
     const i = this.indexOf(avatar);
-    if (!crowd || i < 0) return this.headings.get(avatar) ?? 0;
+    if (!crowd || i < 0) return this.lastFootHeadings.get(avatar) ?? 0;
     const leg = foot === 'left' ? crowd.skeleton.leftLeg : crowd.skeleton.rightLeg;
     const ankle = (i * crowd.skeleton.jointCount + Math.max(leg.ankle, 0)) * 3;
     const ball = i * 6 + (foot === 'left' ? 0 : 3);
-    return Math.atan2(crowd.balls[ball]! - crowd.positions[ankle]!,
-      crowd.balls[ball + 2]! - crowd.positions[ankle + 2]!);
+    return Math.atan2(crowd.footBalls[ball]! - crowd.positions[ankle]!,
+      crowd.footBalls[ball + 2]! - crowd.positions[ankle + 2]!);
   }
 
-  private mark(timeS: number): void {
+  private updateDecals(timeS: number): void {
     const crowd = this.crowd!;
     const n = crowd.count;
     if (this.planted.length < n * 2) {
       this.planted = new Uint8Array(n * 4);
-      this.previous = new Float32Array(n * 12);
+      this.previousBalls = new Float32Array(n * 12);
       this.previousAvatars = new Uint32Array(n * 2);
     }
-    const dt = timeS - this.previousS;
-    const measure = Math.abs(dt) > 0.004;
-    const soon = Math.abs(dt) < 0.25;
+    const dt = timeS - this.previousTimeS;
+    const measurable = Math.abs(dt) > 0.004;
+    const recent = Math.abs(dt) < 0.25;
     const stride = crowd.skeleton.jointCount * 3;
-    const {ground} = this;
+    const {terrain} = this;
     const {shade, accent, left, right} = this.colours;
     let blob = 0;
     let ring = 0;
     for (let i = 0; i < n; ++i) {
       const avatar = crowd.avatars[i]!;
-      const known = this.previousAvatars[i] === avatar;
-      const chosen = avatar === this.chosen;
+      const sameAvatar = this.previousAvatars[i] === avatar;
+      const selected = avatar === this.selectedAvatar;
       const rootAt = i * stride;
-      if (blob < markCapacity) {
-        this.blobs.set(blob++, ground, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
+      if (blob < decalCapacity) {
+        this.blobs.set(blob++, terrain, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
           crowd.heightM * 0.28, shade.r, shade.g, shade.b, 0.5);
       }
-      if (chosen && ring < markCapacity) {
-        this.rings.set(ring++, ground, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
+      if (selected && ring < decalCapacity) {
+        this.rings.set(ring++, terrain, crowd.positions[rootAt]!, crowd.positions[rootAt + 2]!, 0,
           crowd.heightM * 0.3, accent.r, accent.g, accent.b, 0.8);
       }
       for (let f = 0; f < 2; ++f) {
         const at = i * 6 + f * 3;
-        const x = crowd.balls[at]!;
-        const y = crowd.balls[at + 1]!;
-        const z = crowd.balls[at + 2]!;
-        const above = y - ground.heightAt(x, z);
+        const x = crowd.footBalls[at]!;
+        const y = crowd.footBalls[at + 1]!;
+        const z = crowd.footBalls[at + 2]!;
+        const above = y - terrain.heightAt(x, z);
         const p = i * 2 + f;
-        if (measure) {
+        if (measurable) {
           const moved = Math.hypot(
-            x - this.previous[at]!, y - this.previous[at + 1]!, z - this.previous[at + 2]!);
-          this.planted[p] = known && soon && above < plantedHeightM &&
-            moved / Math.abs(dt) < plantedSpeedMs ? 1 : 0;
-          this.previous[at] = x;
-          this.previous[at + 1] = y;
-          this.previous[at + 2] = z;
+            x - this.previousBalls[at]!, y - this.previousBalls[at + 1]!,
+            z - this.previousBalls[at + 2]!);
+          this.planted[p] = sameAvatar && recent && above < plantedHeightM &&
+            moved / Math.abs(dt) < plantedSpeedMPerS ? 1 : 0;
+          this.previousBalls[at] = x;
+          this.previousBalls[at + 1] = y;
+          this.previousBalls[at + 2] = z;
         }
-        if (!this.options.simple && blob < markCapacity) {
+        if (!this.options.simplified && blob < decalCapacity) {
           const near = Math.min(1, Math.max(0, 1 - above / 0.5));
-          this.blobs.set(blob++, ground, x, z, 0, crowd.heightM * 0.085, shade.r, shade.g, shade.b, 0.75 * near);
+          this.blobs.set(blob++, terrain, x, z, 0, crowd.heightM * 0.085,
+            shade.r, shade.g, shade.b, 0.75 * near);
         }
-        if (this.planted[p] && ring < markCapacity) {
+        if (this.planted[p] && ring < decalCapacity) {
           const c = f === 0 ? left : right;
-          this.rings.set(ring++, ground, x, z, 0, crowd.heightM * 0.066, c.r, c.g, c.b, 0.95);
+          this.rings.set(ring++, terrain, x, z, 0, crowd.heightM * 0.066, c.r, c.g, c.b, 0.95);
         }
       }
-      if (measure) this.previousAvatars[i] = avatar;
+      if (measurable) this.previousAvatars[i] = avatar;
     }
-    if (measure) this.previousS = timeS;
-    this.blobs.show(blob);
-    this.rings.show(ring);
-  }
-
-  /** Whether the left and right foot of the avatar at `index` carry it. */
-  feetPlanted(index: number): [boolean, boolean] {
-    return [this.planted[index * 2] === 1, this.planted[index * 2 + 1] === 1];
+    if (measurable) this.previousTimeS = timeS;
+    this.blobs.upload(blob);
+    this.rings.upload(ring);
   }
 }
 
 const point = new THREE.Vector3();
 const direction = new THREE.Vector3();
-/** The last point projected: CSS pixels, and metres from the camera. */
+/** Result of `WorldView.project`: x and y in CSS pixels, z in metres from the camera. */
 export const projected = {x: 0, y: 0, z: 0};

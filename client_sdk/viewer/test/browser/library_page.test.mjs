@@ -1,11 +1,10 @@
-// The animator's page in a real browser: what is dragged, chosen and switched has its effect, and what
-// is drawn is what the server's library gives.
+// The library page in a browser: its controls work, and it shows the steps of the server's library.
 
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
 
 import {launch} from '../browser.mjs';
-import {Server, keep, openIn, sleep, until} from './support.mjs';
+import {Server, openInContext, saveScreenshot, sleep, waitFor} from './support.mjs';
 
 let server;
 let browser;
@@ -17,7 +16,8 @@ before(async () => {
   server = await Server.start();
   browser = await launch();
   context = await browser.newContext({viewport: {width: 1280, height: 720}, colorScheme: 'light'});
-  ({page, errors} = await openIn(context, `http://127.0.0.1:${server.httpPort}/library.html`));
+  ({page, errors} = await openInContext(context,
+    `http://127.0.0.1:${server.httpPort}/library.html`));
   await stepShown(0);
 });
 
@@ -26,132 +26,137 @@ after(async () => {
   await server?.kill();
 });
 
-const stepShown = (after) => until('a step is shown', () => page.evaluate(
+const stepShown = (after) => waitFor('a new step is shown', () => page.evaluate(
   (count) => window.stridewireLibrary?.stepsShown > count, after));
-const shown = () => page.evaluate(() => window.stridewireLibrary.stepsShown);
-const wanted = () => page.evaluate(() => [...window.stridewireLibrary.wanted]);
-const settled = () => until('the step is that of the parameters wanted', () => page.evaluate(() => {
-  const {step, wanted} = window.stridewireLibrary;
-  return step && step.requested.length === wanted.length &&
-    step.requested.every((v, l) => Math.abs(v - wanted[l]) < 2e-5);
-}));
-/** Where parameters lie on the page. */
-const placeOf = (p) => page.evaluate((values) => {
+const stepsShown = () => page.evaluate(() => window.stridewireLibrary.stepsShown);
+const requested = () => page.evaluate(() => [...window.stridewireLibrary.requested]);
+const settled = () => waitFor('the step for the requested parameters is shown', () =>
+  page.evaluate(() => {
+    const {step, requested} = window.stridewireLibrary;
+    return step && step.requested.length === requested.length &&
+      step.requested.every((v, l) => Math.abs(v - requested[l]) < 2e-5);
+  }));
+/** Position of parameters on the page. */
+const positionOf = (p) => page.evaluate((values) => {
   const {plane} = window.stridewireLibrary;
   const box = plane.element.getBoundingClientRect();
-  const at = plane.place(values);
+  const at = plane.toPixels(values);
   return {x: box.left + at.x, y: box.top + at.y};
 }, p);
 
-test('dragging the cross changes the step at once', async () => {
-  const before = await wanted();
-  const from = await placeOf(before);
-  const stepsBefore = await shown();
+test('dragging the cross changes the step immediately', async () => {
+  const before = await requested();
+  const from = await positionOf(before);
+  const stepsBefore = await stepsShown();
   await page.mouse.move(from.x, from.y);
   await page.mouse.down();
   for (let i = 1; i <= 8; ++i) await page.mouse.move(from.x + 3 * i, from.y - 4 * i);
-  await stepShown(stepsBefore);  // Still held down.
+  await stepShown(stepsBefore);  // The button is still pressed.
   await page.mouse.up();
   await settled();
-  const after = await wanted();
+  const after = await requested();
   assert.ok(after[0] > before[0] + 0.02 && after[1] > before[1] + 0.02, `${before}, then ${after}`);
   const step = await page.evaluate(() => window.stridewireLibrary.step);
-  // Corrected: the step measures what was asked for, to a hundredth of a millimetre.
+  // Correction is on, so the measured parameters equal the requested ones to 0.05 mm.
   step.measured.forEach((v, l) => assert.ok(Math.abs(v - after[l]) < 5e-5, `${step.measured}`));
   const last = step.roots_m.length - 1;
-  assert.ok(step.roots_m[last] > 0.2, 'the figure went ahead');
+  assert.ok(step.roots_m[last] > 0.2, 'the step goes forward');
 });
 
-test('an example is played beside the step of its parameters, and they are the same', async () => {
+test('plays an example beside the step with its parameters, and both are equal', async () => {
   const sites = await page.evaluate(() => window.stridewireLibrary.group.sites);
-  const chosen = 5;
-  const at = await placeOf(sites[chosen].p);
+  const index = 5;
+  const at = await positionOf(sites[index].p);
   await page.mouse.click(at.x, at.y);
   await settled();
-  await until('the example is there', () => page.evaluate(
-    () => window.stridewireLibrary.stage.example !== null));
-  assert.deepEqual((await wanted()).map((v) => Math.round(1e5 * v)),
-    sites[chosen].p.map((v) => Math.round(1e5 * v)));
+  await waitFor('the example has been received', () => page.evaluate(
+    () => window.stridewireLibrary.preview.example !== null));
+  assert.deepEqual((await requested()).map((v) => Math.round(1e5 * v)),
+    sites[index].p.map((v) => Math.round(1e5 * v)));
   const {step, example} = await page.evaluate(() => {
-    const {stage} = window.stridewireLibrary;
-    return {step: stage.step, example: stage.example};
+    const {preview} = window.stridewireLibrary;
+    return {step: preview.step, example: preview.example};
   });
   assert.equal(step.rotations.length, example.rotations.length);
   step.rotations.forEach((v, i) => assert.ok(Math.abs(v - example.rotations[i]) < 1e-3));
-  // Both are drawn, a metre apart.
-  await until('two figures are drawn', () => page.evaluate(
-    () => window.stridewireLibrary.stage.pose.count === 2));
-  const roots = await page.evaluate(() => [...window.stridewireLibrary.stage.pose.rootsM]);
-  assert.ok(Math.abs(roots[0] - roots[3] - 1.1) < 0.02 && Math.abs(roots[2] - roots[5]) < 0.02, `${roots}`);
-  await keep(page, 'library');
+  // Both are drawn, 1.1 m apart.
+  await waitFor('two avatars are drawn', () => page.evaluate(
+    () => window.stridewireLibrary.preview.pose.count === 2));
+  const roots = await page.evaluate(() => [...window.stridewireLibrary.preview.pose.rootsM]);
+  assert.ok(Math.abs(roots[0] - roots[3] - 1.1) < 0.02, `${roots}`);
+  assert.ok(Math.abs(roots[2] - roots[5]) < 0.02, `${roots}`);
+  await saveScreenshot(page, 'library');
 });
 
-test('the map of errors is dark at the examples and follows its switch', async () => {
-  const lightest = () => page.evaluate(() => {
+test('the error map has small errors at examples, and can be switched', async () => {
+  const largest = () => page.evaluate(() => {
     const {plane} = window.stridewireLibrary;
     return plane.map === null ? null : plane.map.largest_m;
   });
-  const plain = await until('a map', lightest);
+  const uncorrected = await waitFor('the error map is shown', largest);
   await page.selectOption('#map', 'corrected');
-  await until('the corrected map', async () => await lightest() < plain / 5);
+  await waitFor('the corrected map is shown', async () => await largest() < uncorrected / 5);
   await page.selectOption('#map', 'none');
-  assert.equal(await lightest(), null);
-  await page.selectOption('#map', 'plain');
-  await until('the map again', async () => await lightest() === plain);
+  assert.equal(await largest(), null);
+  await page.selectOption('#map', 'uncorrected');
+  await waitFor('the first map is shown again', async () => await largest() === uncorrected);
   const atExample = await page.evaluate(() => {
     const {plane, group} = window.stridewireLibrary;
     const {map} = plane;
-    const column = Math.floor((group.sites[5].p[0] - map.x[0]) / (map.x[1] - map.x[0]) * map.cells);
-    const row = Math.floor((group.sites[5].p[1] - map.y[0]) / (map.y[1] - map.y[0]) * map.cells);
+    const cell = (value, [min, max]) => Math.floor((value - min) / (max - min) * map.cells);
+    const column = cell(group.sites[5].p[0], map.x);
+    const row = cell(group.sites[5].p[1], map.y);
     return map.errors_mm[row * map.cells + column] / 1e3;
   });
-  assert.ok(atExample < plain / 2, `${atExample} of ${plain}`);
+  assert.ok(atExample < uncorrected / 2, `${atExample} of ${uncorrected}`);
 });
 
-test('every group opens, sliders and keys move the cross, time can be scrubbed', async () => {
+test('opens every group; sliders and keys move the cross; the time slider works', async () => {
   const groups = await page.evaluate(() => window.stridewireLibrary.library.groups.length);
   assert.ok(groups >= 3);
   for (let g = 0; g < groups; ++g) {
-    const before = await shown();
+    const before = await stepsShown();
     await page.selectOption('#group', String(g));
     await stepShown(before);
     await settled();
-    await until('its map', () => page.evaluate(() => window.stridewireLibrary.plane.map !== null));
+    await waitFor('its error map is shown', () => page.evaluate(
+      () => window.stridewireLibrary.plane.map !== null));
   }
   const slider = page.locator('.sliders input').first();
-  const before = await wanted();
+  const before = await requested();
   await slider.focus();
   await page.keyboard.press('ArrowRight');
-  assert.notDeepEqual(await wanted(), before);
+  assert.notDeepEqual(await requested(), before);
   await settled();
   await page.locator('.plane').focus();
-  const beforeKey = await wanted();
+  const beforeKey = await requested();
   await page.keyboard.press('ArrowLeft');
-  assert.notDeepEqual(await wanted(), beforeKey);
-  await page.getByRole('button', {name: 'Middle'}).click();
+  assert.notDeepEqual(await requested(), beforeKey);
+  await page.getByRole('button', {name: 'Reset to mean'}).click();
   await settled();
   await page.locator('#time').focus();
   await page.keyboard.press('Home');
   await page.keyboard.press('PageUp');
-  const root = () => page.evaluate(() => [...window.stridewireLibrary.stage.pose.rootsM.subarray(0, 3)]);
+  const root = () => page.evaluate(
+    () => [...window.stridewireLibrary.preview.pose.rootsM.subarray(0, 3)]);
   const same = (a, b) => a.every((v, i) => v === b[i]);
-  const still = await until('it stands still', async () => {
+  const still = await waitFor('playback is paused', async () => {
     const first = await root();
     await sleep(300);
     const second = await root();
     return same(first, second) ? second : null;
   });
   await page.getByRole('button', {name: 'Play'}).click();
-  await until('it plays', async () => !same(await root(), still));
+  await waitFor('the movement plays', async () => !same(await root(), still));
   await page.locator('#corrected').uncheck();
-  await until('an uncorrected step', () => page.evaluate(
+  await waitFor('an uncorrected step is shown', () => page.evaluate(
     () => window.stridewireLibrary.step.iterations === 0));
   assert.deepEqual(errors, []);
 });
 
-test('a server that went away is said so', async () => {
+test('reports that the server does not respond', async () => {
   await server.kill();
-  await page.getByRole('button', {name: 'Middle'}).click();
-  await until('the page says so', () => page.evaluate(
-    () => document.querySelector('.notice:not([hidden])')?.textContent.includes('No server answers')));
+  await page.getByRole('button', {name: 'Reset to mean'}).click();
+  await waitFor('the error is shown', () => page.evaluate(() =>
+    document.querySelector('.notice:not([hidden])')?.textContent.includes('No server responds')));
 });

@@ -1,12 +1,15 @@
-// Pictures that a browser has taken, pixel by pixel: quicker here than in a page that draws meanwhile.
+// Decodes screenshots. Doing it here is faster than in a page that is busy drawing.
 
 import {inflateSync} from 'node:zlib';
 
 const signature = '89504e470d0a1a0a';
 
-/** Of 8 bits a channel, not interlaced: {width, height, channels, pixels}. Others throw. */
+/**
+ * Returns {width, height, channels, pixels}. Supports 8 bits per channel, RGB or RGBA, without
+ * interlacing; throws for other formats.
+ */
 export function decodePng(bytes) {
-  if (bytes.toString('hex', 0, 8) !== signature) throw new Error('no PNG');
+  if (bytes.toString('hex', 0, 8) !== signature) throw new Error('not a PNG file');
   const parts = [];
   let header;
   for (let at = 8; at < bytes.length;) {
@@ -18,9 +21,11 @@ export function decodePng(bytes) {
     at += 12 + length;
   }
   const [width, height] = [header.readUInt32BE(0), header.readUInt32BE(4)];
-  const [depth, kind, , , interlaced] = header.subarray(8);
-  const channels = {2: 3, 6: 4}[kind];
-  if (depth !== 8 || interlaced !== 0 || !channels) throw new Error(`a PNG of kind ${kind}, ${depth} bits`);
+  const [depth, colourType, , , interlaced] = header.subarray(8);
+  const channels = {2: 3, 6: 4}[colourType];
+  if (depth !== 8 || interlaced !== 0 || !channels) {
+    throw new Error(`unsupported PNG: colour type ${colourType}, ${depth} bits per channel`);
+  }
   const lines = inflateSync(Buffer.concat(parts));
   const stride = width * channels;
   const pixels = new Uint8Array(stride * height);
@@ -38,7 +43,7 @@ export function decodePng(bytes) {
   return {width, height, channels, pixels};
 }
 
-/** What a filter of the PNG specification, Section 9, takes for a byte from those before it. */
+/** The value that a filter predicts for a byte (PNG specification, Section 9). */
 function predicted(filter, left, up, corner) {
   switch (filter) {
     case 0: return 0;
@@ -50,6 +55,6 @@ function predicted(filter, left, up, corner) {
       const [a, b, c] = [Math.abs(p - left), Math.abs(p - up), Math.abs(p - corner)];
       return a <= b && a <= c ? left : b <= c ? up : corner;
     }
-    default: throw new Error(`PNG filter ${filter}`);
+    default: throw new Error(`unknown PNG filter ${filter}`);
   }
 }

@@ -1,4 +1,5 @@
-// What browser tests stand on: a server, a proxy whose connections can be cut, walkers, a browser.
+// Shared by the browser tests: a server, a proxy that can cut connections, walking avatars, and
+// helpers for pages.
 
 import {spawn} from 'node:child_process';
 import {once} from 'node:events';
@@ -14,34 +15,43 @@ export const programs = process.env.STRIDEWIRE_BIN;
 const screenshots = process.env.STRIDEWIRE_SCREENSHOTS ?? '/tmp/stridewire-screenshots';
 
 /** A whole number from the environment. */
-export function numberFrom(name, otherwise) {
+export function numberFrom(name, defaultValue) {
   const value = process.env[name] ?? '';
-  if (value === '') return otherwise;
-  if (!/^\d+$/.test(value)) throw new Error(`${name} is no number: ${value}`);
+  if (value === '') return defaultValue;
+  if (!/^\d+$/.test(value)) throw new Error(`${name}: expected a number, got ${value}`);
   return Number(value);
 }
 
 export const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 
-/** Says what takes long, where STRIDEWIRE_TIMES is set. */
-export function tell(beganMs, what) {
-  if (process.env.STRIDEWIRE_TIMES) console.log(`${(performance.now() - beganMs).toFixed(0)} ms ${what}`);
+/** Logs how long something took if STRIDEWIRE_TIMES is set. */
+export function logDuration(beganMs, what) {
+  if (!process.env.STRIDEWIRE_TIMES) return;
+  console.log(`${(performance.now() - beganMs).toFixed(0)} ms: ${what}`);
 }
 
-/** Waits for what must come, however slow the machine is. */
-export async function until(what, holds, seconds = 120) {
+/**
+ * Polls until `condition` returns a true value, and returns that. `what` describes the condition.
+ * The default limit is long, so that tests pass on slow machines.
+ */
+export async function waitFor(what, condition, seconds = 120) {
   const beganMs = performance.now();
   let value;
-  while (!(value = await holds())) {
-    if (performance.now() > beganMs + 1000 * seconds) throw new Error(`waited ${seconds} s until ${what}`);
+  while (!(value = await condition())) {
+    if (performance.now() > beganMs + 1000 * seconds) {
+      throw new Error(`not true within ${seconds} s: ${what}`);
+    }
     await sleep(20);
   }
-  tell(beganMs, `until ${what}`);
+  logDuration(beganMs, what);
   return value;
 }
 
 export class Server {
-  /** On free ports, or where another one was before: that a port is taken meanwhile passes. */
+  /**
+   * Starts on the given ports, or on free ones. If another process has taken a given port, tries
+   * again for a while.
+   */
   static async start(port = 0, httpPort = 0) {
     for (let attempt = 1; ; ++attempt) {
       try {
@@ -63,8 +73,8 @@ export class Server {
       child.on('error', reject);
       child.stdout.on('data', (text) => {
         out += text;
-        const found = /ready listen=\S+:(\d+) http=\S+:(\d+)/.exec(out);
-        if (found) resolve(found);
+        const match = /ready listen=\S+:(\d+) http=\S+:(\d+)/.exec(out);
+        if (match) resolve(match);
       });
       child.on('close', () => reject(new Error(`stridewired ended: ${out}`)));
     });
@@ -79,22 +89,23 @@ export class Server {
     await ended;
   }
 
-  /** What it keeps in memory. */
+  /** Resident memory of the process. */
   residentKiB() {
-    return Number(/^VmRSS:\s+(\d+)/m.exec(readFileSync(`/proc/${this.child.pid}/status`, 'utf8'))[1]);
+    const status = readFileSync(`/proc/${this.child.pid}/status`, 'utf8');
+    return Number(/^VmRSS:\s+(\d+)/m.exec(status)[1]);
   }
 
-  /** A line of /metrics; the sum where it has labels. */
+  /** A metric from /metrics. Samples with different labels are summed. */
   async metric(name) {
     const text = await (await fetch(`http://127.0.0.1:${this.httpPort}/metrics`)).text();
     const lines = text.split('\n').filter(
       (line) => line.startsWith(`${name} `) || line.startsWith(`${name}{`));
-    if (lines.length === 0) throw new Error(`no metric ${name}`);
+    if (lines.length === 0) throw new Error(`/metrics has no ${name}`);
     return lines.reduce((sum, line) => sum + Number(line.split(' ').at(-1)), 0);
   }
 }
 
-/** Between page and server, so that their connection can be cut. */
+/** A TCP proxy between page and server, whose connections a test can cut. */
 export class Proxy {
   static async start(target) {
     const proxy = new Proxy();
@@ -117,7 +128,7 @@ export class Proxy {
     return proxy;
   }
 
-  /** Every connection there is; new ones are taken. */
+  /** Closes all connections. New ones are accepted. */
   cut() {
     for (const socket of this.sockets) socket.destroy();
   }
@@ -128,29 +139,29 @@ export class Proxy {
   }
 }
 
-/** Avatars that walk in circles, and one (the number after theirs) that stands. */
+/** Avatars 1 to `count` that walk in circles, and one more, `standing`, that stands. */
 export class Walkers {
   constructor(server, worldName, count) {
     this.count = count;
-    this.still = count + 1;
+    this.standing = count + 1;
     this.client = new Client({
       url: `ws://127.0.0.1:${server.httpPort}/stream`, webSocket: WebSocket, clientName: 'walkers',
       respawn: true,
     });
     this.client.connect();
     this.world = this.client.joinWorld(worldName);
-    this.heard = [];
+    this.events = [];
     this.world.on('event', (event) => {
-      this.heard.push(event);
-      if (this.heard.length > 20_000) this.heard.splice(0, 10_000);
+      this.events.push(event);
+      if (this.events.length > 20_000) this.events.splice(0, 10_000);
       if (event.type === 'idle' && event.avatar <= count) this.walk(event.avatar);
     });
   }
 
   async start() {
     const items = [];
-    for (let i = 1; i <= this.still; ++i) {
-      const angle = 2 * Math.PI * i / this.still;
+    for (let i = 1; i <= this.standing; ++i) {
+      const angle = 2 * Math.PI * i / this.standing;
       items.push({
         avatar: i, positionM: [2.5 * Math.sin(angle), 0, 2.5 * Math.cos(angle)],
         headingRad: angle + Math.PI / 2,
@@ -171,7 +182,7 @@ export class Walkers {
   }
 }
 
-/** Poses as the C++ library has them: [tick, time, root, rotations]. */
+/** Poses that the C++ client receives; each is [tick, time, ...root, ...rotations]. */
 export async function dumpPoses(server, world, avatar, count, mode) {
   const beganMs = performance.now();
   const child = spawn(`${programs}/web_pose_dump`, [
@@ -182,23 +193,27 @@ export async function dumpPoses(server, world, avatar, count, mode) {
   child.stdout.on('data', (text) => out += text);
   const [code] = await once(child, 'close');
   if (code !== 0) throw new Error(`web_pose_dump ended with ${code}`);
-  tell(beganMs, `to dump ${count} poses`);
+  logDuration(beganMs, `dumped ${count} poses`);
   return out.trim().split('\n').map((line) => line.split(' ').map(Number));
 }
 
-// A frame costs a processor that draws 50 ms: as many as it manages would leave nothing to what else runs.
-const framesPerS = 8;
+/**
+ * Frame rate limit of test pages. With software rendering a frame takes about 50 ms; at full rate,
+ * pages would leave no processor time for the server and other tests.
+ */
+const maxFramesPerS = 8;
 
-/** A page of the viewer, and what it complained of. */
+/** Opens the viewer in a new browser context. `errors` collects console errors and exceptions. */
 export async function openPage(browser, port, query, options = {}) {
   const context = await browser.newContext({
     viewport: {width: 960, height: 600}, colorScheme: 'light', ...options});
-  return {context, ...await openIn(context, `http://127.0.0.1:${port}/?frames=${framesPerS}&${query}`)};
+  const url = `http://127.0.0.1:${port}/?frames=${maxFramesPerS}&${query}`;
+  return {context, ...await openInContext(context, url)};
 }
 
-/** The same in a context that there is. */
-export async function openIn(context, link) {
-  context.setDefaultTimeout(120_000);  // However slow the machine is.
+/** Opens a page in an existing browser context. */
+export async function openInContext(context, url) {
+  context.setDefaultTimeout(120_000);  // Long enough for slow machines.
   const beganMs = performance.now();
   const page = await context.newPage();
   const errors = [];
@@ -206,59 +221,59 @@ export async function openIn(context, link) {
     if (message.type() === 'error') errors.push(message.text());
   });
   page.on('pageerror', (error) => errors.push(String(error)));
-  await page.goto(link);
-  tell(beganMs, `to open ${link}`);
+  await page.goto(url);
+  logDuration(beganMs, `opened ${url}`);
   return {page, errors};
 }
 
-/** So many more frames are drawn. */
-export async function framesDrawn(page, count) {
+/** Waits until the page has drawn `count` more frames. */
+export async function waitForFrames(page, count) {
   const from = await page.evaluate(() => window.stridewire.stats.framesDrawn);
-  await until('frames are drawn', () => page.evaluate(
+  await waitFor(`${count} more frames are drawn`, () => page.evaluate(
     (n) => window.stridewire.stats.framesDrawn >= n, from + count));
 }
 
-/** Figures are drawn. */
-export async function figuresShown(page, count = 1) {
-  await until('figures are drawn', () => page.evaluate(
-    (wanted) => window.stridewire?.sampled()[0]?.avatars.length >= wanted, count));
+/** Waits until the first world shows at least `count` avatars. */
+export async function waitForAvatars(page, count = 1) {
+  await waitFor(`${count} avatars are drawn`, () => page.evaluate(
+    (n) => window.stridewire?.sampled()[0]?.avatars.length >= n, count));
 }
 
-export async function keep(page, name) {
+export async function saveScreenshot(page, name) {
   mkdirSync(screenshots, {recursive: true});
   const beganMs = performance.now();
   await page.screenshot({path: `${screenshots}/${name}.png`});
-  tell(beganMs, `to keep ${name}`);
+  logDuration(beganMs, `saved screenshot ${name}`);
 }
 
-/** The first world's camera is where it wants to be. */
-export async function cameraRests(page) {
-  const where = () => page.evaluate(() => {
-    const {view} = window.stridewire.worlds[0].view;
-    return [...view.camera.position.toArray(), ...view.target.toArray()];
+/** Waits until the camera of the first world stops moving. */
+export async function waitForCamera(page) {
+  const position = () => page.evaluate(() => {
+    const {camera, target} = window.stridewire.worlds[0].view.viewCamera;
+    return [...camera.position.toArray(), ...target.toArray()];
   });
-  let last = await where();
-  await until('the camera rests', async () => {
-    await framesDrawn(page, 2);
-    const now = await where();
-    const rests = now.every((x, i) => Math.abs(x - last[i]) < 1e-4);
+  let last = await position();
+  await waitFor('the camera stands still', async () => {
+    await waitForFrames(page, 2);
+    const now = await position();
+    const still = now.every((x, i) => Math.abs(x - last[i]) < 1e-4);
     last = now;
-    return rests;
+    return still;
   });
 }
 
-/** Share of pixels that differ between two pictures of the scene, a moment and some frames apart. */
-export async function movingShare(page, clip, apartMs) {
+/** Fraction of pixels that change within `apartMs` and at least three frames. */
+export async function changedShare(page, clip, apartMs) {
   const first = await page.screenshot({clip});
   await sleep(apartMs);
-  await framesDrawn(page, 3);
-  return differing(first, await page.screenshot({clip}));
+  await waitForFrames(page, 3);
+  return differingShare(first, await page.screenshot({clip}));
 }
 
-/** Share of pixels that differ between two pictures of one size. */
-export function differing(first, second) {
+/** Fraction of pixels that differ between two screenshots; 1 if their sizes differ. */
+export function differingShare(first, second) {
   const [a, b] = [decodePng(first), decodePng(second)];
-  if (a.width !== b.width || a.height !== b.height) return 1;  // The page was laid out anew.
+  if (a.width !== b.width || a.height !== b.height) return 1;
   let different = 0;
   for (let i = 0; i < a.width * a.height; ++i) {
     const [p, q] = [i * a.channels, i * b.channels];

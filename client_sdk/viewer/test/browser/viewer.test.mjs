@@ -1,6 +1,9 @@
-// The page in a real browser, with a real server. Environment: STRIDEWIRE_BIN (programs),
-// STRIDEWIRE_SCREENSHOTS (where pictures are kept), CHROMIUM (which browser), and for the long versions
-// STRIDEWIRE_PAUSE_S=60, STRIDEWIRE_MEMORY_S=180. Run by run.mjs.
+// The viewer page in a browser with a server. Run by run.mjs. Environment:
+// STRIDEWIRE_BIN          folder of stridewired and web_pose_dump
+// STRIDEWIRE_SCREENSHOTS  folder for screenshots
+// CHROMIUM                path of the browser
+// STRIDEWIRE_PAUSE_S      how long a browser is paused; 5 by default, 60 for a long test
+// STRIDEWIRE_MEMORY_S     how long memory use is watched; 10 by default, 180 for a long test
 
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
@@ -9,23 +12,23 @@ import {createCrowdPose} from '@stridewire/client';
 
 import {launch} from '../browser.mjs';
 import {
-  Proxy, Server, Walkers, cameraRests, dumpPoses, figuresShown, framesDrawn, keep, movingShare,
-  numberFrom, openIn, openPage, sleep, until,
+  Proxy, Server, Walkers, changedShare, dumpPoses, numberFrom, openInContext, openPage,
+  saveScreenshot, sleep, waitFor, waitForAvatars, waitForCamera, waitForFrames,
 } from './support.mjs';
 
 const pauseS = numberFrom('STRIDEWIRE_PAUSE_S', 5);
 const memoryS = numberFrom('STRIDEWIRE_MEMORY_S', 10);
 const walkerCount = 6;
-/** For pictures to look at; the others are smaller, for they are drawn by the processor. */
+/** Size of pages for screenshots. Other pages are smaller, so that software rendering is faster. */
 const large = {width: 1280, height: 720};
 
 let server;
 let proxy;
 let walkers;
 let browser;
-/** A page that runs beside the others from the start, and what it keeps in memory. */
-let lasting;
-let remembered;
+/** A page that stays open during all tests, and a promise of its memory use. */
+let longRunningPage;
+let memoryUse;
 
 before(async () => {
   server = await Server.start();
@@ -33,9 +36,10 @@ before(async () => {
   walkers = new Walkers(server, 'plaza', walkerCount);
   await walkers.start();
   browser = await launch();
-  lasting = await openPage(browser, server.httpPort, 'world=plaza', {viewport: {width: 480, height: 320}});
-  remembered = watchMemory(lasting);
-  remembered.catch(() => {});  // The test that waits for it says so.
+  longRunningPage = await openPage(
+    browser, server.httpPort, 'world=plaza', {viewport: {width: 480, height: 320}});
+  memoryUse = watchMemory(longRunningPage);
+  memoryUse.catch(() => {});  // The memory test awaits the promise and reports errors.
 });
 
 after(async () => {
@@ -46,54 +50,54 @@ after(async () => {
 });
 
 const scene = (page) => page.evaluate(() => {
-  const {x, y, width, height} = window.stridewire.worlds[0].view.free;
+  const {x, y, width, height} = window.stridewire.worlds[0].view.freeArea;
   return {x: Math.ceil(x), y: Math.ceil(y), width: Math.floor(width), height: Math.floor(height)};
 });
 
-/** Root of one avatar as drawn. */
-const rootOf = (page, avatar) => page.evaluate((number) => {
+/** Root of an avatar as drawn, or null. */
+const rootOf = (page, avatar) => page.evaluate((id) => {
   const {avatars, rootsM, timeS} = window.stridewire.sampled()[0];
-  const i = avatars.indexOf(number);
+  const i = avatars.indexOf(id);
   return i < 0 ? null : {timeS, rootM: rootsM.slice(3 * i, 3 * i + 3)};
 }, avatar);
 
-const metres = (a, b) => Math.hypot(a[0] - b[0], a[2] - b[2]);
+const distanceM = (a, b) => Math.hypot(a[0] - b[0], a[2] - b[2]);
 
-/** Clicks on the figure, as it is drawn, till that one is chosen: others walk by. */
-async function click(page, avatar) {
-  await until(`avatar ${avatar} is chosen`, async () => {
-    const at = await page.evaluate((number) => {
+/** Clicks on an avatar until it is selected; others that walk by may be hit first. */
+async function clickAvatar(page, avatar) {
+  await waitFor(`avatar ${avatar} is selected`, async () => {
+    const at = await page.evaluate((id) => {
       const {view} = window.stridewire.worlds[0];
-      const {x, y, width, height} = view.free;
+      const {x, y, width, height} = view.freeArea;
       for (let row = y + 4; row < y + height; row += 6) {
         for (let column = x + 4; column < x + width; column += 6) {
-          if (view.pick(column, row, 6) === number) return {x: column, y: row};
+          if (view.pick(column, row, 6) === id) return {x: column, y: row};
         }
       }
       return null;
     }, avatar);
     if (at) await page.mouse.click(at.x, at.y);
-    return page.evaluate((number) => window.stridewire.selection?.avatar === number, avatar);
+    return page.evaluate((id) => window.stridewire.selection?.avatar === id, avatar);
   });
 }
 
-test('figures walk, and their poses are those of the C++ library', async () => {
+test('shows walking avatars with the same poses as the C++ client', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza&mode=full',
     {viewport: large});
-  await figuresShown(page, walkerCount + 1);
-  // Figures move, and once the camera rests nothing else does: it looks from further away, so that they are
-  // a small part of the picture.
+  await waitForAvatars(page, walkerCount + 1);
+  // Once the camera stands still, only avatars move. Zooming out makes them a small part of the
+  // image.
   for (let i = 0; i < 5; ++i) await page.keyboard.press('-');
-  await cameraRests(page);
-  const share = await until('only figures move', async () => {
-    const now = await movingShare(page, await scene(page), 300);
+  await waitForCamera(page);
+  const share = await waitFor('only avatars move', async () => {
+    const now = await changedShare(page, await scene(page), 300);
     return now > 0.0005 && now < 0.2 ? now : 0;
   });
   const compare = async () => {
     const lines = await dumpPoses(server, 'plaza', 1, 60, 'full');
-    await until('the last of them is here', () => page.evaluate(
+    await waitFor('the page has received the last of them', () => page.evaluate(
       (timeS) => window.stridewire.worlds[0].world.recording.lastTimeS >= timeS, lines.at(-1)[1]));
-    // The pose of each time, if one of just then was received: null, and none made of those around it, else.
+    // The received pose of each time, or null. Interpolated poses do not count.
     const ours = await page.evaluate(([times, avatar]) => {
       const {world} = window.stridewire.worlds[0];
       const received = new Set([...world.recording.streams.values()].flatMap(
@@ -109,133 +113,141 @@ test('figures walk, and their poses are those of the C++ library', async () => {
         const i = out.avatars.subarray(0, count).indexOf(avatar);
         const size = 4 * out.jointCount;
         return i < 0 || !received.has(timeS) ? null : [
-          ...out.rootsM.subarray(3 * i, 3 * i + 3), ...out.rotations.subarray(size * i, size * (i + 1))];
+          ...out.rootsM.subarray(3 * i, 3 * i + 3),
+          ...out.rotations.subarray(size * i, size * (i + 1))];
       });
     }, [lines.map((line) => line[1]), 1]);
     return {lines, ours};
   };
   const dropped = () => page.evaluate(() => window.stridewire.stats.batchesDropped);
-  // On a busy machine the page may lose a tick, of which it is told; then another sixty are compared.
+  // On a busy machine, the server may drop a batch, which it reports. Then the test compares
+  // another 60 ticks.
   let lines, ours;
   for (let attempt = 1; ; ++attempt) {
     const droppedBefore = await dropped();
     ({lines, ours} = await compare());
     const lost = ours.filter((pose) => pose === null).length;
     if (lost === 0) break;
-    assert.ok(attempt < 20, `the page loses ticks all the time, ${lost} of the last 60`);
-    await until('the page is told of ticks that are lost', async () => await dropped() > droppedBefore);
+    assert.ok(attempt < 20, `the page keeps losing ticks, ${lost} of the last 60`);
+    await waitFor('the server reports the dropped batches',
+      async () => await dropped() > droppedBefore);
   }
   lines.forEach(([tick, , ...theirs], i) =>
     assert.deepEqual(ours[i], theirs.map(Math.fround), `tick ${tick}`));
-  await until('it walks', async () => {
+  await waitFor('the avatar has moved', async () => {
     const drawn = await rootOf(page, 1);
-    return drawn !== null && drawn.timeS >= lines[0][1] && metres(ours[0], drawn.rootM) > 0.2;
+    return drawn !== null && drawn.timeS >= lines[0][1] && distanceM(ours[0], drawn.rootM) > 0.2;
   });
   const firstMs = await page.evaluate(() => window.stridewire.stats.firstFigureMs);
-  console.log(`60 ticks the same, ${(100 * share).toFixed(2)} % of the scene moved, first figures ` +
-    `after ${firstMs.toFixed(0)} ms`);
-  await keep(page, 'figures');
+  console.log(`60 ticks are equal, ${(100 * share).toFixed(2)} % of the scene changed, ` +
+    `first avatars after ${firstMs.toFixed(0)} ms`);
+  await saveScreenshot(page, 'avatars');
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('a step commanded by clicks arrives, and the avatar can be looked into', async () => {
+test('a step requested by clicks is performed, and can be inspected', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza',
     {viewport: large});
-  await figuresShown(page, walkerCount + 1);
-  const {still} = walkers;
-  const before = await rootOf(page, still);
-  await click(page, still);
+  await waitForAvatars(page, walkerCount + 1);
+  const {standing} = walkers;
+  const before = await rootOf(page, standing);
+  await clickAvatar(page, standing);
   assert.deepEqual(await page.evaluate(() => window.stridewire.selection),
-                   {world: 'plaza', avatar: still});
-  const from = walkers.heard.length;
+    {world: 'plaza', avatar: standing});
+  const from = walkers.events.length;
   const lengthM = await page.evaluate(() => Number(document.getElementById('step-length').value));
-  await page.getByRole('button', {name: /^Step\b/}).first().click();
-  const started = await until('the step starts', () => walkers.heard.slice(from).find(
-    ({type, avatar, requestId}) => type === 'started' && avatar === still && requestId !== 0n));
+  await page.getByRole('button', {name: 'Step', exact: true}).click();
+  const started = await waitFor('the step starts', () => walkers.events.slice(from).find(
+    ({type, avatar, requestId}) => type === 'started' && avatar === standing && requestId !== 0n));
   assert.match(started.kind, /^step/);
-  // Looked into while it lasts; should the page miss that, another step is asked for.
-  let asked = 1;
-  const movement = await until('it is inspected', async () => {
+  // If the page does not inspect the avatar during the step, another step is requested.
+  let requested = 1;
+  const movement = await waitFor('the step is inspected', async () => {
     const seen = await page.evaluate((avatar) => {
-      const m = window.stridewire.inspected?.avatar === avatar && window.stridewire.inspected.movement;
+      const m = window.stridewire.inspected?.avatar === avatar &&
+        window.stridewire.inspected.movement;
       return m && m.weights.length > 0 ? {
         kind: m.kind, requested: m.requested, keytimes: m.keytimesS.length,
         sum: m.weights.reduce((sum, weight) => sum + weight, 0),
       } : null;
-    }, still);
-    const finished = walkers.heard.slice(from).filter(({type, avatar, requestId}) =>
-      type === 'finished' && avatar === still && requestId !== 0n).length;
-    if (seen || finished < asked) return seen;
-    ++asked;
-    await page.getByRole('button', {name: /^Step\b/}).first().click();
+    }, standing);
+    const finished = walkers.events.slice(from).filter(({type, avatar, requestId}) =>
+      type === 'finished' && avatar === standing && requestId !== 0n).length;
+    if (seen || finished < requested) return seen;
+    ++requested;
+    await page.getByRole('button', {name: 'Step', exact: true}).click();
     return null;
   });
   assert.ok(Math.abs(movement.sum - 1) < 1e-3 && movement.keytimes > 2, JSON.stringify(movement));
-  await keep(page, 'inspected');
-  await until('it is over', () => walkers.heard.slice(from).find(
-    ({type, avatar, requestId}) => type === 'finished' && avatar === still &&
+  await saveScreenshot(page, 'inspected');
+  await waitFor('the step is finished', () => walkers.events.slice(from).find(
+    ({type, avatar, requestId}) => type === 'finished' && avatar === standing &&
       requestId === started.requestId));
-  const after = await until('it is drawn', async () => {
-    const now = await rootOf(page, still);
-    return now !== null && metres(now.rootM, before.rootM) > lengthM / 4 ? now : null;
+  const after = await waitFor('the new position is drawn', async () => {
+    const now = await rootOf(page, standing);
+    return now !== null && distanceM(now.rootM, before.rootM) > lengthM / 4 ? now : null;
   });
-  assert.ok(metres(after.rootM, before.rootM) < 2 * asked * lengthM);
+  assert.ok(distanceM(after.rootM, before.rootM) < 2 * requested * lengthM);
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('scrubbing shows what was, and live is now', async () => {
+test('scrubbing shows the recording, and Live shows the present', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza');
-  await figuresShown(page, walkerCount + 1);
+  await waitForAvatars(page, walkerCount + 1);
   let past, again;
   for (let attempt = 1; !again; ++attempt) {
-    past = await until('one is drawn', () => rootOf(page, 2));
-    await until('it went elsewhere', async () => {
+    past = await waitFor('the avatar is drawn', () => rootOf(page, 2));
+    await waitFor('the avatar has moved', async () => {
       const now = await rootOf(page, 2);
-      return now !== null && now.timeS - past.timeS > 1.5 && metres(now.rootM, past.rootM) > 0.3;
+      return now !== null && now.timeS - past.timeS > 1.5 && distanceM(now.rootM, past.rootM) > 0.3;
     });
     await page.evaluate((timeS) => {
       window.stridewire.playback.pause();
       window.stridewire.playback.seek(timeS);
     }, past.timeS);
-    const seen = await until('the past is drawn, or recorded no more', async () => {
+    const seen = await waitFor('the past is drawn, or no longer recorded', async () => {
       const now = await rootOf(page, 2);
       if (now !== null && Math.abs(now.timeS - past.timeS) < 1e-6) return {now};
-      const told = await page.evaluate(() => {
+      const state = await page.evaluate(() => {
         const {client, playback, stats, worlds: [{world}]} = window.stridewire;
         return {
-          firstS: world.recording.firstTimeS, lastS: world.recording.lastTimeS, timeS: playback.timeS,
+          firstS: world.recording.firstTimeS, lastS: world.recording.lastTimeS,
+            timeS: playback.timeS,
           paused: playback.paused, live: playback.live, renderS: client.renderTimeS(),
           framesDrawn: stats.framesDrawn, reconnects: stats.reconnects};
       });
-      return told.firstS > past.timeS ? {now: null, told, drawnS: now?.timeS} : null;
+      return state.firstS > past.timeS ? {now: null, state, drawnS: now?.timeS} : null;
     });
     again = seen.now;
     if (again) break;
-    // A page that was kept from drawing for 18 s has nothing left to go back to.
-    const text = `wanted ${past.timeS} s: ${JSON.stringify(seen)}`;
+    // If the page could not draw for 18 s, the recording no longer contains that time.
+    const text = `expected time ${past.timeS} s: ${JSON.stringify(seen)}`;
     console.log(text);
     assert.ok(attempt < 3, text);
     await page.evaluate(() => window.stridewire.playback.goLive());
   }
-  // As another client saw it, but for batches that this one may have lost.
+  // The pose equals the one that another client received. A small difference is allowed, because
+  // either client may have lost a batch.
   const crowd = createCrowdPose();
   const count = walkers.world.recording.sampleAll(past.timeS, crowd);
-  const place = crowd.avatars.subarray(0, count).indexOf(2);
-  const seen = [...crowd.rootsM.subarray(3 * place, 3 * place + 3)];
-  assert.ok(place >= 0 && metres(again.rootM, seen) < 0.05, `${again.rootM}, seen ${seen}`);
+  const index = crowd.avatars.subarray(0, count).indexOf(2);
+  const expected = [...crowd.rootsM.subarray(3 * index, 3 * index + 3)];
+  assert.ok(index >= 0 && distanceM(again.rootM, expected) < 0.05,
+    `${again.rootM}, not ${expected}`);
   const clip = await scene(page);
-  await cameraRests(page);
-  await until('the past stands still', async () => await movingShare(page, clip, 200) < 0.0005);
-  await keep(page, 'scrubbed');
-  // The same by the slider and the button.
+  await waitForCamera(page);
+  await waitFor('the paused scene does not change', async () => await changedShare(
+    page, clip, 200) < 0.0005);
+  await saveScreenshot(page, 'scrubbed');
+  // The slider and the Live button work, too.
   await page.locator('#scrub').focus();
   await page.keyboard.press('PageDown');
   await page.getByRole('button', {name: /^Live/}).click();
-  await until('it is live', () => page.evaluate(() => window.stridewire.playback.live));
+  await waitFor('playback is live', () => page.evaluate(() => window.stridewire.playback.live));
   const renderS = await page.evaluate(() => window.stridewire.client.renderTimeS());
-  await until('what is now is drawn', async () => {
+  await waitFor('the present is drawn', async () => {
     const now = await rootOf(page, 2);
     return now !== null && now.timeS >= renderS;
   });
@@ -243,18 +255,18 @@ test('scrubbing shows what was, and live is now', async () => {
   await context.close();
 });
 
-test('a connection that is cut is resumed', async () => {
+test('resumes the session after the connection was cut', async () => {
   const {page, context, errors} = await openPage(browser, proxy.port, 'world=plaza');
-  await figuresShown(page, walkerCount + 1);
+  await waitForAvatars(page, walkerCount + 1);
   for (let cut = 1; cut <= 3; ++cut) {
     proxy.cut();
-    await until('it is resumed', () => page.evaluate((count) =>
+    await waitFor('the session is resumed', () => page.evaluate((count) =>
       window.stridewire.stats.resumes >= count && window.stridewire.client.state === 'ready', cut));
   }
-  const before = await until('one is drawn', () => rootOf(page, 1));
-  await until('figures walk on', async () => {
+  const before = await waitFor('the avatar is drawn', () => rootOf(page, 1));
+  await waitFor('avatars continue to walk', async () => {
     const now = await rootOf(page, 1);
-    return now !== null && metres(now.rootM, before.rootM) > 0.1;
+    return now !== null && distanceM(now.rootM, before.rootM) > 0.1;
   });
   const stats = await page.evaluate(() => window.stridewire.stats);
   assert.equal(stats.resumes, stats.reconnects);
@@ -264,9 +276,9 @@ test('a connection that is cut is resumed', async () => {
   await context.close();
 });
 
-test('a browser that stops costs little, and goes on with what is now', async () => {
+test('a paused browser costs the server little, and continues with the present', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza&mode=full');
-  await figuresShown(page, walkerCount + 1);
+  await waitForAvatars(page, walkerCount + 1);
   const devtools = await context.newCDPSession(page);
   await devtools.send('Debugger.enable');
   const paused = new Promise((resolve) => devtools.once('Debugger.paused', resolve));
@@ -281,41 +293,41 @@ test('a browser that stops costs little, and goes on with what is now', async ()
     mostKiB = Math.max(mostKiB, server.residentKiB());
   }
   const dropped = await server.metric('stridewire_batches_dropped_total') - droppedBefore;
-  // Four batches a world and mode, and what events wait; far less than it would have sent.
+  // The server keeps at most four batches per world and mode, and the events that wait.
   assert.ok(mostKiB - beforeKiB < 16 * 1024, `${beforeKiB} KiB, then ${mostKiB}`);
-  // Others notice nothing.
+  // Other clients are not affected.
   assert.ok(walkers.client.renderTimeS() - stoppedS > pauseS - 1);
   await devtools.send('Debugger.resume');
   await devtools.send('Debugger.disable');
-  await until('what is drawn is what is now', async () => {
-    const askedS = walkers.client.renderTimeS();
+  await waitFor('the page draws the present', async () => {
+    const presentS = walkers.client.renderTimeS();
     const now = await rootOf(page, 1);
-    return now !== null && now.timeS > askedS - 1;
+    return now !== null && now.timeS > presentS - 1;
   });
   const stats = await page.evaluate(() => window.stridewire.stats);
   assert.equal(stats.invalidFrames, 0);
-  console.log(`stopped for ${pauseS} s: server ${beforeKiB} KiB, at most ${mostKiB}; ${dropped} batches ` +
-    `dropped; ${stats.reconnects} reconnects, ${stats.resumes} resumed`);
+  console.log(`paused for ${pauseS} s: server ${beforeKiB} KiB, at most ${mostKiB}; ` +
+    `${dropped} batches dropped; ${stats.reconnects} reconnects, ${stats.resumes} resumed`);
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-/** Bytes a page keeps once its recording is full, and `memoryS` later. */
+/** Memory of a page in bytes when its recording is full, and `memoryS` seconds later. */
 async function watchMemory({page, context}) {
-  await figuresShown(page, walkerCount + 1);
+  await waitForAvatars(page, walkerCount + 1);
   const devtools = await context.newCDPSession(page);
   const used = async () => {
     await devtools.send('HeapProfiler.collectGarbage');
     const heap = await devtools.send('Runtime.getHeapUsage');
     return heap.usedSize + (heap.backingStorageSize ?? 0);
   };
-  // Its oldest poses have been dropped.
+  // The recording is full when it has dropped its oldest poses.
   const recorded = () => page.evaluate(() => {
     const {firstTimeS, lastTimeS} = window.stridewire.worlds[0].world.recording;
     return {firstS: firstTimeS, seconds: lastTimeS - firstTimeS};
   });
   const {firstS} = await recorded();
-  const recordedS = await until('the recording is full', async () => {
+  const recordedS = await waitFor('the recording is full', async () => {
     const now = await recorded();
     if (now.firstS > firstS) return now.seconds;
     await sleep(500);
@@ -328,32 +340,32 @@ async function watchMemory({page, context}) {
   return {recordedS, before, after};
 }
 
-test('works on a phone, in the dark', async () => {
+test('fits on a phone, in the dark theme', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza', {
     viewport: {width: 390, height: 844}, colorScheme: 'dark', hasTouch: true, isMobile: true,
     deviceScaleFactor: 2,
   });
-  await figuresShown(page, walkerCount + 1);
-  const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-  assert.ok(wide <= 0, `${wide} pixels too wide`);
-  await keep(page, 'phone');
+  await waitForAvatars(page, walkerCount + 1);
+  const excess = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  assert.ok(excess <= 0, `${excess} pixels too wide`);
+  await saveScreenshot(page, 'phone');
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('draws as for a graphics card, on uneven ground', async () => {
+test('draws uneven terrain with the shaders for a GPU', async () => {
   const context = await browser.newContext({viewport: {width: 640, height: 400}});
-  // Its shaders are others than those for a processor, which this is.
+  // The page chooses its shaders by the name of the renderer, which this replaces.
   await context.addInitScript(() => {
     const {getParameter} = WebGL2RenderingContext.prototype;
     const unmaskedRenderer = 0x9246;
     WebGL2RenderingContext.prototype.getParameter = function(name) {
-      return name === unmaskedRenderer ? 'A card' : getParameter.call(this, name);
+      return name === unmaskedRenderer ? 'Test GPU' : getParameter.call(this, name);
     };
   });
-  const {page, errors} = await openIn(
+  const {page, errors} = await openInContext(
     context, `http://127.0.0.1:${server.httpPort}/?world=graphics&quality=high`);
-  await until('the page is there', () => page.evaluate(
+  await waitFor('the page has loaded', () => page.evaluate(
     () => window.stridewire?.worlds[0]?.world.skeleton));
   assert.deepEqual(await page.evaluate(async () => {
     const {world} = window.stridewire.worlds[0];
@@ -365,17 +377,17 @@ test('draws as for a graphics card, on uneven ground', async () => {
     });
     return [window.stridewire.renderer.software, spawned.ok, changed.ok];
   }), [false, true, true]);
-  await figuresShown(page, 1);
-  await until('the ground is there', () => page.evaluate(() =>
-    !window.stridewire.worlds[0].view.ground.flat));
-  await framesDrawn(page, 3);
-  await keep(page, 'graphics');
+  await waitForAvatars(page, 1);
+  await waitFor('the terrain has changed', () => page.evaluate(() =>
+    !window.stridewire.worlds[0].view.terrain.isFlat));
+  await waitForFrames(page, 3);
+  await saveScreenshot(page, 'graphics');
   assert.equal(await page.evaluate(() => window.stridewire.draw.level), 0);
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('says in a sentence what to do where nothing can be drawn or joined', async () => {
+test('reports that WebGL is missing, and that a world cannot be joined', async () => {
   const context = await browser.newContext();
   await context.addInitScript(() => {
     const {getContext} = HTMLCanvasElement.prototype;
@@ -383,51 +395,54 @@ test('says in a sentence what to do where nothing can be drawn or joined', async
       return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...rest);
     };
   });
-  const {page} = await openIn(context, `http://127.0.0.1:${server.httpPort}/`);
-  await until('it says so', async () => /no WebGL 2/.test(await page.locator('.fatal').textContent()));
+  const {page} = await openInContext(context, `http://127.0.0.1:${server.httpPort}/`);
+  await waitFor('the error is shown', async () =>
+    /needs WebGL 2/.test(await page.locator('.fatal').textContent()));
   await context.close();
 
   const refused = await openPage(browser, server.httpPort, 'world=not%20a%20name&world=plaza');
-  await until('it says so', () => refused.page.evaluate(() =>
-    document.querySelector('.notice:not([hidden])')?.textContent.includes('cannot be joined')));
-  await until('the other is shown', () => refused.page.evaluate((count) =>
-    window.stridewire.sampled().some(({world, avatars}) => world === 'plaza' && avatars.length >= count),
+  await waitFor('the problem is shown', () => refused.page.evaluate(() =>
+    document.querySelector('.notice:not([hidden])')?.textContent.includes('Cannot join world')));
+  await waitFor('the other world is shown', () => refused.page.evaluate((count) =>
+    window.stridewire.sampled().some(({world, avatars}) => world === 'plaza' && avatars.length >=
+      count),
   walkerCount + 1));
   assert.deepEqual(refused.errors, []);
   await refused.context.close();
 });
 
-test('memory stays as it is', async () => {
-  const {recordedS, before, after} = await remembered;
+test('memory use stays constant', async () => {
+  const {recordedS, before, after} = await memoryUse;
   console.log(`memory: ${(before / 1e6).toFixed(2)} MB, ${memoryS} s later ` +
     `${(after / 1e6).toFixed(2)} MB`);
   assert.ok(recordedS > 19, `${recordedS} s recorded`);
   assert.ok(after - before < 4e6, `${before} bytes, then ${after}`);
-  assert.deepEqual(lasting.errors, []);
+  assert.deepEqual(longRunningPage.errors, []);
 });
 
-// The last: what comes after it would have another server.
-test('a server that is killed and started again is found again', async () => {
+// This test must be the last one, because it replaces the server.
+test('reconnects after the server was restarted', async () => {
   const {page, context, errors} = await openPage(browser, server.httpPort, 'world=plaza');
-  await figuresShown(page, walkerCount + 1);
+  await waitForAvatars(page, walkerCount + 1);
   const {port, httpPort} = server;
   await server.kill();
-  await until('the page says so', () => page.evaluate(
-    () => document.querySelector('.notice:not([hidden])')?.textContent.includes('No server answers')));
-  await keep(page, 'no_server');
+  await waitFor('the problem is shown', () => page.evaluate(() =>
+    document.querySelector('.notice:not([hidden])')?.textContent.includes('No server responds')));
+  await saveScreenshot(page, 'no_server');
   server = await Server.start(port, httpPort);
-  await until('the crowd is back', () => walkers.world.avatars().length === walkerCount + 1);
+  await waitFor('the avatars have been spawned again', () => walkers.world.avatars().length ===
+    walkerCount + 1);
   for (let i = 1; i <= walkerCount; ++i) walkers.walk(i);
-  await until('the page shows it', () => page.evaluate((count) =>
+  await waitFor('the page shows them', () => page.evaluate((count) =>
     window.stridewire.client.state === 'ready' &&
     window.stridewire.sampled()[0].avatars.length === count, walkerCount + 1));
   assert.equal(await page.evaluate(() => document.querySelector('.notice:not([hidden])')), null);
-  const before = await until('one is drawn', () => rootOf(page, 1));
-  await until('figures walk', async () => {
+  const before = await waitFor('the avatar is drawn', () => rootOf(page, 1));
+  await waitFor('avatars walk', async () => {
     const now = await rootOf(page, 1);
-    return now !== null && metres(now.rootM, before.rootM) > 0.1;
+    return now !== null && distanceM(now.rootM, before.rootM) > 0.1;
   });
-  await keep(page, 'restarted');
+  await saveScreenshot(page, 'restarted');
   const other = errors.filter((text) => !/WebSocket|Failed to load resource/.test(text));
   assert.deepEqual(other, []);
   await context.close();

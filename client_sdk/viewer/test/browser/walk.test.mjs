@@ -1,5 +1,5 @@
-// Avatars are sent to places by clicks on the ground, over level ground and hills, and the page shows where to
-// until they are there, or says why they go no further.
+// The step and walk tools in a browser: clicks on the ground send an avatar there, on flat terrain
+// and hills. The page shows the goal until the walk ends, and the reason if it is rejected.
 
 import assert from 'node:assert/strict';
 import {after, before, test} from 'node:test';
@@ -8,7 +8,9 @@ import {Client} from '@stridewire/client';
 import WebSocket from 'ws';
 
 import {launch} from '../browser.mjs';
-import {Proxy, Server, cameraRests, figuresShown, framesDrawn, keep, openPage, until} from './support.mjs';
+import {
+  Proxy, Server, openPage, saveScreenshot, waitFor, waitForAvatars, waitForCamera, waitForFrames,
+} from './support.mjs';
 
 let server;
 let client;
@@ -27,94 +29,100 @@ after(async () => {
   await server?.kill();
 });
 
-/** A page with one avatar, chosen, and the tool that sends it taken up; seen from above. */
+/** Opens a page with one selected avatar, seen from above, and activates the walk tool. */
 async function openWorld(name, options = {}, port = server.httpPort) {
-  const heard = [];
+  const events = [];
   const world = client.joinWorld(name);
-  world.on('event', (event) => heard.push(event));
+  world.on('event', (event) => events.push(event));
   const {page, context, errors} = await openPage(
     browser, port, `world=${name}&quality=low&figures=bodies`, {hasTouch: true, ...options});
   const look = (f, argument) => page.evaluate(f, argument);
-  const eventually = (what, f, argument) => until(what, () => page.evaluate(f, argument));
+  const eventually = (what, f, argument) => waitFor(what, () => page.evaluate(f, argument));
   const key = (letter) => page.locator('canvas.scene').press(letter);
-  await eventually('the page is there', () => window.stridewire?.worlds[0]?.world.skeleton);
+  await eventually('the page has loaded', () => window.stridewire?.worlds[0]?.world.skeleton);
   await key('b');
-  const avatar = await eventually('it is chosen and inspected', () =>
+  const avatar = await eventually('the avatar is selected and inspected', () =>
     window.stridewire.inspected && window.stridewire.selection?.avatar);
   await key('m');
   for (let i = 0; i < 8; ++i) await key('ArrowUp');
-  /** All of it in view, and so much more around. */
+  /** Frames all avatars, then zooms out `times` times. */
   const frameAll = async (times) => {
     await key('f');
-    await framesDrawn(page, 2);  // A key more would be instead of it.
+    await waitForFrames(page, 2);  // Zooming earlier would cancel the framing.
     for (let i = 0; i < times; ++i) await key('-');
-    await cameraRests(page);
+    await waitForCamera(page);
   };
-  await figuresShown(page);
+  await waitForAvatars(page);
   await frameAll(3);
-  /** Where a place is on the page, beside the panels. */
+  /** Position of a point of the terrain on the page. Fails if a panel covers it. */
   const onPage = async (x, z) => {
     const {at, free} = await look(([a, b]) => {
       const {view} = window.stridewire.worlds[0];
-      return {at: view.onPage([a, view.ground.heightAt(a, b), b]), free: {...view.free}};
+      return {
+        at: view.projectToPage([a, view.terrain.heightAt(a, b), b]), free: {...view.freeArea}};
     }, [x, z]);
-    assert.ok(at.x > free.x && at.x < free.x + free.width && at.y > free.y && at.y < free.y + free.height,
-      `${x}, ${z} is not to be clicked: ${JSON.stringify({at, free})}`);
+    const visible = at.x > free.x && at.x < free.x + free.width &&
+      at.y > free.y && at.y < free.y + free.height;
+    assert.ok(visible, `${x}, ${z} cannot be clicked: ${JSON.stringify({at, free})}`);
     return at;
   };
-  const marked = (goals) => eventually(`${goals} goals are marked`, (n) =>
+  const goalsShown = (goals) => eventually(`${goals} goals are shown`, (n) =>
     window.stridewire.sampled()[0].goals === n, goals);
   const message = () => page.locator('.message').textContent();
-  const said = async (text) => {
+  const messageContains = async (text) => {
     let last = '';
-    await until(`it is said: ${text}`, async () => (last = await message()).includes(text), 30).catch((error) => {
-      throw new Error(`${error.message}, not: ${last}`);
+    const contains = async () => (last = await message()).includes(text);
+    await waitFor(`the message contains: ${text}`, contains, 30).catch((error) => {
+      throw new Error(`${error.message}; the message is: ${last}`);
     });
   };
-  /** As the page tells what is so at that time or later. */
-  const rests = (timeS = 0) => eventually('it stands', (t) => {
+  /** Waits until the inspector shows, for server time `timeS` or later, that the avatar is idle. */
+  const isIdle = (timeS = 0) => eventually('the avatar is idle', (t) => {
     const {inspected} = window.stridewire;
-    return inspected.timeS >= t && inspected.movement === null && inspected.queueSize === 0 ? inspected : null;
+    const idle = inspected.timeS >= t && inspected.movement === null && inspected.queueSize === 0;
+    return idle ? inspected : null;
   }, timeS);
-  /** A walk that `act` asks for, as the server has it. */
+  /** Returns the walk that `act` requests, as the server has queued it. */
   const walk = async (act) => {
-    const from = heard.length;
+    const from = events.length;
     await act();
-    const {requestId} = await until('it is accepted', () => heard.slice(from).find(
+    const {requestId} = await waitFor('the walk is accepted', () => events.slice(from).find(
       (event) => event.type === 'accepted' && event.avatar === avatar));
-    const item = await until('it is queued', async () => (await world.inspect(avatar)).queue.find(
-      (queued) => queued.requestId === requestId));
+    const item = await waitFor('the walk is queued', async () =>
+      (await world.inspect(avatar)).queue.find((queued) => queued.requestId === requestId));
     assert.equal(item.type, 'walk');
     return item;
   };
-  /** It stands where it was sent, to 1 cm and a degree, and nothing is marked any more. */
+  /** Checks that the avatar arrives within 1 cm and 1 degree, and that the goal disappears. */
   const arrives = async ({atM, headingRad, requestId}) => {
-    const {timeS} = await until('it arrives', () => heard.find(
-      (event) => event.requestId === requestId && event.type === 'finished' && event.kind === 'stand'));
-    await said(`Avatar ${avatar} has arrived.`);
-    await marked(0);
-    const {basePositionM: base, baseHeadingRad} = await rests(timeS);
+    const {timeS} = await waitFor('the avatar arrives', () => events.find((event) =>
+      event.requestId === requestId && event.type === 'finished' && event.kind === 'stand'));
+    await messageContains(`Avatar ${avatar} has arrived.`);
+    await goalsShown(0);
+    const {basePositionM: base, baseHeadingRad} = await isIdle(timeS);
     assert.ok(Math.hypot(base[0] - atM[0], base[2] - atM[2]) < 0.01, `${base}, not ${atM}`);
     const turn = baseHeadingRad - headingRad;
     assert.ok(Math.abs(Math.atan2(Math.sin(turn), Math.cos(turn))) < Math.PI / 180, `${turn}`);
     return base;
   };
-  const near = (atM, x, z) => assert.ok(Math.hypot(atM[0] - x, atM[2] - z) < 0.05, `${atM}, not ${x}, ${z}`);
+  const near = (atM, x, z) =>
+    assert.ok(Math.hypot(atM[0] - x, atM[2] - z) < 0.05, `${atM}, not ${x}, ${z}`);
   return {
-    heard, world, page, context, errors, avatar, frameAll, look, eventually, key, onPage, marked, said, rests, walk, arrives,
-    near};
+    events, world, page, context, errors, avatar, frameAll, look, eventually, key, onPage,
+    goalsShown, messageContains, isIdle, walk, arrives, near};
 }
 
-test('a click on level ground brings the avatar there', async () => {
-  const {page, context, errors, look, onPage, marked, walk, arrives, near} = await openWorld('level');
+test('a click on flat terrain sends the avatar there', async () => {
+  const {page, context, errors, look, onPage, goalsShown, walk, arrives, near} =
+    await openWorld('level');
   const goal = await onPage(1.1, 1.4);
   const item = await walk(() => page.mouse.click(goal.x, goal.y));
   near(item.atM, 1.1, 1.4);
-  await marked(1);
-  await keep(page, 'walk_level');
+  await goalsShown(1);
+  await saveScreenshot(page, 'walk_level');
   await arrives(item);
 
-  // By a finger, and by the keyboard alone.
+  // The avatar is sent back by touch, and then elsewhere with the keyboard only.
   const back = await onPage(0.2, 0.1);
   const second = await walk(() => page.touchscreen.tap(back.x, back.y));
   near(second.atM, 0.2, 0.1);
@@ -133,174 +141,190 @@ test('a click on level ground brings the avatar there', async () => {
   assert.ok(Math.abs(third.headingRad + Math.PI / 2) < 1e-9);
   await arrives(third);
 
-  // There is nothing to click where the server knows no walks.
-  const offered = () => page.locator('#drive-walk, #walk-x').evaluateAll(
+  // The walk controls are hidden if the server does not support walks.
+  const visibleControls = () => page.locator('#command-walk-there, #walk-x').evaluateAll(
     (elements) => elements.filter((element) => element.checkVisibility()).length);
-  assert.equal(await offered(), 2);
+  assert.equal(await visibleControls(), 2);
   await look(() => {
     const {client} = window.stridewire;
-    client.serverHas = (feature) => feature !== 'walks' && Object.getPrototypeOf(client).serverHas.call(client, feature);
+    const {serverHas} = Object.getPrototypeOf(client);
+    client.serverHas = (feature) => feature !== 'walks' && serverHas.call(client, feature);
   });
-  await until('walks are not offered', async () => await offered() === 0);
-  assert.equal(await page.locator('#drive-place').isVisible(), true);
-  assert.equal(await look(() => document.querySelector('canvas.scene').classList.contains('placing')), false);
+  await waitFor('the walk controls are hidden', async () => await visibleControls() === 0);
+  assert.equal(await page.locator('#command-step-there').isVisible(), true);
+  assert.equal(await look(() =>
+    document.querySelector('canvas.scene').classList.contains('placing')), false);
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('a click on hills brings the avatar there, seen from any side', async () => {
-  const {page, context, errors, eventually, frameAll, key, look, onPage, marked, walk, arrives, near} =
-    await openWorld('hilly', {colorScheme: 'dark'});
-  await page.locator('#drive-ground').selectOption('hills');
-  await eventually('there are hills', () => !window.stridewire.worlds[0].view.ground.flat);
+test('a click on hills sends the avatar there, from any camera direction', async () => {
+  const {
+    page, context, errors, eventually, frameAll, key, look, onPage, goalsShown, walk, arrives, near,
+  } = await openWorld('hilly', {colorScheme: 'dark'});
+  await page.locator('#command-terrain').selectOption('hills');
+  await eventually('the terrain has changed', () =>
+    !window.stridewire.worlds[0].view.terrain.isFlat);
   for (const [x, z] of [[1.6, 1.3], [-0.4, 1.8]]) {
     for (let i = 0; i < 6; ++i) await key('ArrowLeft');
     await frameAll(5);
     const goal = await onPage(x, z);
     const item = await walk(() => page.mouse.click(goal.x, goal.y));
     near(item.atM, x, z);
-    await marked(1);
-    await keep(page, 'walk_hills');
+    await goalsShown(1);
+    await saveScreenshot(page, 'walk_hills');
     const base = await arrives(item);
-    const height = await look(([a, , b]) => window.stridewire.worlds[0].view.ground.heightAt(a, b), base);
-    assert.ok(height > 0.05 && Math.abs(base[1] - height) < 0.1, `${base[1]} on ground of ${height} m`);
+    const height = await look(
+      ([a, , b]) => window.stridewire.worlds[0].view.terrain.heightAt(a, b), base);
+    assert.ok(height > 0.05 && Math.abs(base[1] - height) < 0.1,
+      `base frame at ${base[1]} m, terrain at ${height} m`);
   }
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('a new goal mid-way counts from the next step on', async () => {
-  const {heard, page, context, errors, world, avatar, onPage, marked, walk, arrives, near} =
+test('a new goal during a walk takes effect with the next step', async () => {
+  const {events, page, context, errors, world, avatar, onPage, goalsShown, walk, arrives, near} =
     await openWorld('midway');
   const far = await onPage(1.4, 1.6);
   const first = await walk(() => page.mouse.click(far.x, far.y));
-  await until('it is on its way', () => heard.filter((event) => event.requestId === first.requestId &&
-    event.type === 'started').length >= 2);
+  await waitFor('two steps have started', () => events.filter((event) =>
+    event.requestId === first.requestId && event.type === 'started').length >= 2);
   const other = await onPage(-1.2, 0.9);
   const second = await walk(() => page.mouse.click(other.x, other.y));
   near(second.atM, -1.2, 0.9);
-  // The first one is no more; only the step under way is finished.
-  await marked(1);
-  assert.ok((await world.inspect(avatar)).queue.every(({requestId}) => requestId !== first.requestId));
+  // The first walk is cancelled; only the current step is finished.
+  await goalsShown(1);
+  const {queue} = await world.inspect(avatar);
+  assert.ok(queue.every(({requestId}) => requestId !== first.requestId));
   await arrives(second);
-  const taken = heard.findIndex(({type, requestId}) => type === 'accepted' && requestId === second.requestId);
-  const late = heard.slice(taken).filter(({requestId}) => requestId === first.requestId);
+  const accepted = events.findIndex(
+    ({type, requestId}) => type === 'accepted' && requestId === second.requestId);
+  const late = events.slice(accepted).filter(({requestId}) => requestId === first.requestId);
   assert.deepEqual(late.filter(({type}) => type !== 'footStrike' && type !== 'finished'), []);
   assert.ok(late.filter(({type}) => type === 'finished').length <= 1);
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('a goal that can not be reached says why', async () => {
-  const {heard, world, page, context, errors, avatar, eventually, onPage, marked, rests} =
+test('shows the reason if a goal cannot be reached', async () => {
+  const {events, world, page, context, errors, avatar, eventually, onPage, goalsShown, isIdle} =
     await openWorld('walled');
   const box = {minM: [-2, 0.8], maxM: [2, 2.8], heightM: 0.2};
   assert.ok((await world.setTerrain({heightField: null, boxes: [box]})).ok);
-  await eventually('the block is there', () => !window.stridewire.worlds[0].view.ground.flat);
+  await eventually('the box is there', () => !window.stridewire.worlds[0].view.terrain.isFlat);
   for (const closed of [false, true]) {
-    // Where the panel is closed it is said over the scene.
-    if (closed) await page.getByRole('button', {name: 'Close Drive', exact: true}).click();
-    await cameraRests(page);
-    // Nobody can stand on an edge.
+    // If the command panel is closed, the message appears over the scene.
+    if (closed) await page.getByRole('button', {name: 'Close Commands', exact: true}).click();
+    await waitForCamera(page);
+    // An avatar cannot stand on the edge of the box.
     const goal = await onPage(0.1, 0.83);
-    const from = heard.length;
+    const from = events.length;
     await page.mouse.click(goal.x, goal.y);
-    const {reason} = await until('it is rejected', () => heard.slice(from).find(
+    const {reason} = await waitFor('the walk is rejected', () => events.slice(from).find(
       (event) => event.type === 'rejected' && event.avatar === avatar));
     assert.match(reason, /edge/);
     const [where, other] = closed ? ['.toast', '.message'] : ['.message', '.toast'];
-    await until('that is said', async () => await page.locator(where).isVisible() &&
-      await page.locator(where).textContent() === `Avatar ${avatar} goes no further: ${reason}.`);
+    await waitFor('the reason is shown', async () => await page.locator(where).isVisible() &&
+      await page.locator(where).textContent() === `Avatar ${avatar} stopped: ${reason}.`);
     assert.equal(await page.locator(other).isVisible(), false);
-    await keep(page, closed ? 'walk_refused_toast' : 'walk_refused');
-    await marked(0);
-    await rests();
+    await saveScreenshot(page, closed ? 'walk_refused_toast' : 'walk_refused');
+    await goalsShown(0);
+    await isIdle();
   }
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('where a foot is asked to is marked until it is there', async () => {
-  const {heard, page, context, errors, avatar, look, eventually, key, onPage, rests} = await openWorld('feet');
+test('outlines a requested footprint until the foot lands', async () => {
+  const {events, page, context, errors, avatar, look, eventually, key, onPage, isIdle} =
+    await openWorld('feet');
   await key('t');
-  // It begins at once, so nothing waits in the queue. A step is short: every frame is looked at, and on a machine
-  // that is too slow to show one, another is asked for.
+  // The step starts immediately, so the queue is empty. Every frame is checked, because a step is
+  // short. If a slow machine draws no frame during the step, the test requests another one.
   await look(() => {
-    window.markedUnderWay = false;
+    window.outlinedDuringStep = false;
     const each = () => {
       const {inspected} = window.stridewire;
-      window.markedUnderWay ||= inspected !== null && inspected.movement !== null && inspected.queueSize === 0 &&
-        window.stridewire.sampled()[0].planned === 1;
+      const stepping =
+        inspected !== null && inspected.movement !== null && inspected.queueSize === 0;
+      window.outlinedDuringStep ||= stepping && window.stridewire.sampled()[0].planned === 1;
       requestAnimationFrame(each);
     };
     each();
   });
   let x = 0.25;
-  await until('it is marked', async () => {
+  await waitFor('the outline was drawn during a step', async () => {
     const goal = await onPage(x, 0.35);
-    const from = heard.length;
+    const from = events.length;
     await page.mouse.click(goal.x, goal.y);
-    const strike = await until('a foot lands', () => heard.slice(from).find(
-      (event) => event.type === 'footStrike' && event.avatar === avatar && event.requestId !== 0n));
-    assert.ok(Math.hypot(strike.positionM[0] - x, strike.positionM[2] - 0.35) < 0.03, `${strike.positionM}`);
-    await eventually('the mark is gone', () => window.stridewire.sampled()[0].planned === 0);
-    await rests();
+    const strike = await waitFor('a foot lands', () => events.slice(from).find((event) =>
+      event.type === 'footStrike' && event.avatar === avatar && event.requestId !== 0n));
+    const missM = Math.hypot(strike.positionM[0] - x, strike.positionM[2] - 0.35);
+    assert.ok(missM < 0.03, `${strike.positionM}`);
+    await eventually('the outline is gone', () => window.stridewire.sampled()[0].planned === 0);
+    await isIdle();
     x = -x;
-    return look(() => window.markedUnderWay);
+    return look(() => window.outlinedDuringStep);
   });
   assert.deepEqual(errors, []);
   await context.close();
 });
 
-test('a goal is shown again, and its end told, after the connection was cut', async () => {
+test('shows a goal again, and its end, after the connection was cut', async () => {
   const proxy = await Proxy.start(server.httpPort);
-  const {page, context, look, eventually, marked, said} = await openWorld('cut', {}, proxy.port);
+  const {page, context, look, eventually, goalsShown, messageContains} =
+    await openWorld('cut', {}, proxy.port);
   await look(() => {
-    window.markedAlone = false;
+    window.goalWithoutConnection = false;
     const each = () => {
       const {client} = window.stridewire;
-      window.markedAlone ||= client.state !== 'ready' && window.stridewire.sampled()[0].goals > 0;
+      window.goalWithoutConnection ||=
+        client.state !== 'ready' && window.stridewire.sampled()[0].goals > 0;
       requestAnimationFrame(each);
     };
     each();
   });
   await page.locator('#walk-x').fill('3');
   await page.locator('#walk-x').press('Enter');
-  await marked(1);
+  await goalsShown(1);
   proxy.cut();
-  await eventually('the session goes on', () => window.stridewire.client.statistics.resumes === 1);
-  await said('has arrived.');
-  await marked(0);
-  assert.equal(await look(() => window.markedAlone), false);
+  await eventually('the session is resumed', () => window.stridewire.client.statistics.resumes ===
+    1);
+  await messageContains('has arrived.');
+  await goalsShown(0);
+  assert.equal(await look(() => window.goalWithoutConnection), false);
   await context.close();
   proxy.stop();
 });
 
-test('marks go when the walk is given up, its avatar leaves, or the server', async () => {
-  const {page, context, key, eventually, look, onPage, marked, rests, walk} = await openWorld('ended');
+test('hides the goal when the walk, its avatar or the server ends', async () => {
+  const {page, context, key, eventually, look, onPage, goalsShown, isIdle, walk} =
+    await openWorld('ended');
   const far = await onPage(1.2, 1.5);
   await walk(() => page.mouse.click(far.x, far.y));
-  await marked(1);
+  await goalsShown(1);
   await key('x');
-  await marked(0);
-  await rests();
+  await goalsShown(0);
+  await isIdle();
 
   const back = await onPage(0, 0);
   await walk(() => page.mouse.click(back.x, back.y));
-  await marked(1);
+  await goalsShown(1);
   await key('Delete');
-  await marked(0);
-  await eventually('it is gone', () => window.stridewire.worlds[0].world.avatars().length === 0);
+  await goalsShown(0);
+  await eventually('the avatar is removed', () =>
+    window.stridewire.worlds[0].world.avatars().length === 0);
 
   await key('b');
-  await eventually('another is chosen', () => window.stridewire.selection !== null);
+  await eventually('a new avatar is selected', () => window.stridewire.selection !== null);
   await key('m');
   await key('m');
   await page.locator('#walk-x').fill('40');
   await page.locator('#walk-x').press('Enter');
-  await marked(1);
+  await goalsShown(1);
   await server.kill();
-  await marked(0);
+  await goalsShown(0);
   assert.notEqual(await look(() => window.stridewire.client.state), 'ready');
   await context.close();
 });

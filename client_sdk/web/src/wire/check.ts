@@ -1,26 +1,30 @@
 import type {
-  LayerRequest, MovementRequest, Observation, PoseDetail, PoseMode, QueuedRequest, Region, Role, SpawnItem, Terrain, TerrainBox,
-  Vec3
+  LayerRequest, MovementRequest, Observation, PoseDetail, PoseMode, QueuedRequest, Region, Role,
+  SpawnItem, Terrain, TerrainBox, Vec3
 } from '../types';
-import {footChoices, movementTypes, poseDetails, poseModes, roles, takeovers} from './decode';
+import {footChoices, interrupts, movementTypes, poseDetails, poseModes, roles} from './decode';
 import {
-  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes, maxTerrainColumns,
-  maxWaypoints
+  maxAvatarNumber, maxEveryNTicks, maxItems, maxNameBytes, maxRateRings, maxTerrainBoxes,
+  maxTerrainColumns, maxWaypoints
 } from './limits';
 import {Malformed} from './malformed';
 import type {
-  CancelQueue, JoinWorld, LayerEntry, Observe, RegionEntry, Remove, Request, SetLayers, SetPlanting, SetTerrain, Spawn
+  CancelQueue, JoinWorld, LayerEntry, Observe, RegionEntry, Remove, Request, SetLayers,
+  SetPlanting, SetTerrain, Spawn
 } from './messages';
 import {checkName} from './text';
 
-/** What callers pass, as messages to send: checked as the receiver would. Numbers that the session
- * gives (seq, world) are still 0. All throw Malformed. */
+/**
+ * Converts arguments of the public interface to messages. The same checks apply as in the server's
+ * decoder. `seq` and `world` are 0; the session sets them. All functions throw Malformed if an
+ * argument is invalid.
+ */
 
 const maxRequestId = 0xffff_ffff_ffff_ffffn;
 
 function finite(value: unknown, field: string, index: number): number {
   if (typeof value !== 'number' || !Number.isFinite(value)) {
-    throw new Malformed('is not a finite number', field, index);
+    throw new Malformed(`expected a finite number, got ${value}`, field, index);
   }
   return value;
 }
@@ -28,40 +32,45 @@ function finite(value: unknown, field: string, index: number): number {
 function avatarNumber(value: unknown, least: number, field: string, index: number): number {
   if (typeof value !== 'number' || !Number.isInteger(value) || value < least ||
       value > maxAvatarNumber) {
-    throw new Malformed(`is not a whole number from ${least} to 4294967295`, field, index);
+    throw new Malformed(`expected an integer from ${least} to ${maxAvatarNumber}, got ${value}`,
+                        field, index);
   }
   return value;
 }
 
 function list<T>(items: readonly T[], least: number, field: string): readonly T[] {
   if (items === null || typeof items !== 'object' || typeof items.length !== 'number') {
-    throw new Malformed('is not a list', field);
+    throw new Malformed('expected a list', field);
   }
-  if (items.length < least) throw new Malformed('list is empty', field);
-  if (items.length > maxItems) throw new Malformed(`has more than ${maxItems} items`, field);
+  if (items.length < least) throw new Malformed('expected at least one item', field);
+  if (items.length > maxItems) {
+    throw new Malformed(`expected at most ${maxItems} items, got ${items.length}`, field);
+  }
   return items;
 }
 
 function oneOf<T>(values: readonly T[], value: unknown, field: string, index = -1): T {
   if (!values.includes(value as T)) {
-    throw new Malformed(`is none of ${values.join(', ')}`, field, index);
+    throw new Malformed(`expected one of ${values.join(', ')}, got ${value}`, field, index);
   }
   return value as T;
 }
 
 function vector(value: unknown, field: string, index: number): Vec3 {
   const numbers = value as Vec3 | undefined;
-  if (!numbers || numbers.length !== 3) throw new Malformed('is not three numbers', field, index);
+  if (!numbers || numbers.length !== 3) {
+    throw new Malformed('expected three numbers', field, index);
+  }
   return [
     finite(numbers[0], field, index), finite(numbers[1], field, index),
     finite(numbers[2], field, index)
   ];
 }
 
-/** x and z. */
+/** Checks the x and z of a point on the ground. */
 function place(value: unknown, field: string, index: number): readonly [number, number] {
   const numbers = value as readonly number[] | undefined;
-  if (!numbers || numbers.length !== 2) throw new Malformed('is not two numbers', field, index);
+  if (!numbers || numbers.length !== 2) throw new Malformed('expected two numbers', field, index);
   return [finite(numbers[0], field, index), finite(numbers[1], field, index)];
 }
 
@@ -96,23 +105,27 @@ export function cancelQueue(avatars: readonly number[]): CancelQueue {
   return {type: 'CancelQueue', seq: 0n, world: 0, avatars: avatarList(avatars, 1, 'avatars')};
 }
 
-/** `nextId` gives the number of a request that has none. */
+/** `nextId` returns an id for a request that has none. */
 export function request(items: readonly MovementRequest[], nextId: () => bigint): Request {
   return {
     type: 'Request',
     seq: 0n,
     world: 0,
     items: list(items, 1, 'items').map((item, i): QueuedRequest => {
-      if (item === null || typeof item !== 'object') throw new Malformed('is none', 'items', i);
+      if (item === null || typeof item !== 'object') {
+        throw new Malformed('expected an object', 'items', i);
+      }
       const type = oneOf(movementTypes, item.type, 'type', i);
       const step = type === 'step';
       const walk = type === 'walk';
       const at = walk || (step && item.atM !== undefined) ? vector(item.atM, 'atM', i) : null;
       const moves = type !== 'stand' && at === null;
-      const mustBeMet = item.mustBeMet ?? false;
-      if (typeof mustBeMet !== 'boolean') throw new Malformed('is neither true nor false', 'mustBeMet', i);
-      if (mustBeMet && !(step && at !== null)) {
-        throw new Malformed('has a meaning only for a step with atM', 'mustBeMet', i);
+      const exactOnly = item.exactOnly ?? false;
+      if (typeof exactOnly !== 'boolean') {
+        throw new Malformed('expected true or false', 'exactOnly', i);
+      }
+      if (exactOnly && !(step && at !== null)) {
+        throw new Malformed('is only allowed for a step with atM', 'exactOnly', i);
       }
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
@@ -130,8 +143,8 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
         waypointsM: walk ? waypoints(item.waypointsM ?? [], i) : [],
         speedMPerS: walk && item.speedMPerS !== undefined
             ? finite(item.speedMPerS, 'speedMPerS', i) : null,
-        takeover: oneOf(takeovers, item.takeover ?? 'none', 'takeover', i),
-        mustBeMet,
+        interrupt: oneOf(interrupts, item.interrupt ?? 'none', 'interrupt', i),
+        exactOnly,
       };
     }),
   };
@@ -139,7 +152,7 @@ export function request(items: readonly MovementRequest[], nextId: () => bigint)
 
 function waypoints(places: readonly Vec3[], index: number): readonly Vec3[] {
   if (!Array.isArray(places) || places.length > maxWaypoints) {
-    throw new Malformed('is not a list of up to 64 places', 'waypointsM', index);
+    throw new Malformed(`expected a list of up to ${maxWaypoints} positions`, 'waypointsM', index);
   }
   return places.map((place: Vec3) => vector(place, 'waypointsM', index));
 }
@@ -147,41 +160,47 @@ function waypoints(places: readonly Vec3[], index: number): readonly Vec3[] {
 function requestId(value: unknown, index: number): bigint {
   const id = typeof value === 'number' && Number.isSafeInteger(value) ? BigInt(value) : value;
   if (typeof id !== 'bigint' || id < 1n || id > maxRequestId) {
-    throw new Malformed('is not a whole number from 1 on, exact as it is', 'requestId', index);
+    throw new Malformed('expected a bigint or a safe integer, at least 1', 'requestId', index);
   }
   return id;
 }
 
-/** A copy: what the caller does with its arrays later changes nothing. */
+/** Copies the arrays, so that the caller may change them later. */
 export function setTerrain(terrain: Terrain | null): SetTerrain {
   const message: SetTerrain = {type: 'SetTerrain', seq: 0n, world: 0, terrain: null};
   if (terrain === null) return message;
-  if (typeof terrain !== 'object') throw new Malformed('is none', 'terrain');
+  if (typeof terrain !== 'object') throw new Malformed('expected an object or null', 'terrain');
   const from = terrain.heightField ?? null;
   let heightField = null;
   if (from !== null) {
     const {columns, rows, heightsM} = from;
     for (const samples of [columns, rows]) {
       if (!Number.isInteger(samples) || samples < 2 || samples > maxTerrainColumns) {
-        throw new Malformed('is not 2 to 1024', 'columns, rows');
+        throw new Malformed(`expected 2 to ${maxTerrainColumns}, got ${samples}`, 'columns, rows');
       }
     }
-    if (heightsM?.length !== columns * rows) throw new Malformed('is not one a sample', 'heightsM');
+    if (heightsM?.length !== columns * rows) {
+      throw new Malformed(`expected ${columns * rows} numbers, got ${heightsM?.length}`,
+                          'heightsM');
+    }
     const cellM = finite(from.cellM, 'cellM', -1);
-    if (!(cellM > 0)) throw new Malformed('is not above 0', 'cellM');
+    if (!(cellM > 0)) throw new Malformed(`expected a number above 0, got ${cellM}`, 'cellM');
     const copy = Float32Array.from(heightsM);
     copy.forEach((height, h) => finite(height, 'heightsM', h));
-    heightField = {originM: place(from.originM, 'originM', -1), cellM, columns, rows, heightsM: copy};
+    const originM = place(from.originM, 'originM', -1);
+    heightField = {originM, cellM, columns, rows, heightsM: copy};
   }
   const boxes = terrain.boxes ?? [];
-  if (boxes.length > maxTerrainBoxes) throw new Malformed('has more than 65536', 'boxes');
+  if (boxes.length > maxTerrainBoxes) {
+    throw new Malformed(`expected at most ${maxTerrainBoxes}, got ${boxes.length}`, 'boxes');
+  }
   message.terrain = {
     heightField,
     boxes: Array.from(boxes, (box, b): TerrainBox => {
       const minM = place(box?.minM, 'boxes.minM', b);
       const maxM = place(box?.maxM, 'boxes.maxM', b);
       if (!(minM[0] < maxM[0] && minM[1] < maxM[1])) {
-        throw new Malformed('is not above minM', 'boxes.maxM', b);
+        throw new Malformed('expected both numbers to be above minM', 'boxes.maxM', b);
       }
       return {minM, maxM, heightM: finite(box.heightM, 'boxes.heightM', b)};
     }),
@@ -195,12 +214,18 @@ export function setLayers(items: readonly LayerRequest[]): SetLayers {
     seq: 0n,
     world: 0,
     items: list(items, 1, 'items').map((item, i): LayerEntry => {
-      if (item === null || typeof item !== 'object') throw new Malformed('is none', 'items', i);
+      if (item === null || typeof item !== 'object') {
+        throw new Malformed('expected an object', 'items', i);
+      }
+      const enabled = item.enabled ?? true;
+      if (typeof enabled !== 'boolean') {
+        throw new Malformed('expected true or false', 'enabled', i);
+      }
       checkName(item.layer, maxNameBytes, 'layer');
       return {
         avatar: avatarNumber(item.avatar, 1, 'avatar', i),
         layer: item.layer,
-        off: item.off === true,
+        off: !enabled,
         weight: finite(item.weight ?? 1, 'weight', i),
         blendS: finite(item.blendS ?? 0.3, 'blendS', i),
         speed: finite(item.speed ?? 1, 'speed', i),
@@ -209,25 +234,31 @@ export function setLayers(items: readonly LayerRequest[]): SetLayers {
   };
 }
 
-export function setPlanting(avatars: readonly number[], on: boolean): SetPlanting {
-  if (typeof on !== 'boolean') throw new Malformed('is neither true nor false', 'on');
-  return {type: 'SetPlanting', seq: 0n, world: 0, avatars: avatarList(avatars, 1, 'avatars'), off: !on};
+export function setPlanting(avatars: readonly number[], enabled: boolean): SetPlanting {
+  if (typeof enabled !== 'boolean') throw new Malformed('expected true or false', 'enabled');
+  return {
+    type: 'SetPlanting',
+    seq: 0n,
+    world: 0,
+    avatars: avatarList(avatars, 1, 'avatars'),
+    off: !enabled,
+  };
 }
 
 export function observe(observation: Observation): Observe {
   if (observation === null || typeof observation !== 'object') {
-    throw new Malformed('is none', 'observation');
+    throw new Malformed('expected an object', 'observation');
   }
-  const everyNTicks = observation.everyNTicks ?? 1;
-  if (!Number.isInteger(everyNTicks) || everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
-    throw new Malformed('is not 1 to 3600', 'everyNTicks');
-  }
+  const everyNTicks = tickInterval(observation.everyNTicks ?? 1, 'everyNTicks');
   const mode = oneOf(poseModes.slice(0, 2) as PoseMode[], observation.mode, 'mode');
   const detail = oneOf(poseDetails, observation.detail ?? 'all', 'detail');
-  if (detail !== 'all' && mode !== 'quantised') throw new Malformed('is of quantised poses only', 'detail');
-  const inRegion = observation.region === undefined ? null : region(observation.region, mode, detail);
+  if (detail !== 'all' && mode !== 'quantised') {
+    throw new Malformed(`requires mode quantised, got ${mode}`, 'detail');
+  }
+  const inRegion =
+      observation.region === undefined ? null : region(observation.region, mode, detail);
   if (inRegion !== null && (observation.avatars?.length ?? 0) > 0) {
-    throw new Malformed('are not needed beside a region', 'avatars');
+    throw new Malformed('must be empty or absent if a region is given', 'avatars');
   }
   return {
     type: 'Observe',
@@ -244,33 +275,49 @@ export function observe(observation: Observation): Observe {
   };
 }
 
-/** A region observed in that mode, and beyond its rings in that detail. */
+function tickInterval(value: number, field: string, index = -1): number {
+  if (!Number.isInteger(value) || value < 1 || value > maxEveryNTicks) {
+    throw new Malformed(`expected an integer from 1 to ${maxEveryNTicks}, got ${value}`, field,
+                        index);
+  }
+  return value;
+}
+
+/** `mode` and `beyond` are mode and detail of the observation. */
 export function region(asked: Region, mode: Observe['mode'], beyond: PoseDetail): RegionEntry {
-  if (asked === null || typeof asked !== 'object') throw new Malformed('is none', 'region');
+  if (asked === null || typeof asked !== 'object') {
+    throw new Malformed('expected an object', 'region');
+  }
   const radiusM = finite(asked.radiusM, 'radiusM', -1);
-  if (!(radiusM > 0)) throw new Malformed('is not above 0', 'radiusM');
-  const leaveM = asked.leaveM === undefined ? null : finite(asked.leaveM, 'leaveM', -1);
-  if (leaveM !== null && leaveM < 0) throw new Malformed('is below 0', 'leaveM');
+  if (!(radiusM > 0)) throw new Malformed(`expected a number above 0, got ${radiusM}`, 'radiusM');
+  const leaveM =
+      asked.leaveMarginM === undefined ? null : finite(asked.leaveMarginM, 'leaveMarginM', -1);
+  if (leaveM !== null && leaveM < 0) {
+    throw new Malformed(`expected a number of at least 0, got ${leaveM}`, 'leaveMarginM');
+  }
   const rings = asked.rings ?? [];
   if (!Array.isArray(rings) || rings.length > maxRateRings) {
-    throw new Malformed('are not a list of up to 4', 'rings');
+    throw new Malformed(`expected a list of up to ${maxRateRings}`, 'rings');
   }
-  let beforeM = 0;
-  for (const {toM, everyNTicks} of rings) {
-    if (!Number.isFinite(toM) || toM <= beforeM) throw new Malformed('does not grow', 'toM');
-    if (!Number.isInteger(everyNTicks) || everyNTicks < 1 || everyNTicks > maxEveryNTicks) {
-      throw new Malformed('is not 1 to 3600', 'everyNTicks');
+  let previousM = 0;
+  rings.forEach(({outerRadiusM, everyNTicks}, i) => {
+    if (!Number.isFinite(outerRadiusM) || outerRadiusM <= previousM) {
+      throw new Malformed(`expected a number above ${previousM}, got ${outerRadiusM}`,
+                          'rings.outerRadiusM', i);
     }
-    beforeM = toM;
-  }
+    tickInterval(everyNTicks, 'rings.everyNTicks', i);
+    previousM = outerRadiusM;
+  });
   const hasDetails = rings.some(({detail}) => detail !== undefined);
-  if (hasDetails && mode !== 'quantised') throw new Malformed('is of quantised poses only', 'rings.detail');
+  if (hasDetails && mode !== 'quantised') {
+    throw new Malformed(`requires mode quantised, got ${mode}`, 'rings.detail');
+  }
   return {
     x: finite(asked.x, 'x', -1),
     z: finite(asked.z, 'z', -1),
     radiusM,
     leaveM,
-    rings: rings.map(({toM, everyNTicks}) => ({toM, everyNTicks})),
+    rings: rings.map(({outerRadiusM, everyNTicks}) => ({toM: outerRadiusM, everyNTicks})),
     ringDetails: hasDetails
         ? rings.map(({detail}, i) => oneOf(poseDetails, detail ?? beyond, 'rings.detail', i)) : [],
   };

@@ -6,52 +6,63 @@ const leastToldW = 0.9;
 const rootStepM = 1 / 16384;
 const maxRootSteps = 131_071 * 16384;
 
-/** @throws Malformed: codes that no encoder has (protocol/STANDARD.md, "Poses"). */
+/**
+ * Checks a world's rotation codes against protocol/STANDARD.md, "Poses".
+ * @throws Malformed a code is invalid
+ */
 export function checkRotationCodes(codes: readonly RotationCode[], jointCount: number): void {
   if (codes.length !== 0 && codes.length !== jointCount) {
-    throw new Malformed('is not one a joint', 'WorldInfo.rotationCodes');
+    throw new Malformed('expected one per joint, or none', 'WorldInfo.rotationCodes');
   }
   codes.forEach((code, j) => {
     const wrong = (what: string): never => {
       throw new Malformed(what, 'WorldInfo.rotationCodes', j);
     };
     const {freeBits, reference, low, step, bits, leastW} = code;
-    if (freeBits !== 0 ? freeBits < 8 || freeBits > 15 : j === 0) wrong('free bits are not 8 to 15');
+    if (freeBits !== 0 ? freeBits < 8 || freeBits > 15 : j === 0) {
+      wrong('free_bits is not 8 to 15; 0 is allowed except for the root');
+    }
     const squared = reference.reduce((sum, x) => sum + x * x, 0);
     if (!(Math.abs(squared - 1) <= 1e-5)) wrong('reference is not a unit quaternion');
-    if (!(leastW >= 0.3 - 1e-7 && leastW <= 1)) wrong('least w is not 0.3 to 1');
+    if (!(leastW >= 0.3 - 1e-7 && leastW <= 1)) wrong('least_w is not 0.3 to 1');
     for (let c = 0; c < 3; ++c) {
-      if (!(Math.abs(low[c]!) <= 1)) wrong('component begins outside -1 to 1');
+      if (!(Math.abs(low[c]!) <= 1)) wrong('low is not -1 to 1');
       if (!(step[c]! >= 2 ** -20 && step[c]! <= 2)) wrong('step is not 2^-20 to 2');
-      if (bits[c]! > 16) wrong('more than 16 bits');
+      if (bits[c]! > 16) wrong('has more than 16 bits');
     }
   });
 }
 
-/** @throws Malformed: joints that cannot be told without the others: not growing, or without the one they hang from. */
+/**
+ * Checks the joints that reduced poses contain.
+ * @throws Malformed they are not ascending from the root, or a joint's parent is missing
+ */
 export function checkFewerJoints(joints: readonly number[], parents: readonly number[]): void {
   const wrong = (what: string, i: number): never => {
     throw new Malformed(what, 'WorldInfo.fewerJoints', i);
   };
-  if (joints.length > parents.length) wrong('are more than there are', -1);
+  if (joints.length > parents.length) wrong('has more entries than joints', -1);
   joints.forEach((joint, i) => {
-    if (joint >= parents.length) wrong('is no joint', i);
-    if (i === 0 ? joint !== 0 : joint <= joints[i - 1]!) wrong('does not grow from the root', i);
-    if (i > 0 && !joints.includes(parents[joint]!)) wrong('is without the one it hangs from', i);
+    if (joint >= parents.length) wrong('is not a joint', i);
+    if (i === 0 ? joint !== 0 : joint <= joints[i - 1]!) wrong('is not ascending from the root', i);
+    if (i > 0 && !joints.includes(parents[joint]!)) wrong('has no parent in the list', i);
   });
 }
 
-/** Reads compact poses of one world. */
+/** Decodes the compact poses of one world and one detail. */
 export class CompactCodec {
   readonly jointCount: number;
   readonly poseBytes: number;
-  /** Per joint: free bits, bits of x, y, z. Of one that is left out none. */
+  /** Per joint: free bits, then bits of x, y, z. All 0 for joints that poses do not contain. */
   private readonly bits: Uint8Array;
-  /** Per joint: reference x, y, z, w, low x, y, z, step x, y, z, square of the least w. */
+  /** Per joint: reference x, y, z, w; low x, y, z; step x, y, z; square of the smallest valid w. */
   private readonly numbers: Float64Array;
 
-  /** `codes` as checkRotationCodes takes them, at least one; `told` as checkFewerJoints does, the joints that are
-   * told, or none: all. Others are read as their references. */
+  /**
+   * `codes` must have at least one entry and pass checkRotationCodes. `told` lists the joints that
+   * poses contain and must pass checkFewerJoints; empty: all joints. Other joints are set to their
+   * references.
+   */
   constructor(codes: readonly RotationCode[], told: readonly number[] = []) {
     this.jointCount = codes.length;
     this.bits = new Uint8Array(4 * codes.length);
@@ -59,7 +70,7 @@ export class CompactCodec {
     let count = 0;
     codes.forEach((code, j) => {
       if (told.length > 0 && !told.includes(j)) {
-        this.numbers.set(code.reference, 11 * j);  // All others 0: w is 1.
+        this.numbers.set(code.reference, 11 * j);  // With zeros elsewhere, w becomes 1.
         return;
       }
       const {freeBits} = code;
@@ -73,8 +84,10 @@ export class CompactCodec {
   }
 
   /**
-   * The pose that begins at `words[at]`, all of it there: the root to `rootM[rootAt ...]`, x, y, z, w of each
-   * joint to `rotations[rotationsAt ...]`. False: it is none; what was written then has no meaning.
+   * Decodes the pose that starts at `words[at]`; `words` must contain it completely. Writes the
+   * root's position at `rootM[rootAt]` and the x, y, z, w of all joints at
+   * `rotations[rotationsAt]`. Returns false if the pose is invalid; the output is then invalid as
+   * well.
    */
   read(words: Uint16Array, at: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
        rotationsAt: number): boolean {
@@ -85,7 +98,7 @@ export class CompactCodec {
       if (steps > maxRootSteps || steps < -maxRootSteps) return false;
       rootM[rootAt + i] = steps * rootStepM;
     }
-    let held = 0;  // of `window`, the lowest bits that were not taken yet
+    let held = 0;  // Number of unread bits in `window`, from the lowest.
     let window = 0;
     for (let j = 0, n = 0, to = rotationsAt; j < bits.length; j += 4, n += 11, to += 4) {
       const free = bits[j]!;

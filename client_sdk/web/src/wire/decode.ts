@@ -2,16 +2,17 @@ import {ByteBuffer, Encoding} from 'flatbuffers';
 import {tableNumbers} from '../../generated/layout';
 import * as wire from '../../generated/wire';
 import type {
-  CurrentMovement, EndSite, Foot, FootChoice, Landing, Leg, MovementKind, MovementType, ParameterName, Parameters,
-  PlayingLayer, PoseDetail, PoseMode, QueuedRequest, Role, Terrain, TerrainBox, Vec3, WorldEvent, WorldEventType, Takeover
+  CurrentMovement, EndSite, Foot, Interrupt, Landing, Leg, MovementKind, MovementType,
+  ParameterName, Parameters, PlayingLayer, PoseDetail, PoseMode, QueuedRequest, Role, Terrain,
+  TerrainBox, Vec3, WorldEvent, WorldEventType
 } from '../types';
 import {isBulk, readFrameHeader, type MessageName, type Sender} from './frame';
 import {
   frameHeaderBytes, maxAuthTokenBytes, maxBatchParts, maxCrowdTables, maxEndSites, maxEveryNTicks,
-  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames, maxLibraryBytes, maxNameBytes, maxParameters,
-  maxPieceBytes, maxPlayingLayers, maxRateRings,
-  maxReasonBytes, maxRecordBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns, maxTextBytes, maxWaypoints, maxWeights,
-  minResumeTokenBytes
+  maxFewTables, maxInspectedRequests, maxItems, maxJoints, maxKeytimes, maxLandings, maxLayerNames,
+  maxLibraryBytes, maxNameBytes, maxParameters, maxPieceBytes, maxPlayingLayers, maxRateRings,
+  maxReasonBytes, maxRecordBytes, maxResumeTokenBytes, maxTerrainBoxes, maxTerrainColumns,
+  maxTextBytes, maxWaypoints, maxWeights, minResumeTokenBytes
 } from './limits';
 import {Malformed} from './malformed';
 import type {
@@ -22,18 +23,18 @@ import {compactPoseBytes, poseBytes} from './pose_codec';
 import {readName, readText} from './text';
 import {verify} from './verify';
 
-/** Texts are taken as bytes: they are counted and checked before they become strings. */
+/** Texts are read as bytes, so that they can be checked before they become strings. */
 const asBytes = Encoding.UTF8_BYTES;
 
 export const roles: readonly Role[] = ['controller', 'observer'];
 export const poseModes =
     ['full', 'quantised', 'movement', 'compact', 'compactFewer', 'compactRoot'] as const;
-export const poseDetails: readonly PoseDetail[] = ['all', 'fewer', 'root'];
-/** Those that can be asked for. */
+export const poseDetails: readonly PoseDetail[] = ['all', 'reduced', 'root'];
+/** Modes that a client can request. */
 const observedModes = poseModes.slice(0, 3) as (PoseMode | 'movement')[];
 export const movementTypes: readonly MovementType[] = ['step', 'jump', 'stand', 'walk'];
-export const takeovers: readonly Takeover[] = ['none', 'afterMovement', 'now'];
-export const footChoices: readonly FootChoice[] = ['auto', 'left', 'right'];
+export const interrupts: readonly Interrupt[] = ['none', 'afterMovement', 'now'];
+export const footChoices: readonly (Foot | 'auto')[] = ['auto', 'left', 'right'];
 const feet: readonly Foot[] = ['left', 'right'];
 export const movementKinds: readonly MovementKind[] = ['stepLeft', 'stepRight', 'jump', 'stand'];
 export const eventTypes: readonly WorldEventType[] = [
@@ -45,9 +46,9 @@ export const parameterNames: readonly ParameterName[] = [
 ];
 
 /**
- * One frame as a message that holds what protocol/STANDARD.md says: structure, then meaning. A
- * batch's poses are checked when PoseReader reads them.
- * @throws Malformed and nothing else
+ * Decodes a frame and checks it against protocol/STANDARD.md: first its structure, then the meaning
+ * of its fields. The poses of a batch are checked later, by PoseReader.
+ * @throws Malformed the frame is invalid; no other error is thrown
  */
 export function decodeFrame(frame: ArrayBuffer, sender: Sender): Message {
   const name = readFrameHeader(new DataView(frame), sender);
@@ -58,7 +59,7 @@ export function decodeFrame(frame: ArrayBuffer, sender: Sender): Message {
   return decoders[name](new ByteBuffer(new Uint8Array(frame, frameHeaderBytes)));
 }
 
-// ---- what a field may hold
+// ---- Checks of fields.
 
 function finite(value: number, field: string, index = -1): number {
   if (!Number.isFinite(value)) throw new Malformed('is not finite', field, index);
@@ -121,13 +122,13 @@ function parameters(length: number,
   for (let p = 0; p < length; ++p) {
     get(p, value);
     const name = known(parameterNames, value.name(), field, index);
-    if (name in values) throw new Malformed(`${name} stands twice`, field, index);
+    if (name in values) throw new Malformed(`${name} occurs twice`, field, index);
     values[name] = finite(value.value(), field, index);
   }
   return values;
 }
 
-// ---- the messages
+// ---- Messages.
 
 function rotationCodes(m: wire.WorldInfo, jointCount: number): RotationCode[] {
   const length = count(m.rotationCodesLength(), 0, maxJoints, 'WorldInfo.rotationCodes');
@@ -150,7 +151,7 @@ function rotationCodes(m: wire.WorldInfo, jointCount: number): RotationCode[] {
 function fewerJoints(m: wire.WorldInfo, joints: readonly Joint[]): number[] {
   const length = count(m.fewerJointsLength(), 0, joints.length, 'WorldInfo.fewerJoints');
   if (length > 0 && m.rotationCodesLength() === 0) {
-    throw new Malformed('is without codes', 'WorldInfo.fewerJoints');
+    throw new Malformed('requires rotation codes', 'WorldInfo.fewerJoints');
   }
   const told = Array.from({length}, (_, i) => m.fewerJoints(i)!);
   checkFewerJoints(told, joints.map(({parent}) => parent));
@@ -256,18 +257,18 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const avatars = avatarList(m.avatarsArray(), 0, 'Observe.avatars');
     const inRegion = region(m.region());
     if (inRegion !== null && avatars.length > 0) {
-      throw new Malformed('a region has no list beside it', 'Observe.avatars');
+      throw new Malformed('must be empty beside a region', 'Observe.avatars');
     }
     if (inRegion === null && m.replace()) {
-      throw new Malformed("only a region takes another one's place", 'Observe.replace');
+      throw new Malformed('requires a region', 'Observe.replace');
     }
     const mode = known(observedModes, m.mode(), 'Observe.mode');
     const detail = known(poseDetails, m.detail(), 'Observe.detail');
     if (detail !== 'all' && mode !== 'quantised') {
-      throw new Malformed('only quantised poses have levels of detail', 'Observe.detail');
+      throw new Malformed('requires mode quantised', 'Observe.detail');
     }
     if (inRegion !== null && inRegion.ringDetails.length > 0 && mode !== 'quantised') {
-      throw new Malformed('only quantised poses have levels of detail', 'Region.ringDetails');
+      throw new Malformed('requires mode quantised', 'Region.ringDetails');
     }
     return {
       type: 'Observe',
@@ -358,12 +359,12 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
       skeleton!.joints(j, joint);
       const jointName = name(joint.name(asBytes), 'WorldInfo.joint.name', j);
       if (names.has(jointName)) {
-        throw new Malformed('name stands twice', 'WorldInfo.joint.name', j);
+        throw new Malformed('occurs twice', 'WorldInfo.joint.name', j);
       }
       names.add(jointName);
       const parent = joint.parent();
       if (j === 0 ? parent !== -1 : parent < 0 || parent >= j) {
-        throw new Malformed('does not come before its child', 'WorldInfo.joint.parent', j);
+        throw new Malformed('does not precede the joint', 'WorldInfo.joint.parent', j);
       }
       const offsetM = vector(joint.offsetM(), 'WorldInfo.joint.offsetM', j);
       joints.push({name: jointName, parent, offsetM});
@@ -375,7 +376,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     for (let e = 0; e < endSiteCount; ++e) {
       skeleton!.endSites(e, endSite);
       if (endSite.joint() >= jointCount) {
-        throw new Malformed('no such joint', 'WorldInfo.endSite.joint', e);
+        throw new Malformed('is not a joint', 'WorldInfo.endSite.joint', e);
       }
       endSites.push({
         joint: endSite.joint(),
@@ -410,7 +411,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     for (let i = 0; i < length; ++i) {
       m.items(i, item);
       if (item.index() >= maxItems) {
-        throw new Malformed('no command has so many items', 'Reply.item.index', i);
+        throw new Malformed('exceeds the number of items of a command', 'Reply.item.index', i);
       }
       items.push({
         index: item.index(),
@@ -435,10 +436,10 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const part = m.part();
     const parts = m.parts();
     if (parts < 1 || parts > maxBatchParts || part >= parts) {
-      throw new Malformed('is not 0 to parts - 1 of 1 to 1024', 'PoseBatch.part');
+      throw new Malformed('is not below parts, or parts is not 1 to 1024', 'PoseBatch.part');
     }
     const mode = known(poseModes, m.mode(), 'PoseBatch.mode');
-    if (mode === 'movement') throw new Malformed('no pose is sent in this mode', 'PoseBatch.mode');
+    if (mode === 'movement') throw new Malformed('is not a mode of poses', 'PoseBatch.mode');
     const jointCount = m.jointCount();
     if (jointCount < 1 || jointCount > maxJoints) {
       throw new Malformed('is not 1 to 256', 'PoseBatch.jointCount');
@@ -446,14 +447,14 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const avatars = avatarList(m.avatarsArray(), 0, 'PoseBatch.avatars');
     const flags = m.flagsArray() ?? new Uint8Array(0);
     if (flags.length !== avatars.length) {
-      throw new Malformed('is not one an avatar', 'PoseBatch.flags');
+      throw new Malformed('is not one per avatar', 'PoseBatch.flags');
     }
     const poses = m.posesArray() ?? new Uint8Array(0);
     const isCompact = mode !== 'full' && mode !== 'quantised';
     const compactBytes = isCompact ? compactPoseBytes(flags, poses.length, jointCount) : 0;
     if (isCompact ? compactBytes < 0
                   : poses.length !== avatars.length * poseBytes(mode, jointCount)) {
-      throw new Malformed('is not one an avatar', 'PoseBatch.poses');
+      throw new Malformed('is not one per avatar', 'PoseBatch.poses');
     }
     return {
       type: 'PoseBatch',
@@ -554,7 +555,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const queueSize = m.queueSize();
     const length = count(m.queueLength(), 0, maxInspectedRequests, 'AvatarState.queue');
     if (length > queueSize) {
-      throw new Malformed('has more requests than the queue is long', 'AvatarState.queue');
+      throw new Malformed('has more requests than queueSize', 'AvatarState.queue');
     }
     const queue: QueuedRequest[] = [];
     const item = new wire.RequestItem();
@@ -589,7 +590,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
         movement: current === null ? null : movement(current),
         queueSize,
         queue,
-        plantingOff: m.plantingOff(),
+        plantingEnabled: !m.plantingOff(),
         layers,
       },
     };
@@ -653,7 +654,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const m = wire.FetchLibrary.getRootAsFetchLibrary(bytes);
     const length = m.length();
     if (length < 1 || length > maxPieceBytes) {
-      throw new Malformed('is not 1 byte to 1 MiB', 'FetchLibrary.length');
+      throw new Malformed('is not 1 to 1048576', 'FetchLibrary.length');
     }
     return {
       type: 'FetchLibrary',
@@ -669,27 +670,27 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const part = m.part();
     const parts = m.parts();
     if (parts < 1 || parts > maxBatchParts || part >= parts) {
-      throw new Malformed('is not 0 to parts - 1 of 1 to 1024', 'Movements.part');
+      throw new Malformed('is not below parts, or parts is not 1 to 1024', 'Movements.part');
     }
     const avatars = avatarList(m.avatarsArray(), 0, 'Movements.avatars');
     const flags = m.flagsArray() ?? new Uint8Array(0);
     if (flags.length !== avatars.length) {
-      throw new Malformed('is not one an avatar', 'Movements.flags');
+      throw new Malformed('is not one per avatar', 'Movements.flags');
     }
     const ends = m.endsArray() ?? new Uint32Array(0);
     if (ends.length !== avatars.length) {
-      throw new Malformed('is not one an avatar', 'Movements.ends');
+      throw new Malformed('is not one per avatar', 'Movements.ends');
     }
     const records = m.recordsArray() ?? new Uint8Array(0);
     let before = 0;
     ends.forEach((end, i) => {
       if (end < before || end - before > maxRecordBytes) {
-        throw new Malformed('lies before its record or too far behind', 'Movements.ends', i);
+        throw new Malformed('is descending, or the record is too long', 'Movements.ends', i);
       }
       before = end;
     });
     if (before !== records.length) {
-      throw new Malformed('do not end where the last one does', 'Movements.records');
+      throw new Malformed('does not end with the last record', 'Movements.records');
     }
     return {
       type: 'Movements',
@@ -716,7 +717,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
     const totalBytes = below(m.totalBytes(), BigInt(maxLibraryBytes), 'LibraryPiece.totalBytes');
     const offset = below(m.offset(), BigInt(totalBytes), 'LibraryPiece.offset');
     if (piece.length > totalBytes - offset) {
-      throw new Malformed('lies outside of its library', 'LibraryPiece.bytes');
+      throw new Malformed('exceeds totalBytes', 'LibraryPiece.bytes');
     }
     return {
       type: 'LibraryPiece',
@@ -731,7 +732,7 @@ const decoders: {readonly [name in MessageName]: (bytes: ByteBuffer) => Message}
   },
 };
 
-/** What the generated readers give for a text asked for as bytes. */
+/** Type of a text that the generated readers return as bytes. */
 type WireText = string | Uint8Array | null;
 
 function text(bytes: WireText, maxBytes: number, field: string, index = -1): string {
@@ -746,7 +747,7 @@ function finiteOrNull(value: number | null, field: string, index: number): numbe
   return value === null ? null : finite(value, field, index);
 }
 
-/** Fields that a type does not have are ignored, whatever they hold. */
+/** Ignores fields that the type of the request does not use. */
 function request(item: wire.RequestItem, i: number): QueuedRequest {
   const type = known(movementTypes, item.type(), 'Request.type', i);
   const step = type === 'step';
@@ -754,12 +755,15 @@ function request(item: wire.RequestItem, i: number): QueuedRequest {
   const place = step || walk ? item.atM() : null;
   const moves = type !== 'stand' && place === null;
   if (walk && (place === null || item.headingRad() === null)) {
-    throw new Malformed('has no goal', 'Request.atM', i);
+    throw new Malformed('a walk requires atM and headingRad', 'Request.atM', i);
   }
-  const mustBeMet = step && item.mustBeMet();
-  if (mustBeMet && place === null) throw new Malformed('must be met and is not there', 'Request.atM', i);
+  const exactOnly = step && item.mustBeMet();
+  if (exactOnly && place === null) {
+    throw new Malformed('is missing, but mustBeMet is set', 'Request.atM', i);
+  }
   const waypointsM: Vec3[] = [];
-  const waypoints = walk ? count(item.waypointsMLength(), 0, maxWaypoints, 'Request.waypointsM') : 0;
+  const waypoints =
+      walk ? count(item.waypointsMLength(), 0, maxWaypoints, 'Request.waypointsM') : 0;
   for (let w = 0; w < waypoints; ++w) {
     waypointsM.push(vector(item.waypointsM(w), 'Request.waypointsM', i));
   }
@@ -777,8 +781,8 @@ function request(item: wire.RequestItem, i: number): QueuedRequest {
     seconds: type === 'stand' ? finite(item.seconds(), 'Request.seconds', i) : 0,
     waypointsM,
     speedMPerS: walk ? finiteOrNull(item.speedMS(), 'Request.speedMPerS', i) : null,
-    takeover: known(takeovers, item.takeover(), 'Request.takeover', i),
-    mustBeMet,
+    interrupt: known(interrupts, item.takeover(), 'Request.takeover', i),
+    exactOnly,
   };
 }
 
@@ -791,7 +795,7 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
   for (let k = 0; k < keytimesS.length; ++k) {
     const keytimeS = finite(keytimesS[k]!, `${field}.keytimesS`, k);
     if (k === 0 ? keytimeS !== 0 : keytimeS < keytimesS[k - 1]!) {
-      throw new Malformed('does not go from 0 upwards', `${field}.keytimesS`, k);
+      throw new Malformed('is not ascending from 0', `${field}.keytimesS`, k);
     }
   }
   const genericTime = m.genericTime();
@@ -802,13 +806,13 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
   const length = count(m.parameterNamesLength(), 0, maxParameters, `${field}.parameterNames`);
   for (let p = 0; p < length; ++p) {
     const name = known(parameterNames, m.parameterNames(p)!, `${field}.parameterNames`, p);
-    if (names.includes(name)) throw new Malformed('stands twice', `${field}.parameterNames`, p);
+    if (names.includes(name)) throw new Malformed('occurs twice', `${field}.parameterNames`, p);
     names.push(name);
   }
   const weights = numbers(m.weightsArray(), maxWeights, `${field}.weights`);
   const sites = numbers(m.sitesArray(), maxWeights * maxParameters, `${field}.sites`);
   if (sites.length !== 0 && sites.length !== weights.length * names.length) {
-    throw new Malformed('is not one row a weight', `${field}.sites`);
+    throw new Malformed('is not one row per weight', `${field}.sites`);
   }
   const landings: Landing[] = [];
   const landing = new wire.Landing();
@@ -829,7 +833,7 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
     endTimeS: finite(startTimeS + (keytimesS[keytimesS.length - 1] ?? 0), `${field}.keytimesS`),
     keytimesS,
     genericTime,
-    easeS: notNegative(m.easeOutS(), `${field}.easeOutS`),
+    easeOutS: notNegative(m.easeOutS(), `${field}.easeOutS`),
     requested: parameters(m.requestedLength(), (p, into) => m.requested(p, into),
                           `${field}.requested`, -1),
     applied: parameters(m.appliedLength(), (p, into) => m.applied(p, into), `${field}.applied`, -1),
@@ -837,7 +841,7 @@ function movement(m: wire.CurrentMovement): CurrentMovement {
     clamped: m.clamped(),
     weights,
     parameterNames: names,
-    sites,
+    exampleParameters: sites,
     landings,
   };
 }
@@ -851,7 +855,7 @@ function region(m: wire.Region | null): RegionEntry | null {
   if (m === null) return null;
   const centre = m.centreM();
   const radiusM = notNegative(m.radiusM(), 'Region.radiusM');
-  if (radiusM === 0) throw new Malformed('has nothing in it', 'Region.radiusM');
+  if (radiusM === 0) throw new Malformed('is not above 0', 'Region.radiusM');
   const leaveM = m.leaveM();
   const rings: RegionEntry['rings'] = [];
   const length = count(m.ringsLength(), 0, maxRateRings, 'Region.rings');
@@ -859,13 +863,15 @@ function region(m: wire.Region | null): RegionEntry | null {
   for (let i = 0; i < length; ++i) {
     const ring = m.rings(i)!;
     const toM = finite(ring.toM(), 'RateRing.toM', i);
-    if (!(toM > beforeM)) throw new Malformed('is not beyond the ring before it', 'RateRing.toM', i);
+    if (!(toM > beforeM)) {
+      throw new Malformed('is not above that of the previous ring', 'RateRing.toM', i);
+    }
     beforeM = toM;
     rings.push({toM, everyNTicks: everyNTicks(ring.everyNTicks(), 'RateRing.everyNTicks', i)});
   }
   const details = count(m.ringDetailsLength(), 0, maxRateRings, 'Region.ringDetails');
   if (details > 0 && details !== length) {
-    throw new Malformed('are not one for each ring', 'Region.ringDetails');
+    throw new Malformed('is not one per ring', 'Region.ringDetails');
   }
   const ringDetails = Array.from({length: details}, (_, i) =>
       known(poseDetails, m.ringDetails(i)!, 'Region.ringDetails', i));
@@ -886,7 +892,9 @@ function terrain(m: wire.Terrain | null): Terrain | null {
   if (from !== null) {
     const origin = from.originM();
     const cellM = from.cellM();
-    if (!(finite(cellM, 'Terrain.cellM') > 0)) throw new Malformed('is not above 0', 'Terrain.cellM');
+    if (!(finite(cellM, 'Terrain.cellM') > 0)) {
+      throw new Malformed('is not above 0', 'Terrain.cellM');
+    }
     const columns = from.columns();
     const rows = from.rows();
     for (const samples of [columns, rows]) {
@@ -897,7 +905,7 @@ function terrain(m: wire.Terrain | null): Terrain | null {
     const heightsM =
         numbers(from.heightsMArray(), maxTerrainColumns * maxTerrainColumns, 'Terrain.heightsM');
     if (heightsM.length !== columns * rows) {
-      throw new Malformed('is not one a sample', 'Terrain.heightsM');
+      throw new Malformed('is not one per sample', 'Terrain.heightsM');
     }
     const originM = [
       finite(origin?.x() ?? 0, 'Terrain.originM'), finite(origin?.z() ?? 0, 'Terrain.originM')
@@ -920,7 +928,7 @@ function terrain(m: wire.Terrain | null): Terrain | null {
   return {heightField, boxes};
 }
 
-/** A copy, for the frame it came in is not kept. */
+/** Returns a copy, because the frame is not kept. */
 function numbers(list: Float32Array | null, max: number, field: string): Float32Array {
   if (list === null) return new Float32Array(0);
   count(list.length, 0, max, field);
@@ -930,7 +938,7 @@ function numbers(list: Float32Array | null, max: number, field: string): Float32
 
 function leg(from: wire.Leg | null, jointCount: number): Leg {
   const joint = (index: number): number => {
-    if (index < -1 || index >= jointCount) throw new Malformed('no such joint', 'WorldInfo.leg');
+    if (index < -1 || index >= jointCount) throw new Malformed('is not a joint', 'WorldInfo.leg');
     return index;
   };
   return {

@@ -1,27 +1,27 @@
 import {Builder} from 'flatbuffers';
 import * as wire from '../../generated/wire';
-import {footChoices, movementTypes, poseDetails, poseModes, roles, takeovers} from './decode';
+import {footChoices, interrupts, movementTypes, poseDetails, poseModes, roles} from './decode';
 import {makeFrame, maxPayloadBytes} from './frame';
 import {maxBulkBytes, maxControlBytes} from './limits';
 import {Malformed} from './malformed';
 import type {Terrain} from '../types';
 import type {ClientMessage, RegionEntry} from './messages';
 
-/** Makes frames of checked messages; sender's limits are those of the server it talks to. */
+/** Encodes valid messages as frames. The constructor takes the size limits of the server. */
 export class Encoder {
   private readonly builder = new Builder(1024);
 
   constructor(private readonly controlBytes = maxControlBytes,
               private readonly bulkBytes = maxBulkBytes) {}
 
-  /** @throws Malformed: the message is larger than the server takes. */
+  /** @throws Malformed the message exceeds the limit of the server */
   encode(message: ClientMessage): ArrayBuffer {
     const b = this.builder;
     b.clear();
     b.finish(build(b, message));
     const bytes = b.asUint8Array();
     if (bytes.length > maxPayloadBytes(message.type, this.controlBytes, this.bulkBytes)) {
-      throw new Malformed(`${bytes.length} bytes are more than the server takes`, message.type);
+      throw new Malformed(`${bytes.length} bytes exceed the limit of the server`, message.type);
     }
     return makeFrame(message.type, bytes);
   }
@@ -41,7 +41,7 @@ function buildTerrain(b: Builder, terrain: Terrain): number {
     field = wire.HeightField.endHeightField(b);
   }
   wire.Terrain.startBoxesVector(b, terrain.boxes.length);
-  for (let i = terrain.boxes.length - 1; i >= 0; --i) {  // Written from the end.
+  for (let i = terrain.boxes.length - 1; i >= 0; --i) {  // Vectors are written from the end.
     const {minM, maxM, heightM} = terrain.boxes[i]!;
     wire.TerrainBox.createTerrainBox(b, ...minM, ...maxM, heightM);
   }
@@ -54,7 +54,7 @@ function buildTerrain(b: Builder, terrain: Terrain): number {
 
 function buildRegion(b: Builder, region: RegionEntry): number {
   wire.Region.startRingsVector(b, region.rings.length);
-  for (let i = region.rings.length - 1; i >= 0; --i) {  // Written from the end.
+  for (let i = region.rings.length - 1; i >= 0; --i) {  // Vectors are written from the end.
     wire.RateRing.createRateRing(b, region.rings[i]!.toM, region.rings[i]!.everyNTicks);
   }
   const rings = b.endVector();
@@ -111,7 +111,7 @@ function build(b: Builder, m: ClientMessage): number {
         wire.RequestItem.addFoot(b, footChoices.indexOf(item.foot));
         wire.RequestItem.addLengthM(b, item.lengthM);
         if (item.sideM !== null) {
-          b.forceDefaults(true);  // 0 is not the same as absent.
+          b.forceDefaults(true);  // A side of 0 differs from an absent one.
           wire.RequestItem.addSideM(b, item.sideM);
           b.forceDefaults(false);
         }
@@ -133,8 +133,8 @@ function build(b: Builder, m: ClientMessage): number {
           wire.RequestItem.addSpeedMS(b, item.speedMPerS);
           b.forceDefaults(false);
         }
-        wire.RequestItem.addTakeover(b, takeovers.indexOf(item.takeover));
-        wire.RequestItem.addMustBeMet(b, item.mustBeMet);
+        wire.RequestItem.addTakeover(b, interrupts.indexOf(item.interrupt));
+        wire.RequestItem.addMustBeMet(b, item.exactOnly);
         return wire.RequestItem.endRequestItem(b);
       });
       return wire.Request.createRequest(b, m.seq, m.world,

@@ -53,7 +53,7 @@ function maySend(sender: Sender, name: MessageName): boolean {
   return name === 'Goodbye' || (sender === 'client') === (MessageType[name] < MessageType.Goodbye);
 }
 
-/** Most bytes of a payload, with what the server says it takes. */
+/** Returns the size limit of a payload. `controlBytes` and `bulkBytes` are the server's limits. */
 export function maxPayloadBytes(name: MessageName, controlBytes = maxControlBytes,
                                 bulkBytes = maxBulkBytes): number {
   if (isBulk(name)) return Math.min(bulkBytes, maxBulkBytes);
@@ -62,8 +62,9 @@ export function maxPayloadBytes(name: MessageName, controlBytes = maxControlByte
 }
 
 /**
- * Looks at the header of one whole frame, in the order of the standard.
- * @throws Malformed
+ * Checks the header of a complete frame, in the order of the standard, and returns its message
+ * type.
+ * @throws Malformed the header is invalid
  */
 export function readFrameHeader(view: DataView, sender: Sender): MessageName {
   if (view.byteLength < frameHeaderBytes) {
@@ -77,22 +78,22 @@ export function readFrameHeader(view: DataView, sender: Sender): MessageName {
   const type = view.getUint16(6, true);
   const name = names.get(type);
   if (name === undefined) throw new Malformed(`message type ${type} is unknown`, 'frame');
-  if (!maySend(sender, name)) throw new Malformed(`${name} goes the other way`, 'frame');
+  if (!maySend(sender, name)) throw new Malformed(`${name} may not be sent by this side`, 'frame');
   if (view.getUint32(12, true) !== 0) throw new Malformed('flags are not zero', 'frame');
   const bytes = view.getUint32(8, true);
   if (bytes > maxPayloadBytes(name)) {
-    throw new Malformed(`a payload of ${bytes} bytes is longer than ${name} may be`, 'frame');
+    throw new Malformed(`a payload of ${bytes} bytes is longer than the limit of ${name}`, 'frame');
   }
   if (bytes === 0 || bytes % 8 !== 0) {
-    throw new Malformed('payload length is not a multiple of 8 above 0', 'frame');
+    throw new Malformed('payload length is not a positive multiple of 8', 'frame');
   }
   if (view.byteLength !== frameHeaderBytes + bytes) {
-    throw new Malformed('is not as long as its header says', 'frame');
+    throw new Malformed('length differs from its header', 'frame');
   }
   return name;
 }
 
-/** A frame around a finished FlatBuffers message. */
+/** Returns a frame that contains a copy of a finished FlatBuffers message. */
 export function makeFrame(name: MessageName, message: Uint8Array): ArrayBuffer {
   const bytes = Math.ceil(message.byteLength / 8) * 8;
   const frame = new ArrayBuffer(frameHeaderBytes + bytes);

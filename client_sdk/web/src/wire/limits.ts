@@ -1,4 +1,4 @@
-/** Limits and numbers of protocol/STANDARD.md. */
+/** Constants of protocol/STANDARD.md. */
 export const frameHeaderBytes = 16;
 export const protocolVersion = 1;
 
@@ -48,6 +48,6 @@ export const maxBatchParts = 1024;
 export const maxReplyMemory = 1024;
 export const maxAvatarNumber = 0xffff_ffff;
 export const maxDepth = 4;
-/** Tables of a payload: of the types capped at 1 MiB or less, and of the others. */
+/** Limits of FlatBuffers tables per payload: for message types of at most 1 MiB, and for others. */
 export const maxFewTables = 1024;
 export const maxCrowdTables = maxItems + 1024;

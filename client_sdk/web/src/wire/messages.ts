@@ -1,4 +1,6 @@
-/** Messages as plain objects, checked. 64-bit numbers are bigint where all their bits matter. */
+/**
+ * Validated messages as plain objects. 64-bit integers are `bigint` if they may exceed 2^53.
+ */
 import type {
   AvatarState, EndSite, Leg, PoseDetail, PoseMode, QueuedRequest, Role, Terrain, Vec3, WorldEvent
 } from '../types';
@@ -73,7 +75,7 @@ export interface RegionEntry {
   radiusM: number;
   leaveM: number | null;
   rings: {toM: number; everyNTicks: number}[];
-  /** One a ring, or none: the Observe's everywhere. */
+  /** One per ring. Empty: the detail of the Observe message everywhere. */
   ringDetails: PoseDetail[];
 }
 export interface StopObserving {
@@ -138,12 +140,12 @@ export interface WorldInfo {
   leftLeg: Leg;
   rightLeg: Leg;
   layers: string[];
-  /** How compact poses are told: one a joint, or none. */
+  /** How rotations in compact poses are encoded: one per joint. Empty: no compact poses. */
   rotationCodes: RotationCode[];
-  /** Joints that the detail 'fewer' tells, growing; none: there is no such detail. */
+  /** Joints in poses of detail `reduced`, ascending. Empty: the server has no such detail. */
   fewerJoints: number[];
 }
-/** STANDARD.md, "Poses". */
+/** How a joint's rotation is encoded, see protocol/STANDARD.md, "Poses". */
 export interface RotationCode {
   /** x, y, z, w. */
   reference: readonly [number, number, number, number];
@@ -153,9 +155,10 @@ export interface RotationCode {
   freeBits: number;
   leastW: number;
 }
-/** In which mode poses come: who asked for quantised ones gets compact ones from servers that have them. */
+/** Encoding of a batch. Servers send compact batches to clients that requested `quantised`, if they
+ * can. */
 export type BatchMode = PoseMode | CompactMode;
-/** Of all joints, and those of the details 'fewer' and 'root'. */
+/** Compact encodings for the details `all`, `reduced` and `root`. */
 export type CompactMode = 'compact' | 'compactFewer' | 'compactRoot';
 export interface ReplyEntry {
   index: number;
@@ -172,7 +175,7 @@ export interface ReplyMessage {
   accepted: number;
   items: ReplyEntry[];
 }
-/** Arrays are views of the frame. Poses are not looked at yet: PoseReader does. */
+/** Arrays are views of the frame. `poses` is not validated yet; PoseReader does that. */
 export interface PoseBatch {
   type: 'PoseBatch';
   world: number;
@@ -186,9 +189,9 @@ export interface PoseBatch {
   avatars: Uint32Array;
   flags: Uint8Array;
   poses: Uint8Array;
-  /** Who is not in it may be there all the same. */
+  /** True for regions: an avatar that is missing in the batch may still exist. */
   partial: boolean;
-  /** That of the world, for compact poses; null as decoded, since the batch does not know. */
+  /** Decoder for compact poses. decodeFrame sets it to null; the session sets that of the world. */
   codec: CompactCodec | null;
 }
 export interface Events {
@@ -261,7 +264,7 @@ export interface WorldTerrain {
   terrain: Terrain | null;
 }
 
-/** A question for a piece of a library's file. */
+/** Requests a piece of a motion library file. */
 export interface FetchLibrary {
   type: 'FetchLibrary';
   nonce: bigint;
@@ -279,7 +282,7 @@ export interface LibraryPiece {
   offset: number;
   bytes: Uint8Array;
 }
-/** What avatars begin, for who evaluates their poses, which this library does not. */
+/** Movements of avatars, for clients that evaluate poses themselves. This package does not. */
 export interface Movements {
   type: 'Movements';
   world: number;

@@ -10,10 +10,13 @@ const maxRootSteps = 131_071 * 16384;
 const leastSquared = (1 - 1e-3) ** 2;
 const mostSquared = (1 + 1e-3) ** 2;
 
-/** Flag of an avatar in a compact batch: its pose is quantised. */
+/** Flag of an avatar in a compact batch: its pose is encoded as in mode `quantised`. */
 const wide = 4;
 
-/** Bytes of each pose of a compact batch that is not wide, 0 without any; -1: `length` is not that of so many. */
+/**
+ * Returns the size of each compact pose in a batch of `length` bytes. Poses with the flag `wide`
+ * are larger and do not count. Returns 0 if all poses are wide, and -1 if `length` does not fit.
+ */
 export function compactPoseBytes(flags: Uint8Array, length: number, jointCount: number): number {
   let wides = 0;
   for (let i = 0; i < flags.length; ++i) wides += (flags[i]! & wide) >> 2;
@@ -23,28 +26,28 @@ export function compactPoseBytes(flags: Uint8Array, length: number, jointCount: 
   return rest >= 0 && rest % compact === 0 ? rest / compact : -1;
 }
 
-/** Bytes of one pose. */
+/** Returns the size of a pose in bytes. */
 export function poseBytes(mode: PoseMode, jointCount: number): number {
   return 12 + (mode === 'full' ? 16 : 6) * jointCount;
 }
 
-/** What a reader needs of a batch. */
+/** The fields of a batch that PoseReader needs. */
 interface Poses {
   readonly mode: BatchMode;
   readonly jointCount: number;
   readonly flags: Uint8Array;
-  /** Begins on a multiple of 4 of its buffer, as a verified message's do. */
+  /** Must start at a multiple of 4 within its buffer. Verified messages guarantee this. */
   readonly poses: Uint8Array;
   readonly codec: CompactCodec | null;
 }
 
-/** Reads the poses of one batch. Its memory is one view a batch, none a pose. */
+/** Decodes the poses of a batch. Does not allocate per pose. */
 export class PoseReader {
   private readonly jointCount: number;
   private full: Float32Array | null = null;
   private words: Uint16Array | null = null;
   private readonly compactBytes: number;
-  /** A compact batch's pose where reading goes on, and where it is. */
+  /** Compact batches: index of the next pose, and where it starts in `words`. */
   private next = 0;
   private nextAt = 0;
 
@@ -61,9 +64,9 @@ export class PoseReader {
   }
 
   /**
-   * Pose number `index`: the root to `rootM[rootAt ...]`, x, y, z, w of each joint to
-   * `rotations[rotationsAt ...]`. False: it is none; what was written then has no meaning.
-   * Those of a compact batch are quickest in growing order.
+   * Decodes pose `index`. Writes the root's position at `rootM[rootAt]` and the x, y, z, w of all
+   * joints at `rotations[rotationsAt]`. Returns false if the pose is invalid; the output is then
+   * invalid as well. Compact batches are fastest in ascending order.
    */
   read(index: number, rootM: Float32Array, rootAt: number, rotations: Float32Array,
        rotationsAt: number): boolean {
@@ -91,7 +94,7 @@ export class PoseReader {
     if ((flags[index]! & wide) !== 0) {
       return this.readQuantised(this.nextAt, rootM, rootAt, rotations, rotationsAt);
     }
-    // Without its codes, or with others than were told, a pose means nothing.
+    // A compact pose can only be decoded with the codec that it was encoded with.
     if (codec === null || codec.jointCount !== this.jointCount ||
         codec.poseBytes !== this.compactBytes) {
       return false;
@@ -118,7 +121,7 @@ export class PoseReader {
       const c = from[at + 2]!;
       const d = from[at + 3]!;
       const squared = a * a + b * b + c * c + d * d;
-      good = good && squared >= leastSquared && squared <= mostSquared;  // Not for NaN, too.
+      good = good && squared >= leastSquared && squared <= mostSquared;  // False for NaN.
       const to = rotationsAt + i;
       rotations[to] = a;
       rotations[to + 1] = b;
@@ -146,7 +149,7 @@ export class PoseReader {
       const b = ((v & 0x7fff) - zero) * componentScale;
       const c = (w - zero) * componentScale;
       const squared = a * a + b * b + c * c;
-      // Zero and the high bit of the last are not written by an encoder.
+      // No encoder writes a component of zero or the high bit of the last word.
       if ((u & 0x7fff) === 0 || (v & 0x7fff) === 0 || w === 0 || w > 0x7fff ||
           squared > maxThreeSquared) {
         return false;

@@ -4,8 +4,10 @@ const decoder = new TextDecoder('utf-8', {fatal: true, ignoreBOM: true});
 const encoder = new TextEncoder();
 const controls = /[\u0000-\u001f\u007f-\u009f]/;
 
-/** Text of at most `maxBytes` bytes, UTF-8 without control characters.
- * @throws Malformed */
+/**
+ * Decodes a text of at most `maxBytes` bytes.
+ * @throws Malformed the text is too long, is not UTF-8, or has control characters
+ */
 export function readText(bytes: Uint8Array | null, maxBytes: number, field: string,
                          index = -1): string {
   if (bytes === null || bytes.length === 0) return '';
@@ -20,7 +22,7 @@ export function readText(bytes: Uint8Array | null, maxBytes: number, field: stri
   return text;
 }
 
-/** As readText, and not empty. */
+/** Same as readText, but rejects an empty text. */
 export function readName(bytes: Uint8Array | null, maxBytes: number, field: string,
                          index = -1): string {
   const name = readText(bytes, maxBytes, field, index);
@@ -28,16 +30,22 @@ export function readName(bytes: Uint8Array | null, maxBytes: number, field: stri
   return name;
 }
 
-/** Whether such a text may be sent. Lone surrogates would not come back as they were. */
+/**
+ * Checks a text before it is sent.
+ * @throws Malformed the text is too long, or has control characters or lone surrogates
+ */
 export function checkText(text: unknown, maxBytes: number, field: string): void {
-  if (typeof text !== 'string') throw new Malformed('is not a text', field);
+  if (typeof text !== 'string') throw new Malformed('expected a string', field);
   const bytes = encoder.encode(text);
-  if (bytes.length > maxBytes) throw new Malformed(`is longer than ${maxBytes} bytes`, field);
+  if (bytes.length > maxBytes) {
+    throw new Malformed(`expected at most ${maxBytes} bytes, got ${bytes.length}`, field);
+  }
   if (controls.test(text) || decoder.decode(bytes) !== text) {
-    throw new Malformed('is not Unicode without control characters', field);
+    throw new Malformed('contains control characters or lone surrogates', field);
   }
 }
 
+/** Same as checkText, but rejects an empty text. */
 export function checkName(name: unknown, maxBytes: number, field: string): void {
   checkText(name, maxBytes, field);
   if (name === '') throw new Malformed('is empty', field);

@@ -2,12 +2,13 @@ import {tableLayouts} from '../../generated/layout';
 import {maxDepth} from './limits';
 
 /**
- * Whether everything a reader of this table can reach lies inside the payload, aligned, with strings
- * ended by a zero, not nested deeper than the standard says, and with at most `maxTables` tables.
- * npm's flatbuffers reads without such checks, and neither can it tell afterwards.
+ * Returns true if a FlatBuffers message can be read safely. All data reachable from the root must
+ * be aligned and inside the payload. Strings must end with a zero byte. Nesting and the number of
+ * tables are limited. The npm package `flatbuffers` has no such check.
  *
- * @param payload begins on a multiple of 8 of its message
+ * @param payload starts at a multiple of 8 within its frame
  * @param table number of the root's table in `tableNumbers`
+ * @param maxTables limit of tables in the message
  */
 export function verify(payload: DataView, table: number, maxTables: number): boolean {
   return new Verifier(payload, maxTables).root(table);
@@ -30,7 +31,7 @@ class Verifier {
     return at % align === 0 && at >= 0 && bytes <= this.size && at <= this.size - bytes;
   }
 
-  /** Where the offset at `at` leads; 0: nowhere good. */
+  /** Returns the target of the offset at `at`; 0 if it is invalid. */
   private follow(at: number): number {
     if (!this.inside(at, 4, 4)) return 0;
     const offset = this.view.getUint32(at, true);
@@ -38,11 +39,11 @@ class Verifier {
     return offset > 0 && target < this.size ? target : 0;
   }
 
-  /** Number of entries of the vector there, whose bytes are inside; -1: they are not. */
+  /** Returns the number of entries of the vector at `at`; -1 if it is outside or misaligned. */
   private vector(at: number, size: number, align: number): number {
     if (!this.inside(at, 4, 4)) return -1;
     const count = this.view.getUint32(at, true);
-    const bytes = count * size;  // Below 2^53: both are below 2^32.
+    const bytes = count * size;  // Exact: count is below 2^32 and size is small.
     return this.inside(at + 4, bytes, 1) && (at + 4) % align === 0 ? count : -1;
   }
 
@@ -58,7 +59,7 @@ class Verifier {
     const vtable = at - this.view.getInt32(at, true);
     if (!this.inside(vtable, 4, 2)) return false;
     const vtableBytes = this.view.getUint16(vtable, true);
-    // Readers take sizes and offsets for signed, so the upper half of them would lead astray.
+    // The reader treats sizes and offsets as signed, so values above 0x7fff would be misread.
     if (vtableBytes < 4 || vtableBytes % 2 !== 0 || vtableBytes > 0x7fff ||
         !this.inside(vtable, vtableBytes, 2)) {
       return false;

@@ -1,13 +1,15 @@
-/** Written in by scripts/test.mjs. */
+/** Defined by scripts/test.mjs when it bundles a test. */
 declare const STRIDEWIRE_ROOT: string;
 
-/** The project's folder, ended by a slash. */
+/** Path of the repository, with a slash at the end. */
 export const root = STRIDEWIRE_ROOT;
 
-/** A whole number from the environment. */
+/** Returns an environment variable as a non-negative integer, or `otherwise` if it is not set. */
 export function numberFrom(name: string, otherwise: number): number {
   const value = process.env[name];
   if (value === undefined || value === '') return otherwise;
-  if (!/^\d+$/.test(value)) throw new Error(`${name} is no number: ${value}`);
+  if (!/^\d+$/.test(value)) {
+    throw new Error(`${name}: expected a non-negative integer, got ${value}`);
+  }
   return Number(value);
 }

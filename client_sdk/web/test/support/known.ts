@@ -3,31 +3,35 @@ import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
 import {vectorCodec} from './vectors';
 
-const texts = new Set([
+/** Values of all enumerators and message types. */
+const enumerators = new Set([
   'Hello', 'JoinWorld', 'LeaveWorld', 'Spawn', 'Remove', 'Request', 'CancelQueue', 'Observe',
-  'StopObserving', 'Ping', 'InspectAvatar', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch',
-  'compact', 'compactFewer', 'compactRoot', 'all', 'fewer', 'root', 'Events', 'Lagging', 'Error', 'Pong', 'AvatarState', 'SetTerrain', 'WorldTerrain', 'SetLayers', 'SetPlanting', 'FetchLibrary', 'Movements', 'LibraryPiece', 'controller', 'observer', 'full',
-  'quantised', 'movement', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto', 'left', 'right', 'stepLeft',
-  'stepRight', 'accepted', 'started', 'footStrike', 'finished', 'idle', 'rejected', 'spawned',
-  'removed', 'entered', 'startX', 'startY', 'startZ', 'endX', 'endY', 'endZ', 'turn', 'length', 'height',
+  'StopObserving', 'Ping', 'InspectAvatar', 'SetTerrain', 'SetLayers', 'SetPlanting',
+  'FetchLibrary', 'Goodbye', 'Welcome', 'WorldInfo', 'Reply', 'PoseBatch', 'Events', 'Lagging',
+  'Error', 'Pong', 'AvatarState', 'WorldTerrain', 'Movements', 'LibraryPiece', 'controller',
+  'observer', 'full', 'quantised', 'movement', 'compact', 'compactFewer', 'compactRoot', 'all',
+  'reduced', 'root', 'step', 'jump', 'stand', 'walk', 'none', 'afterMovement', 'now', 'auto',
+  'left', 'right', 'stepLeft', 'stepRight', 'accepted', 'started', 'footStrike', 'finished',
+  'idle', 'rejected', 'spawned', 'removed', 'entered', 'startX', 'startY', 'startZ', 'endX',
+  'endY', 'endZ', 'turn', 'length', 'height',
 ]);
-/** Fields whose texts are free; all others are enumerators. */
-const free = new Set([
+/** Text fields that are not enumerators. */
+const freeTexts = new Set([
   'text', 'reason', 'name', 'clientName', 'authToken', 'serverName', 'serverVersion', 'libraryHash',
   'layer', 'layers', 'hash'
 ]);
 
-/** Every number finite, every enumerator one that is known, every text clean and short. */
-export function onlyKnown(value: unknown, field = ''): void {
+/** Asserts that numbers are finite, enumerators are known, and texts are short and printable. */
+export function assertValid(value: unknown, field = ''): void {
   switch (typeof value) {
     case 'number': assert.ok(Number.isFinite(value), `${field}: ${value}`); break;
     case 'bigint': assert.ok(value >= 0n && value < 2n ** 64n, `${field}: ${value}`); break;
     case 'string':
-      if (free.has(field)) {
+      if (freeTexts.has(field)) {
         assert.ok(Buffer.byteLength(value) <= 4096, `${field}: ${value.length} characters`);
         assert.ok(!/[\u0000-\u001f\u007f-\u009f]/.test(value), field);
       } else {
-        assert.ok(texts.has(value), `${field}: ${value}`);
+        assert.ok(enumerators.has(value), `${field}: ${value}`);
       }
       break;
     case 'object':
@@ -39,17 +43,18 @@ export function onlyKnown(value: unknown, field = ''): void {
         break;
       }
       for (const [name, entry] of Object.entries(value)) {
-        onlyKnown(entry, Array.isArray(value) ? field : name);
+        assertValid(entry, Array.isArray(value) ? field : name);
       }
       break;
     default: assert.equal(typeof value, 'boolean', field);
   }
 }
 
-/** As onlyKnown, with the poses of a batch: refused ones are counted, others are finite and unit. */
-export function checkMessage(message: Message): 'known' | 'refused pose' {
-  onlyKnown(message);
-  if (message.type !== 'PoseBatch') return 'known';
+/** Asserts that a message is valid. Poses of a batch must be finite with unit rotations, unless the
+ * reader rejects them. */
+export function checkMessage(message: Message): 'valid' | 'invalid pose' {
+  assertValid(message);
+  if (message.type !== 'PoseBatch') return 'valid';
   message.codec = vectorCodec(message.mode);
   const reader = new PoseReader(message);
   const rootM = new Float32Array(3);
@@ -57,13 +62,13 @@ export function checkMessage(message: Message): 'known' | 'refused pose' {
   for (let i = 0; i < message.avatars.length; ++i) {
     rootM.fill(NaN);
     rotations.fill(NaN);
-    if (!reader.read(i, rootM, 0, rotations, 0)) return 'refused pose';
+    if (!reader.read(i, rootM, 0, rotations, 0)) return 'invalid pose';
     for (const x of rootM) assert.ok(Number.isFinite(x), `root ${x}`);
     for (let j = 0; j < rotations.length; j += 4) {
       const length = Math.hypot(rotations[j]!, rotations[j + 1]!, rotations[j + 2]!,
                                 rotations[j + 3]!);
-      assert.ok(Math.abs(length - 1) <= 1.001e-3, `length ${length} of a rotation`);
+      assert.ok(Math.abs(length - 1) <= 1.001e-3, `a rotation has length ${length}`);
     }
   }
-  return 'known';
+  return 'valid';
 }

@@ -1,6 +1,6 @@
 import {numberFrom} from './environment';
 
-/** Repeatable numbers; the seed is printed, and may be given as STRIDEWIRE_SEED. */
+/** Reproducible random numbers. Prints its seed, which STRIDEWIRE_SEED overrides. */
 export class Random {
   private state: number;
   readonly seed: number;
@@ -11,7 +11,7 @@ export class Random {
     console.log(`${what}: STRIDEWIRE_SEED=${this.seed}`);
   }
 
-  /** [0, 1) */
+  /** Returns a number in [0, 1). */
   uniform(): number {
     this.state = (this.state + 0x9e3779b9) >>> 0;
     let z = this.state;
@@ -20,7 +20,7 @@ export class Random {
     return ((z ^ (z >>> 15)) >>> 0) / 0x1_0000_0000;
   }
 
-  /** 0 to below `end`, whole. */
+  /** Returns an integer in [0, end). */
   below(end: number): number {
     return Math.floor(this.uniform() * end);
   }

@@ -4,7 +4,7 @@ import {eventTypes} from '../../src/wire/decode';
 import {makeFrame} from '../../src/wire/frame';
 import type {WorldEventType} from '../../src/types';
 
-/** Frames as a server sends them. */
+/** Functions that return the frames of a server. */
 
 function builder(): Builder {
   return new Builder(1024);
@@ -93,7 +93,7 @@ export interface PoseFields {
   avatar: number;
   x: number;
   flags?: number;
-  /** About +Y; of every joint. */
+  /** Rotation of every joint about +Y. */
   angleRad?: number;
 }
 
@@ -105,13 +105,13 @@ export interface BatchFields {
   tick: number;
   timeS?: number;
   joints?: number;
-  /** Of a region. */
+  /** Set for batches of a region. */
   partial?: boolean;
-  /** Not in mode full. */
+  /** Mode `quantised` instead of `full`. */
   quantised?: boolean;
 }
 
-/** In mode full, or of quantised poses, which do not turn. */
+/** Returns a batch in mode `full` or `quantised`. The latter ignores `angleRad`. */
 export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer {
   const joints = fields.joints ?? 2;
   const b = builder();
@@ -125,7 +125,8 @@ export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer
     }
   });
   const bytes = wire.PoseBatch.createPosesVector(
-      b, fields.quantised === true ? quantisedPoses(poses, joints) : new Uint8Array(numbers.buffer));
+      b, fields.quantised === true ? quantisedPoses(poses, joints)
+                                   : new Uint8Array(numbers.buffer));
   const flags = wire.PoseBatch.createFlagsVector(b, poses.map((pose) => pose.flags ?? 0));
   const avatars = wire.PoseBatch.createAvatarsVector(b, poses.map((pose) => pose.avatar));
   wire.PoseBatch.startPoseBatch(b);
@@ -135,7 +136,8 @@ export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer
   wire.PoseBatch.addParts(b, fields.parts ?? 1);
   wire.PoseBatch.addTick(b, BigInt(fields.tick));
   wire.PoseBatch.addServerTimeS(b, fields.timeS ?? fields.tick / 60);
-  wire.PoseBatch.addMode(b, fields.quantised === true ? wire.PoseMode.Quantised : wire.PoseMode.Full);
+  wire.PoseBatch.addMode(
+      b, fields.quantised === true ? wire.PoseMode.Quantised : wire.PoseMode.Full);
   wire.PoseBatch.addJointCount(b, joints);
   wire.PoseBatch.addAvatars(b, avatars);
   wire.PoseBatch.addFlags(b, flags);
@@ -144,7 +146,7 @@ export function poseBatch(fields: BatchFields, poses: PoseFields[]): ArrayBuffer
   return finish(b, 'PoseBatch', wire.PoseBatch.endPoseBatch(b));
 }
 
-/** The root at x, 1, 0; no joint turns. */
+/** Encodes poses with the root at (x, 1, 0) and without rotations. */
 function quantisedPoses(poses: PoseFields[], joints: number): Uint8Array {
   const poseBytes = 12 + 6 * joints;
   const view = new DataView(new ArrayBuffer(poses.length * poseBytes));
@@ -152,7 +154,7 @@ function quantisedPoses(poses: PoseFields[], joints: number): Uint8Array {
     const at = i * poseBytes;
     view.setInt32(at, Math.round(pose.x * 2 ** 14), true);
     view.setInt32(at + 4, 2 ** 14, true);
-    // Of a quaternion 0, 0, 0, 1 the last number is left out: its index is in the top bits.
+    // The identity leaves out its last component, whose index 3 is in the top bits.
     for (let j = 0; j < joints; ++j) {
       [0xc000, 0xc000, 0x4000].forEach(
           (bits, k) => view.setUint16(at + 12 + 6 * j + 2 * k, bits, true));
@@ -185,7 +187,7 @@ export function events(number: bigint, list: EventFields[], world = 3): ArrayBuf
   return finish(b, 'Events', wire.Events.createEvents(b, world, number, 1n, vector));
 }
 
-/** Boxes of one square metre along x, of these heights; null: flat. */
+/** Returns terrain of boxes of 1 m x 1 m along x with these heights; null: flat. */
 export function worldTerrain(heights: number[] | null, world = 3): ArrayBuffer {
   const b = builder();
   let terrain = 0;

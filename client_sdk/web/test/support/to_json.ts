@@ -1,5 +1,6 @@
 import {
-  eventTypes, footChoices, movementKinds, movementTypes, takeovers, parameterNames, poseDetails, poseModes, roles
+  eventTypes, footChoices, interrupts, movementKinds, movementTypes, parameterNames, poseDetails,
+  poseModes, roles
 } from '../../src/wire/decode';
 import type {Message} from '../../src/wire/messages';
 import {PoseReader} from '../../src/wire/pose_codec';
@@ -23,13 +24,13 @@ function parameters(set: Parameters): Json {
 function request(item: QueuedRequest): Json {
   const type = movementTypes.indexOf(item.type);
   const common = {avatar: item.avatar, request_id: u64(item.requestId), type,
-    takeover: takeovers.indexOf(item.takeover)};
+    takeover: interrupts.indexOf(item.interrupt)};
   switch (item.type) {
     case 'step':
       if (item.atM !== null) {
         return {
           ...common, foot: footChoices.indexOf(item.foot), at_m: vec3(item.atM),
-          heading_rad: item.headingRad, must_be_met: item.mustBeMet,
+          heading_rad: item.headingRad, must_be_met: item.exactOnly,
         };
       }
       return {
@@ -74,16 +75,16 @@ function movement(m: CurrentMovement): Json {
   return {
     request_id: u64(m.requestId), kind: movementKinds.indexOf(m.kind), group: m.group,
     started_s: m.startTimeS, keytimes_s: [...m.keytimesS], generic_time: m.genericTime,
-    ease_out_s: m.easeS, requested: parameters(m.requested), applied: parameters(m.applied),
+    ease_out_s: m.easeOutS, requested: parameters(m.requested), applied: parameters(m.applied),
     extrapolated: m.extrapolated, clamped: m.clamped, weights: [...m.weights],
     parameter_names: m.parameterNames.map((name) => parameterNames.indexOf(name)),
-    sites: [...m.sites],
+    sites: [...m.exampleParameters],
     landings: m.landings.map((l) => ({
       foot: l.foot === 'right' ? 1 : 0, position_m: vec3(l.positionM), heading_rad: l.headingRad})),
   };
 }
 
-/** A message with the schema's names, as protocol/vectors has it. */
+/** Converts a message to the JSON of protocol/vectors, which uses the names of the schema. */
 export function toJson(m: Message): {[name: string]: Json} {
   switch (m.type) {
     case 'Hello':
@@ -130,8 +131,8 @@ export function toJson(m: Message): {[name: string]: Json} {
       return {nonce: u64(m.nonce), hash: m.hash, offset: u64(m.offset), length: m.length};
     case 'LibraryPiece':
       return {
-        nonce: u64(m.nonce), code: m.code, text: m.text, hash: m.hash, total_bytes: u64(m.totalBytes),
-        offset: u64(m.offset), bytes: token(m.bytes),
+        nonce: u64(m.nonce), code: m.code, text: m.text, hash: m.hash,
+        total_bytes: u64(m.totalBytes), offset: u64(m.offset), bytes: token(m.bytes),
       };
     case 'Movements':
       return {
@@ -191,7 +192,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         poses: [...m.avatars].map((avatar, i) => {
           const rootM = new Float32Array(3);
           const rotations = new Float32Array(4 * m.jointCount);
-          if (!reader.read(i, rootM, 0, rotations, 0)) throw new Error(`pose ${i} is none`);
+          if (!reader.read(i, rootM, 0, rotations, 0)) throw new Error(`pose ${i} is invalid`);
           return {
             avatar, flags: m.flags[i], root_position_m: [...rootM],
             rotations: Array.from({length: m.jointCount}, (_, j) =>
@@ -207,7 +208,8 @@ export function toJson(m: Message): {[name: string]: Json} {
           type: eventTypes.indexOf(e.type), avatar: e.avatar, request_id: u64(e.requestId),
           kind: movementKinds.indexOf(e.kind), group: e.group, tick: u64(e.tick),
           time_s: e.timeS, requested: parameters(e.requested), applied: parameters(e.applied),
-          extrapolated: e.extrapolated, clamped: e.clamped, cut_short: e.cutShort, foot: e.foot === 'right' ? 1 : 0,
+          extrapolated: e.extrapolated, clamped: e.clamped, cut_short: e.cutShort,
+          foot: e.foot === 'right' ? 1 : 0,
           position_m: vec3(e.positionM), base_position_m: vec3(e.basePositionM),
           base_heading_rad: e.baseHeadingRad, code: e.code, reason: e.reason,
         })),
@@ -243,7 +245,7 @@ export function toJson(m: Message): {[name: string]: Json} {
         base_position_m: vec3(state.basePositionM), base_heading_rad: state.baseHeadingRad,
         movement: state.movement === null ? null : movement(state.movement),
         queue_size: state.queueSize, queue: state.queue.map(request),
-        planting_off: state.plantingOff,
+        planting_off: !state.plantingEnabled,
         layers: state.layers.map((l) => ({
           layer: l.layer, weight: l.weight, time_s: l.timeS, speed: l.speed, ending: l.ending})),
       };

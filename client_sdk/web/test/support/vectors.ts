@@ -12,7 +12,7 @@ export interface Vector {
   fields: {[name: string]: unknown};
 }
 
-/** Every frame of protocol/vectors with what it says. */
+/** Returns all frames of protocol/vectors with their expected contents. */
 export function readVectors(): Vector[] {
   const folder = `${root}protocol/vectors`;
   return readdirSync(folder).filter((file) => file.endsWith('.bin')).sort().map((file) => {
@@ -30,14 +30,15 @@ export function readVectors(): Vector[] {
 
 const codecs = new Map<BatchMode, CompactCodec>();
 
-/** Of the vectors' compact poses: told by `world_info_detail`. Null for modes that need none. */
+/** Returns the codec of the compact poses in the vectors, built from `world_info_detail`. Returns
+ * null for other modes. */
 export function vectorCodec(mode: BatchMode): CompactCodec | null {
   if (mode === 'full' || mode === 'quantised') return null;
   const known = codecs.get(mode);
   if (known !== undefined) return known;
   const vector = readVectors().find(({name}) => name === 'world_info_detail')!;
   const info = decodeFrame(vector.frame, 'server');
-  if (info.type !== 'WorldInfo') throw new Error('world_info_detail is no WorldInfo');
+  if (info.type !== 'WorldInfo') throw new Error('world_info_detail is not a WorldInfo');
   const codec = new CompactCodec(info.rotationCodes,
     mode === 'compactFewer' ? info.fewerJoints : mode === 'compactRoot' ? [0] : []);
   codecs.set(mode, codec);

@@ -25,58 +25,69 @@ struct Capture {
   std::vector<std::string> notes;  ///< What the reader assumed or repaired, one sentence each.
 };
 
-/// Limits on a BVH file; beyond one of them reading ends with kLimitExceeded. Joints are limited by
-/// kMaxJoints. Memory follows what the file really holds, never what it announces.
+/// Limits on a BVH file. A file that exceeds one of them is rejected with kLimitExceeded.
+/// kMaxJoints limits the number of joints. Memory use depends on the data in the file, not on the
+/// counts that its header declares.
 inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
-inline constexpr int kMaxBvhDepth = 128;  ///< Joints nested in each other.
+inline constexpr int kMaxBvhDepth = 128;  ///< Levels of nested joints.
 inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;  ///< Frames times joints.
 inline constexpr double kMaxBvhNumber = 1e7;  ///< Largest magnitude of any number in the file.
 
-inline constexpr std::size_t kMaxBvhNameBytes = 256;  ///< A joint's name.
+inline constexpr std::size_t kMaxBvhNameBytes = 256;  ///< Longest name of a joint, in bytes.
 
+/// A direction along one of the file's own axes.
 enum class BvhAxis : std::uint8_t { kPlusX, kMinusX, kPlusY, kMinusY, kPlusZ, kMinusZ };
 
-/// What the reader would otherwise find out by itself.
+/// Overrides for properties that the reader otherwise detects by itself.
 struct BvhReadOptions {
-  std::optional<double> unit_m;  ///< Length of one file unit, in (0, 1000].
-  std::optional<BvhAxis> up;     ///< Which way is up, in the file's axes.
-  std::optional<double> fps;     ///< Instead of `Frame Time`, in (0, 10000].
-  std::string left_ankle;        ///< Joint names; empty: found. Give both ankles or none.
-  std::string right_ankle;
-  std::string left_ball;  ///< Toe joints below those ankles; empty: found.
-  std::string right_ball;
+  std::optional<double> unit_m;  ///< Length of one file unit in metres, in (0, 1000].
+  std::optional<BvhAxis> up;     ///< The up axis of the file.
+  std::optional<double> fps;     ///< Replaces `Frame Time`; frames per second, in (0, 10000].
+  /// Name of the left ankle joint; empty: detected. Set both ankles or neither.
+  std::string left_ankle;
+  std::string right_ankle;  ///< Same for the right ankle.
+  /// Name of a toe joint below `left_ankle`; empty: detected.
+  std::string left_ball;
+  std::string right_ball;  ///< Same for the right toe joint.
 };
 
-/// Reads a BVH file into our conventions: metres, +Y up, facing +Z at identity rotations, only the
-/// root moving. What was assumed or mended is told in `Capture::notes`.
+/// Reads a BVH file and converts it to Stridewire's conventions: metres, +Y up, facing +Z at
+/// identity rotations, and translation on the root only. `Capture::notes` lists every assumption
+/// and repair.
 ///
-/// - Line ends (LF, CRLF, CR) may mix; blank lines, tabs, letter case of keywords and channels, any
-///   channel order and a missing last line end do not matter. A joint's name is the rest of its
-///   line; a name that stands twice gets a number.
-/// - One line after `Frame Time` is one frame. A line with too few or too many numbers is an error;
-///   fewer whole lines than `Frames` announces are read, more are left out, each with a note.
-/// - Position channels of the root replace its OFFSET. Those of another joint give it their mean
-///   as offset, and a note tells the largest deviation (all zero: the OFFSET stays).
-/// - `Frame Time` is rounded to a whole number of frames a second where its digits allow it.
-/// - Legs are found by names, then by shape: the longest two equal chains nearest to the root.
-///   Without a toe joint the ball rides on the ankle: at the foot's End Site if that is nearer
-///   than 0.2 leg lengths, else at 2/3 of the way there, at the End Site's height.
-/// - Up is the way from ankles to hips, over the motion; the rest pose is turned to face +Z.
-/// - The unit is the known one (m, ft, dm, 1/0.45 inch, inch, cm, mm) that makes legs 0.68 to
-///   1.0 m long; if none does, the standing hips are put at 0.95 m.
-/// - `first_frame` is past an artificial rest pose at the start: four joints or more jump from
-///   frame 0 to 1 by over 10 degrees and 8 times what they do next, or rush (600 degrees a second)
-///   from a frame whose root is not turned at all. It is left out as long as two joints rush, at
-///   most 0.1 s.
-/// - A `Frame Time` that makes the feet too slow for people gets a note; `fps` overrides it.
+/// - The file may mix LF, CRLF and CR line ends. Blank lines, tabs, the letter case of keywords and
+///   channels, the order of channels and a missing final line end do not matter. The name of a
+///   joint is the rest of its line. Duplicate names get a number appended.
+/// - Each line after `Frame Time` is one frame. A line with too few or too many numbers is an
+///   error. If the number of lines differs from `Frames`, the reader keeps the complete lines, at
+///   most `Frames` of them, and adds a note.
+/// - Position channels of the root replace its OFFSET. For other joints, the mean of the position
+///   channels becomes the offset, and a note states the largest deviation from it. If all positions
+///   of a joint are zero, its OFFSET is kept.
+/// - `Frame Time` is rounded to a whole number of frames per second if its digits allow it.
+/// - The reader detects legs by joint names. If that fails, it takes the longest pair of equally
+///   long chains that start nearest to the root. If there is no toe joint, the ball of the foot is
+///   a fixed point in the frame of the ankle. This point is the End Site of the foot if that is
+///   nearer than 0.2 leg lengths. Otherwise it is 2/3 of the way there, at the height of the
+///   End Site.
+/// - The up axis is the mean direction from ankles to hips over the motion. The rest pose is then
+///   turned to face +Z.
+/// - The unit is the common unit (m, ft, dm, 1/0.45 inch, inch, cm or mm) for which the legs are
+///   0.68 to 1.0 m long. If no unit fits, the motion is scaled so that standing hips are at 0.95 m.
+/// - `Capture::first_frame` skips an artificial rest pose at the start. The reader assumes such a
+///   pose if at least four joints jump between frames 0 and 1: by more than 10 degrees and 8 times
+///   as far as in the following frames, or at more than 600 degrees/s from a frame whose root is
+///   not rotated. It skips frames while at least two joints turn that fast, at most 0.1 s.
+/// - If `Frame Time` implies feet that are too slow for a person, the reader adds a note; use `fps`
+///   to override it.
 ///
-/// Errors: kNotFound, kIo; kMalformed, kOutOfRange, kLimitExceeded, kUnsupported with `where` =
-/// "file:line", or the file alone when no line is to blame; kInvalidArgument or kNotFound with the
-/// option's name in `where` for options.
+/// Errors: kNotFound or kIo if the file cannot be read. kMalformed, kOutOfRange, kLimitExceeded or
+/// kUnsupported for its contents, with "file:line" in `where`, or the file name alone if the error
+/// belongs to no line. kInvalidArgument or kNotFound for an option, with its name in `where`.
 [[nodiscard]] Expected<Capture> ReadBvh(const std::filesystem::path& path,
                                         const BvhReadOptions& options = {});
 
-/// As above, from text in memory; `name` takes the path's place.
+/// Same as ReadBvh, for text in memory. `name` replaces the path in errors and in Capture::path.
 [[nodiscard]] Expected<Capture> ParseBvh(std::string_view text, std::string_view name,
                                          const BvhReadOptions& options = {});
 

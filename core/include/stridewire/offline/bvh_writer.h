@@ -9,22 +9,22 @@
 
 namespace stridewire {
 
-/// Writes a clip as BVH that common tools open: metres, y up; the root with six channels (X, Y, Z
-/// position, then Z, Y, X rotation), other joints with three (Z, Y, X rotation), one line a frame.
+/// Writes a clip as BVH in metres with y up. The root has six channels (X, Y, Z position, then
+/// Z, Y, X rotation), other joints have three (Z, Y, X rotation). Each frame is one line.
 ///
-/// - Positions and offsets are written so that reading gives back the same floats; angles have six
-///   decimals of a degree and run on over +-180 degrees without jumps.
-/// - Joints stand depth first, children in the skeleton's order; a skeleton read from a BVH file
-///   keeps its order.
-/// - A joint without child and End Site gets an End Site of no length. White space and braces in
+/// - Positions and offsets are written with enough digits to restore the same floats. Angles have
+///   six decimals, in degrees. They are continuous over time and may therefore exceed +-180.
+/// - Joints are written depth first, with the children of a joint in the order of the skeleton.
+///   A skeleton that was read from a BVH file keeps its order.
+/// - A joint without a child or End Site gets an End Site of length zero. White space and braces in
 ///   names become `_`.
 ///
-/// Errors: whatever Skeleton::Validate and Clip::Validate find; kShapeMismatch: skeleton and clip
-/// differ in joints; kIo: the stream took no more.
+/// Errors: those of Skeleton::Validate and Clip::Validate. kShapeMismatch if skeleton and clip
+/// differ in their number of joints. kIo if writing to the stream fails.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out);
 
-/// As above, into a file: written beside it first and then renamed, so that `path` holds either
-/// what it held before or everything. kIo: `where` names the path.
+/// Same, for a file. Writes a temporary file in the same folder and renames it, so that `path`
+/// holds either its previous content or the complete clip. kIo: `where` is the path.
 [[nodiscard]] Status WriteBvh(const Skeleton& skeleton, const Clip& clip,
                               const std::filesystem::path& path);
 

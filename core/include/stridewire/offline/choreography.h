@@ -14,40 +14,55 @@
 
 namespace stridewire {
 
-/// Limits on a choreography; beyond one of them reading ends with kLimitExceeded.
+/// Limits on a choreography. A file that exceeds one of them is rejected with kLimitExceeded.
 inline constexpr std::size_t kMaxChoreographyBytes = std::size_t{4} << 20;
 inline constexpr std::size_t kMaxChoreographyMovements = 65'536;
-inline constexpr int kMaxChoreographyDepth = 16;  ///< Arrays and objects nested in each other.
-inline constexpr double kMaxChoreographyPositionM = 1e5;   ///< Each coordinate of the start.
-inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Of the start, either sign.
+inline constexpr int kMaxChoreographyDepth = 16;           ///< Levels of nested JSON values.
+inline constexpr double kMaxChoreographyPositionM = 1e5;   ///< Magnitude of a start coordinate.
+inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Magnitude of the start heading.
 
-/// Movements asked for one after the other, and where the avatar stands before the first.
+/// A start position and a list of movements that an avatar plays one after the other. As JSON:
 ///
-///   {"start":{"position_m":[0,0,0],"heading_rad":0},
-///    "terrain":{…as in terrain_file.h…},
-///    "movements":[{"step":{"length_m":0.6}},
-///                 {"step":{"foot":"left","length_m":0.5,"side_m":0.1,"height_m":0.15,"turn_rad":0.3}},
-///                 {"step":{"foot":"right","at_m":[0,0,2],"heading_rad":0,"exact_only":true}},
-///                 {"walk_to":{"position_m":[3,0,5],"heading_rad":1.6,"waypoints_m":[[0,0,4]],"speed_m_s":1}},
-///                 {"jump":{"length_m":0.9,"height_m":0,"turn_rad":0}},
-///                 {"layer":{"name":"wave","weight":0.8,"blend_s":0.5,"speed":1}},
-///                 {"layer":{"name":"wave","off":true}},
-///                 {"stand":{"seconds":1.5}}]}
+///   {"start": {"position_m": [0, 0, 0], "heading_rad": 0},
+///    "terrain": {... see terrain_file.h ...},
+///    "movements": [
+///      {"step": {"length_m": 0.6}},
+///      {"step": {"foot": "left", "length_m": 0.5, "side_m": 0.1, "height_m": 0.15,
+///                "turn_rad": 0.3}},
+///      {"step": {"foot": "right", "at_m": [0, 0, 2], "heading_rad": 0, "exact_only": true}},
+///      {"walk_to": {"position_m": [3, 0, 5], "heading_rad": 1.6, "waypoints_m": [[0, 0, 4]],
+///                   "speed_m_s": 1}},
+///      {"jump": {"length_m": 0.9, "height_m": 0, "turn_rad": 0}},
+///      {"layer": {"name": "wave", "weight": 0.8, "blend_s": 0.5, "speed": 1}},
+///      {"layer": {"name": "wave", "enabled": false}},
+///      {"stand": {"seconds": 1.5}}]}
 ///
-/// `start` and what is in it may be left out (the origin, heading 0), and so may `terrain` (flat at
-/// y = 0). A step and a jump need `length_m`, a stand `seconds`; the rest may be left out. A key
-/// that is not listed here is an error, so is one that stands twice. A step's `at_m`, where the ball
-/// of its foot lands in the world, stands instead of length, side, height and turn; the `heading_rad`
-/// of that footprint may be left out, and so may `exact_only`, with which the step is left out if that is out of
-/// reach. A `walk_to` needs position and heading. A `layer` takes no time: it begins, changes or (`off`) ends when the
-/// movement after it begins; it needs a `name`.
+/// `movements` is required. `start` and its fields are optional (default: the origin, heading 0),
+/// and so is `terrain` (default: flat at y = 0). Unknown and duplicate keys are errors.
+///
+/// - step: requires either `length_m`, with optional side, height and turn, or `at_m`, the world
+///   position where the ball of the foot lands. With `at_m`, `heading_rad` of the footprint is
+///   optional. With `exact_only`, the step is skipped if the footprint is out of reach.
+/// - walk_to: requires `position_m` and `heading_rad`.
+/// - jump: requires `length_m`.
+/// - stand: requires `seconds`.
+/// - layer: requires `name`. It takes no time. It starts, changes or (with `"enabled": false`)
+///   stops the layer when the following movement begins.
 struct Choreography {
   BaseFrame start;
   std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground.
-  /// 1 to kMaxChoreographyMovements with the layers; an id is 1 more than the place in the list: 1, 2, 3, … without.
+  /// Together with `layers` 1 to kMaxChoreographyMovements entries. The id of a request is its
+  /// position in the JSON list, counted from 1 and including layers.
   std::vector<MovementRequest> movements;
   std::vector<LayerCue> layers;
 };
+
+/// Reads a choreography. It checks numbers against the limits in movement_request.h. It does not
+/// check whether a library supports the movements; use ValidateRequest for that.
+///
+/// Errors: kNotFound or kIo with the file in `where`. kMalformed with "file:line:column" if the
+/// text is not JSON. kMalformed, kOutOfRange, kShapeMismatch or kUnsupported with the field, for
+/// example "c.json: movements[3].step.length_m". kLimitExceeded with the file or the field.
 
 /// Reads a choreography. Numbers are checked against the limits of requests (movement_request.h);
 /// whether a library has such movements is for ValidateRequest to say.
@@ -57,7 +72,7 @@ struct Choreography {
 /// "c.json: movements[3].step.length_m"; kLimitExceeded with file or field.
 [[nodiscard]] Expected<Choreography> ReadChoreography(const std::filesystem::path& path);
 
-/// As above, from text in memory; `name` takes the path's place.
+/// Same as ReadChoreography, for text in memory. `name` replaces the path in errors.
 [[nodiscard]] Expected<Choreography> ParseChoreography(std::string_view text,
                                                        std::string_view name);
 

@@ -62,35 +62,38 @@ struct GroupSelection {
   [[nodiscard]] int Count(ExampleFate fate) const;
 };
 
-/// Turns a RawLibrary into library bytes: one generic-time grid a group, examples resampled on it,
-/// hemispheres aligned, near duplicates averaged, weights solved.
+/// Builds a MotionLibrary from a RawLibrary. It resamples the examples of each group on a common
+/// generic-time grid, aligns quaternion hemispheres, selects or averages examples as configured,
+/// and solves for the interpolation weights.
 struct LibraryBuilder {
-  /// One that keeps a representative selection of captured movements: those within 5 cm of each other
-  /// averaged, outliers of five deviations and what the others make within 2.5 cm left out, the rest
-  /// made smooth.
+  /// Returns a builder configured to keep a representative selection of captured movements: it
+  /// averages movements within 5 cm of each other, drops outliers beyond five deviations and
+  /// movements that the rest reproduces within 2.5 cm, and smooths what remains.
   [[nodiscard]] static LibraryBuilder Selecting();
 
-  double grid_fps = 30.0;  ///< About this many grid cells a second of mean duration, more where
-                           ///< an example would be stored worse than 0.45 degrees otherwise.
-  /// Average examples whose parameters all lie within this of each other (complete linkage),
-  /// metres (a radian counts 0.5 m). 0: none.
+  /// Grid cells per second of mean duration, approximately. Intervals where an example would
+  /// otherwise be stored with an error above 0.45 degrees get more.
+  double grid_fps = 30.0;
+  /// Averages examples whose parameters all lie within this distance of each other, in metres; a
+  /// radian counts as 0.5 m. Uses complete linkage. 0: averages nothing.
   double cluster_diameter = 0.0;
-  /// Which of the averages to leave out; by default none.
+  /// Which examples (after averaging) to leave out; by default none.
   SelectionOptions selection;
-  /// Store the examples chosen as a smooth function of their parameters has them, which all but outliers
-  /// decide: what they have in common stays, what is one's own goes. How smooth is chosen by the poses of
-  /// examples left out. Groups of fewer than four examples for each number of a linear function (d + 1)
-  /// stay as they are.
+  /// Replaces the selected examples by a smooth function of their parameters that is robust against
+  /// outliers. This keeps what the examples have in common and removes individual variation.
+  /// Leave-one-out pose errors determine the smoothness. Groups with fewer than 4 (d + 1) examples
+  /// (d parameters) remain unchanged.
   bool smooths = false;
 
   struct Note {
     int group = 0;
     std::string text;
   };
-  std::vector<Note> notes;  ///< Filled by Build: merged duplicates, directions no example spans.
-  std::vector<GroupSelection> selections;  ///< Filled by Build, one a group.
+  /// Output of Build: merged duplicates and parameter directions in which no example varies.
+  std::vector<Note> notes;
+  std::vector<GroupSelection> selections;  ///< Output of Build, one per group.
 
-  /// kOutOfRange, kShapeMismatch, kIllConditioned; `where` names group and example.
+  /// Errors: kOutOfRange, kShapeMismatch or kIllConditioned; `where` names the group and example.
   [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> Build(const RawLibrary& raw);
 };
 

@@ -10,49 +10,50 @@
 
 namespace stridewire {
 
-/// A foot that stands during a movement, as its keytimes say.
+/// A time span within a movement during which a foot stands on the ground.
 struct PlantRecord {
   Foot foot = Foot::kLeft;
   double from_s = 0.0;
   double to_s = 0.0;
-  DVec3 anchor_m = DVec3(0.0);  ///< Where its ball is to stand; unplanted: where it is at first
-  double drift_m = 0.0;         ///< How far the ball gets from there in any frame, horizontally
+  DVec3 anchor_m = DVec3(0.0);  ///< Target of the ball; without planting its first position.
+  double drift_m = 0.0;         ///< Largest horizontal distance of the ball from the anchor.
 };
 
-/// What became of one movement. Times count from the start of the choreography.
+/// Describes one played movement. Times are seconds since the start of the choreography.
 struct MovementRecord {
   MovementKind kind = MovementKind::kStand;
-  std::uint64_t request_id = 0;  ///< 0: inserted (closing step)
+  std::uint64_t request_id = 0;  ///< 0: the planner inserted this movement, e.g. a closing step.
   int group = -1;
   double start_s = 0.0;
   double end_s = 0.0;
   std::vector<double> keytimes_s;
   ParameterValues requested;
-  ParameterValues applied;  ///< After clamping to what the examples span
-  ParameterValues
-      corrected;  ///< sum w_i p_i, p_i of the examples: not `applied`, so that `measured` is
-  ParameterValues measured;  ///< a(p) of the synthesized movement
+  ParameterValues applied;  ///< `requested` after clamping to the range of the examples.
+  /// sum w_i p_i over the examples: the parameters used for the blend. The weight correction
+  /// chooses them so that `measured` meets `applied`.
+  ParameterValues corrected;
+  ParameterValues measured;  ///< a(p) of the synthesized movement.
   bool extrapolated = false;
   bool clamped = false;
   std::vector<float> weights;
   std::vector<PlantRecord> plants;
-  // Steps: how far from where it was asked to the moving foot is when it first stands, horizontally, and
-  // how far turned; without planting what `measured` misses of `requested`.
+  /// Steps only: horizontal distance of the moving foot from its target when it first stands.
+  /// Without planting: distance between the measured and the requested end parameters.
   double landing_error_m = 0.0;
-  double landing_error_rad = 0.0;
-  BaseFrame base;  ///< After the movement
+  double landing_error_rad = 0.0;  ///< Same, for the heading of the foot.
+  BaseFrame base;                  ///< Base frame after the movement.
 };
 
-/// How a walk ended.
+/// The outcome of one walk.
 struct WalkRecord {
   std::uint64_t request_id = 0;
   bool arrived = false;
-  std::string reason;  ///< Why not
+  std::string reason;  ///< Why the walk failed; empty if `arrived`.
   double end_s = 0.0;
-  BaseFrame base;  ///< Where it ended
+  BaseFrame base;  ///< Base frame at the end of the walk.
 };
 
-/// A step that was not played, since it would have missed a footprint it had to meet.
+/// A step that was skipped because it required exact placement and could not reach its footprint.
 struct UnreachableFootprint {
   std::uint64_t request_id = 0;
   std::string reason;
@@ -60,31 +61,34 @@ struct UnreachableFootprint {
   FootprintError missed;
 };
 
-/// A layer that begins, changes or ends when a movement of the list begins.
+/// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
-  std::size_t before =
-      0;  ///< Which, from 0; as many as there are: after all of them, which shows nothing
-  std::string layer;  ///< Its name
-  bool is_off = false;
+  /// Index of that movement in the list of requests. The number of requests means after all of
+  /// them, which has no visible effect.
+  std::size_t before = 0;
+  std::string layer;  ///< Name of the layer.
+  bool enabled = true;
   double weight = 1.0;
   double blend_s = 0.3;
   double speed = 1.0;
 };
 
 struct Synthesis {
-  Clip clip;  ///< World poses; frame 0 is the stand before the first tick
+  Clip clip;  ///< Poses in world space; frame 0 is the standing pose before the first tick.
   std::vector<MovementRecord> movements;
   std::vector<WalkRecord> walks;
   std::vector<UnreachableFootprint> unreachable_footprints;
 };
 
-inline constexpr int kMaxSynthesisFrames = 1 << 20;
+inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Longest result of Synthesize.
 
-/// Runs an avatar through requests, without a server: what `fps` ticks a second would show, until it
-/// stands idle. kUnsupported, kOutOfRange: a request is refused or no way leads to it (`where`); kLimitExceeded:
-/// more than kMaxSynthesisFrames. `layers` in the order of `before`: each is on its way from the frame after the one its
-/// movement (or a step inserted for it) begins in; kNotFound, kOutOfRange, kLimitExceeded as LayerStack::Set. Errors name
-/// movements by their place in a choreography, where layers count among them.
+/// Plays requests on an avatar without a server and records one pose per tick, with `fps` ticks per
+/// second, until the avatar is idle. `layers` must be sorted by `before`; each takes effect in the
+/// frame after its movement (or a step inserted before that movement) begins.
+///
+/// Errors: kUnsupported or kOutOfRange if the library rejects a request or no transition path leads
+/// to it. kLimitExceeded if the result exceeds kMaxSynthesisFrames. For layers the errors of
+/// LayerStack::Set. `where` names a movement by its index in a choreography, which counts layers.
 [[nodiscard]] Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library,
                                              const BaseFrame& start,
                                              std::span<const MovementRequest> requests, double fps,

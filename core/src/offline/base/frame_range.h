@@ -2,7 +2,7 @@
 
 namespace stridewire {
 
-/// Frames [begin, end) of a capture.
+/// A range of frames of a capture: [begin, end).
 struct FrameRange {
   int begin = 0;
   int end = 0;

@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-// How far apart two places are on level ground.
+// Returns the distance of two points, ignoring their heights.
 [[nodiscard]] inline double HorizontalDistance(const DVec3& a, const DVec3& b) {
   return std::hypot(a.x - b.x, a.z - b.z);
 }

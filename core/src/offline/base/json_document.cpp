@@ -10,20 +10,20 @@
 namespace stridewire {
 namespace {
 
-/// Builds the document from the parser's events. Returning false ends the parsing; why is in `code`
-/// and `reason`.
+/// Builds the document from the events of the parser. A handler that returns false stops the parser
+/// and sets `code` and `reason`.
 class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
  public:
   explicit DocumentBuilder(int max_depth) : max_depth_(max_depth) {}
 
-  bool null() override { return Put(nullptr) != nullptr; }
-  bool boolean(bool value) override { return Put(value) != nullptr; }
-  bool number_integer(number_integer_t value) override { return Put(value) != nullptr; }
-  bool number_unsigned(number_unsigned_t value) override { return Put(value) != nullptr; }
+  bool null() override { return Append(nullptr) != nullptr; }
+  bool boolean(bool value) override { return Append(value) != nullptr; }
+  bool number_integer(number_integer_t value) override { return Append(value) != nullptr; }
+  bool number_unsigned(number_unsigned_t value) override { return Append(value) != nullptr; }
   bool number_float(number_float_t value, const string_t& /*text*/) override {
-    return Put(value) != nullptr;
+    return Append(value) != nullptr;
   }
-  bool string(string_t& value) override { return Put(std::move(value)) != nullptr; }
+  bool string(string_t& value) override { return Append(std::move(value)) != nullptr; }
   bool binary(binary_t& /*value*/) override { return false; }  // Not in JSON text.
   bool start_object(std::size_t /*size*/) override { return Open(nlohmann::json::object()); }
   bool start_array(std::size_t /*size*/) override { return Open(nlohmann::json::array()); }
@@ -32,7 +32,7 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
 
   bool key(string_t& name) override {
     if (open_.back()->contains(name)) {
-      return Stop(ErrorCode::kMalformed, "the key before this stands twice in its object");
+      return Stop(ErrorCode::kMalformed, "duplicate key before this position");
     }
     key_ = std::move(name);
     return true;
@@ -42,23 +42,24 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
                    const nlohmann::json::exception& error) override {
     constexpr int kNumberOverflow = 406;
     if (error.id == kNumberOverflow) {
-      return Stop(ErrorCode::kOutOfRange, "the number before this is too large");
+      return Stop(ErrorCode::kOutOfRange,
+                  "the number before this position is too large for a double");
     }
-    return Stop(ErrorCode::kMalformed, "the text is not JSON near here");
+    return Stop(ErrorCode::kMalformed, "invalid JSON near this position");
   }
 
   nlohmann::json document;
   ErrorCode code = ErrorCode::kMalformed;
-  const char* reason = "the text is not JSON";
+  const char* reason = "invalid JSON";
 
  private:
-  bool Stop(ErrorCode why, const char* text) {
-    code = why;
+  bool Stop(ErrorCode stop_code, const char* text) {
+    code = stop_code;
     reason = text;
     return false;
   }
 
-  nlohmann::json* Put(nlohmann::json&& value) {
+  nlohmann::json* Append(nlohmann::json&& value) {
     if (open_.empty()) {
       document = std::move(value);
       return &document;
@@ -68,17 +69,17 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
       parent.push_back(std::move(value));
       return &parent.back();
     }
-    nlohmann::json& place = parent[key_];
-    place = std::move(value);
-    return &place;
+    nlohmann::json& member = parent[key_];
+    member = std::move(value);
+    return &member;
   }
 
   bool Open(nlohmann::json&& container) {
     if (static_cast<int>(open_.size()) >= max_depth_) {
-      return Stop(ErrorCode::kLimitExceeded, "arrays and objects are nested too deep");
+      return Stop(ErrorCode::kLimitExceeded, "arrays and objects are nested too deeply");
     }
-    // A container grows only while it is the innermost open one, so pointers to the others hold.
-    open_.push_back(Put(std::move(container)));
+    // Only the innermost open container grows, so the pointers to the others remain valid.
+    open_.push_back(Append(std::move(container)));
     return true;
   }
 
@@ -92,10 +93,10 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
   std::string key_;
 };
 
-/// Passes bytes on and counts them, so that every error has a place.
+/// Iterates over text and counts the consumed bytes, to locate errors.
 class CountingIterator {
  public:
-  // NOLINTBEGIN(readability-identifier-naming): names the standard library asks for.
+  // NOLINTBEGIN(readability-identifier-naming): names required by the standard library.
   using difference_type = std::ptrdiff_t;
   using value_type = char;
   using pointer = const char*;

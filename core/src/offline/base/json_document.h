@@ -8,11 +8,10 @@
 
 namespace stridewire {
 
-/// Parses JSON from outside without exceptions: nesting is limited, a key may stand only once in its
-/// object, and an error tells line and column. `text` is at most as long as the caller allows; the
-/// document takes at most about 50 times that.
-/// kMalformed, kOutOfRange (a number beyond double), kLimitExceeded (nesting); `where` is
-/// "name:line:column", both from 1, columns in bytes.
+/// Parses untrusted JSON without exceptions. Limits the nesting and rejects duplicate keys. The
+/// caller must limit the size of `text`; the document uses up to about 50 times as much memory.
+/// Errors: kMalformed; kOutOfRange for a number too large for a double; kLimitExceeded for nesting.
+/// `where` is "name:line:column", both counted from 1, columns in bytes.
 [[nodiscard]] Expected<nlohmann::json> ParseJson(std::string_view text, std::string_view name,
                                                  int max_depth);
 

@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-/// A key as it stands in an error: one line of at most 64 printable characters.
+/// Shortens a key for an error message to one line of at most 64 printable characters.
 std::string Printable(const std::string& key) {
   constexpr std::size_t kMaxShown = 64;
   std::string shown = key.substr(0, kMaxShown);
@@ -25,12 +25,11 @@ Status CheckKeys(const JsonField& field, std::initializer_list<const char*> know
   if (!field.value.is_object()) {
     std::string where = field.where;
     if (where.ends_with(": ")) where.resize(where.size() - 2);  // The whole document.
-    return Fail(ErrorCode::kMalformed, "is not an object", std::move(where));
+    return Fail(ErrorCode::kMalformed, "expected an object", std::move(where));
   }
   for (const auto& item : field.value.items()) {
     if (std::find(known.begin(), known.end(), item.key()) == known.end()) {
-      return Fail(ErrorCode::kMalformed, "is not a key known here",
-                  field.WhereOf(Printable(item.key())));
+      return Fail(ErrorCode::kMalformed, "unknown key", field.WhereOf(Printable(item.key())));
     }
   }
   return {};
@@ -56,7 +55,7 @@ Status ReadNumber(const JsonField& field, const char* key, const JsonLimit& limi
 Status ReadRequiredNumber(const JsonField& field, const char* key, const JsonLimit& limit,
                           double& out) {
   if (field.Find(key) == nullptr) {
-    return Fail(ErrorCode::kMalformed, "is missing", field.WhereOf(key));
+    return Fail(ErrorCode::kMalformed, "required key is missing", field.WhereOf(key));
   }
   return ReadNumber(field, key, limit, out);
 }
@@ -68,16 +67,16 @@ Expected<std::string> ReadTextFile(const std::filesystem::path& path, std::size_
   if (status.type() == std::filesystem::file_type::not_found) {
     return Fail(ErrorCode::kNotFound, "there is no such file", name);
   }
-  if (code) return Fail(ErrorCode::kIo, "the file cannot be opened", name);
+  if (code) return Fail(ErrorCode::kIo, "cannot open the file", name);
   if (std::filesystem::is_directory(status)) {
-    return Fail(ErrorCode::kIo, "this is a directory", name);
+    return Fail(ErrorCode::kIo, "expected a file, got a directory", name);
   }
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) return Fail(ErrorCode::kIo, "the file cannot be opened", name);
-  // A pipe has no size to ask for.
+  if (!stream) return Fail(ErrorCode::kIo, "cannot open the file", name);
+  // Reads up to the limit instead of asking for the size, since a pipe has none.
   std::string text(max_bytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return Fail(ErrorCode::kIo, "the file cannot be read", name);
+  if (stream.bad()) return Fail(ErrorCode::kIo, "cannot read the file", name);
   text.resize(static_cast<std::size_t>(stream.gcount()));
   return text;
 }

@@ -8,15 +8,15 @@
 
 #include "stridewire/base/error.h"
 
-/// Reading values out of a JSON document, with errors that name the way to them.
+/// Helpers that read values from a JSON document. Their errors contain the path of the value.
 namespace stridewire {
 
-/// A value of the document and the way to it, for errors: "c.json: movements[3].step".
+/// A value and its path in the document, for example "c.json: movements[3].step".
 struct JsonField {
   const nlohmann::json& value;
   std::string where;
 
-  /// Null where there is no such key.
+  /// Returns null if there is no such key.
   [[nodiscard]] const nlohmann::json* Find(const char* key) const {
     const auto found = value.find(key);
     return found == value.end() ? nullptr : &*found;
@@ -26,29 +26,31 @@ struct JsonField {
   }
 };
 
-/// A number's limit and the sentence that tells it.
+/// The allowed range of a number, and an error message that states it.
 struct JsonLimit {
   double min;
   double max;
   const char* text;
 };
 
-/// The field is an object and has no other keys than these.
+/// Checks that the field is an object that contains no other keys than `known`.
 [[nodiscard]] Status CheckKeys(const JsonField& field, std::initializer_list<const char*> known);
 
-/// kMalformed: not a number; kOutOfRange. On an error `out` stays as it was.
+/// Reads a number. Errors: kMalformed if the value is not a number, kOutOfRange. On error `out`
+/// remains unchanged.
 [[nodiscard]] Status ReadNumberAt(const nlohmann::json& value, std::string where,
                                   const JsonLimit& limit, double& out);
 
-/// Leaves `out` alone when the key is not there.
+/// Reads an optional number. If the key is absent, `out` remains unchanged.
 [[nodiscard]] Status ReadNumber(const JsonField& field, const char* key, const JsonLimit& limit,
                                 double& out);
 
+/// Reads a required number.
 [[nodiscard]] Status ReadRequiredNumber(const JsonField& field, const char* key,
                                         const JsonLimit& limit, double& out);
 
-/// The text of a file, up to one byte more than `max_bytes`, which tells that there is more.
-/// kNotFound, kIo with `where` = file.
+/// Reads a file, but at most `max_bytes` + 1 bytes; a longer result tells the caller that the file
+/// exceeds its limit. Errors: kNotFound or kIo with the file in `where`.
 [[nodiscard]] Expected<std::string> ReadTextFile(const std::filesystem::path& path,
                                                  std::size_t max_bytes);
 

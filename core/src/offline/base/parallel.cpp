@@ -7,10 +7,11 @@
 
 namespace stridewire {
 
-int ThreadCount(int asked) {
-  constexpr int kMost = 16;
-  const int count = asked > 0 ? asked : static_cast<int>(std::thread::hardware_concurrency());
-  return std::clamp(count, 1, kMost);
+int ThreadCount(int requested) {
+  constexpr int kMaxThreads = 16;
+  const int count =
+      requested > 0 ? requested : static_cast<int>(std::thread::hardware_concurrency());
+  return std::clamp(count, 1, kMaxThreads);
 }
 
 void ParallelFor(int count, int chunk, int threads, const std::function<void(int, int)>& work) {

@@ -4,12 +4,12 @@
 
 namespace stridewire {
 
-// How many threads to use where `asked` says 0: one a processor, at most 16.
-[[nodiscard]] int ThreadCount(int asked);
+// Returns `requested`, or the number of processors if it is 0; 1 to 16 in either case.
+[[nodiscard]] int ThreadCount(int requested);
 
-// Calls work(i, thread) for every i in [0, count) on `threads` threads, this one included. Which thread
-// takes which i is left open: work must put its result where i says, so that it is the same for any
-// number of threads. `chunk` of them are taken at a time. `work` must not throw.
+// Calls work(i, thread) for every i in [0, count) on `threads` threads, including the calling one,
+// in chunks of `chunk` calls. The assignment of i to threads is unspecified. For results that do
+// not depend on the number of threads, `work` must store its result by i. `work` must not throw.
 void ParallelFor(int count, int chunk, int threads, const std::function<void(int, int)>& work);
 
 }  // namespace stridewire

@@ -5,7 +5,7 @@
 
 namespace stridewire {
 
-/// The value below which `percent` of the values lie (linear between ranks); 0 if there are none.
+/// Returns a percentile with linear interpolation between ranks; 0 if `values` is empty.
 [[nodiscard]] double Percentile(std::vector<double> values, double percent);
 
 [[nodiscard]] inline double Median(std::vector<double> values) {

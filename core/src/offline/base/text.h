@@ -5,7 +5,8 @@
 
 namespace stridewire {
 
-// A number within a sentence; `format` is printf's, and the whole shorter than 128 bytes.
+// Formats a number as part of a sentence. `format` is a printf format for one double; the result is
+// truncated to 127 bytes.
 [[nodiscard]] inline std::string Text(const char* format, double value) {
   char text[128];
   std::snprintf(text, sizeof text, format, value);

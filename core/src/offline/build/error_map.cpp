@@ -5,15 +5,15 @@
 #include <cmath>
 #include <limits>
 
-#include "offline/build/hull_survey.h"
 #include "offline/base/parallel.h"
+#include "offline/build/hull_survey.h"
 #include "runtime/library/convex_hull.h"
 
 namespace stridewire {
 namespace {
 
-// Grid points on the boundary of the hull are off it by rounding.
-constexpr double kInside = 1e-6;  // scaled
+// Tolerance for grid points on the boundary of the hull, in scaled parameters.
+constexpr double kInside = 1e-6;
 
 std::vector<double> Axis(const Parameter& parameter, int count) {
   std::vector<double> values(static_cast<std::size_t>(count));
@@ -35,11 +35,11 @@ Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index
   const int d = group.parameter_count();
   if (options.axis_x < 0 || options.axis_x >= d || options.axis_y < -1 || options.axis_y >= d ||
       options.axis_x == options.axis_y) {
-    return Fail(ErrorCode::kOutOfRange, "an axis is no parameter of the group", group_index);
+    return Fail(ErrorCode::kOutOfRange, "an axis is not a parameter of the group", group_index);
   }
-  const auto is_count = [](int n) { return n >= 2 && n <= ErrorMapOptions::kMostPoints; };
+  const auto is_count = [](int n) { return n >= 2 && n <= ErrorMapOptions::kMaxPoints; };
   if (!is_count(options.columns) || !is_count(options.rows)) {
-    return Fail(ErrorCode::kOutOfRange, "columns and rows are not from 2 to 1000");
+    return Fail(ErrorCode::kOutOfRange, "expected 2 to 1000 columns and rows");
   }
 
   const auto n = static_cast<std::size_t>(group.example_count);

@@ -8,28 +8,29 @@
 
 namespace stridewire {
 
-/// Which part of a group's parameter space a map shows: one or two of its parameters, by index; the
-/// others are held at `others`.
+/// Selects the slice of the parameter space of a group that a map covers. One or two parameters
+/// vary, given by index; the others are constant, see ErrorMap::others.
 struct ErrorMapOptions {
   int axis_x = 0;
-  int axis_y = -1;   ///< -1: only one
-  int columns = 41;  ///< 2 to kMostPoints
-  int rows = 41;     ///< likewise; 1 is used where axis_y is -1
-  static constexpr int kMostPoints = 1000;
+  int axis_y = -1;   ///< -1: only one parameter varies.
+  int columns = 41;  ///< 2 to kMaxPoints.
+  int rows = 41;     ///< 2 to kMaxPoints; if axis_y is -1, there is one row.
+  static constexpr int kMaxPoints = 1000;
 };
 
-/// e(p) = |p - a(p)| on a grid over a slice of a group's parameter space (paper, Figure 1): from the
-/// least to the largest value an example has, NaN outside the hull of the examples.
+/// The error e(p) = |p - a(p)| on a grid over a slice of the parameter space of a group (paper,
+/// Figure 1). The grid spans the range of the examples. Values outside their hull are NaN.
 struct ErrorMap {
-  std::vector<double> x, y;        ///< [column], [row]: values of the parameters
-  std::vector<double> others;      ///< [parameter]: what the parameters not shown are held at
-  std::vector<double> error_m;     ///< [row][column]: as movements start uncorrected
-  std::vector<double> weight_sum;  ///< [row][column]: of |w|
-  double max_error_m = 0.0;        ///< Of those shown, not of the group
+  std::vector<double> x, y;        ///< [column], [row]: values of the parameters on the axes.
+  std::vector<double> others;      ///< [parameter]: values of the constant parameters.
+  std::vector<double> error_m;     ///< [row][column]: error without weight correction.
+  std::vector<double> weight_sum;  ///< [row][column]: sum of |w|.
+  double max_error_m = 0.0;        ///< Largest error on the map; the group may have larger ones.
 };
 
-/// The parameters not shown are held at their mean over the examples. Uses all processors, same result
-/// with any number of them. kOutOfRange: an option, the group.
+/// Measures an error map. Parameters without axis are constant at their mean over the examples.
+/// Uses all processors; the result does not depend on their number. Error: kOutOfRange for an
+/// option or the group.
 [[nodiscard]] Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index,
                                                  const ErrorMapOptions& options = {});
 

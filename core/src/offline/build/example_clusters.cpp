@@ -23,7 +23,7 @@ std::vector<std::vector<int>> CompleteLinkage(const std::vector<GridExample>& ex
                                               std::span<const double> units, double diameter) {
   const std::size_t n = examples.size();
   std::vector<std::vector<int>> clusters(n);
-  std::vector<double> distance(n * n, 0.0);  // between clusters: that of their furthest members
+  std::vector<double> distance(n * n, 0.0);  // Between clusters: of their most distant members.
   for (std::size_t i = 0; i < n; ++i) {
     clusters[i] = {static_cast<int>(i)};
     for (std::size_t j = 0; j < n; ++j)
@@ -86,7 +86,7 @@ GridExample AverageExamples(const std::vector<GridExample>& examples, std::span<
       const std::size_t at = begin + 4 * j;
       double* q = &rows[at];
       const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      if (norm < 0.1) {  // no mean: keep the first member's rotation
+      if (norm < 0.1) {  // The rotations cancel each other: uses those of the first member.
         for (std::size_t c = 0; c < 4; ++c) {
           q[c] = examples[static_cast<std::size_t>(members[0])].rows[at + c];
         }

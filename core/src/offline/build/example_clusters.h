@@ -8,14 +8,15 @@
 
 namespace stridewire {
 
-// Groups examples so that within each all parameters, times `units`, lie within `diameter` of each
-// other (complete linkage: the two clusters whose furthest members are nearest are joined first).
-// Clusters and their members in ascending order of index.
+// Clusters examples by complete linkage: it repeatedly merges the two clusters whose most distant
+// members are nearest. Within a cluster all parameters, multiplied by `units`, lie within
+// `diameter` of each other. Clusters and their members are sorted by index.
 [[nodiscard]] std::vector<std::vector<int>> CompleteLinkage(
     const std::vector<GridExample>& examples, std::span<const double> units, double diameter);
 
-// Mean of some hemisphere-aligned examples at equal generic times, keytimes too. The parameters of
-// a step are measured again on the result; a jump's are averaged.
+// Averages examples at equal generic times, including their keytimes. The examples must have
+// aligned hemispheres. The parameters of steps are measured again on the result; those of jumps are
+// averaged.
 [[nodiscard]] GridExample AverageExamples(const std::vector<GridExample>& examples,
                                           std::span<const int> members, const GridLayout& layout,
                                           const Skeleton& skeleton, const RawGroup& group);

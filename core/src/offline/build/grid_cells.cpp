@@ -12,10 +12,10 @@ namespace stridewire {
 namespace {
 
 constexpr int kMinCells = 2;
-constexpr int kMaxCells = 400;  // an interval; kMaxIntervals of them fit into the grid's limit
+constexpr int kMaxCells = 400;  // Per interval; kMaxIntervals of them fit into the grid.
 constexpr double kGrowth = 1.15;
 constexpr int kMaxRounds = 20;
-constexpr int kSamples = 24;  // an interval and example
+constexpr int kSamples = 24;  // Per interval and example.
 static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
 
 struct IntervalLength {
@@ -33,11 +33,11 @@ IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
   return length;
 }
 
-// For each interval how far the stored example is from its clip: mean over joints and time.
+// Returns the error of the stored example per interval: the mean over joints and time, in radians.
 std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
                                  const GridLayout& layout) {
   const GridExample stored = ResampleOnGrid(example, cells, layout);
-  // A group of one, for the very code that plays it.
+  // Uses a group with one example, to measure with the code that plays it.
   MotionGroup alone;
   alone.example_count = 1;
   alone.cells = cells;
@@ -85,7 +85,8 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
   }
   for (int round = 0; round < kMaxRounds; ++round) {
-    // In an example that is off in the mean, the intervals that are more off than that grow.
+    // If the mean error of an example is too large, its intervals with an error above the mean
+    // grow.
     std::vector<bool> grows(intervals, false);
     for (const RawExample& example : group.examples) {
       const std::vector<double> errors = StoredErrors(example, cells, layout);

@@ -8,7 +8,7 @@
 
 namespace stridewire {
 
-// An example resampled on its group's generic-time grid; rows as GridLayout has them.
+// An example resampled on the generic-time grid of its group. GridLayout defines the rows.
 struct GridExample {
   std::vector<float> rows;  // [grid point][row_floats]
   std::vector<double> keytimes_s;
@@ -18,20 +18,22 @@ struct GridExample {
   bool mirrored = false;
 };
 
-// Samples the example at the times its own warp gives the grid points.
+// Samples an example at the grid points, using its own keytimes.
 [[nodiscard]] GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells,
                                          const GridLayout& layout);
 
-// Makes each joint's track continuous in sign, then flips whole tracks into the hemisphere of one example (the one
-// nearest to the mean parameters). Point by point, one that turns half a turn away from it would jump, and with it the
-// blend that is interpolated between points. The reference must not depend on the weights, for the same reason.
+// Makes the rotation tracks of each joint continuous in sign, and then flips whole tracks into the
+// hemisphere of a reference: the example nearest to the mean parameters. Flipping single points
+// would make tracks jump that turn by 180 degrees away from the reference, and with them the
+// interpolated blend. A reference that depends on the weights would have the same effect.
 void AlignHemispheres(std::vector<GridExample>& examples, const GridLayout& layout,
                       int joint_count);
 
-// Sets a row to a weighted sum of rows, rotations made unit. One whose rotations cancel each other stays as it was.
+// Sets a row to a weighted sum of rows with normalised rotations. Rotations that cancel each other
+// keep their previous value in `row`.
 void SetBlendedRow(std::span<const float> sum, const GridLayout& layout, float* row);
 
-// Pose of a row: root position and yaw put back together.
+// Returns the pose of a row, with root position and yaw applied.
 [[nodiscard]] Pose PoseOfRow(std::span<const float> row, const GridLayout& layout, int joint_count);
 
 }  // namespace stridewire

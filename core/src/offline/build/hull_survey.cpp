@@ -14,13 +14,13 @@ namespace stridewire {
 namespace {
 
 constexpr int kPeaks = 8;
-constexpr double kPeakDistance = 0.3;  // scaled: where climbs start, from each other
+constexpr double kPeakDistance = 0.3;  // Between the starting points of climbs, scaled.
 constexpr int kClimbRounds = 24;
-constexpr double kSlopeStep = 1e-3;  // scaled
+constexpr double kSlopeStep = 1e-3;  // Scaled.
 constexpr double kFirstStride = 0.1;
 constexpr double kLastStride = 2e-3;
 
-// Uniform in (0, 1): the standard distributions may differ between C++ libraries.
+// Uniform in (0, 1). The standard distributions differ between C++ libraries.
 double Uniform(std::mt19937& random) {
   return (static_cast<double>(random()) + 0.5) / 4294967296.0;
 }
@@ -78,9 +78,9 @@ std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples, s
   }
   std::vector<double> share(n);
   for (int s = 0; s < samples; ++s) {
-    // Few examples carry most of a sample (Dirichlet, alpha = 1/2). Every other sample mixes but
-    // two to d + 1 of them: else edges, where errors are often largest, would hardly be met among
-    // many.
+    // A Dirichlet distribution with alpha = 1/2, so that few examples dominate a sample. Every
+    // other sample mixes only two to d + 1 examples. Otherwise samples of large groups would hardly
+    // reach the edges, where errors are often largest.
     std::fill(share.begin(), share.end(), 0.0);
     const bool takes_all = s % 2 == 0;
     const std::size_t count = takes_all ? n : 2 + static_cast<std::size_t>(s / 2) % d;

@@ -12,19 +12,19 @@
 
 namespace stridewire {
 
-// Points in the hull of a group's examples: convex combinations of them, half of all and half of
-// but a few, so that faces and corners are met as well; the examples themselves come first.
+// Samples the hull of the examples of a group. The examples come first, followed by convex
+// combinations: half of them of all examples, half of a few examples, to reach faces and corners.
 [[nodiscard]] std::vector<ParameterValues> SampleHull(const MotionGroup& group, int samples,
                                                       std::uint32_t seed);
 
-// What there is to know of a group at one point.
+// The properties of a group at one point of its parameter space.
 struct HullPoint {
   ParameterValues p;
   double error_m = 0.0;     // e(p) = |p - a(p)|
-  double weight_sum = 0.0;  // of |w(p)|
+  double weight_sum = 0.0;  // Sum of |w(p)|.
 };
 
-// Evaluates groups that belong to a skeleton but perhaps to no library yet. One thread's.
+// Evaluates groups of one skeleton that need not belong to a library. Not thread-safe.
 class GroupProbe {
  public:
   GroupProbe(const Skeleton& skeleton, int max_example_count);
@@ -34,7 +34,7 @@ class GroupProbe {
   [[nodiscard]] Correction Correct(const MotionGroup& group, const ParameterValues& wanted,
                                    const CorrectionLimits& limits);
 
-  // Of the last that was corrected [n].
+  // Returns the weights [n] of the last Correct.
   [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) {
     return scratch_.weights(group);
   }
@@ -48,21 +48,22 @@ class GroupProbe {
   CorrectionScratch scratch_;
 };
 
-// One a thread. `threads` 0: one a processor.
+// Creates one probe per thread. `threads` = 0: one per processor.
 [[nodiscard]] std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads);
 
-// e over the hull of a group's examples.
+// The error e over the hull of the examples of a group.
 struct HullSurvey {
   double min_m = 0.0;
-  double mean_m = 0.0;  // over the samples
+  double mean_m = 0.0;  // Over the samples.
   double max_m = 0.0;
   double weight_sum_max = 0.0;
-  std::vector<HullPoint> points;  // as sampled
-  std::vector<HullPoint> peaks;   // local maxima found from the worst of them, worst first
+  std::vector<HullPoint> points;  // One per sample.
+  std::vector<HullPoint> peaks;   // Local maxima found from the worst samples, largest first.
 };
 
-// Evaluates all samples, then climbs from the worst of them, apart from each other, by steepest
-// ascent inside the hull. One probe a thread; the result is the same for any number of them.
+// Evaluates all samples and climbs from the worst ones by steepest ascent inside the hull. The
+// starting points keep a distance from each other. Uses one thread per probe; the result does not
+// depend on their number.
 [[nodiscard]] HullSurvey SurveyHull(const MotionGroup& group,
                                     std::span<const ParameterValues> samples,
                                     std::span<GroupProbe> probes);

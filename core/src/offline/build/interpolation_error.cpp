@@ -4,8 +4,8 @@
 #include <cmath>
 #include <vector>
 
-#include "offline/build/hull_survey.h"
 #include "offline/base/parallel.h"
+#include "offline/build/hull_survey.h"
 
 namespace stridewire {
 

@@ -6,24 +6,24 @@
 
 namespace stridewire {
 
-/// How far synthesized movements miss what was asked: e(p) = |p - a(p)| (paper, Section 4), over the
-/// hull of a group's examples.
+/// The error of synthesized movements, e(p) = |p - a(p)| (paper, Section 4), over the hull of the
+/// examples of a group.
 struct InterpolationError {
   double min_m = 0.0;
   double mean_m = 0.0;
   double max_m = 0.0;
   double corrected_mean_m = 0.0;
   double corrected_max_m = 0.0;           ///< After CorrectWeights, as when a movement starts.
-  double corrected_in_3_max_m = 0.0;      ///< The same after three rounds at most
-  double corrected_weight_sum_max = 0.0;  ///< Of |w|, corrected
-  double weight_sum_max = 0.0;            ///< Of |w|, uncorrected
-  int samples = 0;                        ///< What the means are over.
-  int iterations = 0;                     ///< The most a correction takes.
+  double corrected_in_3_max_m = 0.0;      ///< Same, with at most three iterations.
+  double corrected_weight_sum_max = 0.0;  ///< Largest sum of |w| after correction.
+  double weight_sum_max = 0.0;            ///< Largest sum of |w| without correction.
+  int samples = 0;                        ///< Number of points for the means.
+  int iterations = 0;                     ///< Limit on the iterations of a correction.
 };
 
-/// Samples the hull by seeded convex combinations (Dirichlet weighted, so that faces and corners are
-/// met too) plus the examples themselves, and climbs from the worst samples to the largest errors. Uses
-/// all processors; the result is the same with any number of them.
+/// Measures the error at the examples, at random convex combinations (see SampleHull), and at the
+/// peaks found by steepest ascent from the worst of them. Uses all processors; the result does not
+/// depend on their number.
 [[nodiscard]] InterpolationError MeasureInterpolationError(const MotionLibrary& library,
                                                            int group_index, int samples = 1000,
                                                            std::uint32_t seed = 1);

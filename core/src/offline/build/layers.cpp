@@ -12,7 +12,7 @@
 namespace stridewire {
 namespace {
 
-constexpr double kLeastLayerS = 0.1;
+constexpr double kMinLayerS = 0.1;
 
 std::vector<int> ChildrenOf(const Skeleton& skeleton, int joint,
                             const std::vector<bool>& left_out) {
@@ -24,7 +24,7 @@ std::vector<int> ChildrenOf(const Skeleton& skeleton, int joint,
   return children;
 }
 
-// Joints that follow each other alone from the root up: the spine, until arms or head branch off.
+// Returns the trunk: the longest chain of joints up from the root until arms and head branch off.
 std::vector<int> TrunkOf(const Skeleton& skeleton, const std::vector<bool>& of_legs) {
   std::vector<int> trunk;
   for (int j = 0; j < skeleton.joint_count(); ++j) {
@@ -35,7 +35,7 @@ std::vector<int> TrunkOf(const Skeleton& skeleton, const std::vector<bool>& of_l
       chain.push_back(next.front());
       next = ChildrenOf(skeleton, next.front(), of_legs);
     }
-    // A chain that ends without a branch is an arm, a tail or the like.
+    // A chain that ends without a branch is an arm or a tail.
     if (next.size() > 1 && chain.size() > trunk.size()) trunk = std::move(chain);
   }
   return trunk;
@@ -49,11 +49,12 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
     return Fail(code, text, Quoted(layer.name));
   };
   if (!IsLayerName(layer.name)) {
-    return fail(ErrorCode::kInvalidArgument, "a name is 1 to 32 of a-z, A-Z, 0-9, '_', '-', '.'");
+    return fail(ErrorCode::kInvalidArgument,
+                "expected a name of 1 to 32 characters a-z, A-Z, 0-9, '_', '-' or '.'");
   }
   const std::size_t joints = skeleton.joints.size();
   if (layer.weights.size() != joints || layer.clip.joint_count != skeleton.joint_count()) {
-    return fail(ErrorCode::kShapeMismatch, "the clip or its mask does not fit the skeleton");
+    return fail(ErrorCode::kShapeMismatch, "clip and mask must have the joints of the skeleton");
   }
   if (Status status = layer.clip.Validate(); !status) {
     return fail(status.error().code, status.error().text);
@@ -62,20 +63,20 @@ Status CheckLayer(const RawLayer& layer, const Skeleton& skeleton,
   for (std::size_t j = 0; j < joints; ++j) {
     const float weight = layer.weights[j];
     if (!(weight >= 0.0f && weight <= 1.0f)) {
-      return fail(ErrorCode::kOutOfRange, "its mask holds a weight not from 0 to 1");
+      return fail(ErrorCode::kOutOfRange, "expected weights from 0 to 1 in the mask");
     }
     if (weight > 0.0f && of_legs[j]) {
-      return Fail(ErrorCode::kInvalidArgument, "its mask touches the root or a leg",
+      return Fail(ErrorCode::kInvalidArgument, "the mask must not contain the root or a leg",
                   Quoted(layer.name) + ", joint " + skeleton.joints[j].name);
     }
     is_empty = is_empty && weight <= 0.0f;
   }
-  if (is_empty) return fail(ErrorCode::kInvalidArgument, "its mask holds no joint");
+  if (is_empty) return fail(ErrorCode::kInvalidArgument, "the mask contains no joint");
   if (layer.clip.duration_s() * kLayerKeysPerSecond > kMaxLayerFrames - 2) {
-    return fail(ErrorCode::kLimitExceeded, "is longer than ten minutes");
+    return fail(ErrorCode::kLimitExceeded, "the clip is longer than ten minutes");
   }
-  if (layer.is_looping && layer.clip.duration_s() < kLeastLayerS) {
-    return fail(ErrorCode::kOutOfRange, "is shorter than 0.1 s");
+  if (layer.is_looping && layer.clip.duration_s() < kMinLayerS) {
+    return fail(ErrorCode::kOutOfRange, "the loop is shorter than 0.1 s");
   }
   return {};
 }
@@ -102,7 +103,7 @@ Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
     const int joint = skeleton.FindJoint(name);
     if (joint < 0) return Fail(ErrorCode::kNotFound, "the skeleton has no such joint", name);
     if (of_legs[static_cast<std::size_t>(joint)]) {
-      return Fail(ErrorCode::kInvalidArgument, "a layer cannot move the root or a leg", name);
+      return Fail(ErrorCode::kInvalidArgument, "a layer cannot animate the root or a leg", name);
     }
     mask[static_cast<std::size_t>(joint)] = 1.0f;
   }
@@ -116,17 +117,17 @@ Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
 Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, const LayerCut& cut) {
   const std::string where = Quoted(cut.name) + ": " + capture.path;
   if (!SameJointTree(skeleton, capture.skeleton)) {
-    return Fail(ErrorCode::kShapeMismatch, "has another skeleton than the library",
+    return Fail(ErrorCode::kShapeMismatch, "the capture has another skeleton than the library",
                 where + ": " + TreeDifference(skeleton, "the library", capture.skeleton));
   }
   const double from_s = cut.from_s.value_or(capture.first_frame / capture.clip.fps);
   const double to_s = cut.to_s.value_or(capture.clip.duration_s());
-  // Times are written with two digits, and what is written should do.
+  // Tolerates times that were rounded to two decimals.
   if (!(from_s >= 0.0 && to_s <= capture.clip.duration_s() + 0.01)) {
-    return Fail(ErrorCode::kOutOfRange, "the times lie outside the capture", where);
+    return Fail(ErrorCode::kOutOfRange, "the times are outside the capture", where);
   }
-  if (!(to_s - from_s >= kLeastLayerS)) {
-    return Fail(ErrorCode::kOutOfRange, "a layer takes at least 0.1 s", where);
+  if (!(to_s - from_s >= kMinLayerS)) {
+    return Fail(ErrorCode::kOutOfRange, "a layer must take at least 0.1 s", where);
   }
   RawLayer layer;
   layer.name = cut.name;
@@ -143,7 +144,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
   layer.clip.Resize(intervals + 1, skeleton.joint_count());
   Pose tail(skeleton.joint_count());
   for (int f = 0; f <= intervals; ++f) {
-    // The loop's last frame is its first: where the blend begins.
+    // The last frame of a loop equals the first, where the blend begins.
     const double time_s = cut.is_looping && f == intervals ? 0.0 : f / layer.clip.fps;
     PoseSpan frame = layer.clip.frame(f);
     SampleClip(capture.clip, from_s + time_s, frame);
@@ -162,7 +163,7 @@ Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton, co
 
 Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers, const Skeleton& skeleton) {
   if (layers.size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kLimitExceeded, "a library holds at most 64 layers",
+    return Fail(ErrorCode::kLimitExceeded, "a library may have at most 64 layers",
                 static_cast<std::int64_t>(layers.size()));
   }
   const std::vector<bool> of_legs = JointsOfLegs(skeleton);
@@ -174,7 +175,7 @@ Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers, const Skele
     }
     for (const LayerClip& other : stored.views_) {
       if (other.name == layer.name) {
-        return Fail(ErrorCode::kInvalidArgument, "stands twice", Quoted(layer.name));
+        return Fail(ErrorCode::kInvalidArgument, "duplicate name", Quoted(layer.name));
       }
     }
     auto& content = *stored.contents_.emplace_back(std::make_unique<StoredLayers::Content>());
@@ -219,7 +220,7 @@ Expected<std::shared_ptr<const MotionLibrary>> AddLayers(const MotionLibrary& li
   }
   all.insert(all.end(), added->views().begin(), added->views().end());
   if (all.size() > static_cast<std::size_t>(kMaxLayerClips)) {
-    return Fail(ErrorCode::kLimitExceeded, "a library holds at most 64 layers",
+    return Fail(ErrorCode::kLimitExceeded, "a library may have at most 64 layers",
                 static_cast<std::int64_t>(all.size()));
   }
   return WriteLibrary({library.skeleton(), library.stand_pose(), library.groups(), all});

@@ -15,36 +15,38 @@
 
 namespace stridewire {
 
-inline constexpr double kLayerKeysPerSecond =
-    30.0;                                   ///< About: a loop holds a whole number of them.
-inline constexpr double kLoopBlendS = 0.4;  ///< The most that goes into closing a captured loop.
+/// Approximate number of keys per second; a loop contains a whole number of them.
+inline constexpr double kLayerKeysPerSecond = 30.0;
+inline constexpr double kLoopBlendS = 0.4;  ///< Longest blend that closes a captured loop.
 
-/// The mask of layers that name no joints, one weight a joint: everything but the root and the legs.
-/// Those of the k-th joint up the trunk, of n up to where arms or head branch off, are k / (n + 1), so
-/// that a clip's lean is spread over the spine; beyond, 1.
+/// Returns the default mask of layers, one weight per joint: 0 for the root and the legs, 1 for the
+/// upper body. On the n joints of the trunk below arms and head the weights rise evenly, k / (n +
+/// 1) for the k-th joint, so that the lean of a clip is distributed over the spine.
 [[nodiscard]] std::vector<float> UpperBodyMask(const Skeleton& skeleton);
 
-/// Weight 1 for the joints named and all that hangs on them. kNotFound: no joint of that name;
-/// kInvalidArgument: the root or a joint that legs hang on; `where` is the name.
+/// Returns a mask with weight 1 for the named joints and all joints below them. Errors, with the
+/// name in `where`: kNotFound if the joint does not exist, kInvalidArgument for the root or a joint
+/// above a leg.
 [[nodiscard]] Expected<std::vector<float>> MaskOfJoints(const Skeleton& skeleton,
                                                         std::span<const std::string> names);
 
-/// What of a capture becomes a layer, and how it is played.
+/// The part of a capture that becomes a layer, and how it plays.
 struct LayerCut {
   std::string name;
-  std::optional<double> from_s;  ///< Else the capture's first frame that is not artificial.
-  std::optional<double> to_s;    ///< Else its end.
+  std::optional<double> from_s;  ///< Empty: the first usable frame of the capture.
+  std::optional<double> to_s;    ///< Empty: the end of the capture.
   bool is_looping = true;
 };
 
-/// Cuts a layer out of a capture. A loop is closed by easing from its last kLoopBlendS (a quarter of
-/// it at most) into its first, and so is shorter by as much. The mask is UpperBodyMask().
-/// kShapeMismatch: other joints than the skeleton's; kInvalidArgument: not a name for a layer;
-/// kOutOfRange: times outside the capture, or less than 0.1 s. `where` says which and why.
+/// Cuts a layer out of a capture. To close a loop, its last kLoopBlendS (at most a quarter) are
+/// blended into its beginning, which shortens the loop by that time. The mask is UpperBodyMask().
+/// Errors, with details in `where`: kShapeMismatch if the joints differ from the skeleton,
+/// kInvalidArgument for an invalid name, kOutOfRange for times outside the capture or less than 0.1
+/// s.
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 
-/// Layers as a library has them: about kLayerKeysPerSecond, joints in the mask only.
+/// Layers in the form of a library: resampled to about kLayerKeysPerSecond, masked joints only.
 class StoredLayers {
  public:
   [[nodiscard]] std::span<const LayerClip> views() const { return views_; }
@@ -63,12 +65,14 @@ class StoredLayers {
   std::vector<LayerClip> views_;
 };
 
-/// Errors name the layer in `where`: kInvalidArgument: its name, a mask that touches the root or a leg
-/// or is empty, a name that stands twice; kShapeMismatch; kLimitExceeded.
+/// Converts layers. Errors, with the layer in `where`: kInvalidArgument for an invalid or duplicate
+/// name or a mask that is empty or touches the root or a leg; kShapeMismatch; kOutOfRange;
+/// kLimitExceeded.
 [[nodiscard]] Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers,
                                                  const Skeleton& skeleton);
 
-/// The library with layers added; those of the same name are replaced. Errors as StoreLayers.
+/// Returns a library with layers added; they replace layers with the same name. Errors as
+/// StoreLayers.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> AddLayers(
     const MotionLibrary& library, std::span<const RawLayer> layers);
 

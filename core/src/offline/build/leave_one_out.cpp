@@ -21,14 +21,14 @@ namespace {
 
 constexpr double kSameSite = 1e-9;
 
-// Averages of the examples but one, where they are near duplicates, as sites.
+// All examples except one, with near duplicates averaged to sites.
 struct Others {
   std::vector<int> examples;
   std::vector<std::vector<int>> clusters;
   std::vector<double> sites;  // [cluster][parameter]
 };
 
-Others AllBut(const MotionGroup& group, int left_out, double cluster_diameter_m) {
+Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_m) {
   Others others;
   std::vector<GridExample> points;
   for (int e = 0; e < group.example_count; ++e) {
@@ -52,16 +52,17 @@ Others AllBut(const MotionGroup& group, int left_out, double cluster_diameter_m)
   return others;
 }
 
-// The group with the others' sites: the same motion, weights of the left out one 0. What a site
-// stands for is a blend of examples: a blend of sites is one of them as well.
+// The group with sites made of the other examples. It keeps the motion of all examples, but the
+// weight of the one that is left out is 0. Each site stands for a blend of examples, so a blend of
+// sites is a blend of examples as well.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
   std::vector<double> radial;
-  MotionGroup group;  // spans into these
+  MotionGroup group;  // Spans into the other members.
 };
 
-// `shares` [site][example]: the blend each site stands for.
+// `shares` [site][example]: the blend that each site stands for.
 std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<const double> sites,
                                          std::span<const double> shares, bool is_smooth) {
   const std::vector<double> scales = ScalesOf(original);
@@ -69,7 +70,7 @@ std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<
   const std::size_t count = shares.size() / n;
   auto fitted = std::make_unique<GroupOfOthers>();
   if (is_smooth) {
-    auto wide = FitOverSmooth(sites, scales);
+    auto wide = FitSmoothBasis(sites, scales);
     if (!wide) return nullptr;
     fitted->basis = std::move(wide->basis);
   } else {
@@ -131,9 +132,9 @@ std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::
   return weights;
 }
 
-// One left-out movement by one method.
+// One left-out movement, synthesized by one method.
 struct Comparison {
-  bool is_there = false;
+  bool is_valid = false;
   PoseError pose;
   double foot_m = 0.0;
   double keytime_s = 0.0;
@@ -160,8 +161,8 @@ class Comparer {
         cache_(library.layout()),
         pose_(library.skeleton().joint_count()) {}
 
-  // Weights [example] as movements get them: brought onto the hull of the others, then corrected.
-  // Empty if they cannot be solved. `products`: MovementProducts.
+  // Returns the weights [example] that an avatar would use: with parameters projected onto the hull
+  // of the others, and corrected. Empty if they cannot be solved. `products`: see MovementProducts.
   std::vector<double> CardinalWeights(const Others& others, std::span<const double> products,
                                       std::span<const double> wanted) {
     const auto smoothness = ChooseSmoothness(group_, others.examples, products);
@@ -198,11 +199,11 @@ class Comparer {
     std::vector<double> one(weights.size());
     one[static_cast<std::size_t>(left_out)] = 1.0;
     const std::vector<Pose> truth = PosesAtGridPoints(group_, library_.layout(), one);
-    const std::vector<Pose> made = PosesAtGridPoints(group_, library_.layout(), weights);
+    const std::vector<Pose> synthesized = PosesAtGridPoints(group_, library_.layout(), weights);
     Comparison result;
-    const auto pose = comparison_.Measure(truth, made);
+    const auto pose = comparison_.Measure(truth, synthesized);
     if (!pose) return result;
-    result.is_there = true;
+    result.is_valid = true;
     result.pose = *pose;
     int feet = 0;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -210,16 +211,16 @@ class Comparer {
       ++feet;
       for (std::size_t i = 0; i < truth.size(); ++i) {
         result.foot_m += glm::length(BallPosition(library_.skeleton(), truth[i], foot) -
-                                     BallPosition(library_.skeleton(), made[i], foot)) /
+                                     BallPosition(library_.skeleton(), synthesized[i], foot)) /
                          static_cast<double>(truth.size());
       }
     }
     result.foot_m /= feet;
     const std::vector<double> true_keys = Keytimes(group_, one);
-    const std::vector<double> made_keys = Keytimes(group_, weights);
+    const std::vector<double> synthesized_keys = Keytimes(group_, weights);
     for (std::size_t k = 1; k < true_keys.size(); ++k) {
       result.keytime_s +=
-          std::fabs(true_keys[k] - made_keys[k]) / static_cast<double>(true_keys.size() - 1);
+          std::fabs(true_keys[k] - synthesized_keys[k]) / static_cast<double>(true_keys.size() - 1);
     }
     movement_.weights.assign(weights.begin(), weights.end());
     movement_.heading_change_rad = 0.0;
@@ -277,7 +278,7 @@ LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
   const std::vector<double> products =
       MovementProducts(group, library.layout(), library.skeleton());
   ParallelFor(group.example_count, 1, threads, [&](int e, int thread) {
-    const Others others = AllBut(group, e, cluster_diameter_m);
+    const Others others = OthersOf(group, e, cluster_diameter_m);
     Comparer& comparer = comparers[static_cast<std::size_t>(thread)];
     const std::vector<double> cardinal = comparer.CardinalWeights(others, products, group.site(e));
     if (cardinal.empty()) return;
@@ -286,11 +287,11 @@ LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
                                         comparer.Compare(e, NearestWeights(group, e, 1)),
                                         comparer.Compare(e, NearestWeights(group, e, d + 1))};
   });
-  for (const auto& methods : all) result.movements += methods[0].is_there ? 1 : 0;
+  for (const auto& methods : all) result.movements += methods[0].is_valid ? 1 : 0;
   if (result.movements == 0) return result;
   const double share = 1.0 / result.movements;
   for (const auto& methods : all) {
-    if (!methods[0].is_there) continue;
+    if (!methods[0].is_valid) continue;
     for (std::size_t m = 0; m < methods.size(); ++m) {
       AddTo(result.means[m], methods[m], share);
       result.wins[m] += methods[0].pose.mean_m < methods[m].pose.mean_m ? share : 0.0;

@@ -10,37 +10,38 @@
 
 namespace stridewire {
 
-/// Ways to make a movement of given parameters from examples.
+/// Methods that synthesize a movement with given parameters from examples.
 enum class BlendMethod : std::uint8_t {
-  kCardinal = 0,         ///< Ours: weights by cardinal basis functions (paper, Section 3).
-  kNearest = 1,          ///< The nearest example as it is.
-  kInverseDistance = 2,  ///< The nearest d + 1, weighted by 1 / distance, as blend spaces do.
+  kCardinal = 0,         ///< Weights by cardinal basis functions (paper, Section 3).
+  kNearest = 1,          ///< The nearest example without changes.
+  kInverseDistance = 2,  ///< The nearest d + 1 weighted by 1 / distance, as in blend spaces.
 };
 inline constexpr int kBlendMethodCount = 3;
-[[nodiscard]] std::string_view BlendMethodName(BlendMethod method);  ///< "cardinal", …
+/// Returns "cardinal", "nearest" or "inverse_distance".
+[[nodiscard]] std::string_view BlendMethodName(BlendMethod method);
 
-/// How far made movements are from captured ones, means over the movements.
+/// Mean differences between synthesized and captured movements.
 struct LeftOutMean {
-  double pose_m = 0.0;                          ///< Mean distance of joints at equal generic times
-  std::array<double, kBodyPartCount> part_m{};  ///< The same of a part's joints
-  double foot_m = 0.0;                          ///< Of the moving foot's ball; of both in a jump
-  double keytime_s = 0.0;                       ///< Of keytimes but the first
-  double parameter_m = 0.0;  ///< What is asked less what is made, largest difference
+  double pose_m = 0.0;                          ///< Distance of joints at equal generic times.
+  std::array<double, kBodyPartCount> part_m{};  ///< Same, for the joints of one part of the body.
+  double foot_m = 0.0;       ///< Distance of the ball of the moving foot; both feet in a jump.
+  double keytime_s = 0.0;    ///< Difference of keytimes, without the first.
+  double parameter_m = 0.0;  ///< Largest difference of a requested and a synthesized parameter.
 };
 
 struct LeaveOneOut {
   int movements = 0;
-  std::array<LeftOutMean, kBlendMethodCount> means;  ///< By BlendMethod
-  /// Share of the movements where ours is nearer to the truth than that method, 0 to 1.
+  std::array<LeftOutMean, kBlendMethodCount> means;  ///< Indexed by BlendMethod.
+  /// Share of the movements for which kCardinal is nearer to the capture than this method, 0 to 1.
   std::array<double, kBlendMethodCount> wins{};
 };
 
-/// Leaves each example of a group out, makes a movement of its parameters from the others and compares
-/// it with the example. Ours is made as avatars make it: near duplicates averaged (complete linkage, all
-/// parameters within `cluster_diameter_m`, a radian counts kMetresPerRadian), parameters brought onto
-/// the hull of the others grown by a tenth, then corrected. Distances between parameters are scaled as
-/// weights have it. Uses all processors, same result with any number of them. Nothing (movements 0)
-/// below three examples.
+/// Leaves out each example of a group, synthesizes a movement with its parameters from the others
+/// and compares it with the example. kCardinal works as in avatars: near duplicates are averaged
+/// (see CompleteLinkage; a radian counts as kMetresPerRadian), parameters are projected onto the
+/// hull of the others, grown by 10 %, and weights are corrected. Distances of parameters are scaled
+/// as for the weights. Uses all processors; the result does not depend on their number. Groups with
+/// fewer than three examples give an empty result (movements 0).
 [[nodiscard]] LeaveOneOut MeasureLeaveOneOut(const MotionLibrary& library, int group_index,
                                              double cluster_diameter_m = 0.05);
 

@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-constexpr std::size_t kEveryPoint = 2;  // of the grid; poses between are near their neighbours
+constexpr std::size_t kEveryPoint = 2;  // Every other grid point; the others are similar.
 
 }  // namespace
 
@@ -87,7 +87,7 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
       const std::size_t at = begin + 4 * j;
       float* q = &blend_.rows[at];
       const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      if (norm < 0.1f) {  // no mean: as one of them has it
+      if (norm < 0.1f) {  // The rotations cancel each other: uses those of the first example.
         for (std::size_t c = 0; c < 4; ++c) {
           q[c] = set.examples.front()->rows[at + c];
         }
@@ -96,11 +96,11 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
       for (std::size_t c = 0; c < 4; ++c) q[c] /= norm;
     }
   }
-  const std::vector<Vec3> made = JointPositions(blend_, layout_, skeleton_);
-  for (std::size_t i = 0; i < made.size(); ++i) {
-    error.pose_m += static_cast<double>(glm::length(made[i] - truth[i]));
+  const std::vector<Vec3> synthesized = JointPositions(blend_, layout_, skeleton_);
+  for (std::size_t i = 0; i < synthesized.size(); ++i) {
+    error.pose_m += static_cast<double>(glm::length(synthesized[i] - truth[i]));
   }
-  error.pose_m /= static_cast<double>(made.size());
+  error.pose_m /= static_cast<double>(synthesized.size());
   return error;
 }
 

@@ -10,37 +10,37 @@
 
 namespace stridewire {
 
-// How far a set of examples is from one that is not in it, when asked for its parameters.
+// The error with which a set of examples reproduces an example outside the set.
 struct LeftOutError {
-  double pose_m = 0.0;      // mean distance of joints at equal generic times
-  double miss_m = 0.0;      // of its parameters by the hull of the set, grown by 10 %
-  double outside_m = 0.0;   // the same of the hull itself
-  double duration_s = 0.0;  // made less its own
+  double pose_m = 0.0;      // Mean distance of joints at equal generic times.
+  double miss_m = 0.0;      // Distance of its parameters from the hull of the set, grown by 10 %.
+  double outside_m = 0.0;   // Distance from the hull itself.
+  double duration_s = 0.0;  // Synthesized minus original duration.
   [[nodiscard]] double worst_m() const { return pose_m > miss_m ? pose_m : miss_m; }
 };
 
-// Examples to blend, with their weights' basis as a library of them would have it. Borrows them.
+// Examples to blend, and the basis of their weights as in a library. Borrows the examples.
 struct BlendSet {
   std::vector<const GridExample*> examples;
   CardinalBasis basis;
   std::vector<double> sites;  // [example][parameter]
 };
 
-// Nothing if their weights cannot be solved, or without any example.
+// Returns nullopt if there is no example, or if the weights cannot be solved.
 [[nodiscard]] std::optional<BlendSet> MakeBlendSet(std::vector<const GridExample*> examples);
 
-// Joint positions of an example at every other grid point.
+// Returns the joint positions of an example at every other grid point.
 [[nodiscard]] std::vector<Vec3> JointPositions(const GridExample& example, const GridLayout& layout,
                                                const Skeleton& skeleton);
 
-// Compares what sets make with the truth. One thread's: it keeps scratch.
+// Measures how well sets reproduce left-out examples. Not thread-safe, since it has scratch memory.
 class LeftOutProbe {
  public:
-  // `units`: metres a unit of each parameter.
+  // `units`: metres per unit of each parameter.
   LeftOutProbe(const GridLayout& layout, const Skeleton& skeleton, std::span<const double> units)
       : layout_(layout), skeleton_(skeleton), units_(units.begin(), units.end()) {}
 
-  // `truth`: JointPositions of the target.
+  // `truth` must be the JointPositions of the target.
   [[nodiscard]] LeftOutError Measure(const BlendSet& set, const GridExample& target,
                                      std::span<const Vec3> truth);
 

@@ -10,10 +10,10 @@
 
 #include "offline/build/grid_cells.h"
 #include "offline/build/grid_example.h"
-#include "offline/build/select_examples.h"
-#include "offline/build/smooth_examples.h"
 #include "offline/build/layers.h"
 #include "offline/build/library_writer.h"
+#include "offline/build/select_examples.h"
+#include "offline/build/smooth_examples.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/weights/measure.h"
 
@@ -32,31 +32,34 @@ Status ValidateExample(const RawGroup& group, const RawExample& example, int joi
     return failed(status.error().code, status.error().text);
   }
   if (example.clip.joint_count != joint_count) {
-    return failed(ErrorCode::kShapeMismatch, "the clip has another joint count than the skeleton");
+    return failed(ErrorCode::kShapeMismatch, "clip and skeleton have different numbers of joints");
   }
   if (Status status = ValidateKeytimes(example.keytimes_s); !status) {
     return failed(status.error().code, status.error().text);
   }
   if (example.keytimes_s.size() != group.examples.front().keytimes_s.size()) {
-    return failed(ErrorCode::kShapeMismatch, "another number of keytimes than the group");
+    return failed(ErrorCode::kShapeMismatch,
+                  "the example has another number of keytimes than its group");
   }
   if (example.keytimes_s.back() > example.clip.duration_s() + 1e-6) {
-    return failed(ErrorCode::kOutOfRange, "the last keytime lies behind the end of the clip");
+    return failed(ErrorCode::kOutOfRange, "the last keytime is after the end of the clip");
   }
   if (example.parameters.size() != group.parameters.size()) {
-    return failed(ErrorCode::kShapeMismatch, "another number of parameters than the group");
+    return failed(ErrorCode::kShapeMismatch,
+                  "the example has another number of parameters than its group");
   }
   for (const double parameter : example.parameters) {
-    if (!std::isfinite(parameter))
-      return failed(ErrorCode::kOutOfRange, "a parameter is not finite");
+    if (!std::isfinite(parameter)) {
+      return failed(ErrorCode::kOutOfRange, "expected finite parameters");
+    }
   }
   if (!std::isfinite(example.heading_change_rad)) {
-    return failed(ErrorCode::kOutOfRange, "the heading change is not finite");
+    return failed(ErrorCode::kOutOfRange, "expected a finite heading change");
   }
   return {};
 }
 
-constexpr double kLeastSpread = 1e-6;
+constexpr double kMinSpread = 1e-6;
 
 struct ParameterRange {
   double min = HUGE_VAL;
@@ -80,19 +83,20 @@ ParameterRange RangeOf(const std::vector<GridExample>& examples, std::size_t l) 
   return range;
 }
 
-// With ranges of the examples, and their spreads as scales; centres are the basis's.
+// Returns parameters with the ranges of the examples and their spreads as scales, but without
+// centres.
 std::vector<Parameter> ParametersOf(const RawGroup& group,
                                     const std::vector<GridExample>& examples) {
   std::vector<Parameter> parameters;
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
     const ParameterRange range = RangeOf(examples, l);
-    const double scale = range.spread > kLeastSpread ? range.spread : 1.0;
+    const double scale = range.spread > kMinSpread ? range.spread : 1.0;
     parameters.push_back({group.parameters[l], range.min, range.max, 0.0, scale});
   }
   return parameters;
 }
 
-// A group's numbers, in the order a library has them.
+// Owns the numbers of a group, in the order in which a library stores them.
 struct StoredGroup {
   CardinalBasis basis;
   std::vector<int> cells;
@@ -124,7 +128,7 @@ struct StoredGroup {
     }
   }
 
-  // Without kind and parameters; without weights until there is a basis.
+  // Returns a view without kind and parameters. It has no weights until `basis` is set.
   [[nodiscard]] MotionGroup View() const {
     MotionGroup view;
     view.example_count = view.site_count = static_cast<int>(mirrored.size());
@@ -143,7 +147,8 @@ struct StoredGroup {
   }
 };
 
-// Makes the examples to be stored smooth in their parameters, by all found but outliers.
+// Replaces the selected examples by smooth functions of their parameters. Uses all examples except
+// outliers.
 std::optional<Smoothness> Smooth(const RawGroup& group, std::vector<GridExample> found,
                                  const GroupSelection& selection, const std::vector<int>& cells,
                                  const GridLayout& layout, const Skeleton& skeleton,
@@ -170,9 +175,10 @@ Status FitWeights(std::span<const double> scales, StoredGroup& stored) {
   return {};
 }
 
-// The same over smooth examples.
-Status FitWide(std::span<const double> scales, StoredGroup& stored, double& radius_factor) {
-  Expected<SmoothBasis> wide = FitOverSmooth(stored.sites, scales);
+// Same for smooth examples, with wider radii.
+Status FitSmoothWeights(std::span<const double> scales, StoredGroup& stored,
+                        double& radius_factor) {
+  Expected<SmoothBasis> wide = FitSmoothBasis(stored.sites, scales);
   if (!wide) return std::unexpected(wide.error());
   stored.basis = std::move(wide->basis);
   radius_factor = wide->radius_factor;
@@ -188,21 +194,23 @@ void NoteSelection(const GroupSelection& selection, std::size_t stored, const No
   }
   const int redundant = selection.Count(ExampleFate::kRedundant);
   if (redundant > 0) {
-    note(std::to_string(redundant) + " examples left out, which the " + std::to_string(stored) +
-         " stored make");
+    note(std::to_string(redundant) + " redundant examples dropped; the " + std::to_string(stored) +
+         " stored examples reproduce them");
   }
   for (const SelectedExample& example : selection.examples) {
     if (example.fate != ExampleFate::kOutlier) continue;
-    note(example.source + (example.mirrored ? ", mirrored" : "") + " left out: " + example.reason);
+    note(example.source + (example.mirrored ? ", mirrored" : "") +
+         " dropped as an outlier: " + example.reason);
   }
 }
 
 }  // namespace
 
-// Captured steps of equal parameters differ by centimetres and would make the weights jump, hence the
-// averages. On subject 16 a bound of 2.5 cm keeps a fifth of the straight steps and half of the general
-// ones, and steps left out come out as well as from all of them; 4 cm loses 5 to 10 %. Five deviations take
-// a recovery after a jump and the last step before a sharp turn; three take starts as well.
+// Averaging: captured steps with equal parameters differ by centimetres, which would make weights
+// jump. Bound: on subject 16 a bound of 2.5 cm keeps a fifth of the straight and half of the
+// general steps, and left-out steps are reproduced as well as with all steps; with 4 cm they are 5
+// to 10 % worse. Outliers: five deviations drop a recovery after a jump and the last step before a
+// sharp turn; three would also drop first steps.
 LibraryBuilder LibraryBuilder::Selecting() {
   LibraryBuilder builder;
   builder.cluster_diameter = 0.05;
@@ -217,11 +225,11 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
   if (Status status = raw.skeleton.Validate(); !status) return std::unexpected(status.error());
   const int joint_count = raw.skeleton.joint_count();
   if (static_cast<int>(raw.stand_pose.rotations.size()) != joint_count) {
-    return Fail(ErrorCode::kShapeMismatch, "the stand pose does not fit the skeleton");
+    return Fail(ErrorCode::kShapeMismatch, "stand_pose and skeleton have different joints");
   }
   const GridLayout layout(joint_count);
 
-  std::vector<std::unique_ptr<StoredGroup>> groups;  // what the views are of
+  std::vector<std::unique_ptr<StoredGroup>> groups;  // Own the data of `views`.
   std::vector<MotionGroup> views;
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
     const RawGroup& group = raw.groups[g];
@@ -249,7 +257,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     }
     const double diameter = std::max(cluster_diameter, 10.0 * kMinSiteDistance);
     Selected selected =
-        SelectExamples(found, units, diameter, selection, layout, raw.skeleton, group);
+        SelectExamplesJob{found, units, diameter, selection, layout, raw.skeleton, group}.Run();
     std::vector<GridExample> examples = std::move(selected.examples);
     selected.report.group = static_cast<int>(g);
     NoteSelection(selected.report, examples.size(), note);
@@ -262,7 +270,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
       selected.report.ridge = smoothness->ridge;
       selected.report.ridge_radius = smoothness->radius;
       char text[64];
-      std::snprintf(text, sizeof text, "made smooth in their parameters, ridge %g",
+      std::snprintf(text, sizeof text, "smoothed over their parameters, ridge %g",
                     smoothness->ridge);
       note(text);
     }
@@ -276,13 +284,13 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
     std::vector<double> scales;
     for (const Parameter& parameter : view.parameters) {
       scales.push_back(parameter.scale);
-      if (examples.size() > 1 && parameter.max - parameter.min <= kLeastSpread) {
+      if (examples.size() > 1 && parameter.max - parameter.min <= kMinSpread) {
         note(std::string(ParameterText(parameter.name)) +
-             " is the same in every example: asking for another value has no effect");
+             " is equal in all examples: requests for other values have no effect");
       }
     }
-    if (Status status =
-            smoothness ? FitWide(scales, stored, view.radius_factor) : FitWeights(scales, stored);
+    if (Status status = smoothness ? FitSmoothWeights(scales, stored, view.radius_factor)
+                                   : FitWeights(scales, stored);
         !status) {
       Error error = status.error();
       error.where = "group " + std::string(MovementKindName(group.kind));

@@ -70,7 +70,7 @@ flatbuffers::Offset<fb::Layer> AddLayer(Builder& builder, const LayerClip& layer
 
 Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent& content) {
   if (content.groups.empty()) {
-    return Fail(ErrorCode::kOutOfRange, "there is no example to build from");
+    return Fail(ErrorCode::kOutOfRange, "there are no examples to build a library from");
   }
   Builder builder(1 << 20);
   std::vector<flatbuffers::Offset<fb::Group>> groups;
@@ -98,7 +98,8 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   const auto groups_offset = builder.CreateVector(groups);
   std::vector<flatbuffers::Offset<fb::Layer>> layers;
   for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
-  // A library without layers has the bytes it had before there were any.
+  // Omits the field if there are no layers, so that such libraries keep the bytes of older
+  // versions.
   const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
   std::vector<fb::Transition> transitions;
   for (const Transition& t : FindTransitions(content)) {

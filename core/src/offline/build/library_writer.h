@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// What a library holds: views of whatever holds it meanwhile.
+/// The content of a library, as views that the caller must keep alive.
 struct LibraryContent {
   const Skeleton& skeleton;
   const Pose& stand_pose;
@@ -17,8 +17,8 @@ struct LibraryContent {
   std::span<const LayerClip> layers = {};
 };
 
-/// Puts a library together: the bytes of its file, opened again and so checked. Same content, same
-/// bytes. kOutOfRange: no group; else as MotionLibrary::FromBytes.
+/// Writes the bytes of a library file and opens them again, which validates them. The same content
+/// gives the same bytes. Errors: kOutOfRange without groups, or those of MotionLibrary::FromBytes.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(
     const LibraryContent& content);
 

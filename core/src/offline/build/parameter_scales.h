@@ -8,14 +8,15 @@
 
 namespace stridewire {
 
-// By what distances between parameters of a group are measured, in the order of its parameters.
+// Returns the scales by which distances between parameters are measured, in the order of
+// parameters.
 [[nodiscard]] inline std::vector<double> ScalesOf(const MotionGroup& group) {
   std::vector<double> scales;
   for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
   return scales;
 }
 
-// Between two points of a group's parameters [d], or more.
+// Returns the scaled distance of two points. `a` and `b` may have more than d values.
 [[nodiscard]] inline double ScaledDistance(const MotionGroup& group, std::span<const double> a,
                                            std::span<const double> b) {
   double sum = 0.0;

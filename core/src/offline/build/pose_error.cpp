@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-constexpr float kBesideM = 0.03f;
+constexpr float kSideMinM = 0.03f;
 
 std::vector<bool> SidedJoints(const Skeleton& skeleton) {
   const auto n = skeleton.joints.size();
@@ -23,7 +23,7 @@ std::vector<bool> SidedJoints(const Skeleton& skeleton) {
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
     x[j] = x[parent] + skeleton.joints[j].offset_m.x;
-    sided[j] = sided[parent] || std::fabs(x[j]) > kBesideM;
+    sided[j] = sided[parent] || std::fabs(x[j]) > kSideMinM;
   }
   return sided;
 }
@@ -38,7 +38,7 @@ std::string_view BodyPartName(BodyPart part) {
 std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton) {
   const auto n = skeleton.joints.size();
   std::vector<BodyPart> parts(n, BodyPart::kTrunk);
-  // What carries a leg and nothing else beside it (a joint between root and hip) is trunk.
+  // Joints between root and hip that carry only a leg belong to the trunk.
   std::vector<bool> above_hip(n, false);
   for (const Leg& leg : skeleton.legs) {
     for (int j = leg.hip; j > 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
@@ -64,7 +64,7 @@ std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton) {
   for (std::size_t j = 1; j < n; ++j) {
     const auto parent = static_cast<std::size_t>(skeleton.joints[j].parent);
     if (parts[j] != BodyPart::kTrunk || above_hip[j] || carries_arm[j]) continue;
-    // The root carries the arms as well: what hangs from it besides them is no head.
+    // The root carries the arms as well, but its other children are not heads.
     if (parts[parent] == BodyPart::kHead || (parent != 0 && carries_arm[parent])) {
       parts[j] = BodyPart::kHead;
     }
@@ -80,13 +80,13 @@ PoseComparison::PoseComparison(const Skeleton& skeleton)
 Expected<PoseError> PoseComparison::Measure(std::span<const Pose> truth,
                                             std::span<const Pose> other) {
   if (truth.empty() || truth.size() != other.size()) {
-    return Fail(ErrorCode::kShapeMismatch, "movements of unlike numbers of poses");
+    return Fail(ErrorCode::kShapeMismatch, "the movements have different numbers of poses");
   }
   PoseError error;
   std::array<double, kBodyPartCount> counts{};
   for (std::size_t p = 0; p < truth.size(); ++p) {
     if (truth[p].rotations.size() != parts_.size() || other[p].rotations.size() != parts_.size()) {
-      return Fail(ErrorCode::kShapeMismatch, "a pose of another number of joints", "",
+      return Fail(ErrorCode::kShapeMismatch, "a pose has a wrong number of joints", "",
                   static_cast<std::int64_t>(p));
     }
     ForwardKinematics(skeleton_, truth[p], positions_[0], rotations_);

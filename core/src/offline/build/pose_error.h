@@ -13,33 +13,35 @@
 
 namespace stridewire {
 
-/// Parts of a body whose errors are told apart.
+/// Parts of the body that are evaluated separately.
 enum class BodyPart : std::uint8_t { kTrunk = 0, kHead = 1, kArms = 2, kLegs = 3 };
 inline constexpr int kBodyPartCount = 4;
 
-/// "trunk", "head", "arms", "legs".
+/// Returns "trunk", "head", "arms" or "legs".
 [[nodiscard]] std::string_view BodyPartName(BodyPart part);
 
-/// The part each joint belongs to [joint]. Legs: the hips and all below them. Arms: of the rest what
-/// is on one side (FindMirrorJoints; without it, what sits more than 3 cm beside the root at identity
-/// rotations). Head: what is in the middle above the joint the arms hang from. Trunk: the rest.
+/// Returns the part of the body of each joint. Legs: the hips and all joints below them. Arms:
+/// other joints on one side, by FindMirrorJoints or else more than 3 cm from the root sideways at
+/// identity rotations. Head: joints in the middle above the joint where the arms branch off. Trunk:
+/// the rest.
 [[nodiscard]] std::vector<BodyPart> FindBodyParts(const Skeleton& skeleton);
 
-/// How far the joints of one movement are from those of another, metres.
+/// Distances between the joints of two movements, in metres.
 struct PoseError {
-  double mean_m = 0.0;                          ///< Over all joints and all poses.
-  std::array<double, kBodyPartCount> part_m{};  ///< The same over a part's joints; 0 without any.
-  double max_m = 0.0;                           ///< The furthest joint of all.
+  double mean_m = 0.0;                          ///< Mean over all joints and all poses.
+  std::array<double, kBodyPartCount> part_m{};  ///< Mean over one part; 0 if it has no joints.
+  double max_m = 0.0;                           ///< Largest distance of a joint.
 };
 
-/// Compares movements pose by pose. Both must be normalised (root at x = z = 0 and heading 0 at the
-/// start): no frame is fitted, so a root that goes astray counts. Borrows the skeleton. One thread's.
+/// Compares movements pose by pose. Both must be normalised: the root starts at x = z = 0 with
+/// heading 0. Poses are not aligned, so deviations of the root count. Borrows the skeleton. Not
+/// thread-safe.
 class PoseComparison {
  public:
   explicit PoseComparison(const Skeleton& skeleton);
 
-  /// Mean distance of equal joints over equal generic times. kShapeMismatch: another number of poses
-  /// or joints, or no pose.
+  /// Returns the distances of corresponding joints at equal generic times. Error: kShapeMismatch if
+  /// the numbers of poses or joints differ, or if there is no pose.
   [[nodiscard]] Expected<PoseError> Measure(std::span<const Pose> truth,
                                             std::span<const Pose> other);
 
@@ -52,13 +54,14 @@ class PoseComparison {
   std::vector<Quat> rotations_;
 };
 
-/// Poses of a normalised clip at the grid points of a group, cells[i] to keytime interval i: where
-/// Eq. (3) puts them with the example's own keytimes. `keytimes_s` has one value more than `cells`.
+/// Samples a normalised clip at the grid points of a group, at the times that Eq. (3) gives for the
+/// keytimes of the clip. `cells[i]` is the number of cells of keytime interval i. `keytimes_s` must
+/// have one more value than `cells`.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const Clip& clip,
                                                   std::span<const double> keytimes_s,
                                                   std::span<const int> cells);
 
-/// The same of a blend, from the origin with heading 0 whatever the movement's base is. `weights` [n].
+/// Same for a blend with `weights` [n]. It starts at the origin with heading 0.
 [[nodiscard]] std::vector<Pose> PosesAtGridPoints(const MotionGroup& group,
                                                   const GridLayout& layout,
                                                   std::span<const double> weights);

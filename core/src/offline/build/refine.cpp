@@ -6,26 +6,26 @@
 #include <optional>
 
 #include "offline/build/hull_survey.h"
-#include "offline/build/parameter_scales.h"
 #include "offline/build/library_writer.h"
+#include "offline/build/parameter_scales.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {
 
-// A pseudoexample is what it says to this: weights are floats, positions of feet then good to 1 um.
+// Residual of a pseudoexample. Weights are floats, which limits positions of feet to about 1 um.
 constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
-// The largest error must fall by a thousandth: less is the survey's own noise.
+// The largest error must decrease by this share; smaller changes are noise of the survey.
 constexpr double kMinGain = 1e-3;
-// Others than the survey's samples have larger sums of |w|, by as much as this leaves.
+// Margin for points between the samples, where the sum of |w| may be larger.
 constexpr double kSampledWeightShare = 0.96;
 constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;
 constexpr int kMaxChecks = 10;
 constexpr std::size_t kNearSamples = 60;
-constexpr std::size_t kHotSamples = 64;  // looked at first: most additions fail there
+constexpr std::size_t kHotSamples = 64;  // Checked first, since most additions fail there.
 
 // Sites of a group: its examples and the pseudoexamples found so far.
 struct Sites {
@@ -34,11 +34,11 @@ struct Sites {
   std::vector<double> radius_factors;
 };
 
-// A group with other sites than its library has: the same motion, its own weights.
+// The group with other sites than in its library: the same motion with new weights.
 struct Candidate {
   Sites sites;
   CardinalBasis basis;
-  MotionGroup group;  // spans into `sites` and `basis`
+  MotionGroup group;  // Spans into `sites` and `basis`.
 };
 
 Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Sites sites,
@@ -71,7 +71,7 @@ Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Site
   return candidate;
 }
 
-// The examples with radii `factor` times as wide as those of the library that was built.
+// Returns the examples as sites. Their radii are `factor` times those in the library.
 Sites ExamplesOf(const MotionGroup& group, double factor) {
   const auto n = static_cast<std::size_t>(group.example_count);
   const std::span<const double> examples = group.sites.first(n * group.parameters.size());
@@ -97,20 +97,20 @@ GroupQuality QualityOf(const HullSurvey& survey, double condition) {
           .condition = condition};
 }
 
-// One way to refine a group.
+// One pass of the amended rule.
 struct Pass {
   RadiusRule radii = RadiusRule::kExamples;
-  double radius_factor = 1.0;   // of the examples' radii
-  bool takes_anything = false;  // even what makes the largest error larger: it may fall later
-  bool tries_own_radii = true;  // of the new site
+  double radius_factor = 1.0;   // Factor on the radii of the examples.
+  bool accepts_any = false;     // Also adds sites that increase the error, which may fall later.
+  bool tries_own_radii = true;  // Tries several radii for a new site.
 };
 
-// In this order, until the error is reached.
+// Run in this order until the error is reached.
 constexpr std::array kAmendedPasses = {
     Pass{}, Pass{RadiusRule::kAllSites, 1.0, true, false}, Pass{RadiusRule::kAllSites, 1.0, true},
     Pass{RadiusRule::kExamples, 2.0}, Pass{RadiusRule::kExamples, 3.0}};
 
-// One group being refined.
+// Refines one group.
 class GroupRefiner {
  public:
   GroupRefiner(const MotionGroup& group, const RefineOptions& options, std::span<GroupProbe> probes,
@@ -151,7 +151,7 @@ class GroupRefiner {
         if (!wider) break;
         start = *wider;
         start_survey = SurveyHull(start->group, samples_, probes_);
-        // Wider still would only be worse.
+        // Even wider radii would only be worse.
         if (!IsWithinBounds(start_survey, start->basis.condition)) break;
       }
       Expected<Outcome> outcome = RunPass(pass, std::move(start), std::move(start_survey));
@@ -171,7 +171,7 @@ class GroupRefiner {
       if (best.report.end == RefineEnd::kErrorReached) break;
     }
     if (!is_bare && best.report.after.max_error_m > before.max_error_m) {
-      // Other samples say that none of it helped.
+      // With other samples, no pass improved the group.
       best.candidate = *plain;
       best.report = {.before = before,
                      .after = before,
@@ -183,7 +183,8 @@ class GroupRefiner {
   }
 
  private:
-  // Samples may miss a peak, and refinement works where they are: what is reported comes from others.
+  // Measures with other samples, since refinement improves the error at its own samples in
+  // particular and samples may miss a peak.
   void Verify(const MotionGroup& group, GroupQuality& quality) const {
     const std::vector<ParameterValues> others =
         SampleHull(group, 2 * options_.samples, options_.seed + kOtherSeed);
@@ -198,18 +199,18 @@ class GroupRefiner {
     return survey.weight_sum_max <= sampled_weight_sum_ && condition <= max_condition_;
   }
 
-  [[nodiscard]] bool Tell(double fraction) const {
+  [[nodiscard]] bool ReportProgress(double fraction) const {
     return !progress_ || progress_(done_ + share_ * std::min(1.0, fraction));
   }
 
-  // Where it is worst is looked at again, and new peaks rise beside the newest site.
-  void LookAround(const Candidate& current, const HullSurvey& survey) {
+  // Adds samples at the current peaks and around the newest site, where new peaks develop.
+  void AddNearSamples(const Candidate& current, const HullSurvey& survey) {
     for (const HullPoint& peak : survey.peaks) samples_.push_back(peak.p);
     const MotionGroup& group = current.group;
     const std::span<const double> site = group.site(group.site_count - 1);
     const double radius = 2.0 * group.dilations.back();
     for (std::size_t i = 0; i < kNearSamples; ++i) {
-      // Towards another point of the hull, so that it stays inside.
+      // Moves towards another point of the hull, so that the sample is inside the hull.
       const ParameterValues& other =
           samples_[(i * 7919) % static_cast<std::size_t>(options_.samples)];
       double squared = 0.0;
@@ -226,9 +227,9 @@ class GroupRefiner {
     }
   }
 
-  // Whether samples of another seed find an error that is too large; then the worst of them are kept
-  // and `survey` is made anew.
-  bool FindsMore(const Candidate& current, int check, HullSurvey& survey) {
+  // Returns true if samples of another seed find an error above the limit. Then it adds the worst
+  // of them to the samples and updates `survey`.
+  bool OtherSamplesFindMore(const Candidate& current, int check, HullSurvey& survey) {
     const std::vector<ParameterValues> others = SampleHull(
         current.group, 2 * options_.samples, options_.seed + static_cast<std::uint32_t>(check));
     const HullSurvey found = SurveyHull(current.group, others, probes_);
@@ -258,8 +259,8 @@ class GroupRefiner {
     for (int added = 0;; ++added) {
       if (survey.max_m < options_.max_error_m &&
           (is_bare || IsWithinBounds(survey, current->basis.condition))) {
-        // Samples may miss a narrow peak: others are asked as well, until they agree.
-        if (is_bare || checks >= kMaxChecks || !FindsMore(*current, ++checks, survey)) {
+        // The samples may miss a narrow peak, so other samples must agree.
+        if (is_bare || checks >= kMaxChecks || !OtherSamplesFindMore(*current, ++checks, survey)) {
           report.end = RefineEnd::kErrorReached;
           break;
         }
@@ -270,7 +271,7 @@ class GroupRefiner {
         report.end = RefineEnd::kCountReached;
         break;
       }
-      if (!Tell(static_cast<double>(added) / options_.max_pseudoexamples)) {
+      if (!ReportProgress(static_cast<double>(added) / options_.max_pseudoexamples)) {
         return Fail(ErrorCode::kUnsupported, "stopped");
       }
       std::shared_ptr<const Candidate> next =
@@ -280,13 +281,13 @@ class GroupRefiner {
         break;
       }
       current = std::move(next);
-      if (!is_bare) LookAround(*current, survey);
+      if (!is_bare) AddNearSamples(*current, survey);
       report.max_error_curve_m.push_back(survey.max_m);
       const bool is_better = survey.max_m < report.after.max_error_m &&
                              IsWithinBounds(survey, current->basis.condition);
       if (is_bare || is_better) keep();
     }
-    // What was added after the best did not help.
+    // Drops the sites that were added after the best state.
     const MotionGroup& group = outcome.candidate->group;
     const auto kept = static_cast<std::size_t>(group.site_count - group.example_count + 1);
     if (kept < report.max_error_curve_m.size()) {
@@ -304,7 +305,7 @@ class GroupRefiner {
     return outcome;
   }
 
-  // The sites with the pseudoexample (p^, w(p*)); empty where p* is not to be found.
+  // Returns the sites with the pseudoexample (p^, w(p*)) added, or nullopt if p* is not found.
   std::optional<Sites> WithPseudoexample(const Candidate& current, const ParameterValues& wanted,
                                          double radius_factor) {
     const Correction solved = probes_[0].Correct(current.group, wanted, kSolve);
@@ -319,7 +320,7 @@ class GroupRefiner {
     return sites;
   }
 
-  // The bare rule: at the largest error, whatever comes of it.
+  // The bare rule: adds a pseudoexample at the largest error, even if the error increases.
   std::shared_ptr<const Candidate> AddWorst(const Candidate& current, HullSurvey& survey,
                                             GroupRefinement& report) {
     for (const HullPoint& peak : survey.peaks) {
@@ -337,8 +338,9 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // The amended rule: at the largest errors, of the radii tried what makes the largest error least. Null
-  // if that is no less than now, unless the pass takes anything.
+  // The amended rule: adds a pseudoexample at one of the largest errors, with the radius that gives
+  // the smallest largest error. Returns null if the error would not decrease, unless the pass
+  // accepts that.
   std::shared_ptr<const Candidate> AddBest(const Pass& pass, const Candidate& current,
                                            HullSurvey& survey, GroupRefinement& report) {
     const std::vector<ParameterValues> hot = HotPoints(survey);
@@ -352,10 +354,10 @@ class GroupRefiner {
         if (!sites) break;
         const auto next = Fit(original_, *std::move(sites), pass.radii);
         if (!next || (*next)->basis.condition > max_condition_) continue;
-        const double below_m = best != nullptr       ? best_survey.max_m
-                               : pass.takes_anything ? HUGE_VAL
-                                                     : survey.max_m * (1.0 - kMinGain);
-        // Most fail where the error was large before.
+        const double below_m = best != nullptr    ? best_survey.max_m
+                               : pass.accepts_any ? HUGE_VAL
+                                                  : survey.max_m * (1.0 - kMinGain);
+        // Checks the hot samples first, where most candidates fail.
         const bool is_worse = std::any_of(hot.begin(), hot.end(), [&](const ParameterValues& p) {
           const HullPoint point = probes_[0].At((*next)->group, p);
           return point.error_m >= below_m || point.weight_sum > sampled_weight_sum_;
@@ -378,7 +380,7 @@ class GroupRefiner {
     return nullptr;
   }
 
-  // Peaks and the worst samples.
+  // Returns the peaks and the worst samples.
   static std::vector<ParameterValues> HotPoints(const HullSurvey& survey) {
     std::vector<ParameterValues> hot;
     for (const HullPoint& peak : survey.peaks) hot.push_back(peak.p);
@@ -394,7 +396,7 @@ class GroupRefiner {
   const RefineOptions& options_;
   std::span<GroupProbe> probes_;
   const std::function<bool(double)>& progress_;
-  std::vector<ParameterValues> samples_;  // of the hull, and peaks met on the way
+  std::vector<ParameterValues> samples_;  // Samples of the hull and peaks found so far.
   double max_weight_sum_ = kMaxRefinedWeightSum;
   double sampled_weight_sum_ = kMaxRefinedWeightSum;
   double max_condition_ = kMaxRefinedCondition;
@@ -416,14 +418,14 @@ std::string_view RefineEndText(RefineEnd end) {
 Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
                             const RefineOptions& options) {
   if (!(options.max_error_m >= 0.0 && options.max_error_m <= 1e3)) {
-    return Fail(ErrorCode::kOutOfRange, "max_error_m is not a number from 0 to 1000");
+    return Fail(ErrorCode::kOutOfRange, "max_error_m: expected a number from 0 to 1000");
   }
   if (options.max_pseudoexamples < 0 ||
-      options.max_pseudoexamples > RefineOptions::kMostPseudoexamples) {
-    return Fail(ErrorCode::kOutOfRange, "max_pseudoexamples is not from 0 to 1024");
+      options.max_pseudoexamples > RefineOptions::kMaxPseudoexamples) {
+    return Fail(ErrorCode::kOutOfRange, "max_pseudoexamples: expected 0 to 1024");
   }
-  if (options.samples < 1 || options.samples > RefineOptions::kMostSamples) {
-    return Fail(ErrorCode::kOutOfRange, "samples is not from 1 to 1000000");
+  if (options.samples < 1 || options.samples > RefineOptions::kMaxSamples) {
+    return Fail(ErrorCode::kOutOfRange, "samples: expected 1 to 1000000");
   }
   std::vector<GroupProbe> probes = MakeProbes(*library, options.threads);
   Refinement refinement;

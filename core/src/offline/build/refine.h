@@ -11,94 +11,101 @@
 
 namespace stridewire {
 
+/// How pseudoexamples are chosen.
 enum class RefineRule : std::uint8_t {
-  kAmended,  ///< Several ways are tried; only what makes the largest error smaller stays.
-  kBare,     ///< As the paper has it: radii from all sites, every pseudoexample is added.
+  kAmended,  ///< Tries several passes and keeps only what reduces the largest error.
+  kBare,     ///< The rule of the paper: radii from all sites; every pseudoexample is added.
 };
 
-/// What a site's radius is the distance to.
+/// Defines the radius of a site.
 enum class RadiusRule : std::uint8_t {
-  kExamples,  ///< Of an example the nearest other example, of a pseudoexample the nearest site.
-  kAllSites,  ///< The nearest other site: radii shrink as pseudoexamples come.
+  kExamples,  ///< Distance to the nearest other example; for a pseudoexample, to the nearest site.
+  kAllSites,  ///< Distance to the nearest other site. Pseudoexamples make radii shrink.
 };
 
-/// The amended rule keeps these, or what a group without pseudoexamples has if that is more.
-inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Of |w|, over the hull.
+/// Limits of the amended rule. A group that exceeds them without pseudoexamples keeps its own
+/// values.
+inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Sum of |w| over the hull.
 inline constexpr double kMaxRefinedCondition = 1e3;
-/// Pseudoexamples keep this distance from every site, in scaled parameters.
+/// Minimum distance of a pseudoexample from every site, in scaled parameters.
 inline constexpr double kMinPseudoexampleDistance = 0.03;
 
 struct RefineOptions {
   RefineRule rule = RefineRule::kAmended;
-  double max_error_m = 0.01;    ///< Below this a group is left as it is.
-  int max_pseudoexamples = 32;  ///< A group; 0 to kMostPseudoexamples.
-  int samples = 3000;           ///< Of the hull, 1 to kMostSamples.
+  double max_error_m = 0.01;    ///< Groups with smaller errors are not refined.
+  int max_pseudoexamples = 32;  ///< Per group; 0 to kMaxPseudoexamples.
+  int samples = 3000;           ///< Samples of the hull; 1 to kMaxSamples.
   std::uint32_t seed = 1;
-  int threads = 0;  ///< 0: one a processor. Changes no byte.
-  /// Told from time to time how much is done (0 to 1, at a guess); false ends the refinement. Called on
-  /// the thread that refines.
+  int threads = 0;  ///< 0: one per processor. Does not affect the result.
+  /// Called repeatedly, on the thread that called Refine, with the estimated share of the work that
+  /// is done, 0 to 1. Returns false to stop.
   std::function<bool(double)> progress;
 
-  static constexpr int kMostPseudoexamples = 1024;
-  static constexpr int kMostSamples = 1'000'000;
+  static constexpr int kMaxPseudoexamples = 1024;
+  static constexpr int kMaxSamples = 1'000'000;
 };
 
-/// What a group is like all over the hull of its examples: sampled, and climbed from the worst samples.
+/// Quality of a group over the hull of its examples, measured at samples and at the peaks found by
+/// steepest ascent from the worst samples.
 struct GroupQuality {
   double min_error_m = 0.0;
   double mean_error_m = 0.0;
   double max_error_m = 0.0;
-  double weight_sum_max = 0.0;  ///< Of |w|
-  double condition = 1.0;       ///< Of the radial part
+  double weight_sum_max = 0.0;  ///< Largest sum of |w|.
+  double condition = 1.0;       ///< Condition of the radial part.
 };
 
+/// Why the refinement of a group ended.
 enum class RefineEnd : std::uint8_t {
-  kErrorReached,  ///< Largest error below max_error_m.
-  kCountReached,  ///< max_pseudoexamples are there.
-  kNothingHelps,  ///< No further one makes the largest error smaller within the bounds.
+  kErrorReached,  ///< The largest error is below max_error_m.
+  kCountReached,  ///< The group has max_pseudoexamples.
+  kNothingHelps,  ///< No further pseudoexample reduces the largest error within the limits.
 };
+/// Returns "error_reached", "count_reached" or "nothing_helps".
 [[nodiscard]] std::string_view RefineEndText(RefineEnd end);
 
 struct GroupRefinement {
-  GroupQuality before;  ///< Without any pseudoexample; both over samples of their own
-  GroupQuality after;
-  double pseudoexample_error_m = 0.0;        ///< Largest e at a pseudoexample
-  RadiusRule radii = RadiusRule::kExamples;  ///< Of the way that led furthest, see Refine
-  double radius_factor = 1.0;                ///< Of all examples' radii
-  int rejected = 0;                          ///< Pseudoexamples found but not taken
-  std::vector<double> max_error_curve_m;     ///< [pseudoexamples + 1]: largest error with so many
+  GroupQuality before;  ///< Without pseudoexamples; measured with samples of another seed.
+  GroupQuality after;   ///< Same, with pseudoexamples.
+  double pseudoexample_error_m = 0.0;        ///< Largest error at a pseudoexample.
+  RadiusRule radii = RadiusRule::kExamples;  ///< Radius rule of the best pass, see Refine.
+  double radius_factor = 1.0;                ///< Factor on the radii of the examples.
+  int rejected = 0;                          ///< Number of tried and rejected pseudoexamples.
+  std::vector<double> max_error_curve_m;     ///< Largest error with 0, 1, ... pseudoexamples.
   RefineEnd end = RefineEnd::kErrorReached;
 };
 
 struct Refinement {
   std::shared_ptr<const MotionLibrary> library;
-  std::vector<GroupRefinement> groups;  ///< As in the library
+  std::vector<GroupRefinement> groups;  ///< In the order of the library.
 };
 
-/// Adds pseudoexamples, sites with weights instead of motion, where synthesized movements miss most
-/// what is asked (paper, Section 4):
+/// Adds pseudoexamples, which are sites with weights instead of motion, where the error of
+/// synthesized movements is largest (paper, Section 4):
 ///
 ///   repeat: p^ = argmax e over the hull V of the examples: samples, then steepest ascent
 ///           p* with a(p*) = p^ (CorrectWeights); add the site p^ with the weights w(p*); refit
-///   until max e < max_error_m, or enough of them are there
+///   until max e < max_error_m or the number of pseudoexamples is reached
 ///
-/// The bare rule shrinks every radius near a new site, and now and then the largest error grows. The
-/// amended one keeps the condition below kMaxRefinedCondition and the sum of |w| below
-/// kMaxRefinedWeightSum, and goes these ways until one reaches
-/// max_error_m; else the one with the smallest largest error counts, by samples of another seed:
+/// With the bare rule the radii near a new site shrink, and sometimes the largest error grows. The
+/// amended rule keeps the condition below kMaxRefinedCondition and the sum of |w| below
+/// kMaxRefinedWeightSum. It runs these passes until one reaches max_error_m. If none does, the pass
+/// with the smallest largest error, measured with samples of another seed, is used:
 ///
-///   1. the examples' radii stay as they are, a site is added only if the largest error falls
-///   2. radii shrink, any site is added, and those after the smallest largest error are dropped; first
-///      with the radii as they come, then with some tried for each new site
-///   3. as 1 with the examples' radii 2 and 3 times as wide (evenly spaced examples bear that)
+///   1. The radii of the examples are constant, and sites that do not reduce the error are
+///   rejected. 2. Radii shrink, and every site is added. At the end the sites after the best state
+///   are dropped.
+///      The pass is repeated with several radii tried for each new site.
+///   3. Like 1, with the radii of the examples 2 and 3 times as wide, which suits evenly spaced
+///      examples.
 ///
-/// Pseudoexamples already there are replaced.
+/// Replaces existing pseudoexamples.
 ///
-/// kOutOfRange: an option; kUnsupported, "stopped": `progress` said so.
+/// Errors: kOutOfRange for an option; kUnsupported, "stopped", if `progress` returned false.
 [[nodiscard]] Expected<Refinement> Refine(const std::shared_ptr<const MotionLibrary>& library,
                                           const RefineOptions& options = {});
 
-/// A group's quality as it stands, pseudoexamples included, or as if it had none.
+/// Measures the quality of a group, with its pseudoexamples or without them.
 [[nodiscard]] GroupQuality MeasureGroupQuality(const MotionLibrary& library, int group_index,
                                                bool with_pseudoexamples, int samples = 1000,
                                                std::uint32_t seed = 1);

@@ -5,20 +5,20 @@
 #include <cstdio>
 #include <numeric>
 
-#include "offline/build/example_clusters.h"
-#include "offline/build/left_out_error.h"
 #include "offline/base/parallel.h"
 #include "offline/base/statistics.h"
+#include "offline/build/example_clusters.h"
+#include "offline/build/left_out_error.h"
 
 namespace stridewire {
 namespace {
 
 constexpr std::size_t kOutlierExamplesMin = 8;
-constexpr std::size_t kOneIn = 10;             // examples may be an outlier
-constexpr double kInsideM = 1e-3;              // nearer to the hull is inside it
-constexpr double kDeviationOfMad = 1.4826;     // of a normal distribution
-constexpr double kLeastPoseDeviationM = 2e-3;  // spreads below these tell nothing
-constexpr double kLeastDurationDeviationS = 5e-3;
+constexpr std::size_t kExamplesPerOutlier = 10;
+constexpr double kInsideM = 1e-3;            // Points nearer to the hull count as inside.
+constexpr double kDeviationOfMad = 1.4826;   // Standard deviation per MAD if normal.
+constexpr double kMinPoseDeviationM = 2e-3;  // Smaller spreads are not significant.
+constexpr double kMinDurationDeviationS = 5e-3;
 
 std::string Text(const char* format, double a, double b) {
   char text[160];
@@ -26,7 +26,7 @@ std::string Text(const char* format, double a, double b) {
   return text;
 }
 
-// The examples of a group, or averages of them, with what comparing them takes.
+// The examples of a group, or averages of them, with the data needed to compare them.
 class Candidates {
  public:
   Candidates(const std::vector<GridExample>& examples, std::span<const double> units,
@@ -41,8 +41,8 @@ class Candidates {
 
   [[nodiscard]] int count() const { return static_cast<int>(examples_.size()); }
 
-  // Error of each target when made from the set; 0 where it is in the set, infinite if there are no
-  // weights.
+  // Returns the error of each example when it is reproduced from `set`. It is 0 for members of the
+  // set, and infinite if the weights cannot be solved.
   [[nodiscard]] std::vector<LeftOutError> Errors(const std::vector<int>& set) {
     std::vector<LeftOutError> errors(examples_.size());
     const std::optional<BlendSet> blend = Blend(set);
@@ -55,7 +55,7 @@ class Candidates {
     return errors;
   }
 
-  // Error of each of `of` when made from all the others of them.
+  // Returns the error of each example of `of` when it is reproduced from all the others of them.
   [[nodiscard]] std::vector<LeftOutError> LeaveOneOut(const std::vector<int>& of) {
     std::vector<LeftOutError> errors(of.size());
     ParallelFor(static_cast<int>(of.size()), 1, ThreadCount(0), [&](int k, int thread) {
@@ -70,7 +70,7 @@ class Candidates {
     return errors;
   }
 
-  // The one nearest to the mean parameters.
+  // Returns the example nearest to the mean parameters.
   [[nodiscard]] int Middle(std::span<const double> units) const {
     int best = 0;
     double nearest = HUGE_VAL;
@@ -101,12 +101,12 @@ class Candidates {
 
   const std::vector<GridExample>& examples_;
   std::vector<std::vector<Vec3>> truths_;
-  std::vector<LeftOutProbe> probes_;  // one a thread
+  std::vector<LeftOutProbe> probes_;  // One per thread.
 };
 
 struct Deviation {
   double usual = 0.0;
-  double one = 0.0;  // 1.4826 MAD
+  double one = 0.0;  // 1.4826 MAD.
 };
 
 Deviation DeviationOf(const std::vector<double>& values, double least) {
@@ -118,10 +118,10 @@ Deviation DeviationOf(const std::vector<double>& values, double least) {
   return deviation;
 }
 
-// Takes the outliers out of `left`, the worst first.
+// Removes the outliers from `left`, the worst first.
 void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidates,
                   double deviations, std::vector<int>& left, GroupSelection& report) {
-  const std::size_t most = examples.size() / kOneIn;
+  const std::size_t most = examples.size() / kExamplesPerOutlier;
   while (left.size() >= kOutlierExamplesMin && examples.size() - left.size() < most) {
     const std::vector<LeftOutError> errors = candidates.LeaveOneOut(left);
     std::vector<double> poses, durations;
@@ -129,8 +129,8 @@ void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidat
       poses.push_back(error.pose_m);
       durations.push_back(error.duration_s);
     }
-    const Deviation pose = DeviationOf(poses, kLeastPoseDeviationM);
-    const Deviation duration = DeviationOf(durations, kLeastDurationDeviationS);
+    const Deviation pose = DeviationOf(poses, kMinPoseDeviationM);
+    const Deviation duration = DeviationOf(durations, kMinDurationDeviationS);
     std::size_t worst = 0;
     double worst_by = deviations;
     bool by_duration = false;
@@ -150,20 +150,21 @@ void DropOutliers(const std::vector<GridExample>& examples, Candidates& candidat
     if (by_duration) {
       const double longer_s = -errors[worst].duration_s;
       dropped.reason = Text(
-          longer_s > 0.0 ? "takes %.2f s longer than the others make it, of %.2f s"
-                         : "takes %.2f s less than the others make it, of %.2f s",
+          longer_s > 0.0 ? "takes %.2f s longer than the others predict, with a duration of %.2f s"
+                         : "takes %.2f s less than the others predict, with a duration of %.2f s",
           std::fabs(longer_s), examples[static_cast<std::size_t>(left[worst])].keytimes_s.back());
     } else {
       dropped.reason = Text(
-          "its joints are %.3f m from what the others make of its parameters, where %.3f m is "
-          "usual",
+          "the mean distance of its joints from the prediction of the others is %.3f m, where "
+          "%.3f m is typical",
           errors[worst].pose_m, pose.usual);
     }
     left.erase(left.begin() + static_cast<std::ptrdiff_t>(worst));
   }
 }
 
-// As few candidates as make all others within the bound, ascending; `errors` of all from them.
+// Chooses few candidates that reproduce all others within the bound, sorted by index. `errors`
+// receives the errors of all candidates.
 std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units, double bound_m,
                            std::vector<LeftOutError>& errors) {
   std::vector<int> chosen = {candidates.Middle(units)};
@@ -182,7 +183,8 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
     chosen.insert(std::ranges::upper_bound(chosen, worst), worst);
     order.push_back(worst);
   }
-  // The first ones were added knowing little: whatever the later ones make as well can go.
+  // The first candidates were added with little knowledge; removes those that have become
+  // redundant.
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t k = 0; k < order.size() && chosen.size() > 1; ++k) {
@@ -204,9 +206,7 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
 
 }  // namespace
 
-Selected SelectExamples(const std::vector<GridExample>& examples, std::span<const double> units,
-                        double diameter, const SelectionOptions& options, const GridLayout& layout,
-                        const Skeleton& skeleton, const RawGroup& group) {
+Selected SelectExamplesJob::Run() const {
   Selected selected;
   selected.report.kind = group.kind;
   for (const GridExample& example : examples) {
@@ -219,7 +219,7 @@ Selected SelectExamples(const std::vector<GridExample>& examples, std::span<cons
     DropOutliers(examples, all, options.outlier_deviations, left, selected.report);
   }
 
-  // Near duplicates are spikes in the weights: average them at equal generic times.
+  // Near duplicates would cause spikes in the weights, so they are averaged at equal generic times.
   std::vector<GridExample> usable;
   for (const int i : left) usable.push_back(examples[static_cast<std::size_t>(i)]);
   std::vector<std::vector<int>> clusters = CompleteLinkage(usable, units, diameter);
@@ -245,14 +245,15 @@ Selected SelectExamples(const std::vector<GridExample>& examples, std::span<cons
       if (!is_chosen) {
         example.fate = ExampleFate::kRedundant;
         example.error_m = errors[c].pose_m;
-        example.reason = Text("those kept make it, or its average, within %.3f m (bound %.3f m)",
+        example.reason = Text("the stored examples reproduce it within %.3f m (limit %.3f m)",
                               errors[c].worst_m(), options.max_pose_error_m);
         continue;
       }
       example.example = static_cast<int>(found - chosen.begin());
       example.fate = others > 0 ? ExampleFate::kAveraged : ExampleFate::kKept;
       example.reason =
-          others > 0 ? "averaged with " + std::to_string(others) + " of its parameters" : "kept";
+          others > 0 ? "averaged with " + std::to_string(others) + " examples of similar parameters"
+                     : "kept";
     }
     if (is_chosen) {
       selected.clusters.push_back(clusters[c]);

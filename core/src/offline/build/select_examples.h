@@ -9,20 +9,32 @@
 
 namespace stridewire {
 
-// What is to be stored of a group, and why.
+// The examples of a group to be stored, and why.
 struct Selected {
-  std::vector<std::vector<int>> clusters;  // of examples to store as one, ascending
+  std::vector<std::vector<int>> clusters;  // Examples to be stored as one; sorted by index.
   std::vector<GridExample> examples;       // [cluster]
-  GroupSelection report;                   // all but `group`
+  GroupSelection report;                   // Everything except `group`.
 };
 
-// Chooses from the hemisphere-aligned examples of a group: outliers go, those within `diameter` of each
-// other are averaged, then as few of these as make all others within the bound: the worst made is added
-// until none is worse (forward), then whichever can be spared is (backward, in the order they came). The same
-// result with any number of threads.
-[[nodiscard]] Selected SelectExamples(const std::vector<GridExample>& examples,
-                                      std::span<const double> units, double diameter,
-                                      const SelectionOptions& options, const GridLayout& layout,
-                                      const Skeleton& skeleton, const RawGroup& group);
+// Selects the examples of a group to be stored:
+//
+//   1. Outliers are dropped.
+//   2. Examples within `diameter` of each other are averaged.
+//   3. Forward: the average that the chosen ones reproduce worst is added until all are within the
+//   bound. 4. Backward, in the order of adding: averages that the others reproduce are removed
+//   again.
+//
+// The result does not depend on the number of threads.
+struct SelectExamplesJob {
+  const std::vector<GridExample>& examples;  // With aligned hemispheres.
+  std::span<const double> units;             // Metres per unit of each parameter.
+  double diameter = 0.0;                     // Metres.
+  const SelectionOptions& options;
+  const GridLayout& layout;
+  const Skeleton& skeleton;
+  const RawGroup& group;
+
+  [[nodiscard]] Selected Run() const;
+};
 
 }  // namespace stridewire

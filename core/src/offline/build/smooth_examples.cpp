@@ -13,7 +13,6 @@
 #include "runtime/library/keytimes.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
-#include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
@@ -42,14 +41,14 @@ std::vector<double> SitesOf(const MotionGroup& group, std::span<const int> examp
   return sites;
 }
 
-// The inverse of [R + ridge I, A; A^T, 0], whose first columns hold r and a.
+// Inverse of [R + ridge I, A; A^T, 0]. Its first columns contain r and a.
 struct Kriging {
   std::vector<double> sites;  // [site][d]
   std::vector<double> scales;
   std::vector<double> centres;
   Eigen::MatrixXd inverse;
   double radius;
-  bool is_there = false;
+  bool is_valid = false;
 
   Kriging(std::vector<double> of_sites, std::vector<double> of_scales, const Smoothness& smoothness)
       : sites(std::move(of_sites)),
@@ -73,10 +72,10 @@ struct Kriging {
     const Eigen::PartialPivLU<Eigen::MatrixXd> decomposition(matrix);
     if (!(decomposition.rcond() > kSmallestReciprocalCondition)) return;
     inverse = decomposition.inverse();
-    is_there = inverse.allFinite();
+    is_valid = inverse.allFinite();
   }
 
-  // R(p), then A(p).
+  // Returns R(p) followed by A(p).
   [[nodiscard]] Eigen::VectorXd Functions(std::span<const double> p) const {
     const std::size_t d = scales.size();
     const std::size_t m = sites.size() / d;
@@ -96,8 +95,8 @@ struct Kriging {
     return functions;
   }
 
-  // Weights [site] at p as if site `left_out` were not there: the inverse without its row and
-  // column is that of the smaller matrix less a product of the two (block inversion).
+  // Returns the weights [site] at p without site `left_out`. By block inversion, the inverse
+  // without its row and column is the full inverse minus a product of both.
   [[nodiscard]] Eigen::VectorXd WeightsWithout(Eigen::Index left_out,
                                                std::span<const double> p) const {
     Eigen::VectorXd functions = Functions(p);
@@ -115,7 +114,7 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
                                              std::span<const int> examples,
                                              const Smoothness& smoothness) {
   const Kriging kriging(SitesOf(group, examples), ScalesOf(group), smoothness);
-  if (!kriging.is_there) return nullptr;
+  if (!kriging.is_valid) return nullptr;
   const std::size_t d = group.parameters.size();
   const std::size_t m = examples.size();
   const auto n = static_cast<std::size_t>(group.example_count);
@@ -188,7 +187,7 @@ std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group, std::span<c
   const std::size_t d = group.parameters.size();
   const std::size_t m = examples.size();
   const auto n = static_cast<std::size_t>(group.example_count);
-  if (m < static_cast<std::size_t>(kExamplesPerNumber) * (d + 1)) return std::nullopt;
+  if (m < static_cast<std::size_t>(kExamplesPerCoefficient) * (d + 1)) return std::nullopt;
   const std::vector<double> scales = ScalesOf(group);
   std::vector<double> metric;
   for (const double scale : scales) metric.push_back(1.0 / scale);
@@ -217,7 +216,7 @@ std::optional<Smoothness> ChooseSmoothness(const MotionGroup& group, std::span<c
     for (const double ridge : kRidges) {
       const Smoothness smoothness{ridge, radius};
       const Kriging kriging(sites, scales, smoothness);
-      if (!kriging.is_there) continue;
+      if (!kriging.is_valid) continue;
       double sum_m = 0.0;
       for (std::size_t i = 0; i < m; ++i) {
         const auto left_out = static_cast<Eigen::Index>(i);
@@ -266,21 +265,22 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   return smoothness;
 }
 
-Expected<SmoothBasis> FitOverSmooth(std::span<const double> sites, std::span<const double> scales) {
+Expected<SmoothBasis> FitSmoothBasis(std::span<const double> sites,
+                                     std::span<const double> scales) {
   const std::size_t d = scales.size();
   const std::size_t n = sites.size() / d;
   CardinalBasisFit fit{.parameter_count = static_cast<int>(d),
                        .example_count = static_cast<int>(n),
                        .sites = sites,
                        .scales = scales};
-  const auto as_near = [&]() -> Expected<SmoothBasis> {
+  const auto fit_default_radii = [&]() -> Expected<SmoothBasis> {
     fit.radius_factors = {};
     Expected<CardinalBasis> basis = fit.Run();
     if (!basis) return std::unexpected(basis.error());
     return SmoothBasis{*std::move(basis), 1.0};
   };
-  if (d < kWideFromParameters) return as_near();
-  MotionGroup group;  // as far as sampling its hull takes
+  if (d < kWideFromParameters) return fit_default_radii();
+  MotionGroup group;  // Contains only what SampleHull needs.
   group.parameters.resize(d);
   group.example_count = static_cast<int>(n);
   group.sites = sites;
@@ -291,7 +291,7 @@ Expected<SmoothBasis> FitOverSmooth(std::span<const double> sites, std::span<con
     fit.radius_factors = factors;
     Expected<CardinalBasis> basis = fit.Run();
     if (!basis || basis->condition >= kWideCondition) continue;
-    const bool is_sane = std::ranges::all_of(samples, [&](const ParameterValues& p) {
+    const bool is_within_bounds = std::ranges::all_of(samples, [&](const ParameterValues& p) {
       EvaluateWeights({basis->centres, basis->scales, basis->sites, basis->dilations, basis->linear,
                        basis->radial},
                       std::span(p.values).first(d), weights);
@@ -299,9 +299,9 @@ Expected<SmoothBasis> FitOverSmooth(std::span<const double> sites, std::span<con
       for (const double weight : weights) sum += std::fabs(weight);
       return sum <= kWideWeightSum;
     });
-    if (is_sane) return SmoothBasis{*std::move(basis), factor};
+    if (is_within_bounds) return SmoothBasis{*std::move(basis), factor};
   }
-  return as_near();
+  return fit_default_radii();
 }
 
 }  // namespace stridewire

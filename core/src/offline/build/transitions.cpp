@@ -10,7 +10,7 @@
 namespace stridewire {
 namespace {
 
-// Where joints are and how fast they go, seen from the ground below the root, along the heading.
+// Positions and velocities of the joints, relative to the ground below the root and the heading.
 struct Moment {
   int example = -1;
   std::vector<DVec3> joints_m;
@@ -34,7 +34,7 @@ class MomentReader {
 
   Moment Stand(const Pose& pose) {
     const std::vector<DVec3> joints_m = PointsOf(pose);
-    return {-1, Seen(joints_m, joints_m[0], 0.0, 0.0), std::vector<DVec3>(joints_m.size())};
+    return {-1, RelativeTo(joints_m, joints_m[0], 0.0, 0.0), std::vector<DVec3>(joints_m.size())};
   }
 
   Moment Start(const MotionGroup& group, int example) {
@@ -61,21 +61,21 @@ class MomentReader {
     return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
   }
 
-  // The velocity is that to the grid point `beside`, `away_s` later.
+  // The velocity is the difference to the grid point `beside`, which is `away_s` later.
   Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
                   double heading_rad, double ground_m) {
     const std::vector<DVec3> at = PointsOf(group, example, point);
     const DVec3 root_m = at[0];
-    Moment moment{example, Seen(at, root_m, heading_rad, ground_m),
-                  Seen(PointsOf(group, example, beside), root_m, heading_rad, ground_m)};
+    Moment moment{example, RelativeTo(at, root_m, heading_rad, ground_m),
+                  RelativeTo(PointsOf(group, example, beside), root_m, heading_rad, ground_m)};
     for (std::size_t j = 0; j < at.size(); ++j) {
       moment.velocities_m_s[j] = (moment.velocities_m_s[j] - moment.joints_m[j]) / away_s;
     }
     return moment;
   }
 
-  static std::vector<DVec3> Seen(std::vector<DVec3> points, const DVec3& root_m, double heading_rad,
-                                 double ground_m) {
+  static std::vector<DVec3> RelativeTo(std::vector<DVec3> points, const DVec3& root_m,
+                                       double heading_rad, double ground_m) {
     for (DVec3& point : points) {
       point = RotateYaw(-heading_rad, point - DVec3(root_m.x, ground_m, root_m.z));
     }

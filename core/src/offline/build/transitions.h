@@ -7,13 +7,14 @@
 
 namespace stridewire {
 
-/// Of a group at most this many examples, spread evenly, are looked at.
+/// Largest number of examples per group that are compared; larger groups are sampled evenly.
 inline constexpr int kMaxComparedExamples = 64;
 
-/// How the end of every group meets the start of every other, of itself and the stand:
-/// [from * (groups + 1) + to], the stand behind the groups. Of all pairs of an example that ends and one that
-/// starts (at most kMaxComparedExamples of a group) the one whose poses are nearest; the stand is its pose,
-/// at rest. Same content, same values. Source: method, "Transitions".
+/// Finds the best transition from every group to every group, where the standing pose counts as an
+/// additional group after the others: [from * (groups + 1) + to]. The best transition connects the
+/// example whose final pose is nearest to the initial pose of another (at most kMaxComparedExamples
+/// per group). The standing pose has velocity 0. The same content gives the same values.
+/// See docs/decisions/0015-transitions-are-computed-when-a-library-is-built.md.
 [[nodiscard]] std::vector<Transition> FindTransitions(const LibraryContent& content);
 
 }  // namespace stridewire

@@ -5,8 +5,9 @@
 
 namespace stridewire::builtin {
 
-/// A C1 curve through knots: cubic Hermite pieces. A knot without a slope gets the one that keeps
-/// the curve monotone between knots (PCHIP, Fritsch and Carlson 1980). Constant beyond its ends.
+/// A C1 curve of cubic Hermite segments through knots, constant beyond its ends. If a knot has no
+/// slope, it gets the one that keeps the curve monotone between knots (PCHIP, Fritsch and Carlson
+/// 1980).
 class Curve {
  public:
   struct Knot {
@@ -17,7 +18,8 @@ class Curve {
 
   Curve() : Curve({{0.0, 0.0}}) {}
 
-  /// `knots` in order of time, at least one; a knot less than 1e-9 s after its forerunner is left out.
+  /// `knots` must be non-empty and sorted by time. A knot less than 1e-9 s after its predecessor is
+  /// ignored.
   explicit Curve(const std::vector<Knot>& knots);
 
   [[nodiscard]] double At(double time_s) const;

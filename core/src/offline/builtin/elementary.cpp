@@ -5,7 +5,7 @@ namespace {
 
 constexpr double kLn2 = 0.69314718055994530942;
 
-// ln x: x = m 2^k with m in [0.75, 1.5), then 2 artanh((m - 1) / (m + 1)).
+// Returns ln x for x = m 2^k with m in [0.75, 1.5), using ln m = 2 artanh((m - 1) / (m + 1)).
 double Log(double x) {
   int k = 0;
   while (x >= 1.5) {
@@ -26,7 +26,7 @@ double Log(double x) {
 }  // namespace
 
 double Exp(double x) {
-  // e^x = (e^(x/64))^64; the series is short on |x| <= 20/64.
+  // e^x = (e^(x/64))^64; the series converges fast for |x| <= 20/64.
   const double y = x / 64.0;
   double sum = 1.0;
   for (int n = 14; n >= 1; --n) sum = 1.0 + sum * y / n;

@@ -8,7 +8,7 @@ namespace {
 struct JointRow {
   const char* name;
   int parent;
-  double x, y, z;  // metres in the parent's frame
+  double x, y, z;  // Metres in the frame of the parent.
 };
 
 constexpr double kShoulderOutM = 0.13 * kStatureM;

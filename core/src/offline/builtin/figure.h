@@ -8,24 +8,24 @@
 
 namespace stridewire::builtin {
 
-/// The generated figure: stature H = 1.75 m, segments as fractions of it after Drillis and Contini
-/// 1966 (in Winter, Biomechanics and Motor Control of Human Movement). Lengths in metres.
+/// The generated figure: stature H = 1.75 m, with segments as fractions of H (Drillis and Contini
+/// 1966, in Winter, Biomechanics and Motor Control of Human Movement). Lengths are in metres.
 inline constexpr double kStatureM = 1.75;
 inline constexpr double kThighM = 0.245 * kStatureM;
 inline constexpr double kShankM = 0.246 * kStatureM;
 inline constexpr double kAnkleHeightM = 0.039 * kStatureM;
 inline constexpr double kHeelBehindAnkleM = 0.06;
 inline constexpr double kBallAheadOfAnkleM = 0.13;
-inline constexpr double kToeM = 0.07;  ///< ball to toe tip
+inline constexpr double kToeM = 0.07;  ///< Distance from ball to toe tip.
 inline constexpr double kHipHalfWidthM = 0.085;
-inline constexpr double kAnkleHalfWidthM = 0.05;  ///< half the step width
+inline constexpr double kAnkleHalfWidthM = 0.05;  ///< Half the step width.
 inline constexpr double kStandingHipHeightM = 0.926;
 
 inline constexpr double kDegree = 0.017453292519943295;
 inline constexpr double kToeOutRad = 6.0 * kDegree;
 
-/// Joints of the figure, named as CMU's captures name theirs. The ball of the foot is the toe
-/// joint and lies in the plane of the sole, so that a flat foot turns about its contact point.
+/// Joints of the figure, with the names of the CMU captures. The ball of the foot is the toe joint.
+/// It is in the plane of the sole, so that a flat foot turns about its contact point.
 enum JointIndex : int {
   kHips,
   kLeftUpLeg,
@@ -53,11 +53,10 @@ enum JointIndex : int {
   kFigureJointCount
 };
 
-/// A T-pose facing +Z at identity rotations.
+/// Returns the skeleton: a T-pose facing +Z at identity rotations.
 [[nodiscard]] Skeleton MakeFigure();
 
-/// A pose under construction, in double precision. Rotations are local, the root's in the example's
-/// frame.
+/// A pose in double precision. Rotations are local; the root is in the frame of the example.
 struct FigurePose {
   DVec3 root_m = DVec3(0.0);
   std::array<DQuat, kFigureJointCount> rotations;
@@ -65,24 +64,26 @@ struct FigurePose {
   FigurePose() { rotations.fill(DQuat(1.0, 0.0, 0.0, 0.0)); }
 };
 
-/// +1 for the left side (+X), -1 for the right.
+/// Returns +1 for the left side (+X) and -1 for the right side.
 [[nodiscard]] constexpr double SideSign(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
-/// Rotations about the axes, radians. RotateX by a positive angle lowers the toes.
+/// Rotations about the axes, in radians. RotateX with a positive angle lowers the toes.
 [[nodiscard]] DQuat RotateX(double angle_rad);
 [[nodiscard]] DQuat RotateY(double angle_rad);
 [[nodiscard]] DQuat RotateZ(double angle_rad);
 
+/// Positions and rotations of all joints in the frame of the example.
 struct FigurePoints {
   std::array<DVec3, kFigureJointCount> positions_m;
-  std::array<DQuat, kFigureJointCount> rotations;  ///< in the example's frame
+  std::array<DQuat, kFigureJointCount> rotations;
 };
 
 [[nodiscard]] FigurePoints PointsOf(const Skeleton& figure, const FigurePose& pose);
 
-/// Centre of mass; segment masses and their centres from Winter's table.
+/// Returns the centre of mass, with masses and centres of the segments from Winter's table.
 [[nodiscard]] DVec3 BodyCentre(const Skeleton& figure, const FigurePose& pose);
 
+/// Converts a pose to single precision.
 void StorePose(const FigurePose& pose, PoseSpan out);
 
 }  // namespace stridewire::builtin

@@ -2,36 +2,36 @@
 
 #include <algorithm>
 
-#include "offline/builtin/elementary.h"
 #include "base/trig.h"
+#include "offline/builtin/elementary.h"
 
 namespace stridewire::builtin {
 namespace {
 
-constexpr double kClearanceM = 0.017;  // 15 mm, and what blending takes off it
+constexpr double kClearanceM = 0.017;  // 15 mm, plus what is lost by blending.
 constexpr double kLiftStepM = 0.004;
-constexpr double kLeastLiftM = -0.08;
-constexpr double kMostLiftM = 0.30;
+constexpr double kMinLiftM = -0.08;
+constexpr double kMaxLiftM = 0.30;
 
-// Landing on a lower step: toes first.
+// On a lower step the toes land first.
 constexpr double kToesFirstDropM = 0.1;
 constexpr double kToesFirstRad = -18.0 * kDegree;
-// A tread begins this far behind the ball of the foot that lands on it from below, and ends this far
-// ahead of the ball of a foot that leaves it downward.
+// A tread begins behind the ball of a foot that lands on it from below, and ends ahead of the ball
+// of a foot that leaves it downwards.
 constexpr double kEdgeBehindBallM = 0.15;
 constexpr double kEdgeAheadOfBallM = 0.03;
 constexpr double kEdgeClearanceM = 0.02;
 
-constexpr double kFootWidthM = 0.085;  // feet that pass each other stay this far apart
+constexpr double kFootWidthM = 0.085;  // Minimum distance of feet that pass each other.
 constexpr double kBowStepM = 0.005;
-constexpr double kMostBowM = 0.40;
+constexpr double kMaxBowM = 0.40;
 
 DVec3 Forward(Foot foot, double yaw_rad = 0.0) {
   const double yaw = yaw_rad + SideSign(foot) * kToeOutRad;
   return {Sin(yaw), 0.0, Cos(yaw)};
 }
 
-// From standing only half the push: the body is not yet moving.
+// A step from standing has half the push-off, since the body does not move yet.
 double ToeOffPitch(const StepTiming& timing) {
   if (!timing.start.standing()) return timing.start.toe_off_pitch_rad;
   return 0.5 * 68.0 * kDegree * Tanh(0.5 * timing.end.length_m / 0.5);
@@ -40,7 +40,7 @@ double ToeOffPitch(const StepTiming& timing) {
 Curve MakeFixedPitch(const StepTiming& timing) {
   const GaitState& start = timing.start;
   const GaitState& end = timing.end;
-  // Heels rise from the middle of single support on.
+  // The heel starts to rise in the middle of single support.
   const double heel_off_s = timing.toe_off_s + 0.42 * timing.swing_s();
   return Curve({{0.0, start.front_pitch_rad(), start.front_pitch_rate()},
                 {timing.toe_off_s, 0.0, 0.0},
@@ -82,13 +82,13 @@ Curve MakeToeRock(const StepTiming& timing) {
   return Curve({{0.0, 0.0, 0.0}, {timing.toe_off_s, rock, 1.9 * rock / timing.toe_off_s}});
 }
 
-// Angle of the toe joint in swing: what it has at toe-off fades to straight.
+// Returns the angle of the toe joint in swing: it decreases from its value at toe-off to straight.
 Curve MakeToeBend(const StepTiming& timing) {
   const double bend = ToeOffPitch(timing) - timing.start.toe_rock_rad;
   const double straight_s = timing.toe_off_s + 0.45 * timing.swing_s();
   const double strike = StrikePitch(timing);
   if (strike >= 0.0) return Curve({{timing.toe_off_s, bend, 0.0}, {straight_s, 0.0, 0.0}});
-  // Toes that land first lie flat then.
+  // Toes that land first are flat on the ground then.
   return Curve({{timing.toe_off_s, bend, 0.0},
                 {straight_s, 0.0, 0.0},
                 {timing.toe_off_s + 0.7 * timing.swing_s(), 0.0, 0.0},
@@ -101,24 +101,24 @@ DQuat FootRotation(Foot foot, double pitch_rad, double yaw_rad) {
   return RotateY(yaw_rad + SideSign(foot) * kToeOutRad) * RotateX(-pitch_rad);
 }
 
-FootPlace FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad, double toe_rock_rad,
-                       double yaw_rad) {
-  FootPlace place;
-  place.pitch_rad = pitch_rad;
-  place.yaw_rad = yaw_rad;
+FootPose FootOnGround(Foot foot, const DVec3& flat_ball_m, double pitch_rad, double toe_rock_rad,
+                      double yaw_rad) {
+  FootPose foot_pose;
+  foot_pose.pitch_rad = pitch_rad;
+  foot_pose.yaw_rad = yaw_rad;
   const DQuat rotation = FootRotation(foot, pitch_rad, yaw_rad);
   if (pitch_rad > 0.0) {
     const DVec3 heel =
         flat_ball_m - (kHeelBehindAnkleM + kBallAheadOfAnkleM) * Forward(foot, yaw_rad);
-    place.toe_pitch_rad = pitch_rad;
-    place.ankle_m = heel + rotation * DVec3(0.0, kAnkleHeightM, kHeelBehindAnkleM);
-    return place;
+    foot_pose.toe_pitch_rad = pitch_rad;
+    foot_pose.ankle_m = heel + rotation * DVec3(0.0, kAnkleHeightM, kHeelBehindAnkleM);
+    return foot_pose;
   }
-  place.toe_pitch_rad = -toe_rock_rad;
+  foot_pose.toe_pitch_rad = -toe_rock_rad;
   const DVec3 tip = flat_ball_m + kToeM * Forward(foot, yaw_rad);
   const DVec3 ball = tip - FootRotation(foot, -toe_rock_rad, yaw_rad) * DVec3(0.0, 0.0, kToeM);
-  place.ankle_m = ball + rotation * DVec3(0.0, kAnkleHeightM, -kBallAheadOfAnkleM);
-  return place;
+  foot_pose.ankle_m = ball + rotation * DVec3(0.0, kAnkleHeightM, -kBallAheadOfAnkleM);
+  return foot_pose;
 }
 
 DVec3 StandingBall(Foot foot) {
@@ -133,14 +133,14 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
       toe_rock_(MakeToeRock(timing)),
       toe_bend_(MakeToeBend(timing)) {
   fixed_ball_m_ = DVec3(StandingBall(OtherFoot(moving)).x, 0.0, 0.0);
-  // Lengths are measured at the balls as they are in the states, the front one raised.
+  // Lengths are measured between the balls in the states, where the front ball is raised.
   const StepShape& shape = timing.shape;
   start_ball_m_ = fixed_ball_m_ + shape.start_m - DVec3(0.0, 0.0, timing.start.front_ball_back_m());
   end_ball_m_ = fixed_ball_m_ + RotateY(shape.turn_rad) *
                                     (shape.end_m + DVec3(0.0, 0.0, timing.end.front_ball_back_m()));
 
   const double h = 1e-5;
-  const FootPlace toe_off = MovingBeforeToeOff(timing.toe_off_s);
+  const FootPose toe_off = MovingBeforeToeOff(timing.toe_off_s);
   toe_off_m_ = toe_off.ankle_m;
   toe_off_velocity_ = (toe_off_m_ - MovingBeforeToeOff(timing.toe_off_s - h).ankle_m) / h;
   const auto striking = [&](double time_s) {
@@ -153,47 +153,47 @@ FootPaths::FootPaths(Foot moving, const StepTiming& timing)
   RaiseSwingUntilClear();
 }
 
-FootPlace FootPaths::Fixed(double time_s) const {
+FootPose FootPaths::Fixed(double time_s) const {
   return FootOnGround(OtherFoot(moving_), fixed_ball_m_, fixed_pitch_.At(time_s), 0.0);
 }
 
-FootPlace FootPaths::MovingBeforeToeOff(double time_s) const {
+FootPose FootPaths::MovingBeforeToeOff(double time_s) const {
   return FootOnGround(moving_, start_ball_m_, moving_pitch_.At(time_s), toe_rock_.At(time_s));
 }
 
-FootPlace FootPaths::MovingInSwing(double time_s) const {
+FootPose FootPaths::MovingInSwing(double time_s) const {
   const double swing = timing_.swing_s();
   const double u = (time_s - timing_.toe_off_s) / swing;
   const double y0 = start_ball_m_.y, y1 = end_ball_m_.y, climb = y1 - y0;
-  // Downward the foot first goes out over the edge; upward it first rises.
+  // Downwards, the foot first moves out over the edge; upwards, it rises first.
   const double w = climb < 0.0   ? u + 0.6 * u * u * (1.0 - u)
                    : climb > 0.0 ? u - 0.6 * u * (1.0 - u) * (1.0 - u)
                                  : u;
   const double climbed = climb < 0.0 ? Ease((u - 0.45) / 0.55) : Ease(u / 0.6);
   const double u2 = w * w, u3 = u2 * w;
-  FootPlace place;
-  place.pitch_rad = moving_pitch_.At(time_s);
-  place.yaw_rad = timing_.shape.turn_rad * Ease((u - 0.1) / 0.8);
-  place.toe_pitch_rad = place.pitch_rad + toe_bend_.At(time_s);
+  FootPose foot_pose;
+  foot_pose.pitch_rad = moving_pitch_.At(time_s);
+  foot_pose.yaw_rad = timing_.shape.turn_rad * Ease((u - 0.1) / 0.8);
+  foot_pose.toe_pitch_rad = foot_pose.pitch_rad + toe_bend_.At(time_s);
   const DVec3 from = toe_off_m_ - DVec3(0.0, y0, 0.0), to = strike_m_ - DVec3(0.0, y1, 0.0);
-  place.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * from +
-                  (u3 - 2.0 * u2 + w) * swing * toe_off_velocity_ + (3.0 * u2 - 2.0 * u3) * to +
-                  (u3 - u2) * swing * strike_velocity_;
+  foot_pose.ankle_m = (2.0 * u3 - 3.0 * u2 + 1.0) * from +
+                      (u3 - 2.0 * u2 + w) * swing * toe_off_velocity_ + (3.0 * u2 - 2.0 * u3) * to +
+                      (u3 - u2) * swing * strike_velocity_;
   const double middle = 16.0 * u * u * (1.0 - u) * (1.0 - u);
-  place.ankle_m.y += y0 + climb * climbed + lift_m_ * middle;
-  place.ankle_m += bow_m_ * middle * SideSign(moving_) *
-                   (RotateY(0.5 * timing_.shape.turn_rad) * DVec3(1, 0, 0));
-  return place;
+  foot_pose.ankle_m.y += y0 + climb * climbed + lift_m_ * middle;
+  foot_pose.ankle_m += bow_m_ * middle * SideSign(moving_) *
+                       (RotateY(0.5 * timing_.shape.turn_rad) * DVec3(1, 0, 0));
+  return foot_pose;
 }
 
-FootPlace FootPaths::Moving(double time_s) const {
+FootPose FootPaths::Moving(double time_s) const {
   if (time_s <= timing_.toe_off_s) return MovingBeforeToeOff(time_s);
   if (time_s < timing_.heel_strike_s) return MovingInSwing(time_s);
   return FootOnGround(moving_, end_ball_m_, moving_pitch_.At(time_s), 0.0, timing_.shape.turn_rad);
 }
 
-// Height of the ground along the way: where the moving foot comes from, the fixed foot's tread, where
-// it goes to.
+// Returns the height of the ground at z: at the start of the moving foot, below the fixed foot, or
+// at the end of the moving foot.
 double FootPaths::GroundAt(double z_m) const {
   const auto edge = [](const DVec3& behind, const DVec3& ahead) {
     return behind.y < ahead.y ? ahead.z - kEdgeBehindBallM : behind.z + kEdgeAheadOfBallM;
@@ -203,19 +203,20 @@ double FootPaths::GroundAt(double z_m) const {
   return 0.0;
 }
 
-// How near the swinging foot comes to the fixed one, seen from above, heel to toe tip each.
+// Returns the smallest distance between the swinging and the fixed foot, seen from above, between
+// heel and toe tip.
 double FootPaths::NearestApproach() const {
   const Foot fixed = OtherFoot(moving_);
-  const auto points = [](Foot foot, const FootPlace& place, DVec3(&out)[5]) {
-    const DVec3 ahead = Forward(foot, place.yaw_rad);
+  const auto points = [](Foot foot, const FootPose& foot_pose, DVec3(&out)[5]) {
+    const DVec3 ahead = Forward(foot, foot_pose.yaw_rad);
     for (int k = 0; k < 5; ++k) {
-      out[k] = place.ankle_m + (-kHeelBehindAnkleM + 0.065 * k) * ahead;
+      out[k] = foot_pose.ankle_m + (-kHeelBehindAnkleM + 0.065 * k) * ahead;
       out[k].y = 0.0;
     }
   };
   DVec3 still[5], swinging[5];
   points(fixed, FootOnGround(fixed, fixed_ball_m_, 0.0, 0.0), still);
-  double nearest = kMostBowM;
+  double nearest = kMaxBowM;
   for (int i = 1; i < 20; ++i) {
     points(moving_, MovingInSwing(timing_.toe_off_s + 0.05 * i * timing_.swing_s()), swinging);
     for (const DVec3& a : still) {
@@ -227,9 +228,9 @@ double FootPaths::NearestApproach() const {
 
 void FootPaths::BowSwingAroundFixedFoot() {
   double best_m = 0.0, widest_m = 0.0;
-  for (bow_m_ = 0.0; bow_m_ < kMostBowM; bow_m_ += kBowStepM) {
+  for (bow_m_ = 0.0; bow_m_ < kMaxBowM; bow_m_ += kBowStepM) {
     const double nearest_m = NearestApproach();
-    if (nearest_m <= widest_m + 1e-3) continue;  // where the foot lands may be what is near
+    if (nearest_m <= widest_m + 1e-3) continue;  // The landing position may be the nearest one.
     widest_m = nearest_m;
     best_m = bow_m_;
     if (widest_m >= kFootWidthM) break;
@@ -242,11 +243,11 @@ void FootPaths::RaiseSwingUntilClear() {
   const double clearance = level ? kClearanceM : kEdgeClearanceM;
   const auto clear = [&] {
     for (int i = 5; i <= 85; ++i) {
-      const FootPlace place = MovingInSwing(timing_.toe_off_s + 0.01 * i * timing_.swing_s());
-      const DQuat foot = FootRotation(moving_, place.pitch_rad, place.yaw_rad);
-      const DQuat toes = FootRotation(moving_, place.toe_pitch_rad, place.yaw_rad);
-      const DVec3 heel = place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, -kHeelBehindAnkleM);
-      const DVec3 ball = place.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, kBallAheadOfAnkleM);
+      const FootPose foot_pose = MovingInSwing(timing_.toe_off_s + 0.01 * i * timing_.swing_s());
+      const DQuat foot = FootRotation(moving_, foot_pose.pitch_rad, foot_pose.yaw_rad);
+      const DQuat toes = FootRotation(moving_, foot_pose.toe_pitch_rad, foot_pose.yaw_rad);
+      const DVec3 heel = foot_pose.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, -kHeelBehindAnkleM);
+      const DVec3 ball = foot_pose.ankle_m + foot * DVec3(0.0, -kAnkleHeightM, kBallAheadOfAnkleM);
       const DVec3 tip = ball + toes * DVec3(0.0, 0.0, kToeM);
       const auto above = [&](const DVec3& point) { return point.y - GroundAt(point.z); };
       if (i >= 30 && (above(heel) < clearance || above(ball) < clearance)) return false;
@@ -254,8 +255,8 @@ void FootPaths::RaiseSwingUntilClear() {
     }
     return true;
   };
-  lift_m_ = kLeastLiftM;
-  while (!clear() && lift_m_ < kMostLiftM) lift_m_ += kLiftStepM;
+  lift_m_ = kMinLiftM;
+  while (!clear() && lift_m_ < kMaxLiftM) lift_m_ += kLiftStepM;
 }
 
 }  // namespace stridewire::builtin

@@ -3,15 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/trig.h"
 #include "offline/builtin/curve.h"
 #include "offline/builtin/elementary.h"
 #include "offline/builtin/figure.h"
-#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {
 
-// On stairs heels rise further, so that the ankle below a bent knee need not.
+// On stairs the heel rises further, so that the ankle below a bent knee can stay lower.
 constexpr double kRiseHeel_deg_m = 60.0;
 
 }  // namespace
@@ -19,8 +19,8 @@ constexpr double kRiseHeel_deg_m = 60.0;
 double ToWholeFrames(double time_s) { return std::floor(time_s * kClipFps + 0.5) / kClipFps; }
 
 double SteadyStepTime(double length_m) {
-  const double speed = Power(length_m / (0.463 * kStatureM), 1.0 / 0.43);  // statures a second
-  const double cadence = 129.6 * Power(speed, 0.57);                       // steps a minute
+  const double speed = Power(length_m / (0.463 * kStatureM), 1.0 / 0.43);  // Statures per second.
+  const double cadence = 129.6 * Power(speed, 0.57);                       // Steps per minute.
   return std::clamp(60.0 / cadence, 0.42, 0.75);
 }
 
@@ -48,16 +48,17 @@ GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
   state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   state.strike_pitch_rad = flat ? 0.0 : 22.0 * kDegree * Tanh(length_m / 0.5);
-  // Between 68 tanh(L / 0.5) and what keeps the poses of blended lengths nearest to their own.
+  // A compromise between 68 tanh(L / 0.5) and the pitch with the smallest errors of blended
+  // lengths.
   const Curve toe_off_deg({{0.0, 0.0}, {0.35, 30.0}, {0.55, 54.0}, {0.75, 61.5}, {0.9, 64.5}});
   state.toe_off_pitch_rad = (toe_off_deg.At(length_m) + kRiseHeel_deg_m * rise_m) * kDegree;
   state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
-  // Legs reach less high when the feet are apart; knees bend a little more than they must.
+  // The pelvis is lower when the feet are apart, with knees slightly more bent than necessary.
   const Curve drop({{0.0, 0.0}, {0.35, 0.003}, {0.55, 0.021}, {0.75, 0.0415}, {0.9, 0.075}});
   state.pelvis_drop_m = drop.At(length_m);
   const Curve ahead({{0.0, 0.02}, {0.35, 0.240}, {0.55, 0.405}, {0.75, 0.4955}, {0.9, 0.59}});
   state.pelvis_ahead_m = ahead.At(length_m);
-  // Peak to peak 7.0 cm at 0.7 m/s, 3.9 cm at 1.6 m/s (Orendurff et al. 2004).
+  // Peak to peak 7.0 cm at 0.7 m/s and 3.9 cm at 1.6 m/s (Orendurff et al. 2004).
   state.sway_m = 0.5 * (0.070 - (mean_speed - 0.7) / 0.9 * 0.031);
   return state;
 }

@@ -24,7 +24,8 @@ std::string Degrees(double angle_rad) {
   return std::to_string(static_cast<int>(std::floor(angle_rad / kDegree + 0.5)));
 }
 
-// "generated step 0.35 to 0.55 m", and what else is not that of walking straight ahead.
+// Returns for example "generated step 0.35 to 0.55 m" and appends what differs from a straight
+// step.
 std::string Describe(const StepShape& shape) {
   std::string text = "generated step " + Centimetres(std::fabs(shape.start_m.z)) + " to " +
                      Centimetres(shape.end_m.z) + " m";
@@ -41,12 +42,12 @@ std::string Describe(const StepShape& shape) {
 constexpr double kWalkTurnRad = 40.0 * kDegree;
 constexpr double kSpotTurnRad = 60.0 * kDegree;
 
-// How far aside the ball of a foot is that has turned outward on the spot.
+// Returns the sideways position of the ball of a foot that turned outwards on the spot.
 double OpenSide(double turn_rad) {
   return NaturalSide() + (0.26 - NaturalSide()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
 }
 
-// A group of left steps and its mirror image.
+// A group of left steps and the group of their mirror images.
 class Groups {
  public:
   explicit Groups(Names names)
@@ -70,12 +71,13 @@ class Groups {
   RawGroup left_, right_;
 };
 
-// `way` 1: up, -1: down. Two groups, since knees bend the more the further a foot is from level either
-// way, which no linear part follows through both.
-void AddClimbingSteps(double way, RawLibrary& library) {
+// Adds steps upwards (`direction` 1) or downwards (-1). They are separate groups, since knees bend
+// more with the distance from level in both directions, which a single linear part cannot
+// represent.
+void AddClimbingSteps(double direction, RawLibrary& library) {
   constexpr double kRiseM = 0.25;
   constexpr double kTurnRad = 35.0 * kDegree;
-  // Height of the moving above the fixed foot, before and after, in parts of kRiseM.
+  // Heights of the moving above the fixed foot at both ends, in units of kRiseM.
   struct Climb {
     double start, end;
   };
@@ -85,13 +87,13 @@ void AddClimbingSteps(double way, RawLibrary& library) {
                  ParameterName::kEndZ, ParameterName::kTurn});
   const auto add = [&](const Climb& climb, double start_z, double end_z, double turn_rad) {
     StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
-    shape.start_m.y = way * climb.start * kRiseM;
-    shape.end_m.y = way * climb.end * kRiseM;
+    shape.start_m.y = direction * climb.start * kRiseM;
+    shape.end_m.y = direction * climb.end * kRiseM;
     shape.turn_rad = turn_rad;
     shape.flat = true;
     groups.Add(library.skeleton, shape);
   };
-  // On stairs the other foot is a tread behind or ahead; on level ground it may be anywhere.
+  // On stairs the other foot is one tread away; on level ground the length varies more.
   const auto lengths = [](double height) {
     return height == 0.0 ? std::array{0.0, 0.5} : std::array{0.28, 0.42};
   };
@@ -100,7 +102,8 @@ void AddClimbingSteps(double way, RawLibrary& library) {
       for (const double end_z : lengths(climb.end)) add(climb, start_z, end_z, 0.0);
     }
     for (const double turn_rad : {kTurnRad, -kTurnRad}) add(climb, 0.3, 0.3, turn_rad);
-    // Knees bend with the square root of a height: between level and high the blend needs a middle.
+    // The bend of knees is proportional to the square root of the height, so the blend needs an
+    // example halfway between level and high.
     const Climb half{0.5 * climb.start, 0.5 * climb.end};
     if ((climb.start == 0.0) == (climb.end == 0.0)) {
       add(half, 0.3, 0.3, 0.0);
@@ -152,19 +155,20 @@ void AddTurningSteps(RawLibrary& library) {
     StepShape shape = StraightShape(Foot::kLeft, start_z, end_z);
     shape.start_m.x = start_x;
     shape.turn_rad = turn_rad;
-    // A foot that turns out and lands beside the other must stay clear of that one's heel.
+    // If the foot turns outwards and lands beside the other, it must not touch the heel of that
+    // foot.
     if (end_z == 0.0 && turn_rad > 0.0) shape.end_m.x = OpenSide(turn_rad);
     groups.Add(library.skeleton, shape);
   };
   for (const double start_m : kLengthsM) {
     for (const double end_m : kLengthsM) {
       const bool on_the_spot = start_m == 0.0 && end_m == 0.0;
-      for (const double way : {0.0, 1.0, -1.0}) {
-        add(NaturalSide(), start_m, end_m, way * (on_the_spot ? kSpotTurnRad : kWalkTurnRad));
+      for (const double side : {0.0, 1.0, -1.0}) {
+        add(NaturalSide(), start_m, end_m, side * (on_the_spot ? kSpotTurnRad : kWalkTurnRad));
       }
     }
   }
-  // On from there.
+  // Steps that continue after an outward turn.
   const double open_m = OpenSide(kSpotTurnRad);
   add(open_m, 0.0, 0.0, 0.0);
   add(open_m, 0.0, 0.0, kSpotTurnRad);

@@ -5,13 +5,12 @@
 
 namespace stridewire::builtin {
 
-/// The groups of general steps: `AddStraightSteps` first, which walks ahead, the others beside it.
-/// Each adds a group of left steps and one of their mirror images to `library`.
-void AddStraightSteps(RawLibrary& library);
+/// Each function adds a group of left steps and one of their mirror images to `library`.
+void AddStraightSteps(RawLibrary& library);  ///< start_z, end_z; must be added first.
 void AddBackwardSteps(RawLibrary& library);  ///< start_z, end_z
 void AddTurningSteps(RawLibrary& library);   ///< start_x, start_z, end_z, turn
 void AddSideSteps(RawLibrary& library);      ///< start_x, start_z, end_x, end_z
-/// start_y, start_z, end_y, end_z, turn; a pair of groups up, another down.
+/// start_y, start_z, end_y, end_z, turn. Adds two groups upwards and two downwards.
 void AddClimbingSteps(RawLibrary& library);
 
 }  // namespace stridewire::builtin

@@ -4,8 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "offline/builtin/figure.h"
 #include "base/trig.h"
+#include "offline/builtin/figure.h"
 
 namespace stridewire::builtin {
 namespace {
@@ -13,11 +13,12 @@ namespace {
 constexpr double kFps = 60.0;
 constexpr double kTwoPi = 6.283185307179586;
 
-// Shoulder, upper arm, forearm and hand follow each other; arms stick out sideways at identity.
+// Shoulder, upper arm, forearm and hand have successive indices. Arms point sideways at identity.
 std::size_t ShoulderOf(Foot side) { return side == Foot::kLeft ? kLeftShoulder : kRightShoulder; }
 
-// An arm: raised forward and away from the body, turned about itself (the elbow's plane; 0 bends it
-// forward, outward turns bend it up), bent at elbow and wrist. Radians.
+// Angles of an arm in radians: raised forwards (flexion) and sideways (abduction), turned about its
+// own axis, and bent at elbow and wrist. At outward_turn 0 the elbow bends forwards, outward turns
+// make it bend upwards.
 struct ArmAngles {
   double flexion = 0.0;
   double abduction = 0.0;
@@ -38,7 +39,8 @@ void SetArm(Foot side, const ArmAngles& arm, FigurePose& pose) {
   pose.rotations[shoulder + 3] = RotateY(-out * arm.wrist);
 }
 
-// `phase` runs from 0 to 1 over the loop: two swings, the hand following the forearm.
+// `phase` increases from 0 to 1 over the loop. The forearm swings twice, and the hand lags behind
+// it.
 FigurePose Waving(double phase) {
   const double swing = Sin(2.0 * kTwoPi * phase);
   const double behind = Sin(2.0 * kTwoPi * phase - 0.9);
@@ -54,7 +56,8 @@ FigurePose Waving(double phase) {
   return pose;
 }
 
-// Forearms level, hands a box's width apart, the back leaning against the load; breathing moves them.
+// The forearms are level, the hands a box apart, and the back leans against the load. The figure
+// breathes.
 FigurePose Carrying(double phase) {
   const double breath = Sin(kTwoPi * phase);
   FigurePose pose;
@@ -89,7 +92,7 @@ RawLayer MakeLoop(const char* name, double duration_s, PoseAt pose_at) {
   return layer;
 }
 
-void TakeArm(Foot side, RawLayer& layer) {
+void IncludeArm(Foot side, RawLayer& layer) {
   for (std::size_t i = 0; i < 4; ++i) layer.weights[ShoulderOf(side) + i] = 1.0f;
 }
 
@@ -97,13 +100,13 @@ void TakeArm(Foot side, RawLayer& layer) {
 
 void AddGestures(RawLibrary& library) {
   RawLayer wave = MakeLoop("wave", 1.2, Waving);
-  TakeArm(Foot::kRight, wave);
+  IncludeArm(Foot::kRight, wave);
   library.layers.push_back(std::move(wave));
 
   RawLayer carry = MakeLoop("carry", 3.0, Carrying);
-  TakeArm(Foot::kLeft, carry);
-  TakeArm(Foot::kRight, carry);
-  // Above, the back is the load's; below, the legs'.
+  IncludeArm(Foot::kLeft, carry);
+  IncludeArm(Foot::kRight, carry);
+  // The spine blends from the motion of the legs below to that of the load above.
   carry.weights[kLowerBack] = 0.25f;
   carry.weights[kSpine] = 0.5f;
   carry.weights[kSpine1] = 0.75f;

@@ -4,8 +4,8 @@
 
 namespace stridewire::builtin {
 
-/// Adds the figure's layers: "wave", the right arm raised and its forearm swung to and fro, and "carry",
-/// both forearms held ahead as under a box. Both are loops.
+/// Adds two looping layers: "wave" raises the right arm and swings its forearm, "carry" holds both
+/// forearms forward as if under a box.
 void AddGestures(RawLibrary& library);
 
 }  // namespace stridewire::builtin

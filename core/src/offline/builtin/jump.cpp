@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/trig.h"
 #include "offline/builtin/curve.h"
 #include "offline/builtin/elementary.h"
 #include "offline/builtin/figure.h"
@@ -12,7 +13,6 @@
 #include "offline/builtin/gait_state.h"
 #include "offline/builtin/leg_ik.h"
 #include "offline/builtin/step.h"
-#include "base/trig.h"
 #include "offline/builtin/upper_body.h"
 
 namespace stridewire::builtin {
@@ -22,12 +22,12 @@ constexpr double kGravity = 9.81;
 constexpr double kCrouchS = 0.45, kPushS = 0.28, kAbsorbS = 0.35, kStandUpS = 0.45;
 constexpr double kToeOffKneeRad = 24.0 * kDegree;
 
-/// A jump over a length, as curves of time.
+/// A jump over a length, described by curves over time.
 class JumpPath {
  public:
   JumpPath(const Skeleton& figure, double length_m) : figure_(figure), length_m_(length_m) {
-    // How far the centre falls below its height at toe-off follows from the pose at landing, whose
-    // curves need the times: three times round settles it to the frame.
+    // The height of the centre of mass at landing depends on the pose, whose curves depend on the
+    // times. Three iterations converge to the frame.
     double lower_m = 0.15;
     for (int i = 0; i < 3; ++i) {
       PlanTimes(lower_m);
@@ -63,7 +63,7 @@ class JumpPath {
       times_[i + 1] = times_[i] + ToWholeFrames(lengths[i]);
     for (double& time_s : times_) time_s = ToWholeFrames(time_s);
     const double flight_s = landing_s() - toe_off_s();
-    velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;  // so rounded, still that low
+    velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;  // For the rounded flight time.
   }
 
   void PlanBody() {
@@ -98,7 +98,7 @@ class JumpPath {
 
   void PlanFeet() {
     const double push_s = toe_off_s() - lowest_s();
-    // The ankles finish the push: near toe-off they rise almost as fast as the body.
+    // The ankles finish the push: at toe-off they rise almost as fast as the body.
     toe_off_pitch_rad_ = (36.0 + 11.0 * length_m_) * kDegree;
     const double rate = 0.75 * velocity_.y / kBallAheadOfAnkleM;
     push_pitch_ = Curve({{0.0, 0.0, 0.0},
@@ -108,13 +108,13 @@ class JumpPath {
     landing_pitch_ = Curve({{landing_s(), strike, -strike / 0.12}, {landing_s() + 0.09, 0.0, 0.0}});
   }
 
-  // The centre of the body: down and forward over the balls, off along a parabola, down again.
+  // Plans the centre of mass: down and forwards over the balls, a parabola in flight, down again.
   void PlanCentre() {
     const FigurePose standing = StandingPose();
     DVec3 rest = BodyCentre(figure_, standing);
-    rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;  // from the balls
+    rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;  // From the balls.
 
-    // Toe-off: the centre this far ahead of the balls, as high as the legs let it.
+    // At toe-off the centre is ahead of the balls and as high as the legs allow.
     const double toe_off_z = -0.02 + 0.19 * length_m_;
     const double low = CentreHeightAtKnee(toe_off_s(), toe_off_z, kToeOffKneeRad);
     toe_off_centre_ = DVec3(0.0, low, toe_off_z);
@@ -140,7 +140,8 @@ class JumpPath {
                              {end_s(), length_m_ + rest.z, 0.0}});
   }
 
-  // A leg in flight is led from the hip, by length and angle, so that it never gets out of reach.
+  // In flight, the length and angle of the leg from the hip are prescribed, so that it stays in
+  // reach.
   void PlanFlight() {
     const double h = 1e-4;
     const LegAim leave = AimAt(toe_off_s()), land = AimAt(landing_s());
@@ -162,27 +163,27 @@ class JumpPath {
   }
 
   struct LegAim {
-    double length_m, angle_rad;  // hip to ankle from the side; forward positive
+    double length_m, angle_rad;  // From hip to ankle, seen from the side; forward is positive.
   };
 
   [[nodiscard]] LegAim AimAt(double time_s) const {
     const FigurePose pose = PoseWithCentre(time_s, Centre(time_s));
-    const DVec3 leg =
-        Place(Foot::kLeft, time_s, pose).ankle_m - pose.root_m;  // hips beside the root
+    const DVec3 leg = PoseOfFoot(Foot::kLeft, time_s, pose).ankle_m -
+                      pose.root_m;  // The hips are at the root's z.
     return {std::sqrt(leg.y * leg.y + leg.z * leg.z), Atan2(leg.z, -leg.y)};
   }
 
-  // The centre trails the feet at landing.
+  // At landing the centre of mass is behind the feet.
   [[nodiscard]] double landing_z() const { return 0.84 * length_m_ - 0.08; }
 
-  // Height of the centre, `z_m` ahead, at which the legs on the ground have that knee angle.
+  // Returns the height of the centre of mass, `z_m` ahead, at which the legs have this knee angle.
   [[nodiscard]] double CentreHeightAtKnee(double time_s, double z_m, double knee_rad) const {
     double low = 0.5, high = 1.5;
     for (int i = 0; i < 28; ++i) {
       const double y = 0.5 * (low + high);
       const FigurePose pose = PoseWithCentre(time_s, DVec3(0.0, y, z_m));
       const DVec3 hip = pose.root_m + pose.rotations[kHips] * DVec3(kHipHalfWidthM, 0.0, 0.0);
-      const DVec3 leg = hip - Place(Foot::kLeft, time_s, pose).ankle_m;
+      const DVec3 leg = hip - PoseOfFoot(Foot::kLeft, time_s, pose).ankle_m;
       (std::sqrt(glm::dot(leg, leg)) < ReachAtKnee(knee_rad) ? low : high) = y;
     }
     return low;
@@ -196,7 +197,7 @@ class JumpPath {
     return toe_off_centre_ + velocity_ * t + DVec3(0.0, -0.5 * kGravity * t * t, 0.0);
   }
 
-  [[nodiscard]] FootPlace Place(Foot foot, double time_s, const FigurePose& pose) const {
+  [[nodiscard]] FootPose PoseOfFoot(Foot foot, double time_s, const FigurePose& pose) const {
     const DVec3 ball(StandingBall(foot).x, 0.0, 0.0);
     if (time_s <= toe_off_s()) {
       return FootOnGround(foot, ball, push_pitch_.At(time_s), 0.0);
@@ -206,16 +207,17 @@ class JumpPath {
     }
     const double u = (time_s - toe_off_s()) / (landing_s() - toe_off_s());
     const double angle = leg_angle_.At(u), length = leg_length_.At(u);
-    FootPlace place;
-    place.ankle_m = pose.root_m + DVec3(0.0, -length * Cos(angle), length * Sin(angle));
-    place.pitch_rad = flight_pitch_.At(u);
-    place.toe_pitch_rad = place.pitch_rad + flight_toe_bend_.At(u);
-    place.ankle_m.x = FootOnGround(foot, ball, place.pitch_rad, 0.0).ankle_m.x;
-    return place;
+    FootPose foot_pose;
+    foot_pose.ankle_m = pose.root_m + DVec3(0.0, -length * Cos(angle), length * Sin(angle));
+    foot_pose.pitch_rad = flight_pitch_.At(u);
+    foot_pose.toe_pitch_rad = foot_pose.pitch_rad + flight_toe_bend_.At(u);
+    foot_pose.ankle_m.x = FootOnGround(foot, ball, foot_pose.pitch_rad, 0.0).ankle_m.x;
+    return foot_pose;
   }
 
-  // Legs follow the root and move the centre themselves, so this is iterated; on the ground they
-  // take up a part of each shift, hence a little more than what is missing.
+  // Solves for the root iteratively, since the legs follow the root and move the centre of mass.
+  // Legs on the ground compensate a part of each shift, so each shift is 15 % larger than the
+  // error.
   [[nodiscard]] FigurePose PoseWithCentre(double time_s, const DVec3& centre_m) const {
     UpperBody body = StandingUpperBody();
     body.thorax_lean = lean_.At(time_s);
@@ -228,15 +230,15 @@ class JumpPath {
     pose.rotations[kHips] = RotateX(tilt);
     SetUpperBody(body, 0.0, 0.0, tilt, pose);
     for (int i = 0; i < 60; ++i) {
-      SolveLeg(Foot::kLeft, Place(Foot::kLeft, time_s, pose), pose);
-      SolveLeg(Foot::kRight, Place(Foot::kRight, time_s, pose), pose);
+      SolveLeg(Foot::kLeft, PoseOfFoot(Foot::kLeft, time_s, pose), pose);
+      SolveLeg(Foot::kRight, PoseOfFoot(Foot::kRight, time_s, pose), pose);
       DVec3 miss = centre_m - BodyCentre(figure_, pose);
-      miss.x = -pose.root_m.x;  // both sides are alike
+      miss.x = -pose.root_m.x;  // The jump is symmetric.
       pose.root_m += 1.15 * miss;
       if (glm::dot(miss, miss) < 1e-20) break;
     }
-    SolveLeg(Foot::kLeft, Place(Foot::kLeft, time_s, pose), pose);
-    SolveLeg(Foot::kRight, Place(Foot::kRight, time_s, pose), pose);
+    SolveLeg(Foot::kLeft, PoseOfFoot(Foot::kLeft, time_s, pose), pose);
+    SolveLeg(Foot::kRight, PoseOfFoot(Foot::kRight, time_s, pose), pose);
     return pose;
   }
 
@@ -244,7 +246,7 @@ class JumpPath {
   double length_m_;
   std::array<double, 6> times_{};
   Curve lean_, arm_, elbow_, push_pitch_, landing_pitch_;
-  Curve leg_length_, leg_angle_, flight_pitch_, flight_toe_bend_;  // over the flight's 0..1
+  Curve leg_length_, leg_angle_, flight_pitch_, flight_toe_bend_;  // Over the flight, 0 to 1.
   Curve centre_y_before_, centre_z_before_, centre_y_after_, centre_z_after_;
   DVec3 velocity_ = DVec3(0.0), toe_off_centre_ = DVec3(0.0);
   double toe_off_pitch_rad_ = 0.0;

@@ -4,10 +4,10 @@
 
 namespace stridewire::builtin {
 
-/// A standing jump forward over `length_m` (0.2..1.6), from standing to standing. Keytimes: start,
-/// lowest of the crouch, toe-off, landing, lowest of the absorption, end. The feet stay where they
-/// are until toe-off and from landing on; the centre of the body is led, in flight along its
-/// parabola, and the root solved for it.
+/// Generates a standing jump over `length_m` (0.2 to 1.6 m). Its keytimes are start, lowest point
+/// of the crouch, toe-off, landing, lowest point of the absorption and end. The feet stay in place
+/// before toe-off and after landing. The path of the centre of mass is prescribed, a parabola in
+/// flight, and the root is solved for it.
 [[nodiscard]] RawExample MakeJump(const Skeleton& figure, double length_m);
 
 }  // namespace stridewire::builtin

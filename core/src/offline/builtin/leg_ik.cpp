@@ -8,7 +8,7 @@
 namespace stridewire::builtin {
 namespace {
 
-// The rotation whose y axis is `up` and whose x axis is `left` (both unit, perpendicular).
+// Returns the rotation with y axis `up` and x axis `left`, which must be orthonormal.
 DQuat FromAxes(const DVec3& left, const DVec3& up) {
   const DVec3 forward = glm::cross(left, up);
   return glm::normalize(glm::quat_cast(glm::dmat3(left, up, forward)));
@@ -20,23 +20,24 @@ double ReachAtKnee(double knee_rad) {
   return std::sqrt(kThighM * kThighM + kShankM * kShankM + 2.0 * kThighM * kShankM * Cos(knee_rad));
 }
 
-void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose, double heading_rad) {
+void SolveLeg(Foot foot, const FootPose& target, FigurePose& pose, double heading_rad) {
   const std::size_t hip = foot == Foot::kLeft ? kLeftUpLeg : kRightUpLeg;
   const double side = SideSign(foot);
   const DQuat pelvis = pose.rotations[kHips];
   const DVec3 hip_m = pose.root_m + pelvis * DVec3(side * kHipHalfWidthM, 0.0, 0.0);
-  const DVec3 to_hip = hip_m - place.ankle_m;
+  const DVec3 to_hip = hip_m - target.ankle_m;
   const double least = std::fabs(kThighM - kShankM) + 1e-6;
   const double distance =
       std::clamp(std::sqrt(glm::dot(to_hip, to_hip)), least, ReachAtKnee(1.0 * kDegree));
   const DVec3 up = to_hip / std::sqrt(glm::dot(to_hip, to_hip));
-  const double knee_yaw = 0.5 * (place.yaw_rad + heading_rad) + side * kToeOutRad;
+  const double knee_yaw = 0.5 * (target.yaw_rad + heading_rad) + side * kToeOutRad;
   const DVec3 ahead(Sin(knee_yaw), 0.0, Cos(knee_yaw));
   DVec3 left = glm::cross(up, ahead);
   left /= std::sqrt(glm::dot(left, left));
   const DVec3 forward = glm::cross(left, up);
 
-  // Angle at the hip between the thigh and the line to the ankle, by the law of cosines.
+  // The angle at the hip between the thigh and the line to the ankle follows from the law of
+  // cosines.
   const double at_hip = Acos((kThighM * kThighM + distance * distance - kShankM * kShankM) /
                              (2.0 * kThighM * distance));
   const double at_ankle = Acos((kShankM * kShankM + distance * distance - kThighM * kThighM) /
@@ -45,11 +46,11 @@ void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose, double headin
   const DVec3 shank_up = Cos(at_ankle) * up + Sin(at_ankle) * forward;
   const DQuat thigh = FromAxes(left, thigh_up);
   const DQuat shank = FromAxes(left, shank_up);
-  const DQuat sole = FootRotation(foot, place.pitch_rad, place.yaw_rad);
+  const DQuat sole = FootRotation(foot, target.pitch_rad, target.yaw_rad);
   pose.rotations[hip] = glm::conjugate(pelvis) * thigh;
   pose.rotations[hip + 1] = glm::conjugate(thigh) * shank;
   pose.rotations[hip + 2] = glm::conjugate(shank) * sole;
-  pose.rotations[hip + 3] = RotateX(place.pitch_rad - place.toe_pitch_rad);
+  pose.rotations[hip + 3] = RotateX(target.pitch_rad - target.toe_pitch_rad);
 }
 
 }  // namespace stridewire::builtin

@@ -5,13 +5,13 @@
 
 namespace stridewire::builtin {
 
-/// Distance from hip to ankle with the knee bent by that angle (0: straight), metres.
+/// Returns the distance from hip to ankle in metres for a knee angle (0: straight).
 [[nodiscard]] double ReachAtKnee(double knee_rad);
 
-/// Turns hip, knee, ankle and toe joint of one leg so that the foot is at `place`. The knee is a
-/// hinge about its x axis and points where the foot does, or half-way between the foot and
-/// `heading_rad` where the body has turned over it. Out of reach the leg is all but straight
-/// and the foot falls short.
-void SolveLeg(Foot foot, const FootPlace& place, FigurePose& pose, double heading_rad = 0.0);
+/// Sets the rotations of hip, knee, ankle and toe joint of one leg such that the foot has the pose
+/// `target`. The knee is a hinge about its x axis and points in the direction of the foot. If the
+/// body has turned relative to the foot, it points halfway between the foot and `heading_rad`. If
+/// the pose is out of reach, the leg is almost straight and the foot does not reach it.
+void SolveLeg(Foot foot, const FootPose& target, FigurePose& pose, double heading_rad = 0.0);
 
 }  // namespace stridewire::builtin

@@ -4,25 +4,26 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/trig.h"
 #include "offline/builtin/elementary.h"
 #include "offline/builtin/leg_ik.h"
-#include "base/trig.h"
 
 namespace stridewire::builtin {
 namespace {
 
 constexpr int kSamples = 161;
-constexpr double kLeastKneeRad = 4.0 * kDegree;
+constexpr double kMinKneeRad = 4.0 * kDegree;
 constexpr double kYawRad = 5.0 * kDegree;
 constexpr double kRollRad = 4.0 * kDegree;
 constexpr double kTiltRad = 1.5 * kDegree;
 
-// In the states pelvis and feet must be as anybody who passes through the state expects them, so only
-// the balls' places count: midway between the feet, and ahead of where the rear ankle is when flat.
+// All steps through a state must have the same pelvis there. Therefore it depends only on the
+// balls: it is midway between the feet sideways, and ahead of the rear ankle as if that foot were
+// flat.
 constexpr double kMiddleShare = 0.5;
 
 struct Ends {
-  DVec3 start;  // pelvis, y not used
+  DVec3 start;  // Positions of the pelvis; y is not used.
   DVec3 end;
   DVec3 end_velocity;
 };
@@ -55,9 +56,10 @@ Curve MakeSway(Foot moving, const StepTiming& timing) {
   const GaitState& end = timing.end;
   const double toward_fixed = SideSign(OtherFoot(moving));
   double sway = 0.5 * (start.sway_m + end.sway_m);
-  if (start.standing() || end.standing())
-    sway = 0.036;  // the weight has to come over one foot without any swing
-  // A foot that goes far aside needs a body that leans the other way first.
+  if (start.standing() || end.standing()) {
+    sway = 0.036;  // The weight must move over one foot without momentum.
+  }
+  // Before a foot moves far sideways, the body leans to the other side.
   const double natural = 2.0 * StandingBall(Foot::kLeft).x;
   sway += 0.2 * std::max(0.0, std::fabs(timing.shape.end_m.x) - natural);
   const double middle_s = timing.toe_off_s + (start.standing() ? 0.3 : 0.5) * timing.swing_s();
@@ -69,7 +71,7 @@ Curve MakeSway(Foot moving, const StepTiming& timing) {
                 {timing.end_s, 0.0, -toward_fixed * rate(end)}});
 }
 
-// The side whose leg is ahead is ahead: a positive yaw brings the right side forward.
+// The side of the leading leg is forward. A positive yaw moves the right side forwards.
 Curve MakeYaw(Foot moving, const StepTiming& timing) {
   const double to_right = SideSign(moving);
   return Curve({{0.0, to_right * kYawRad * timing.start.vigour, 0.0},
@@ -88,7 +90,8 @@ Curve MakeRoll(Foot moving, const StepTiming& timing) {
                 {timing.end_s, 0.0, -drop * rate(timing.end)}});
 }
 
-// Forward, twice a stride. The ten degrees by which a pelvis tilts anyway are in its bones.
+// The pelvis tilts forwards twice per stride. Its constant tilt of ten degrees is part of the
+// skeleton.
 Curve MakeTilt(const StepTiming& timing) {
   const double start = kTiltRad * timing.start.vigour, end = kTiltRad * timing.end.vigour;
   return Curve({{0.0, start, 0.0},
@@ -96,8 +99,9 @@ Curve MakeTilt(const StepTiming& timing) {
                 {timing.end_s, end, 0.0}});
 }
 
-// Height of the pelvis in a state with the moving foot `moved_m` from the fixed one: that of walking
-// above the lower foot, or what the legs reach with knees bent by 12 degrees if that is less.
+// Returns the height of the pelvis in a state with the moving foot `moved_m` from the fixed one:
+// the height of walking above the lower foot, limited by the reach of the legs with knees bent 12
+// degrees.
 double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const double low = std::min(0.0, moved_m.y);
   const double height = low + kStandingHipHeightM - state.pelvis_drop_m;
@@ -107,7 +111,7 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
   const bool fixed_is_rear = moved_m.z >= 0.0;
   const DVec3 rear_ball = fixed_is_rear ? DVec3(0.0) : moved_m;
   const DVec3 front_ball = fixed_is_rear ? moved_m : DVec3(0.0);
-  const double side = fixed_is_rear ? -1.0 : 1.0;  // of the rear foot; the left one moves
+  const double side = fixed_is_rear ? -1.0 : 1.0;  // Side of the rear foot; the left foot moves.
   const Foot rear = fixed_is_rear ? Foot::kRight : Foot::kLeft;
   const DVec3 rear_ankle = FootOnGround(rear, rear_ball, state.rear_pitch_rad(), 0.0).ankle_m;
   const DVec3 front_ankle =
@@ -122,7 +126,7 @@ double StateHeight(const GaitState& state, const DVec3& moved_m) {
   return std::min({height, ceiling(rear_ankle, side), ceiling(front_ankle, -side)});
 }
 
-// The left foot's step; a right one has its x taken to the other side first.
+// Converts a vector of a right step to that of the mirrored left step.
 DVec3 AsLeft(Foot moving, const DVec3& d) { return {SideSign(moving) * d.x, d.y, d.z}; }
 
 Curve MakeHeight(Foot moving, const StepTiming& timing) {
@@ -134,8 +138,8 @@ Curve MakeHeight(Foot moving, const StepTiming& timing) {
   if (level) {
     return Curve({{0.0, start, 0.0}, {0.42 * timing.end_s, top, 0.0}, {timing.end_s, end, 0.0}});
   }
-  // Climbing, most of the rise comes early, as soon as the upper leg bears; descending, most of the
-  // fall comes late.
+  // Upwards, most of the rise is early, when the upper leg takes the weight. Downwards, most of the
+  // drop is late.
   const double middle = top - 0.2 * std::max(0.0, top - start) - 0.25 * std::max(0.0, top - end);
   return Curve({{0.0, start, 0.0}, {0.45 * timing.end_s, middle}, {timing.end_s, end, 0.0}});
 }
@@ -159,7 +163,7 @@ PelvisPath::PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& f
 DVec3 PelvisPath::Position(double time_s) const {
   const double at = std::clamp(time_s / timing_.end_s, 0.0, 1.0) * (kSamples - 1);
   const int i = std::clamp(static_cast<int>(at), 1, kSamples - 3);
-  // Catmull-Rom through the samples keeps velocities smooth.
+  // Catmull-Rom interpolation of the samples keeps velocities smooth.
   const double s = at - i;
   const auto y = [&](int k) { return lowered_m_[static_cast<std::size_t>(k)]; };
   const double m0 = 0.5 * (y(i + 1) - y(i - 1)), m1 = 0.5 * (y(i + 2) - y(i));
@@ -181,9 +185,10 @@ DQuat PelvisPath::Rotation(double time_s) const {
 }
 
 void PelvisPath::StayWithinReach(const FootPaths& feet) {
-  // A few spline knots instead of these filters diverge: the ceiling is sharp where legs change.
+  // Uses filters, since a fit of a few spline knots diverges: the limit has a kink where the legs
+  // change.
   constexpr int kRounds = 3, kMaxHalf = 12, kSmoothHalf = 20;
-  const double reach = ReachAtKnee(kLeastKneeRad);
+  const double reach = ReachAtKnee(kMinKneeRad);
   std::vector<double> excess(kSamples), highest(kSamples);
   for (int round = 0; round < kRounds; ++round) {
     for (int i = 0; i < kSamples; ++i) {
@@ -215,7 +220,8 @@ void PelvisPath::StayWithinReach(const FootPaths& feet) {
         sum += weight * highest[static_cast<std::size_t>(std::clamp(i + k, 0, kSamples - 1))];
         weights += weight;
       }
-      // The states stay as they are; after a turn the rear foot no longer points as in the state.
+      // The states must not change. After a turn the rear foot does not have the direction of the
+      // state, so the end may change.
       const int to_state = timing_.shape.turn_rad == 0.0 ? std::min(i, kSamples - 1 - i) : i;
       lowered_m_[static_cast<std::size_t>(i)] +=
           sum / weights * Ease(to_state / (0.06 * (kSamples - 1)));

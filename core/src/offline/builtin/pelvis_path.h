@@ -9,15 +9,15 @@
 
 namespace stridewire::builtin {
 
-/// The pelvis of a step: position and rotation. Its height follows the states and rises between
-/// them, and is then lowered smoothly to where both legs reach with the knees a little bent.
+/// The motion of the pelvis in a step. Its height follows the states and rises between them. It is
+/// then lowered smoothly where a leg could not reach the ground with a slightly bent knee.
 class PelvisPath {
  public:
   PelvisPath(Foot moving, const StepTiming& timing, const FootPaths& feet);
 
   [[nodiscard]] DVec3 Position(double time_s) const;
   [[nodiscard]] DQuat Rotation(double time_s) const;
-  /// Where the body is heading; turns from one end of the step to the other. Yaw is relative to it.
+  /// Heading of the body, which turns over the whole step. Yaw is relative to it.
   [[nodiscard]] double Heading(double time_s) const;
   [[nodiscard]] double Yaw(double time_s) const { return yaw_.At(time_s); }
   [[nodiscard]] double Roll(double time_s) const { return roll_.At(time_s); }
@@ -29,7 +29,7 @@ class PelvisPath {
   Foot moving_;
   StepTiming timing_;
   Curve across_, forward_, sway_, yaw_, roll_, tilt_, height_;
-  std::vector<double> lowered_m_;  // at equal times over the step
+  std::vector<double> lowered_m_;  // At equal time intervals over the step.
 };
 
 }  // namespace stridewire::builtin

@@ -21,14 +21,15 @@ constexpr double kStandingArmRad = -1.0 * kDegree;
 
 double Mix(double a, double b, double s) { return a + (b - a) * s; }
 
-// Perry and Burnfield: shoulder from 24 degrees of extension to 8 of flexion, elbow 20 to 45.
+// Perry and Burnfield: the shoulder moves between 24 degrees of extension and 8 of flexion, the
+// elbow between 20 and 45 degrees.
 double ArmForward(double vigour) { return Mix(kStandingArmRad, 10.0 * kDegree, vigour); }
 double ArmBack(double vigour) { return Mix(kStandingArmRad, -24.0 * kDegree, vigour); }
 double ElbowForward(double vigour) { return Mix(kStandingElbowRad, 42.0 * kDegree, vigour); }
 double ElbowBack(double vigour) { return Mix(kStandingElbowRad, 20.0 * kDegree, vigour); }
 double Lean(const GaitState& state) { return (2.0 + 2.0 * state.speed_mps) * kDegree; }
 
-/// The curves of everything above the pelvis over a step.
+/// Curves of all joints above the pelvis over a step.
 struct UpperBodyPath {
   Curve thorax_yaw, thorax_roll, lean, arm_with_moving, arm_with_fixed, elbow_with_moving,
       elbow_with_fixed;
@@ -41,7 +42,7 @@ struct UpperBodyPath {
                       SideSign(moving) * 1.0 * kDegree, 0.0},
                      {timing.end_s, 0.0, 0.0}}),
         lean(Swing(timing, Lean(timing.start), Lean(timing.end))),
-        // The moving foot is behind at the start: the arm on its side is ahead.
+        // The moving foot is behind at the start, so the arm of its side is in front.
         arm_with_moving(Swing(timing, ArmForward(timing.start.vigour), ArmBack(timing.end.vigour))),
         arm_with_fixed(Swing(timing, ArmBack(timing.start.vigour), ArmForward(timing.end.vigour))),
         elbow_with_moving(
@@ -145,7 +146,7 @@ RawExample MakeStep(const Skeleton& figure, Foot moving, const StepShape& shape,
     pose.root_m = pelvis.Position(time_s);
     pose.rotations[kHips] = pelvis.Rotation(time_s);
     UpperBody body = upper.At(moving, time_s);
-    // People look where they are about to go.
+    // People look in the direction in which they are about to walk.
     body.head_yaw = (pelvis.Heading(time_s + kHeadLeadS) - heading) * Ease(time_s / 0.2);
     SetUpperBody(body, pelvis.Yaw(time_s), pelvis.Roll(time_s), pelvis.Tilt(time_s), pose);
     SolveLeg(moving, feet.Moving(time_s), pose, heading);

@@ -13,19 +13,20 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   timing.start = MakeGaitState(start_length_m, start_rise_m, shape.flat);
   timing.end = MakeGaitState(end_length_m, end_rise_m, shape.flat);
   const bool partial = timing.start.standing() || timing.end.standing();
-  // Aside and on the spot nothing swings through: such a step has its own pace.
-  const bool aside = timing.start.standing() && timing.end.standing();
-  const double level_s = aside ? 0.62
-                               : SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
-                                                        : 0.5 * (start_length_m + end_length_m));
+  // Steps sideways and on the spot do not swing through; they have their own duration.
+  const bool in_place = timing.start.standing() && timing.end.standing();
+  const double level_s = in_place ? 0.62
+                                  : SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
+                                                           : 0.5 * (start_length_m + end_length_m));
   const double step_s = level_s + kRiseTime_s_m * 0.5 * (start_rise_m + end_rise_m);
-  // From standing the weight first moves over the foot that stays; to standing the body settles.
-  const double weight_shift_s = aside ? 0.24 : 0.30;
-  const double plant_fade_s = 0.12 * step_s + (aside ? 0.10 : 0.15);
+  // From standing, the weight first moves over the fixed foot; before standing, the body comes to
+  // rest.
+  const double weight_shift_s = in_place ? 0.24 : 0.30;
+  const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);
   timing.toe_off_s = timing.start.standing() ? weight_shift_s : timing.start.half_support_s;
   timing.heel_strike_s = timing.toe_off_s + ToWholeFrames(0.76 * step_s);
   timing.end_s = timing.heel_strike_s +
-                 (timing.end.standing() ? ToWholeFrames(plant_fade_s) : timing.end.half_support_s);
+                 (timing.end.standing() ? ToWholeFrames(settling_s) : timing.end.half_support_s);
   timing.toe_off_s = ToWholeFrames(timing.toe_off_s);
   timing.heel_strike_s = ToWholeFrames(timing.heel_strike_s);
   timing.end_s = ToWholeFrames(timing.end_s);

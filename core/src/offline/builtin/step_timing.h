@@ -7,9 +7,9 @@
 
 namespace stridewire::builtin {
 
-/// A step from one state to the next and its keytimes: start, toe-off, heel-strike, end. Double
-/// support around a state lasts as long on both sides of it whatever the step, so that velocities
-/// agree where steps join.
+/// The timing of a step between two states, with keytimes start, toe-off, heel-strike and end.
+/// Double support around a state is symmetric and independent of the step, so that velocities agree
+/// where steps join.
 struct StepTiming {
   StepShape shape;
   GaitState start;

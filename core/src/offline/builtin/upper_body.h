@@ -4,20 +4,21 @@
 
 namespace stridewire::builtin {
 
-/// What the body above the pelvis does, radians. Everything 0 is a soldier at attention.
+/// Angles of the body above the pelvis in radians. With all angles 0, the figure stands at
+/// attention.
 struct UpperBody {
-  double thorax_yaw = 0.0;             ///< in the example's frame, left positive
-  double thorax_roll = 0.0;            ///< likewise; positive lifts the left side
-  double thorax_lean = 0.0;            ///< likewise; forward positive
-  double head_yaw = 0.0;               ///< likewise; left positive
-  double head_nod = 0.0;               ///< likewise; forward positive
-  double arm_flexion[2] = {0.0, 0.0};  ///< indexed by Foot; forward positive
+  double thorax_yaw = 0.0;   ///< In the frame of the example; positive is left.
+  double thorax_roll = 0.0;  ///< In the frame of the example; positive lifts the left side.
+  double thorax_lean = 0.0;  ///< In the frame of the example; positive is forward.
+  double head_yaw = 0.0;     ///< In the frame of the example; positive is left.
+  double head_nod = 0.0;     ///< In the frame of the example; positive is forward.
+  double arm_flexion[2] = {0.0, 0.0};  ///< Indexed by Foot; positive is forward.
   double arm_abduction = 0.0;
   double elbow_flexion[2] = {0.0, 0.0};
 };
 
-/// Sets spine, neck, head and arms; the pelvis must be set. Yaw, roll and lean are small enough to
-/// be shared out evenly over the joints of a chain.
+/// Sets the rotations of spine, neck, head and arms; the pelvis must be set before. The angles are
+/// small enough to be distributed evenly over the joints of a chain.
 void SetUpperBody(const UpperBody& body, double pelvis_yaw, double pelvis_roll, double pelvis_tilt,
                   FigurePose& pose);
 

@@ -24,24 +24,27 @@ bool StartsWithWord(std::string_view a, std::string_view lower_word) {
   return a.size() >= lower_word.size() && EqualsWord(a.substr(0, lower_word.size()), lower_word);
 }
 
-enum class NumberFault { kNone, kNoNumber, kTooLarge };
+enum class NumberFault { kNone, kNotANumber, kTooLarge };
 
-// A finite number within our limit. What is too small to be told from zero is zero.
+static_assert(kMaxBvhNumber == 1e7 && kMaxBvhNameBytes == 256);
+constexpr const char* kTooLargeText = "expected a finite number from -1e7 to 1e7";
+
+// Parses a finite number within kMaxBvhNumber. Values too small for a double become zero.
 NumberFault ReadNumber(std::string_view token, double& value) {
   std::string_view digits = token;
   if (!digits.empty() && digits.front() == '+') digits.remove_prefix(1);
   const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (digits.empty() || end != digits.data() + digits.size()) return NumberFault::kNoNumber;
+  if (digits.empty() || end != digits.data() + digits.size()) return NumberFault::kNotANumber;
   if (code == std::errc::result_out_of_range) {
     value = std::strtod(std::string(digits).c_str(), nullptr);
     if (std::fabs(value) < 1.0) value = 0.0;
   } else if (code != std::errc()) {
-    return NumberFault::kNoNumber;
+    return NumberFault::kNotANumber;
   }
   return std::fabs(value) <= kMaxBvhNumber ? NumberFault::kNone : NumberFault::kTooLarge;
 }
 
-// Names go on into reports and other files, which are UTF-8.
+// Joint names are written to reports and other files, which are UTF-8.
 bool IsUtf8(std::string_view text) {
   for (std::size_t i = 0; i < text.size();) {
     const unsigned char lead = static_cast<unsigned char>(text[i]);
@@ -63,7 +66,7 @@ bool IsUtf8(std::string_view text) {
   return true;
 }
 
-// One unit of the last digit written: 1e-7 for ".0083333", 1e-8 for "8.33333e-03".
+// Returns one unit of the last digit: 1e-7 for ".0083333", 1e-8 for "8.33333e-03".
 double LastDigit(std::string_view token) {
   const std::size_t e = token.find_first_of("eE");
   const std::string_view mantissa = token.substr(0, e);
@@ -105,7 +108,7 @@ class Parser {
     return FailAt(token_line_, ErrorCode::kMalformed, sentence);
   }
 
-  // Steps over one line end (LF, CRLF or CR) at `at_`.
+  // Skips one line end (LF, CRLF or CR) at `at_`.
   void SkipLineEnd() {
     if (text_[at_] == '\r' && at_ + 1 < text_.size() && text_[at_ + 1] == '\n') ++at_;
     ++at_;
@@ -125,7 +128,7 @@ class Parser {
     }
   }
 
-  // Next word; a brace is a word of its own. Empty at the end of the text.
+  // Returns the next word; a brace is a word of its own. Empty at the end of the text.
   std::string_view Next() {
     SkipSpace();
     token_line_ = line_;
@@ -141,7 +144,7 @@ class Parser {
     return text_.substr(begin, at_ - begin);
   }
 
-  // Rest of the line without surrounding space, up to an opening brace.
+  // Returns the rest of the line up to an opening brace, without surrounding space.
   std::string_view RestOfLine() {
     while (at_ < text_.size() && IsSpace(text_[at_])) ++at_;
     token_line_ = line_;
@@ -155,15 +158,16 @@ class Parser {
   Status NextNumber(double& value, const char* sentence) {
     switch (ReadNumber(Next(), value)) {
       case NumberFault::kNone: return {};
-      case NumberFault::kNoNumber: return Malformed(sentence);
+      case NumberFault::kNotANumber: return Malformed(sentence);
       case NumberFault::kTooLarge: break;
     }
-    return FailAt(token_line_, ErrorCode::kOutOfRange, "a number is not finite or too large");
+    return FailAt(token_line_, ErrorCode::kOutOfRange, kTooLargeText);
   }
 
   Status ParseOffset(DVec3& offset) {
     for (int axis = 0; axis < 3; ++axis) {
-      if (Status status = NextNumber(offset[axis], "OFFSET needs three numbers"); !status) {
+      if (Status status = NextNumber(offset[axis], "expected three numbers after OFFSET");
+          !status) {
         return status;
       }
     }
@@ -172,11 +176,12 @@ class Parser {
 
   Status ParseChannels(BvhJoint& joint) {
     double count = 0.0;
-    if (Status status = NextNumber(count, "CHANNELS needs a number of channels"); !status) {
+    if (Status status = NextNumber(count, "expected the number of channels after CHANNELS");
+        !status) {
       return status;
     }
     if (!(count >= 0.0 && count <= 6.0) || count != std::floor(count)) {
-      return FailAt(token_line_, ErrorCode::kOutOfRange, "a joint has 0 to 6 channels");
+      return FailAt(token_line_, ErrorCode::kOutOfRange, "expected 0 to 6 channels");
     }
     joint.first_channel = file_.channel_count;
     for (int i = 0; i < static_cast<int>(count); ++i) {
@@ -191,7 +196,7 @@ class Parser {
       }
       for (const BvhChannel& other : joint.channels) {
         if (other.axis == channel.axis && other.is_rotation == channel.is_rotation) {
-          return Malformed("a joint has the same channel twice");
+          return Malformed("duplicate channel of a joint");
         }
       }
       joint.channels.push_back(channel);
@@ -205,11 +210,11 @@ class Parser {
     std::string name(RestOfLine());
     if (name.empty()) return FailAt(line, ErrorCode::kMalformed, "expected a joint name");
     if (name.size() > kMaxBvhNameBytes) {
-      return FailAt(line, ErrorCode::kLimitExceeded, "a joint's name is too long");
+      return FailAt(line, ErrorCode::kLimitExceeded, "the joint name is longer than 256 bytes");
     }
     for (const char c : name) {
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-        return FailAt(line, ErrorCode::kMalformed, "a joint's name has a control character");
+        return FailAt(line, ErrorCode::kMalformed, "the joint name contains a control character");
       }
     }
     if (!IsUtf8(name)) {
@@ -218,22 +223,23 @@ class Parser {
       }
     }
     if (static_cast<int>(file_.joints.size()) >= kMaxJoints) {
-      return FailAt(line, ErrorCode::kLimitExceeded, "the skeleton has too many joints",
+      return FailAt(line, ErrorCode::kLimitExceeded, "the skeleton has more joints than the limit",
                     kMaxJoints);
     }
     if (static_cast<int>(stack_.size()) >= kMaxBvhDepth) {
-      return FailAt(line, ErrorCode::kLimitExceeded, "joints are nested too deeply", kMaxBvhDepth);
+      return FailAt(line, ErrorCode::kLimitExceeded, "joints are nested deeper than the limit",
+                    kMaxBvhDepth);
     }
     if (!names_.insert(name).second) {
       for (int number = 2;; ++number) {
         std::string numbered = name + '_' + std::to_string(number);
         if (!names_.insert(numbered).second) continue;
-        file_.notes.push_back("a second joint " + name + " is called " + numbered);
+        file_.notes.push_back("duplicate joint " + name + " is renamed to " + numbered);
         name = std::move(numbered);
         break;
       }
     }
-    if (Next() != "{") return Malformed("expected { after a joint's name");
+    if (Next() != "{") return Malformed("expected { after a joint name");
     BvhJoint joint;
     joint.name = std::move(name);
     joint.parent = parent;
@@ -244,7 +250,7 @@ class Parser {
   }
 
   Status ParseEndSite(int joint) {
-    RestOfLine();  // "Site", or whatever the program wrote.
+    RestOfLine();  // Usually "Site".
     if (Next() != "{") return Malformed("expected { after End Site");
     if (!EqualsWord(Next(), "offset")) return Malformed("expected OFFSET in an End Site");
     BvhEndSite site;
@@ -253,16 +259,18 @@ class Parser {
     if (Status status = ParseOffset(site.offset); !status) return status;
     if (Next() != "}") return Malformed("expected } after an End Site");
     if (file_.end_sites.size() >= static_cast<std::size_t>(kMaxJoints)) {
-      return FailAt(token_line_, ErrorCode::kLimitExceeded, "the skeleton has too many End Sites",
-                    kMaxJoints);
+      return FailAt(token_line_, ErrorCode::kLimitExceeded,
+                    "the skeleton has more End Sites than the limit", kMaxJoints);
     }
     file_.end_sites.push_back(site);
     return {};
   }
 
-  // A loop with its own stack: no file makes the program's stack grow.
+  // Uses its own stack instead of recursion, so that no file can overflow the call stack.
   Status ParseHierarchy() {
-    if (!EqualsWord(Next(), "hierarchy")) return Malformed("a BVH file begins with HIERARCHY");
+    if (!EqualsWord(Next(), "hierarchy")) {
+      return Malformed("expected HIERARCHY at the beginning; this is not a BVH file");
+    }
     if (!EqualsWord(Next(), "root")) return Malformed("expected ROOT after HIERARCHY");
     if (Status status = OpenJoint(-1); !status) return status;
     while (!stack_.empty()) {
@@ -273,15 +281,15 @@ class Parser {
       if (word.empty()) {
         return Malformed("the file ends inside HIERARCHY");
       } else if (word == "}") {
-        if (!open.has_offset) return Malformed("a joint has no OFFSET");
+        if (!open.has_offset) return Malformed("the joint has no OFFSET");
         stack_.pop_back();
       } else if (EqualsWord(word, "offset")) {
-        if (open.has_offset) return Malformed("a joint has two OFFSETs");
+        if (open.has_offset) return Malformed("the joint has two OFFSETs");
         open.has_offset = true;
         joint.line = token_line_;
         status = ParseOffset(joint.offset);
       } else if (EqualsWord(word, "channels")) {
-        if (open.has_channels) return Malformed("a joint has CHANNELS twice");
+        if (open.has_channels) return Malformed("the joint has two CHANNELS");
         open.has_channels = true;
         status = ParseChannels(joint);
       } else if (EqualsWord(word, "joint")) {
@@ -293,12 +301,12 @@ class Parser {
       }
       if (!status) return status;
     }
-    if (file_.channel_count == 0) return Malformed("no joint has a channel");
+    if (file_.channel_count == 0) return Malformed("expected CHANNELS for at least one joint");
     return {};
   }
 
-  // "Frames: 10", "Frames:10", "Frames : 10", "Frames 10"; likewise "Frame Time:". Leaves the value
-  // as the next word.
+  // Skips a label such as "Frames:" or "Frame Time:". Accepts "Frames: 10", "Frames:10",
+  // "Frames : 10" and "Frames 10".
   bool SkipLabel(std::string_view lower_first, std::string_view lower_second) {
     const auto skip = [&](std::string_view lower_word) {
       SkipSpace();
@@ -317,59 +325,61 @@ class Parser {
   Status ParseMotionHead() {
     const std::string_view word = Next();
     if (EqualsWord(word, "root")) {
-      return FailAt(token_line_, ErrorCode::kUnsupported, "a file with a second ROOT");
+      return FailAt(token_line_, ErrorCode::kUnsupported,
+                    "the file has a second ROOT; only one figure per file is supported");
     }
     if (!EqualsWord(word, "motion")) return Malformed("expected MOTION after HIERARCHY");
     if (!SkipLabel("frames", "")) return Malformed("expected Frames: after MOTION");
     const std::string_view count = Next();
     const auto [end, code] =
-        std::from_chars(count.data(), count.data() + count.size(), announced_frames_);
+        std::from_chars(count.data(), count.data() + count.size(), declared_frames_);
     if (code == std::errc::result_out_of_range && end == count.data() + count.size() &&
         count.front() != '-') {
-      announced_frames_ = INT64_MAX;  // As good as any number that the rows will not reach.
-    } else if (code != std::errc() || end != count.data() + count.size() || announced_frames_ < 1) {
-      return Malformed("Frames: must be a whole number, 1 or more");
+      declared_frames_ = INT64_MAX;  // No file can have that many rows.
+    } else if (code != std::errc() || end != count.data() + count.size() || declared_frames_ < 1) {
+      return Malformed("Frames: expected an integer of at least 1");
     }
     frames_line_ = token_line_;
     if (!SkipLabel("frame", "time")) return Malformed("expected Frame Time: after Frames:");
     SkipSpace();
     const std::size_t begin = at_;
-    if (Status status = NextNumber(file_.frame_time_s, "Frame Time: must be a number of seconds");
+    if (Status status = NextNumber(file_.frame_time_s, "Frame Time: expected a number of seconds");
         !status) {
       return status;
     }
     file_.frame_time_line = token_line_;
     file_.frame_time_digit_s = LastDigit(text_.substr(begin, at_ - begin));
-    if (!RestOfLine().empty()) return Malformed("something stands after Frame Time");
+    if (!RestOfLine().empty()) return Malformed("Frame Time: unexpected text after the number");
     return {};
   }
 
   Status ParseRows() {
     const std::size_t channels = static_cast<std::size_t>(file_.channel_count);
     const std::int64_t joints = static_cast<std::int64_t>(file_.joints.size());
-    // A number takes two characters at least, its separator included.
+    // A number takes at least two characters, including its separator.
     const std::size_t most_rows = (text_.size() - at_) / (2 * channels) + 1;
     file_.values.reserve(channels *
-                         std::min(most_rows, static_cast<std::size_t>(announced_frames_)));
+                         std::min(most_rows, static_cast<std::size_t>(declared_frames_)));
     std::int64_t frames = 0;
     for (;;) {
       SkipSpace();
       if (at_ >= text_.size()) break;
-      if (frames == announced_frames_) {
+      if (frames == declared_frames_) {
         file_.notes.push_back("line " + std::to_string(line_) +
-                              ": more than the frames that Frames: announces; left out");
+                              ": ignored the frames beyond the number declared by Frames:");
         break;
       }
       if ((frames + 1) * joints > kMaxBvhRotations) {
-        return FailAt(line_, ErrorCode::kLimitExceeded, "the motion has too many frames", frames);
+        return FailAt(line_, ErrorCode::kLimitExceeded, "the motion has more frames than the limit",
+                      frames);
       }
       if (Status status = ParseRow(channels); !status) return status;
       ++frames;
     }
-    if (frames == 0) return FailAt(line_, ErrorCode::kMalformed, "the motion has no frame");
-    if (frames < announced_frames_) {
-      file_.notes.push_back("line " + std::to_string(frames_line_) + ": Frames: announces " +
-                            std::to_string(announced_frames_) + " frames, the file holds " +
+    if (frames == 0) return FailAt(line_, ErrorCode::kMalformed, "expected at least one frame");
+    if (frames < declared_frames_) {
+      file_.notes.push_back("line " + std::to_string(frames_line_) + ": Frames: declares " +
+                            std::to_string(declared_frames_) + " frames, but the file contains " +
                             std::to_string(frames));
     }
     file_.frame_count = static_cast<int>(frames);
@@ -383,21 +393,20 @@ class Parser {
       while (at_ < text_.size() && !IsSpace(text_[at_]) && !IsLineEnd(text_[at_])) ++at_;
       if (at_ == begin) {
         if (i == channels) return {};
-        return FailAt(line_, ErrorCode::kMalformed, "a frame has fewer numbers than the channels",
+        return FailAt(line_, ErrorCode::kMalformed, "the frame has fewer numbers than channels",
                       static_cast<std::int64_t>(i));
       }
       if (i == channels) {
-        return FailAt(line_, ErrorCode::kMalformed, "a frame has more numbers than the channels");
+        return FailAt(line_, ErrorCode::kMalformed, "the frame has more numbers than channels");
       }
       double value = 0.0;
       switch (ReadNumber(text_.substr(begin, at_ - begin), value)) {
         case NumberFault::kNone: break;
-        case NumberFault::kNoNumber:
+        case NumberFault::kNotANumber:
           return FailAt(line_, ErrorCode::kMalformed, "expected a number",
                         static_cast<std::int64_t>(i));
         case NumberFault::kTooLarge:
-          return FailAt(line_, ErrorCode::kOutOfRange, "a number is not finite or too large",
-                        static_cast<std::int64_t>(i));
+          return FailAt(line_, ErrorCode::kOutOfRange, kTooLargeText, static_cast<std::int64_t>(i));
       }
       file_.values.push_back(static_cast<float>(value));
     }
@@ -414,7 +423,7 @@ class Parser {
   std::size_t at_ = 0;
   int line_ = 1;
   int token_line_ = 1;
-  std::int64_t announced_frames_ = 0;
+  std::int64_t declared_frames_ = 0;
   int frames_line_ = 0;
   std::vector<Open> stack_;
   std::unordered_set<std::string> names_;

@@ -9,19 +9,19 @@
 
 namespace stridewire {
 
-/// One number of a frame: which joint it drives is told by the joint's `first_channel`.
+/// The meaning of one number per frame. BvhJoint::first_channel assigns channels to joints.
 struct BvhChannel {
   bool is_rotation = false;
-  int axis = 0;  ///< 0 x, 1 y, 2 z
+  int axis = 0;  ///< 0: x, 1: y, 2: z.
 };
 
 struct BvhJoint {
   std::string name;
   int parent = -1;
-  int line = 0;               ///< Where its OFFSET stands.
-  DVec3 offset = DVec3(0.0);  ///< File units
+  int line = 0;               ///< The line of its OFFSET.
+  DVec3 offset = DVec3(0.0);  ///< In file units.
   std::vector<BvhChannel> channels;
-  int first_channel = 0;  ///< Its first number in a frame's row.
+  int first_channel = 0;  ///< Index of its first number in the row of a frame.
 };
 
 struct BvhEndSite {
@@ -30,20 +30,21 @@ struct BvhEndSite {
   DVec3 offset = DVec3(0.0);
 };
 
-/// A BVH file as it stands, in its own units and axes.
+/// The contents of a BVH file, in its own units and axes.
 struct BvhFile {
   std::vector<BvhJoint> joints;
   std::vector<BvhEndSite> end_sites;
   int channel_count = 0;
   int frame_count = 0;
-  double frame_time_s = 0.0;        ///< As written; may be anything finite.
-  double frame_time_digit_s = 0.0;  ///< One unit of its last written digit.
+  double frame_time_s = 0.0;        ///< As written; any finite number.
+  double frame_time_digit_s = 0.0;  ///< Value of one unit in its last written digit.
   int frame_time_line = 0;
-  std::vector<float> values;  ///< [frame * channel_count + channel]; degrees and file units
+  std::vector<float> values;  ///< [frame * channel_count + channel]; degrees or file units.
   std::vector<std::string> notes;
 };
 
-/// Checks the form alone. `name` begins every `where`.
+/// Parses a BVH file and checks its syntax, but not whether it describes a person. `name` is the
+/// beginning of every `where`.
 [[nodiscard]] Expected<BvhFile> ParseBvhFile(std::string_view text, std::string_view name);
 
 }  // namespace stridewire

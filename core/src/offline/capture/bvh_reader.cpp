@@ -11,29 +11,29 @@
 #include <numbers>
 #include <system_error>
 
+#include "base/trig.h"
 #include "offline/capture/bvh_file.h"
 #include "offline/capture/leg_finder.h"
-#include "base/trig.h"
 
-// From a file's own axes and unit to ours. With W the turn of the world that brings up to +Y, and B
-// the turn of the joints' frames that makes the figure at rest face +Z:
+// Conversion from the axes and the unit of a file to ours. Let W be the rotation of the world that
+// turns up to +Y, and B the rotation of the joint frames that makes the resting figure face +Z:
 //
 //   root'    = unit W root        R_root' = W R_root B^-1
 //   offset'  = unit B offset      R_joint' = B R_joint B^-1
 //
-// so that every world position is W times what the file says, times the unit.
+// Every world position is then the position in the file, rotated by W and scaled to metres.
 
 namespace stridewire {
 namespace {
 
-constexpr double kSnapCos = 0.906;       // An axis within 25 degrees is meant to be that axis.
-constexpr int kSampledFrames = 64;       // Frames looked at to find directions.
-constexpr double kFastTurnRadS = 10.5;   // 600 degrees a second
-constexpr double kStandingHipsM = 0.95;  // Hips of a grown-up standing.
+constexpr double kSnapCos = 0.906;       // Directions within 25 degrees of an axis snap to it.
+constexpr int kSampledFrames = 64;       // Frames sampled to determine directions.
+constexpr double kFastTurnRadS = 10.5;   // 600 degrees/s.
+constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
-constexpr double kLeastTravelM = 0.15;
-constexpr double kFootEndIsBall = 0.2;    // End Site nearer to the ankle, in leg lengths: the ball.
-constexpr double kBallShare = 2.0 / 3.0;  // Ball on the level way from ankle to toe tip.
+constexpr double kMinTravelM = 0.15;
+constexpr double kFootEndIsBall = 0.2;    // Nearer End Sites are the ball; in leg lengths.
+constexpr double kBallShare = 2.0 / 3.0;  // Position of the ball between ankle and toe tip.
 
 struct KnownUnit {
   double m;
@@ -64,7 +64,7 @@ DVec3 AxisVector(BvhAxis axis) {
   return v;
 }
 
-// The axis nearest to `v`.
+// Returns the signed axis nearest to `v`.
 DVec3 NearestAxis(const DVec3& v) {
   int largest = 0;
   for (int i = 1; i < 3; ++i) {
@@ -81,7 +81,7 @@ const char* AxisName(const DVec3& v) {
     if (v[i] > 0.999) return kNames[2 * i];
     if (v[i] < -0.999) return kNames[2 * i + 1];
   }
-  return "a slanting axis";
+  return "an oblique axis";
 }
 
 DVec3 Unit(const DVec3& v) {
@@ -95,14 +95,14 @@ DVec3 SnapAxis(const DVec3& v) {
 }
 
 DQuat AxisTurn(int axis, double degrees) {
-  // remainder() is exact and keeps the argument where our trigonometry is.
+  // remainder() is exact and reduces the argument to the range of our trigonometry.
   const double half = std::remainder(degrees, 720.0) * (0.5 * std::numbers::pi / 180.0);
   DQuat q(Cos(half), 0.0, 0.0, 0.0);
   (axis == 0 ? q.x : axis == 1 ? q.y : q.z) = Sin(half);
   return q;
 }
 
-// The turn that takes `left`, `up`, `left` x `up` to +X, +Y, +Z.
+// Returns the rotation that takes `left`, `up` and `left` x `up` to +X, +Y and +Z.
 DQuat TurnToOurAxes(const DVec3& left, const DVec3& up) {
   const DVec3 forward = glm::cross(left, up);
   return glm::normalize(glm::quat_cast(glm::transpose(glm::dmat3(left, up, forward))));
@@ -134,14 +134,15 @@ class Reader {
   Status SetFrameRate() {
     if (options_.fps) {
       if (!(*options_.fps > 0.0 && *options_.fps <= 10000.0)) {
-        return Fail(ErrorCode::kInvalidArgument, "frames a second must lie in (0, 10000]", "fps");
+        return Fail(ErrorCode::kInvalidArgument,
+                    "expected a number of frames per second above 0 and at most 10000", "fps");
       }
       capture_.clip.fps = *options_.fps;
       return {};
     }
     const double frame_time = file_.frame_time_s;
     if (!(frame_time >= 1e-4 && frame_time <= 10.0)) {
-      return Fail(ErrorCode::kOutOfRange, "Frame Time: must lie in 0.0001 to 10 seconds",
+      return Fail(ErrorCode::kOutOfRange, "Frame Time: expected 0.0001 to 10 seconds",
                   LineOf(file_.frame_time_line));
     }
     double fps = 1.0 / frame_time;
@@ -162,7 +163,7 @@ class Reader {
     for (const BvhEndSite& site : file_.end_sites) {
       capture_.skeleton.end_sites.push_back({site.joint, Vec3(site.offset)});
     }
-    // Positions of joints that only their offset should place.
+    // Replaces the offsets of joints other than the root by the mean of their position channels.
     for (std::size_t j = 1; j < file_.joints.size(); ++j) {
       const BvhJoint& source = file_.joints[j];
       DVec3 mean = source.offset;
@@ -200,14 +201,14 @@ class Reader {
     return file_.values[Index(frame) * Index(file_.channel_count) + Index(channel)];
   }
 
-  // Still in the file's axes and unit.
+  // The clip is still in the axes and the unit of the file.
   Status BuildClip() {
     Clip& clip = capture_.clip;
     clip.Resize(file_.frame_count, static_cast<int>(file_.joints.size()));
     roots_.resize(Index(file_.frame_count));
     bool root_moves = false;
     for (const BvhChannel& channel : file_.joints[0].channels) root_moves |= !channel.is_rotation;
-    if (!root_moves) Note("the root has no position channels and stays where its OFFSET puts it");
+    if (!root_moves) Note("the root has no position channels and stays at its OFFSET");
     for (int f = 0; f < file_.frame_count; ++f) {
       const PoseSpan pose = clip.frame(f);
       DVec3& root = roots_[Index(f)];
@@ -233,7 +234,7 @@ class Reader {
     return {};
   }
 
-  // Joints that turn from frame `f` to the next faster than people can.
+  // Returns the number of joints that turn between frames `f` and `f` + 1 faster than people can.
   int FastJoints(int f) const {
     const Clip& clip = capture_.clip;
     int fast = 0;
@@ -253,8 +254,8 @@ class Reader {
       const double second = AngleBetween(clip.frame(1).rotations[j], clip.frame(2).rotations[j]);
       jumping += first > std::numbers::pi / 18.0 && first > 8.0 * second;
     }
-    // Some programs smooth the way from the artificial pose into the motion; then nothing jumps,
-    // but the root begins at exactly no rotation and many joints rush off.
+    // Some programs blend from the artificial pose into the motion. Then no joint jumps, but the
+    // root starts with exactly no rotation and many joints turn fast.
     const bool root_at_rest = AngleBetween(clip.frame(0).rotations[0], kIdentityQuat) < 1e-6 &&
                               AngleBetween(clip.frame(1).rotations[0], kIdentityQuat) > 1e-3;
     if (jumping < 4 && !(root_at_rest && FastJoints(0) >= 4)) return;
@@ -262,7 +263,7 @@ class Reader {
     const int last = std::min(static_cast<int>(0.1 * clip.fps), clip.frame_count() - 2);
     while (first < last && FastJoints(first) >= 2) ++first;
     capture_.first_frame = first;
-    Note(Text("%d frame%s at the start left out: an artificial pose that %d joints rush away from",
+    Note(Text("skipped %d frame%s at the start: an artificial pose that %d joints leave too fast",
               first, first == 1 ? "" : "s", std::max(jumping, FastJoints(0))));
   }
 
@@ -274,41 +275,44 @@ class Reader {
         const std::string& ankle_name = side == 0 ? options_.left_ankle : options_.right_ankle;
         const int ankle = capture_.skeleton.FindJoint(ankle_name);
         if (ankle < 0)
-          return Fail(ErrorCode::kNotFound, "the file has no joint of that name", option);
+          return Fail(ErrorCode::kNotFound, "the file has no joint with this name", option);
         if (!FindLegAbove(joints(), ankle, found_.legs[side])) {
-          return Fail(ErrorCode::kInvalidArgument, "there is no knee and hip above that joint",
-                      option);
+          return Fail(ErrorCode::kInvalidArgument,
+                      "expected a joint with a knee and a hip above it", option);
         }
       }
       if (found_.legs[0].hip == found_.legs[1].hip) {
-        return Fail(ErrorCode::kInvalidArgument, "both ankles are on one leg", "right_ankle");
+        return Fail(ErrorCode::kInvalidArgument, "both ankles belong to the same leg",
+                    "right_ankle");
       }
     } else if (FindLegsByName(joints(), found_)) {
-      // The usual case needs no words.
+      // The normal case needs no note.
     } else if (FindLegsByShape(joints(), found_)) {
-      Note("legs were found by shape, as their names say nothing");
+      Note("legs were detected by shape, since the joint names do not identify them");
     } else {
       return Fail(ErrorCode::kUnsupported,
-                  "no pair of legs was found; name the ankle joints with options", name_);
+                  "no pair of legs was found; name both ankle joints with options", name_);
     }
     for (int side = 0; side < 2; ++side) {
       const std::string& ball_name = side == 0 ? options_.left_ball : options_.right_ball;
       if (ball_name.empty()) continue;
       const char* option = side == 0 ? "left_ball" : "right_ball";
       const int ball = capture_.skeleton.FindJoint(ball_name);
-      if (ball < 0) return Fail(ErrorCode::kNotFound, "the file has no joint of that name", option);
+      if (ball < 0) {
+        return Fail(ErrorCode::kNotFound, "the file has no joint with this name", option);
+      }
       int above = ball;
       while (above > found_.legs[side].ankle) above = joint(above).parent;
       if (above != found_.legs[side].ankle) {
-        return Fail(ErrorCode::kInvalidArgument, "the ball's joint must hang on the ankle", option);
+        return Fail(ErrorCode::kInvalidArgument, "expected a joint below the ankle", option);
       }
       found_.legs[side].ball = ball;
     }
     return {};
   }
 
-  // Positions of all joints and world rotation of the root; identity rotations for frame -1.
-  void Place(int frame, std::vector<DVec3>& positions) {
+  // Computes the positions of all joints; frame -1 is the rest pose with identity rotations.
+  void ComputePositions(int frame, std::vector<DVec3>& positions) {
     positions.resize(joints().size());
     world_.resize(joints().size());
     for (std::size_t j = 0; j < joints().size(); ++j) {
@@ -325,7 +329,8 @@ class Reader {
     }
   }
 
-  // Where the foot points, in the frame of its ankle: to the toe joint, or the farthest tip.
+  // Returns the direction of the foot in the frame of its ankle: the vector to the toe joint, or to
+  // the farthest tip.
   DVec3 FootVector(const FoundLeg& leg) const {
     if (leg.ball >= 0) {
       DVec3 v(0.0);
@@ -357,10 +362,10 @@ class Reader {
       return Unit(sum);
     };
 
-    Place(-1, p);
+    ComputePositions(-1, p);
     const DVec3 rest_direction = legs_up();
     DVec3 rest_up = NearestAxis(rest_direction);
-    // The rest pose tells up if its legs hang straight and the rest of the body is above them.
+    // The rest pose determines up if its legs hang straight and the rest of the body is above them.
     const DVec3 hips = 0.5 * (p[Index(found_.legs[0].hip)] + p[Index(found_.legs[1].hip)]);
     DVec3 body(0.0);
     for (int j = 1; j < static_cast<int>(joints().size()); ++j) {
@@ -372,13 +377,13 @@ class Reader {
     const bool rest_stands =
         glm::dot(rest_direction, rest_up) >= 0.8 && glm::dot(body, rest_up) >= 0.0;
 
-    // The motion tells up if its legs are below its hips on the mean of the frames.
+    // The motion determines up if the legs are below the hips on average.
     const int frames = capture_.clip.frame_count() - capture_.first_frame;
     DVec3 motion_sum(0.0);
     const int step = std::max(1, frames / kSampledFrames);
     int sampled = 0;
     for (int f = capture_.first_frame; f < capture_.clip.frame_count(); f += step, ++sampled) {
-      Place(f, p);
+      ComputePositions(f, p);
       motion_sum += legs_up();
     }
     const DVec3 motion_direction = motion_sum / static_cast<double>(sampled);
@@ -391,50 +396,54 @@ class Reader {
       world_up = motion_up;
     } else if (rest_stands) {
       world_up = rest_up;
-      Note(Text("up is taken as %s from the rest pose; the motion does not tell",
+      Note(Text("up is taken as %s from the rest pose; the motion is inconclusive",
                 AxisName(rest_up)));
     } else {
-      Note("up is taken as +y; neither the rest pose nor the motion tells");
+      Note("up is taken as +y; rest pose and motion are inconclusive");
     }
     if (!options_.up && world_up != DVec3(0.0, 1.0, 0.0)) {
-      Note(Text("%s is up in the file; turned to +y", AxisName(world_up)));
+      Note(Text("the up axis of the file is %s; the motion was turned to +y", AxisName(world_up)));
     }
     if (!rest_stands) {
-      // The frames of a rig whose bones all lie along one axis at rest: what is up in the root's
-      // frame on the mean of the motion.
+      // In rigs whose bones are all parallel at rest, up is the mean world up in the frame of the
+      // root over the motion.
       DVec3 sum(0.0);
       for (int f = capture_.first_frame; f < capture_.clip.frame_count(); f += step) {
         sum += glm::conjugate(DQuat(capture_.clip.frame(f).rotations[0])) * world_up;
       }
       rest_up = SnapAxis(sum);
       if (rest_up == DVec3(0.0)) rest_up = world_up;
-      Note("the rest pose does not stand; the root's upright direction is taken from the motion");
+      Note(
+          "the rest pose does not stand; the upright direction of the root is taken from the "
+          "motion");
     }
     return TurnAxes(world_up, rest_up);
   }
 
   Status TurnAxes(const DVec3& world_up, const DVec3& rest_up) {
     std::vector<DVec3> p;
-    Place(-1, p);
+    ComputePositions(-1, p);
     const auto level = [&](const DVec3& v) { return v - glm::dot(v, rest_up) * rest_up; };
     DVec3 feet(0.0);
     for (const FoundLeg& leg : found_.legs) feet += Unit(level(FootVector(leg)));
     const DVec3 hips = level(p[Index(found_.legs[0].hip)] - p[Index(found_.legs[1].hip)]);
     if (!found_.sides_known) {
-      // Facing where the feet point, left is up x forward.
+      // If forward is the direction of the feet, left is up x forward.
       const DVec3 left = glm::cross(rest_up, feet);
-      if (glm::length(feet) < 0.5) Note("left and right are guessed; the feet show no direction");
+      if (glm::length(feet) < 0.5) {
+        Note("left and right are guessed, since the feet have no clear direction");
+      }
       if (glm::dot(hips, left) < 0.0) std::swap(found_.legs[0], found_.legs[1]);
     }
     DVec3 left = found_.sides_known || glm::length(feet) < 0.5 ? hips : glm::cross(rest_up, feet);
     if (glm::length(left) < 1e-9) left = glm::cross(rest_up, feet);
     if (glm::length(left) < 1e-9) {
-      return Fail(ErrorCode::kUnsupported, "the figure's left and right cannot be told apart",
-                  name_);
+      return Fail(ErrorCode::kUnsupported,
+                  "cannot determine left and right; name both ankle joints with options", name_);
     }
     left = Unit(level(SnapAxis(left)));
     if (glm::dot(glm::cross(left, rest_up), feet) < 0.0) {
-      Note("the feet point backwards from where left and right say the figure faces");
+      Note("the feet point backwards; left and right may be swapped");
     }
     joint_turn_ = TurnToOurAxes(left, rest_up);
     if (glm::dot(world_up, rest_up) > 0.999) {
@@ -458,12 +467,13 @@ class Reader {
     const double leg = 0.5 * (LegLength(found_.legs[0]) + LegLength(found_.legs[1]));
     if (options_.unit_m) {
       if (!(*options_.unit_m > 0.0 && *options_.unit_m <= 1000.0)) {
-        return Fail(ErrorCode::kInvalidArgument, "a unit must lie in (0, 1000] metres", "unit_m");
+        return Fail(ErrorCode::kInvalidArgument, "expected a unit above 0 and at most 1000 metres",
+                    "unit_m");
       }
       capture_.unit_m = *options_.unit_m;
       return {};
     }
-    if (!(leg > 1e-9)) return Fail(ErrorCode::kOutOfRange, "the legs have no length", name_);
+    if (!(leg > 1e-9)) return Fail(ErrorCode::kOutOfRange, "the legs have length zero", name_);
     double best = 0.0;
     for (const KnownUnit& unit : kKnownUnits) {
       const double leg_m = leg * unit.m;
@@ -475,13 +485,14 @@ class Reader {
       unit_name_ = unit.name;
     }
     if (best > 0.0) {
-      Note(Text("one unit is taken as %s: the legs are then %.2f m long", unit_name_,
+      Note(Text("one file unit is taken as %s: the legs are then %.2f m long", unit_name_,
                 leg * capture_.unit_m));
       return {};
     }
-    // Standing hips from the bones: root above the hip joints, the legs, ankle above the ball.
+    // Estimates the height of standing hips from the bones: root above hips, legs, ankle above
+    // ball.
     std::vector<DVec3> p;
-    Place(-1, p);
+    ComputePositions(-1, p);
     double standing = leg;
     for (const FoundLeg& found : found_.legs) {
       standing -= 0.5 * (joint_turn_ * p[Index(found.hip)]).y;
@@ -490,8 +501,8 @@ class Reader {
     if (!(standing > 0.5 * leg)) standing = leg;
     capture_.unit_m = kStandingHipsM / standing;
     Note(
-        Text("no known unit makes the legs 0.68 to 1.0 m long; a unit of %.5g m puts the standing "
-             "hips at %.2f m",
+        Text("no common unit gives legs of 0.68 to 1.0 m; a unit of %.5g m puts the hips of the "
+             "standing figure at %.2f m",
              capture_.unit_m, kStandingHipsM));
     return {};
   }
@@ -505,13 +516,13 @@ class Reader {
     for (EndSite& site : capture_.skeleton.end_sites) point(site.offset_m);
     for (std::size_t j = 1; j < joints().size(); ++j) {
       if (glm::length(joints()[j].offset_m) > kMaxOffsetM) {
-        return Fail(ErrorCode::kOutOfRange, "a joint's offset is too large",
+        return Fail(ErrorCode::kOutOfRange, "the OFFSET of the joint is too large",
                     LineOf(file_.joints[j].line));
       }
     }
     for (std::size_t i = 0; i < file_.end_sites.size(); ++i) {
       if (glm::length(capture_.skeleton.end_sites[i].offset_m) > kMaxOffsetM) {
-        return Fail(ErrorCode::kOutOfRange, "an End Site's offset is too large",
+        return Fail(ErrorCode::kOutOfRange, "the OFFSET of the End Site is too large",
                     LineOf(file_.end_sites[i].line));
       }
     }
@@ -527,12 +538,12 @@ class Reader {
       }
     }
     MakeSignContinuous(clip);
-    for (int side = 0; side < 2; ++side) PlaceFoot(found_.legs[side], capture_.skeleton.legs[side]);
+    for (int side = 0; side < 2; ++side) SetFoot(found_.legs[side], capture_.skeleton.legs[side]);
     NoteSlowMotion();
     if (positioned_joints_ > 0) {
       Note(Text(
-          "%d joints besides the root have positions; each keeps its mean as offset, at most "
-          "%.4f m off (%.100s)",
+          "%d joints besides the root have position channels; their means replace the OFFSETs "
+          "(largest deviation %.4f m, %.100s)",
           positioned_joints_, position_deviation_ * unit, joint(position_joint_).name.c_str()));
     }
     if (Status status = capture_.skeleton.Validate(); !status) {
@@ -556,9 +567,9 @@ class Reader {
     return position;
   }
 
-  // Some conversions say 1/30 s of motion taken at 120 Hz. Feet that move at all are flung: over a
-  // window of 50 ms the 99th percentile of an ankle's acceleration is 17 m/s^2 in the slowest walk
-  // of our captures, 68 in the briskest. Four times too slow makes that 1 to 4.
+  // Some conversions declare 30 Hz for motion that was captured at 120 Hz. This is detected by the
+  // acceleration of the ankles over 50 ms. Its 99th percentile is 17 m/s^2 in the slowest walk of
+  // our captures and 68 in the fastest. Playback at a quarter of the speed reduces that to 1 to 4.
   void NoteSlowMotion() {
     const Clip& clip = capture_.clip;
     const int half = std::max(1, static_cast<int>(std::lround(0.025 * clip.fps)));
@@ -578,20 +589,20 @@ class Reader {
         accelerations.push_back(glm::length(d) * scale);
       }
     }
-    if (travel_m < kLeastTravelM) return;  // Standing still is no sign.
+    if (travel_m < kMinTravelM) return;  // A standing figure is inconclusive.
     const auto p99 =
         accelerations.begin() +
         static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(accelerations.size() - 1));
     std::nth_element(accelerations.begin(), p99, accelerations.end());
     if (*p99 >= kSlowestFeetMS2) return;
     Note(Text(
-        "the feet accelerate by %.1f m/s^2 at most, people's by 17 and more: Frame Time %.6g s "
-        "may be too long (120 frames a second are usual)",
+        "the feet accelerate by %.1f m/s^2 at most, which is too slow for a person (17 or more): "
+        "Frame Time %.6g s may be too long; most captures have 120 frames per second",
         *p99, file_.frame_time_s));
   }
 
-  // Already in metres and our axes.
-  void PlaceFoot(const FoundLeg& found, Leg& leg) {
+  // Fills in `leg`, in metres and our axes.
+  void SetFoot(const FoundLeg& found, Leg& leg) {
     leg.hip = found.hip;
     leg.knee = found.knee;
     leg.ankle = found.ankle;
@@ -609,7 +620,9 @@ class Reader {
     DVec3 tip = FarthestTip(found.ankle);
     if (glm::length(tip) < 1e-6) {
       tip = DVec3(0.0, -0.07, 0.24) * leg_m;
-      Note("a foot has neither toe joint nor End Site; it is taken as 0.24 leg lengths long");
+      Note(
+          "a foot has neither a toe joint nor an End Site; its length is taken as 0.24 leg "
+          "lengths");
     } else if (glm::length(tip) < kFootEndIsBall * leg_m) {
       leg.ball_offset_m = Vec3(tip);
       leg.toe_tip_offset_m = Vec3(tip.x / kBallShare, tip.y, tip.z / kBallShare);
@@ -624,8 +637,8 @@ class Reader {
   const BvhReadOptions& options_;
   Capture capture_;
   FoundLegs found_;
-  std::vector<DVec3> roots_;  // Root position, file axes and units
-  std::vector<DQuat> world_;  // Scratch of Place
+  std::vector<DVec3> roots_;  // Root positions, in file axes and units.
+  std::vector<DQuat> world_;  // World rotations, scratch of ComputePositions.
   DQuat world_turn_ = DQuat(1.0, 0.0, 0.0, 0.0);
   DQuat joint_turn_ = DQuat(1.0, 0.0, 0.0, 0.0);
   const char* unit_name_ = "";
@@ -639,7 +652,8 @@ class Reader {
 Expected<Capture> ParseBvh(std::string_view text, std::string_view name,
                            const BvhReadOptions& options) {
   if (text.size() > kMaxBvhBytes) {
-    return Fail(ErrorCode::kLimitExceeded, "the file is larger than 512 MiB", std::string(name));
+    return Fail(ErrorCode::kLimitExceeded, "the file is larger than the limit of 512 MiB",
+                std::string(name));
   }
   Expected<BvhFile> file = ParseBvhFile(text, name);
   if (!file) return std::unexpected(std::move(file.error()));
@@ -653,22 +667,22 @@ Expected<Capture> ReadBvh(const std::filesystem::path& path, const BvhReadOption
   if (status.type() == std::filesystem::file_type::not_found) {
     return Fail(ErrorCode::kNotFound, "there is no such file", name);
   }
-  if (code) return Fail(ErrorCode::kIo, "the file cannot be opened", name);
+  if (code) return Fail(ErrorCode::kIo, "cannot open the file", name);
   if (!std::filesystem::is_regular_file(status)) {
-    return Fail(ErrorCode::kIo, "this is no ordinary file", name);
+    return Fail(ErrorCode::kIo, "expected a regular file", name);
   }
   const std::uintmax_t size = std::filesystem::file_size(path, code);
-  if (code) return Fail(ErrorCode::kIo, "the file cannot be opened", name);
+  if (code) return Fail(ErrorCode::kIo, "cannot open the file", name);
   if (size > kMaxBvhBytes) {
-    return Fail(ErrorCode::kLimitExceeded, "the file is larger than 512 MiB", name);
+    return Fail(ErrorCode::kLimitExceeded, "the file is larger than the limit of 512 MiB", name);
   }
   std::ifstream stream(path, std::ios::binary);
-  if (!stream) return Fail(ErrorCode::kIo, "the file cannot be opened", name);
+  if (!stream) return Fail(ErrorCode::kIo, "cannot open the file", name);
   std::string text(static_cast<std::size_t>(size), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(size));
-  // Shorter than a moment ago: what is there is read.
+  // The file may have become shorter since file_size.
   text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (stream.bad()) return Fail(ErrorCode::kIo, "the file cannot be read", name);
+  if (stream.bad()) return Fail(ErrorCode::kIo, "cannot read the file", name);
   return ParseBvh(text, name, options);
 }
 

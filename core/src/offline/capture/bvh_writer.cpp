@@ -21,9 +21,9 @@ namespace {
 
 constexpr double kDegrees = 180.0 / std::numbers::pi;
 
-// The shortest digits that read back as the same float, never with an exponent.
+// Appends the shortest decimal number that reads back as the same float, without an exponent.
 void AppendFloat(std::string& text, float value) {
-  if (value == 0.0f) value = 0.0f;  // No "-0".
+  if (value == 0.0f) value = 0.0f;  // Avoids "-0".
   char buffer[128];
   const auto result =
       std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::fixed);
@@ -44,7 +44,7 @@ void AppendVector(std::string& text, const Vec3& v) {
   }
 }
 
-std::string FileName(const std::string& name) {
+std::string BvhName(const std::string& name) {
   std::string result = name;
   for (char& c : result) {
     if (static_cast<unsigned char>(c) <= ' ' || c == 0x7f || c == '{' || c == '}') c = '_';
@@ -53,17 +53,19 @@ std::string FileName(const std::string& name) {
 }
 
 struct Angles {
-  double z = 0.0, y = 0.0, x = 0.0;  // Radians; R = Rz Ry Rx
+  double z = 0.0, y = 0.0, x = 0.0;  // Radians; R = Rz Ry Rx.
 };
 
-// Angles of a rotation, of the two sets that make it the one nearer to the frame before.
+// Decomposes a rotation into Euler angles. Of the two solutions, returns the one nearer to the
+// angles of the previous frame.
 //
 //                  | cz cy   cz sy sx - sz cx   cz sy cx + sz sx |
 //   Rz Ry Rx   =   | sz cy   sz sy sx + cz cx   sz sy cx - cz sx |
 //                  |  -sy         cy sx              cy cx       |
 //
-// With cy near 0 (gimbal lock) only z -+ x is determined: x stays as it was. z is taken from
-// R Rx(-x) = Rz Ry, whose second column is (-sz, cz, 0), so it fits x in every case.
+// If cy is near 0 (gimbal lock), only z -+ x is determined, and x keeps its previous value. z is
+// computed from R Rx(-x) = Rz Ry, whose second column is (-sz, cz, 0), so it is correct in all
+// cases.
 Angles NearestAngles(const Quat& rotation, const Angles& before) {
   const glm::dmat3 r = glm::mat3_cast(glm::normalize(DQuat(rotation)));  // r[column][row]
   const double cos_y = std::sqrt(r[0][0] * r[0][0] + r[0][1] * r[0][1]);
@@ -91,7 +93,7 @@ Angles NearestAngles(const Quat& rotation, const Angles& before) {
 
 struct Tree {
   std::vector<std::vector<int>> children;
-  std::vector<std::vector<int>> end_sites;  // Indices into Skeleton::end_sites
+  std::vector<std::vector<int>> end_sites;  // Indices into Skeleton::end_sites.
   std::vector<int> depth_first;
 
   explicit Tree(const Skeleton& skeleton)
@@ -107,13 +109,13 @@ struct Tree {
   }
 };
 
-// No deeper than kMaxJoints, which Validate has checked.
+// Recursive. The depth is at most kMaxJoints, which Skeleton::Validate has checked.
 void AppendJoint(std::string& text, const Skeleton& skeleton, Tree& tree, int j, int depth) {
   const std::size_t index = static_cast<std::size_t>(j);
   const Joint& joint = skeleton.joints[index];
   tree.depth_first.push_back(j);
   const std::string indent(static_cast<std::size_t>(depth), '\t');
-  text += indent + (j == 0 ? "ROOT " : "JOINT ") + FileName(joint.name) + '\n';
+  text += indent + (j == 0 ? "ROOT " : "JOINT ") + BvhName(joint.name) + '\n';
   text += indent + "{\n" + indent + "\tOFFSET ";
   AppendVector(text, j == 0 ? Vec3(0.0f) : joint.offset_m);
   text += '\n' + indent;
@@ -138,7 +140,8 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out) {
   if (Status status = skeleton.Validate(); !status) return status;
   if (Status status = clip.Validate(); !status) return status;
   if (skeleton.joint_count() != clip.joint_count) {
-    return Fail(ErrorCode::kShapeMismatch, "skeleton and clip differ in joints", clip.joint_count);
+    return Fail(ErrorCode::kShapeMismatch, "skeleton and clip have different numbers of joints",
+                clip.joint_count);
   }
   Tree tree(skeleton);
   std::string text = "HIERARCHY\n";
@@ -163,7 +166,7 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, std::ostream& out) {
     text.clear();
   }
   out.flush();
-  if (!out) return Fail(ErrorCode::kIo, "the motion could not be written");
+  if (!out) return Fail(ErrorCode::kIo, "cannot write the motion");
   return {};
 }
 
@@ -174,15 +177,15 @@ Status WriteBvh(const Skeleton& skeleton, const Clip& clip, const std::filesyste
   Status status;
   {
     std::ofstream out(part, std::ios::binary | std::ios::trunc);
-    if (!out) return Fail(ErrorCode::kIo, "the file cannot be made", path.string());
+    if (!out) return Fail(ErrorCode::kIo, "cannot create the file", path.string());
     status = WriteBvh(skeleton, clip, out);
     out.close();
-    if (status && !out) status = Fail(ErrorCode::kIo, "the motion could not be written");
+    if (status && !out) status = Fail(ErrorCode::kIo, "cannot write the motion");
   }
   if (status) {
     std::filesystem::rename(part, path, code);
     if (!code) return {};
-    status = Fail(ErrorCode::kIo, "the written file cannot be put in its place");
+    status = Fail(ErrorCode::kIo, "cannot rename the temporary file to this path");
   }
   std::filesystem::remove(part, code);
   status.error().where = path.string();

@@ -10,9 +10,9 @@ namespace stridewire {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kJumpRad_s = 1800.0 * kDegree;  // Arms of a jumping person reach about 1000.
-constexpr double kJumpMinRad = 12.0 * kDegree;   // At 240 Hz and above speeds are mostly noise.
-constexpr double kJumpMaxRad = 60.0 * kDegree;   // At 30 Hz 1800 degrees/s would excuse anything.
+constexpr double kJumpRad_s = 1800.0 * kDegree;  // Arms reach about 1000 degrees/s in a jump.
+constexpr double kJumpMinRad = 12.0 * kDegree;   // Ignores noise at 240 Hz and above.
+constexpr double kJumpMaxRad = 60.0 * kDegree;   // At 30 Hz, 1800 degrees/s would allow too much.
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;
 constexpr double kLimbEndM = 0.15;
@@ -35,7 +35,7 @@ class Track {
   int joint_;
 };
 
-// Frames strictly between `before` and `after` on the short arc between those two.
+// Replaces the frames strictly between `before` and `after` by slerp between those two.
 void Interpolate(Track& track, int before, int after) {
   const Quat from = track[before];
   const Quat turn = glm::conjugate(from) * track[after];
@@ -45,7 +45,7 @@ void Interpolate(Track& track, int before, int after) {
   }
 }
 
-// How far the body reaches beyond a joint.
+// Returns the length of the body beyond a joint.
 double ReachBeyond(const Skeleton& skeleton, int joint) {
   std::vector<double> distance(skeleton.joints.size(), -1.0);
   distance[static_cast<std::size_t>(joint)] = 0.0;
@@ -74,12 +74,12 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   const double limit = std::clamp(kJumpRad_s / clip.fps, kJumpMinRad, kJumpMaxRad);
   const int spike = std::max(2, static_cast<int>(std::lround(kSpikeS * clip.fps)));
   const int spread = std::max(1, static_cast<int>(std::lround(0.5 * kSpreadS * clip.fps)));
-  // jump at f: between f and f + 1
+  // A jump at f is the rotation between f and f + 1.
   const auto jump = [&](int f) { return AngleBetween(track[f], track[f + 1]); };
   for (int f = first_frame; f + 1 < end; ++f) {
     const double angle = jump(f);
     if (angle <= limit) continue;
-    // Back again soon? Then everything in between is bad.
+    // If the joint returns soon, all frames in between are bad.
     int back = -1;
     double largest = angle;
     for (int g = f + 1; g < std::min(f + 1 + spike, end - 1); ++g) {
@@ -114,8 +114,9 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   }
 }
 
-// One or two frames at which the root is beside its path: the solver that made the recording
-// gave them to another joint (16_17: pelvis 4 cm aside and 30 degrees turned for a frame).
+// Repairs single frames at which the root leaves its path. The solver of the recording sometimes
+// attributes its motion to another joint (16_17: pelvis moved 4 cm and turned 30 degrees for a
+// frame).
 void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
   std::vector<Vec3>& path = clip.root_positions_m;
   const int end = clip.frame_count();
@@ -134,7 +135,7 @@ void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
     }
     off[static_cast<std::size_t>(f)] = glm::length(path[static_cast<std::size_t>(f)] - median);
   }
-  // A fast walk moves 2 cm a frame at 120 Hz, but its median moves along.
+  // In a fast walk the root moves 2 cm per frame at 120 Hz, but so does the median.
   for (int f = first_frame + 1; f + 1 < end; ++f) {
     if (off[static_cast<std::size_t>(f)] <= limit) continue;
     int last = f;
@@ -170,10 +171,10 @@ std::string DescribeFlip(const Skeleton& skeleton, const JointFlip& flip, double
   char text[64];
   const double middle_s = 0.5 * (flip.frames.begin + flip.frames.end - 1) / fps;
   if (flip.distance_m > 0.0) {
-    std::snprintf(text, sizeof text, " moves %.1f cm at once at %.2f s", 100.0 * flip.distance_m,
-                  middle_s);
+    std::snprintf(text, sizeof text, " moves %.1f cm in one frame at %.2f s",
+                  100.0 * flip.distance_m, middle_s);
   } else {
-    std::snprintf(text, sizeof text, " turns %.0f degrees at once at %.2f s",
+    std::snprintf(text, sizeof text, " turns %.0f degrees in one frame at %.2f s",
                   flip.angle_rad / kDegree, middle_s);
   }
   return skeleton.joints[static_cast<std::size_t>(flip.joint)].name + text;
@@ -191,12 +192,15 @@ std::vector<std::string> DescribeRepairs(const Skeleton& skeleton, const GlitchR
       if (worst == nullptr || flip.angle_rad > worst->angle_rad) worst = &flip;
     }
     if (count == 0) continue;
-    std::string sentence = DescribeFlip(skeleton, *worst, fps) + ": mended";
-    if (count > 1) sentence += ", as " + std::to_string(count - 1) + " smaller flips of it";
+    std::string sentence = DescribeFlip(skeleton, *worst, fps) + ": repaired";
+    if (count > 1)
+      sentence += ", with " + std::to_string(count - 1) + " smaller flips of the joint";
     sentences.push_back(std::move(sentence));
   }
   for (const JointFlip& flip : report.repaired) {
-    if (flip.distance_m > 0.0) sentences.push_back(DescribeFlip(skeleton, flip, fps) + ": mended");
+    if (flip.distance_m > 0.0) {
+      sentences.push_back(DescribeFlip(skeleton, flip, fps) + ": repaired");
+    }
   }
   return sentences;
 }

@@ -14,7 +14,8 @@ const Joint& At(const std::vector<Joint>& joints, int j) {
   return joints[static_cast<std::size_t>(j)];
 }
 
-// Lower-case words of a name: "mixamorig:LeftUpLeg" -> left, up, leg; "LHipJoint" -> l, hip, joint.
+// Splits a name into lower-case words: "mixamorig:LeftUpLeg" -> left, up, leg; "LHipJoint" -> l,
+// hip, joint.
 std::vector<std::string> Words(std::string_view name) {
   name.remove_prefix(name.find_last_of(":|") + 1);  // npos + 1 is 0
   std::vector<std::string> words;
@@ -39,7 +40,7 @@ LegPart PartOf(const std::string& word) {
     return std::any_of(parts.begin(), parts.end(),
                        [&](std::string_view part) { return word.find(part) != std::string::npos; });
   };
-  // Helpers of a rig and tips are none of the joints looked for.
+  // Ignores helper joints of rigs and tips.
   if (has({"ik", "pole", "target", "ctrl", "roll", "twist", "heel"})) return LegPart::kNone;
   if (has({"toe", "ball"})) return has({"end", "tip", "nub"}) ? LegPart::kNone : LegPart::kBall;
   if (has({"end", "tip", "nub", "index", "hand", "arm"})) return LegPart::kNone;
@@ -69,8 +70,9 @@ bool IsBelow(const std::vector<Joint>& joints, int j, int ancestor) {
   return j == ancestor;
 }
 
-// The toe joint below an ankle: the nearest one called so, or the only joint there is, if it has a
-// bone. Joints stand parents first, so the first hit is one of the nearest.
+// Finds the toe joint below an ankle: the nearest joint with a matching name, or else the only
+// child if its bone has a length. Joints are sorted parents first, so the first match is a nearest
+// one.
 int FindBall(const std::vector<Joint>& joints, int ankle) {
   int only = -1;
   int children = 0;
@@ -110,7 +112,7 @@ LegName ReadLegName(std::string_view name) {
     }
   }
   result.part = PartOf(rest);
-  // "lfemur", "leftfoot": the side stands in front without a mark.
+  // Names such as "lfemur" or "leftfoot" begin with the side without a separator.
   if (result.side == Side::kNone) {
     for (const std::string_view prefix : {"left", "right", "l", "r"}) {
       if (!rest.starts_with(prefix)) continue;
@@ -132,7 +134,7 @@ bool FindLegAbove(const std::vector<Joint>& joints, int ankle, FoundLeg& leg) {
     for (int j = At(joints, from).parent; j > 0; j = At(joints, j).parent) {
       if (ReadLegName(At(joints, j).name).part == part) return j;
     }
-    // No such name: the next joint up that has a bone to its child.
+    // Without a matching name, takes the next joint up that has a bone of non-zero length below it.
     int child = from;
     for (int j = At(joints, from).parent; j >= 0; child = j, j = At(joints, j).parent) {
       if (Length(joints, child) > 0.0f) return j;
@@ -174,7 +176,7 @@ bool FindLegsByName(const std::vector<Joint>& joints, FoundLegs& legs) {
 
 bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs) {
   const int count = static_cast<int>(joints.size());
-  // Longest way down from each joint, its own offset left out.
+  // Longest chain of bones below each joint, without its own offset.
   std::vector<float> reach(joints.size(), 0.0f);
   std::vector<int> next(joints.size(), -1);
   for (int j = count - 1; j > 0; --j) {

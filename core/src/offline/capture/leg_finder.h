@@ -10,17 +10,17 @@
 
 namespace stridewire {
 
-/// A leg as the names or the shape of a skeleton show it.
+/// The joints of a leg, as detected from the names or the shape of a skeleton.
 struct FoundLeg {
-  int hip = -1;  ///< The joint at the hip end of the thigh.
+  int hip = -1;  ///< The joint at the upper end of the thigh.
   int knee = -1;
   int ankle = -1;
-  int ball = -1;  ///< Toe joint; -1: the ankle is the last joint.
+  int ball = -1;  ///< The toe joint; -1: there is none below the ankle.
 };
 
 struct FoundLegs {
   FoundLeg legs[2];         ///< Indexed by Foot.
-  bool sides_known = true;  ///< False: found by shape, and which is left is a guess so far.
+  bool sides_known = true;  ///< False: detected by shape, so left and right may be swapped.
 };
 
 enum class Side { kNone, kLeft, kRight };
@@ -31,19 +31,21 @@ struct LegName {
   LegPart part = LegPart::kNone;
 };
 
-/// What a joint's name says: "LeftUpLeg", "lfemur", "Bip01 L Thigh", "mixamorig:RightToeBase",
-/// "foot.R". A plain "LeftHip" is the upper end of the thigh.
+/// Derives side and part of the leg from a joint name: "LeftUpLeg", "lfemur", "Bip01 L Thigh",
+/// "mixamorig:RightToeBase", "foot.R". "LeftHip" is the upper end of the thigh.
 [[nodiscard]] LegName ReadLegName(std::string_view name);
 
-/// The joints above and below an ankle: the knee and the hip are the nearest joints above it that
-/// their names call so, or else those that end and begin a bone of some length.
+/// Finds the other joints of a leg from its ankle. Knee and hip are the nearest joints above it
+/// with matching names; without such names, the next joints at the ends of bones of non-zero
+/// length. Returns false if there is no knee or hip.
 [[nodiscard]] bool FindLegAbove(const std::vector<Joint>& joints, int ankle, FoundLeg& leg);
 
-/// Both legs by their names; false if a side has none.
+/// Detects both legs by joint names. Returns false if a side has no leg.
 [[nodiscard]] bool FindLegsByName(const std::vector<Joint>& joints, FoundLegs& legs);
 
-/// Both legs by shape: two chains that leave the same joint, of equal lengths (8 %), nearest to the
-/// root and then longest. The thigh and the shin are the longest two bones in a row.
+/// Detects both legs by shape: two chains from the same joint with equal lengths (within 8 %). Of
+/// several pairs it takes the one nearest to the root, and then the longest. Thigh and shin are the
+/// longest pair of successive bones.
 [[nodiscard]] bool FindLegsByShape(const std::vector<Joint>& joints, FoundLegs& legs);
 
 }  // namespace stridewire

@@ -17,24 +17,25 @@ static_assert(kMaxRequestLengthM == 10.0 && kMaxRequestTurnRad == 3.2 && kMaxSta
               kMaxWaypoints == 64 && kMaxChoreographyPositionM == 1e5 &&
               kMaxChoreographyHeadingRad == 1e4);
 constexpr JsonLimit kLength = {-kMaxRequestLengthM, kMaxRequestLengthM,
-                               "is not a number within 10 m"};
+                               "expected a number from -10 to 10 m"};
 constexpr JsonLimit kTurn = {-kMaxRequestTurnRad, kMaxRequestTurnRad,
-                             "is not a number within 3.2 rad"};
-constexpr JsonLimit kSeconds = {0.0, kMaxStandS, "is not a number from 0 to 3600 s"};
+                             "expected a number from -3.2 to 3.2 rad"};
+constexpr JsonLimit kSeconds = {0.0, kMaxStandS, "expected a number from 0 to 3600 s"};
 constexpr JsonLimit kSpeed = {kMinWalkSpeedMPerS, kMaxWalkSpeedMPerS,
-                              "is not a number from 0.05 to 5 m/s"};
-constexpr JsonLimit kWeight = {0.0, 1.0, "is not a number from 0 to 1"};
-constexpr JsonLimit kBlend = {0.0, kMaxLayerBlendS, "is not a number from 0 to 10 s"};
-constexpr JsonLimit kLayerSpeed = {kMinLayerSpeed, kMaxLayerSpeed, "is not a number from 0.1 to 4"};
+                              "expected a number from 0.05 to 5 m/s"};
+constexpr JsonLimit kWeight = {0.0, 1.0, "expected a number from 0 to 1"};
+constexpr JsonLimit kBlend = {0.0, kMaxLayerBlendS, "expected a number from 0 to 10 s"};
+constexpr JsonLimit kLayerSpeed = {kMinLayerSpeed, kMaxLayerSpeed,
+                                   "expected a number from 0.1 to 4"};
 constexpr JsonLimit kPosition = {-kMaxChoreographyPositionM, kMaxChoreographyPositionM,
-                                 "is not a number within 100000 m"};
+                                 "expected a number from -100000 to 100000 m"};
 constexpr JsonLimit kHeading = {-kMaxChoreographyHeadingRad, kMaxChoreographyHeadingRad,
-                                "is not a number within 10000 rad"};
+                                "expected a number from -10000 to 10000 rad"};
 
-/// [x, y, z]
-Status ReadPlace(const json& position, const std::string& where, DVec3& out) {
+/// Reads [x, y, z].
+Status ReadPosition(const json& position, const std::string& where, DVec3& out) {
   if (!position.is_array() || position.size() != 3) {
-    return Fail(ErrorCode::kMalformed, "is not an array of three numbers", where);
+    return Fail(ErrorCode::kMalformed, "expected an array of three numbers", where);
   }
   for (int axis = 0; axis < 3; ++axis) {
     if (auto ok = ReadNumberAt(position[static_cast<std::size_t>(axis)],
@@ -47,14 +48,14 @@ Status ReadPlace(const json& position, const std::string& where, DVec3& out) {
 }
 
 Status ReadPosition(const JsonField& field, const char* key, DVec3& out) {
-  return ReadPlace(*field.Find(key), field.WhereOf(key), out);
+  return ReadPosition(*field.Find(key), field.WhereOf(key), out);
 }
 
-/// A step that lands in a place has it instead of a length.
+/// Reads a step with `at_m`, which excludes length, side, height and turn.
 Status ReadFootprint(const JsonField& field, FootprintRequest& at) {
   for (const char* key : {"length_m", "side_m", "height_m", "turn_rad"}) {
     if (field.Find(key) != nullptr) {
-      return Fail(ErrorCode::kMalformed, "has no meaning beside at_m", field.WhereOf(key));
+      return Fail(ErrorCode::kMalformed, "cannot be combined with at_m", field.WhereOf(key));
     }
   }
   if (auto ok = ReadPosition(field, "at_m", at.position_m); !ok) return ok;
@@ -66,7 +67,7 @@ Status ReadFlag(const JsonField& field, const char* key, bool& out) {
   const json* value = field.Find(key);
   if (value == nullptr) return {};
   if (!value->is_boolean()) {
-    return Fail(ErrorCode::kMalformed, "is neither true nor false", field.WhereOf(key));
+    return Fail(ErrorCode::kMalformed, "expected true or false", field.WhereOf(key));
   }
   out = value->get<bool>();
   return {};
@@ -84,8 +85,7 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
     } else if (*foot == "right") {
       step.foot = Foot::kRight;
     } else {
-      return Fail(ErrorCode::kMalformed, "is neither \"left\" nor \"right\"",
-                  field.WhereOf("foot"));
+      return Fail(ErrorCode::kMalformed, "expected \"left\" or \"right\"", field.WhereOf("foot"));
     }
   }
   if (field.Find("at_m") != nullptr) {
@@ -94,7 +94,7 @@ Status ReadStep(const JsonField& field, StepRequest& step) {
   }
   for (const char* key : {"heading_rad", "exact_only"}) {
     if (field.Find(key) == nullptr) continue;
-    return Fail(ErrorCode::kMalformed, "has a meaning only beside at_m", field.WhereOf(key));
+    return Fail(ErrorCode::kMalformed, "requires at_m", field.WhereOf(key));
   }
   if (auto ok = ReadRequiredNumber(field, "length_m", kLength, step.length_m); !ok) return ok;
   if (field.Find("side_m") != nullptr) {
@@ -118,20 +118,20 @@ Status ReadWalk(const JsonField& field, WalkRequest& walk) {
     return ok;
   }
   if (field.Find("position_m") == nullptr) {
-    return Fail(ErrorCode::kMalformed, "is missing", field.WhereOf("position_m"));
+    return Fail(ErrorCode::kMalformed, "required key is missing", field.WhereOf("position_m"));
   }
   if (auto ok = ReadPosition(field, "position_m", walk.position_m); !ok) return ok;
   if (auto ok = ReadRequiredNumber(field, "heading_rad", kHeading, walk.heading_rad); !ok)
     return ok;
   if (const json* waypoints = field.Find("waypoints_m")) {
     const std::string where = field.WhereOf("waypoints_m");
-    if (!waypoints->is_array()) return Fail(ErrorCode::kMalformed, "is not an array", where);
+    if (!waypoints->is_array()) return Fail(ErrorCode::kMalformed, "expected an array", where);
     if (waypoints->size() > kMaxWaypoints) {
-      return Fail(ErrorCode::kLimitExceeded, "holds more than 64 places", where);
+      return Fail(ErrorCode::kLimitExceeded, "expected at most 64 positions", where);
     }
     for (std::size_t i = 0; i < waypoints->size(); ++i) {
-      if (auto ok = ReadPlace((*waypoints)[i], where + "[" + std::to_string(i) + "]",
-                              walk.waypoints_m.emplace_back());
+      if (auto ok = ReadPosition((*waypoints)[i], where + "[" + std::to_string(i) + "]",
+                                 walk.waypoints_m.emplace_back());
           !ok) {
         return ok;
       }
@@ -147,14 +147,15 @@ Status ReadStand(const JsonField& field, StandRequest& stand) {
 }
 
 Status ReadLayer(const JsonField& field, LayerCue& cue) {
-  if (auto ok = CheckKeys(field, {"name", "off", "weight", "blend_s", "speed"}); !ok) return ok;
+  if (auto ok = CheckKeys(field, {"name", "enabled", "weight", "blend_s", "speed"}); !ok) return ok;
   const json* name = field.Find("name");
-  if (name == nullptr) return Fail(ErrorCode::kMalformed, "is missing", field.WhereOf("name"));
+  if (name == nullptr)
+    return Fail(ErrorCode::kMalformed, "required key is missing", field.WhereOf("name"));
   if (!name->is_string() || name->get<std::string>().empty()) {
-    return Fail(ErrorCode::kMalformed, "is not the name of a layer", field.WhereOf("name"));
+    return Fail(ErrorCode::kMalformed, "expected a non-empty string", field.WhereOf("name"));
   }
   cue.layer = name->get<std::string>();
-  if (auto ok = ReadFlag(field, "off", cue.is_off); !ok) return ok;
+  if (auto ok = ReadFlag(field, "enabled", cue.enabled); !ok) return ok;
   if (auto ok = ReadNumber(field, "weight", kWeight, cue.weight); !ok) return ok;
   if (auto ok = ReadNumber(field, "blend_s", kBlend, cue.blend_s); !ok) return ok;
   return ReadNumber(field, "speed", kLayerSpeed, cue.speed);
@@ -181,7 +182,8 @@ Status ReadStart(const JsonField& field, BaseFrame& start) {
 
 Expected<Choreography> ParseChoreography(std::string_view text, std::string_view name) {
   if (text.size() > kMaxChoreographyBytes) {
-    return Fail(ErrorCode::kLimitExceeded, "the file is larger than 4 MiB", std::string(name));
+    return Fail(ErrorCode::kLimitExceeded, "the file is larger than the limit of 4 MiB",
+                std::string(name));
   }
   const Expected<json> document = ParseJson(text, name, kMaxChoreographyDepth);
   if (!document) return std::unexpected(document.error());
@@ -203,11 +205,12 @@ Expected<Choreography> ParseChoreography(std::string_view text, std::string_view
   }
   const std::string where = root.WhereOf("movements");
   const json* movements = root.Find("movements");
-  if (movements == nullptr) return Fail(ErrorCode::kMalformed, "is missing", where);
-  if (!movements->is_array()) return Fail(ErrorCode::kMalformed, "is not an array", where);
-  if (movements->empty()) return Fail(ErrorCode::kOutOfRange, "holds no movement", where);
+  if (movements == nullptr) return Fail(ErrorCode::kMalformed, "required key is missing", where);
+  if (!movements->is_array()) return Fail(ErrorCode::kMalformed, "expected an array", where);
+  if (movements->empty())
+    return Fail(ErrorCode::kOutOfRange, "expected at least one movement", where);
   if (movements->size() > kMaxChoreographyMovements) {
-    return Fail(ErrorCode::kLimitExceeded, "holds more than 65536 movements", where);
+    return Fail(ErrorCode::kLimitExceeded, "expected at most 65536 movements", where);
   }
   choreography.movements.reserve(movements->size());
   for (std::size_t i = 0; i < movements->size(); ++i) {
@@ -217,7 +220,7 @@ Expected<Choreography> ParseChoreography(std::string_view text, std::string_view
     }
     if (field.value.size() != 1) {
       return Fail(ErrorCode::kMalformed,
-                  "needs exactly one of step, walk_to, jump, stand and layer", field.where);
+                  "expected exactly one of step, walk_to, jump, stand and layer", field.where);
     }
     if (const json* layer = field.Find("layer")) {
       LayerCue& cue = choreography.layers.emplace_back();
@@ -232,7 +235,7 @@ Expected<Choreography> ParseChoreography(std::string_view text, std::string_view
     if (auto ok = ReadMovement(field, request); !ok) return std::unexpected(ok.error());
   }
   if (choreography.movements.empty()) {
-    return Fail(ErrorCode::kOutOfRange, "holds no movement", where);
+    return Fail(ErrorCode::kOutOfRange, "expected at least one movement", where);
   }
   return choreography;
 }

@@ -15,7 +15,8 @@
 namespace stridewire {
 namespace {
 
-// The frames from `from_s` to `to_s`, both within a millionth of one; empty: first > last.
+// The frames from `from_s` to `to_s`, with a tolerance of a millionth of a frame. Empty if first >
+// last.
 struct Frames {
   Frames(const Clip& clip, double from_s, double to_s)
       : first(static_cast<int>(std::ceil(from_s * clip.fps - 1e-6))),
@@ -29,7 +30,8 @@ DVec3 Ball(const MotionLibrary& library, const Clip& clip, int frame, Foot foot)
   return DVec3(BallPosition(library.skeleton(), clip.frame(frame), foot));
 }
 
-// Where feet were planted, from the movement's own plan; a step's landing last.
+// Returns the contacts of planted feet from the plan of the movement; the landing of a step is
+// last.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& movement) {
   std::vector<PlantRecord> plants;
   const Foot last = IsStep(record.kind) ? MovingFoot(record.kind) : Foot::kRight;
@@ -45,8 +47,9 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record, const Movement& 
   return plants;
 }
 
-// The fixed foot of a step stands all along, the moving one before toe-off and after heel-strike;
-// a jump has both feet down before toe-off and after landing.
+// Returns the contacts of a movement without planting, from its keytimes. The fixed foot of a step
+// stands all the time, the moving foot before toe-off and after heel-strike. In a jump both feet
+// stand before toe-off and after landing.
 std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
   std::vector<PlantRecord> plants;
   const std::size_t n = record.keytimes_s.size() - 1;
@@ -67,12 +70,12 @@ std::vector<PlantRecord> PlantsOf(const MovementRecord& record) {
   return plants;
 }
 
-// Where a planted step was asked to bring its foot.
-Footprint AskedOf(MovementKind kind, const FootPlan& feet) {
-  Footprint asked = feet.foot(MovingFoot(kind)).to;
-  asked.position_m += feet.missed_m;
-  asked.heading_rad += feet.missed_rad;
-  return asked;
+// Returns the footprint that a planted step was requested to reach.
+Footprint RequestedFootprint(MovementKind kind, const FootPlan& feet) {
+  Footprint requested = feet.foot(MovingFoot(kind)).to;
+  requested.position_m += feet.missed_m;
+  requested.heading_rad += feet.missed_rad;
+  return requested;
 }
 
 void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecord& record) {
@@ -90,35 +93,35 @@ void MeasurePlants(const MotionLibrary& library, const Clip& clip, MovementRecor
   }
 }
 
-// Ids are the caller's own; walks are told by how they end: with a stand that no movement was for.
+// Returns true for the event that ends a walk: its final standing movement, or a rejection.
 bool EndsWalk(const AvatarEvent& event, const std::set<std::uint64_t>& walks) {
   return walks.contains(event.request_id) &&
          (event.type == AvatarEventType::kRejected ||
           (event.type == AvatarEventType::kFinished && event.kind == MovementKind::kStand));
 }
 
-// Where a movement stands in a choreography, among layers.
-std::string PlaceOf(std::size_t request, std::span<const LayerCue> layers) {
+// Returns the path of a request in the choreography, whose list also contains layers.
+std::string PathOf(std::size_t request, std::span<const LayerCue> layers) {
   const auto before =
       std::ranges::count_if(layers, [&](const LayerCue& cue) { return cue.before <= request; });
   return "movements[" + std::to_string(request + static_cast<std::size_t>(before)) + "]";
 }
 
-// A step or jump that no way leads to when its turn comes.
+// Converts the rejection of a step or jump, to which no transition path leads, to an error.
 Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> requests,
                std::span<const LayerCue> layers) {
   const auto request = std::ranges::find(requests, event.request_id, &MovementRequest::id);
   return {event.code, event.reason, -1,
-          PlaceOf(static_cast<std::size_t>(request - requests.begin()), layers)};
+          PathOf(static_cast<std::size_t>(request - requests.begin()), layers)};
 }
 
-// Sets the layers that go before a movement, and those left of earlier ones.
+// Sets the layers that start before a movement, including those left over from earlier movements.
 Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
                  AvatarSimulation& avatar) {
   for (; next < layers.size() && layers[next].before <= before; ++next) {
     const LayerCue& cue = layers[next];
     const Status status = avatar.SetLayer({.layer = avatar.library().FindLayer(cue.layer),
-                                           .is_on = !cue.is_off,
+                                           .enabled = cue.enabled,
                                            .weight = cue.weight,
                                            .blend_s = cue.blend_s,
                                            .speed = cue.speed});
@@ -131,8 +134,8 @@ Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size
   return {};
 }
 
-// How far a step's foot, when it first stands, is from where it was asked to.
-void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& asked,
+// Measures how far the foot of a step is from its requested footprint when it first stands.
+void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footprint& requested,
                     MovementRecord& record) {
   const Foot foot = MovingFoot(record.kind);
   const double end_s = clip.frame_count() / clip.fps;
@@ -143,11 +146,12 @@ void MeasureLanding(const MotionLibrary& library, const Clip& clip, const Footpr
   EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
   const BlendedFoot lands = FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg);
   record.landing_error_m =
-      std::hypot(lands.ball_m.x - asked.position_m.x, lands.ball_m.z - asked.position_m.z);
-  record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - asked.heading_rad));
+      std::hypot(lands.ball_m.x - requested.position_m.x, lands.ball_m.z - requested.position_m.z);
+  record.landing_error_rad = std::fabs(WrapAngle(lands.heading_rad - requested.heading_rad));
 }
 
-// The examples' own, by their weights: what cardinal weights that are the same were asked for.
+// Returns the mean parameters of the examples, weighted. Cardinal functions give these weights for
+// these parameters.
 ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> weights) {
   ParameterValues mean;
   mean.count = group.parameter_count();
@@ -159,7 +163,8 @@ ParameterValues MeanParameters(const MotionGroup& group, std::span<const float> 
   return mean;
 }
 
-// Without planting: how far the measured end is from what was requested, in the parameters the group has.
+// Measures the landing without planting: the difference between measured and requested end
+// parameters of the group.
 void MeasureUnplantedLanding(const MotionGroup& group, MovementRecord& record) {
   double squared = 0.0;
   for (std::size_t l = 0; l < group.parameters.size(); ++l) {
@@ -181,12 +186,12 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
                                std::span<const MovementRequest> requests, double fps,
                                const AvatarOptions& options, std::span<const LayerCue> layers) {
   if (!(fps >= 10.0 && fps <= 1000.0)) {
-    return Fail(ErrorCode::kOutOfRange, "frames a second must be from 10 to 1000");
+    return Fail(ErrorCode::kOutOfRange, "expected 10 to 1000 frames per second");
   }
   for (std::size_t i = 0; i < requests.size(); ++i) {
     if (Status status = ValidateRequest(*library, requests[i]); !status) {
       Error error = status.error();
-      error.where = PlaceOf(i, layers) + "." + error.where;
+      error.where = PathOf(i, layers) + "." + error.where;
       error.index = -1;
       return std::unexpected(error);
     }
@@ -207,7 +212,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
 
   Pose scratch(joint_count);
   GridCache cache(library->layout());
-  std::vector<std::optional<Footprint>> asked;  // of steps that were planted
+  std::vector<std::optional<Footprint>> requested;  // Per movement; only of planted steps.
   std::set<std::uint64_t> walks;
   for (const MovementRequest& request : requests) {
     if (std::holds_alternative<WalkRequest>(request.movement)) walks.insert(request.id);
@@ -221,14 +226,15 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
     while (next < requests.size() && avatar.queue_size() < AvatarSimulation::kMaxQueue) {
       if (Status status = avatar.Enqueue(requests[next]); !status) {
         Error error = status.error();
-        error.where = PlaceOf(next, layers) + (error.where.empty() ? "" : "." + error.where);
+        error.where = PathOf(next, layers) + (error.where.empty() ? "" : "." + error.where);
         error.index = -1;
         return std::unexpected(std::move(error));
       }
       ++next;
     }
     if (result.clip.frame_count() >= kMaxSynthesisFrames) {
-      return Fail(ErrorCode::kLimitExceeded, "the choreography takes more than 2^20 frames");
+      return Fail(ErrorCode::kLimitExceeded,
+                  "the choreography takes more than the limit of 2^20 frames");
     }
     avatar.Advance(1.0 / fps);
     record_pose();
@@ -241,7 +247,7 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
         }
       }
       if (event.type == AvatarEventType::kStarted) {
-        asked.emplace_back();
+        requested.emplace_back();
         MovementRecord record;
         record.kind = event.kind;
         record.request_id = event.request_id;
@@ -262,7 +268,8 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
           cache.Clear();
           if (movement->feet.is_active) {
             record.plants = PlantsOf(record, *movement);
-            if (IsStep(record.kind)) asked.back() = AskedOf(record.kind, movement->feet);
+            if (IsStep(record.kind))
+              requested.back() = RequestedFootprint(record.kind, movement->feet);
           }
           record.measured = MeasureMovement(*library, *movement, cache, scratch);
         }
@@ -285,8 +292,8 @@ Expected<Synthesis> Synthesize(std::shared_ptr<const MotionLibrary> library, con
     MovementRecord& record = result.movements[i];
     if (record.keytimes_s.empty()) continue;
     MeasurePlants(*library, result.clip, record);
-    if (asked[i]) {
-      MeasureLanding(*library, result.clip, *asked[i], record);
+    if (requested[i]) {
+      MeasureLanding(*library, result.clip, *requested[i], record);
     } else if (IsStep(record.kind)) {
       MeasureUnplantedLanding(library->group(record.group), record);
     }

@@ -17,23 +17,23 @@ constexpr int kMaxTerrainDepth = 8;
 static_assert(kMaxTerrainPositionM == 1e6 && kMaxTerrainHeightM == 1e4);
 static_assert(kMinTerrainCellM == 0.01 && kMaxTerrainCellM == 1e3);
 constexpr JsonLimit kGroundPosition = {-kMaxTerrainPositionM, kMaxTerrainPositionM,
-                                       "is not a number within 1000000 m"};
+                                       "expected a number from -1000000 to 1000000 m"};
 constexpr JsonLimit kHeight = {-kMaxTerrainHeightM, kMaxTerrainHeightM,
-                               "is not a number within 10000 m"};
+                               "expected a number from -10000 to 10000 m"};
 constexpr JsonLimit kCell = {kMinTerrainCellM, kMaxTerrainCellM,
-                             "is not a number from 0.01 to 1000 m"};
+                             "expected a number from 0.01 to 1000 m"};
 
 Status FailMissing(std::string where) {
-  return Fail(ErrorCode::kMalformed, "is missing", std::move(where));
+  return Fail(ErrorCode::kMalformed, "required key is missing", std::move(where));
 }
 
-/// [x, z]
+/// Reads [x, z].
 Status ReadPoint(const JsonField& field, const char* key, GroundPoint& out) {
   const json* point = field.Find(key);
   const std::string where = field.WhereOf(key);
   if (point == nullptr) return FailMissing(where);
   if (!point->is_array() || point->size() != 2) {
-    return Fail(ErrorCode::kMalformed, "is not an array of two numbers", where);
+    return Fail(ErrorCode::kMalformed, "expected an array of two numbers", where);
   }
   if (auto ok = ReadNumberAt((*point)[0], where + "[0]", kGroundPosition, out.x); !ok) return ok;
   return ReadNumberAt((*point)[1], where + "[1]", kGroundPosition, out.z);
@@ -57,21 +57,21 @@ Status ReadHeightField(const JsonField& field, HeightField& out) {
     return ok;
   }
   static_assert(kMaxTerrainColumns == 1024 && kMaxTerrainRows == 1024);
-  constexpr const char* kNoCount = "is not a whole number from 2 to 1024";
+  constexpr const char* kCountText = "expected an integer from 2 to 1024";
   if (auto ok = ReadPoint(field, "origin_m", out.origin_m); !ok) return ok;
   if (auto ok = ReadRequiredNumber(field, "cell_m", kCell, out.cell_m); !ok) return ok;
-  if (auto ok = ReadCount(field, "columns", kMaxTerrainColumns, kNoCount, out.columns); !ok) {
+  if (auto ok = ReadCount(field, "columns", kMaxTerrainColumns, kCountText, out.columns); !ok) {
     return ok;
   }
-  if (auto ok = ReadCount(field, "rows", kMaxTerrainRows, kNoCount, out.rows); !ok) return ok;
+  if (auto ok = ReadCount(field, "rows", kMaxTerrainRows, kCountText, out.rows); !ok) return ok;
 
   const json* heights = field.Find("heights_m");
   const std::string where = field.WhereOf("heights_m");
   if (heights == nullptr) return FailMissing(where);
-  if (!heights->is_array()) return Fail(ErrorCode::kMalformed, "is not an array", where);
+  if (!heights->is_array()) return Fail(ErrorCode::kMalformed, "expected an array", where);
   if (heights->size() !=
       static_cast<std::size_t>(out.columns) * static_cast<std::size_t>(out.rows)) {
-    return Fail(ErrorCode::kShapeMismatch, "has not columns x rows numbers", where,
+    return Fail(ErrorCode::kShapeMismatch, "expected columns * rows numbers", where,
                 static_cast<std::int64_t>(heights->size()));
   }
   out.heights_m.reserve(heights->size());
@@ -96,11 +96,11 @@ Status ReadBox(const JsonField& field, TerrainBox& out) {
 
 Status ReadBoxes(const JsonField& field, std::vector<TerrainBox>& out) {
   if (!field.value.is_array()) {
-    return Fail(ErrorCode::kMalformed, "is not an array", field.where);
+    return Fail(ErrorCode::kMalformed, "expected an array", field.where);
   }
   if (field.value.size() > kMaxTerrainBoxes) {
     static_assert(kMaxTerrainBoxes == 65'536);
-    return Fail(ErrorCode::kLimitExceeded, "holds more than 65536 boxes", field.where);
+    return Fail(ErrorCode::kLimitExceeded, "expected at most 65536 boxes", field.where);
   }
   out.resize(field.value.size());
   for (std::size_t b = 0; b < out.size(); ++b) {
@@ -144,7 +144,8 @@ Expected<std::shared_ptr<const Terrain>> ParseTerrain(std::string_view text,
                                                       std::string_view name) {
   if (text.size() > kMaxTerrainFileBytes) {
     static_assert(kMaxTerrainFileBytes == std::size_t{16} << 20);
-    return Fail(ErrorCode::kLimitExceeded, "the file is larger than 16 MiB", std::string(name));
+    return Fail(ErrorCode::kLimitExceeded, "the file is larger than the limit of 16 MiB",
+                std::string(name));
   }
   const Expected<json> document = ParseJson(text, name, kMaxTerrainDepth);
   if (!document) return std::unexpected(document.error());

@@ -10,23 +10,25 @@
 
 namespace stridewire {
 
-inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
+inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;  ///< Size of a file.
 
-/// Reads ground that is written down as JSON:
+/// Reads a terrain from a JSON file:
 ///
-///   {"height_field":{"origin_m":[x,z],"cell_m":0.25,"columns":C,"rows":R,
-///                    "heights_m":[…C·R numbers row by row, x fastest]},
-///    "boxes":[{"min_m":[x,z],"max_m":[x,z],"height_m":h}]}
+///   {"height_field": {"origin_m": [x, z], "cell_m": 0.25, "columns": C, "rows": R,
+///                     "heights_m": [C * R numbers, row by row, x fastest]},
+///    "boxes": [{"min_m": [x, z], "max_m": [x, z], "height_m": h}]}
 ///
-/// Either may be left out; everything within them is needed. Any other key is an error.
+/// `height_field` and `boxes` are optional, but all keys inside them are required. Unknown keys are
+/// errors.
 ///
-/// Errors: kNotFound, kIo with `where` = file; kMalformed with "file:line:column" where the text is
-/// not JSON; with the field, e.g. "t.json: boxes[3].max_m", kMalformed (not a number, a key missing
-/// or too many) and those of Terrain::Make; kLimitExceeded: kMaxTerrainFileBytes.
+/// Errors: kNotFound or kIo with the file in `where`. kMalformed with "file:line:column" if the
+/// text is not JSON. For wrong values, kMalformed or the errors of Terrain::Make with the field in
+/// `where`, for example "t.json: boxes[3].max_m". kLimitExceeded if the file exceeds
+/// kMaxTerrainFileBytes.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrain(
     const std::filesystem::path& path);
 
-/// As above, from text in memory; `name` takes the path's place.
+/// Same as ReadTerrain, for text in memory. `name` replaces the path in errors.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ParseTerrain(std::string_view text,
                                                                     std::string_view name);
 

@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// Reads what stands under "terrain" in a choreography, and is all of a terrain file. Errors name
-/// the way from `field` on; codes as those of ParseTerrain.
+/// Reads a terrain from a JSON value: the key "terrain" of a choreography, or a whole terrain file.
+/// The paths in errors start at `field`. The error codes are those of ParseTerrain.
 [[nodiscard]] Expected<std::shared_ptr<const Terrain>> ReadTerrainField(const JsonField& field);
 
 }  // namespace stridewire

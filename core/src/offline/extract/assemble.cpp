@@ -13,10 +13,10 @@ namespace stridewire {
 namespace {
 
 constexpr std::size_t kExamplesPerParameter = 3;
-constexpr std::size_t kLeastForAnArea = std::size(kStraightStepParameters) + 1;
-constexpr std::size_t kOutlierFreeMin = 4;  // examples from which on extremes are not counted
+constexpr std::size_t kMinForAnArea = std::size(kStraightStepParameters) + 1;
+constexpr std::size_t kOutlierFreeMin = 4;  // With this many examples, extremes are ignored.
 
-// Examples of one kind with all their parameters, on their way into a group.
+// Examples of one kind with all their parameters, before they become a group.
 struct Pool {
   MovementKind kind = MovementKind::kStepLeft;
   std::span<const ParameterName> names;
@@ -32,13 +32,13 @@ double Spread(const Pool& pool, std::size_t parameter) {
   return values[values.size() - 1 - skip] - values[skip];
 }
 
-// The parameters a pool spans, `always` among them, at most one fewer than it has examples (but
-// `always`).
+// Returns the indices of the parameters in which a pool varies, including `always`. The number is
+// limited by the number of examples, but `always` is complete.
 std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const ParameterName> always,
                                            bool with_height, const AssembleOptions& options) {
   struct Candidate {
     std::size_t index;
-    double spread;  // in units of the least that counts
+    double spread;  // In units of the smallest spread that counts.
     bool fixed;
   };
   std::vector<Candidate> candidates;
@@ -82,7 +82,7 @@ void Raise(Clip& clip, double by_m) {
   for (Vec3& position : clip.root_positions_m) position.y += static_cast<float>(by_m);
 }
 
-// Brings the examples of several captures together.
+// Combines the examples of several captures.
 class Assembler {
  public:
   Assembler(const AssembleOptions& options, const Skeleton& skeleton,
@@ -101,7 +101,7 @@ class Assembler {
   Expected<RawLibrary> Run() {
     if (options_.mirror && !partners_) {
       return Fail(ErrorCode::kUnsupported,
-                  "cannot mirror: neither the joints' names nor their places pair left with right",
+                  "cannot mirror: neither names nor positions of the joints pair left with right",
                   "--mirror");
     }
     RawLibrary library;
@@ -111,15 +111,15 @@ class Assembler {
     }
     if (options_.jumps) AddJumpGroup(library);
     if (library.groups.empty()) {
-      return Fail(ErrorCode::kNotFound, "no usable step or jump in the captures");
+      return Fail(ErrorCode::kNotFound, "the captures contain no usable step or jump");
     }
     library.stand_pose = StandPose(library);
     return library;
   }
 
  private:
-  // What brings a capture's resting balls to the library's height. A foot may be off by its markers
-  // (2 cm seen), so the foot that agrees better decides.
+  // Returns the shift that brings the resting balls of a capture to the height of the library.
+  // Markers may displace a foot (by up to 2 cm), so the foot with the smaller difference decides.
   [[nodiscard]] double Shift(const Extraction& file) const {
     if (!file.has_contacts) return 0.0;
     const double left = ball_height_m_[0] - file.ball_height_m[0];
@@ -127,7 +127,7 @@ class Assembler {
     return std::fabs(left) < std::fabs(right) ? left : right;
   }
 
-  void Collect(const ExtractedExample& from, const Extraction& file, Pool& pool) const {
+  void Append(const ExtractedExample& from, const Extraction& file, Pool& pool) const {
     if (from.kind != pool.kind) return;
     pool.examples.push_back(from.example);
     Raise(pool.examples.back().clip, Shift(file));
@@ -141,9 +141,9 @@ class Assembler {
       if (!file.error.empty()) continue;
       for (const ExtractedExample& example : file.*member) {
         if (!keep(example)) continue;
-        Collect(example, file, pool);
+        Append(example, file, pool);
         if (partners_ && IsStep(kind)) {
-          Collect(MirrorExample(skeleton_, *partners_, names, example), file, pool);
+          Append(MirrorExample(skeleton_, *partners_, names, example), file, pool);
         }
       }
     }
@@ -154,7 +154,7 @@ class Assembler {
     constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};
     const auto all = [](const ExtractedExample&) { return true; };
     const auto level = [](const ExtractedExample& e) { return e.level; };
-    std::array<Pool, 2> straight_steps;  // by foot
+    std::array<Pool, 2> straight_steps;  // Indexed by foot.
     std::array<Pool, 2> level_steps;
     std::array<Pool, 2> all_steps;
     for (std::size_t f = 0; f < 2; ++f) {
@@ -166,10 +166,10 @@ class Assembler {
       const std::size_t level_count = level_steps[f].examples.size();
       if (all_steps[f].examples.size() <= level_count) all_steps[f].examples.clear();
       if (level_count <= straight_count) level_steps[f].examples.clear();
-      // Fewer span no area: what is asked beside their line would be met by no weights.
-      const bool all_hold_them = !all_steps[f].examples.empty();
-      if (all_hold_them && level_count < kLeastForAnArea) level_steps[f].examples.clear();
-      if ((all_hold_them || !level_steps[f].examples.empty()) && straight_count < kLeastForAnArea) {
+      // Fewer examples lie on a line; no weights could produce parameters beside it.
+      const bool has_all = !all_steps[f].examples.empty();
+      if (has_all && level_count < kMinForAnArea) level_steps[f].examples.clear();
+      if ((has_all || !level_steps[f].examples.empty()) && straight_count < kMinForAnArea) {
         straight_steps[f].examples.clear();
       }
     }
@@ -197,7 +197,8 @@ class Assembler {
     library.groups.push_back(MakeGroup(std::move(pool), spanned));
   }
 
-  // The quietest stand of all captures; without any, how the first example starts.
+  // Returns the stillest standing pose of all captures. If there is none, returns the first pose of
+  // the first example.
   [[nodiscard]] Pose StandPose(const RawLibrary& library) const {
     const Extraction* best = nullptr;
     for (const Extraction& file : files_) {
@@ -276,8 +277,8 @@ std::string TreeDifference(const Skeleton& first, const std::string& first_name,
              a.name;
     }
     if (a.parent != b.parent) {
-      return "its joint " + b.name + " hangs on " + parent(other, j) + " where in " + first_name +
-             " it hangs on " + parent(first, j);
+      return "its joint " + b.name + " has the parent " + parent(other, j) + " where in " +
+             first_name + " the parent is " + parent(first, j);
     }
   }
   return "it has " + std::to_string(other.joints.size()) + " joints, " + first_name + " has " +

@@ -14,51 +14,56 @@ namespace stridewire {
 struct AssembleOptions {
   bool steps = true;
   bool jumps = true;
-  bool mirror = false;          ///< Add every step mirrored to the other foot's groups.
+  bool mirror = false;          ///< Also add the mirror image of every step, for the other foot.
   bool unsettled_jumps = true;  ///< Keep jumps that end in motion.
-  /// A parameter belongs to a group if its examples spread over it by this, the most extreme example
-  /// on either side not counted (from four examples on): what one example spans is an outlier.
+  /// A group gets a parameter only if its examples spread over at least this range. With four or
+  /// more examples the lowest and the highest value are ignored, since they may be outliers.
   double spread_min_m = 0.05;
-  double spread_min_rad = 0.0873;  // 5 degrees
-  ExtractOptions extract;          ///< `target` is set by the assembler.
+  double spread_min_rad = 0.0873;  ///< Same for angles; 5 degrees.
+  ExtractOptions extract;          ///< The assembler sets `target`.
 };
 
-/// Puts the examples of captures together, ready for the LibraryBuilder:
+/// Combines the examples of several captures into a RawLibrary with these groups:
 ///
-///   straight step_left, step_right   start_z, end_z                 straight level steps
-///   level step_left, step_right      those of x, z, turn spanned    all steps on level ground
-///   general step_left, step_right    those of all seven spanned     all steps; if some are not level
-///   jump                             length, and what is spanned
+///   straight step_left, step_right   start_z, end_z                  straight level steps
+///   level step_left, step_right      x, z and turn as far as they    all steps on level ground
+///                                    vary
+///   general step_left, step_right    all seven as far as they vary   all steps, if some are not
+///                                                                    level
+///   jump                             length; height and turn as far as they vary
 ///
-/// A group that would hold nothing another does not hold is left out, and so are fewer than three straight or
-/// level steps, which span no area, where another group has them. The first capture gives the
-/// skeleton; those with other bone lengths are fitted to it, those with another joint tree are left
-/// out and say so in `Extraction::error`, which names both captures' joints. Recordings differ by centimetres in where their floor
-/// is: each is shifted so that balls rest at the same height all over the library.
+/// A group without examples of its own is omitted. So are straight or level groups with fewer than
+/// three steps, which span no area, if another group contains those steps.
+///
+/// The first usable capture determines the skeleton. Captures with other bone lengths are
+/// retargeted. Captures with another joint tree are rejected; `Extraction::error` names the
+/// differing joints. The floors of recordings differ by centimetres, so each capture is shifted
+/// such that balls rest at the same height in the whole library.
 class LibraryAssembler {
  public:
   explicit LibraryAssembler(AssembleOptions options = {});
 
-  /// Extracts a capture's movements. The reference is valid until the next Add.
+  /// Extracts the movements of a capture. The reference is valid until the next call of Add.
   const Extraction& Add(const Capture& capture);
 
-  /// In the order of Add.
+  /// The results in the order of Add.
   [[nodiscard]] std::span<const Extraction> files() const { return files_; }
 
-  /// kNotFound: no usable movement of the kinds asked for in any capture.
+  /// Error: kNotFound if no capture contains a usable movement of the requested kinds.
   [[nodiscard]] Expected<RawLibrary> Assemble() const;
 
  private:
   AssembleOptions options_;
-  Skeleton skeleton_;          // of the first usable capture
-  std::string skeleton_path_;  // that capture's
+  Skeleton skeleton_;          // Skeleton of the first usable capture.
+  std::string skeleton_path_;  // Path of that capture.
   std::vector<Extraction> files_;
 };
 
-/// Whether two skeletons have the same joints (names and parents, in order).
+/// Returns true if two skeletons have the same joints: names and parents, in order.
 [[nodiscard]] bool SameJointTree(const Skeleton& a, const Skeleton& b);
 
-/// How `other` departs from `first`, which is what `first_name` has, as a sentence: "its joint 3 is …".
+/// Describes the first difference of `other` from `first`, a skeleton called `first_name`, for
+/// example "its joint 3 is Neck where a.bvh has Head".
 [[nodiscard]] std::string TreeDifference(const Skeleton& first, const std::string& first_name,
                                          const Skeleton& other);
 

@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-/// World paths of the points that tell where a figure walks: three of each foot and the pelvis.
-/// All vectors have one value a frame of `frames`, so index 0 is frame `frames.begin`.
+/// World paths of the points that determine where a figure walks: three points per foot and the
+/// pelvis. All vectors have one value per frame of `frames`; index 0 is frame `frames.begin`.
 struct BodyTracks {
   struct FootTrajectory {
     std::vector<DVec3> ankle_m;
@@ -17,24 +17,25 @@ struct BodyTracks {
     std::vector<DVec3> toe_tip_m;
   };
 
-  FrameRange frames;  ///< Of the clip; the artificial first frame is left out.
+  FrameRange frames;  ///< Frames of the clip, without an artificial pose at the start.
   double fps = 0.0;
-  FootTrajectory feet[2];  ///< Indexed by Foot
+  FootTrajectory feet[2];  ///< Indexed by Foot.
   std::vector<DVec3> pelvis_m;
-  std::vector<double> pelvis_speed_m_s;  ///< of the path smoothed over 60 ms
-  std::vector<double> pelvis_yaw_rad;    ///< unwrapped, left positive
+  std::vector<double> pelvis_speed_m_s;  ///< Speed along the path smoothed over 60 ms.
+  std::vector<double> pelvis_yaw_rad;    ///< Unwrapped; positive is left.
 
   [[nodiscard]] int size() const { return static_cast<int>(pelvis_m.size()); }
   [[nodiscard]] const FootTrajectory& foot(Foot f) const { return feet[static_cast<int>(f)]; }
 };
 
-/// Follows the points through frames [first_frame, end) of a clip of that skeleton.
+/// Computes the tracks for frames [first_frame, end) of a clip.
 [[nodiscard]] BodyTracks TrackBody(const Skeleton& skeleton, const Clip& clip, int first_frame);
 
-/// Moving average over `window` frames (made odd), the ends repeated.
+/// Returns the moving average over `window` frames, extended to an odd number. The end values are
+/// repeated beyond the ends.
 [[nodiscard]] std::vector<DVec3> SmoothPath(const std::vector<DVec3>& path, int window);
 
-/// Speed by central differences, one-sided at the ends.
+/// Returns the speed along a path by central differences, one-sided at the ends.
 [[nodiscard]] std::vector<double> PathSpeed(const std::vector<DVec3>& path, double fps);
 
 }  // namespace stridewire

@@ -8,9 +8,9 @@
 namespace stridewire {
 namespace {
 
-constexpr double kLongContactS = 0.3;   // A swing's or jump's slow moment is shorter.
-constexpr double kFreeFallM_s2 = -5.0;  // Mean pelvis acceleration of a figure in the air.
-constexpr double kBallAtRestM_s = 0.3;  // The foot is flat, not rolling.
+constexpr double kLongContactS = 0.3;   // Slow moments of swings and jumps are shorter.
+constexpr double kFreeFallM_s2 = -5.0;  // Mean pelvis acceleration below this: in the air.
+constexpr double kBallAtRestM_s = 0.3;  // A slower ball belongs to a flat foot.
 
 using Flags = std::vector<char>;
 
@@ -31,7 +31,8 @@ std::vector<double> Heights(const std::vector<DVec3>& path) {
   return heights;
 }
 
-// Slow, and low if asked for, at any of the three points; short gaps and contacts cleaned up.
+// Returns the frames at which any of the three points is slow and, if `use_height`, low. Fills
+// short gaps and drops short contacts.
 std::vector<FrameRange> StandingRuns(const BodyTracks::FootTrajectory& track, double fps,
                                      bool use_height, const ContactOptions& options) {
   Flags standing(track.ball_m.size(), 0);
@@ -57,8 +58,8 @@ std::vector<FrameRange> StandingRuns(const BodyTracks::FootTrajectory& track, do
   return merged;
 }
 
-// Mean vertical acceleration of the pelvis over a few frames: a parabola's, by second differences
-// of thirds.
+// Returns the mean vertical acceleration of the pelvis over some frames, from the second difference
+// of the mean heights of thirds.
 double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
   const int third = std::max(1, range.size() / 3);
   if (range.size() < 3 * third) return 0.0;
@@ -73,9 +74,10 @@ double VerticalAcceleration(const BodyTracks& tracks, const FrameRange& range) {
          (dt * dt);
 }
 
-// The lower quartile of the ball's height while it hardly moves; of all frames if it always does.
-double RestingBallHeight(const BodyTracks::FootTrajectory& track, const std::vector<double>& ball_speed,
-                         const FrameRange& frames) {
+// Returns the lower quartile of the height of the ball while it rests, or over all frames if it
+// never rests.
+double RestingBallHeight(const BodyTracks::FootTrajectory& track,
+                         const std::vector<double>& ball_speed, const FrameRange& frames) {
   std::vector<double> still;
   std::vector<double> all;
   for (int i = frames.begin; i < frames.end; ++i) {

@@ -5,13 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "offline/extract/ground.h"
 #include "offline/base/horizontal_distance.h"
-#include "offline/extract/stand_pose.h"
-#include "offline/extract/body_tracks.h"
 #include "offline/capture/glitch_repair.h"
+#include "offline/extract/body_tracks.h"
+#include "offline/extract/ground.h"
 #include "offline/extract/heading.h"
 #include "offline/extract/normalise.h"
+#include "offline/extract/stand_pose.h"
 #include "stridewire/runtime/pose.h"
 
 namespace stridewire {
@@ -34,7 +34,7 @@ double LegLength(const Skeleton& skeleton) {
   return length;
 }
 
-// One capture on its way to examples.
+// Extracts the examples of one capture.
 class Extractor {
  public:
   Extractor(const Capture& capture, const ExtractOptions& options)
@@ -75,11 +75,11 @@ class Extractor {
  private:
   [[nodiscard]] Status Check() const {
     if (clip_.frame_count() <= capture_.first_frame) {
-      return Fail(ErrorCode::kInvalidArgument, "the capture has no frame to use", capture_.path);
+      return Fail(ErrorCode::kInvalidArgument, "the capture has no usable frame", capture_.path);
     }
     if (capture_.skeleton.joint_count() != clip_.joint_count ||
         out_.skeleton.joint_count() != clip_.joint_count) {
-      return Fail(ErrorCode::kShapeMismatch, "skeleton and motion differ in their joints",
+      return Fail(ErrorCode::kShapeMismatch, "skeleton and motion have different joints",
                   capture_.path);
     }
     if (Status valid = capture_.skeleton.Validate(); !valid) return valid;
@@ -104,7 +104,7 @@ class Extractor {
     out_.rejected.push_back({Seconds(frames.begin), Seconds(frames.end), std::move(reason)});
   }
 
-  // Of a frame of the tracks, from the capture's first frame.
+  // Converts a frame of the tracks to seconds since the first frame of the capture.
   [[nodiscard]] double Seconds(int frame) const {
     return (tracks_.frames.begin + frame) / clip_.fps;
   }
@@ -122,14 +122,14 @@ class Extractor {
     return 0.5 * (tracks_.feet[0].ball_m[i] + tracks_.feet[1].ball_m[i]);
   }
 
-  // Moving minus fixed foot in a heading frame.
+  // Returns the moving minus the fixed ball, in a frame with this heading.
   [[nodiscard]] DVec3 FootVectorAt(Foot moving, int frame, double heading_rad) const {
     const auto i = static_cast<std::size_t>(frame);
     return RotateYaw(-heading_rad,
                      tracks_.foot(moving).ball_m[i] - tracks_.foot(OtherFoot(moving)).ball_m[i]);
   }
 
-  // A flip between these frames that could not be mended, as a sentence; empty if there is none.
+  // Describes a joint flip within these frames that was not repaired. Empty if there is none.
   [[nodiscard]] std::string FlipWithin(const FrameRange& frames) const {
     const FrameRange in_clip{frames.begin + tracks_.frames.begin,
                              frames.end + tracks_.frames.begin};
@@ -198,7 +198,7 @@ class Extractor {
     return true;
   }
 
-  // Whether a step is a plain one ahead on level ground; `heading` becomes the step's direction.
+  // Returns true for a forward step on level ground, and sets `heading` to its direction.
   [[nodiscard]] bool IsStraight(const StepSegment& step, double& heading) const {
     const double turn = Heading(step.end) - Heading(step.start);
     if (!IsLevel(step) || std::fabs(turn) > options_.straight_turn_max_rad) return false;
@@ -218,7 +218,8 @@ class Extractor {
            FootVectorAt(step.moving, step.start, heading).z;
   }
 
-  // Pelvis yaw around a moment of standing. The stride heading looks too far around for a jump.
+  // Returns the mean pelvis yaw around a standing moment. The stride heading of a jump would
+  // average over too long a time.
   [[nodiscard]] double StandingYaw(int frame) const {
     const int reach = static_cast<int>(std::lround(kStandingYawS * 0.5 * clip_.fps));
     const int begin = std::max(0, frame - reach);
@@ -265,7 +266,7 @@ class Extractor {
     out.example.heading_change_rad = to - from;
     if (!jump.settled) {
       out_.notes.push_back("the jump of " + out.example.source +
-                           " does not come to rest: its end is in motion");
+                           " does not come to rest; its end is in motion");
     }
     out_.jump_examples.push_back(std::move(out));
   }

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "stridewire/offline/bvh_reader.h"
 #include "offline/extract/contacts.h"
 #include "offline/extract/segment.h"
-#include "stridewire/offline/bvh_reader.h"
 #include "stridewire/offline/raw_library.h"
 
 namespace stridewire {
@@ -14,38 +14,40 @@ namespace stridewire {
 struct ExtractOptions {
   ContactOptions contacts;
   SegmentOptions segments;
-  /// Straight steps: the stride heading turns by no more than this,
-  double straight_turn_max_rad = 0.0698;  // 4 degrees
-  /// the root goes where the heading points within this (else a side or backward step),
-  double straight_drift_max_rad = 0.262;  // 15 degrees
-  /// the ground under the feet differs by no more than this,
-  double level_rise_max_m = 0.05;
-  /// and the moving foot stays on its own side within this of the fixed one.
+  // A step is straight if all four conditions hold.
+  double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
+  /// Limit on the angle between the motion of the root and the heading; 15 degrees. Beyond it are
+  /// side and backward steps.
+  double straight_drift_max_rad = 0.262;
+  double level_rise_max_m = 0.05;  ///< Limit on the difference of the ground under the feet.
+  /// Limit on the sideways distance of the moving from the fixed foot, on its own side.
   double straight_side_max_m = 0.35;
-  /// From this distance on the direction of the root tells the heading better than the pelvis.
+  /// If the root moves farther than this, its direction determines the heading more accurately than
+  /// the pelvis.
   double displacement_heading_min_m = 0.2;
-  /// Skeleton the examples are for; must have the same joint tree. Null: the capture's own. Bones of
-  /// other lengths: contacts and segments are found on the capture's own figure, then the root path
-  /// is scaled by the ratio of leg lengths and everything is measured again.
+  /// Skeleton of the examples, with the same joint tree as the capture. Null: that of the capture.
+  /// If bone lengths differ, contacts and segments are still detected on the capture's own figure.
+  /// Then the path of the root is scaled by the ratio of leg lengths and everything is measured
+  /// again.
   const Skeleton* target = nullptr;
 };
 
-/// A usable movement of a capture, normalised, with every parameter its kind can have.
+/// A usable movement of a capture in normalised form, with all parameters of its kind.
 struct ExtractedExample {
   MovementKind kind = MovementKind::kStepLeft;
   RawExample example;
-  bool settled = true;  ///< Jumps: comes to rest at its end.
-  bool level = true;    ///< Steps: the ground below all three footholds is one (within 5 cm).
+  bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
+  bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
 };
 
-/// A stretch of a capture that was left out, seconds from its first frame.
+/// A time span of a capture that is not usable, in seconds since its first frame.
 struct RejectedTime {
   double from_s = 0.0;
   double to_s = 0.0;
   std::string reason;
 };
 
-/// What a capture holds.
+/// All movements extracted from one capture.
 struct Extraction {
   std::string path;
   int frames = 0;
@@ -55,21 +57,21 @@ struct Extraction {
   int steps_right = 0;
   int jumps = 0;
   std::vector<RejectedTime> rejected;
-  std::vector<std::string> notes;  ///< The reader's, and joint flips mended
-  std::string error;               ///< Not empty: the file as a whole could not be used.
+  std::vector<std::string> notes;  ///< Notes of the reader, and repaired joint flips.
+  std::string error;               ///< Non-empty: the whole capture is not usable.
 
-  Skeleton skeleton;                             ///< Of the examples
-  std::vector<ExtractedExample> straight_steps;  ///< start_z, end_z; heading change 0
-  std::vector<ExtractedExample> general_steps;   ///< The seven of a general step; straight ones too
-  std::vector<ExtractedExample> jump_examples;   ///< length, height, turn
-  double ball_height_m[2] = {0.0, 0.0};  ///< Of resting balls above the floor y = 0 (by foot)
-  bool has_contacts = false;             ///< Whether a foot ever stood: else the above is 0.
+  Skeleton skeleton;                             ///< Skeleton of the examples.
+  std::vector<ExtractedExample> straight_steps;  ///< start_z and end_z; heading change 0.
+  std::vector<ExtractedExample> general_steps;   ///< All steps with the seven parameters.
+  std::vector<ExtractedExample> jump_examples;   ///< Length, height and turn.
+  double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the floor, by foot.
+  bool has_contacts = false;             ///< False if no foot ever stood; then the heights are 0.
 
   struct Stand {
-    Pose pose;            ///< x = z = 0, heading 0, y above the ground
-    double unrest = 0.0;  ///< How far from quiet, upright standing; smaller is better
+    Pose pose;            ///< At x = z = 0 with heading 0; y is above the ground.
+    double unrest = 0.0;  ///< Deviation from still, upright standing; smaller is better.
   };
-  std::optional<Stand> stand;  ///< Stillest moment with both feet on the same ground
+  std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.
 };
 
 inline constexpr ParameterName kGeneralStepParameters[] = {
@@ -82,12 +84,15 @@ inline constexpr ParameterName kJumpParameters[] = {ParameterName::kLength, Para
 
 /// Finds the steps and standing jumps of a capture and cuts them out as normalised examples.
 ///
-/// A step keeps the capture's frame rate, has keytimes start, toe-off, heel-strike, end, and starts
-/// in the stride heading at its start; its y is measured from the ground under the fixed foot. A
-/// jump has keytimes start, lowest point, toe-off, landing, lowest point, end. Parameters are
-/// measured at the balls in the first and last pose (paper, Section 6). Straight steps and jumps
-/// have one heading from start to end, so that a row of them does not veer.
-/// Never fails: what is unusable is in `rejected`, a whole unusable capture in `error`.
+/// Steps keep the frame rate of the capture. Their keytimes are start, toe-off, heel-strike and
+/// end. They start in the stride heading of their first frame, and heights are relative to the
+/// ground under the fixed foot. The keytimes of jumps are start, lowest point, toe-off, landing,
+/// lowest point and end. Parameters are measured at the balls in the first and last pose (paper,
+/// Section 6). Straight steps and jumps keep one heading from start to end, so that a sequence does
+/// not veer.
+///
+/// Never fails: `rejected` lists unusable time spans, and `error` is set if the capture is
+/// unusable.
 [[nodiscard]] Extraction Extract(const Capture& capture, const ExtractOptions& options = {});
 
 }  // namespace stridewire

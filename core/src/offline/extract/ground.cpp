@@ -8,7 +8,7 @@
 namespace stridewire {
 namespace {
 
-constexpr double kFloorBandM = 0.06;  // Feet this near to the lowest ones stand on the floor.
+constexpr double kFloorBandM = 0.06;  // Feet within this of the lowest ones stand on the floor.
 constexpr double kFeetDifferMaxM = 0.03;
 constexpr double kTiltMaxM = 0.015;
 constexpr double kBallUsualM = 0.04;
@@ -41,7 +41,7 @@ Ground FindGround(const FootContacts& contacts) {
   if (!found[0]) resting[0] = resting[1];
   if (!found[1]) resting[1] = resting[0];
   if (!contacts.single_floor && std::fabs(resting[0] - resting[1]) > kFeetDifferMaxM) {
-    // The feet never stood on the same level: nothing tells how high which ball rests.
+    // The feet never stood on the same level, so their resting heights cannot be distinguished.
     resting[0] = resting[1] = std::min(resting[0], resting[1]);
   }
   const double mean = 0.5 * (resting[0] + resting[1]);

@@ -14,19 +14,20 @@ constexpr double kStepDefaultS = 0.55;
 constexpr double kStepMinS = 0.25;
 constexpr double kStepMaxS = 1.0;
 
-// Priors of the fit at the ends, as standard deviations.
+// Standard deviations of the priors for the fit at the ends.
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRad_s = 50.0 * kDegree;
 constexpr double kOscillationRad = 8.0 * kDegree;
-constexpr double kIndependentShare = 0.1;  // Neighbouring frames tell nearly the same.
+constexpr double kIndependentShare = 0.1;  // Neighbouring frames are strongly correlated.
 
 struct StepTime {
-  double centre = 0.0;  // frame
+  double centre = 0.0;  // Frame.
   double frames = 0.0;
 };
 
-// Heel-strike to next heel-strike of the other foot, in order of time; each the median of three.
+// Returns the times from each heel-strike to the next one of the other foot, sorted and filtered by
+// a median of three.
 std::vector<StepTime> StepTimes(const FootContacts& contacts, double fps) {
   struct Strike {
     int frame;
@@ -62,7 +63,8 @@ double StepFramesAt(const std::vector<StepTime>& times, double frame, double fps
   return nearest->frames;
 }
 
-// Value at `centre` of a + b t + c cos(wt) + d sin(wt), fitted to yaw over [begin, end).
+// Fits a + b t + c cos(wt) + d sin(wt) to the yaw over [begin, end) and returns a, its smoothed
+// value at `centre`.
 double FitAtEnd(const std::vector<double>& yaw, int begin, int end, int centre,
                 double stride_frames, double fps) {
   Eigen::Matrix4d normal = Eigen::Matrix4d::Zero();

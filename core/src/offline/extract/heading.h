@@ -7,14 +7,14 @@
 
 namespace stridewire {
 
-/// Where the body goes, one value a frame of the tracks: the pelvis yaw averaged over one stride
-/// (two step durations, centred), unwrapped, left positive.
+/// Returns the stride heading for every frame of the tracks: the pelvis yaw averaged over one
+/// stride (two step durations, centred). It is unwrapped, and positive is left.
 ///
-/// On straight takes the pelvis itself yaws by 5 to 13 degrees with every step; taken as heading it
-/// makes forty equal steps veer by a quarter turn. Near the ends of a recording, where half of the
-/// stride is missing, a line plus one oscillation of stride length is fitted to what there is (with
-/// slope held near 0 within 50 degrees/s and the oscillation within 8 degrees): 1.5 instead of
-/// 3.6 degrees off the full average at a quarter stride from the end.
+/// Even in straight walks the pelvis yaws by 5 to 13 degrees with every step. Used as heading, it
+/// would make forty equal steps veer by a quarter turn. Near the ends of a recording half of the
+/// stride is missing. There a line plus an oscillation of stride length is fitted, with priors of
+/// 0 +- 50 degrees/s for the slope and 8 degrees for the oscillation. A quarter stride from the end
+/// this differs by 1.5 degrees from the full average, instead of 3.6.
 [[nodiscard]] std::vector<double> StrideHeading(const BodyTracks& tracks,
                                                 const FootContacts& contacts);
 

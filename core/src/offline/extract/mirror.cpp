@@ -19,7 +19,7 @@ struct Sides {
 constexpr Sides kSideWords[] = {{"Left", "Right"}, {"left", "right"}, {"LEFT", "RIGHT"}};
 constexpr Sides kSideLetters[] = {{"L", "R"}, {"l", "r"}};
 
-// The name of the joint on the other side; the name itself if it names no side.
+// Returns the name of the joint on the other side, or the name itself if it has no side.
 std::string OtherSideName(const Skeleton& skeleton, const std::string& name) {
   for (const Sides& words : kSideWords) {
     for (const auto& [from, to] :
@@ -29,7 +29,7 @@ std::string OtherSideName(const Skeleton& skeleton, const std::string& name) {
       }
     }
   }
-  // One letter is a side only if the other side's joint exists: "Root" and "Ribs" are none.
+  // A single letter counts as a side only if the joint of the other side exists ("Root", "Ribs").
   for (const Sides& letters : kSideLetters) {
     for (const auto& [from, to] :
          {std::pair(letters.left, letters.right), std::pair(letters.right, letters.left)}) {
@@ -55,17 +55,17 @@ std::optional<std::vector<int>> PairByName(const Skeleton& skeleton) {
     const int expected = parent < 0 ? -1 : partners[static_cast<std::size_t>(parent)];
     if (skeleton.joints[partner].parent != expected) return std::nullopt;
   }
-  // Names that say nothing of sides leave every joint its own partner.
+  // Names without sides would make every joint its own partner.
   const int left = skeleton.leg(Foot::kLeft).hip, right = skeleton.leg(Foot::kRight).hip;
   if (left >= 0 && partners[static_cast<std::size_t>(left)] != right) return std::nullopt;
   return partners;
 }
 
 constexpr double kNoPair = 1e9;
-constexpr double kShapeShare = 0.08;  // bones of a mirrored pair differ by no more than this share
-constexpr double kShapeM = 0.01;      // and this much
+constexpr double kShapeShare = 0.08;  // Relative tolerance for bones of a mirrored pair,
+constexpr double kShapeM = 0.01;      // plus an absolute tolerance in metres.
 
-// Pairs joints by where they sit at identity rotations: x = 0 is the plane between the sides.
+// Pairs joints by their positions at identity rotations; x = 0 is the plane of symmetry.
 class ShapePairs {
  public:
   explicit ShapePairs(const Skeleton& skeleton)
@@ -87,7 +87,7 @@ class ShapePairs {
   }
 
  private:
-  // How far the bone to `b` is from the mirror image of the one to `a`; kNoPair if too far.
+  // Returns the distance of the bone to `b` from the mirror image of the bone to `a`, or kNoPair.
   [[nodiscard]] double BoneCost(int a, int b) const {
     if (a == 0 || b == 0) return a == b ? 0.0 : kNoPair;
     const DVec3 u(skeleton_.joints[static_cast<std::size_t>(a)].offset_m);
@@ -97,8 +97,8 @@ class ShapePairs {
                                                                                      : kNoPair;
   }
 
-  // Pairs the children of `a` with those of `b` (`a` may be `b`), each with the one that fits best;
-  // what is left without a fit makes it fail. Returns what they cost together.
+  // Pairs each child of `a` with the best fitting child of `b` (`a` may equal `b`) and returns the
+  // total cost. Returns kNoPair if a child remains without partner.
   double PairChildren(int a, int b, std::vector<std::pair<int, int>>* pairs) {
     const std::vector<int>& from = children_[Index(a)];
     const std::vector<int>& to = children_[Index(b)];
@@ -125,7 +125,7 @@ class ShapePairs {
     return cost;
   }
 
-  // What pairing `a` with `b` and all below them costs; each two joints are looked at once.
+  // Returns the memoized cost of pairing `a` with `b` and all joints below them.
   double Cost(int a, int b) {
     double& known = costs_[Index(a) * skeleton_.joints.size() + Index(b)];
     if (known < 0.0) {
@@ -149,7 +149,7 @@ class ShapePairs {
   const Skeleton& skeleton_;
   std::vector<std::vector<int>> children_;
   std::vector<int> partners_;
-  std::vector<double> costs_;  // [a][b], negative until known
+  std::vector<double> costs_;  // [a][b]; negative: not computed yet.
 };
 
 }  // namespace

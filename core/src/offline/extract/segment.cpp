@@ -4,25 +4,25 @@
 #include <cmath>
 
 #include "offline/base/horizontal_distance.h"
-#include "offline/extract/segment_jumps.h"
 #include "offline/base/statistics.h"
 #include "offline/base/text.h"
+#include "offline/extract/segment_jumps.h"
 
 namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
-constexpr double kHalfSupportMinShare = 0.5;  // of the usual, at the ends of a recording
+constexpr double kHalfSupportMinShare = 0.5;  // Of the usual half support, at cut-off ends.
 
-// One lift of a foot, with the supports around it.
+// One lift of a foot with the contacts around it.
 struct Swing {
   Foot moving = Foot::kLeft;
-  const Contact* before = nullptr;  // of the moving foot
+  const Contact* before = nullptr;  // Contacts of the moving foot.
   const Contact* after = nullptr;
-  const Contact* fixed = nullptr;  // the other foot's contact that contains the swing; may be null
+  const Contact* fixed = nullptr;  // Contact of the other foot that contains the swing, or null.
   int before_index = 0;
   int fixed_index = -1;
-  FrameRange frames;  // off the ground
+  FrameRange frames;  // The foot is off the ground.
 
   [[nodiscard]] int SupportBegin() const {
     return std::max(before->frames.begin, fixed->frames.begin);
@@ -54,7 +54,7 @@ std::vector<Swing> FindSwings(const FootContacts& contacts) {
   return swings;
 }
 
-// Median half double support of the swings whose supports the recording shows whole, while walking.
+// Returns the median of half the double support, over walking swings whose supports are complete.
 double UsualHalfSupport(const std::vector<Swing>& swings, int frame_count, double fps,
                         double standing_max_s) {
   std::vector<double> halves;
@@ -79,12 +79,12 @@ class StepFinder {
   StepFinder(const BodyTracks& tracks, const SegmentOptions& options, double usual_half)
       : tracks_(tracks), options_(options), usual_half_(usual_half) {}
 
-  // Empty reason: `step` is filled.
+  // Fills `step` and returns an empty string, or returns the reason why the swing is not a step.
   std::string Find(const Swing& swing, StepSegment& step) const {
-    if (swing.fixed == nullptr) return "no foot stands throughout";
+    if (swing.fixed == nullptr) return "no foot stands during the whole swing";
     const double seconds = swing.frames.size() / tracks_.fps;
-    if (seconds < options_.swing_min_s) return Text("the foot is lifted for %.2f s only", seconds);
-    if (seconds > options_.swing_max_s) return Text("the foot is in the air for %.1f s", seconds);
+    if (seconds < options_.swing_min_s) return Text("the foot is lifted for only %.2f s", seconds);
+    if (seconds > options_.swing_max_s) return Text("the foot is lifted for %.1f s", seconds);
     const BodyTracks::FootTrajectory& moving = tracks_.foot(swing.moving);
     const BodyTracks::FootTrajectory& fixed = tracks_.foot(OtherFoot(swing.moving));
     step.moving = swing.moving;
@@ -106,7 +106,7 @@ class StepFinder {
     const double turned =
         std::fabs(WrapAngle(FootYaw(moving, step.end) - FootYaw(moving, step.start)));
     if (moved < options_.moved_min_m && turned < options_.turned_min_rad) {
-      return Text("the foot lands %.2f m from where it was", moved);
+      return Text("the foot lands only %.2f m from its start", moved);
     }
     double slide = 0.0;
     for (int i = step.toe_off; i < step.heel_strike; ++i) {
@@ -123,15 +123,16 @@ class StepFinder {
   }
 
  private:
-  // Frames from the swing to the centre of a double support of `frames`, at most the cap. When the
-  // recording cuts the support off, the usual half is taken if it is there; 0: too little is left.
+  // Returns the frames between the swing and the centre of a double support of `frames`, limited by
+  // standing_max_s. If the recording cuts the support off, returns the usual half if it fits, or 0
+  // if too little is left.
   [[nodiscard]] int Half(int frames, bool cut_off) const {
     double half = 0.5 * frames;
     if (cut_off && half < usual_half_) {
       half = std::min<double>(frames, usual_half_);
       if (half < kHalfSupportMinShare * usual_half_) return 0;
     }
-    // A hasty step may leave no frame with both feet down: then the next best, one frame.
+    // Fast steps may have no frame with both feet on the ground; then one frame is the best choice.
     return std::max(1, static_cast<int>(std::min(half, options_.standing_max_s * tracks_.fps)));
   }
 
@@ -146,7 +147,7 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
                      const SegmentOptions& options) {
   Segmentation result;
   std::vector<FrameRange> held;
-  std::vector<FrameRange> explained;  // Flights that are jumps or already reported
+  std::vector<FrameRange> explained;  // Flights that are jumps or were already rejected.
   for (const FrameRange& flight : FlightRanges(tracks, contacts)) {
     JumpFinding finding = FindJump(tracks, contacts, flight, options);
     if (finding.jump) {
@@ -170,7 +171,7 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
           return FrameRange{range.begin - before, range.end + after}.Overlaps(
               {step.start, step.end});
         })) {
-      reason = "leads to or from being held by something";
+      reason = "the figure reaches for or lets go of something that holds it";
     }
     if (reason.empty()) {
       result.steps.push_back(step);

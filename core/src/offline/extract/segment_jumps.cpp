@@ -16,17 +16,17 @@
 namespace stridewire {
 namespace {
 
-// A falling body: the pelvis of a captured jump follows -9.5 to -11.8 m/s^2 (arms and legs swing);
-// a figure that hangs on a bar stays near 0.
+// Acceleration of a falling pelvis. In captured jumps it is -9.5 to -11.8 m/s^2, since arms and
+// legs swing. For a figure that hangs on a bar it is near 0.
 constexpr double kFallMin_m_s2 = -15.0;
 constexpr double kFallMax_m_s2 = -5.0;
 constexpr double kGravity_m_s2 = -9.81;
 constexpr double kGravityDoubt_m_s2 = 1.5;
-constexpr double kPastLowestM = 0.03;   // Risen by this much, the lowest point lies behind.
-constexpr double kNextCrouchM = 0.05;   // Sunk again by this much, the next crouch has begun.
-constexpr double kUprightShare = 0.6;   // Standing again: this share of the crouch undone.
-constexpr double kNearlyStill = 2.5;    // times still_m_s: stillest moment accepted instead
-constexpr double kUnsettledMinS = 0.1;  // least support after landing that shows the lowest point
+constexpr double kPastLowestM = 0.03;   // The lowest point is past if the pelvis rose this much.
+constexpr double kNextCrouchM = 0.05;   // The next crouch has begun if it sank this much again.
+constexpr double kUprightShare = 0.6;   // The figure stands if this share of the crouch is undone.
+constexpr double kNearlyStill = 2.5;    // Largest speed of a standing figure, times still_m_s.
+constexpr double kUnsettledMinS = 0.1;  // Shortest usable support after landing.
 
 double FlightAcceleration(const BodyTracks& tracks, const FrameRange& flight) {
   const int n = flight.size();
@@ -44,11 +44,11 @@ double FlightAcceleration(const BodyTracks& tracks, const FrameRange& flight) {
 struct Standing {
   int lowest = 0;
   int still = 0;
-  double speed_m_s = 0.0;  // at `still`
+  double speed_m_s = 0.0;  // Speed at `still`.
 };
 
-// From the flight's edge away from it (direction -1 before, +1 after) within [first, last]: the
-// pelvis' lowest point, then the first moment it stands still and upright.
+// Searches from an edge of the flight away from it (direction -1: before, +1: after) up to `last`
+// for the lowest point of the pelvis, and then for the first moment when it is still and upright.
 Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int last,
                       double still_m_s) {
   const auto height = [&](int i) { return tracks.pelvis_m[static_cast<std::size_t>(i)].y; };
@@ -62,7 +62,7 @@ Standing FindStanding(const BodyTracks& tracks, int edge, int direction, int las
       break;
     }
   }
-  // Up to where the pelvis goes down again: the crouch of another jump.
+  // Stops where the pelvis sinks again, which is the crouch of another jump.
   double highest = height(standing.lowest);
   for (int k = standing.lowest; k != last + direction; k += direction) {
     highest = std::max(highest, height(k));
@@ -123,13 +123,14 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                      factor * tracks.fps)};
       }
     }
-    return {{},
-            Text("both feet off the ground but not falling (%.1f m/s^2): held by something",
-                 acceleration),
-            true};
+    return {
+        {},
+        Text("both feet off the ground but not falling (%.1f m/s^2): something holds the figure",
+             acceleration),
+        true};
   }
   if (seconds > options.flight_max_s) return {{}, Text("in the air for %.1f s", seconds)};
-  // Both feet must leave and land together.
+  // Both feet must leave the ground together and land together.
   JumpSegment jump;
   int support_begin = 0;
   int support_end = tracks.size();
@@ -158,7 +159,7 @@ JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
   const Standing from = FindStanding(tracks, flight.begin, -1, support_begin, options.still_m_s);
   const Standing to = FindStanding(tracks, flight.end, +1, support_end - 1, options.still_m_s);
   if (from.speed_m_s > kNearlyStill * options.still_m_s) {
-    return {{}, Text("a leap that does not start from standing (%.2f m/s)", from.speed_m_s)};
+    return {{}, Text("a leap without standing before it (%.2f m/s)", from.speed_m_s)};
   }
   if (support_end - flight.end < kUnsettledMinS * tracks.fps || to.lowest >= support_end - 1) {
     return {{}, "the recording or the landing ends too early"};

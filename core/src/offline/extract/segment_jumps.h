@@ -3,20 +3,20 @@
 #include <optional>
 #include <string>
 
-#include "stridewire/base/error.h"
 #include "offline/extract/segment.h"
+#include "stridewire/base/error.h"
 
 namespace stridewire {
 
-/// Frames during which neither foot stands, between two frames at which one does.
+/// Returns the ranges of frames without ground contact, between two frames with contact.
 [[nodiscard]] std::vector<FrameRange> FlightRanges(const BodyTracks& tracks,
                                                    const FootContacts& contacts);
 
-/// The standing jump around a flight, or why it is none.
+/// The standing jump around a flight, or the reason why there is none.
 struct JumpFinding {
   std::optional<JumpSegment> jump;
   std::string reason;
-  bool held = false;  ///< Both feet in the air, yet not falling
+  bool held = false;  ///< Both feet are in the air, but the figure does not fall.
 };
 [[nodiscard]] JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                                    const FrameRange& flight, const SegmentOptions& options);

@@ -11,12 +11,12 @@
 namespace stridewire {
 namespace {
 
-constexpr double kWindowS = 0.1;  // Speeds over this time: single frames are noise.
+constexpr double kWindowS = 0.1;  // Speeds are averaged over this time to reduce noise.
 constexpr double kSameGroundM = 0.03;
-// What counts how much, beside the mean joint speed in m/s.
-constexpr double kStridePerM = 2.0;  // One foot ahead of the other
-constexpr double kCrouchPerM = 4.0;  // Pelvis lower than it stands otherwise
-constexpr double kLeanPerM = 2.0;    // Pelvis off the feet, or the top of the body off the pelvis
+// Penalties that are added to the mean joint speed in m/s.
+constexpr double kStridePerM = 2.0;  // One foot is in front of the other.
+constexpr double kCrouchPerM = 4.0;  // The pelvis is lower than in usual standing.
+constexpr double kLeanPerM = 2.0;    // The pelvis is not above the feet, or the head not above it.
 
 double StandHeight(const BodyTracks& tracks) {
   std::vector<double> heights;
@@ -25,8 +25,8 @@ double StandHeight(const BodyTracks& tracks) {
   return Percentile(std::move(heights), 75.0);
 }
 
-// The still moments of a capture may be a crouch before a jump or a reach for a bar: how far the body
-// is from upright, pelvis above the ankles and the highest joint above the pelvis.
+// Returns the deviation from an upright posture, with the pelvis above the ankles and the highest
+// joint above the pelvis. Still moments may also be a crouch before a jump or a reach for a bar.
 double Lean(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   const DVec3 pelvis(positions[0]);
   const auto at = [&](int joint) { return DVec3(positions[static_cast<std::size_t>(joint)]); };

@@ -2,14 +2,15 @@
 
 #include <optional>
 
-#include "offline/extract/ground.h"
 #include "offline/extract/body_tracks.h"
 #include "offline/extract/extract.h"
+#include "offline/extract/ground.h"
 
 namespace stridewire {
 
-/// The quietest moment of a clip with both feet on the same ground, side by side and legs straight.
-/// `heading_rad`: stride heading, one value a frame of the tracks.
+/// Returns the stillest moment of a clip with both feet on the same ground, side by side, and
+/// straight legs. `heading_rad` is the stride heading per frame of the tracks. Returns nullopt if
+/// both feet never stand.
 [[nodiscard]] std::optional<Extraction::Stand> FindStand(const Skeleton& skeleton, const Clip& clip,
                                                          const BodyTracks& tracks,
                                                          const FootContacts& contacts,

@@ -1,5 +1,3 @@
-#include "stridewire/runtime/avatar.h"
-
 #include <utility>
 #include <vector>
 

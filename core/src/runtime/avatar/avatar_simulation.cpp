@@ -118,11 +118,11 @@ Status AvatarSimulation::SetLayer(const LayerRequest& request) {
   return {};
 }
 
-Status AvatarSimulation::SetFootPlanting(bool is_on) {
-  if (is_on && !body_.library->leg_rig().is_usable) {
+Status AvatarSimulation::SetFootPlanting(bool enabled) {
+  if (enabled && !body_.library->leg_rig().is_usable) {
     return Fail(ErrorCode::kUnsupported, "this skeleton does not support foot planting");
   }
-  options_.foot_planting = is_on;
+  options_.foot_planting = enabled;
   return {};
 }
 

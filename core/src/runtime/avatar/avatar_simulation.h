@@ -82,7 +82,7 @@ class AvatarSimulation {
   /// a jump. A swing is not sent elsewhere meanwhile, and what waits in the queue for a footprint
   /// that must be met is rejected while it is off. kUnsupported: to be on, but this skeleton does
   /// not support foot planting.
-  [[nodiscard]] Status SetFootPlanting(bool is_on);
+  [[nodiscard]] Status SetFootPlanting(bool enabled);
   /// As last set; false where the library's legs can not.
   [[nodiscard]] bool foot_planting() const {
     return options_.foot_planting && body_.library->leg_rig().is_usable;

@@ -69,7 +69,7 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
     return Fail(ErrorCode::kOutOfRange, "a layer's blend time must be from 0 to 10 s");
   }
   Playing* on = Find(request.layer, false);
-  if (!request.is_on) {
+  if (!request.enabled) {
     if (on == nullptr) return {};
     StartBlend(0.0, on->speed, request.blend_s, *on);
     on->is_ending = true;

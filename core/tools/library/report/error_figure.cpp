@@ -9,7 +9,7 @@
 namespace stridewire {
 namespace {
 
-// Cividis: its lightness rises evenly and its hues stay apart without colour vision.
+// Cividis: lightness increases evenly, and the hues remain distinct for colour-blind readers.
 constexpr const char* kPalette =
     "set palette defined (0 '#00224e', 0.25 '#414d6b', 0.5 '#7c7b78', 0.75 '#bcae6c', "
     "1 '#fee838')\n";
@@ -26,7 +26,7 @@ std::string MapBlock(const std::string& name, const ErrorMap& map) {
   return block + "EOD\n";
 }
 
-// Examples and pseudoexamples by the parameters shown.
+// Data blocks with the examples and pseudoexamples, projected on the axes of the figure.
 std::string SiteBlocks(const MotionGroup& group, const FigureAxes& axes,
                        const std::string& suffix) {
   std::array<std::string, 2> blocks;
@@ -36,7 +36,7 @@ std::string SiteBlocks(const MotionGroup& group, const FigureAxes& axes,
         Number(site[static_cast<std::size_t>(axes.x)]) + " " +
         Number(axes.y < 0 ? 0.0 : site[static_cast<std::size_t>(axes.y)]) + "\n";
   }
-  // A block without data would be an error.
+  // gnuplot rejects an empty data block.
   if (blocks[1].empty()) blocks[1] = "NaN NaN\n";
   return "$examples_" + suffix + " << EOD\n" + blocks[0] + "EOD\n$pseudo_" + suffix + " << EOD\n" +
          blocks[1] + "EOD\n";
@@ -48,7 +48,7 @@ std::string HeldAt(const MotionGroup& group, const FigureAxes& axes, const Error
     if (static_cast<int>(l) == axes.x || static_cast<int>(l) == axes.y) continue;
     std::array<char, 64> value{};
     std::snprintf(value.data(), value.size(), " %.2f", map.others[l]);
-    text += (text.empty() ? "; held: " : ", ") +
+    text += (text.empty() ? "; fixed: " : ", ") +
             std::string(ParameterText(group.parameters[l].name)) + value.data();
   }
   return text;
@@ -60,11 +60,11 @@ std::string Millimetres(double m) {
   return text.data();
 }
 
-Figure LineFigure(const MotionLibrary& after, int group_index, const FigureAxes& axes,
-                  const ErrorMap& map_before, const ErrorMap& map_after) {
-  const MotionGroup& group = after.group(group_index);
-  Figure figure{.file = FilePrefix(after, group_index) + "error.svg", .height = 360};
-  figure.script = MapBlock("before", map_before) + MapBlock("after", map_after) +
+Figure LineFigure(const ErrorFigureInput& input) {
+  const FigureAxes& axes = input.axes;
+  const MotionGroup& group = input.after.group(input.group_index);
+  Figure figure{.file = FilePrefix(input.after, input.group_index) + "error.svg", .height = 360};
+  figure.script = MapBlock("before", input.map_before) + MapBlock("after", input.map_after) +
                   SiteBlocks(group, axes, "after");
   figure.script += "set xlabel " +
                    Quoted(AxisLabel(group.parameters[static_cast<std::size_t>(axes.x)])) +
@@ -83,12 +83,12 @@ ErrorMapOptions MapOptions(const FigureAxes& axes) {
   return {.axis_x = axes.x, .axis_y = axes.y, .columns = axes.y < 0 ? 201 : 61, .rows = 61};
 }
 
-Figure ErrorFigure(const MotionLibrary& before, const MotionLibrary& after, int group_index,
-                   const FigureAxes& axes, const ErrorMap& map_before, const ErrorMap& map_after) {
+Figure ErrorFigure(const ErrorFigureInput& input) {
+  const auto& [before, after, group_index, axes, map_before, map_after] = input;
   const MotionGroup& group = after.group(group_index);
   Figure figure;
   if (axes.y < 0) {
-    figure = LineFigure(after, group_index, axes, map_before, map_after);
+    figure = LineFigure(input);
   } else {
     figure = {.file = FilePrefix(after, group_index) + "error.svg", .width = 1000, .height = 480};
     const double top_mm = 1000.0 * std::max({map_before.max_error_m, map_after.max_error_m, 1e-6});
@@ -97,7 +97,7 @@ Figure ErrorFigure(const MotionLibrary& before, const MotionLibrary& after, int 
     figure.script = MapBlock("before", map_before) + MapBlock("after", map_after) +
                     SiteBlocks(before.group(group_index), axes, "before") +
                     SiteBlocks(group, axes, "after") + kPalette;
-    // Contours carry the same for who sees no colours.
+    // Contour lines carry the same information without colour.
     figure.script += "set contour base\nunset surface\nset cntrparam levels incremental 0," +
                      Number(top_mm / 8.0) + "," + Number(top_mm) +
                      "\nset table $lines_before\nsplot $before u 1:2:3\nset table $lines_after\n"
@@ -131,8 +131,8 @@ Figure ErrorFigure(const MotionLibrary& before, const MotionLibrary& after, int 
     figure.script += "unset multiplot\n";
   }
   figure.caption =
-      "How far synthesized movements miss what is asked, before and after refinement, "
-      "over the hull of the examples (paper, Figure 1 left and middle)" +
+      "Error of synthesized movements before and after refinement, over the hull of the examples "
+      "(paper, Figure 1 left and middle)" +
       HeldAt(group, axes, map_before);
   return figure;
 }
@@ -141,9 +141,9 @@ Figure CurveFigure(const MotionLibrary& library, int group_index, const GroupRef
                    const GroupRefinement& bare) {
   Figure figure{.file = FilePrefix(library, group_index) + "pseudoexamples.svg",
                 .caption =
-                    "The largest error against the number of pseudoexamples (paper, Figure 1 "
-                    "right): by the amended rule and by the paper's, under which one more may "
-                    "make it larger",
+                    "Largest error against the number of pseudoexamples (paper, Figure 1 right), "
+                    "for the amended rule and for the rule of the paper, under which an "
+                    "additional pseudoexample may increase the error",
                 .width = 700,
                 .height = 360};
   const auto block = [&](const char* name, const std::vector<double>& curve) {

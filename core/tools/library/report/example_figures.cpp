@@ -10,11 +10,11 @@
 namespace stridewire {
 namespace {
 
-constexpr std::size_t kShownExamples = 6;
-constexpr int kPosesAnExample = 6;
+constexpr std::size_t kMaxStrips = 6;
+constexpr int kPosesPerExample = 6;
 constexpr int kCurvePoints = 48;
 
-// The examples from the least to the largest sum of the parameters shown.
+// Returns the examples sorted by the sum of their parameters on the axes of the figure.
 std::vector<int> InOrder(const MotionGroup& group, const FigureAxes& axes) {
   std::vector<int> order(static_cast<std::size_t>(group.example_count));
   std::iota(order.begin(), order.end(), 0);
@@ -22,7 +22,7 @@ std::vector<int> InOrder(const MotionGroup& group, const FigureAxes& axes) {
     const std::span<const double> site = group.site(e);
     const auto value = [&](int l) {
       const auto at = static_cast<std::size_t>(l);
-      // A step gets longer as its start goes further back.
+      // A step becomes longer as its start moves further back.
       const bool is_start = group.parameters[at].name <= ParameterName::kStartZ;
       return (is_start ? -site[at] : site[at]) / group.parameters[at].scale;
     };
@@ -42,7 +42,8 @@ std::string Values(const MotionGroup& group, int example) {
   return text;
 }
 
-// Angle between two bones at their common joint, less what it is when straight: degrees.
+// Returns the angle at `at` by which the bones from-at and at-to deviate from a straight line, in
+// degrees.
 double Bend(const Vec3& from, const Vec3& at, const Vec3& to) {
   const Vec3 a = at - from;
   const Vec3 b = to - at;
@@ -50,7 +51,8 @@ double Bend(const Vec3& from, const Vec3& at, const Vec3& to) {
   return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / M_PI;
 }
 
-// Flexion of both hips (thigh against the vertical, ahead positive), knees and ankles (foot against shank).
+// Returns angles in degrees, left before right: hips (thigh against the vertical, forward
+// positive), knees, and ankles (foot against shank).
 std::array<double, 6> LegAngles(const Skeleton& skeleton, const std::vector<Vec3>& positions) {
   std::array<double, 6> angles{};
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -83,12 +85,12 @@ std::string FilePrefix(const MotionLibrary& library, int group_index) {
 Figure ExamplesFigure(const MotionLibrary& library, int group_index, const FigureAxes& axes) {
   const MotionGroup& group = library.group(group_index);
   const std::vector<int> order = InOrder(group, axes);
-  const std::size_t shown = std::min(kShownExamples, order.size());
+  const std::size_t shown = std::min(kMaxStrips, order.size());
   const std::size_t rows = (shown + 2) / 3;
   Figure figure{.file = FilePrefix(library, group_index) + "examples.svg",
                 .caption =
                     "Examples as strips of poses, from the shortest to the longest (paper, "
-                    "Figure 3); left limbs thick, above each its parameters",
+                    "Figure 3), with their parameters. Left limbs are thick",
                 .width = 1000,
                 .height = static_cast<int>(300 * rows)};
   figure.script =
@@ -102,12 +104,12 @@ Figure ExamplesFigure(const MotionLibrary& library, int group_index, const Figur
     StickFigure stick(library);
     double least = HUGE_VAL;
     double most = -HUGE_VAL;
-    // Poses stand apart even where the figure stays on the spot.
+    // Spreads the poses out if the figure does not move forward.
     const double end_z = player.At(player.movement().duration_s()).root_position_m.z;
-    const double apart_m = std::max(0.0, 0.4 - std::fabs(end_z) / (kPosesAnExample - 1));
-    for (int k = 0; k < kPosesAnExample; ++k) {
+    const double apart_m = std::max(0.0, 0.4 - std::fabs(end_z) / (kPosesPerExample - 1));
+    for (int k = 0; k < kPosesPerExample; ++k) {
       const ConstPoseSpan pose =
-          player.At(player.movement().duration_s() * k / (kPosesAnExample - 1));
+          player.At(player.movement().duration_s() * k / (kPosesPerExample - 1));
       stick.Draw(pose, apart_m * k);
       for (const Vec3& position : stick.Place(pose)) {
         least = std::min(least, position.z + apart_m * k);
@@ -130,10 +132,10 @@ Figure SitesFigure(const MotionLibrary& library, int group_index) {
   const int columns = std::min(3, panels);
   const int rows = (panels + columns - 1) / columns;
   Figure figure{.file = FilePrefix(library, group_index) + "sites.svg",
-                .caption = "Where the examples lie: every parameter against the last one",
+                .caption = "Parameters of the examples: every parameter against the last one",
                 .width = 330 * columns + 10,
                 .height = 300 * rows};
-  if (d == 1) figure.caption = "Where the examples lie";
+  if (d == 1) figure.caption = "Parameters of the examples";
   const auto block = [&](const char* name, int from, int to) {
     figure.script += std::string("$") + name + " << EOD\n";
     for (int s = from; s < to; ++s) {
@@ -156,7 +158,7 @@ Figure SitesFigure(const MotionLibrary& library, int group_index) {
   for (int l = 0; l < panels; ++l) {
     const auto at = static_cast<std::size_t>(l);
     figure.script += "set xlabel " + Quoted(AxisLabel(group.parameters[at])) + " noenhanced\n";
-    // Of examples that are all alike gnuplot would make no axis.
+    // gnuplot cannot choose a range if all examples have the same value.
     const auto range = [](const Parameter& p) {
       return p.max - p.min > 1e-6 ? std::string("[*:*]\n")
                                   : "[" + Number(p.min - 0.1) + ":" + Number(p.max + 0.1) + "]\n";
@@ -180,8 +182,9 @@ Figure JointFigure(const MotionLibrary& library, int group_index) {
   const MotionGroup& group = library.group(group_index);
   Figure figure{.file = FilePrefix(library, group_index) + "joints.svg",
                 .caption =
-                    "Hips, knees and ankles over generic time: examples thin, the movement in "
-                    "their middle thick. Whole numbers are keytimes",
+                    "Angles of hips, knees and ankles over generic time. Thin lines are examples, "
+                    "the thick line is the movement at the centre of their parameters. Whole "
+                    "numbers are keytimes",
                 .width = 1000,
                 .height = 480};
   const StickFigure stick(library);
@@ -238,14 +241,14 @@ Figure TimingFigure(const MotionLibrary& library, int group_index, const FigureA
   const MotionGroup& group = library.group(group_index);
   const bool is_step = IsStep(group.kind);
   Figure figure{.file = FilePrefix(library, group_index) + "timing.svg",
-                .caption = is_step ? "Contact timing: an example a row, the moving foot off the "
-                                     "ground between toe-off and heel-strike (thick)"
-                                   : "Timing: an example a row, a mark a keytime (lowest point, "
-                                     "toe-off, landing, lowest point); in flight thick",
+                .caption = is_step ? "Contact timing, one row per example. Between toe-off and "
+                                     "heel-strike (thick) the moving foot is off the ground"
+                                   : "Timing, one row per example. Marks are keytimes (lowest "
+                                     "point, toe-off, landing, lowest point); the flight is thick",
                 .width = 800,
                 .height = 140 + 9 * group.example_count};
   const auto keys = static_cast<std::size_t>(group.interval_count() + 1);
-  // Jumps have a lowest point between start and toe-off.
+  // Jumps have an additional keytime between start and toe-off: the lowest point of the crouch.
   const std::size_t off = is_step || keys < 6 ? 1 : 2;
   int row = 0;
   std::string whole = "$whole << EOD\n";

@@ -33,17 +33,20 @@ std::string ReadAll(std::FILE* file) {
 }  // namespace
 
 Expected<std::string> DrawSvg(const std::string& script, int width, int height) {
-  // Unnamed files, not pipes: gnuplot may write before it has read everything.
+  // Uses unnamed files instead of pipes: gnuplot may write output before it has read all input,
+  // which could block both processes.
   const File in(std::tmpfile());
   const File out(std::tmpfile());
   const File err(std::tmpfile());
-  if (!in || !out || !err) return Fail(ErrorCode::kIo, "no temporary file can be made", "gnuplot");
+  if (!in || !out || !err) {
+    return Fail(ErrorCode::kIo, "cannot create a temporary file", "gnuplot");
+  }
   const std::string whole = "set encoding utf8\nset terminal svg size " + std::to_string(width) +
                             "," + std::to_string(height) +
                             " font 'sans-serif,13' background '#ffffff'\n" + script;
   if (std::fwrite(whole.data(), 1, whole.size(), in.get()) != whole.size() ||
       std::fflush(in.get()) != 0) {
-    return Fail(ErrorCode::kIo, "a temporary file cannot be written", "gnuplot");
+    return Fail(ErrorCode::kIo, "cannot write a temporary file", "gnuplot");
   }
   std::rewind(in.get());
 
@@ -61,7 +64,7 @@ Expected<std::string> DrawSvg(const std::string& script, int width, int height) 
   posix_spawn_file_actions_destroy(&actions);
   if (failed != 0) {
     return Fail(ErrorCode::kUnsupported,
-                "pictures are drawn by gnuplot, which is not installed (Debian: gnuplot-nox)",
+                "not installed; the report needs it to draw figures (Debian: gnuplot-nox)",
                 "gnuplot");
   }
   int status = 0;
@@ -73,7 +76,7 @@ Expected<std::string> DrawSvg(const std::string& script, int width, int height) 
     for (char& c : reason) {
       if (c == '\n') c = ' ';
     }
-    return Fail(ErrorCode::kIo, "gnuplot does not draw", reason.substr(0, 200));
+    return Fail(ErrorCode::kIo, "gnuplot failed to draw a figure", reason.substr(0, 200));
   }
   return svg;
 }
@@ -86,7 +89,7 @@ std::string Number(double value) {
 }
 
 std::string Quoted(const std::string& text) {
-  // In single quotes gnuplot takes everything as it stands, backquotes as well; two are one.
+  // Inside single quotes gnuplot interprets nothing, not even backquotes; '' stands for one quote.
   std::string quoted = "'";
   for (const char c : text) {
     if (c == '\'') quoted += '\'';

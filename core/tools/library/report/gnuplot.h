@@ -6,16 +6,16 @@
 
 namespace stridewire {
 
-// Runs a gnuplot script, data included, and returns the SVG it draws: `width` by `height` pixels, the
-// same bytes every time. gnuplot reads no settings of the user's. kUnsupported: gnuplot is not there;
-// kIo: it does not draw.
+// Runs a gnuplot script that contains its data and returns the SVG, with `width` by `height`
+// pixels. The same script gives the same bytes, since gnuplot does not read the settings of the
+// user. Errors: kUnsupported if gnuplot is not installed, kIo if it fails.
 [[nodiscard]] Expected<std::string> DrawSvg(const std::string& script, int width, int height);
 
-// A number as the scripts have it: six digits, "NaN" for what is none.
+// Formats a number for a script with six significant digits. Returns "NaN" if it is not finite.
 [[nodiscard]] std::string Number(double value);
 
-// Text in quotes of a script: nothing in it is taken for a command. Markup (^ _ { }) is unless the
-// script says noenhanced.
+// Quotes text for a script, so that gnuplot never interprets it as a command. gnuplot still
+// interprets markup (^ _ { }) unless the script says noenhanced.
 [[nodiscard]] std::string Quoted(const std::string& text);
 
 }  // namespace stridewire

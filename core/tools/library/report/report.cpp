@@ -1,25 +1,18 @@
 #include "report.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "gnuplot.h"
 #include "html.h"
+#include "offline/base/text.h"
 
 namespace stridewire {
 namespace {
 
-// Shares of the work, at a guess.
+// Estimated share of the work that is finished after refinement and after planning the figures.
 constexpr double kRefined = 0.6;
 constexpr double kPlanned = 0.7;
-
-std::string Text(const char* format, double value) {
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), format, value);
-  return text.data();
-}
 
 std::string Mm(double m) { return Text("%.2f", 1000.0 * m); }
 
@@ -55,19 +48,20 @@ std::string GroupTable(const Report& report) {
          Text("%.2f", refined.after.weight_sum_max), Text("%.1f", refined.after.condition)});
   }
   return TableHtml(rows) +
-         "<p>How far synthesized movements miss what is asked, anywhere inside the hull of the "
-         "examples; a radian counts half a metre. Corrected: parameters are corrected when a "
-         "movement starts, without any refinement, in so many iterations at most.</p>\n" +
+         "<p>Error of synthesized movements over the hull of the examples; a radian counts as "
+         "0.5 m. Corrected: error without pseudoexamples after the run-time correction of the "
+         "weights, "
+         "and the largest number of iterations it takes.</p>\n" +
          TableHtml(errors);
 }
 
 std::string Cm(double m) { return Text("%.2f", 100.0 * m); }
 
-// How near made movements are to captured ones.
+// Compares synthesized with captured movements.
 std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOneOut>& realism) {
-  HtmlTable rows = {{"Group", "Parameters", "Movements", "Made by", "Joints, cm", "Trunk", "Head",
+  HtmlTable rows = {{"Group", "Parameters", "Movements", "Method", "Joints, cm", "Trunk", "Head",
                      "Arms", "Legs", "Foot, cm", "Keytimes, ms", "Parameters, cm",
-                     "Ours is nearer"}};
+                     "Cardinal is nearer"}};
   for (std::size_t g = 0; g < realism.size(); ++g) {
     const MotionGroup& group = captured.groups()[g];
     const LeaveOneOut& left_out = realism[g];
@@ -86,18 +80,16 @@ std::string RealismHtml(const MotionLibrary& captured, const std::vector<LeaveOn
       row.push_back(Text("%.0f", 1000.0 * mean.keytime_s));
       row.push_back(Cm(mean.parameter_m));
       row.push_back(m == 0 ? ""
-                           : Text("%.0f %%", 100.0 * gain) + " in the mean, for " +
-                                 Text("%.0f %%", 100.0 * left_out.wins[m]));
+                           : Text("%.0f %%", 100.0 * gain) + " on average, for " +
+                                 Text("%.0f %%", 100.0 * left_out.wins[m]) + " of movements");
       rows.push_back(std::move(row));
     }
   }
-  return "<h2>Realism</h2>\n<p>Every captured movement is left out once, made from the others for "
-         "its "
-         "own parameters and compared with what was captured: mean distance of joints at equal "
-         "generic times. Beside it the nearest captured movement as it is, and the nearest d + 1 "
-         "blended by inverse distance, as blend spaces do. Ours brings what lies outside the hull "
-         "of "
-         "the others to its edge first.</p>\n" +
+  return "<h2>Realism</h2>\n<p>Leave-one-out test: each captured movement is synthesized from all "
+         "others with its own parameters and compared with the capture by the mean distance of "
+         "joints at equal generic times. Parameters outside the hull of the others are moved to "
+         "its edge. The other methods are the nearest captured movement without changes, and the "
+         "nearest d + 1 blended by inverse distance, as in blend spaces.</p>\n" +
          TableHtml(rows);
 }
 
@@ -106,7 +98,8 @@ bool IsMirrored(const MotionGroup& group) {
                      [](std::uint8_t mirrored) { return mirrored != 0; });
 }
 
-// Whether there is something to see: a single example, or a slice that hardly meets the hull, is no map.
+// Returns false if a map would be empty: for a single example, or a slice that hardly meets the
+// hull.
 bool IsMap(const ErrorMap& map) {
   const auto spans = [](const std::vector<double>& axis) {
     return axis.size() == 1 || axis.back() - axis.front() > 1e-6;
@@ -116,7 +109,7 @@ bool IsMap(const ErrorMap& map) {
   return spans(map.x) && spans(map.y) && inside > 8;
 }
 
-// A part of the page: a heading, a sentence, pictures.
+// A section of the page: a heading, a sentence and figures.
 struct Part {
   std::string heading;
   std::string text;
@@ -144,29 +137,34 @@ FigureAxes AxesOf(const MotionGroup& group, const std::vector<std::string>& name
 Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
                             const ReportOptions& options) {
   for (const std::string& axis : options.axes) {
-    const bool is_there = std::any_of(
+    const bool is_known = std::any_of(
         library->groups().begin(), library->groups().end(), [&](const MotionGroup& group) {
           return std::any_of(group.parameters.begin(), group.parameters.end(),
                              [&](const Parameter& p) { return ParameterText(p.name) == axis; });
         });
-    if (!is_there) return Fail(ErrorCode::kOutOfRange, "no group has such a parameter", axis);
+    if (!is_known) {
+      return Fail(ErrorCode::kOutOfRange, "no group of this library has this parameter",
+                  "--axes: " + axis);
+    }
   }
-  const auto tell = [&](double done) { return !options.progress || options.progress(done); };
-  // First a picture without anything in it: gnuplot may be missing.
+  const auto report_progress = [&](double done) {
+    return !options.progress || options.progress(done);
+  };
+  // Draws an empty figure first, to fail early if gnuplot is not installed.
   if (auto drawn = DrawSvg("plot 0 notitle\n", 10, 10); !drawn)
     return std::unexpected(drawn.error());
 
   Report report;
   RefineOptions refine = {.max_error_m = options.max_error_m,
                           .max_pseudoexamples = options.max_pseudoexamples};
-  refine.progress = [&](double done) { return tell(kRefined * done); };
+  refine.progress = [&](double done) { return report_progress(kRefined * done); };
   auto amended = Refine(library, refine);
   if (!amended) return std::unexpected(amended.error());
   refine.progress = nullptr;
   refine.rule = RefineRule::kBare;
   const auto bare = Refine(library, refine);
   if (!bare) return std::unexpected(bare.error());
-  // The library as if it had no pseudoexamples.
+  // Measures the library without its pseudoexamples.
   refine.max_pseudoexamples = 0;
   refine.samples = 1;
   const auto plain = Refine(library, refine);
@@ -175,8 +173,8 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
 
   std::vector<Part> parts;
   for (int g = 0; g < static_cast<int>(library->groups().size()); ++g) {
-    if (!tell(kRefined +
-              (kPlanned - kRefined) * g / static_cast<double>(library->groups().size()))) {
+    if (!report_progress(kRefined + (kPlanned - kRefined) * g /
+                                        static_cast<double>(library->groups().size()))) {
       return Fail(ErrorCode::kUnsupported, "stopped");
     }
     report.plain.push_back(MeasureInterpolationError(*plain->library, g));
@@ -185,7 +183,7 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
               std::to_string(group.example_count) + " examples; " + ParameterList(group) + ".",
               {}};
     if (group.kind == MovementKind::kStepRight && IsMirrored(group)) {
-      part.text += " All of them are left steps mirrored; see those.";
+      part.text += " All of them are mirror images of left steps; see the left group.";
     } else {
       const FigureAxes axes = AxesOf(group, options.axes);
       const auto index = static_cast<std::size_t>(g);
@@ -193,13 +191,13 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
       if (!before) return std::unexpected(before.error());
       const auto after = MeasureErrorMap(*report.refinement.library, g, MapOptions(axes));
       if (!after) return std::unexpected(after.error());
-      // A grid may hit a narrow peak that samples missed.
+      // The grid of the map may hit a narrow peak that the samples missed.
       GroupRefinement& refined = report.refinement.groups[index];
       refined.before.max_error_m = std::max(refined.before.max_error_m, before->max_error_m);
       refined.after.max_error_m = std::max(refined.after.max_error_m, after->max_error_m);
       if (IsMap(*before)) {
         part.figures = {
-            ErrorFigure(*plain->library, *report.refinement.library, g, axes, *before, *after),
+            ErrorFigure({*plain->library, *report.refinement.library, g, axes, *before, *after}),
             CurveFigure(*library, g, refined, bare->groups[index])};
       }
       part.figures.push_back(ExamplesFigure(*library, g, axes));
@@ -209,8 +207,9 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
     }
     parts.push_back(std::move(part));
   }
-  Part walks{"Walks", "Synthesized from the library, as an avatar shows them.", {}};
-  for (const Walk& walk : ShownWalks(*library)) {
+  Part walks{
+      "Walks", "Synthesized from the library with run-time correction and planted feet.", {}};
+  for (const Walk& walk : DemonstrationWalks(*library)) {
     auto figure = WalkFigure(library, walk.name, walk.caption, walk.requests);
     if (!figure) return std::unexpected(figure.error());
     walks.figures.push_back(*std::move(figure));
@@ -232,7 +231,7 @@ Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
     body += "<h2>" + EscapeHtml(part.heading) + "</h2>\n<p>" + EscapeHtml(part.text) + "</p>\n";
     for (const Figure& figure : part.figures) {
       const double drawn = static_cast<double>(report.pictures.size()) / static_cast<double>(count);
-      if (!tell(kPlanned + (1.0 - kPlanned) * drawn)) {
+      if (!report_progress(kPlanned + (1.0 - kPlanned) * drawn)) {
         return Fail(ErrorCode::kUnsupported, "stopped");
       }
       auto svg = DrawSvg(figure.script, figure.width, figure.height);

@@ -6,21 +6,21 @@
 #include <vector>
 
 #include "figures.h"
-#include "stridewire/base/error.h"
 #include "offline/build/interpolation_error.h"
 #include "offline/build/leave_one_out.h"
 #include "offline/build/refine.h"
+#include "stridewire/base/error.h"
 
 namespace stridewire {
 
 struct ReportOptions {
-  std::string name;               // of the library, as people know it
-  std::vector<std::string> axes;  // none, or the names of the one or two parameters the maps show
-  double max_error_m = 0.001;     // refinement, see RefineOptions
+  std::string name;               // Name of the library, for the title.
+  std::vector<std::string> axes;  // Names of at most two parameters for the axes; may be empty.
+  double max_error_m = 0.001;     // See RefineOptions.
   int max_pseudoexamples = 16;
-  // Every usable movement of some captures, none averaged: what realism is measured on. May be null.
+  // All usable movements of some captures without averaging, to measure realism. May be null.
   std::shared_ptr<const MotionLibrary> captured;
-  // Told from time to time how much is done, 0 to 1; false ends it.
+  // Called repeatedly with the finished share of the work, in [0, 1]. Returns false to stop.
   std::function<bool(double)> progress;
 };
 
@@ -29,21 +29,22 @@ struct ReportPicture {
   std::string svg;
 };
 
-// What a report says, all of it in memory: nothing is written before everything is there.
+// A complete report in memory. Files are written only after all figures have been drawn.
 struct Report {
   std::string html;
   std::vector<ReportPicture> pictures;
-  Refinement refinement;                  // by the amended rule
-  std::vector<InterpolationError> plain;  // of the groups without pseudoexamples
-  std::vector<LeaveOneOut> realism;       // of the groups of `captured`
+  Refinement refinement;                  // With the amended rule.
+  std::vector<InterpolationError> plain;  // Per group, without pseudoexamples.
+  std::vector<LeaveOneOut> realism;       // Per group of ReportOptions::captured.
 };
 
-// The axes of a group's pictures: those named, as far as the group has them, else start_z and end_z, else
-// its first ones.
+// Chooses the axes of a group's figures: the named parameters if the group has them, then start_z
+// and end_z, then its first parameters.
 [[nodiscard]] FigureAxes AxesOf(const MotionGroup& group, const std::vector<std::string>& names);
 
-// Measures a library, refines it and draws the paper's figures of it. kOutOfRange: no group has such an
-// axis; kUnsupported: no gnuplot, or "stopped".
+// Measures and refines a library and draws the figures of the paper for it. Errors: kOutOfRange if
+// no group has a parameter named in `axes`; kUnsupported if gnuplot is not installed or `progress`
+// returned false.
 [[nodiscard]] Expected<Report> MakeReport(const std::shared_ptr<const MotionLibrary>& library,
                                           const ReportOptions& options);
 

@@ -9,15 +9,15 @@
 namespace stridewire {
 namespace {
 
-// A joint this far aside of the root belongs to that side, whatever its name.
-constexpr float kAsideM = 0.04f;
+// A joint this far from the root sideways belongs to that side, regardless of its name.
+constexpr float kSideMinM = 0.04f;
 
 }  // namespace
 
 StickFigure::StickFigure(const MotionLibrary& library) : skeleton_(library.skeleton()) {
   for (const Vec3& position : Place(library.stand_pose())) {
-    const float aside = position.x - library.stand_pose().root_position_m.x;
-    sides_.push_back(aside > kAsideM ? 0 : aside < -kAsideM ? 1 : 2);
+    const float side_m = position.x - library.stand_pose().root_position_m.x;
+    sides_.push_back(side_m > kSideMinM ? 0 : side_m < -kSideMinM ? 1 : 2);
   }
 }
 
@@ -45,7 +45,7 @@ void StickFigure::Draw(ConstPoseSpan pose, double shift_m, bool from_front) {
     if (std::hypot(dx, dy) < 0.002) continue;
     std::string& lines = lines_[static_cast<std::size_t>(sides_[i])];
     for (const Vec3& end : {positions[parent], positions[i]}) {
-      // Millimetres are enough to look at.
+      // Millimetres are precise enough for a figure.
       lines += Number(std::round(1000.0 * (end[across] + shift_m)) / 1000.0) + " " +
                Number(std::round(1000.0 * end.y) / 1000.0) + "\n";
     }

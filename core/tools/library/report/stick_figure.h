@@ -12,39 +12,39 @@
 
 namespace stridewire {
 
-// Colours that stay apart without colour vision (Okabe, Ito); sides differ in width as well.
+// Colours that colour-blind readers can distinguish (Okabe, Ito). The sides also differ in width.
 inline constexpr const char* kLeftColour = "#d55e00";
 inline constexpr const char* kRightColour = "#0072b2";
-inline constexpr const char* kMiddleColour = "#555555";
 
-// A skeleton drawn as lines.
+// Draws the skeleton of a library as lines.
 class StickFigure {
  public:
   explicit StickFigure(const MotionLibrary& library);
 
-  // World positions of all joints, then of the end sites.
+  // World positions of all joints, followed by the end sites.
   [[nodiscard]] std::vector<Vec3> Place(ConstPoseSpan pose) const;
 
-  // Adds the lines of a pose moved on by `shift_m`, seen from its right side (ahead is right) or
-  // from the front (its left is right).
+  // Adds the lines of a pose, shifted by `shift_m`. The figure is seen from its right side (forward
+  // is right), or from the front (its left is right).
   void Draw(ConstPoseSpan pose, double shift_m, bool from_front = false);
 
-  // gnuplot data blocks $left, $right and $middle with all that was drawn, and what plots them.
+  // Returns the gnuplot data blocks $left, $right and $middle of all poses that were drawn.
+  // PlotCommand returns the commands that plot them.
   [[nodiscard]] std::string Blocks() const;
   static const char* PlotCommand();
 
  private:
   const Skeleton& skeleton_;
-  std::vector<int> sides_;  // of joints and end sites: 0 left, 1 right, 2 middle
+  std::vector<int> sides_;  // Per joint and end site: 0 left, 1 right, 2 middle.
   std::array<std::string, 3> lines_;
 };
 
-// One movement of a group, without any before it.
+// Evaluates single movements of a group.
 class MovementPlayer {
  public:
   MovementPlayer(const MotionLibrary& library, int group_index);
 
-  // With exactly these parameters if the run-time correction reaches them.
+  // Starts a movement with these parameters. If `corrected`, its weights are corrected at first.
   void Start(std::span<const double> parameters, bool corrected);
 
   [[nodiscard]] const Movement& movement() const { return movement_; }

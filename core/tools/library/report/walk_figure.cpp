@@ -12,11 +12,11 @@ namespace stridewire {
 namespace {
 
 constexpr double kFps = 60.0;
-constexpr double kBetweenPosesM = 0.3;
-constexpr double kMostPixelsAMetre = 220.0;
-constexpr double kSlabM = 0.3;  // length of a slab
+constexpr double kPoseSpacingM = 0.3;
+constexpr double kMaxPixelsPerMetre = 220.0;
+constexpr double kSlabM = 0.3;  // Length of a slab.
 
-// Where a step was asked to land, from where the foot beside it stands.
+// The requested position of a step, relative to the foot beside it.
 struct Slab {
   DVec3 centre_m = DVec3(0.0);
   double heading_rad = 0.0;
@@ -36,7 +36,7 @@ std::vector<Slab> SlabsOf(const Synthesis& synthesis, const MotionLibrary& libra
                                synthesis.clip.frame_count() - 1);
     const DVec3 fixed =
         BallPosition(library.skeleton(), synthesis.clip.frame(frame), OtherFoot(moving));
-    // Where no side was asked for, any is right.
+    // If the request has no side_m, the slab is drawn where the foot landed.
     const DVec3 ball = BallPosition(library.skeleton(), synthesis.clip.frame(frame), moving);
     const double own_side = moving == Foot::kLeft ? 1.0 : -1.0;
     const double side = step->side_m ? own_side * *step->side_m
@@ -64,16 +64,17 @@ Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
   double last_m = -HUGE_VAL;
   std::array<std::string, 2> ways;
   std::string pelvis;
-  // What goes aside is seen from the front: then x runs to the right, else z.
+  // Walks that move mainly sideways are drawn from the front, with x to the right; others from the
+  // side, with z to the right.
   const Vec3 way = clip.root_positions_m.back() - clip.root_positions_m.front();
   const bool from_front = std::fabs(way.x) > std::fabs(way.z);
   const int ahead = from_front ? 0 : 2;
-  // Upwards in the picture from above.
+  // The vertical axis of the picture from above.
   const auto up = [&](const auto& p) { return from_front ? -double{p[2]} : double{p[0]}; };
   const auto point = [&](const auto& p) { return Number(p[ahead]) + " " + Number(up(p)) + "\n"; };
   for (int f = 0; f < clip.frame_count(); ++f) {
     const Vec3 root = clip.frame(f).root_position_m;
-    const bool is_shown = std::fabs(root[ahead] - last_m) > kBetweenPosesM;
+    const bool is_shown = std::fabs(root[ahead] - last_m) > kPoseSpacingM;
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
       const Vec3 ball = BallPosition(skeleton, clip.frame(f), foot);
       ways[static_cast<std::size_t>(foot)] += point(ball);
@@ -94,7 +95,7 @@ Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
   const std::vector<Slab> slabs = SlabsOf(*synthesis, *library, requests);
   for (const Slab& slab : slabs) {
     const double half = 0.5 * kSlabM;
-    const double ground = slab.centre_m.y - 0.02;  // drawn thick, below the feet
+    const double ground = slab.centre_m.y - 0.02;  // Draws the thick line below the feet.
     const double middle = slab.centre_m[ahead];
     const double reach = from_front ? 0.2 * kSlabM : half;
     side_slabs += Number(middle - reach) + " " + Number(ground) + "\n" + Number(middle + reach) +
@@ -107,7 +108,7 @@ Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
 
   Figure figure{.file = "walk_" + name + ".svg", .caption = caption, .width = 1200};
   const double width_m = along[1] - along[0] + 0.3;
-  const double scale = std::min(1140.0 / width_m, kMostPixelsAMetre);
+  const double scale = std::min(1140.0 / width_m, kMaxPixelsPerMetre);
   const int strip = static_cast<int>(scale * (top + 0.35)) + 60;
   const double above_m = std::clamp(across[1] - across[0] + 0.5, 0.8, 6.0);
   const int above = static_cast<int>(std::min(scale, 300.0) * above_m) + 70;
@@ -141,7 +142,7 @@ Expected<Figure> WalkFigure(const std::shared_ptr<const MotionLibrary>& library,
   return figure;
 }
 
-std::vector<Walk> ShownWalks(const MotionLibrary& library) {
+std::vector<Walk> DemonstrationWalks(const MotionLibrary& library) {
   struct Range {
     double min = 0.0;
     double max = 0.0;
@@ -171,8 +172,8 @@ std::vector<Walk> ShownWalks(const MotionLibrary& library) {
     steps.push_back({.length_m = share * longest});
   }
   add("slabs",
-      "A walk over slabs at arbitrary distances (paper, Figure 4): grey where each step was "
-      "asked to land",
+      "A walk over slabs at arbitrary distances (paper, Figure 4). Grey marks show where each step "
+      "was requested to land",
       steps);
   const Range height = widest(ParameterName::kEndY);
   if (height.max > 0.1) {
@@ -181,7 +182,7 @@ std::vector<Walk> ShownWalks(const MotionLibrary& library) {
       steps.push_back({.length_m = 0.35, .height_m = std::min(rise, height.max)});
     }
     steps.push_back({.length_m = 0.0});
-    add("stairs", "Up a staircase: grey where each step was asked to land", steps);
+    add("stairs", "A walk up stairs. Grey marks show where each step was requested to land", steps);
   }
   const Range turn = widest(ParameterName::kTurn);
   if (turn.max > 0.15 && turn.min < -0.15) {
@@ -203,8 +204,8 @@ std::vector<Walk> ShownWalks(const MotionLibrary& library) {
       steps.push_back({.foot = Foot::kRight, .length_m = 0.0, .side_m = 0.12});
     }
     add("shuffle",
-        "A sideways shuffle to the left, seen from the front; grey where each step was asked to "
-        "land",
+        "A sideways shuffle to the left, seen from the front. Grey marks show where each step was "
+        "requested to land",
         steps);
   }
   return walks;

@@ -124,7 +124,7 @@ TEST(LibraryAssembler, AnotherJointTreeIsLeftOutAndTheRestGoesOn) {
   rehung.skeleton.joints[3].parent = 0;
   EXPECT_THAT(assembler.Add(rehung).error,
               testing::MatchesRegex(
-                  "its joint LeftFoot hangs on .+ where in synthetic.bvh it hangs on .+"));
+                  "its joint LeftFoot has the parent .+ where in synthetic.bvh the parent is .+"));
   Capture fewer = PlainWalk();
   fewer.skeleton.joints.pop_back();
   EXPECT_EQ(assembler.Add(fewer).error, "it has 11 joints, synthetic.bvh has 12");

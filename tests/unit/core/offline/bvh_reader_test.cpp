@@ -54,8 +54,8 @@ const std::string& JointName(const Capture& capture, int joint) {
   return capture.skeleton.joints[static_cast<std::size_t>(joint)].name;
 }
 
-// What holds for any recording of an upright person.
-void ExpectAPerson(const Capture& capture) {
+// Expects properties that every recording of an upright person has.
+void ExpectUprightPerson(const Capture& capture) {
   ASSERT_TRUE(capture.skeleton.Validate().has_value());
   ASSERT_TRUE(capture.clip.Validate().has_value());
   const Leg& left = capture.skeleton.leg(Foot::kLeft);
@@ -95,13 +95,13 @@ void ExpectAPerson(const Capture& capture) {
     ASSERT_GT(glm::dot(across, left_hand), 0.1f) << "frame " << f;
     ASSERT_LT(glm::length(across), 0.35f);
   }
-  // Above the lower ball, as some climb.
+  // Heights are above the lower ball, since some figures climb.
   EXPECT_GT(Quantile(hips, 0.5), 0.78);
   EXPECT_LT(Quantile(hips, 0.5), 1.06);
   EXPECT_GT(Quantile(heads, 0.5), 0.33);
-  EXPECT_GT(Quantile(facing, 0.5), 0.9) << "the feet do not point where the root faces";
+  EXPECT_GT(Quantile(facing, 0.5), 0.9) << "feet and root must face in the same direction";
   for (int side = 0; side < 2; ++side) {
-    // A floor at y = 0 or a block on it; ankles above balls.
+    // The floor is at y = 0, or a block stands on it. Ankles are above balls.
     EXPECT_GT(Quantile(balls[side], 0.05), -0.01);
     EXPECT_LT(Quantile(balls[side], 0.05), 0.25);
     EXPECT_GT(Quantile(ankles[side], 0.5) - Quantile(balls[side], 0.5), 0.01);
@@ -120,11 +120,11 @@ struct FileFacts {
   int joints, frames;
   double fps, unit_m;
   int first_frame;
-  const char* left_leg;  // hip knee ankle ball
+  const char* left_leg;  // Hip, knee, ankle and ball.
 };
 constexpr double kCmuUnit = 0.0254 / 0.45;
 
-TEST(ReadBvh, TakesEverySharedCapture) {
+TEST(ReadBvh, ReadsAllSharedCaptures) {
   const std::vector<std::filesystem::path> paths = test::SharedCaptures();
   if (paths.empty()) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
   EXPECT_GE(paths.size(), 37u);
@@ -132,25 +132,25 @@ TEST(ReadBvh, TakesEverySharedCapture) {
     SCOPED_TRACE(path.string());
     const Expected<Capture> capture = ReadBvh(path);
     ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
-    // The floors of the other folders are not level, so heights above y = 0 mean nothing there.
-    if (path.string().find("/cmu/") != std::string::npos) ExpectAPerson(*capture);
+    // Floors in the other folders are not level, so heights above y = 0 cannot be checked there.
+    if (path.string().find("/cmu/") != std::string::npos) ExpectUprightPerson(*capture);
   }
 }
 
-TEST(ReadBvh, TakesThePackagedCaptures) {
+TEST(ReadBvh, ReadsPackagedCaptures) {
   const std::vector<std::filesystem::path> paths = test::PackagedCaptures();
   if (paths.empty()) GTEST_SKIP() << "assimp-testmodels is not installed";
   for (const std::filesystem::path& path : paths) {
     SCOPED_TRACE(path.string());
     const Expected<Capture> capture = ReadBvh(path);
     ASSERT_TRUE(capture.has_value()) << Describe(capture.error());
-    ExpectAPerson(*capture);
+    ExpectUprightPerson(*capture);
     EXPECT_EQ(capture->first_frame, 1);
     EXPECT_NEAR(capture->unit_m, kCmuUnit, 1e-9);
   }
 }
 
-TEST(ReadBvh, FindsOutAboutUnlikeFiles) {
+TEST(ReadBvh, DetectsPropertiesOfDifferentFiles) {
   constexpr const char* kCmuLeg = "LeftUpLeg LeftLeg LeftFoot LeftToeBase";
   const FileFacts expected[] = {
       {"cmu/01/01_01.bvh", 31, 2752, 120, kCmuUnit, 1, kCmuLeg},
@@ -185,8 +185,8 @@ TEST(ReadBvh, FindsOutAboutUnlikeFiles) {
   }
 }
 
-// The same take in another unit: every position agrees.
-TEST(ReadBvh, ReadsOneTakeInTwoUnitsAlike) {
+// The same take in two units must give the same positions.
+TEST(ReadBvh, IsIndependentOfTheUnit) {
   const std::filesystem::path folder = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "other/max";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
   const Expected<Capture> a = ReadBvh(folder / "131_01.bvh");
@@ -205,7 +205,7 @@ TEST(ReadBvh, ReadsOneTakeInTwoUnitsAlike) {
   EXPECT_LT(worst, 1e-4);
 }
 
-TEST(ReadBvh, TellsOfATooLongFrameTime) {
+TEST(ReadBvh, NotesTooLongFrameTime) {
   const std::filesystem::path path =
       std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / "other/amc2bvh/16_02.bvh";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "no captures at " STRIDEWIRE_MOCAP_DIR;
@@ -226,21 +226,22 @@ TEST(ReadBvh, TellsOfATooLongFrameTime) {
   }
 }
 
-// A second, plain reading: 3x3 matrices in double, straight down the file, sharing no code with the
-// reader. It knows only what each file's README line says: unit and which way is up.
-struct PlainReading {
+// An independent reader for comparison. It uses 3x3 matrices of doubles and shares no code with the
+// product. Units and up axes come from the documentation of the captures.
+struct ReferenceReading {
   std::vector<std::string> names;
-  std::vector<std::vector<std::array<double, 3>>> positions;  // [frame][joint], file axes and units
+  std::vector<std::vector<std::array<double, 3>>>
+      positions;  // [frame][joint], in file axes and units.
 };
 
-PlainReading ReadPlainly(const std::filesystem::path& path) {
+ReferenceReading ReadReference(const std::filesystem::path& path) {
   struct Node {
     int parent;
     double offset[3];
     std::vector<std::string> channels;
   };
   std::istringstream in(test::FileText(path));
-  PlainReading reading;
+  ReferenceReading reading;
   std::vector<Node> nodes;
   std::vector<int> stack;
   std::string word;
@@ -323,7 +324,7 @@ PlainReading ReadPlainly(const std::filesystem::path& path) {
   return reading;
 }
 
-TEST(ReadBvh, AgreesWithAPlainReading) {
+TEST(ReadBvh, AgreesWithAReferenceReader) {
   struct File {
     const char* path;
     bool z_up;
@@ -338,7 +339,7 @@ TEST(ReadBvh, AgreesWithAPlainReading) {
     const std::filesystem::path path = std::filesystem::path(STRIDEWIRE_MOCAP_DIR) / file.path;
     const Expected<Capture> capture = ReadBvh(path);
     ASSERT_TRUE(capture.has_value());
-    const PlainReading plain = ReadPlainly(path);
+    const ReferenceReading plain = ReadReference(path);
     ASSERT_EQ(plain.names.size(), static_cast<std::size_t>(capture->skeleton.joint_count()));
     ASSERT_EQ(plain.positions.size(), static_cast<std::size_t>(capture->clip.frame_count()));
     double worst = 0.0;
@@ -347,7 +348,7 @@ TEST(ReadBvh, AgreesWithAPlainReading) {
       for (std::size_t j = 0; j < p.size(); ++j) {
         ASSERT_EQ(plain.names[j], JointName(*capture, static_cast<int>(j)));
         const auto& q = plain.positions[static_cast<std::size_t>(f)][j];
-        // The z-up figure faces -y at rest: x stays, z goes to y, y to -z.
+        // The z-up figure faces -y at rest, so (x, y, z) becomes (x, z, -y).
         const DVec3 ours =
             capture->unit_m * (file.z_up ? DVec3(q[0], q[2], -q[1]) : DVec3(q[0], q[1], q[2]));
         worst = std::max(worst, glm::length(ours - DVec3(p[j])));
@@ -385,7 +386,7 @@ double WorstRotation(const Capture& a, const Capture& b) {
   return worst;
 }
 
-TEST(ParseBvh, TakesAnyLineEndsSpacesAndCase) {
+TEST(ParseBvh, AcceptsAnyLineEndsSpacesAndCase) {
   const Capture plain = Read(BvhText().Text());
   ASSERT_EQ(plain.clip.frame_count(), 12);
   BvhText text;
@@ -397,7 +398,7 @@ TEST(ParseBvh, TakesAnyLineEndsSpacesAndCase) {
     text.last_line_end = false;
     variants.push_back(text.Text());
   }
-  std::string mixed = BvhText().Text();  // CRLF in the header, LF in the rows.
+  std::string mixed = BvhText().Text();  // CRLF in the header and LF in the rows.
   for (std::size_t at = 0; (at = mixed.find('\n', at)) < mixed.find("Frame Time"); at += 2)
     mixed.insert(at, "\r");
   variants.push_back(mixed);
@@ -430,12 +431,11 @@ TEST(ParseBvh, TakesAnyLineEndsSpacesAndCase) {
   }
 }
 
-// The same figure lying in the file in each of the 24 ways reads as the same figure, and in any of
-// the known units.
-TEST(ParseBvh, TurnsAndScalesAnyFigureIntoOurs) {
+// The figure must read the same in all 24 orientations of the file axes and in all common units.
+TEST(ParseBvh, ConvertsAxesAndUnits) {
   const Capture plain = Read(BvhText().Text());
   EXPECT_THAT(plain.notes, Contains(HasSubstr("1 m")));
-  int ways = 0;
+  int orientations = 0;
   for (const int x : {1, -1, 2, -2, 3, -3}) {
     for (const int y : {1, -1, 2, -2, 3, -3}) {
       if (std::abs(x) == std::abs(y)) continue;
@@ -455,10 +455,10 @@ TEST(ParseBvh, TurnsAndScalesAnyFigureIntoOurs) {
         ASSERT_LT(WorstPosition(plain, capture), 1e-5);
         ASSERT_LT(WorstRotation(plain, capture), 1e-5);
       }
-      ++ways;
+      ++orientations;
     }
   }
-  EXPECT_EQ(ways, 24);
+  EXPECT_EQ(orientations, 24);
 }
 
 TEST(ParseBvh, FindsLegsByShape) {
@@ -480,11 +480,11 @@ TEST(ParseBvh, FindsLegsByShape) {
   }
 }
 
-TEST(ParseBvh, PutsTheBallOnTheAnkleWithoutToes) {
+TEST(ParseBvh, FixesTheBallToTheAnkleWithoutToeJoint) {
   BvhText text;
   text.toes = false;
   const Capture capture = Read(text.Text());
-  // The End Site (0, -0.06, 0.21) lies beyond 0.2 leg lengths: the tip of the toes.
+  // The End Site (0, -0.06, 0.21) is farther than 0.2 leg lengths, so it is the tip of the toes.
   for (const Leg& leg : capture.skeleton.legs) {
     EXPECT_EQ(leg.ball, leg.ankle);
     EXPECT_NEAR(glm::length(leg.toe_tip_offset_m - Vec3(0, -0.06f, 0.21f)), 0.0, 1e-6);
@@ -497,10 +497,10 @@ TEST(ParseBvh, PutsTheBallOnTheAnkleWithoutToes) {
     EXPECT_NEAR(leg.toe_tip_offset_m.z, 0.24 * 0.83, 0.01);
     EXPECT_LT(leg.ball_offset_m.z, leg.toe_tip_offset_m.z);
   }
-  EXPECT_THAT(bare.notes, Contains(HasSubstr("neither toe joint nor End Site")));
+  EXPECT_THAT(bare.notes, Contains(HasSubstr("neither a toe joint nor an End Site")));
 }
 
-TEST(ParseBvh, StandsUpARigWhoseRestPoseDoesNot) {
+TEST(ParseBvh, HandlesRigsWhoseRestPoseDoesNotStand) {
   BvhText text;
   text.folded = true;
   for (const std::array<int, 3>& axes : {std::array{1, 2, 3}, std::array{1, 3, -2}}) {
@@ -523,21 +523,21 @@ TEST(ParseBvh, StandsUpARigWhoseRestPoseDoesNot) {
   }
 }
 
-TEST(ParseBvh, KeepsTheMeanOfPositionsOnOtherJoints) {
+TEST(ParseBvh, UsesTheMeanOfPositionChannelsAsOffset) {
   BvhText text;
   text.positions_everywhere = true;
   const Capture capture = Read(text.Text());
   const Capture plain = Read(BvhText().Text());
-  // Each y swings 1 cm about its offset.
+  // Each y oscillates by 1 cm around its offset.
   for (std::size_t j = 1; j < capture.skeleton.joints.size(); ++j) {
     EXPECT_NEAR(
         glm::length(capture.skeleton.joints[j].offset_m - plain.skeleton.joints[j].offset_m), 0.0,
         1e-6);
   }
-  EXPECT_THAT(capture.notes, Contains(HasSubstr("at most 0.0100 m off")));
+  EXPECT_THAT(capture.notes, Contains(HasSubstr("largest deviation 0.0100 m")));
 }
 
-TEST(ParseBvh, KeepsTheOffsetWherePositionsAreAllZero) {
+TEST(ParseBvh, KeepsTheOffsetIfAllPositionsAreZero) {
   const std::string text =
       "HIERARCHY\nROOT Hips\n{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation "
       "Xrotation Yrotation\n"
@@ -560,10 +560,10 @@ TEST(ParseBvh, RootPositionsReplaceItsOffset) {
   EXPECT_EQ(Read(text).clip.root_positions_m, Read(BvhText().Text()).clip.root_positions_m);
 }
 
-TEST(ParseBvh, LeavesOutAnArtificialFirstPose) {
+TEST(ParseBvh, SkipsAnArtificialFirstPose) {
   std::string text = BvhText().Text();
   EXPECT_EQ(Read(text).first_frame, 0);
-  // A T-pose row in front: arms and legs 40 degrees from where the motion has them.
+  // Inserts a T-pose as first frame, with all joints rotated by 40 degrees.
   const std::size_t rows = text.find('\n', text.find("Frame Time")) + 1;
   std::string row = "0 0.95 0 0 0 0";
   for (std::size_t j = 1; j < BvhText().Parts().size(); ++j) row += " 40 0 0";
@@ -575,7 +575,7 @@ TEST(ParseBvh, LeavesOutAnArtificialFirstPose) {
   EXPECT_THAT(capture.notes, Contains(HasSubstr("artificial pose")));
 }
 
-TEST(ParseBvh, RoundsTheFrameTimeAsFarAsItsDigitsAllow) {
+TEST(ParseBvh, RoundsTheFrameRateIfItsDigitsAllow) {
   const std::pair<const char*, double> cases[] = {{".0083333", 120.0},
                                                   {"0.008333", 120.0},
                                                   {"0.00833333", 120.0},
@@ -596,19 +596,20 @@ TEST(ParseBvh, RoundsTheFrameTimeAsFarAsItsDigitsAllow) {
   }
 }
 
-TEST(ParseBvh, ReadsFewerAndLeavesOutMoreRowsThanAnnounced) {
+TEST(ParseBvh, AcceptsFewerOrMoreRowsThanDeclared) {
   BvhText text;
   text.frames_text = "99999999999";
   const Capture fewer = Read(text.Text());
   EXPECT_EQ(fewer.clip.frame_count(), 12);
-  EXPECT_THAT(fewer.notes, Contains(HasSubstr("announces 99999999999 frames, the file holds 12")));
+  EXPECT_THAT(fewer.notes,
+              Contains(HasSubstr("declares 99999999999 frames, but the file contains 12")));
   text.frames_text = "5";
   const Capture more = Read(text.Text());
   EXPECT_EQ(more.clip.frame_count(), 5);
-  EXPECT_THAT(more.notes, Contains(HasSubstr("left out")));
+  EXPECT_THAT(more.notes, Contains(HasSubstr("ignored the frames")));
 }
 
-TEST(ParseBvh, NamesMayRepeatHoldSpacesOrForeignBytes) {
+TEST(ParseBvh, NamesMayRepeatOrContainSpacesAndInvalidUtf8) {
   std::string text = BvhText().Text();
   const auto rename = [&](const std::string& from, const std::string& to) {
     text.replace(text.find(from), from.size(), to);
@@ -625,7 +626,7 @@ TEST(ParseBvh, NamesMayRepeatHoldSpacesOrForeignBytes) {
   EXPECT_THAT(capture.notes, Contains(HasSubstr("Spine_2")));
 }
 
-TEST(ParseBvh, OptionsOverrideWhatWasFound) {
+TEST(ParseBvh, OptionsOverrideDetection) {
   const std::string text = BvhText().Text();
   BvhReadOptions options;
   options.unit_m = 0.5;
@@ -637,7 +638,7 @@ TEST(ParseBvh, OptionsOverrideWhatWasFound) {
 
   options = {};
   options.up = BvhAxis::kPlusZ;
-  EXPECT_NEAR(Read(text, options).clip.root_positions_m[11].y, 0.04 * 11, 1e-5);  // Was z.
+  EXPECT_NEAR(Read(text, options).clip.root_positions_m[11].y, 0.04 * 11, 1e-5);  // This was z.
 
   options = {};
   options.left_ankle = "LeftFoot";
@@ -645,14 +646,14 @@ TEST(ParseBvh, OptionsOverrideWhatWasFound) {
   options.left_ball = "LeftToeBase";
   EXPECT_EQ(Read(text, options).skeleton.leg(Foot::kLeft).ball,
             Read(text).skeleton.leg(Foot::kLeft).ball);
-  // Arms for legs are not a good idea, but swapped sides are: the figure is then seen from behind.
+  // Swapped sides are accepted: the figure then faces backwards.
   std::swap(options.left_ankle, options.right_ankle);
   options.left_ball.clear();
   const Capture swapped = Read(text, options);
   EXPECT_THAT(swapped.notes, Contains(HasSubstr("backwards")));
 }
 
-TEST(ParseBvh, TellsWhichOptionIsWrong) {
+TEST(ParseBvh, ErrorsNameTheOption) {
   const std::string text = BvhText().Text();
   struct Case {
     BvhReadOptions options;
@@ -673,7 +674,7 @@ TEST(ParseBvh, TellsWhichOptionIsWrong) {
   }
   add(
       [](auto& o) {
-        o.left_ankle = "Nobody";
+        o.left_ankle = "NoSuchJoint";
         o.right_ankle = "RightFoot";
       },
       ErrorCode::kNotFound, "left_ankle");
@@ -690,7 +691,7 @@ TEST(ParseBvh, TellsWhichOptionIsWrong) {
         o.right_ankle = "LeftFoot";
       },
       ErrorCode::kInvalidArgument, "right_ankle");
-  add([](auto& o) { o.right_ball = "Nobody"; }, ErrorCode::kNotFound, "right_ball");
+  add([](auto& o) { o.right_ball = "NoSuchJoint"; }, ErrorCode::kNotFound, "right_ball");
   add([](auto& o) { o.right_ball = "LeftToeBase"; }, ErrorCode::kInvalidArgument, "right_ball");
   for (const Case& c : cases) {
     const Expected<Capture> capture = ParseBvh(text, "figure.bvh", c.options);
@@ -700,7 +701,7 @@ TEST(ParseBvh, TellsWhichOptionIsWrong) {
   }
 }
 
-TEST(ReadBvh, TellsOfFilesThatCannotBeRead) {
+TEST(ReadBvh, ReportsUnreadableFiles) {
   const Expected<Capture> none = ReadBvh("/nowhere/at/all.bvh");
   ASSERT_FALSE(none.has_value());
   EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
@@ -711,7 +712,7 @@ TEST(ReadBvh, TellsOfFilesThatCannotBeRead) {
     EXPECT_EQ(folder.error().code, ErrorCode::kIo);
     EXPECT_EQ(folder.error().where, path);
   }
-  // A file over the limit is turned away by its size; the hole in it takes no room.
+  // Files over the limit are rejected by their size. This one is sparse and uses no disk space.
   const std::filesystem::path huge =
       std::filesystem::path(testing::TempDir()) / "stridewire_huge.bvh";
   {
@@ -724,7 +725,7 @@ TEST(ReadBvh, TellsOfFilesThatCannotBeRead) {
   EXPECT_EQ(large.error().code, ErrorCode::kLimitExceeded);
 }
 
-// Lines of a small file, for saying exactly which one is wrong.
+// A small valid file, line by line, for tests that change one line.
 std::vector<std::string> SmallFile() {
   return {"HIERARCHY",                                                               // 1
           "ROOT Hips",                                                               // 2
@@ -779,26 +780,26 @@ std::string Joined(const std::vector<std::string>& lines) {
   return text;
 }
 
-TEST(ParseBvh, NamesFileLineAndFault) {
+TEST(ParseBvh, ErrorsNameFileLineAndReason) {
   ASSERT_TRUE(ParseBvh(Joined(SmallFile()), "bad.bvh").has_value());
   struct Case {
-    int line;          // Changed line, from 1
-    const char* text;  // Its new text
-    int blamed;        // Line in `where`; 0: the file alone
+    int line;          // The line that is changed, from 1.
+    const char* text;  // Its new text.
+    int reported;      // The line in `where`; 0: only the file.
     ErrorCode code;
     const char* sentence;
   };
   const Case cases[] = {
-      {1, "HIERARCHIE", 1, ErrorCode::kMalformed, "begins with HIERARCHY"},
-      {1, "", 2, ErrorCode::kMalformed, "begins with HIERARCHY"},
+      {1, "HIERARCHIE", 1, ErrorCode::kMalformed, "expected HIERARCHY"},
+      {1, "", 2, ErrorCode::kMalformed, "expected HIERARCHY"},
       {2, "JOINT Hips", 2, ErrorCode::kMalformed, "expected ROOT"},
       {2, "ROOT", 2, ErrorCode::kMalformed, "expected a joint name"},
       {2, "ROOT Hi\x01ps", 2, ErrorCode::kMalformed, "control character"},
-      {3, "(", 3, ErrorCode::kMalformed, "expected { after a joint's name"},
-      {4, "OFFSET 0 0", 5, ErrorCode::kMalformed, "OFFSET needs three numbers"},
-      {4, "OFFSET 0 zero 0", 4, ErrorCode::kMalformed, "OFFSET needs three numbers"},
-      {4, "OFFSET 0 nan 0", 4, ErrorCode::kOutOfRange, "not finite or too large"},
-      {4, "OFFSET 0 1e999 0", 4, ErrorCode::kOutOfRange, "not finite or too large"},
+      {3, "(", 3, ErrorCode::kMalformed, "expected { after a joint name"},
+      {4, "OFFSET 0 0", 5, ErrorCode::kMalformed, "expected three numbers after OFFSET"},
+      {4, "OFFSET 0 zero 0", 4, ErrorCode::kMalformed, "expected three numbers after OFFSET"},
+      {4, "OFFSET 0 nan 0", 4, ErrorCode::kOutOfRange, "expected a finite number"},
+      {4, "OFFSET 0 1e999 0", 4, ErrorCode::kOutOfRange, "expected a finite number"},
       {4, "OFFSET 0 0 0 0", 4, ErrorCode::kMalformed, "expected OFFSET, CHANNELS"},
       {4, "OFFSET 0 0 0 OFFSET 0 0 0", 4, ErrorCode::kMalformed, "two OFFSETs"},
       {8, "", 22, ErrorCode::kMalformed, "no OFFSET"},
@@ -809,46 +810,47 @@ TEST(ParseBvh, NamesFileLineAndFault) {
       {5, "CHANNELS -1", 5, ErrorCode::kOutOfRange, "0 to 6 channels"},
       {5, "CHANNELS 2 Xposition Wposition", 5, ErrorCode::kMalformed, "channel name"},
       {5, "CHANNELS 2 Xposition Yscale", 5, ErrorCode::kMalformed, "channel name"},
-      {5, "CHANNELS 2 Xposition Xposition", 5, ErrorCode::kMalformed, "same channel twice"},
-      {5, "CHANNELS 0 CHANNELS 0", 5, ErrorCode::kMalformed, "CHANNELS twice"},
+      {5, "CHANNELS 2 Xposition Xposition", 5, ErrorCode::kMalformed, "duplicate channel"},
+      {5, "CHANNELS 0 CHANNELS 0", 5, ErrorCode::kMalformed, "two CHANNELS"},
       {6, "LIMB LeftUpLeg", 6, ErrorCode::kMalformed, "expected OFFSET, CHANNELS"},
-      {8, "OFFSET 0.1 500 0", 8, ErrorCode::kOutOfRange, "offset is too large"},
+      {8, "OFFSET 0.1 500 0", 8, ErrorCode::kOutOfRange, "OFFSET of the joint is too large"},
       {18, "JOINT Toe", 18, ErrorCode::kMalformed, "expected OFFSET in an End Site"},
       {17, "", 18, ErrorCode::kMalformed, "expected { after End Site"},
-      {18, "OFFSET 0 0", 19, ErrorCode::kMalformed, "OFFSET needs three numbers"},
-      {18, "OFFSET 0 0 900", 18, ErrorCode::kOutOfRange, "End Site's offset is too large"},
+      {18, "OFFSET 0 0", 19, ErrorCode::kMalformed, "expected three numbers after OFFSET"},
+      {18, "OFFSET 0 0 900", 18, ErrorCode::kOutOfRange, "OFFSET of the End Site is too large"},
       {19, "JOINT Toe", 19, ErrorCode::kMalformed, "expected } after an End Site"},
       {39, "", 40, ErrorCode::kMalformed, "expected OFFSET, CHANNELS, JOINT, End Site or }"},
       {40, "ROOT Second", 40, ErrorCode::kUnsupported, "second ROOT"},
       {40, "", 41, ErrorCode::kMalformed, "expected MOTION"},
       {41, "Frame: 3", 41, ErrorCode::kMalformed, "expected Frames:"},
-      {41, "Frames: three", 41, ErrorCode::kMalformed, "whole number"},
-      {41, "Frames: 0", 41, ErrorCode::kMalformed, "whole number"},
-      {41, "Frames: -3", 41, ErrorCode::kMalformed, "whole number"},
-      {41, "Frames: 2.5", 41, ErrorCode::kMalformed, "whole number"},
-      {41, "Frames: -99999999999999999999999", 41, ErrorCode::kMalformed, "whole number"},
-      {41, "Frames:", 42, ErrorCode::kMalformed, "whole number"},
+      {41, "Frames: three", 41, ErrorCode::kMalformed, "expected an integer"},
+      {41, "Frames: 0", 41, ErrorCode::kMalformed, "expected an integer"},
+      {41, "Frames: -3", 41, ErrorCode::kMalformed, "expected an integer"},
+      {41, "Frames: 2.5", 41, ErrorCode::kMalformed, "expected an integer"},
+      {41, "Frames: -99999999999999999999999", 41, ErrorCode::kMalformed, "expected an integer"},
+      {41, "Frames:", 42, ErrorCode::kMalformed, "expected an integer"},
       {42, "Time: 0.05", 42, ErrorCode::kMalformed, "expected Frame Time:"},
-      {42, "Frame Time: soon", 42, ErrorCode::kMalformed, "number of seconds"},
+      {42, "Frame Time: soon", 42, ErrorCode::kMalformed, "expected a number of seconds"},
       {42, "Frame Time: 0", 42, ErrorCode::kOutOfRange, "0.0001 to 10 seconds"},
       {42, "Frame Time: -0.05", 42, ErrorCode::kOutOfRange, "0.0001 to 10 seconds"},
-      {42, "Frame Time: 0.05 s", 42, ErrorCode::kMalformed, "stands after Frame Time"},
-      {44, "0 0.8 0 1 2 3", 44, ErrorCode::kMalformed, "fewer numbers than the channels"},
-      {44, "0 0.8 0 1 2 3 4 5", 44, ErrorCode::kMalformed, "more numbers than the channels"},
+      {42, "Frame Time: 0.05 s", 42, ErrorCode::kMalformed, "unexpected text after the number"},
+      {44, "0 0.8 0 1 2 3", 44, ErrorCode::kMalformed, "fewer numbers than channels"},
+      {44, "0 0.8 0 1 2 3 4 5", 44, ErrorCode::kMalformed, "more numbers than channels"},
       {44, "0 0.8 0 1 2 3 four", 44, ErrorCode::kMalformed, "expected a number"},
       {44, "0 0,8 0 1 2 3 4", 44, ErrorCode::kMalformed, "expected a number"},
-      {44, "0 nan 0 1 2 3 4", 44, ErrorCode::kOutOfRange, "not finite or too large"},
-      {44, "0 0.8 0 1 2 3 -inf", 44, ErrorCode::kOutOfRange, "not finite or too large"},
-      {44, "0 0.8 0 1 2 3 1e8", 44, ErrorCode::kOutOfRange, "not finite or too large"},
-      {45, "0 0.8 0 1", 45, ErrorCode::kMalformed, "fewer numbers than the channels"},
+      {44, "0 nan 0 1 2 3 4", 44, ErrorCode::kOutOfRange, "expected a finite number"},
+      {44, "0 0.8 0 1 2 3 -inf", 44, ErrorCode::kOutOfRange, "expected a finite number"},
+      {44, "0 0.8 0 1 2 3 1e8", 44, ErrorCode::kOutOfRange, "expected a finite number"},
+      {45, "0 0.8 0 1", 45, ErrorCode::kMalformed, "fewer numbers than channels"},
       {13, "JOINT Paw", 0, ErrorCode::kUnsupported, "no pair of legs was found"},
   };
   for (const Case& c : cases) {
     std::vector<std::string> lines = SmallFile();
     lines[static_cast<std::size_t>(c.line - 1)] = c.text;
-    if (c.code == ErrorCode::kUnsupported && c.blamed == 0) {
+    if (c.code == ErrorCode::kUnsupported && c.reported == 0) {
       for (std::string& line : lines) {
-        if (line == "OFFSET 0 -0.4 0") {  // Neither names nor shape: one leg is short.
+        if (line ==
+            "OFFSET 0 -0.4 0") {  // Makes one leg short, so that neither names nor shape match.
           line = "OFFSET 0 -0.2 0";
           break;
         }
@@ -859,11 +861,11 @@ TEST(ParseBvh, NamesFileLineAndFault) {
     SCOPED_TRACE(testing::Message() << "line " << c.line << ": " << c.text << "\n"
                                     << Describe(capture.error()));
     EXPECT_EQ(capture.error().where,
-              c.blamed == 0 ? "bad.bvh" : "bad.bvh:" + std::to_string(c.blamed));
+              c.reported == 0 ? "bad.bvh" : "bad.bvh:" + std::to_string(c.reported));
     EXPECT_THAT(capture.error().text, HasSubstr(c.sentence));
     EXPECT_EQ(capture.error().code, c.code);
   }
-  // Cut anywhere in the hierarchy or before the first row, the last line is to blame.
+  // If the file is cut off before its first frame, the error is in its last line.
   const std::vector<std::string> lines = SmallFile();
   for (std::size_t kept = 0; kept < 42; ++kept) {
     const std::string text =
@@ -876,7 +878,7 @@ TEST(ParseBvh, NamesFileLineAndFault) {
   }
 }
 
-TEST(ParseBvh, HoldsItsLimits) {
+TEST(ParseBvh, EnforcesItsLimits) {
   const auto chain = [](int joints, bool nested) {
     std::string text = "HIERARCHY\nROOT J\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n";
     int open = 1;
@@ -896,22 +898,22 @@ TEST(ParseBvh, HoldsItsLimits) {
     return capture ? std::string("read") : std::string(capture.error().text);
   };
   EXPECT_THAT(fault(chain(kMaxJoints, false)), HasSubstr("no pair of legs"));
-  EXPECT_THAT(fault(chain(kMaxJoints + 1, false)), HasSubstr("too many joints"));
+  EXPECT_THAT(fault(chain(kMaxJoints + 1, false)), HasSubstr("more joints than the limit"));
   EXPECT_THAT(fault(chain(kMaxBvhDepth, true)), HasSubstr("no pair of legs"));
-  EXPECT_THAT(fault(chain(kMaxBvhDepth + 1, true)), HasSubstr("nested too deeply"));
-  EXPECT_THAT(fault(chain(100000, true)), HasSubstr("nested too deeply"));
+  EXPECT_THAT(fault(chain(kMaxBvhDepth + 1, true)), HasSubstr("nested deeper than the limit"));
+  EXPECT_THAT(fault(chain(100000, true)), HasSubstr("nested deeper than the limit"));
 
   std::string sites = "HIERARCHY\nROOT J\n{\nOFFSET 0 0 0\nCHANNELS 1 Xrotation\n";
   for (int i = 0; i <= kMaxJoints; ++i) sites += "End Site\n{\nOFFSET 0 0 0\n}\n";
-  EXPECT_THAT(fault(sites), HasSubstr("too many End Sites"));
+  EXPECT_THAT(fault(sites), HasSubstr("more End Sites than the limit"));
   EXPECT_THAT(fault("HIERARCHY\nROOT " + std::string(300, 'n') + "\n{"),
-              HasSubstr("name is too long"));
+              HasSubstr("name is longer than"));
 
-  // Two characters a frame and 256 joints: the frames end where the rotations would not fit.
+  // 256 joints and two bytes per frame reach the limit of rotations.
   std::string rows = chain(kMaxJoints, false);
   rows.replace(rows.find("Frames: 1"), 9, "Frames: 9999999");
   for (std::int64_t i = 0; i < kMaxBvhRotations / kMaxJoints + 10; ++i) rows += "0\n";
-  EXPECT_THAT(fault(rows), HasSubstr("too many frames"));
+  EXPECT_THAT(fault(rows), HasSubstr("more frames than the limit"));
 }
 
 }  // namespace

@@ -55,15 +55,15 @@ TEST(ParseChoreography, ReadsEveryMovement) {
   EXPECT_EQ(std::get<StandRequest>(read->movements[4].movement).seconds, 1.5);
 }
 
-TEST(ParseChoreography, LayersStandBetweenMovements) {
+TEST(ParseChoreography, ReadsLayersBetweenMovements) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"movements":[{"layer":{"name":"wave"}},{"step":{"length_m":0.5}},
           {"layer":{"name":"carry","weight":0.5,"blend_s":0.75,"speed":2}},
-          {"layer":{"name":"wave","off":true}},{"stand":{"seconds":1}}]})",
+          {"layer":{"name":"wave","enabled":false}},{"stand":{"seconds":1}}]})",
       "c.json");
   ASSERT_TRUE(read.has_value()) << Describe(read.error());
   ASSERT_EQ(read->movements.size(), 2u);
-  EXPECT_EQ(read->movements[0].id, 2u);  // its place in the list and 1
+  EXPECT_EQ(read->movements[0].id, 2u);  // Position in the JSON list, from 1.
   EXPECT_EQ(read->movements[1].id, 5u);
   ASSERT_EQ(read->layers.size(), 3u);
   EXPECT_EQ(read->layers[0].before, 0u);
@@ -73,28 +73,29 @@ TEST(ParseChoreography, LayersStandBetweenMovements) {
   EXPECT_EQ(read->layers[1].weight, 0.5);
   EXPECT_EQ(read->layers[1].blend_s, 0.75);
   EXPECT_EQ(read->layers[1].speed, 2.0);
-  EXPECT_FALSE(read->layers[1].is_off);
+  EXPECT_TRUE(read->layers[1].enabled);
   EXPECT_EQ(read->layers[2].before, 1u);
-  EXPECT_TRUE(read->layers[2].is_off);
+  EXPECT_FALSE(read->layers[2].enabled);
 
-  const auto refused = [](const char* layer) {
+  const auto error_of = [](const char* layer) {
     const std::string text =
         R"({"movements":[{"stand":{"seconds":1}},{"layer":)" + std::string(layer) + "}]}";
     return Describe(ParseChoreography(text, "c.json").error());
   };
-  EXPECT_THAT(refused("{}"), testing::HasSubstr("c.json: movements[1].layer.name: is missing"));
-  EXPECT_THAT(refused(R"({"name":3})"),
-              testing::HasSubstr("layer.name: is not the name of a layer"));
-  EXPECT_THAT(refused(R"({"name":"a","weight":1.5})"),
-              testing::HasSubstr("layer.weight: is not a number from 0 to 1"));
-  EXPECT_THAT(refused(R"({"name":"a","off":1})"),
-              testing::HasSubstr("layer.off: is neither true nor false"));
-  EXPECT_THAT(refused(R"({"name":"a","mask":1})"), testing::HasSubstr("mask"));
+  EXPECT_THAT(error_of("{}"),
+              testing::HasSubstr("c.json: movements[1].layer.name: required key is missing"));
+  EXPECT_THAT(error_of(R"({"name":3})"),
+              testing::HasSubstr("layer.name: expected a non-empty string"));
+  EXPECT_THAT(error_of(R"({"name":"a","weight":1.5})"),
+              testing::HasSubstr("layer.weight: expected a number from 0 to 1"));
+  EXPECT_THAT(error_of(R"({"name":"a","enabled":1})"),
+              testing::HasSubstr("layer.enabled: expected true or false"));
+  EXPECT_THAT(error_of(R"({"name":"a","mask":1})"), testing::HasSubstr("mask"));
   EXPECT_EQ(ParseChoreography(R"({"movements":[{"layer":{"name":"a"}}]})", "c.json").error().code,
             ErrorCode::kOutOfRange);
 }
 
-TEST(ParseChoreography, StartsAtTheOriginUnlessToldOtherwise) {
+TEST(ParseChoreography, StartsAtTheOriginByDefault) {
   for (const char* text : {R"({"movements":[{"stand":{"seconds":0}}]})",
                            R"({"start":{},"movements":[{"stand":{"seconds":0}}]})"}) {
     const Expected<Choreography> read = ParseChoreography(text, "c.json");
@@ -140,7 +141,7 @@ TEST(ParseChoreography, ReadsWalks) {
   EXPECT_EQ(full.speed_m_s, 1.25);
 }
 
-TEST(ParseChoreography, ReadsTheGround) {
+TEST(ParseChoreography, ReadsTerrain) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"terrain":{"boxes":[{"min_m":[0,1],"max_m":[2,3],"height_m":0.5}]},
           "movements":[{"stand":{"seconds":0}}]})",
@@ -152,7 +153,7 @@ TEST(ParseChoreography, ReadsTheGround) {
   EXPECT_EQ(ParseChoreography(kEverything, "c.json")->terrain, nullptr);
 }
 
-TEST(ParseChoreography, TakesNumbersAtTheirLimits) {
+TEST(ParseChoreography, AcceptsNumbersAtTheirLimits) {
   const Expected<Choreography> read = ParseChoreography(
       R"({"start":{"position_m":[1e5,-1e5,0],"heading_rad":-1e4},
           "movements":[{"step":{"length_m":10,"side_m":-10,"height_m":-10,"turn_rad":3.2}},
@@ -161,126 +162,126 @@ TEST(ParseChoreography, TakesNumbersAtTheirLimits) {
   EXPECT_TRUE(read.has_value()) << Describe(read.error());
 }
 
-/// One case per error.
+/// One case per kind of error.
 const BadText kBadTexts[] = {
-    {"", ErrorCode::kMalformed, "c.json:1:1: the text is not JSON near here"},
+    {"", ErrorCode::kMalformed, "c.json:1:1: invalid JSON near this position"},
     {"{\"movements\":[\n  {\"step\" 3}]}", ErrorCode::kMalformed,
-     "c.json:2:12: the text is not JSON near here"},
-    {"{\"movements\":[]} 3", ErrorCode::kMalformed, "c.json:1:18: the text is not JSON near here"},
+     "c.json:2:12: invalid JSON near this position"},
+    {"{\"movements\":[]} 3", ErrorCode::kMalformed, "c.json:1:18: invalid JSON near this position"},
     {"{\"movements\":[\xff]}", ErrorCode::kMalformed,
-     "c.json:1:15: the text is not JSON near here"},
+     "c.json:1:15: invalid JSON near this position"},
     {R"({"movements":[{"jump":{"length_m":1e999}}]})", ErrorCode::kOutOfRange,
-     "c.json:1:40: the number before this is too large"},
+     "c.json:1:40: the number before this position is too large for a double"},
     {R"({"start":{},"start":{}})", ErrorCode::kMalformed,
-     "c.json:1:19: the key before this stands twice in its object"},
+     "c.json:1:19: duplicate key before this position"},
     {"[[[[[[[[[[[[[[[[[0]]]]]]]]]]]]]]]]]", ErrorCode::kLimitExceeded,
-     "c.json:1:17: arrays and objects are nested too deep"},
-    {"[]", ErrorCode::kMalformed, "c.json: is not an object"},
-    {R"({"movement":[]})", ErrorCode::kMalformed, "c.json: movement: is not a key known here"},
-    {R"({"a\u0007\u00e4":[]})", ErrorCode::kMalformed, "c.json: a???: is not a key known here"},
-    {"{}", ErrorCode::kMalformed, "c.json: movements: is missing"},
-    {R"({"movements":{}})", ErrorCode::kMalformed, "c.json: movements: is not an array"},
-    {R"({"movements":[]})", ErrorCode::kOutOfRange, "c.json: movements: holds no movement"},
+     "c.json:1:17: arrays and objects are nested too deeply"},
+    {"[]", ErrorCode::kMalformed, "c.json: expected an object"},
+    {R"({"movement":[]})", ErrorCode::kMalformed, "c.json: movement: unknown key"},
+    {R"({"a\u0007\u00e4":[]})", ErrorCode::kMalformed, "c.json: a???: unknown key"},
+    {"{}", ErrorCode::kMalformed, "c.json: movements: required key is missing"},
+    {R"({"movements":{}})", ErrorCode::kMalformed, "c.json: movements: expected an array"},
+    {R"({"movements":[]})", ErrorCode::kOutOfRange,
+     "c.json: movements: expected at least one movement"},
     {R"({"terrain":[],"movements":[]})", ErrorCode::kMalformed,
-     "c.json: terrain: is not an object"},
+     "c.json: terrain: expected an object"},
     {R"({"terrain":{"boxes":[{"min_m":[0,0],"max_m":[1,0],"height_m":0.5}]},"movements":[]})",
      ErrorCode::kOutOfRange, "c.json: terrain.boxes[0].max_m: expected values above min_m"},
-    {R"({"start":[],"movements":[]})", ErrorCode::kMalformed, "c.json: start: is not an object"},
-    {R"({"start":{"x":0},"movements":[]})", ErrorCode::kMalformed,
-     "c.json: start.x: is not a key known here"},
+    {R"({"start":[],"movements":[]})", ErrorCode::kMalformed, "c.json: start: expected an object"},
+    {R"({"start":{"x":0},"movements":[]})", ErrorCode::kMalformed, "c.json: start.x: unknown key"},
     {R"({"start":{"position_m":[0,0]},"movements":[]})", ErrorCode::kMalformed,
-     "c.json: start.position_m: is not an array of three numbers"},
+     "c.json: start.position_m: expected an array of three numbers"},
     {R"({"start":{"position_m":[0,"0",0]},"movements":[]})", ErrorCode::kMalformed,
-     "c.json: start.position_m[1]: is not a number within 100000 m"},
+     "c.json: start.position_m[1]: expected a number from -100000 to 100000 m"},
     {R"({"start":{"position_m":[0,0,100001]},"movements":[]})", ErrorCode::kOutOfRange,
-     "c.json: start.position_m[2]: is not a number within 100000 m"},
+     "c.json: start.position_m[2]: expected a number from -100000 to 100000 m"},
     {R"({"start":{"heading_rad":1e5},"movements":[]})", ErrorCode::kOutOfRange,
-     "c.json: start.heading_rad: is not a number within 10000 rad"},
-    {R"({"movements":[1]})", ErrorCode::kMalformed, "c.json: movements[0]: is not an object"},
+     "c.json: start.heading_rad: expected a number from -10000 to 10000 rad"},
+    {R"({"movements":[1]})", ErrorCode::kMalformed, "c.json: movements[0]: expected an object"},
     {R"({"movements":[{}]})", ErrorCode::kMalformed,
-     "c.json: movements[0]: needs exactly one of step, walk_to, jump, stand and layer"},
+     "c.json: movements[0]: expected exactly one of step, walk_to, jump, stand and layer"},
     {R"({"movements":[{"stand":{"seconds":1},"jump":{"length_m":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0]: needs exactly one of step, walk_to, jump, stand and layer"},
+     "c.json: movements[0]: expected exactly one of step, walk_to, jump, stand and layer"},
     {R"({"movements":[{"stand":{"seconds":1}},{"hop":{}}]})", ErrorCode::kMalformed,
-     "c.json: movements[1].hop: is not a key known here"},
+     "c.json: movements[1].hop: unknown key"},
     {R"({"movements":[{"walk_to":{"heading_rad":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].walk_to.position_m: is missing"},
+     "c.json: movements[0].walk_to.position_m: required key is missing"},
     {R"({"movements":[{"walk_to":{"position_m":[0,0,1]}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].walk_to.heading_rad: is missing"},
+     "c.json: movements[0].walk_to.heading_rad: required key is missing"},
     {R"({"movements":[{"walk_to":{"position_m":[0,0,1],"heading_rad":0,"waypoints_m":[[0,1]]}}]})",
      ErrorCode::kMalformed,
-     "c.json: movements[0].walk_to.waypoints_m[0]: is not an array of three numbers"},
+     "c.json: movements[0].walk_to.waypoints_m[0]: expected an array of three numbers"},
     {R"({"movements":[{"walk_to":{"position_m":[0,0,1],"heading_rad":0,"speed_m_s":0}}]})",
      ErrorCode::kOutOfRange,
-     "c.json: movements[0].walk_to.speed_m_s: is not a number from 0.05 to 5 m/s"},
+     "c.json: movements[0].walk_to.speed_m_s: expected a number from 0.05 to 5 m/s"},
     {R"({"movements":[{"step":0.6}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step: is not an object"},
+     "c.json: movements[0].step: expected an object"},
     {R"({"movements":[{"step":{}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.length_m: is missing"},
+     "c.json: movements[0].step.length_m: required key is missing"},
     {R"({"movements":[{"step":{"lenght_m":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.lenght_m: is not a key known here"},
+     "c.json: movements[0].step.lenght_m: unknown key"},
     {R"({"movements":[{"step":{"at_m":[0,1]}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.at_m: is not an array of three numbers"},
+     "c.json: movements[0].step.at_m: expected an array of three numbers"},
     {R"({"movements":[{"step":{"at_m":[0,0,1e6]}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].step.at_m[2]: is not a number within 100000 m"},
+     "c.json: movements[0].step.at_m[2]: expected a number from -100000 to 100000 m"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"heading_rad":true}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.heading_rad: is not a number within 10000 rad"},
+     "c.json: movements[0].step.heading_rad: expected a number from -10000 to 10000 rad"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"turn_rad":0}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.turn_rad: has no meaning beside at_m"},
+     "c.json: movements[0].step.turn_rad: cannot be combined with at_m"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"length_m":0.5}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.length_m: has no meaning beside at_m"},
+     "c.json: movements[0].step.length_m: cannot be combined with at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"heading_rad":0}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.heading_rad: has a meaning only beside at_m"},
+     "c.json: movements[0].step.heading_rad: requires at_m"},
     {R"({"movements":[{"step":{"length_m":0.5,"exact_only":true}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.exact_only: has a meaning only beside at_m"},
+     "c.json: movements[0].step.exact_only: requires at_m"},
     {R"({"movements":[{"step":{"at_m":[0,0,1],"exact_only":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.exact_only: is neither true nor false"},
+     "c.json: movements[0].step.exact_only: expected true or false"},
     {R"({"movements":[{"step":{"foot":"both","length_m":0.5}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
+     "c.json: movements[0].step.foot: expected \"left\" or \"right\""},
     {R"({"movements":[{"step":{"foot":1,"length_m":0.5}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.foot: is neither \"left\" nor \"right\""},
+     "c.json: movements[0].step.foot: expected \"left\" or \"right\""},
     {R"({"movements":[{"step":{"length_m":"0.5"}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.length_m: is not a number within 10 m"},
+     "c.json: movements[0].step.length_m: expected a number from -10 to 10 m"},
     {R"({"movements":[{"step":{"length_m":10.001}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].step.length_m: is not a number within 10 m"},
+     "c.json: movements[0].step.length_m: expected a number from -10 to 10 m"},
     {R"({"movements":[{"step":{"length_m":0.5,"side_m":-11}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].step.side_m: is not a number within 10 m"},
+     "c.json: movements[0].step.side_m: expected a number from -10 to 10 m"},
     {R"({"movements":[{"step":{"length_m":0.5,"height_m":null}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].step.height_m: is not a number within 10 m"},
+     "c.json: movements[0].step.height_m: expected a number from -10 to 10 m"},
     {R"({"movements":[{"step":{"length_m":0.5,"turn_rad":3.3}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].step.turn_rad: is not a number within 3.2 rad"},
+     "c.json: movements[0].step.turn_rad: expected a number from -3.2 to 3.2 rad"},
     {R"({"movements":[{"jump":null}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].jump: is not an object"},
+     "c.json: movements[0].jump: expected an object"},
     {R"({"movements":[{"jump":{"height_m":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].jump.length_m: is missing"},
+     "c.json: movements[0].jump.length_m: required key is missing"},
     {R"({"movements":[{"jump":{"length_m":1,"side_m":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].jump.side_m: is not a key known here"},
+     "c.json: movements[0].jump.side_m: unknown key"},
     {R"({"movements":[{"jump":{"length_m":1,"height_m":-11}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].jump.height_m: is not a number within 10 m"},
+     "c.json: movements[0].jump.height_m: expected a number from -10 to 10 m"},
     {R"({"movements":[{"jump":{"length_m":1,"turn_rad":[]}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].jump.turn_rad: is not a number within 3.2 rad"},
+     "c.json: movements[0].jump.turn_rad: expected a number from -3.2 to 3.2 rad"},
     {R"({"movements":[{"stand":[]}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].stand: is not an object"},
+     "c.json: movements[0].stand: expected an object"},
     {R"({"movements":[{"stand":{}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].stand.seconds: is missing"},
+     "c.json: movements[0].stand.seconds: required key is missing"},
     {R"({"movements":[{"stand":{"second":1}}]})", ErrorCode::kMalformed,
-     "c.json: movements[0].stand.second: is not a key known here"},
+     "c.json: movements[0].stand.second: unknown key"},
     {R"({"movements":[{"stand":{"seconds":-0.5}}]})", ErrorCode::kOutOfRange,
-     "c.json: movements[0].stand.seconds: is not a number from 0 to 3600 s"},
+     "c.json: movements[0].stand.seconds: expected a number from 0 to 3600 s"},
 };
 
-TEST(ParseChoreography, TellsFileFieldAndReason) {
-  ExpectRefused(kBadTexts, [](const char* text) { return ParseChoreography(text, "c.json"); });
+TEST(ParseChoreography, ErrorsNameFileFieldAndReason) {
+  ExpectErrors(kBadTexts, [](const char* text) { return ParseChoreography(text, "c.json"); });
 }
 
-TEST(ParseChoreography, ShortensALongKey) {
+TEST(ParseChoreography, ShortensLongKeysInErrors) {
   const std::string text = "{\"" + std::string(1'000'000, 'k') + "\":0}";
   const Expected<Choreography> read = ParseChoreography(text, "c.json");
   ASSERT_FALSE(read.has_value());
   EXPECT_EQ(read.error().where, "c.json: " + std::string(64, 'k') + "...");
 }
 
-TEST(ParseChoreography, RefusesMoreThanItsLimits) {
+TEST(ParseChoreography, RejectsMoreThanItsLimits) {
   std::string many = R"({"movements":[{"stand":{"seconds":1}})";
   for (std::size_t i = 1; i < kMaxChoreographyMovements; ++i) many += R"(,{"stand":{"seconds":1}})";
   const Expected<Choreography> most = ParseChoreography(many + "]}", "c.json");
@@ -291,16 +292,16 @@ TEST(ParseChoreography, RefusesMoreThanItsLimits) {
       ParseChoreography(many + R"(,{"stand":{"seconds":1}}]})", "c.json");
   ASSERT_FALSE(too_many.has_value());
   EXPECT_EQ(too_many.error().code, ErrorCode::kLimitExceeded);
-  EXPECT_EQ(Describe(too_many.error()), "c.json: movements: holds more than 65536 movements");
+  EXPECT_EQ(Describe(too_many.error()), "c.json: movements: expected at most 65536 movements");
 
   const Expected<Choreography> too_long =
       ParseChoreography(std::string(kMaxChoreographyBytes + 1, ' '), "c.json");
   ASSERT_FALSE(too_long.has_value());
   EXPECT_EQ(too_long.error().code, ErrorCode::kLimitExceeded);
-  EXPECT_EQ(Describe(too_long.error()), "c.json: the file is larger than 4 MiB");
+  EXPECT_EQ(Describe(too_long.error()), "c.json: the file is larger than the limit of 4 MiB");
 }
 
-/// What was read is within every stated limit.
+/// Expects all values to be within the documented limits.
 void ExpectWithinLimits(const Choreography& choreography) {
   for (int axis = 0; axis < 3; ++axis) {
     EXPECT_LE(std::abs(choreography.start.position_m[axis]), kMaxChoreographyPositionM);
@@ -344,7 +345,7 @@ class ReadChoreographyFile : public ::testing::Test {
   std::filesystem::path path_;
 };
 
-TEST_F(ReadChoreographyFile, GivesWhatItsTextGives) {
+TEST_F(ReadChoreographyFile, ReadsTheSameAsFromText) {
   std::ofstream(path_, std::ios::binary) << kEverything;
   const Expected<Choreography> read = ReadChoreography(path_);
   ASSERT_TRUE(read.has_value()) << Describe(read.error());
@@ -352,23 +353,25 @@ TEST_F(ReadChoreographyFile, GivesWhatItsTextGives) {
   EXPECT_EQ(read->start.heading_rad, 0.25);
 }
 
-TEST_F(ReadChoreographyFile, NamesAFileThatIsNotThere) {
+TEST_F(ReadChoreographyFile, ReportsAMissingFile) {
   const Expected<Choreography> read = ReadChoreography(path_);
   ASSERT_FALSE(read.has_value());
   EXPECT_EQ(read.error().code, ErrorCode::kNotFound);
   EXPECT_EQ(Describe(read.error()), path_.string() + ": there is no such file");
 }
 
-TEST_F(ReadChoreographyFile, NamesADirectory) {
+TEST_F(ReadChoreographyFile, ReportsADirectory) {
   const Expected<Choreography> read = ReadChoreography(path_.parent_path());
   ASSERT_FALSE(read.has_value());
   EXPECT_EQ(read.error().code, ErrorCode::kIo);
-  EXPECT_EQ(Describe(read.error()), path_.parent_path().string() + ": this is a directory");
+  EXPECT_EQ(Describe(read.error()),
+            path_.parent_path().string() + ": expected a file, got a directory");
 }
 
-TEST_F(ReadChoreographyFile, RefusesALongFileWithoutReadingAllOfIt) {
+TEST_F(ReadChoreographyFile, RejectsLargeFilesWithoutReadingThem) {
   std::ofstream(path_, std::ios::binary) << '\n';
-  std::filesystem::resize_file(path_, std::uintmax_t{1} << 40);  // Sparse: takes no room.
+  std::filesystem::resize_file(path_,
+                               std::uintmax_t{1} << 40);  // Sparse, so it uses no disk space.
   const Expected<Choreography> read = ReadChoreography(path_);
   ASSERT_FALSE(read.has_value());
   EXPECT_EQ(read.error().code, ErrorCode::kLimitExceeded);
@@ -379,7 +382,7 @@ TEST_F(ReadChoreographyFile, NamesTheFileInItsErrors) {
   const Expected<Choreography> read = ReadChoreography(path_);
   ASSERT_FALSE(read.has_value());
   EXPECT_EQ(Describe(read.error()),
-            path_.string() + ": movements[0].step.length_m: is not a number within 10 m");
+            path_.string() + ": movements[0].step.length_m: expected a number from -10 to 10 m");
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST(RepairGlitches, ReportsALastingLargeJumpOfALimb) {
   EXPECT_TRUE(report.repaired.empty());
   ASSERT_EQ(report.left.size(), 1u);
   EXPECT_EQ(DescribeFlip(figure.capture.skeleton, report.left[0], 120.0),
-            "LeftArm turns 92 degrees at once at 0.83 s");
+            "LeftArm turns 92 degrees in one frame at 0.83 s");
 }
 
 TEST(RepairGlitches, BringsTheRootBackOnItsPath) {

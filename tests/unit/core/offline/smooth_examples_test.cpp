@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "offline/build/grid_example.h"
-#include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "offline/build/library_writer.h"
+#include "offline/builtin/builtin_library.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/weights/measure.h"
+#include "stridewire/offline/library_builder.h"
 
 namespace stridewire {
 namespace {
@@ -196,7 +196,7 @@ TEST_F(SmoothExamples, HaveWiderRadiiInManyDimensionsAndSaneWeights) {
     const MotionGroup& group = library_->group(g);
     std::vector<double> scales;
     for (const Parameter& parameter : group.parameters) scales.push_back(parameter.scale);
-    const auto wide = FitOverSmooth(group.sites, scales);
+    const auto wide = FitSmoothBasis(group.sites, scales);
     ASSERT_TRUE(wide.has_value());
     const double factor = wide->radius_factor;
     EXPECT_NEAR(wide->basis.dilations[0] / group.dilations[0], factor, 1e-12);

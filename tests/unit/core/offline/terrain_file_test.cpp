@@ -28,7 +28,7 @@ TEST(ParseTerrain, ReadsFieldAndBoxes) {
   EXPECT_EQ((*read)->data(), expected);
 }
 
-TEST(ParseTerrain, EitherMayBeLeftOut) {
+TEST(ParseTerrain, FieldAndBoxesAreOptional) {
   for (const char* text : {"{}", R"({"boxes":[]})"}) {
     const auto read = ParseTerrain(text, "t.json");
     ASSERT_TRUE(read.has_value()) << Describe(read.error());
@@ -37,39 +37,40 @@ TEST(ParseTerrain, EitherMayBeLeftOut) {
 }
 
 const BadText kBadTerrains[] = {
-    {"{", ErrorCode::kMalformed, "t.json:1:1: the text is not JSON near here"},
-    {"3", ErrorCode::kMalformed, "t.json: is not an object"},
-    {R"({"box":[]})", ErrorCode::kMalformed, "t.json: box: is not a key known here"},
-    {R"({"boxes":{}})", ErrorCode::kMalformed, "t.json: boxes: is not an array"},
-    {R"({"boxes":[[]]})", ErrorCode::kMalformed, "t.json: boxes[0]: is not an object"},
+    {"{", ErrorCode::kMalformed, "t.json:1:1: invalid JSON near this position"},
+    {"3", ErrorCode::kMalformed, "t.json: expected an object"},
+    {R"({"box":[]})", ErrorCode::kMalformed, "t.json: box: unknown key"},
+    {R"({"boxes":{}})", ErrorCode::kMalformed, "t.json: boxes: expected an array"},
+    {R"({"boxes":[[]]})", ErrorCode::kMalformed, "t.json: boxes[0]: expected an object"},
     {R"({"boxes":[{"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
-     "t.json: boxes[0].min_m: is missing"},
+     "t.json: boxes[0].min_m: required key is missing"},
     {R"({"boxes":[{"min_m":[1],"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
-     "t.json: boxes[0].min_m: is not an array of two numbers"},
+     "t.json: boxes[0].min_m: expected an array of two numbers"},
     {R"({"boxes":[{"min_m":[0,true],"max_m":[1,1],"height_m":1}]})", ErrorCode::kMalformed,
-     "t.json: boxes[0].min_m[1]: is not a number within 1000000 m"},
+     "t.json: boxes[0].min_m[1]: expected a number from -1000000 to 1000000 m"},
     {R"({"boxes":[{"min_m":[0,0],"max_m":[1,1]}]})", ErrorCode::kMalformed,
-     "t.json: boxes[0].height_m: is missing"},
+     "t.json: boxes[0].height_m: required key is missing"},
     {R"({"boxes":[{"min_m":[0,0],"max_m":[1,1],"height_m":20000}]})", ErrorCode::kOutOfRange,
-     "t.json: boxes[0].height_m: is not a number within 10000 m"},
+     "t.json: boxes[0].height_m: expected a number from -10000 to 10000 m"},
     {R"({"boxes":[{"min_m":[0,0],"max_m":[-1,1],"height_m":0}]})", ErrorCode::kOutOfRange,
      "t.json: boxes[0].max_m: expected values above min_m"},
-    {R"({"height_field":null})", ErrorCode::kMalformed, "t.json: height_field: is not an object"},
+    {R"({"height_field":null})", ErrorCode::kMalformed, "t.json: height_field: expected an object"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":0,"columns":2,"rows":2,"heights_m":[0,0,0,0]}})",
-     ErrorCode::kOutOfRange, "t.json: height_field.cell_m: is not a number from 0.01 to 1000 m"},
+     ErrorCode::kOutOfRange, "t.json: height_field.cell_m: expected a number from 0.01 to 1000 m"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2.5,"rows":2,"heights_m":[]}})",
-     ErrorCode::kOutOfRange, "t.json: height_field.columns: is not a whole number from 2 to 1024"},
+     ErrorCode::kOutOfRange, "t.json: height_field.columns: expected an integer from 2 to 1024"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":"2","heights_m":[]}})",
-     ErrorCode::kMalformed, "t.json: height_field.rows: is not a whole number from 2 to 1024"},
+     ErrorCode::kMalformed, "t.json: height_field.rows: expected an integer from 2 to 1024"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":2,"heights_m":[0,0,0]}})",
      ErrorCode::kShapeMismatch,
-     "t.json: height_field.heights_m: has not columns x rows numbers (3)"},
+     "t.json: height_field.heights_m: expected columns * rows numbers (3)"},
     {R"({"height_field":{"origin_m":[0,0],"cell_m":1,"columns":2,"rows":2,"heights_m":[0,0,0,1e300]}})",
-     ErrorCode::kOutOfRange, "t.json: height_field.heights_m[3]: is not a number within 10000 m"},
+     ErrorCode::kOutOfRange,
+     "t.json: height_field.heights_m[3]: expected a number from -10000 to 10000 m"},
 };
 
-TEST(ParseTerrain, TellsFileFieldAndReason) {
-  ExpectRefused(kBadTerrains, [](const char* text) { return ParseTerrain(text, "t.json"); });
+TEST(ParseTerrain, ErrorsNameFileFieldAndReason) {
+  ExpectErrors(kBadTerrains, [](const char* text) { return ParseTerrain(text, "t.json"); });
   const auto too_long = ParseTerrain(std::string(kMaxTerrainFileBytes + 1, ' '), "t.json");
   ASSERT_FALSE(too_long.has_value());
   EXPECT_EQ(too_long.error().code, ErrorCode::kLimitExceeded);
@@ -83,7 +84,7 @@ TEST(ParseTerrain, SurvivesMutatedText) {
       });
 }
 
-TEST(ReadTerrain, ReadsAFileAndTellsWhyNot) {
+TEST(ReadTerrain, ReadsAFileOrReportsThatItIsMissing) {
   const std::string path = testing::TempDir() + "terrain_" + std::to_string(getpid()) + ".json";
   std::ofstream(path) << kBoth;
   const auto read = ReadTerrain(path);

@@ -22,7 +22,7 @@ class ErrorMapOfBuiltin : public testing::Test {
     library_ = *std::move(opened);
   }
 
-  // e(p) the long way round.
+  // Computes e(p) directly, by synthesizing and measuring the movement.
   [[nodiscard]] double Direct(int g, const std::vector<double>& p) const {
     const MotionGroup& group = library_->group(g);
     std::vector<double> scratch(static_cast<std::size_t>(library_->max_example_count()));
@@ -39,7 +39,7 @@ class ErrorMapOfBuiltin : public testing::Test {
   std::shared_ptr<const MotionLibrary> library_;
 };
 
-TEST_F(ErrorMapOfBuiltin, IsWhatDirectEvaluationSays) {
+TEST_F(ErrorMapOfBuiltin, EqualsDirectEvaluation) {
   for (int g = 0; g < static_cast<int>(library_->groups().size()); ++g) {
     SCOPED_TRACE(g);
     const int d = library_->group(g).parameter_count();
@@ -68,7 +68,7 @@ TEST_F(ErrorMapOfBuiltin, IsWhatDirectEvaluationSays) {
   }
 }
 
-TEST_F(ErrorMapOfBuiltin, RefusesAxesAndSizesThatMakeNoSense) {
+TEST_F(ErrorMapOfBuiltin, RejectsInvalidAxesAndSizes) {
   const int d = library_->group(0).parameter_count();
   const auto fails = [&](int group, const ErrorMapOptions& options) {
     const auto map = MeasureErrorMap(*library_, group, options);
@@ -81,7 +81,7 @@ TEST_F(ErrorMapOfBuiltin, RefusesAxesAndSizesThatMakeNoSense) {
   EXPECT_TRUE(fails(0, {.axis_x = 0, .axis_y = 0}));
   EXPECT_TRUE(fails(0, {.axis_x = 0, .axis_y = -2}));
   EXPECT_TRUE(fails(0, {.columns = 1}));
-  EXPECT_TRUE(fails(0, {.rows = ErrorMapOptions::kMostPoints + 1}));
+  EXPECT_TRUE(fails(0, {.rows = ErrorMapOptions::kMaxPoints + 1}));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(DrawSvg, DrawsTheSameBytesTwice) {
+TEST(DrawSvg, IsDeterministic) {
   const std::string script = "$d << EOD\n0 1\n1 2\nEOD\nplot $d w l\n";
   const auto once = DrawSvg(script, 200, 100);
   ASSERT_TRUE(once.has_value()) << once.error().text << once.error().where;
@@ -21,23 +21,23 @@ TEST(DrawSvg, DrawsTheSameBytesTwice) {
   EXPECT_EQ(*once, *DrawSvg(script, 200, 100));
 }
 
-TEST(DrawSvg, SaysWhatGnuplotDidNotLike) {
+TEST(DrawSvg, ReturnsTheErrorOfGnuplot) {
   const auto drawn = DrawSvg("plot nothing_of_that_name\n", 200, 100);
   ASSERT_FALSE(drawn.has_value());
   EXPECT_EQ(drawn.error().code, ErrorCode::kIo);
   EXPECT_THAT(drawn.error().where, HasSubstr("nothing_of_that_name"));
 }
 
-TEST(DrawSvg, TextIsNeverACommand) {
-  const std::string nasty = "\"\\n`echo x` @a $b\n'; set output 'y'; system(\"false\") <&>";
+TEST(DrawSvg, NeverInterpretsQuotedTextAsACommand) {
+  const std::string hostile = "\"\\n`echo x` @a $b\n'; set output 'y'; system(\"false\") <&>";
   const auto drawn =
-      DrawSvg("set title " + Quoted(nasty) + " noenhanced\nplot 0 notitle\n", 400, 200);
+      DrawSvg("set title " + Quoted(hostile) + " noenhanced\nplot 0 notitle\n", 400, 200);
   ASSERT_TRUE(drawn.has_value()) << drawn.error().where;
   EXPECT_THAT(*drawn, HasSubstr("\"\\n`echo x` @a"));
   EXPECT_THAT(*drawn, HasSubstr("&lt;&amp;>"));
 }
 
-TEST(Number, IsWhatGnuplotReads) {
+TEST(Number, FormatsForGnuplot) {
   EXPECT_EQ(Number(0.5), "0.5");
   EXPECT_EQ(Number(-1234.5678), "-1234.57");
   EXPECT_EQ(Number(std::nan("")), "NaN");

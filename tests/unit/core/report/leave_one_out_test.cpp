@@ -7,7 +7,7 @@
 namespace stridewire {
 namespace {
 
-TEST(LeaveOneOut, OfGeneratedStepsIsNearestByCardinalWeights) {
+TEST(LeaveOneOut, CardinalWeightsAreNearestForGeneratedSteps) {
   const auto library = OpenLibrary("builtin");
   ASSERT_TRUE(library.has_value());
   const LeaveOneOut left_out = MeasureLeaveOneOut(**library, 0);
@@ -21,10 +21,11 @@ TEST(LeaveOneOut, OfGeneratedStepsIsNearestByCardinalWeights) {
   EXPECT_GT(left_out.wins[1], 0.5);
 }
 
-TEST(LeaveOneOut, DoesNotUseWhatIsLeftOut) {
+TEST(LeaveOneOut, DoesNotUseTheLeftOutExample) {
   const auto library = OpenLibrary("builtin");
   ASSERT_TRUE(library.has_value());
-  // The nearest example is another one: at 4 m of cluster diameter all others are one average.
+  // The nearest example is always another one. With a cluster diameter of 4 m, all others are
+  // averaged into one example.
   const LeaveOneOut apart = MeasureLeaveOneOut(**library, 0, 0.0);
   const LeaveOneOut averaged = MeasureLeaveOneOut(**library, 0, 4.0);
   EXPECT_GT(apart.means[1].pose_m, 0.01);

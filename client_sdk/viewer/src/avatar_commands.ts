@@ -1,0 +1,299 @@
+// Sends the commands of the command panel and of keys to the selected avatar, or to all avatars of
+// a world.
+
+import {RandomWalkers} from './random_walkers.js';
+import {makeSampleTerrain} from './sample_terrains.js';
+import type {SampleTerrainName} from './sample_terrains.js';
+import type {AvatarState, MovementRequest, Reply, World} from './sdk.js';
+import type {AvatarSelection, WorldPane} from './world_pane.js';
+
+/** The parts of the page that commands use. */
+export interface CommandHost {
+  selection(): AvatarSelection | null;
+  /** The world that receives commands. */
+  commandedPane(): WorldPane | null;
+  /** Avatar 0: clears the selection. */
+  select(pane: WorldPane | null, avatar: number): void;
+  /** Moves the camera so that all avatars are in view. */
+  frameAllAvatars(): void;
+  /** Shows the present again if the user was looking at the recording. */
+  goLive(): void;
+  /** Shows a message to the user. */
+  notify(text: string): void;
+  /** Called after the queues of these avatars have been cleared. */
+  onCancelled(pane: WorldPane, avatars: readonly number[]): void;
+  /** Whether the server reports the layers that avatars play. */
+  reportsLayers(): boolean;
+  /** Shows in the panel that the terrain is none of the sample terrains. */
+  resetTerrainChoice(): void;
+}
+
+/** Number of avatars spawned into an empty world. */
+export const initialWalkerCount = 8;
+
+/** States that the server sent before a toggle may arrive this long after the toggle's reply. */
+const staleStateMs = 1000;
+
+export class AvatarCommands {
+  /** Whether commands go to all avatars of the world instead of the selected one. */
+  allAvatars = false;
+  /** The world whose terrain this page is changing. */
+  private terrainRequestedFor: World | null = null;
+  private terrainChoiceWorld: World | null = null;
+  /** Layers that play as far as the page knows; each entry is "avatar layer". */
+  private readonly playingLayers = new WeakMap<World, Set<string>>();
+  /** Avatars whose foot planting is off as far as the page knows. */
+  private readonly unplantedAvatars = new WeakMap<World, Set<number>>();
+  /** While above 0, reported states may be older than a toggle and are ignored. */
+  private recentToggles = 0;
+
+  constructor(private readonly host: CommandHost) {}
+
+  /** The avatars that receive commands. */
+  targets(): number[] {
+    const pane = this.host.commandedPane();
+    if (!pane) return [];
+    if (this.allAvatars) return [...pane.world.avatars()];
+    const selection = this.host.selection();
+    if (selection) return [selection.avatar];
+    return pane.world.avatars().length === 1 ? [...pane.world.avatars()] : [];
+  }
+
+  /** Requests a movement for each target. */
+  request(make: (avatar: number) => MovementRequest): void {
+    const to = this.addressees();
+    if (!to) return;
+    const {pane, avatars} = to;
+    this.host.goLive();
+    void pane.world.request(avatars.map(make)).then((reply) => {
+      if (!reply.ok) this.notifyRefused(reply);
+      else if (avatars.length === 1) this.host.notify('Movement queued.');
+      else this.host.notify(`Movements queued for ${avatars.length} avatars.`);
+    });
+  }
+
+  setTerrain(name: SampleTerrainName): void {
+    const pane = this.host.commandedPane();
+    if (!pane) return;
+    this.terrainRequestedFor = pane.world;
+    void pane.world.setTerrain(makeSampleTerrain(name)).then((reply) => {
+      if (reply.ok) {
+        this.host.notify(`Changed the terrain of ${pane.world.name}.`);
+        return;
+      }
+      this.host.notify(`Refused: ${reply.text}`);
+      this.terrainRequestedFor = null;
+      this.host.resetTerrainChoice();
+    });
+  }
+
+  /** The panel keeps its choice if this page has changed the terrain, and resets it otherwise. */
+  onTerrainChanged(world: World): void {
+    if (this.terrainRequestedFor !== world) this.host.resetTerrainChoice();
+    this.terrainRequestedFor = null;
+  }
+
+  /**
+   * Call with the world that receives commands. If it is another one, the panel's choice is reset.
+   */
+  setTerrainChoiceWorld(world: World): void {
+    if (world === this.terrainChoiceWorld) return;
+    this.terrainChoiceWorld = world;
+    this.host.resetTerrainChoice();
+  }
+
+  /** Whether all targets play the layer, as far as the page knows. */
+  isLayerPlaying(layer: string): boolean {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    const playing = pane && this.playingLayers.get(pane.world);
+    return !!playing && avatars.length > 0 &&
+      avatars.every((avatar) => playing.has(`${avatar} ${layer}`));
+  }
+
+  /** Stops the layer if all targets play it, and otherwise starts it. */
+  toggleLayer(layer: string): void {
+    const to = this.addressees();
+    if (!to) return;
+    const {pane: {world}, avatars} = to;
+    const off = this.isLayerPlaying(layer);
+    const playing = this.playingLayers.get(world) ?? new Set<string>();
+    this.playingLayers.set(world, playing);
+    this.host.goLive();
+    ++this.recentToggles;
+    void world.setLayers(avatars.map((avatar) => ({avatar, layer, off}))).then((reply) => {
+      if (!reply.ok || reply.accepted === 0) {
+        this.notifyRefused(reply);
+        return;
+      }
+      const refused = new Set(reply.items.map((item) => item.avatar));
+      for (const avatar of avatars) {
+        if (off) playing.delete(`${avatar} ${layer}`);
+        else if (!refused.has(avatar)) playing.add(`${avatar} ${layer}`);
+      }
+    }).finally(() => this.expireToggle());
+  }
+
+  /** Whether foot planting is on for all targets, as far as the page knows. */
+  areFeetPlanted(): boolean {
+    const pane = this.host.commandedPane();
+    const unplanted = pane && this.unplantedAvatars.get(pane.world);
+    return !unplanted || !this.targets().some((avatar) => unplanted.has(avatar));
+  }
+
+  /** Call with each state that the server reports. */
+  onAvatarState(world: World, {avatar, plantingOff, layers}: AvatarState): void {
+    if (this.recentToggles > 0) return;
+    if (plantingOff) this.unplantedIn(world).add(avatar);
+    else this.unplantedAvatars.get(world)?.delete(avatar);
+    if (!this.host.reportsLayers()) return;
+    const playing = this.playingLayers.get(world) ?? new Set<string>();
+    this.playingLayers.set(world, playing);
+    for (const name of world.layers) {
+      const plays = layers.some(({layer, ending}) => layer === name && !ending);
+      if (plays) playing.add(`${avatar} ${name}`);
+      else playing.delete(`${avatar} ${name}`);
+    }
+  }
+
+  /** Turns foot planting off if it is on for all targets, and otherwise on. */
+  togglePlanting(): void {
+    const to = this.addressees();
+    if (!to) return;
+    const {pane: {world}, avatars} = to;
+    const on = !this.areFeetPlanted();
+    this.host.goLive();
+    ++this.recentToggles;
+    void world.setPlanting(avatars, on).then((reply) => {
+      if (!reply.ok || reply.accepted === 0) {
+        this.notifyRefused(reply);
+        return;
+      }
+      this.host.notify(`Foot planting is ${on ? 'on' : 'off'} from the next movement.`);
+      const refused = new Set(reply.items.map((item) => item.avatar));
+      const unplanted = this.unplantedIn(world);
+      for (const avatar of avatars) {
+        if (on) unplanted.delete(avatar);
+        else if (!refused.has(avatar)) unplanted.add(avatar);
+      }
+    }).finally(() => this.expireToggle());
+  }
+
+  /** Clears the queues of all targets. */
+  cancel(): void {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (!pane || avatars.length === 0) return;
+    for (const avatar of avatars) pane.randomWalkers?.remove(avatar);
+    this.host.onCancelled(pane, avatars);
+    void pane.world.cancel(avatars).then((reply) => {
+      this.host.notify(reply.ok ? 'Queue cleared.' : `Refused: ${reply.text}`);
+    });
+  }
+
+  /** Removes all targets from their world. */
+  remove(): void {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (!pane || avatars.length === 0) return;
+    void pane.world.remove(avatars).then((reply) => {
+      if (!reply.ok) this.notifyRefused(reply);
+      else if (avatars.includes(this.host.selection()?.avatar ?? 0)) this.host.select(null, 0);
+    });
+  }
+
+  /**
+   * Spawns avatars on a spiral, outside those that are there already. The server removes them when
+   * the page closes.
+   */
+  async spawn(pane: WorldPane | null, count: number, walkRandomly: boolean): Promise<void> {
+    if (!pane) return;
+    const centre = pane.view.viewCamera.target;
+    const already = pane.world.avatars().length;
+    const items: {positionM: readonly [number, number, number]; headingRad: number}[] = [];
+    for (let i = 0; i < count; ++i) {
+      const k = already === 0 ? i : already + i;
+      const r = 1.1 * Math.sqrt(k);
+      const angle = k * 2.399963;  // The golden angle distributes avatars evenly.
+      const x = (already ? centre.x : 0) + r * Math.sin(angle);
+      const z = (already ? centre.z : 0) + r * Math.cos(angle);
+      items.push({
+        positionM: [x, pane.view.terrain.heightAt(x, z), z] as const,
+        headingRad: count > 1 ? angle : 0,
+      });
+    }
+    const reply = await pane.world.spawn(items);
+    if (!reply.ok) {
+      this.host.notify(`Refused: ${reply.items.find((item) => item.text)?.text || reply.text}`);
+      return;
+    }
+    for (const item of reply.items) pane.ownAvatars.add(item.avatar);
+    if (walkRandomly) {
+      const walkers = this.randomWalkersOf(pane);
+      reply.items.forEach((item, i) => {
+        const {positionM, headingRad} = items[i]!;
+        walkers.add(item.avatar, positionM[0], positionM[2], headingRad);
+      });
+      this.host.frameAllAvatars();
+    } else if (count === 1 && reply.items[0]) {
+      this.host.select(pane, reply.items[0].avatar);
+    }
+  }
+
+  /**
+   * Stops all random walkers of the world if there are any. Otherwise it starts the selected
+   * avatar; without a selection, the avatars that this page has spawned; without those, or if
+   * commands go to all avatars, every avatar of the world. If the world is empty, it spawns new
+   * ones.
+   */
+  toggleRandomWalk(): void {
+    const pane = this.host.commandedPane();
+    if (!pane) return;
+    if (pane.randomWalkers && pane.randomWalkers.size > 0) {
+      pane.randomWalkers.clear();
+      return;
+    }
+    const selection = this.host.selection();
+    const avatars = selection && !this.allAvatars ? [selection.avatar] :
+      this.allAvatars || pane.ownAvatars.size === 0 ? [...pane.world.avatars()] :
+        [...pane.ownAvatars];
+    if (avatars.length === 0) {
+      void this.spawn(pane, initialWalkerCount, true);
+      return;
+    }
+    const walkers = this.randomWalkersOf(pane);
+    for (const avatar of avatars) {
+      const at = pane.view.locate(avatar);
+      walkers.add(avatar, at?.x ?? 0, at?.z ?? 0, at?.headingRad ?? 0);
+    }
+  }
+
+  /** The targets and their pane. If there are none, notifies the user and returns null. */
+  private addressees(): {pane: WorldPane; avatars: number[]} | null {
+    const pane = this.host.commandedPane();
+    const avatars = this.targets();
+    if (pane && avatars.length > 0) return {pane, avatars};
+    this.host.notify('Select an avatar first, or command all avatars.');
+    return null;
+  }
+
+  private randomWalkersOf(pane: WorldPane): RandomWalkers {
+    pane.randomWalkers ??=
+      new RandomWalkers(pane.world, (text) => this.host.notify(`Refused: ${text}`));
+    return pane.randomWalkers;
+  }
+
+  private unplantedIn(world: World): Set<number> {
+    const unplanted = this.unplantedAvatars.get(world) ?? new Set<number>();
+    this.unplantedAvatars.set(world, unplanted);
+    return unplanted;
+  }
+
+  private expireToggle(): void {
+    setTimeout(() => --this.recentToggles, staleStateMs);
+  }
+
+  private notifyRefused(reply: Reply): void {
+    this.host.notify(`Refused: ${reply.items[0]?.text || reply.text}`);
+  }
+}

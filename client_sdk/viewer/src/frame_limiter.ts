@@ -1,0 +1,22 @@
+/**
+ * Limits the frame rate. Its mean is the requested rate, whatever the display's refresh rate is.
+ */
+export class FrameLimiter {
+  /** Mean time between two drawn frames in milliseconds; 0 without a limit. */
+  readonly intervalMs: number;
+  private dueMs = 0;
+
+  /** `framesPerS` Infinity means no limit. */
+  constructor(framesPerS: number) {
+    this.intervalMs = 1000 / framesPerS;
+  }
+
+  /** Call once per animation frame. Returns whether to draw it. */
+  shouldDraw(nowMs: number): boolean {
+    if (nowMs < this.dueMs) return false;
+    // Frames that were missed during a pause are not made up for.
+    const late = nowMs - this.dueMs > 2 * this.intervalMs;
+    this.dueMs = (late ? nowMs : this.dueMs) + this.intervalMs;
+    return true;
+  }
+}

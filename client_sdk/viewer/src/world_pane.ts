@@ -1,0 +1,20 @@
+import type {RandomWalkers} from './random_walkers.js';
+import type {WorldView} from './scene/world_view.js';
+import type {Subscription, World} from './sdk.js';
+
+/** A world that the page shows: its part of the page, its scene and its subscription. */
+export interface WorldPane {
+  readonly world: World;
+  readonly view: WorldView;
+  subscription: Subscription | null;
+  /** Avatars that this page moves at random; null until the first one. */
+  randomWalkers: RandomWalkers | null;
+  /** Ids of the avatars that this page has spawned. */
+  readonly ownAvatars: Set<number>;
+}
+
+/** The avatar that the user has selected. */
+export interface AvatarSelection {
+  readonly pane: WorldPane;
+  readonly avatar: number;
+}

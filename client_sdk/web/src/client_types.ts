@@ -1,0 +1,158 @@
+/** Public types for the connection of a client to a server. */
+
+/**
+ * State of a client's connection.
+ * - `idle`: never connected, or closed by `Client.close`.
+ * - `waiting`: the next connection attempt is scheduled.
+ * - `connecting`: the WebSocket is being opened.
+ * - `handshake`: the WebSocket is open, and the server has not accepted the session yet.
+ * - `ready`: the session is running.
+ * - `closing`: `Client.close` was called, and the last messages are being sent.
+ * - `closed`: the server refused the client, which does not try again; see `Client.lastError`.
+ */
+export type ClientState =
+    'idle' | 'waiting' | 'connecting' | 'handshake' | 'ready' | 'closing' | 'closed';
+
+/**
+ * Optional features of a server.
+ * - `inspect`: `World.inspect`.
+ * - `terrain`: `World.setTerrain`.
+ * - `footprints`: steps to a position.
+ * - `walks`: requests of type `walk`.
+ * - `interrupts`: `MovementRequest.interrupt`.
+ * - `layers`: `World.setLayers`.
+ * - `exactOnly`: `MovementRequest.exactOnly`.
+ * - `planting`: `World.setPlanting`.
+ * - `regions`: `Observation.region`.
+ * - `detail`: `Observation.detail`.
+ *
+ * A command that requires a missing feature fails with the status `unsupported`.
+ */
+export type Feature = 'inspect' | 'terrain' | 'footprints' | 'walks' | 'interrupts' | 'layers' |
+    'exactOnly' | 'planting' | 'regions' | 'detail';
+
+/**
+ * The part of the WebSocket interface that the client uses. Browsers and the package `ws` implement
+ * it. Listener arguments are `any` because these implementations declare different event types.
+ */
+export interface WebSocketLike {
+  /** The client sets it to `arraybuffer`. */
+  binaryType: string;
+  /** 1 if the connection is open. */
+  readonly readyState: number;
+  /** Bytes that have not been sent yet. */
+  readonly bufferedAmount: number;
+  onopen: ((event: any) => void) | null;
+  onmessage: ((event: any) => void) | null;
+  onclose: ((event: any) => void) | null;
+  onerror: ((event: any) => void) | null;
+  send(data: ArrayBuffer): void;
+  close(): void;
+}
+
+/** Options of a client. Only `url` is required. */
+export interface ClientOptions {
+  /** Address of the server: `ws://host:port/stream`, or the same with `wss`. */
+  url: string;
+  /** Name of this client for the server's log, 1 to 64 bytes. Default `stridewire-web`. */
+  clientName?: string;
+  /** Token for servers that require one, at most 4096 bytes. Default empty. */
+  authToken?: string;
+  /** WebSocket class to use. Default: the global one. In Node.js, pass that of the package `ws`. */
+  webSocket?: new (url: string) => WebSocketLike;
+  /** How far `Client.renderTimeS` is behind server time, 0 to 60. Default 0.1. */
+  renderDelayS?: number;
+  /** A clock in milliseconds that never runs backwards. Default: `performance.now`. */
+  now?: () => number;
+  /** Whether to spawn this client's avatars again if the session is lost. They return to their last
+   * known positions. Default false. */
+  respawn?: boolean;
+  /** Limit of commands without a reply, 1 to 2^20. Further ones fail with `commands_full`.
+   * Default 4096. */
+  maxCommands?: number;
+  /** Received poses to keep per avatar for interpolation, 4 to 4096. Default 32. */
+  poseHistory?: number;
+  /** Memory limit in bytes of all these poses. Avatars that do not fit are left out and counted in
+   * `Statistics.posesRefused`. Default 256 MiB. */
+  maxPoseBytes?: number;
+  /** Length of `World.recording`, 0 to 3600. 0 disables recording. Default 20. */
+  recordingS?: number;
+  /** Memory limit in bytes of the poses in one world's recording. Default 192 MiB. */
+  maxRecordingBytes?: number;
+  /** Limit of events in one world's recording, 1 to 2^24. Default 65536. */
+  maxRecordedEvents?: number;
+  /** Time limit for opening the WebSocket, and again for the handshake, 0.1 to 600. Default 5. */
+  connectTimeoutS?: number;
+  /** Time between pings, 0.05 to 600. The client never waits longer than a third of the server's
+   * idle timeout. Default 1. */
+  pingIntervalS?: number;
+  /** Seed for the random part of reconnect delays, 0 to 2^32 - 1. Default: random. */
+  seed?: number;
+}
+
+/** Arguments of the listeners that `Client.on` accepts. */
+export interface ClientListeners {
+  /** `Client.state` has changed. */
+  state: (state: ClientState) => void;
+  /** The session is ready. `resumed`: the previous session continues; otherwise a new one began. */
+  connected: (resumed: boolean) => void;
+  /** The server no longer has the previous session. Sent commands fail with `session_lost`; the
+   * client joins its worlds and starts its subscriptions again. */
+  sessionLost: () => void;
+  /** A message from the server for the user. Also reports commands of the client itself that failed
+   * after a lost session. */
+  notice: (code: number, text: string) => void;
+  /** The connection failed or was lost. The client tries again unless its state is `closed`. */
+  error: (code: number, text: string) => void;
+}
+
+/** Counters since the client was created, and current measurements. */
+export interface Statistics {
+  bytesReceived: number;
+  /** Bytes of pose messages, headers included. */
+  poseBytesReceived: number;
+  bytesSent: number;
+  framesReceived: number;
+  /** Pose messages received. */
+  batchesReceived: number;
+  posesReceived: number;
+  /** Received poses that were discarded, because they were old or their avatar did not fit into
+   * `maxPoseBytes`. */
+  posesRefused: number;
+  /** Pose messages that did not arrive, according to gaps in the ticks. */
+  batchesMissing: number;
+  /** Pose messages that the server dropped because the client read too slowly. */
+  batchesDropped: number;
+  /** Events that the server dropped because the client read too slowly. */
+  eventsDropped: number;
+  eventsReceived: number;
+  /** Received frames that were malformed. Each one ended its connection. */
+  invalidFrames: number;
+  commandsSent: number;
+  /** Commands sent again after a reconnect. */
+  commandsResent: number;
+  /** Commands without a reply now. */
+  commandsWaiting: number;
+  /** Connections that became ready. */
+  connects: number;
+  /** Connections that continued the previous session. */
+  resumes: number;
+  /** Connections that became ready after the first one. */
+  reconnects: number;
+  connectFailures: number;
+  /** Smallest round trip of the last 16 pings; 0 before the first reply. */
+  rttS: number;
+  /** Mean lateness of pose messages relative to the fastest message of the last 4 s. */
+  jitterS: number;
+  /** Largest lateness of the last 4 s. */
+  worstJitterS: number;
+  /** Smoothed time from the sampled time to the newest received pose. Negative if samples are newer
+   * than all poses, so that poses are held. */
+  interpolationDelayS: number;
+  /** Samples for times after the newest received pose of their avatar. */
+  heldSamples: number;
+  /** Mean time in nanoseconds to decode and store a pose. */
+  decodeNsPerPose: number;
+  /** Memory of poses, recordings and unsent messages now. */
+  bufferedBytes: number;
+}
