@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/check.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
 
@@ -31,6 +32,7 @@ void AvatarBody::Evaluate(double time_s) {
 }
 
 void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s <= movement.duration_s());
   const auto corrections = [&](double at_s, const Pose& blended) {
     return movement.feet.is_active
                ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
@@ -61,6 +63,7 @@ void AvatarBody::UseDisplayedAsBlended(double time_s, bool keeps_speed) {
 }
 
 void AvatarBody::CaptureFootLocks(double time_s) {
+  STRIDEWIRE_CHECK(movement.feet.is_active);
   locks = FootLocksAt(*library, movement, time_s, blended_pose);
   if (!begins_planting) return;
   for (FootLock& lock : locks) lock.height_m = lock.turn_rad = 0.0;
@@ -71,12 +74,17 @@ void AvatarBody::StartWeighted(const BaseFrame& base) {
 }
 
 void AvatarBody::SetStartOffset(double time_s) {
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s < movement.duration_s());
   movement.start_offset_s = time_s;
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s() - time_s);
 }
 
 template <typename Landing>
 void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch) {
+  STRIDEWIRE_CHECK(movement.group >= 0);
+  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group().example_count));
+  STRIDEWIRE_CHECK(movement.start_offset_s < movement.duration_s());
+  STRIDEWIRE_CHECK(!plants_feet || library->leg_rig().is_usable);
   std::optional<ConstPoseSpan> earlier;
   if (keeps_speed) earlier.emplace(earlier_pose);
   GridCache& cache = scratch.cache();
@@ -124,6 +132,7 @@ void AvatarBody::ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& ble
 void AvatarBody::ApplyLayers() {
   has_layers = !layers.empty();
   if (!has_layers) return;
+  STRIDEWIRE_CHECK(layered_pose.rotations.size() == pose.rotations.size());
   layered_pose = pose;  // Both have the same size, so this does not allocate.
   layers.Apply(*library, layered_pose);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/check.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
@@ -66,6 +67,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
               .reason = kNeedsPlanting});
     return false;
   }
+  STRIDEWIRE_CHECK(saved_.size() == 1 && plan.exact.has_value());
   saved_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
   std::swap(body_.movement, saved_.front().movement);
   PlanMovement(plan, swing_part, scratch);
@@ -99,6 +101,7 @@ FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
     const auto plan =
         PlanRequest({.movement = StepRequest{
                          .foot = moving, .at = FootprintRequest{aim.position_m, aim.heading_rad}}});
+    STRIDEWIRE_CHECK(plan.has_value() && plan->exact.has_value());
     PlanMovement(*plan, swing_part, scratch);
     error = LandingErrorFrom(*plan->exact);
   }

@@ -57,6 +57,7 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
     change_.needs_state = true;
     return;
   }
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s <= body_.movement.duration_s());
   change_.has_left = true;
   change_.left_s = time_s;
   change_.is_left_at_end = time_s == body_.movement.duration_s();
@@ -67,6 +68,7 @@ void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
 // Replaces the current step by a step of the same foot, at the same fraction of the swing. If the
 // new step is rejected, the current step continues.
 void AvatarSimulation::RedirectSwing(PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(is_moving_ && interrupts_ && queue_size() > 0);
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
   MovementRequest request = queue_[queue_head_];
@@ -90,6 +92,7 @@ void AvatarSimulation::RedirectSwing(PlanScratch& scratch) {
 
 // Applies a change of the foot planting setting. Call it before planning a movement.
 void AvatarSimulation::SwitchPlanting() {
+  STRIDEWIRE_CHECK(!is_moving_);
   if (body_.plants_feet == foot_planting()) return;
   body_.plants_feet = body_.begins_planting = foot_planting();
   change_.needs_state = true;

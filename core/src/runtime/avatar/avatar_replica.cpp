@@ -155,6 +155,7 @@ bool AvatarReplica::IsState(std::span<const std::byte> record) {
 }
 
 Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& scratch) {
+  STRIDEWIRE_CHECK(&scratch.library() == &library());
   Reader reader(record);
   const unsigned flags = reader.Flags();
   if ((flags & record::kIsState) != 0) {
@@ -193,6 +194,7 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& 
       reader.Reject("a movement record ends a movement at a time outside its duration");
     }
     if (!reader.ok()) return;
+    STRIDEWIRE_CHECK(is_moving_ && is_known_);
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
     if (movement.feet.is_active && (flags & record::kIsRedirected) == 0)
       body_.CaptureFootLocks(left_s);

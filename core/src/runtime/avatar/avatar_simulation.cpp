@@ -64,6 +64,7 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   last_group_ = body_.library->groups().size();
   last_moved_ = Foot::kRight;
   CancelQueue();
+  STRIDEWIRE_CHECK(idle());
   body_.ApplyLayers();
   next_change_.needs_state = true;
 }
@@ -107,6 +108,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
   }
   queue_.push_back(request);
+  STRIDEWIRE_CHECK(queue_size() >= 1 && queue_size() <= kMaxQueue);
+  STRIDEWIRE_CHECK(start_not_before_s_ >= 0.0);
   return {};
 }
 
@@ -138,6 +141,7 @@ int AvatarSimulation::CancelQueue() {
 
 void AvatarSimulation::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
+  STRIDEWIRE_CHECK(events_.empty() || events_.back().time_s <= time_s_);
   events_.push_back(event);
   events_.back().time_s = time_s_;
   if (event.type == AvatarEventType::kStarted) started_ = events_.back();
@@ -240,6 +244,8 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   for (;;) {
+    STRIDEWIRE_CHECK(left_s >= 0.0);
+    STRIDEWIRE_CHECK(!(is_moving_ && is_in_stand_));
     // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
     // full, nothing more starts or ends in this tick.
     const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
@@ -271,6 +277,7 @@ void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
     }
     if (!may_change || !StartNext(scratch)) break;
   }
+  STRIDEWIRE_CHECK(time_s_ <= end_s);
   time_s_ = end_s;
   change_.idle_changed = idle() != std::exchange(was_idle_, idle());
 }
@@ -283,6 +290,7 @@ bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
 }
 
 bool AvatarSimulation::StartNext(PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(!is_moving_ && !is_in_stand_);
   interrupts_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
@@ -346,12 +354,14 @@ void AvatarSimulation::StartTransitionPath(PlanScratch& scratch) {
 
 void AvatarSimulation::StartInserted(const RequestPlan& plan, PlanScratch& scratch) {
   const int inserted = inserted_steps_ + 1;
+  STRIDEWIRE_CHECK(inserted <= kMaxInsertedSteps);
   StartPlan(plan, 0, scratch);
   inserted_steps_ = inserted;
 }
 
 // Removes the request at the head of the queue and returns its id.
 std::uint64_t AvatarSimulation::PopQueue() {
+  STRIDEWIRE_CHECK(queue_head_ < queue_.size());
   const std::uint64_t id = queue_[queue_head_++].id;
   if (queue_size() == 0) CancelQueue();
   return id;
@@ -444,7 +454,11 @@ void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_
 // same fraction `swing_part` of its own swing.
 void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part,
                                     PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(&scratch.feet.library() == body_.library.get());
+  STRIDEWIRE_CHECK(plan.group >= 0 &&
+                   static_cast<std::size_t>(plan.group) < body_.library->groups().size());
   const MotionGroup& next = body_.library->group(plan.group);
+  STRIDEWIRE_CHECK(plan.applied.count == next.parameter_count());
   if (options_.run_time_correction) {
     CorrectWeights(next, plan.applied, DefaultCorrectionLimits(next), scratch.correction,
                    body_.movement);
@@ -473,6 +487,8 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
 
+  STRIDEWIRE_CHECK(!is_in_stand_ && body_.movement.group == plan.group);
+  STRIDEWIRE_CHECK(body_.movement.feet.is_active == body_.plants_feet);
   ++revision_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
@@ -509,6 +525,7 @@ void AvatarSimulation::KeepToLine(const DVec3& line_m) {
 }
 
 void AvatarSimulation::FinishMovement(double at_s) {
+  STRIDEWIRE_CHECK(is_moving_);
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
   CaptureBlendSource(at_s);
@@ -550,6 +567,7 @@ void AvatarSimulation::FinishMovement(double at_s) {
 }
 
 void AvatarSimulation::FinishStand() {
+  STRIDEWIRE_CHECK(is_in_stand_ && !is_moving_);
   is_in_stand_ = false;
   last_group_ = body_.library->groups().size();
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});

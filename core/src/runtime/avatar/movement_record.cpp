@@ -102,6 +102,7 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   }
   RecordWriter writer(out);
   writer.Flags(flags);
+  STRIDEWIRE_CHECK(!change.has_begun || avatar.movement() != nullptr);
   if (change.has_left && !change.is_left_at_end) writer.F64(change.left_s);
   if (change.has_begun) WriteBegun(avatar, flags, decision, writer);
   if (change.has_layers) WriteLayers(body.layers, writer);

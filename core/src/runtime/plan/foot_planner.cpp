@@ -400,7 +400,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
                            const BlendSource& source, FootPlanScratch& scratch, PoseSpan pose,
                            Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
-  STRIDEWIRE_CHECK(&scratch.library() == &library);
+  STRIDEWIRE_CHECK(&scratch.library() == &library && library.leg_rig().is_usable);
   GridCache& cache = scratch.cache();
   Planner planner(library, scratch, pose, movement);
   const bool is_step = IsStep(group.kind);
@@ -409,6 +409,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   const auto m = static_cast<std::size_t>(moving);
   const auto x = static_cast<std::size_t>(fixed);
   const SwingTimes times = SwingTimesOf(group.kind, movement);
+  STRIDEWIRE_CHECK(times.release_s < times.land_s && times.land_s <= movement.duration_s());
   if (target == nullptr) {
     movement.extra_turn_rad = decision.extra_turn_rad;
   } else if (target->request.turn_rad) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/skeleton/foot_vector.h"
@@ -176,6 +177,7 @@ std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind k
     const auto plan =
         PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m, best_cost_m);
     if (!plan) continue;
+    STRIDEWIRE_CHECK(plan->cost_m + group_cost_m < best_cost_m);
     best_cost_m = plan->cost_m + group_cost_m;
     best = plan;
   }

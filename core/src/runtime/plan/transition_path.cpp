@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/transition.h"
 #include "runtime/skeleton/foot_vector.h"
 
@@ -36,6 +37,8 @@ class TransitionPathFinder {
 
   [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct,
                                     const Stance& stance) const {
+    STRIDEWIRE_CHECK(stance.group <= library_.groups().size());
+    STRIDEWIRE_CHECK(stance.inserted_steps >= 0 && stance.inserted_steps <= kMaxInsertedSteps);
     if (step_ != nullptr && step_->at) return {direct};
     const bool can_start = direct && CanStart(*direct, stance);
     const TransitionPath without_insertion{can_start ? direct : std::nullopt};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/foot_planner.h"
@@ -223,6 +224,9 @@ WalkDecision Reject(const char* reason) {
 WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                           const WalkRequest& walk, const WalkStance& stance,
                           WalkProgress& progress) {
+  STRIDEWIRE_CHECK(progress.next_waypoint <= walk.waypoints_m.size());
+  STRIDEWIRE_CHECK(progress.steps >= 0 && progress.steps <= kMaxWalkSteps);
+  STRIDEWIRE_CHECK(progress.steps_without >= 0 && progress.steps_without <= kMaxStepsWithout);
   WalkSteering steering(library.locomotion_profile(), walk, stance);
   steering.PassWaypoints(progress.next_waypoint);
   const double arrived_m = stance.is_exact ? kArrivedM : kRoughlyArrivedM;

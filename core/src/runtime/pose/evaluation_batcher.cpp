@@ -15,6 +15,7 @@ constexpr std::uint32_t kParts = 64;  // Times are grouped into this many parts 
 
 int SampleRunCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
                    int most) {
+  STRIDEWIRE_CHECK(step_s > 0.0 && ticks_apart >= 1 && most >= 1);
   const double apart_s = step_s * ticks_apart;
   const double left = (movement.duration_s() - time_s) / apart_s;
   if (!(left < most)) return most;
@@ -23,6 +24,7 @@ int SampleRunCount(const Movement& movement, double time_s, double step_s, int t
 
 void EvaluationBatcher::Add(const SampleRun& run, int count, std::uint32_t tag) {
   STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
+  STRIDEWIRE_CHECK(run.movement != nullptr && run.movement->group >= 0);
   const Movement& movement = *run.movement;
   const double part = std::clamp(run.time_s / movement.duration_s(), 0.0, 1.0);
   // Runs without foot planting come first, and longer runs come before shorter ones.
@@ -50,10 +52,13 @@ void EvaluationBatcher::Sort() {
 }
 
 std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
+  STRIDEWIRE_CHECK(begin < order_.size() && order_.size() == items_.size());
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
   const bool is_planted = order_[begin].run.movement->feet.is_active;
   // Runs with planting come last, so a block ends before the first run that differs from `begin`.
   while (order_[end - 1].run.movement->feet.is_active != is_planted) --end;
+  // The first run of a block decides how many poses are evaluated, so none may be longer.
+  STRIDEWIRE_CHECK(order_[end - 1].count <= order_[begin].count);
   return std::span(order_).subspan(begin, end - begin);
 }
 

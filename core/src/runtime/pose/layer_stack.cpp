@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "stridewire/runtime/motion_library.h"
 
@@ -42,6 +43,7 @@ double SlopeOf(const LayerStack::Playing& p) {
 // fades out within the remaining time of the previous blend, so that the weight does not overshoot.
 void StartBlend(double weight, double speed, double blend_s, LayerStack::Playing& p) {
   const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
+  STRIDEWIRE_CHECK(p.weight >= 0.0 && p.weight <= 1.0 && blend_s >= 0.0);
   p.slope = SlopeOf(p);
   p.slope_s = std::min(left_s, blend_s);
   p.from_weight = p.weight;
@@ -95,10 +97,12 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
   on->is_ending = false;
   on->blend_s = request.blend_s;
   on->weight = WeightOf(*on);
+  STRIDEWIRE_CHECK(playing_.size() <= kMaxLayers);
   return {};
 }
 
 void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
+  STRIDEWIRE_CHECK(playing_.size() <= kMaxLayers);
   for (Playing& p : playing_) {
     p.elapsed_s += dt_s;
     p.speed = p.from_speed + (p.to_speed - p.from_speed) * Ease(Progress(p));

@@ -219,6 +219,7 @@ Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wante
   }
   ApplyWeights(group, weights, movement);
   correction.error_m = best.largest_m;
+  STRIDEWIRE_CHECK(!(correction.error_m > correction.initial_error_m));
   return correction;
 }
 
