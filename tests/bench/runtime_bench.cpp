@@ -162,7 +162,11 @@ class Crowd {
       avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
       // Each at another place of its walk.
-      for (int tick = 0; tick < i % 120; ++tick) avatars_.back().Advance(kTickS);
+      // Not AvatarSimulation::Advance, which would allocate scratch memory per avatar.
+      AvatarSimulation* one = &avatars_.back();
+      for (int tick = 0; tick < i % 120; ++tick) {
+        AvatarSimulation::AdvanceAll({&one, 1}, kTickS, plan_scratch_, evaluator_);
+      }
     }
   }
 
