@@ -257,7 +257,7 @@ class AvatarSimulation {
   FootState stand_feet_;  // Of the library's stand pose.
   FootState feet_;
   Foot last_moved_ = Foot::kRight;
-  // Group of the previous movement; the number of groups stands for a stand.
+  // Group of the previous movement, or the number of groups after a stand.
   std::size_t last_group_ = 0;
   WalkProgress walk_;                   // Of the walk at the head of the queue.
   std::vector<MovementRequest> queue_;  // Elements from queue_head_ on are in use.

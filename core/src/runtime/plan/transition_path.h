@@ -22,8 +22,8 @@ inline constexpr int kMaxInsertedSteps = 3;
 struct Stance {
   FootState feet;
   Foot last_moved = Foot::kRight;
-  std::size_t group =
-      0;  ///< Group of the previous movement; the number of groups stands for a stand.
+  /// Group of the previous movement, or the number of groups after a stand.
+  std::size_t group = 0;
   int inserted_steps = 0;  ///< Number of steps inserted so far.
 };
 
@@ -43,8 +43,8 @@ struct TransitionPath {
 ///   times its distance from the stand. After a stand every movement is possible.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
 ///   that moved last. They need not if they are within 0.25 m of their positions in the movement's
-///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or reduces
-///   the cost of the request by 0.25 m.
+///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
+///   reduces the cost of the request by 0.25 m.
 /// - Steps to footprints are never preceded by inserted steps.
 ///
 /// Breadth-first search with at most 14 calls of PlanStep and 14 more for the request. Never
