@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "bench_libraries.h"
+#include "reference_evaluation.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/pose_quantization.h"
 #include "runtime/pose/evaluation_batcher.h"
-#include "runtime/pose/reference_evaluation.h"
 #include "runtime/weights/correction.h"
 #include "scaled_library.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "runtime/avatar/avatar_simulation.h"
 #include "world/encoded_pose_cache.h"
 
 namespace stridewire {
@@ -90,7 +90,8 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
-// Poses of each tick, evaluated several ticks ahead as in server::EncodedPoseCache, but not stored.
+// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and
+// not kept.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
   // Spread over shards: threads that share nothing but the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
@@ -207,21 +208,22 @@ void MakeSteps(benchmark::State& state, const Library& library) {
       for (std::size_t l = 0; l < d; ++l) parameters.values[l] += 0.5 * site[l];
     }
   }
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  CorrectionScratch scratch(*library);
   Pose measured(library->skeleton().joint_count());
   std::vector<Movement> movements(kSteps);
   for (Movement& movement : movements) movement.difference = measured;
   SoaPoseEvaluator evaluator(*library, kFrames);
-  std::array<SampleRun, kSteps> stretches;
+  std::array<SampleRun, kSteps> runs;
   std::size_t next = 0;
   for (auto _ : state) {
     for (std::size_t i = 0; i < kSteps; ++i) {
-      CorrectWeights(*library, 0, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
+      CorrectWeights(group, wanted[next++ % kKinds], DefaultCorrectionLimits(group), scratch,
                      movements[i]);
+      movements[i].group = 0;
       StartWeighted(group, {}, movements[i]);
-      stretches[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
+      runs[i] = {&movements[i], 0.0, movements[i].duration_s() / (kFrames - 1)};
     }
-    evaluator.Begin(stretches, kFrames);
+    evaluator.Begin(runs, kFrames);
     for (int frame = 0; frame < kFrames; ++frame) {
       benchmark::DoNotOptimize(evaluator.Next().roots_m());
     }

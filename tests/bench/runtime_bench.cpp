@@ -1,11 +1,11 @@
-// What movements, poses and messages cost on one core, on `builtin` and on every library named after
-// the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
+// What movements, poses and messages cost on one core, on `builtin` and on every library named
+// after the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
 //
-// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those named. Floors are always
-// as fast as the machine can be.
+// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those
+// named. Floors are always as fast as the machine can be.
 //
-// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole length,
-// here 30 of them.
+// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole
+// length, here 30 of them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -20,18 +20,18 @@
 
 #include "bench_libraries.h"
 #include "instruction_sets.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/library/locomotion_profile.h"
+#include "runtime/library/pose_quantization.h"
+#include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/layer_clip.h"
+#include "runtime/weights/correction.h"
 #include "stridewire/base/version.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
 #include "stridewire/protocol/pose_rows.h"
-#include "runtime/avatar/avatar_simulation.h"
-#include "runtime/weights/correction.h"
-#include "runtime/movement/movement.h"
-#include "runtime/library/pose_quantization.h"
-#include "runtime/pose/evaluate_poses.h"
-#include "runtime/skeleton/layer_clip.h"
-#include "runtime/library/locomotion_profile.h"
 
 namespace stridewire {
 namespace {
@@ -86,7 +86,7 @@ void StartMovementAlone(benchmark::State& state, const Library& library, int gro
 void StartCorrected(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
-  std::vector<double> scratch(static_cast<std::size_t>(library->max_example_count()));
+  CorrectionScratch scratch(*library);
   Movement movement;
   Pose pose(library->skeleton().joint_count());
   GridCache cache(library->layout());
@@ -96,8 +96,9 @@ void StartCorrected(benchmark::State& state, const Library& library, int group_i
     const std::vector<double>& wanted = parameters[i++ % kVariations];
     ParameterValues values{.count = group.parameter_count()};
     std::copy(wanted.begin(), wanted.end(), values.values.begin());
-    const Correction correction = CorrectWeights(*library, group_index, values,
-                                                 DefaultCorrectionLimits(group), scratch, movement);
+    const Correction correction =
+        CorrectWeights(group, values, DefaultCorrectionLimits(group), scratch, movement);
+    movement.group = group_index;
     StartWeighted(group, {}, movement);
     iterations += correction.iterations;
     benchmark::DoNotOptimize(movement.weights.data());
@@ -156,18 +157,22 @@ void EvaluatePose(benchmark::State& state, const Library& library, int group_ind
 class Crowd {
  public:
   Crowd(const Library& library, int size, const AvatarOptions& options = {})
-      : evaluator_(*library, 1) {
+      : evaluator_(*library, 1), plan_scratch_(*library) {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
       // Each at another place of its walk.
-      for (int tick = 0; tick < i % 120; ++tick) avatars_.back().Advance(kTickS);
+      // Not AvatarSimulation::Advance, which would allocate scratch memory per avatar.
+      AvatarSimulation* one = &avatars_.back();
+      for (int tick = 0; tick < i % 120; ++tick) {
+        AvatarSimulation::AdvanceAll({&one, 1}, kTickS, plan_scratch_, evaluator_);
+      }
     }
   }
 
   void Advance() {
     AdvanceStates();
-    AvatarSimulation::ShowPoses(all_, evaluator_);
+    AvatarSimulation::UpdatePoses(all_, evaluator_);
   }
   /// Without poses.
   void AdvanceStates() {
@@ -176,7 +181,7 @@ class Crowd {
     }
     all_.clear();
     for (AvatarSimulation& avatar : avatars_) all_.push_back(&avatar);
-    AvatarSimulation::AdvanceStates(all_, kTickS);
+    AvatarSimulation::AdvanceStates(all_, kTickS, plan_scratch_);
   }
 
   [[nodiscard]] const std::vector<AvatarSimulation>& avatars() const { return avatars_; }
@@ -193,6 +198,7 @@ class Crowd {
   std::vector<AvatarSimulation> avatars_;
   std::vector<AvatarSimulation*> all_;
   SoaPoseEvaluator evaluator_;
+  PlanScratch plan_scratch_;
 };
 
 void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bool plants_feet) {
@@ -380,8 +386,8 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(frame.size()));
 }
 
-/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such observers
-/// take turns, so that the rows are as cold as in a tick.
+/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such
+/// observers take turns, so that the rows are as cold as in a tick.
 void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   constexpr std::size_t kRows = 10'000;
   constexpr std::size_t kPicked = 100;
@@ -483,7 +489,8 @@ void RegisterAll(const std::string& path, const Library& library) {
   Register(name + "/decode_pose/compact", DecodeCompactPose, library);
 }
 
-/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this machine has none.
+/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this
+/// machine has none.
 std::string_view ChooseInstructionSet(std::string_view name) {
   for (const InstructionSet& set : kInstructionSets) {
     if ((hwy::SupportedTargets() & set.target) == 0 || (!name.empty() && name != set.name))

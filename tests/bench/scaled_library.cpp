@@ -7,9 +7,9 @@
 
 #include "base/check.h"
 #include "offline/builtin/builtin_library.h"
-#include "stridewire/offline/library_builder.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "stridewire/offline/library_builder.h"
 
 namespace stridewire {
 namespace {

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "runtime/terrain/foot_support.h"
 #include "stridewire/protocol/decode.h"
 #include "stridewire/protocol/encoder.h"
-#include "runtime/terrain/foot_support.h"
 #include "stridewire/runtime/terrain.h"
 
 namespace stridewire {

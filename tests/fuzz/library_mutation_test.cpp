@@ -22,9 +22,9 @@
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/library_file.h"
 #include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/offline/library_builder.h"
 #include "test_library.h"
-#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -15,11 +15,11 @@
 #include "random.h"
 #include "random_requests.h"
 #include "rough_ground.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/library/pose_quantization.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/compact_codec.h"
 #include "stridewire/protocol/pose_codec.h"
-#include "runtime/avatar/avatar_simulation.h"
 
 namespace stridewire {
 namespace {
@@ -204,7 +204,7 @@ TEST_P(QuantizedCaptures, KeepAllFramesWithinAMillimetre) {
 
 // The shift of joints that are left out must be within the stated limit.
 TEST_P(QuantizedCaptures, KeepReducedJointsWithinTheStatedError) {
-  const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
+  const std::vector<std::uint16_t> told = ChooseReducedJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
   for (const auto& take : TakesOf(GetParam().subjects)) {
@@ -213,12 +213,12 @@ TEST_P(QuantizedCaptures, KeepReducedJointsWithinTheStatedError) {
   }
   passage.Flush();
   passage.Print(std::string(GetParam().name) + " of " + std::to_string(told.size()) + " joints");
-  EXPECT_LE(passage.largest_error_m(), kFewerJointsShiftM + kLargestErrorM);
+  EXPECT_LE(passage.largest_error_m(), kReducedJointsShiftM + kLargestErrorM);
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
 }
 
 TEST_P(QuantizedAvatars, KeepReducedJointsWithinTheStatedError) {
-  const std::vector<std::uint16_t> told = ChooseFewerJoints(*library_);
+  const std::vector<std::uint16_t> told = ChooseReducedJoints(*library_);
   const CompactCodec codec = CompactCodec::Make(code_.joints, ParentsOf(skeleton()), told).value();
   Passage passage(skeleton(), codec);
   constexpr std::array<std::uint16_t, 1> kRootAlone{0};
@@ -244,7 +244,7 @@ TEST_P(QuantizedAvatars, KeepReducedJointsWithinTheStatedError) {
   }
   passage.Print(who + ", fewer joints, without" + left_out);
   root_passage.Print(who + ", the root");
-  EXPECT_LE(passage.largest_error_m(), kFewerJointsShiftM + kLargestErrorM);
+  EXPECT_LE(passage.largest_error_m(), kReducedJointsShiftM + kLargestErrorM);
   EXPECT_LT(codec.pose_bytes(), CodecOf(skeleton(), code_).pose_bytes());
   EXPECT_EQ(root_passage.wide(), 0u);
   EXPECT_LE(root.pose_bytes(), 20u);

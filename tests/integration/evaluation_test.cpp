@@ -15,6 +15,7 @@
 #include "instruction_sets.h"
 #include "random.h"
 #include "random_requests.h"
+#include "reference_evaluation.h"
 #include "rough_ground.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/plan/foot_sampler.h"
@@ -22,7 +23,6 @@
 #include "runtime/pose/evaluation_batcher.h"
 #include "runtime/pose/plant_feet.h"
 #include "runtime/pose/pose_kernels.h"
-#include "runtime/pose/reference_evaluation.h"
 #include "runtime/skeleton/leg_rig.h"
 #include "stridewire/offline/open_library.h"
 #include "stridewire/protocol/limits.h"
@@ -90,6 +90,7 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
   Random random(kSeed);
   Pose pose(library->skeleton().joint_count());
   Pose scratch = pose;
+  FootPlanScratch plan_scratch(*library);
   int sampled = 0;
   for (int walk = 0; walk < 40; ++walk) {
     AvatarSimulation avatar(library,
@@ -123,8 +124,8 @@ TEST(Evaluation, FootSamplerMatchesSinglePoses) {
         const OnlyInstructionSet only(set);
         SCOPED_TRACE(::testing::Message() << "seed " << kSeed << ", walk " << walk << ", look "
                                           << look << ", " << hwy::TargetName(set));
-        GridCache cache(library->layout());
-        FootSampler sampler(*library, cache, scratch);
+        plan_scratch.cache().Clear();
+        FootSampler sampler(plan_scratch, scratch);
         sampler.Sample(movement, times_s, eased);
         GridCache own(library->layout());
         for (std::size_t i = 0; i < times_s.size(); ++i) {
@@ -208,14 +209,14 @@ struct Sixteen {
       fraction[i] = static_cast<float>(random.Draw(0.0, 1.0));
       slope_s[i] = static_cast<float>(random.Draw(0.0, 0.2));
     }
-    kernels::PrepareEase(differences[0].data(), kJoints, kernels::kBlock, ease[0].data());
-    kernels::FindFastest(velocities[0].data(), kJoints, kernels::kBlock, fastest.data());
+    kernels::PrepareDifferences(differences[0].data(), kJoints, kernels::kBlock, ease[0].data());
+    kernels::FindLargestVelocities(velocities[0].data(), kJoints, kernels::kBlock, fastest.data());
   }
 
   [[nodiscard]] bool Finish() {
     std::array<const float*, kernels::kBlock> of_lanes;
     for (std::size_t i = 0; i < kernels::kBlock; ++i) of_lanes[i] = rows[i].data();
-    return kernels::FinishLanes({.rows = of_lanes.data(),
+    return kernels::FinishPoses({.rows = of_lanes.data(),
                                  .joint_count = kJoints,
                                  .lanes = kernels::kBlock,
                                  .base_m = zeros[0].data(),
@@ -223,7 +224,7 @@ struct Sixteen {
                                  .sine = zeros[0].data(),
                                  .cosine = ones.data(),
                                  .extra_turn_rad = zeros[0].data(),
-                                 .steered = zeros[0].data(),
+                                 .remaining_turn = zeros[0].data(),
                                  .ease = ease[0].data(),
                                  .velocity = velocities[0].data(),
                                  .fastest = fastest.data(),
@@ -244,7 +245,7 @@ struct Sixteen {
   alignas(64) std::array<std::array<float, kRowFloats>, kernels::kBlock> rows{};
   alignas(64) std::array<Lanes, 4 * kJoints> differences{};
   alignas(64) std::array<Lanes, 3 * kJoints> velocities{};
-  alignas(64) std::array<Lanes, kernels::kEaseFloats * kJoints> ease{};
+  alignas(64) std::array<Lanes, kernels::kDifferenceFloats * kJoints> ease{};
   alignas(64) Lanes fastest{}, fraction{}, slope_s{};
   alignas(64) Lanes all = All();
   alignas(64) std::array<Lanes, 3> no_root{};
@@ -457,8 +458,8 @@ TEST_P(LibraryEvaluation, SinglePosesMatchBatches) {
     EvaluatePoses(evaluator, jobs);
     for (const PoseJob& job : jobs) {
       const Pose alone = ShownAlone(*library_, *job.movement, job.time_s);
-      ASSERT_EQ(alone.root_position_m, job.shown->root_position_m) << "seed " << kSeed;
-      ASSERT_EQ(alone.rotations, job.shown->rotations) << "seed " << kSeed;
+      ASSERT_EQ(alone.root_position_m, job.pose->root_position_m) << "seed " << kSeed;
+      ASSERT_EQ(alone.rotations, job.pose->rotations) << "seed " << kSeed;
       ++poses;
     }
   }
@@ -506,23 +507,22 @@ TEST_P(LibraryEvaluation, SampleRunsMatchSinglePoses) {
         for (std::size_t i = 0; i < items.size(); ++i) {
           const EvaluationBatcher::Item& item = items[i];
           if (at >= item.count) continue;
-          const SampleRun& stretch = item.stretch;
+          const SampleRun& run = item.run;
           double& now_s = time_s[item.tag];
-          if (at == 0) now_s = stretch.time_s;
-          for (int t = 0; at > 0 && t < stretch.ticks_apart; ++t) now_s += stretch.step_s;
-          ASSERT_TRUE(at == 0 || now_s <= stretch.movement->duration_s() + 1e-9);
+          if (at == 0) now_s = run.time_s;
+          for (int t = 0; at > 0 && t < run.ticks_apart; ++t) now_s += run.step_s;
+          ASSERT_TRUE(at == 0 || now_s <= run.movement->duration_s() + 1e-9);
           lanes.Get(i, pose);
-          const Pose alone = ShownAlone(*library_, *stretch.movement, now_s);
+          const Pose alone = ShownAlone(*library_, *run.movement, now_s);
           ASSERT_EQ(alone.root_position_m, pose.root_position_m)
               << hwy::TargetName(set) << ", tick " << tick << ", pose " << at << ", seed " << kSeed;
           ASSERT_TRUE(std::memcmp(alone.rotations.data(), pose.rotations.data(),
                                   pose.rotations.size() * sizeof(Quat)) == 0)
               << hwy::TargetName(set) << ", tick " << tick << ", pose " << at << ", seed " << kSeed;
           ++seen;
-          const FootPlan& feet = stretch.movement->feet;
+          const FootPlan& feet = run.movement->feet;
           ++planted[feet.is_active ? 1 : 0];
-          settling +=
-              feet.is_active && now_s < stretch.movement->start_offset_s + feet.plant_fade_s;
+          settling += feet.is_active && now_s < run.movement->start_offset_s + feet.plant_fade_s;
         }
       });
       if (HasFatalFailure()) return;

@@ -17,11 +17,11 @@
 #include "offline/build/refine.h"
 #include "offline/builtin/builtin_library.h"
 #include "random.h"
+#include "runtime/avatar/avatar_simulation.h"
+#include "runtime/skeleton/layer_clip.h"
 #include "stridewire/offline/bvh_writer.h"
 #include "stridewire/offline/synthesis.h"
-#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/terrain.h"
-#include "runtime/skeleton/layer_clip.h"
 
 namespace stridewire {
 namespace {

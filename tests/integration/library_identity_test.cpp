@@ -15,9 +15,9 @@
 #include "captured_library.h"
 #include "offline/builtin/builtin_library.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/library/keytimes.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
-#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 namespace {

@@ -16,8 +16,8 @@
 #include "random.h"
 #include "random_requests.h"
 #include "rough_ground.h"
-#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/avatar_replica.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/avatar/movement_record.h"
 
 namespace stridewire {
@@ -82,7 +82,8 @@ class RandomlyDriven {
 };
 
 std::string Refusal(AvatarReplica& replica, const Bytes& record) {
-  const Status status = replica.Apply(record);
+  FootPlanScratch scratch(replica.library());
+  const Status status = replica.Apply(record, scratch);
   return status ? "" : Describe(status.error());
 }
 
@@ -135,7 +136,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
       if (AppendChange(avatar, record)) {
         ++figures.records;
         EXPECT_LE(record.size(), MaxRecordBytes(*library_));
-        figures.states += avatar.change().is_any;
+        figures.states += avatar.change().needs_state;
         ASSERT_EQ(Refusal(first, record), "") << "tick " << tick << " of " << round;
         if (late) {
           ASSERT_EQ(Refusal(*late, record), "") << "tick " << tick << " of " << round;
@@ -278,6 +279,7 @@ TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
   RandomlyDriven driven(library, random);
   AvatarReplica replica(library);
   SoaPoseEvaluator evaluator(*library, 1);
+  FootPlanScratch scratch(*library);
   Bytes record;
   for (int tick = 0; tick < 3000; ++tick) {
     driven.Stir();
@@ -286,7 +288,7 @@ TEST(AvatarReplica, AllocatesOnlyInItsConstructor) {
     const bool is_changed = AppendChange(driven.avatar(), record);
     const std::size_t before = counted_memory::LiveBytes();
     counted_memory::ResetPeak();
-    const bool is_taken = !is_changed || replica.Apply(record).has_value();
+    const bool is_taken = !is_changed || replica.Apply(record, scratch).has_value();
     Advance(replica, evaluator, 1.0 / 60.0);
     ASSERT_TRUE(is_taken);
     ASSERT_LE(counted_memory::PeakBytes(), before) << "tick " << tick << ", seed " << kSeed;
@@ -299,6 +301,7 @@ TEST(AvatarReplica, SurvivesDamagedRecords) {
   Random random(kSeed);
   const Library library = LibraryOf({});
   SoaPoseEvaluator evaluator(*library, 1);
+  FootPlanScratch scratch(*library);
   const auto below = [&](std::size_t n) {
     return static_cast<std::size_t>(random.Draw(0.0, static_cast<double>(n)));
   };
@@ -324,18 +327,18 @@ TEST(AvatarReplica, SurvivesDamagedRecords) {
       if (below(4) == 0) damaged.resize(below(damaged.size()));
       if (below(8) == 0) damaged.insert(damaged.end(), 1 + below(9), std::byte{1});
       AvatarReplica other = replica;
-      const bool is_taken = other.Apply(damaged).has_value();
+      const bool is_taken = other.Apply(damaged, scratch).has_value();
       (is_taken ? shown : refused) += 1;
       EXPECT_EQ(other.is_known(), is_taken);
       Advance(other, evaluator, 1.0 / 60.0);
       // Records that are truncated or too long are always rejected.
       Bytes shorter = record;
       shorter.resize(below(record.size()));
-      EXPECT_FALSE(AvatarReplica(replica).Apply(shorter).has_value()) << "seed " << kSeed;
+      EXPECT_FALSE(AvatarReplica(replica).Apply(shorter, scratch).has_value()) << "seed " << kSeed;
       Bytes longer = record;
       longer.push_back(std::byte{0});
-      EXPECT_FALSE(AvatarReplica(replica).Apply(longer).has_value()) << "seed " << kSeed;
-      (void)replica.Apply(record);
+      EXPECT_FALSE(AvatarReplica(replica).Apply(longer, scratch).has_value()) << "seed " << kSeed;
+      (void)replica.Apply(record, scratch);
       Advance(replica, evaluator, 1.0 / 60.0);
     }
   }
@@ -354,8 +357,9 @@ TEST(AvatarReplica, IsUnknownBeforeAState) {
   ASSERT_TRUE(AppendChange(avatar, change));
   AvatarReplica replica(library);
   SoaPoseEvaluator evaluator(*library, 1);
+  FootPlanScratch scratch(*library);
   EXPECT_FALSE(replica.is_known());
-  EXPECT_EQ(replica.Apply(change).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(replica.Apply(change, scratch).error().code, ErrorCode::kNotFound);
   Advance(replica, evaluator, 1.0 / 60.0);
   EXPECT_FALSE(replica.is_known());
 }

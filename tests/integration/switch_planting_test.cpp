@@ -256,7 +256,7 @@ TEST(SwitchPlantingOff, RejectsNewAndQueuedExactPlacements) {
   }
   EXPECT_EQ(rejected.request_id, 2u);
   EXPECT_EQ(rejected.code, ErrorCode::kUnsupported);
-  EXPECT_EQ(DescribeRejection(rejected), "feet are not planted: no footprint is sure to be met");
+  EXPECT_EQ(DescribeRejection(rejected), "exact placement requires foot planting");
   ASSERT_TRUE(avatar.SetFootPlanting(true).has_value());
   EXPECT_TRUE(avatar.Enqueue(must).has_value());
 }

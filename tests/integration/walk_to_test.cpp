@@ -12,8 +12,8 @@
 #include "captured_library.h"
 #include "counted_memory.h"
 #include "random.h"
-#include "stridewire/offline/open_library.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/offline/open_library.h"
 
 namespace stridewire {
 namespace {

@@ -70,7 +70,7 @@ inline void DrawLayer(Random& random, AvatarSimulation& avatar) {
 class DrawnCrowd {
  public:
   DrawnCrowd(const std::shared_ptr<const MotionLibrary>& library, int size, unsigned seed)
-      : random_(seed), evaluator_(*library, 1) {
+      : random_(seed), plan_scratch_(*library), evaluator_(*library, 1) {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, DrawBase(random_),
                             AvatarOptions{.terrain = i % 2 == 0 ? nullptr : RoughGround(random_)});
@@ -84,7 +84,7 @@ class DrawnCrowd {
     for (AvatarSimulation& avatar : avatars_) {
       some.push_back(&avatar);
       if (some.size() < at_once && &avatar != &avatars_.back()) continue;
-      AvatarSimulation::AdvanceAll(some, 1.0 / 60.0, evaluator_);
+      AvatarSimulation::AdvanceAll(some, 1.0 / 60.0, plan_scratch_, evaluator_);
       some.clear();
     }
   }
@@ -94,7 +94,7 @@ class DrawnCrowd {
     DrawRequests();
     std::vector<AvatarSimulation*> all;
     for (AvatarSimulation& avatar : avatars_) all.push_back(&avatar);
-    AvatarSimulation::AdvanceStates(all, 1.0 / 60.0);
+    AvatarSimulation::AdvanceStates(all, 1.0 / 60.0, plan_scratch_);
   }
 
   [[nodiscard]] const std::vector<AvatarSimulation>& avatars() const { return avatars_; }
@@ -112,6 +112,7 @@ class DrawnCrowd {
   }
 
   Random random_;
+  PlanScratch plan_scratch_;
   SoaPoseEvaluator evaluator_;
   std::vector<AvatarSimulation> avatars_;
 };

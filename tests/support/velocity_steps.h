@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
+#include "runtime/library/keytimes.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
-#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 

@@ -11,7 +11,8 @@ ReplicaSet::ReplicaSet(std::shared_ptr<const MotionLibrary> library, double tick
     : library_(std::move(library)),
       tick_s_(tick_s),
       max_avatars_(max_avatars),
-      evaluator_(*library_, 1) {
+      evaluator_(*library_, 1),
+      plan_scratch_(*library_) {
   STRIDEWIRE_CHECK(tick_s > 0.0);
 }
 
@@ -45,7 +46,7 @@ Status ReplicaSet::ApplyRecord(const protocol::Movements& message, std::size_t i
     ++avatar_count_;
   }
   if ((message.flags[i] & protocol::kPoseDiscontinuity) != 0) found->second.discontinuity = true;
-  return found->second.replica->Apply(message.record(i));
+  return found->second.replica->Apply(message.record(i), plan_scratch_);
 }
 
 void ReplicaSet::EmitPose(const protocol::Movements& message, protocol::AvatarId id, Avatar& avatar,

@@ -79,6 +79,7 @@ class ReplicaSet {
   std::map<std::uint16_t, Shard> shards_;
   std::vector<AvatarReplica*> scratch_;
   SoaPoseEvaluator evaluator_;
+  FootPlanScratch plan_scratch_;
 };
 
 }  // namespace stridewire::client

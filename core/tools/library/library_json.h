@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
+#include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {

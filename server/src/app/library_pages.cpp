@@ -9,11 +9,11 @@
 #include <vector>
 
 #include "runtime/library/convex_hull.h"
-#include "runtime/weights/correction.h"
-#include "runtime/weights/measure.h"
 #include "runtime/movement/movement.h"
 #include "runtime/plan/request_plan.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/base/error.h"
 
 namespace stridewire::server {
@@ -115,7 +115,7 @@ class MovementPreview {
       : library_(library),
         group_index_(group_index),
         group_(library.group(group_index)),
-        scratch_(static_cast<std::size_t>(library.max_example_count())),
+        scratch_(library),
         cache_(library.layout()),
         pose_(library.skeleton().joint_count()) {
     metric_.fill(1.0);
@@ -139,11 +139,12 @@ class MovementPreview {
   // number of iterations of the correction.
   int ComputeWeights(const ParameterValues& p, bool is_corrected) {
     if (is_corrected) {
-      return CorrectWeights(library_, group_index_, p, DefaultCorrectionLimits(group_), scratch_,
-                            movement_)
-          .iterations;
+      const stridewire::Correction correction =
+          CorrectWeights(group_, p, DefaultCorrectionLimits(group_), scratch_, movement_);
+      movement_.group = group_index_;
+      return correction.iterations;
     }
-    SetWeights(group_, group_index_, Span(p), scratch_, movement_);
+    SetWeights(group_, group_index_, Span(p), scratch_.weights(group_), movement_);
     return 0;
   }
 
@@ -192,7 +193,7 @@ class MovementPreview {
   const MotionLibrary& library_;
   int group_index_;
   const MotionGroup& group_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
   GridCache cache_;
   Pose pose_;
   Movement movement_;

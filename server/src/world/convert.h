@@ -1,9 +1,9 @@
 #pragma once
 
 #include "net/transport.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/base/error.h"
 #include "stridewire/protocol/messages.h"
-#include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/terrain.h"
 

@@ -25,6 +25,7 @@ static_assert(kCacheLineBytes / kPieceBytes == protocol::CompactCodec::kMaxTrail
 PoseScratch::PoseScratch(std::shared_ptr<const MotionLibrary> of_library)
     : library(std::move(of_library)),
       evaluator(*library, static_cast<int>(EncodedPoseCache::kMaxTicksAhead)),
+      plan(*library),
       stored(library->skeleton().joint_count()),
       pose(library->skeleton().joint_count()) {}
 
@@ -155,7 +156,7 @@ void EncodedPoseCache::Request(Slot& slot, AvatarSimulation& avatar) {
     Schedule(slot, avatar.revision(), *movement, avatar.movement_time_s());
     return;
   }
-  avatar.ShowPose();
+  avatar.UpdatePose();
   Store(slot, avatar.revision(), avatar.pose(), !has_layers);
 }
 

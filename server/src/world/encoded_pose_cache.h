@@ -22,6 +22,7 @@ struct PoseScratch {
 
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;  ///< For up to EncodedPoseCache::kMaxTicksAhead poses.
+  PlanScratch plan;  ///< For starting movements.
   EvaluationBatcher batcher;
   SoaPose stored;  ///< Poses given to EncodedPoseCache::Store.
   Pose pose;
@@ -162,6 +163,7 @@ class EncodedPoseCache {
   [[nodiscard]] Vec3 FindRoot(const Slot& slot) const;
 
   [[nodiscard]] SoaPoseEvaluator& evaluator() { return scratch_->evaluator; }
+  [[nodiscard]] PlanScratch& plan_scratch() { return scratch_->plan; }
 
  private:
   static constexpr std::size_t kLanes = SoaPose::kLanes;

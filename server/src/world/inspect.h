@@ -4,6 +4,7 @@
 
 #include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/protocol/messages.h"
 
 namespace stridewire::server {
 

@@ -13,7 +13,7 @@ std::shared_ptr<const PoseQuantizations> MakePoseQuantizations(const MotionLibra
   for (const Joint& joint : library.skeleton().joints) {
     parents.push_back(static_cast<std::int16_t>(joint.parent));
   }
-  std::vector<std::uint16_t> reduced = ChooseFewerJoints(library);
+  std::vector<std::uint16_t> reduced = ChooseReducedJoints(library);
   auto codecs = protocol::CompactCodecs::Make(joints, parents, reduced);
   STRIDEWIRE_CHECK(codecs.has_value());  // the chosen quantizations are always valid
   return std::make_shared<const PoseQuantizations>(std::move(joints), std::move(reduced),

@@ -8,6 +8,7 @@
 #include "base/check.h"
 #include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/motion_library.h"
 #include "world/pose_quantizations.h"
 #include "world/world_terrain.h"

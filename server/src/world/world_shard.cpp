@@ -297,7 +297,7 @@ void WorldShard::AdvanceAvatars(std::uint64_t tick, int steps) {
   const double step_s = clock_.tick_s();
   const std::span<const OrderedAvatar> ordered = OrderedAvatars();
   for (int step = 1; step <= steps; ++step) {
-    AvatarSimulation::AdvanceStates(advancing_, step_s, &eventful_);
+    AvatarSimulation::AdvanceStates(advancing_, step_s, cache_.plan_scratch(), &eventful_);
     ++step_;
     --steps_left_;
     if (interest_.movements()) RecordMovements();
@@ -376,7 +376,7 @@ void WorldShard::RecordMovements() {
   for (const std::uint32_t row : eventful_) {
     const auto& [id, entry] = ordered[row];
     if (!AppendChange(entry->avatar, movements_.back().records)) continue;
-    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().is_any;
+    const bool is_new = entry->spawn_tick == tick_ && entry->avatar.change().needs_state;
     add(id, is_new ? protocol::kPoseDiscontinuity : 0);
   }
   const std::size_t parts = movements_.size() - first;

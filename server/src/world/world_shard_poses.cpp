@@ -75,7 +75,7 @@ void WorldShard::EvaluatePoses(std::span<const std::uint32_t> rows) {
   const std::span<const OrderedAvatar> ordered = OrderedAvatars();
   evaluated_.clear();
   for (const std::uint32_t row : rows) evaluated_.push_back(&ordered[row].entry->avatar);
-  AvatarSimulation::ShowPoses(evaluated_, cache_.evaluator());
+  AvatarSimulation::UpdatePoses(evaluated_, cache_.evaluator());
 }
 
 std::shared_ptr<const SpatialGrid> WorldShard::GridAt(std::uint64_t tick) {

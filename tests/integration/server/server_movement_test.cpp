@@ -30,7 +30,7 @@ using PoseMap = std::map<std::pair<std::uint64_t, AvatarId>, PoseBytes>;  // by 
 class MovementReader {
  public:
   explicit MovementReader(std::shared_ptr<const MotionLibrary> library)
-      : library_(std::move(library)), evaluator_(*library_, 1) {}
+      : library_(std::move(library)), evaluator_(*library_, 1), plan_scratch_(*library_) {}
 
   Status Apply(const protocol::Movements& message) {
     Shard& shard = shards_[message.shard];
@@ -55,7 +55,7 @@ class MovementReader {
         shard.avatars.erase(avatar);
         continue;
       }
-      if (Status status = replica->Apply(message.record(i)); !status) return status;
+      if (Status status = replica->Apply(message.record(i), plan_scratch_); !status) return status;
       due.push_back(avatar);
     }
     if (!message.states) {
@@ -100,6 +100,7 @@ class MovementReader {
 
   std::shared_ptr<const MotionLibrary> library_;
   SoaPoseEvaluator evaluator_;
+  FootPlanScratch plan_scratch_;
   std::map<std::uint16_t, Shard> shards_;
 };
 

@@ -7,23 +7,25 @@
 
 namespace stridewire {
 
-/// How the rotation q of one joint is told in few bits: by the components x, y, z of d = conj(reference) q, with the
-/// sign that makes d's w positive. Component c is low + k step, k in `bits` bits (no bits: it is `low`); w follows.
-/// A joint that turns every way has `smallest_three_bits` instead: the smallest three of q's components (pose_codec.h).
+/// How the rotation q of one joint is quantized: by the components x, y, z of d = conj(reference)
+/// q, negated if d's w is negative. Component c is low + k * step, with k stored in `bits` bits;
+/// without bits it is `low`. w follows from the other components. A joint that may rotate in any
+/// direction uses smallest-three encoding of q instead, with `smallest_three_bits` per component.
 struct RotationQuantization {
   static constexpr std::uint8_t kMaxBits = 16;
   static constexpr std::uint8_t kMinFreeBits = 8;
   static constexpr std::uint8_t kMaxFreeBits = 15;
   static constexpr float kMinStep = 0x1p-20f;
-  /// With a smaller w the last component would be badly told by the others.
+  /// If w is smaller, it follows from the other components with too large an error.
   static constexpr float kMinLeastW = 0.3f;
 
   Quat reference = kIdentityQuat;
-  Vec3 low = Vec3(0.0f);               ///< -1 to 1
-  Vec3 step = Vec3(1.0f);              ///< kMinStep to 2; without bits all that is told as `low`
-  std::array<std::uint8_t, 3> bits{};  ///< 0 to kMaxBits
-  std::uint8_t smallest_three_bits = 0;          ///< 0, or kMinFreeBits to kMaxFreeBits of each of the three
-  float least_w = 1.0f;                ///< d's w is not below it, kMinLeastW to 1
+  Vec3 low = Vec3(0.0f);               ///< In [-1, 1].
+  Vec3 step = Vec3(1.0f);              ///< kMinStep to 2; unused without bits.
+  std::array<std::uint8_t, 3> bits{};  ///< 0 to kMaxBits per component.
+  /// 0, or kMinFreeBits to kMaxFreeBits for smallest-three encoding.
+  std::uint8_t smallest_three_bits = 0;
+  float least_w = 1.0f;  ///< Lower bound for d's w, kMinLeastW to 1.
   bool operator==(const RotationQuantization&) const = default;
 };
 

@@ -20,8 +20,8 @@ struct Capture {
   std::string path;   ///< As the caller gave it.
   Skeleton skeleton;  ///< With both legs identified.
   Clip clip;
-  double unit_m = 1.0;   ///< Length of one file unit in metres, detected or given.
-  int first_frame = 0;   ///< Number of frames at the start that hold an artificial rest pose.
+  double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
+  int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
   std::vector<std::string> notes;  ///< What the reader assumed or repaired, one sentence each.
 };
 

@@ -19,8 +19,9 @@ enum class AvatarEventType : std::uint8_t {
   kFootStrike,  ///< A foot touched the ground: which foot, and where its ball is.
   kFinished,    ///< A movement ended: the new base frame.
   kIdle,        ///< The avatar stands still and its queue is empty.
-  /// A request could not be carried out: code and reason. If the request was a step that had to hit a
-  /// footprint exactly, also the nearest footprint in reach. The requests queued after it are played.
+  /// A request could not be carried out: code and reason. If the request was a step that had to hit
+  /// a footprint exactly, also the nearest footprint in reach. The requests queued after it are
+  /// played.
   kRejected,
 };
 
@@ -51,8 +52,8 @@ struct AvatarEvent {
   std::optional<FootprintError> missed;      ///< kRejected: set for footprints only.
 };
 
-/// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is out
-/// of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off".
+/// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is
+/// out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off".
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
 /// How a movement that begins takes over from the pose displayed before it.
@@ -71,15 +72,15 @@ struct AvatarOptions {
   /// Hold feet still where they land. If false, feet follow the blended pose and may slide.
   bool foot_planting = true;
   BlendKind blend = BlendKind::kInertialization;
-  /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a height
-  /// then raise or lower it.
+  /// Ground that the feet land on. Null: level ground at the avatar's height; requests with a
+  /// height then raise or lower it.
   std::shared_ptr<const Terrain> terrain;
 };
 
 class AvatarSimulation;
 
-/// A character that plays requests one after the other: base frame, queue of requests, movement under
-/// way, displayed pose.
+/// A character that plays requests one after the other: base frame, queue of requests, movement
+/// under way, displayed pose.
 ///
 /// Time is an argument: only Advance moves the avatar. The same library, start, requests and time
 /// steps give the same pose bytes on every machine. Not thread-safe; avatars share nothing but the
@@ -98,15 +99,15 @@ class Avatar {
 
   /// Validates and queues a request. A request that interrupts empties the queue first.
   ///
-  /// Errors: those of ValidateRequest; kUnsupported: an exact footprint was requested while feet are
-  /// not planted; kLimitExceeded: the queue holds kMaxQueue requests.
+  /// Errors: those of ValidateRequest; kUnsupported: an exact footprint was requested while feet
+  /// are not planted; kLimitExceeded: the queue holds kMaxQueue requests.
   [[nodiscard]] Status Enqueue(const MovementRequest& request);
 
   /// Drops the requests that have not started and returns their number.
   int CancelQueue();
 
-  /// Starts, changes or ends a layer with the next Advance. kNotFound: no such layer; kOutOfRange: a
-  /// number is not finite or out of its range; kLimitExceeded: four layers are playing.
+  /// Starts, changes or ends a layer with the next Advance. kNotFound: no such layer; kOutOfRange:
+  /// a number is not finite or out of its range; kLimitExceeded: four layers are playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
@@ -120,6 +121,7 @@ class Avatar {
   void SetTerrain(std::shared_ptr<const Terrain> terrain);
 
   /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
+  /// The first call allocates scratch memory; avatars of an AvatarCrowd share that of the crowd.
   void Advance(double dt_s);
 
   /// Displayed pose in world space. Valid until the next call that is not const.
@@ -142,8 +144,8 @@ class Avatar {
   std::unique_ptr<AvatarSimulation> simulation_;
 };
 
-/// Advances many avatars of one library together, several times as fast as one by one. Every pose has
-/// the same bytes as if the avatar had been advanced alone. Owns scratch memory only.
+/// Advances many avatars of one library together, several times as fast as one by one. Every pose
+/// has the same bytes as if the avatar had been advanced alone. Owns scratch memory only.
 class AvatarCrowd {
  public:
   explicit AvatarCrowd(std::shared_ptr<const MotionLibrary> library);

@@ -83,7 +83,7 @@ struct MovementRequest {
 
 /// Starts, changes or ends one of the library's layer clips on top of the movement.
 struct LayerRequest {
-  int layer = 0;  ///< Index in MotionLibrary::layers().
+  int layer = 0;         ///< Index in MotionLibrary::layers().
   bool enabled = true;   ///< False ends the layer; weight and speed are then ignored.
   double weight = 1.0;   ///< (0, 1]; multiplies the joint mask of the clip.
   double blend_s = 0.3;  ///< Seconds until weight and speed are reached, [0, kMaxLayerBlendS].

@@ -110,10 +110,11 @@ GroupProbe::GroupProbe(const Skeleton& skeleton, int max_example_count)
       layout_(skeleton.joint_count()),
       cache_(layout_),
       pose_(skeleton.joint_count()),
-      scratch_(static_cast<std::size_t>(max_example_count)) {}
+      scratch_(skeleton, layout_, max_example_count) {}
 
 HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
-  SetWeights(group, -1, std::span(p.values).first(group.parameters.size()), scratch_, movement_);
+  SetWeights(group, -1, std::span(p.values).first(group.parameters.size()), scratch_.weights(group),
+             movement_);
   cache_.Clear();
   HullPoint point{.p = p};
   for (const float weight : movement_.weights) {
@@ -126,7 +127,7 @@ HullPoint GroupProbe::At(const MotionGroup& group, const ParameterValues& p) {
 
 Correction GroupProbe::Correct(const MotionGroup& group, const ParameterValues& wanted,
                                const CorrectionLimits& limits) {
-  return CorrectWeights(skeleton_, layout_, group, wanted, limits, scratch_, movement_);
+  return CorrectWeights(group, wanted, limits, scratch_, movement_);
 }
 
 std::vector<GroupProbe> MakeProbes(const MotionLibrary& library, int threads) {

@@ -35,8 +35,8 @@ class GroupProbe {
                                    const CorrectionLimits& limits);
 
   // Returns the weights [n] of the last Correct.
-  [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) const {
-    return std::span(scratch_).first(static_cast<std::size_t>(group.example_count));
+  [[nodiscard]] std::span<const double> Weights(const MotionGroup& group) {
+    return scratch_.weights(group);
   }
 
  private:
@@ -45,7 +45,7 @@ class GroupProbe {
   GridCache cache_;
   Pose pose_;
   Movement movement_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
 };
 
 // Creates one probe per thread. `threads` = 0: one per processor.

@@ -174,7 +174,7 @@ class Comparer {
     const auto smooth = smoothness ? FitSmooth(group_, others.examples, *smoothness) : nullptr;
     const auto n = static_cast<std::size_t>(group_.example_count);
     std::vector<double> shares(others.clusters.size() * n);
-    std::vector<double> scratch(n);
+    CorrectionScratch scratch(library_.skeleton(), library_.layout(), group_.example_count);
     for (std::size_t c = 0; c < others.clusters.size(); ++c) {
       const std::span<double> share = std::span(shares).subspan(c * n, n);
       const std::vector<int>& cluster = others.clusters[c];
@@ -184,9 +184,8 @@ class Comparer {
       if (smooth == nullptr) continue;
       const std::span<const double> site =
           std::span(others.sites).subspan(c * wanted.size(), wanted.size());
-      if (SetSmoothWeights(*smooth, library_.layout(), library_.skeleton(), site, scratch,
-                           movement_)) {
-        std::copy_n(scratch.begin(), n, share.begin());
+      if (SetSmoothWeights(*smooth, site, scratch, movement_)) {
+        std::ranges::copy(scratch.weights(group_), share.begin());
       }
     }
     const auto fitted = FitOthers(group_, others.sites, shares, smooth != nullptr);
@@ -194,8 +193,7 @@ class Comparer {
     ParameterValues applied{.count = group_.parameter_count()};
     ProjectOntoHull(others.sites, MetricOf(group_), kHullGrowth, wanted,
                     std::span(applied.values).first(wanted.size()));
-    CorrectWeights(library_.skeleton(), library_.layout(), fitted->group, applied,
-                   DefaultCorrectionLimits(group_), scratch, movement_);
+    CorrectWeights(fitted->group, applied, DefaultCorrectionLimits(group_), scratch, movement_);
     return {movement_.weights.begin(), movement_.weights.end()};
   }
 

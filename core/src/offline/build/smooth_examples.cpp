@@ -147,11 +147,9 @@ std::unique_ptr<const SmoothGroup> FitSmooth(const MotionGroup& group,
   return smooth;
 }
 
-bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout, const Skeleton& skeleton,
-                      std::span<const double> parameters, std::span<double> scratch,
-                      Movement& movement) {
-  STRIDEWIRE_CHECK(scratch.size() >= static_cast<std::size_t>(smooth.group.example_count));
-  const Correction solved = CorrectWeights(skeleton, layout, smooth.group, ValuesOf(parameters),
+bool SetSmoothWeights(const SmoothGroup& smooth, std::span<const double> parameters,
+                      CorrectionScratch& scratch, Movement& movement) {
+  const Correction solved = CorrectWeights(smooth.group, ValuesOf(parameters),
                                            {.max_iterations = kSolveIterations}, scratch, movement);
   return solved.error_m <= kMaxMissM;
 }
@@ -244,14 +242,14 @@ std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLay
   const auto smoothness = ChooseSmoothness(group, all, MovementProducts(group, layout, skeleton));
   const auto smooth = smoothness ? FitSmooth(group, all, *smoothness) : nullptr;
   if (smooth == nullptr) return std::nullopt;
-  std::vector<double> scratch(all.size());
+  CorrectionScratch scratch(skeleton, layout, group.example_count);
   GridCache cache(layout);
   Pose pose(skeleton.joint_count());
   Movement movement;
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   for (GridExample& example : examples) {
     STRIDEWIRE_CHECK(example.parameters.size() == group.parameters.size());
-    if (!SetSmoothWeights(*smooth, layout, skeleton, example.parameters, scratch, movement)) {
+    if (!SetSmoothWeights(*smooth, example.parameters, scratch, movement)) {
       continue;
     }
     cache.Clear();

@@ -8,6 +8,7 @@
 #include "offline/build/grid_example.h"
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/movement/movement.h"
+#include "runtime/weights/correction.h"
 #include "stridewire/base/error.h"
 #include "stridewire/runtime/motion_library.h"
 
@@ -46,11 +47,10 @@ struct SmoothGroup {
                                                            const Smoothness& smoothness);
 
 // Sets group, parameters and weights of `movement` to the smooth movement with `parameters` [d].
-// Returns false if it misses the parameters by more than 0.1 mm. `scratch` [n] receives the
+// Returns false if it misses the parameters by more than 0.1 mm. `scratch` receives the
 // weights.
-[[nodiscard]] bool SetSmoothWeights(const SmoothGroup& smooth, const GridLayout& layout,
-                                    const Skeleton& skeleton, std::span<const double> parameters,
-                                    std::span<double> scratch, Movement& movement);
+[[nodiscard]] bool SetSmoothWeights(const SmoothGroup& smooth, std::span<const double> parameters,
+                                    CorrectionScratch& scratch, Movement& movement);
 
 // Returns the inner products of the movements of a group: <X_i, X_k> [n][n], in square metres,
 // where X_i are the joint positions of example i over its grid points. They are means over points

@@ -1,9 +1,8 @@
-#include "runtime/avatar/avatar_simulation.h"
-
 #include <utility>
 #include <vector>
 
 #include "base/check.h"
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/soa_pose_evaluator.h"
 
 namespace stridewire {
@@ -38,11 +37,12 @@ double Avatar::time_s() const { return simulation_->time_s(); }
 struct AvatarCrowd::Scratch {
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;
+  PlanScratch plan;
   std::vector<AvatarSimulation*> simulations;  // of the avatars of one Advance
 };
 
 AvatarCrowd::AvatarCrowd(std::shared_ptr<const MotionLibrary> library)
-    : scratch_(new Scratch{library, SoaPoseEvaluator(*library, 1), {}}) {}
+    : scratch_(new Scratch{library, SoaPoseEvaluator(*library, 1), PlanScratch(*library), {}}) {}
 
 AvatarCrowd::~AvatarCrowd() = default;
 AvatarCrowd::AvatarCrowd(AvatarCrowd&&) noexcept = default;
@@ -54,7 +54,7 @@ void AvatarCrowd::Advance(std::span<Avatar* const> avatars, double dt_s) {
     STRIDEWIRE_CHECK(&avatar->library() == scratch_->library.get());
     scratch_->simulations.push_back(avatar->simulation_.get());
   }
-  AvatarSimulation::AdvanceAll(scratch_->simulations, dt_s, scratch_->evaluator);
+  AvatarSimulation::AdvanceAll(scratch_->simulations, dt_s, scratch_->plan, scratch_->evaluator);
 }
 
 }  // namespace stridewire

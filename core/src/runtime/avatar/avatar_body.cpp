@@ -1,13 +1,15 @@
 #include "runtime/avatar/avatar_body.h"
-#include "runtime/pose/evaluate_poses.h"
-#include "runtime/pose/plant_feet.h"
 
 #include <algorithm>
 #include <utility>
 
+#include "base/check.h"
+#include "runtime/pose/evaluate_poses.h"
+#include "runtime/pose/plant_feet.h"
+
 namespace stridewire {
 
-void MakeRoom(const MotionLibrary& library, Movement& movement) {
+void Reserve(const MotionLibrary& library, Movement& movement) {
   const int joint_count = library.skeleton().joint_count();
   movement.difference = Pose(joint_count);
   movement.difference_velocity.joints_rad_s.resize(static_cast<std::size_t>(joint_count));
@@ -19,7 +21,7 @@ AvatarBody::AvatarBody(std::shared_ptr<const MotionLibrary> of_library)
       pose(library->skeleton().joint_count()),
       blended_pose(library->skeleton().joint_count()),
       earlier_pose(library->skeleton().joint_count()) {
-  MakeRoom(*library, movement);
+  stridewire::Reserve(*library, movement);
 }
 
 void AvatarBody::Evaluate(double time_s) {
@@ -30,6 +32,7 @@ void AvatarBody::Evaluate(double time_s) {
 }
 
 void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s <= movement.duration_s());
   const auto corrections = [&](double at_s, const Pose& blended) {
     return movement.feet.is_active
                ? CorrectFeet(library->skeleton(), library->leg_rig(), movement, at_s, blended)
@@ -46,10 +49,10 @@ void AvatarBody::CaptureBlendSource(double time_s, bool keeps_speed) {
   // If planting has not faded in completely, the next movement fades it in again from the start.
   begins_planting =
       movement.feet.is_active && time_s < movement.start_offset_s + movement.feet.plant_fade_s;
-  if (begins_planting) TakeForBlended(time_s, keeps_speed);
+  if (begins_planting) UseDisplayedAsBlended(time_s, keeps_speed);
 }
 
-void AvatarBody::TakeForBlended(double time_s, bool keeps_speed) {
+void AvatarBody::UseDisplayedAsBlended(double time_s, bool keeps_speed) {
   if (keeps_speed) {
     Evaluate(time_s - kBlendStepS);
     earlier_pose = pose;
@@ -60,28 +63,35 @@ void AvatarBody::TakeForBlended(double time_s, bool keeps_speed) {
 }
 
 void AvatarBody::CaptureFootLocks(double time_s) {
+  STRIDEWIRE_CHECK(movement.feet.is_active);
   locks = FootLocksAt(*library, movement, time_s, blended_pose);
   if (!begins_planting) return;
-  for (FootLock& hold : locks) hold.height_m = hold.turn_rad = 0.0;
+  for (FootLock& lock : locks) lock.height_m = lock.turn_rad = 0.0;
 }
 
 void AvatarBody::StartWeighted(const BaseFrame& base) {
   stridewire::StartWeighted(group(), base, movement);
 }
 
-void AvatarBody::EnterAt(double time_s) {
+void AvatarBody::SetStartOffset(double time_s) {
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s < movement.duration_s());
   movement.start_offset_s = time_s;
   movement.ease_out_s = std::min(kEaseOutS, movement.duration_s() - time_s);
 }
 
 template <typename Landing>
-void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
+void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch) {
+  STRIDEWIRE_CHECK(movement.group >= 0);
+  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group().example_count));
+  STRIDEWIRE_CHECK(movement.start_offset_s < movement.duration_s());
+  STRIDEWIRE_CHECK(!plants_feet || library->leg_rig().is_usable);
   std::optional<ConstPoseSpan> earlier;
   if (keeps_speed) earlier.emplace(earlier_pose);
-  GridCache cache(library->layout());
+  GridCache& cache = scratch.cache();
+  cache.Clear();
   if (plants_feet) {
-    KeepFeetGoing(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, cache,
-                                        pose, movement));
+    ContinueFeet(keeps_speed, PlanFeet(*library, locks, landing, {blended_pose, earlier}, scratch,
+                                       pose, movement));
     if (begins_planting) BeginPlantFade(library->leg_rig(), blended_pose, movement, pose);
     movement.feet.packed = PackFootPlan(movement);
     return;
@@ -97,16 +107,17 @@ void AvatarBody::BlendInAt(const Landing& landing, bool keeps_speed) {
   }
 }
 
-void AvatarBody::BlendIn(const LandingTarget& wish, bool keeps_speed) {
-  BlendInAt(wish, keeps_speed);
+void AvatarBody::BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch) {
+  BlendInAt(target, keeps_speed, scratch);
 }
 
-void AvatarBody::BlendIn(const LandingDecision& choice, bool keeps_speed) {
-  BlendInAt(choice, keeps_speed);
+void AvatarBody::BlendIn(const LandingDecision& decision, bool keeps_speed,
+                         FootPlanScratch& scratch) {
+  BlendInAt(decision, keeps_speed, scratch);
 }
 
 // Makes the foot corrections of the planned movement continue smoothly from the previous ones.
-void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
+void AvatarBody::ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& blended) {
   const double start_offset_s = movement.start_offset_s;
   std::array<FeetCorrection, 2> planned{CorrectFeet(movement, start_offset_s, blended[0])};
   if (keeps_speed) {
@@ -118,9 +129,10 @@ void AvatarBody::KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& bl
   ContinueFrom(earlier_feet, planned, movement);
 }
 
-void AvatarBody::ShowLayers() {
+void AvatarBody::ApplyLayers() {
   has_layers = !layers.empty();
   if (!has_layers) return;
+  STRIDEWIRE_CHECK(layered_pose.rotations.size() == pose.rotations.size());
   layered_pose = pose;  // Both have the same size, so this does not allocate.
   layers.Apply(*library, layered_pose);
 }

@@ -4,70 +4,75 @@
 #include <memory>
 #include <optional>
 
+#include "runtime/movement/movement.h"
 #include "runtime/plan/foot_planner.h"
 #include "runtime/pose/layer_stack.h"
-#include "stridewire/runtime/motion_library.h"
-#include "runtime/movement/movement.h"
 #include "runtime/pose/plant_feet.h"
+#include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
 
-/// What can be seen of an avatar and what its next movement goes on from: the part that an Avatar, which decides what
-/// it does, and an AvatarReplica, which is told, have in common. Times are the movement's.
+/// The displayed state of an avatar and everything its next movement depends on. AvatarSimulation,
+/// which makes decisions, and AvatarReplica, which receives them, share this part. Times are
+/// relative to the start of the movement.
 struct AvatarBody {
   explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  Pose pose;  ///< Displayed, but for layers
+  Pose pose;  ///< Displayed pose without layers.
   LayerStack layers;
-  Pose layered_pose;  ///< With layers, if there are any; of no size before the first
+  Pose layered_pose;  ///< Pose with layers; empty until the first layer is set.
   bool has_layers = false;
-  bool plants_feet = false;      ///< What is displayed has planted feet, or would
-  bool begins_planting = false;  ///< The movement that begins next is the first planted
-  Pose blended_pose;  ///< Where a movement ended or gave way: the same before feet were planted
-  /// What a movement that begins goes on from: corrections of the feet at the end of the one before and, if it
-  /// begins then and keeps their speed, kBlendStepS before, as well as the blended pose.
+  bool plants_feet = false;  ///< True if the displayed feet are planted, or would be while moving.
+  bool begins_planting = false;  ///< The next movement is the first one with planted feet.
+  Pose blended_pose;  ///< Pose without planting at the time the movement ended or was interrupted.
+  /// Source of the next blend: foot corrections at the end of the previous movement and, if its
+  /// velocity is kept, kBlendStepS before that. `earlier_pose` is the blended pose at that earlier
+  /// time.
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
-  Movement movement;  ///< Under way, or the last one
-  FootLocks locks;    ///< Where the feet stood when the movement began
+  Movement movement;  ///< Current movement, or the last one.
+  FootLocks locks;    ///< Where the feet stood when the movement began.
 
-  [[nodiscard]] ConstPoseSpan Shown() const { return has_layers ? layered_pose : pose; }
+  [[nodiscard]] ConstPoseSpan DisplayedPose() const { return has_layers ? layered_pose : pose; }
   [[nodiscard]] const MotionGroup& group() const { return library->group(movement.group); }
 
-  /// Shows a time of the movement, and keeps what the blend has then.
+  /// Evaluates `pose` and `blended_pose` at a time of the movement.
   void Evaluate(double time_s);
 
-  /// What a movement that begins at `time_s` of this one goes on from. Leaves blended_pose at `time_s`.
+  /// Stores what the next movement, which begins at `time_s` of this one, blends from. Also
+  /// evaluates `blended_pose` at `time_s`.
   void CaptureBlendSource(double time_s, bool keeps_speed);
 
-  /// What is displayed at a time of the movement is taken for what the blend has then: whatever of it is to end is
-  /// eased out, and feet need no correction.
-  void TakeForBlended(double time_s, bool keeps_speed);
+  /// Uses the displayed pose at `time_s` as the blended pose. Everything that the next movement
+  /// does not continue fades out with the difference pose, and feet need no correction.
+  void UseDisplayedAsBlended(double time_s, bool keeps_speed);
 
-  /// Where feet that are planted stand when the movement ends at `time_s`; CaptureBlendSource came before.
+  /// Stores where the planted feet stand if the movement ends at `time_s`. Call CaptureBlendSource
+  /// first.
   void CaptureFootLocks(double time_s);
 
-  /// Goes on with a movement that has its weights, from `base`.
+  /// Starts the movement, whose weights are set, at `base`.
   void StartWeighted(const BaseFrame& base);
 
-  /// The movement just started is entered later than at its beginning.
-  void EnterAt(double time_s);
+  /// Makes the movement that was just started begin at `time_s` instead of 0.
+  void SetStartOffset(double time_s);
 
-  /// Plans the feet of the movement just started, if they are planted, and what of the pose before is eased out.
-  void BlendIn(const LandingTarget& wish, bool keeps_speed);
-  void BlendIn(const LandingDecision& choice, bool keeps_speed);
+  /// Plans the feet of the movement that was just started, if they are planted, and the difference
+  /// pose that fades out.
+  void BlendIn(const LandingTarget& target, bool keeps_speed, FootPlanScratch& scratch);
+  void BlendIn(const LandingDecision& decision, bool keeps_speed, FootPlanScratch& scratch);
 
-  /// Lays the layers over the pose.
-  void ShowLayers();
+  /// Applies the layers to the pose.
+  void ApplyLayers();
 
  private:
-  void KeepFeetGoing(bool keeps_speed, const std::array<FeetAt, 2>& blended);
+  void ContinueFeet(bool keeps_speed, const std::array<FeetAt, 2>& blended);
   template <typename Landing>
-  void BlendInAt(const Landing& landing, bool keeps_speed);
+  void BlendInAt(const Landing& landing, bool keeps_speed, FootPlanScratch& scratch);
 };
 
-/// Room for any movement of a library.
-void MakeRoom(const MotionLibrary& library, Movement& movement);
+/// Reserves memory for any movement of a library.
+void Reserve(const MotionLibrary& library, Movement& movement);
 
 }  // namespace stridewire

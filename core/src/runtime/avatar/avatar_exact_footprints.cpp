@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "base/check.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
@@ -17,7 +18,7 @@ namespace {
 constexpr double kMetM = 0.9e-3;
 constexpr double kMetRad = 1e-3;
 // Number of times between landing and the end of the step at which the pose is checked.
-constexpr int kLooks = 5;
+constexpr int kChecks = 5;
 // On terrain, a sole is lifted out of the ground if its heel or toes are below it. A lift up to
 // this height does not count as an error.
 constexpr double kLiftedM = 0.1;
@@ -53,25 +54,26 @@ std::string DescribeRejection(const AvatarEvent& event) {
 // Plans the movement of a request. If the request needs exact placement and would miss its
 // footprint, rejects it, restores the previous state and returns false.
 bool AvatarSimulation::PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                     double swing_part) {
+                                     double swing_part, PlanScratch& scratch) {
   const auto* step = std::get_if<StepRequest>(&request.movement);
   if (step == nullptr || !step->exact_only) {
-    PlanMovement(plan, swing_part);
+    PlanMovement(plan, swing_part, scratch);
     return true;
   }
   if (!body_.plants_feet) {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = request.id,
               .base = base_,
-              .reason = kNotPlanted});
+              .reason = kNeedsPlanting});
     return false;
   }
-  kept_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
-  std::swap(body_.movement, kept_.front().movement);
-  PlanMovement(plan, swing_part);
+  STRIDEWIRE_CHECK(saved_.size() == 1 && plan.exact.has_value());
+  saved_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
+  std::swap(body_.movement, saved_.front().movement);
+  PlanMovement(plan, swing_part, scratch);
   FootprintError missed = LandingErrorFrom(*plan.exact);
   if (IsMet(missed)) return true;
-  missed = NearestInReach(*plan.exact, missed, swing_part);
+  missed = NearestInReach(*plan.exact, missed, swing_part, scratch);
   AddEvent({.type = AvatarEventType::kRejected,
             .request_id = request.id,
             .kind = group().kind,
@@ -80,30 +82,32 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
             .code = ErrorCode::kOutOfRange,
             .reason = "the footprint is out of reach",
             .missed = missed});
-  std::swap(body_.movement, kept_.front().movement);
-  body_.pose = kept_.front().pose;
+  std::swap(body_.movement, saved_.front().movement);
+  body_.pose = saved_.front().pose;
   return false;
 }
 
 // Finds a footprint close to one that was missed that the avatar's step can meet exactly.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
-                                                const FootprintError& missed, double swing_part) {
+                                                const FootprintError& missed, double swing_part,
+                                                PlanScratch& scratch) {
   const Foot moving = MovingFoot(group().kind);
-  Footprint tried = asked;
-  FootprintError off = missed;
-  for (int i = 0; i < kMaxTries && !IsMet(off); ++i) {
+  Footprint aim = asked;
+  FootprintError error = missed;
+  for (int i = 0; i < kMaxTries && !IsMet(error); ++i) {
     const double further = i == 0 ? 1.0 : kOvershoot;
-    tried.position_m += further * (off.nearest.position_m - tried.position_m);
-    tried.heading_rad += further * (off.nearest.heading_rad - tried.heading_rad);
-    const auto plan = PlanRequest(
-        {.movement = StepRequest{.foot = moving,
-                                 .at = FootprintRequest{tried.position_m, tried.heading_rad}}});
-    PlanMovement(*plan, swing_part);
-    off = LandingErrorFrom(*plan->exact);
+    aim.position_m += further * (error.nearest.position_m - aim.position_m);
+    aim.heading_rad += further * (error.nearest.heading_rad - aim.heading_rad);
+    const auto plan =
+        PlanRequest({.movement = StepRequest{
+                         .foot = moving, .at = FootprintRequest{aim.position_m, aim.heading_rad}}});
+    STRIDEWIRE_CHECK(plan.has_value() && plan->exact.has_value());
+    PlanMovement(*plan, swing_part, scratch);
+    error = LandingErrorFrom(*plan->exact);
   }
-  const DVec3 away_m = asked.position_m - off.nearest.position_m;
-  return {off.nearest, std::sqrt(glm::dot(away_m, away_m)),
-          std::fabs(asked.heading_rad - off.nearest.heading_rad)};
+  const DVec3 away_m = asked.position_m - error.nearest.position_m;
+  return {error.nearest, std::sqrt(glm::dot(away_m, away_m)),
+          std::fabs(asked.heading_rad - error.nearest.heading_rad)};
 }
 
 // Computes where the planned step brings its foot, and how far that is from the requested
@@ -129,10 +133,10 @@ FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
   GridCache cache(body_.library->layout());
   FootprintError worst{asked};
   const double land_s = body_.movement.feet.foot(moving).land_s;
-  const double stands_s = body_.movement.duration_s() - land_s;
-  const int looks = stands_s > 0.0 ? kLooks : 1;
-  for (int look = 0; look < looks; ++look) {
-    const double time_s = land_s + stands_s * look / std::max(looks - 1, 1);
+  const double standing_s = body_.movement.duration_s() - land_s;
+  const int checks = standing_s > 0.0 ? kChecks : 1;
+  for (int check = 0; check < checks; ++check) {
+    const double time_s = land_s + standing_s * check / std::max(checks - 1, 1);
     EvaluateMovement(group(), body_.library->layout(), body_.movement, time_s, cache, body_.pose);
     std::array<BlendedFoot, 2> planned = feet_of_pose();
     for (std::size_t f = 0; f < 2; ++f) {
@@ -140,16 +144,16 @@ FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
           CorrectFoot(body_.movement, static_cast<Foot>(f), time_s, planned[f]).offset_m;
     }
     PlantFeet(rig, body_.movement, time_s, body_.pose);
-    const std::array<BlendedFoot, 2> lands = feet_of_pose();
-    DVec3 off_m = lands[m].ball_m - planned[m].ball_m;
-    const DVec3 from_other_m = off_m - (lands[x].ball_m - planned[x].ball_m);
-    if (glm::dot(from_other_m, from_other_m) > glm::dot(off_m, off_m)) off_m = from_other_m;
-    if (body_.movement.feet.keeps_above_ground && std::fabs(off_m.y) < kLiftedM) off_m.y = 0.0;
+    const std::array<BlendedFoot, 2> planted = feet_of_pose();
+    DVec3 error_m = planted[m].ball_m - planned[m].ball_m;
+    const DVec3 from_other_m = error_m - (planted[x].ball_m - planned[x].ball_m);
+    if (glm::dot(from_other_m, from_other_m) > glm::dot(error_m, error_m)) error_m = from_other_m;
+    if (body_.movement.feet.keeps_above_ground && std::fabs(error_m.y) < kLiftedM) error_m.y = 0.0;
     // The heights of the balls follow the blend, so compare them with the plan, not with the
     // request.
-    const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - off_m.x, -off_m.y,
-                       asked.position_m.z - planned[m].ball_m.z - off_m.z);
-    const double turn_rad = WrapAngle(asked.heading_rad - lands[m].heading_rad);
+    const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - error_m.x, -error_m.y,
+                       asked.position_m.z - planned[m].ball_m.z - error_m.z);
+    const double turn_rad = WrapAngle(asked.heading_rad - planted[m].heading_rad);
     const double distance_m =
         std::sqrt(away_m.x * away_m.x + away_m.y * away_m.y + away_m.z * away_m.z);
     if (distance_m + std::fabs(turn_rad) <= worst.distance_m + worst.turn_rad) continue;

@@ -12,15 +12,15 @@ namespace stridewire {
 
 // Movement time at which both feet are on the ground: now, if they are, else when the swing ends. A
 // jump that has begun is always completed.
-double AvatarSimulation::Landed() const {
+double AvatarSimulation::LandingTime() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && movement_time_s_ <= swing.release_s
              ? movement_time_s_
              : std::max(movement_time_s_, swing.land_s);
 }
 
-double AvatarSimulation::EndOfMovement() const {
-  return interrupts_ && !IsStartDelayed() ? std::min(Landed(), body_.movement.duration_s())
+double AvatarSimulation::MovementEnd() const {
+  return interrupts_ && !IsStartDelayed() ? std::min(LandingTime(), body_.movement.duration_s())
                                           : body_.movement.duration_s();
 }
 
@@ -52,11 +52,12 @@ void AvatarSimulation::CaptureBlendSource(double time_s) {
 // Records in change_, for replicas, that the avatar leaves the current movement at `time_s`.
 // Replicas do not know a movement that began in the same Advance, so such a change needs the whole
 // state.
-void AvatarSimulation::Leave(double time_s, bool is_redirected) {
+void AvatarSimulation::RecordLeaving(double time_s, bool is_redirected) {
   if (change_.has_left || change_.has_begun) {
-    change_.is_any = true;
+    change_.needs_state = true;
     return;
   }
+  STRIDEWIRE_CHECK(time_s >= 0.0 && time_s <= body_.movement.duration_s());
   change_.has_left = true;
   change_.left_s = time_s;
   change_.is_left_at_end = time_s == body_.movement.duration_s();
@@ -66,7 +67,8 @@ void AvatarSimulation::Leave(double time_s, bool is_redirected) {
 
 // Replaces the current step by a step of the same foot, at the same fraction of the swing. If the
 // new step is rejected, the current step continues.
-void AvatarSimulation::RedirectSwing() {
+void AvatarSimulation::RedirectSwing(PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(is_moving_ && interrupts_ && queue_size() > 0);
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   const double part = (movement_time_s_ - swing.release_s) / (swing.land_s - swing.release_s);
   MovementRequest request = queue_[queue_head_];
@@ -82,32 +84,33 @@ void AvatarSimulation::RedirectSwing() {
                          .group = body_.movement.group,
                          .is_cut_short = true,
                          .base = base_};
-  if (!PlanRequested(request, *plan, part)) return;
+  if (!PlanRequested(request, *plan, part, scratch)) return;
   AddEvent(left);
-  Leave(movement_time_s_, true);
+  RecordLeaving(movement_time_s_, true);
   BeginMovement(*plan, request.id);
 }
 
 // Applies a change of the foot planting setting. Call it before planning a movement.
 void AvatarSimulation::SwitchPlanting() {
+  STRIDEWIRE_CHECK(!is_moving_);
   if (body_.plants_feet == foot_planting()) return;
   body_.plants_feet = body_.begins_planting = foot_planting();
-  change_.is_any = true;
-  body_.TakeForBlended(movement_time_s_, keeps_speed());
+  change_.needs_state = true;
+  body_.UseDisplayedAsBlended(movement_time_s_, keeps_speed());
   if (!body_.plants_feet) return;
   const Skeleton& skeleton = body_.library->skeleton();
   const LegRig& rig = body_.library->leg_rig();
   const Terrain* terrain = options_.terrain.get();
   body_.locks = FootLocksOf(skeleton, rig, body_.pose, base_.position_m.y, terrain);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    FootLock& hold = body_.locks[static_cast<std::size_t>(foot)];
-    hold.height_m = 0.0;
-    hold.normal = Vec3(0.0f, 1.0f, 0.0f);
+    FootLock& lock = body_.locks[static_cast<std::size_t>(foot)];
+    lock.height_m = 0.0;
+    lock.normal = Vec3(0.0f, 1.0f, 0.0f);
     if (terrain != nullptr) continue;
     // The ground is level, unless the feet stand on different steps of a staircase.
-    const double stands_m =
+    const double ball_height_m =
         BallPosition(skeleton, body_.pose, foot).y - rig.side(foot).ball_height_m;
-    hold.print.position_m.y += GroundRise(stands_m - base_.position_m.y);
+    lock.print.position_m.y += GroundRise(ball_height_m - base_.position_m.y);
   }
 }
 

@@ -14,10 +14,10 @@ namespace stridewire {
 namespace {
 
 // Limits on the numbers of a record, in metres, seconds or radians, and on weights.
-constexpr double kMostOfANumber = 1e9;
-constexpr float kMostOfAWeight = 1e3f;
+constexpr double kMaxNumber = 1e9;
+constexpr float kMaxWeight = 1e3f;
 // Tolerance for the squared length of rotations, which products of rotations need.
-constexpr float kNearlyUnit = 0.02f;
+constexpr float kUnitTolerance = 0.02f;
 
 }  // namespace
 
@@ -28,11 +28,11 @@ class AvatarReplica::Reader {
 
   [[nodiscard]] const Status& status() const { return status_; }
   [[nodiscard]] bool ok() const { return status_.has_value(); }
-  void Refuse(const char* text) {
+  void Reject(const char* text) {
     if (ok()) status_ = Fail(ErrorCode::kMalformed, text, static_cast<std::int64_t>(at_));
   }
   void Finish() {
-    if (at_ != record_.size()) Refuse("a movement record has extra bytes at its end");
+    if (at_ != record_.size()) Reject("a movement record has extra bytes at its end");
   }
 
   void F64(double& value) { Number(value); }
@@ -51,16 +51,16 @@ class AvatarReplica::Reader {
     std::uint8_t byte = 0;
     Take(&byte, sizeof byte);
     value = byte == 1;
-    if (byte > 1) Refuse("a flag of a movement record is neither 0 nor 1");
+    if (byte > 1) Reject("a flag of a movement record is neither 0 nor 1");
   }
   void CheckUnit(Quat& q) {
-    if (std::fabs(Dot(q, q) - 1.0f) <= kNearlyUnit) return;
-    Refuse("a rotation in a movement record is not of unit length");
+    if (std::fabs(Dot(q, q) - 1.0f) <= kUnitTolerance) return;
+    Reject("a rotation in a movement record is not of unit length");
     q = kIdentityQuat;
   }
   void CheckUnit(Vec3& v) {
-    if (std::fabs(glm::dot(v, v) - 1.0f) <= kNearlyUnit && v.y > 0.0f) return;
-    Refuse("a normal in a movement record is not of unit length or does not point up");
+    if (std::fabs(glm::dot(v, v) - 1.0f) <= kUnitTolerance && v.y > 0.0f) return;
+    Reject("a normal in a movement record is not of unit length or does not point up");
     v = Vec3(0.0f, 1.0f, 0.0f);
   }
 
@@ -69,14 +69,14 @@ class AvatarReplica::Reader {
   void Number(T& value) {
     value = 0;
     Take(&value, sizeof value);
-    if (std::fabs(value) <= static_cast<T>(kMostOfANumber)) return;
-    Refuse("a number in a movement record is not finite or is too large");
+    if (std::fabs(value) <= static_cast<T>(kMaxNumber)) return;
+    Reject("a number in a movement record is not finite or is too large");
     value = 0;
   }
   void Take(void* value, std::size_t bytes) {
     if (!ok()) return;
     if (record_.size() - at_ < bytes) {
-      Refuse("a movement record is truncated");
+      Reject("a movement record is truncated");
       return;
     }
     std::memcpy(value, record_.data() + at_, bytes);
@@ -96,13 +96,13 @@ void ReadLayers(const MotionLibrary& library, LayerStack& layers, Reader& reader
   reader.Index(count);
   std::array<LayerStack::Playing, LayerStack::kMaxLayers> playing{};
   if (count > static_cast<int>(playing.size())) {
-    reader.Refuse("a movement record contains too many layers");
+    reader.Reject("a movement record contains too many layers");
     return;
   }
-  const auto told = std::span(playing).first(static_cast<std::size_t>(count));
-  for (LayerStack::Playing& p : told) record::LayerFields(reader, p);
-  if (reader.ok() && !layers.Restore(library, told)) {
-    reader.Refuse("a movement record contains an invalid layer");
+  const auto layers_read = std::span(playing).first(static_cast<std::size_t>(count));
+  for (LayerStack::Playing& p : layers_read) record::LayerFields(reader, p);
+  if (reader.ok() && !layers.Restore(library, layers_read)) {
+    reader.Reject("a movement record contains an invalid layer");
   }
 }
 
@@ -112,7 +112,7 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
   reader.Index(group);
   if (!reader.ok()) return;
   if (static_cast<std::size_t>(group) >= library.groups().size()) {
-    reader.Refuse("a movement record refers to a group that the library does not have");
+    reader.Reject("a movement record refers to a group that the library does not have");
     return;
   }
   movement.group = group;
@@ -124,8 +124,8 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
     sum += static_cast<double>(weight);
     magnitude = std::max(magnitude, std::fabs(static_cast<double>(weight)));
   }
-  if (!(std::fabs(sum - 1.0) <= 1e-3) || magnitude > kMostOfAWeight) {
-    reader.Refuse("weights of a movement record do not sum to 1");
+  if (!(std::fabs(sum - 1.0) <= 1e-3) || magnitude > kMaxWeight) {
+    reader.Reject("weights of a movement record do not sum to 1");
   }
 }
 
@@ -134,11 +134,11 @@ void ReadWeights(const MotionLibrary& library, Movement& movement, Reader& reade
 void SetTimes(MovementKind kind, Movement& movement) {
   const SwingTimes times = SwingTimesOf(kind, movement);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-    FootTrajectory& track = movement.feet.foot(foot);
+    FootTrajectory& trajectory = movement.feet.foot(foot);
     const bool moves = !IsStep(kind) || foot == MovingFoot(kind);
-    track.release_s = moves ? times.release_s : FootTrajectory::kNever;
-    track.land_s = moves ? times.land_s : FootTrajectory::kNever;
-    track.root_weight = !IsStep(kind) ? 0.5 : moves ? 0.0 : 1.0;
+    trajectory.release_s = moves ? times.release_s : FootTrajectory::kNever;
+    trajectory.land_s = moves ? times.land_s : FootTrajectory::kNever;
+    trajectory.root_weight = !IsStep(kind) ? 0.5 : moves ? 0.0 : 1.0;
   }
 }
 
@@ -147,14 +147,15 @@ void SetTimes(MovementKind kind, Movement& movement) {
 AvatarReplica::AvatarReplica(std::shared_ptr<const MotionLibrary> library)
     : body_(std::move(library)) {
   body_.layered_pose = body_.pose;
-  body_.layers.MakeRoom();
+  body_.layers.Reserve();
 }
 
 bool AvatarReplica::IsState(std::span<const std::byte> record) {
   return !record.empty() && (std::to_integer<unsigned>(record[0]) & record::kIsState) != 0;
 }
 
-Status AvatarReplica::Apply(std::span<const std::byte> record) {
+Status AvatarReplica::Apply(std::span<const std::byte> record, FootPlanScratch& scratch) {
+  STRIDEWIRE_CHECK(&scratch.library() == &library());
   Reader reader(record);
   const unsigned flags = reader.Flags();
   if ((flags & record::kIsState) != 0) {
@@ -162,37 +163,38 @@ Status AvatarReplica::Apply(std::span<const std::byte> record) {
   } else if (!is_known_) {
     return Fail(ErrorCode::kNotFound, "a change record arrived before the first state record");
   } else {
-    ReadChange(flags, reader);
+    ReadChange(flags, reader, scratch);
   }
   is_known_ = reader.ok();
   is_idle_ = (flags & record::kIsIdle) != 0;
   return reader.status();
 }
 
-void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
+void AvatarReplica::ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch) {
   // Check each part of the record before applying it, because the steps cannot be undone.
   Movement& movement = body_.movement;
   const bool has_left = (flags & record::kLeft) != 0;
   const bool has_begun = (flags & record::kMoves) != 0;
   if (has_left && !is_moving_) {
-    reader.Refuse("a movement record ends a movement, but none is in progress");
+    reader.Reject("a movement record ends a movement, but none is in progress");
     return;
   }
   if (has_begun && is_moving_ && !has_left) {
-    reader.Refuse("a movement record begins a movement before the current one ends");
+    reader.Reject("a movement record begins a movement before the current one ends");
     return;
   }
   if (has_begun && ((flags & record::kPlants) != 0) != body_.plants_feet) {
-    reader.Refuse("a movement record does not agree with the state about foot planting");
+    reader.Reject("a movement record does not agree with the state about foot planting");
     return;
   }
   if (has_left) {
     double left_s = movement.duration_s();
     if ((flags & record::kLeftAtEnd) == 0) reader.F64(left_s);
     if (!(left_s >= 0.0 && left_s <= movement.duration_s())) {
-      reader.Refuse("a movement record ends a movement at a time outside its duration");
+      reader.Reject("a movement record ends a movement at a time outside its duration");
     }
     if (!reader.ok()) return;
+    STRIDEWIRE_CHECK(is_moving_ && is_known_);
     body_.CaptureBlendSource(left_s, (flags & record::kLeftKeepsSpeed) != 0);
     if (movement.feet.is_active && (flags & record::kIsRedirected) == 0)
       body_.CaptureFootLocks(left_s);
@@ -202,14 +204,14 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     double time_s = 0.0;
     double start_offset_s = 0.0;
     BaseFrame base;
-    LandingDecision choice{.is_on_terrain = (flags & record::kOnTerrain) != 0};
+    LandingDecision decision{.is_on_terrain = (flags & record::kOnTerrain) != 0};
     reader.F64(time_s);
     ReadWeights(*body_.library, movement, reader);
     reader.F64(base.heading_rad);
     if ((flags & record::kIsEntered) != 0) reader.F64(start_offset_s);
     if (!reader.ok()) return;
     if (body_.plants_feet) {
-      record::ChoiceFields(reader, flags, body_.group().kind, choice);
+      record::DecisionFields(reader, flags, body_.group().kind, decision);
     } else {
       record::Vector(reader, base.position_m);
     }
@@ -217,18 +219,18 @@ void AvatarReplica::ReadChange(unsigned flags, Reader& reader) {
     body_.StartWeighted(base);
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           time_s >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement at a time outside its duration");
+      reader.Reject("a movement record begins a movement at a time outside its duration");
       return;
     }
-    body_.EnterAt(start_offset_s);
-    body_.BlendIn(choice, (flags & record::kKeepsSpeed) != 0);
+    body_.SetStartOffset(start_offset_s);
+    body_.BlendIn(decision, (flags & record::kKeepsSpeed) != 0, scratch);
     body_.begins_planting = false;
     movement_time_s_ = time_s;
-    is_moving_ = is_told_ = true;
+    is_moving_ = is_time_set_ = true;
   }
   if ((flags & record::kLayers) != 0) {
     ReadLayers(*body_.library, body_.layers, reader);
-    are_layers_told_ = true;
+    are_layers_set_ = true;
   }
   reader.Finish();
 }
@@ -240,7 +242,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   body_.begins_planting = (flags & record::kBeginsPlanting) != 0;
   is_moving_ = (flags & record::kMoves) != 0;
   if (body_.plants_feet && !body_.library->leg_rig().is_usable) {
-    reader.Refuse("a movement record plants feet, but the library does not support it");
+    reader.Reject("a movement record plants feet, but the library does not support it");
     return;
   }
   if (body_.plants_feet) record::FootLockFields(reader, body_.locks);
@@ -259,10 +261,10 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
     movement.extra_turn_rad = extra_turn_rad;
     if (!(start_offset_s >= 0.0 && start_offset_s < movement.duration_s() &&
           movement_time_s_ >= start_offset_s)) {
-      reader.Refuse("a movement record begins a movement at a time outside its duration");
+      reader.Reject("a movement record begins a movement at a time outside its duration");
       return;
     }
-    body_.EnterAt(start_offset_s);
+    body_.SetStartOffset(start_offset_s);
     if (record::NeedsDifference(movement, movement_time_s_)) {
       record::DifferenceFields(reader, movement);
     }
@@ -270,9 +272,9 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
       movement.feet.is_active = true;
       SetTimes(body_.group().kind, movement);
       record::PlanFields(reader, movement.feet);
-      for (const FootResidual& rest : movement.feet.residuals) {
-        if (!(rest.over_s > 0.0))
-          reader.Refuse("a foot residual in a movement record has no duration");
+      for (const FootResidual& residual : movement.feet.residuals) {
+        if (!(residual.over_s > 0.0))
+          reader.Reject("a foot residual in a movement record has no duration");
       }
       movement.feet.packed = PackFootPlan(movement);
     }
@@ -290,7 +292,7 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
   } else {
     body_.layers.Clear();
   }
-  is_told_ = are_layers_told_ = true;
+  is_time_set_ = are_layers_set_ = true;
   reader.Finish();
 }
 
@@ -305,15 +307,15 @@ void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double 
     for (AvatarReplica* replica : block) {
       STRIDEWIRE_CHECK(&replica->library() == &library);
       if (!replica->is_known_ || !replica->is_moving_) continue;
-      if (!replica->is_told_) replica->movement_time_s_ += dt_s;
+      if (!replica->is_time_set_) replica->movement_time_s_ += dt_s;
       jobs[moving++] = {&replica->body_.movement, replica->movement_time_s_, &replica->body_.pose};
     }
     EvaluatePoses(evaluator, std::span(jobs).first(moving));
     for (AvatarReplica* replica : block) {
       if (!replica->is_known_) continue;
-      if (!replica->are_layers_told_) replica->body_.layers.Advance(library, dt_s);
-      replica->body_.ShowLayers();
-      replica->is_told_ = replica->are_layers_told_ = false;
+      if (!replica->are_layers_set_) replica->body_.layers.Advance(library, dt_s);
+      replica->body_.ApplyLayers();
+      replica->is_time_set_ = replica->are_layers_set_ = false;
     }
     replicas = replicas.subspan(block.size());
   }

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "stridewire/base/error.h"
 #include "runtime/avatar/avatar_body.h"
 #include "runtime/pose/soa_pose_evaluator.h"
+#include "stridewire/base/error.h"
 
 namespace stridewire {
 
@@ -30,7 +30,7 @@ class AvatarReplica {
   /// kMalformed: the record is invalid, or does not fit the library or the current state.
   /// kNotFound: a change arrived before any state. The index of an error is the offset in the
   /// record. After an error the replica is unknown until the next state.
-  [[nodiscard]] Status Apply(std::span<const std::byte> record);
+  [[nodiscard]] Status Apply(std::span<const std::byte> record, FootPlanScratch& scratch);
 
   /// Advances replicas by one tick and evaluates their poses. All must have the same library.
   /// Unknown replicas are skipped.
@@ -40,7 +40,7 @@ class AvatarReplica {
   /// True if the replica has received a state and no error occurred since.
   [[nodiscard]] bool is_known() const { return is_known_; }
   /// The displayed pose in world space, after AdvanceAll. Undefined while the replica is unknown.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
+  [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
   /// AvatarSimulation::idle() of the avatar: it stands and has no queued requests.
   [[nodiscard]] bool idle() const { return is_idle_; }
   /// The current movement, or null while standing.
@@ -49,7 +49,7 @@ class AvatarReplica {
 
  private:
   class Reader;
-  void ReadChange(unsigned flags, Reader& reader);
+  void ReadChange(unsigned flags, Reader& reader, FootPlanScratch& scratch);
   void ReadState(unsigned flags, Reader& reader);
 
   AvatarBody body_;
@@ -59,8 +59,8 @@ class AvatarReplica {
   bool is_idle_ = false;
   // The last record set the movement time (or the layers) for the next tick, so AdvanceAll must not
   // advance it.
-  bool is_told_ = false;
-  bool are_layers_told_ = false;
+  bool is_time_set_ = false;
+  bool are_layers_set_ = false;
 };
 
 }  // namespace stridewire

@@ -7,8 +7,8 @@
 #include "base/check.h"
 #include "base/prefetch.h"
 #include "runtime/library/contact_keytimes.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "runtime/weights/correction.h"
 
 namespace stridewire {
@@ -47,7 +47,7 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
       Vec3(start.position_m + RotateYaw(start.heading_rad, DVec3(stand.root_position_m)));
   body_.pose.rotations[0] = YawRotation(start.heading_rad) * stand.rotations[0];
   is_moving_ = is_in_stand_ = is_idle_reported_ = is_walking_ = false;
-  closing_steps_ = 0;
+  inserted_steps_ = 0;
   body_.blended_pose = body_.pose;
   moved_until_s_ = next_event_s_ = -1.0;
   body_.plants_feet = foot_planting();
@@ -64,8 +64,9 @@ void AvatarSimulation::Teleport(const BaseFrame& start) {
   last_group_ = body_.library->groups().size();
   last_moved_ = Foot::kRight;
   CancelQueue();
-  body_.ShowLayers();
-  next_change_.is_any = true;
+  STRIDEWIRE_CHECK(idle());
+  body_.ApplyLayers();
+  next_change_.needs_state = true;
 }
 
 Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_delay_s) {
@@ -75,11 +76,11 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     return Fail(ErrorCode::kLimitExceeded, "the avatar's queue is full", kMaxQueue);
   }
   if (const auto* step = std::get_if<StepRequest>(&request.movement); step && step->exact_only) {
-    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNotPlanted);
-    if (kept_.empty()) {
-      kept_.resize(1);
-      kept_.front().pose = Pose(body_.library->skeleton().joint_count());
-      MakeRoom(*body_.library, kept_.front().movement);
+    if (!foot_planting()) return Fail(ErrorCode::kUnsupported, kNeedsPlanting);
+    if (saved_.empty()) {
+      saved_.resize(1);
+      saved_.front().pose = Pose(body_.library->skeleton().joint_count());
+      Reserve(*body_.library, saved_.front().movement);
       events_.reserve(kMaxEventsPerAdvance);  // One tick may reject many requests.
     }
   }
@@ -107,6 +108,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
     queue_.reserve(queue_.size() + std::max<std::size_t>(2, queue_.size() / 4));
   }
   queue_.push_back(request);
+  STRIDEWIRE_CHECK(queue_size() >= 1 && queue_size() <= kMaxQueue);
+  STRIDEWIRE_CHECK(start_not_before_s_ >= 0.0);
   return {};
 }
 
@@ -138,6 +141,7 @@ int AvatarSimulation::CancelQueue() {
 
 void AvatarSimulation::AddEvent(const AvatarEvent& event) {
   STRIDEWIRE_CHECK(events_.size() < kMaxEventsPerAdvance);
+  STRIDEWIRE_CHECK(events_.empty() || events_.back().time_s <= time_s_);
   events_.push_back(event);
   events_.back().time_s = time_s_;
   if (event.type == AvatarEventType::kStarted) started_ = events_.back();
@@ -147,18 +151,23 @@ FootState AvatarSimulation::MeasureFeet() const {
   return {FootVector(body_.library->skeleton(), body_.pose, Foot::kLeft, base_.heading_rad)};
 }
 
-void AvatarSimulation::Advance(double dt_s) {
-  AdvanceState(dt_s);
-  ShowPose();
+PlanScratch& AvatarSimulation::OwnScratch::Get(const MotionLibrary& library) {
+  if (scratch_ == nullptr) scratch_ = std::make_unique<PlanScratch>(library);
+  return *scratch_;
 }
 
-void AvatarSimulation::ShowPose() {
+void AvatarSimulation::Advance(double dt_s) {
+  AdvanceState(dt_s, own_scratch_.Get(*body_.library));
+  UpdatePose();
+}
+
+void AvatarSimulation::UpdatePose() {
   if (is_moving_) body_.Evaluate(movement_time_s_);
-  body_.ShowLayers();
+  body_.ApplyLayers();
 }
 
 void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                                     std::vector<std::uint32_t>* eventful) {
+                                     PlanScratch& scratch, std::vector<std::uint32_t>* eventful) {
   if (eventful != nullptr) eventful->clear();
   constexpr std::size_t kAhead = 16;
   for (std::size_t i = 0; i < avatars.size(); ++i) {
@@ -166,15 +175,15 @@ void AvatarSimulation::AdvanceStates(std::span<AvatarSimulation* const> avatars,
     if (i + kAhead < avatars.size() && !avatars[i + kAhead]->StaysEventFree(dt_s)) {
       avatars[i + kAhead]->PrefetchState();
     }
-    avatars[i]->AdvanceState(dt_s);
+    avatars[i]->AdvanceState(dt_s, scratch);
     if (eventful != nullptr && !avatars[i]->is_event_free()) {
       eventful->push_back(static_cast<std::uint32_t>(i));
     }
   }
 }
 
-void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
-                                 SoaPoseEvaluator& evaluator) {
+void AvatarSimulation::UpdatePoses(std::span<AvatarSimulation* const> avatars,
+                                   SoaPoseEvaluator& evaluator) {
   std::array<PoseJob, SoaPose::kLanes> jobs;
   while (!avatars.empty()) {
     const std::span<AvatarSimulation* const> block =
@@ -185,15 +194,15 @@ void AvatarSimulation::ShowPoses(std::span<AvatarSimulation* const> avatars,
       jobs[moving++] = {&avatar->body_.movement, avatar->movement_time_s_, &avatar->body_.pose};
     }
     EvaluatePoses(evaluator, std::span(jobs).first(moving));
-    for (AvatarSimulation* avatar : block) avatar->body_.ShowLayers();
+    for (AvatarSimulation* avatar : block) avatar->body_.ApplyLayers();
     avatars = avatars.subspan(block.size());
   }
 }
 
 void AvatarSimulation::AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                                  SoaPoseEvaluator& evaluator) {
-  AdvanceStates(avatars, dt_s);
-  ShowPoses(avatars, evaluator);
+                                  PlanScratch& scratch, SoaPoseEvaluator& evaluator) {
+  AdvanceStates(avatars, dt_s, scratch);
+  UpdatePoses(avatars, evaluator);
 }
 
 // Prefetches what AdvanceEventfully reads of a walking avatar.
@@ -207,14 +216,14 @@ void AvatarSimulation::PrefetchState() const {
 }
 
 // Advances everything except the pose.
-void AvatarSimulation::AdvanceState(double dt_s) {
+void AvatarSimulation::AdvanceState(double dt_s, PlanScratch& scratch) {
   STRIDEWIRE_CHECK(dt_s > 0.0 && dt_s <= 1.0);
   if (StaysEventFree(dt_s)) {
     movement_time_s_ += dt_s;
     time_s_ += dt_s;
     return;
   }
-  AdvanceEventfully(dt_s);
+  AdvanceEventfully(dt_s, scratch);
   body_.layers.Advance(*body_.library, dt_s);
   next_event_s_ = NextEventTime();
 }
@@ -229,22 +238,24 @@ double AvatarSimulation::NextEventTime() const {
                                      : body_.movement.duration_s();
 }
 
-void AvatarSimulation::AdvanceEventfully(double dt_s) {
+void AvatarSimulation::AdvanceEventfully(double dt_s, PlanScratch& scratch) {
   events_.clear();
   change_ = std::exchange(next_change_, {});
   const double end_s = time_s_ + dt_s;
   double left_s = dt_s;
   for (;;) {
+    STRIDEWIRE_CHECK(left_s >= 0.0);
+    STRIDEWIRE_CHECK(!(is_moving_ && is_in_stand_));
     // Movements that are shorter than a tick could overflow the event list. Once the list is nearly
     // full, nothing more starts or ends in this tick.
     const bool may_change = events_.size() + kEventReserve <= kMaxEventsPerAdvance;
     if (is_moving_) {
       const double before_s = movement_time_s_;
       if (may_change && RedirectsSwing()) {
-        RedirectSwing();
+        RedirectSwing(scratch);
         continue;
       }
-      const double duration_s = EndOfMovement();
+      const double duration_s = MovementEnd();
       if (before_s + left_s < duration_s || !may_change) {
         movement_time_s_ = before_s + left_s;
         time_s_ = end_s;
@@ -264,10 +275,11 @@ void AvatarSimulation::AdvanceEventfully(double dt_s) {
       time_s_ = end_s - left_s;
       FinishStand();
     }
-    if (!may_change || !StartNext()) break;
+    if (!may_change || !StartNext(scratch)) break;
   }
+  STRIDEWIRE_CHECK(time_s_ <= end_s);
   time_s_ = end_s;
-  change_.is_idle_other = idle() != std::exchange(was_idle_, idle());
+  change_.idle_changed = idle() != std::exchange(was_idle_, idle());
 }
 
 bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
@@ -277,7 +289,8 @@ bool AvatarSimulation::BringsFeetTogether(const RequestPlan& plan) const {
          std::fabs(feet_.left_from_right_m.z) - kClosingGainM;
 }
 
-bool AvatarSimulation::StartNext() {
+bool AvatarSimulation::StartNext(PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(!is_moving_ && !is_in_stand_);
   interrupts_ = false;
   const bool is_empty = queue_size() == 0;
   const auto* stand = is_empty ? nullptr : std::get_if<StandRequest>(&queue_[queue_head_].movement);
@@ -286,8 +299,8 @@ bool AvatarSimulation::StartNext() {
     is_walking_ = false;
     SwitchPlanting();
     const auto plan = PlanStep(*body_.library, StepRequest{}, feet_, last_moved_, false);
-    if (plan && (closing_steps_ == 0 || BringsFeetTogether(*plan))) {
-      StartInserted(*plan);
+    if (plan && (inserted_steps_ == 0 || BringsFeetTogether(*plan))) {
+      StartInserted(*plan, scratch);
       return true;
     }
   }
@@ -304,7 +317,7 @@ bool AvatarSimulation::StartNext() {
   is_idle_reported_ = false;
   if (stand == nullptr) SwitchPlanting();
   if (std::holds_alternative<WalkRequest>(queue_[queue_head_].movement)) {
-    GoOnWalking();
+    StartWalkStep(scratch);
     return true;
   }
   if (stand != nullptr) {
@@ -314,23 +327,23 @@ bool AvatarSimulation::StartNext() {
     AddEvent({.type = AvatarEventType::kStarted, .request_id = request_id_});
     return true;
   }
-  StartTransitionPath();
+  StartTransitionPath(scratch);
   return true;
 }
 
 // Starts the step or jump at the head of the queue, or a step that must come before it.
-void AvatarSimulation::StartTransitionPath() {
+void AvatarSimulation::StartTransitionPath(PlanScratch& scratch) {
   const MovementRequest& request = queue_[queue_head_];
   const auto direct = PlanRequest(request);
   STRIDEWIRE_CHECK(direct.has_value());  // Enqueue checked that the library has this kind.
-  const TransitionPath way = FindTransitionPath(*body_.library, request, direct,
-                                                {feet_, last_moved_, last_group_, closing_steps_});
-  if (way.is_inserted) {
-    StartInserted(*way.plan);
-  } else if (way.plan) {
+  const TransitionPath path = FindTransitionPath(
+      *body_.library, request, direct, {feet_, last_moved_, last_group_, inserted_steps_});
+  if (path.is_inserted) {
+    StartInserted(*path.plan, scratch);
+  } else if (path.plan) {
     const MovementRequest taken = request;
     PopQueue();
-    if (PlanRequested(taken, *way.plan, 0.0)) BeginMovement(*way.plan, taken.id);
+    if (PlanRequested(taken, *path.plan, 0.0, scratch)) BeginMovement(*path.plan, taken.id);
   } else {
     AddEvent({.type = AvatarEventType::kRejected,
               .request_id = PopQueue(),
@@ -339,14 +352,16 @@ void AvatarSimulation::StartTransitionPath() {
   }
 }
 
-void AvatarSimulation::StartInserted(const RequestPlan& plan) {
-  const int inserted = closing_steps_ + 1;
-  StartPlan(plan, 0);
-  closing_steps_ = inserted;
+void AvatarSimulation::StartInserted(const RequestPlan& plan, PlanScratch& scratch) {
+  const int inserted = inserted_steps_ + 1;
+  STRIDEWIRE_CHECK(inserted <= kMaxInsertedSteps);
+  StartPlan(plan, 0, scratch);
+  inserted_steps_ = inserted;
 }
 
 // Removes the request at the head of the queue and returns its id.
 std::uint64_t AvatarSimulation::PopQueue() {
+  STRIDEWIRE_CHECK(queue_head_ < queue_.size());
   const std::uint64_t id = queue_[queue_head_++].id;
   if (queue_size() == 0) CancelQueue();
   return id;
@@ -354,12 +369,12 @@ std::uint64_t AvatarSimulation::PopQueue() {
 
 // Starts the next step of the walk at the head of the queue. The request stays in the queue until
 // the walk has arrived or is rejected.
-void AvatarSimulation::GoOnWalking() {
+void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   WalkStance stance;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    stance.feet[f] =
-        body_.plants_feet ? body_.locks[f].print : Footprint{StandsAt(foot), base_.heading_rad};
+    stance.feet[f] = body_.plants_feet ? body_.locks[f].print
+                                       : Footprint{StandingPosition(foot), base_.heading_rad};
   }
   stance.heading_rad = base_.heading_rad;
   stance.last_moved = last_moved_;
@@ -370,7 +385,7 @@ void AvatarSimulation::GoOnWalking() {
       PlanWalkStep(*body_.library, options_.terrain.get(),
                    std::get<WalkRequest>(queue_[queue_head_].movement), stance, walk_);
   if (decision.outcome == WalkOutcome::kStep) {
-    StartPlan(decision.plan, queue_[queue_head_].id);
+    StartPlan(decision.plan, queue_[queue_head_].id, scratch);
     return;
   }
   const std::uint64_t id = PopQueue();
@@ -386,7 +401,7 @@ void AvatarSimulation::GoOnWalking() {
 }
 
 // Position of a foot between two movements: its footprint, or the ball if feet are not planted.
-DVec3 AvatarSimulation::StandsAt(Foot foot) const {
+DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
   return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
@@ -398,9 +413,9 @@ double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
   const double side_m = step.side_m.value_or(outward * stand_feet_.Vector(foot).x);
   const DVec3 stands = body_.locks[1 - f].print.position_m;
-  const DVec3 lands = stands + RotateYaw(base_.heading_rad + step.turn_rad,
-                                         DVec3(outward * side_m, 0.0, step.length_m));
-  return GroundRise(options_.terrain->HeightAt(lands.x, lands.z) - stands.y);
+  const DVec3 planted = stands + RotateYaw(base_.heading_rad + step.turn_rad,
+                                           DVec3(outward * side_m, 0.0, step.length_m));
+  return GroundRise(options_.terrain->HeightAt(planted.x, planted.z) - stands.y);
 }
 
 std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& request) const {
@@ -421,40 +436,46 @@ std::optional<RequestPlan> AvatarSimulation::PlanRequest(const MovementRequest& 
   }
   Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   if (!step.foot && !is_walking_) {
-    const DVec3 centre = 0.5 * (StandsAt(Foot::kLeft) + StandsAt(Foot::kRight));
-    const double aside_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
-    foot = aside_m >= 0.0 ? Foot::kLeft : Foot::kRight;
+    const DVec3 centre = 0.5 * (StandingPosition(Foot::kLeft) + StandingPosition(Foot::kRight));
+    const double side_m = RotateYaw(-exact.heading_rad, exact.position_m - centre).x;
+    foot = side_m >= 0.0 ? Foot::kLeft : Foot::kRight;
   }
-  return PlanFootprint(*body_.library, foot, exact, StandsAt(OtherFoot(foot)), base_.heading_rad,
-                       feet_);
+  return PlanFootprint(*body_.library, foot, exact, StandingPosition(OtherFoot(foot)),
+                       base_.heading_rad, feet_);
 }
 
-void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id) {
-  PlanMovement(plan, 0.0);
+void AvatarSimulation::StartPlan(const RequestPlan& plan, std::uint64_t request_id,
+                                 PlanScratch& scratch) {
+  PlanMovement(plan, 0.0, scratch);
   BeginMovement(plan, request_id);
 }
 
 // Plans a movement. It starts with both feet on the ground or, if it interrupts a swing, at the
 // same fraction `swing_part` of its own swing.
-void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part) {
+void AvatarSimulation::PlanMovement(const RequestPlan& plan, double swing_part,
+                                    PlanScratch& scratch) {
+  STRIDEWIRE_CHECK(&scratch.feet.library() == body_.library.get());
+  STRIDEWIRE_CHECK(plan.group >= 0 &&
+                   static_cast<std::size_t>(plan.group) < body_.library->groups().size());
   const MotionGroup& next = body_.library->group(plan.group);
-  // Only the first elements are used, one per example of the group.
-  std::array<double, MotionLibrary::kMaxExamples> weights;
+  STRIDEWIRE_CHECK(plan.applied.count == next.parameter_count());
   if (options_.run_time_correction) {
-    CorrectWeights(*body_.library, plan.group, plan.applied, DefaultCorrectionLimits(next), weights,
+    CorrectWeights(next, plan.applied, DefaultCorrectionLimits(next), scratch.correction,
                    body_.movement);
+    body_.movement.group = plan.group;
   } else {
     SetWeights(next, plan.group,
                std::span(plan.applied.values).first(static_cast<std::size_t>(plan.applied.count)),
-               weights, body_.movement);
+               scratch.correction.weights(next), body_.movement);
   }
   body_.StartWeighted(base_);
   if (swing_part > 0.0) {
     const SwingTimes swing = SwingTimesOf(next.kind, body_.movement);
-    body_.EnterAt(swing.release_s + swing_part * (swing.land_s - swing.release_s));
+    body_.SetStartOffset(swing.release_s + swing_part * (swing.land_s - swing.release_s));
   }
   // An avatar that was standing has no speed to keep.
-  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed());
+  body_.BlendIn(LandingTarget{plan, options_.terrain.get(), base_.position_m}, keeps_speed(),
+                scratch.feet);
 }
 
 // Starts the movement that was just planned.
@@ -466,13 +487,15 @@ void AvatarSimulation::BeginMovement(const RequestPlan& plan, std::uint64_t requ
                       body_.movement.feet.missed_m == DVec3(0.0) &&
                       body_.movement.feet.missed_rad == 0.0;
 
+  STRIDEWIRE_CHECK(!is_in_stand_ && body_.movement.group == plan.group);
+  STRIDEWIRE_CHECK(body_.movement.feet.is_active == body_.plants_feet);
   ++revision_;
   change_.has_begun = true;
   change_.begun_keeps_speed = keeps_speed();
   is_moving_ = true;
   body_.begins_planting = false;
   is_exact_ = plan.exact.has_value();
-  closing_steps_ = 0;
+  inserted_steps_ = 0;
   is_idle_reported_ = false;
   movement_time_s_ = body_.movement.start_offset_s;
   request_id_ = request_id;
@@ -496,16 +519,17 @@ void AvatarSimulation::KeepToLine(const DVec3& line_m) {
   if (!IsStep(group().kind) || group().FindParameter(ParameterName::kEndX) >= 0) return;
   const double heading_rad = body_.movement.base.heading_rad;
   const DVec3 root = DVec3(body_.blended_pose.root_position_m);
-  const double aside_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
-                         RotateYaw(-heading_rad, line_m - base_.position_m).x;
-  base_.position_m += RotateYaw(heading_rad, DVec3(aside_m, 0.0, 0.0));
+  const double side_m = RotateYaw(-heading_rad, root - body_.movement.base.position_m).x +
+                        RotateYaw(-heading_rad, line_m - base_.position_m).x;
+  base_.position_m += RotateYaw(heading_rad, DVec3(side_m, 0.0, 0.0));
 }
 
 void AvatarSimulation::FinishMovement(double at_s) {
+  STRIDEWIRE_CHECK(is_moving_);
   const MotionGroup& finished = group();
   const bool has_moved = at_s > SwingTimesOf(finished.kind, body_.movement).release_s;
   CaptureBlendSource(at_s);
-  Leave(at_s, false);
+  RecordLeaving(at_s, false);
   movement_time_s_ = at_s;
   ++revision_;
   // Without planting, the base frame follows the root, and its height changes by the movement's own
@@ -532,7 +556,7 @@ void AvatarSimulation::FinishMovement(double at_s) {
   is_walking_ = false;
   if (IsStep(finished.kind)) {
     if (has_moved) last_moved_ = MovingFoot(finished.kind);
-    is_walking_ = closing_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
+    is_walking_ = inserted_steps_ < kMaxInsertedSteps && AreFeetApart(feet_, stand_feet_);
   }
   AddEvent({.type = AvatarEventType::kFinished,
             .request_id = request_id_,
@@ -543,6 +567,7 @@ void AvatarSimulation::FinishMovement(double at_s) {
 }
 
 void AvatarSimulation::FinishStand() {
+  STRIDEWIRE_CHECK(is_in_stand_ && !is_moving_);
   is_in_stand_ = false;
   last_group_ = body_.library->groups().size();
   AddEvent({.type = AvatarEventType::kFinished, .request_id = request_id_, .base = base_});

@@ -9,230 +9,261 @@
 #include <utility>
 #include <vector>
 
-#include "stridewire/base/error.h"
-#include "stridewire/runtime/avatar.h"
 #include "base/prefetch.h"
 #include "runtime/avatar/avatar_body.h"
-#include "runtime/pose/layer_stack.h"
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
-#include "stridewire/runtime/movement_request.h"
-#include "runtime/pose/soa_pose_evaluator.h"
 #include "runtime/plan/request_plan.h"
-#include "runtime/plan/walk_planner.h"
 #include "runtime/plan/transition_path.h"
+#include "runtime/plan/walk_planner.h"
+#include "runtime/pose/layer_stack.h"
+#include "runtime/pose/soa_pose_evaluator.h"
+#include "stridewire/base/error.h"
+#include "stridewire/runtime/avatar.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
-/// What has become of an avatar's movement in a call of Advance, for who shows the avatar elsewhere (MovementRecord).
+/// What happened to an avatar's movement during an Advance. Movement records are made from this.
 struct AvatarChange {
-  bool is_any = false;             ///< More than the rest tells: only the whole state does
-  bool has_left = false;           ///< The movement before ended or gave way
-  bool has_begun = false;          ///< One began, and goes on
-  bool has_layers = false;         ///< Layers were asked for
-  bool is_idle_other = false;      ///< idle() is not what it was
-  bool is_left_at_end = false;     ///< The one before ended, and did not give way
-  bool is_redirected = false;      ///< The other began in mid-swing of the one before
-  bool left_keeps_speed = false;   ///< How the one before was left (AvatarBody::CaptureBlendSource)
-  bool begun_keeps_speed = false;  ///< How the other was joined (AvatarBody::BlendIn)
-  double left_s = 0.0;             ///< When the one before was left, its own time
+  /// A change record cannot express what happened; send the whole state.
+  bool needs_state = false;
+  bool has_left = false;        ///< The previous movement ended or was interrupted.
+  bool has_begun = false;       ///< A movement began and is still in progress.
+  bool has_layers = false;      ///< SetLayer was called.
+  bool idle_changed = false;    ///< idle() changed.
+  bool is_left_at_end = false;  ///< The previous movement ended at its end; it was not interrupted.
+  /// The new movement began in the middle of the previous one's swing.
+  bool is_redirected = false;
+  bool left_keeps_speed = false;   ///< Argument of AvatarBody::CaptureBlendSource.
+  bool begun_keeps_speed = false;  ///< Argument of AvatarBody::BlendIn.
+  double left_s = 0.0;             ///< Time within the previous movement at which it was left.
 
   bool operator==(const AvatarChange&) const = default;
 };
 
-/// An avatar: base frame, queue of requests, current movement, displayed pose.
+/// Simulates one avatar: base frame, queue of requests, current movement, displayed pose.
 ///
-/// Time is an argument; `Advance` is the only thing that moves it. Given library, start, requests
-/// and the sizes of the steps in time, the poses are the same bytes on every machine. Not
-/// thread-safe; one owner. After construction only `Enqueue` (its queue, up to kMaxQueue entries) and
-/// `SetLayer` may allocate, and `Advance` room for events when a call has more than any before.
+/// Time is an argument; only Advance moves the avatar. The same library, start, requests and time
+/// steps give the same pose bytes on every machine. Not thread-safe; one owner. After construction
+/// only these allocate: Enqueue, for a queue of up to kMaxQueue requests; SetLayer; the first
+/// Advance; and an Advance with more events than any before.
 class AvatarSimulation {
  public:
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
   static constexpr std::size_t kMaxEventsPerAdvance = Avatar::kMaxEventsPerAdvance;
 
-  /// Stands at `start` in the library's stand pose.
+  /// The avatar stands at `start` in the library's stand pose.
   AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
-         const AvatarOptions& options = {});
+                   const AvatarOptions& options = {});
 
-  /// A swing less than this part of which is left is not sent elsewhere.
+  /// A swing is redirected only if more than this fraction of it is left.
   static constexpr double kLeastSwingLeft = 0.4;
 
-  /// Checks and queues a request; one that takes over empties the queue first. Errors as ValidateRequest;
-  /// kUnsupported also for a footprint that must be met where feet are not planted; kLimitExceeded: queue full.
+  /// Validates and queues a request. A request that interrupts empties the queue first.
   ///
-  /// `start_delay_s` (0 or more): who just stands begins it no sooner than that from now, and who moves is not taken over
-  /// before. What goes on from a movement is never held. One who is held already is not held longer.
+  /// Errors: those of ValidateRequest; kUnsupported: exact placement was requested while feet are
+  /// not planted; kLimitExceeded: the queue is full.
+  ///
+  /// `start_delay_s` (>= 0) delays the start. A standing avatar does not begin the request earlier
+  /// than that from now, and a moving avatar is not interrupted earlier. A request that follows
+  /// another movement is not delayed. An existing delay is not extended.
   [[nodiscard]] Status Enqueue(const MovementRequest& request, double start_delay_s = 0.0);
 
-  /// Drops what has not started; the current movement goes on to its end. Returns how many.
+  /// Drops the requests that have not started and returns their number. The current movement
+  /// continues to its end.
   int CancelQueue();
 
-  /// Plays a layer over the movement, or ends it, from the next Advance on. Legs, root and all that
-  /// movements do are bit by bit what they are without. Errors as LayerStack::Set.
+  /// Starts, changes or ends a layer with the next Advance. The legs and the root keep exactly the
+  /// bits they have without layers. Errors are those of LayerStack::Set.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
-  /// Puts the avatar somewhere else at once, standing; queue dropped. Layers go on.
+  /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Plants feet, or not, from the next movement that starts on; what is displayed goes on without a jump. A swing is
-  /// not sent elsewhere meanwhile, and what waits in the queue for a footprint that must be met is rejected while it
-  /// is off. kUnsupported: to be on, but the library's legs are not such as can be planted.
+  /// Turns foot planting on or off, from the next movement on and without a jump. Until that
+  /// movement starts, swings are not redirected. While planting is off, queued requests for exact
+  /// placement are rejected when their turn comes. kUnsupported: this skeleton does not support
+  /// foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
-  /// As last set; false where the library's legs can not.
+  /// The last setting; false if the skeleton does not support foot planting.
   [[nodiscard]] bool foot_planting() const {
     return options_.foot_planting && body_.library->leg_rig().is_usable;
   }
 
-  /// Changes the ground. Feet that stand stay where they are until their next step.
+  /// Replaces the ground. Standing feet keep their places until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
 
-  /// Goes on by `dt_s` (> 0, at most 1 s): finishes and starts movements, updates the pose.
-  /// Events of this call are in `events()` until the next.
+  /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
+  /// The events of this call are available from events() until the next call. The first call
+  /// allocates scratch memory; use AdvanceAll for many avatars.
   void Advance(double dt_s);
 
-  /// The same for many avatars of one library, whose poses are evaluated together: several times as fast, and not a
-  /// bit of any pose depends on who else is there.
+  /// Advances many avatars of one library and evaluates their poses together, several times as fast
+  /// as one by one. No bit of a pose depends on the other avatars.
   static void AdvanceAll(std::span<AvatarSimulation* const> avatars, double dt_s,
-                         SoaPoseEvaluator& evaluator);
+                         PlanScratch& scratch, SoaPoseEvaluator& evaluator);
 
-  /// AdvanceAll but for the poses, for who has them evaluated otherwise (SampleRun): pose() is none of now until
-  /// ShowPose. `eventful`: the places in `avatars` of those that are not quiet after it, growing.
+  /// Like AdvanceAll, but without poses, for callers that evaluate poses themselves (SampleRun).
+  /// pose() is outdated until UpdatePose. `eventful` receives, in increasing order, the indices in
+  /// `avatars` of those that are not event-free afterwards.
   static void AdvanceStates(std::span<AvatarSimulation* const> avatars, double dt_s,
-                            std::vector<std::uint32_t>* eventful = nullptr);
+                            PlanScratch& scratch, std::vector<std::uint32_t>* eventful = nullptr);
   /// Evaluates pose().
-  void ShowPose();
-  /// The same for many avatars of one library together.
-  static void ShowPoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
+  void UpdatePose();
+  /// Evaluates pose() for many avatars of one library together.
+  static void UpdatePoses(std::span<AvatarSimulation* const> avatars, SoaPoseEvaluator& evaluator);
 
-  /// Displayed, in the world.
-  [[nodiscard]] ConstPoseSpan pose() const { return body_.Shown(); }
+  /// Displayed pose in world space.
+  [[nodiscard]] ConstPoseSpan pose() const { return body_.DisplayedPose(); }
   [[nodiscard]] const LayerStack& layers() const { return body_.layers; }
-  /// What is displayed and what comes after it follow from. Until the next Advance, Teleport or SetLayer it is that of
-  /// pose().
+  /// Everything that the displayed pose and the next movement depend on. It corresponds to pose()
+  /// until the next Advance, Teleport or SetLayer.
   [[nodiscard]] const AvatarBody& body() const { return body_; }
-  /// What changed in the last Advance, and by Teleport and SetLayer before it.
+  /// What the last Advance changed, including calls of Teleport and SetLayer before it.
   [[nodiscard]] const AvatarChange& change() const { return change_; }
-  /// Of who stands: what begins next may keep the speed there was, if it begins at once.
+  /// True if a movement that begins now continues with the velocity of the previous one.
   [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }
   [[nodiscard]] std::span<const AvatarEvent> events() const { return events_; }
   [[nodiscard]] const BaseFrame& base() const { return base_; }
   [[nodiscard]] int queue_size() const { return static_cast<int>(queue_.size() - queue_head_); }
-  /// Standing, nothing queued.
+  /// True if the avatar stands still and its queue is empty.
   [[nodiscard]] bool idle() const { return !is_moving_ && !is_in_stand_ && queue_size() == 0; }
   [[nodiscard]] const MotionLibrary& library() const { return *body_.library; }
 
-  /// The movement under way, null while standing; valid until the next Advance.
+  /// The current movement, or null while standing. Valid until the next Advance.
   [[nodiscard]] const Movement* movement() const { return is_moving_ ? &body_.movement : nullptr; }
   [[nodiscard]] double movement_time_s() const { return movement_time_s_; }
-  /// Seconds since it was made.
+  /// Seconds since construction.
   [[nodiscard]] double time_s() const { return time_s_; }
-  /// Another number whenever a movement begins or ends or the avatar is put elsewhere. As long as it stays, all that is
-  /// displayed but layers follows from movement() and its time, or stands still.
+  /// Changes whenever a movement begins or ends and on Teleport. While it stays the same, the
+  /// displayed pose without layers follows from movement() and movement_time_s().
   [[nodiscard]] std::uint64_t revision() const { return revision_; }
-  /// Moving without layers, and nothing has happened in the last Advance: events() and change() tell nothing. Of who is
-  /// quiet, time_s(), revision(), movement_time_s() and idle() lie in one cache line.
+  /// True if the avatar moves, has no layers, and the last Advance produced neither events nor
+  /// changes. While it is true, time_s(), revision(), movement_time_s() and idle() are in one cache
+  /// line.
   [[nodiscard]] bool is_event_free() const { return movement_time_s_ < next_event_s_; }
-  /// For who asks many: that line is read soon.
+  /// Prefetches that cache line, for callers that check many avatars.
   void PrefetchTickState() const { PrefetchBytes(&time_s_, kCacheLineBytes); }
-  /// The kStarted event of the movement or requested stand under way, null while just standing.
+  /// The kStarted event of the current movement or requested stand; null if the avatar just stands.
   [[nodiscard]] const AvatarEvent* started() const {
     return is_moving_ || is_in_stand_ ? &started_ : nullptr;
   }
-  /// What has not started, in order.
+  /// The requests that have not started, in order.
   [[nodiscard]] std::span<const MovementRequest> queue() const {
     return std::span(queue_).subspan(queue_head_);
   }
 
  private:
-  static constexpr const char* kNotPlanted = "feet are not planted: no footprint is sure to be met";
+  static constexpr const char* kNeedsPlanting = "exact placement requires foot planting";
+
+  // Scratch memory for Advance, which handles a single avatar. The first call allocates it. Copies
+  // of the avatar allocate their own.
+  class OwnScratch {
+   public:
+    OwnScratch() = default;
+    OwnScratch(const OwnScratch&) {}
+    OwnScratch(OwnScratch&&) noexcept = default;
+    OwnScratch& operator=(const OwnScratch&) { return *this; }
+    OwnScratch& operator=(OwnScratch&&) noexcept = default;
+    ~OwnScratch() = default;
+    [[nodiscard]] PlanScratch& Get(const MotionLibrary& library);
+
+   private:
+    std::unique_ptr<PlanScratch> scratch_;
+  };
 
   void AddEvent(const AvatarEvent& event);
-  // Times are sums of ticks: a hold of whole ticks ends with the last of them.
+  // Time is a sum of ticks, so rounding must not make a delay of whole ticks one tick longer.
   [[nodiscard]] bool IsStartDelayed() const { return time_s_ + 1e-6 < start_not_before_s_; }
   [[nodiscard]] const MotionGroup& group() const { return body_.group(); }
   [[nodiscard]] FootState MeasureFeet() const;
-  void AdvanceState(double dt_s);
-  // Nothing happens in an Advance: it moves time only.
+  void AdvanceState(double dt_s, PlanScratch& scratch);
+  // True if nothing but time changes in an Advance of `dt_s`.
   [[nodiscard]] bool StaysEventFree(double dt_s) const {
     return movement_time_s_ + dt_s < next_event_s_;
   }
   [[nodiscard]] double NextEventTime() const;
-  void AdvanceEventfully(double dt_s);
+  void AdvanceEventfully(double dt_s, PlanScratch& scratch);
   void PrefetchState() const;
   [[nodiscard]] bool BringsFeetTogether(const RequestPlan& plan) const;
-  [[nodiscard]] bool StartNext();
-  void GoOnWalking();
-  void StartTransitionPath();
-  void StartInserted(const RequestPlan& plan);
+  [[nodiscard]] bool StartNext(PlanScratch& scratch);
+  void StartWalkStep(PlanScratch& scratch);
+  void StartTransitionPath(PlanScratch& scratch);
+  void StartInserted(const RequestPlan& plan, PlanScratch& scratch);
   std::uint64_t PopQueue();
   [[nodiscard]] double RiseAhead(const StepRequest& step) const;
   [[nodiscard]] std::optional<RequestPlan> PlanRequest(const MovementRequest& request) const;
-  void StartPlan(const RequestPlan& plan, std::uint64_t request_id);
-  void PlanMovement(const RequestPlan& plan, double swing_part);
+  void StartPlan(const RequestPlan& plan, std::uint64_t request_id, PlanScratch& scratch);
+  void PlanMovement(const RequestPlan& plan, double swing_part, PlanScratch& scratch);
   void BeginMovement(const RequestPlan& plan, std::uint64_t request_id);
   [[nodiscard]] bool PlanRequested(const MovementRequest& request, const RequestPlan& plan,
-                                   double swing_part);
+                                   double swing_part, PlanScratch& scratch);
   [[nodiscard]] FootprintError NearestInReach(const Footprint& asked, const FootprintError& missed,
-                                             double swing_part);
+                                              double swing_part, PlanScratch& scratch);
   [[nodiscard]] FootprintError LandingErrorFrom(const Footprint& asked);
-  [[nodiscard]] double EndOfMovement() const;
-  [[nodiscard]] double Landed() const;
+  [[nodiscard]] double MovementEnd() const;
+  [[nodiscard]] double LandingTime() const;
   [[nodiscard]] bool RedirectsSwing() const;
-  void RedirectSwing();
+  void RedirectSwing(PlanScratch& scratch);
   void SwitchPlanting();
   void CaptureBlendSource(double time_s);
-  void Leave(double time_s, bool is_redirected);
+  void RecordLeaving(double time_s, bool is_redirected);
   void FinishMovement(double at_s);
   void KeepToLine(const DVec3& line_m);
   void FinishStand();
-  [[nodiscard]] DVec3 StandsAt(Foot foot) const;
+  [[nodiscard]] DVec3 StandingPosition(Foot foot) const;
   [[nodiscard]] Vec3 LandingBall(Foot foot) const;
   [[nodiscard]] double StrikeTime() const;
   void ReportFootStrikes(double before_s, double after_s);
 
-  // All that an uneventful tick asks, in one cache line.
-  alignas(kCacheLineBytes) double time_s_ = 0.0;  // avatar time
+  // Everything that an event-free tick reads is in one cache line.
+  alignas(kCacheLineBytes) double time_s_ = 0.0;  // Avatar time.
   double movement_time_s_ = 0.0;
-  double next_event_s_ = -1.0;  // movement time; until then nothing happens
+  double next_event_s_ = -1.0;  // Movement time before which no event can happen; -1 if unknown.
   std::uint64_t revision_ = 0;
-  // One of: a movement under way, a requested stand, or just standing.
+  // At most one of these is true: a movement is in progress, or a requested stand is.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
-  bool was_idle_ = false;        // after the Advance before
-  bool is_walking_ = false;      // a step left the feet apart: close before standing
-  bool interrupts_ = false;      // the request at the queue's head does not wait for the end
-  bool is_exact_ = false;        // the step under way lands where it was sent
-  int closing_steps_ = 0;        // of our own in a row, the movement under way included
-  double start_not_before_s_ = 0.0;    // avatar time
-  double moved_until_s_ = -1.0;  // avatar time
+  bool was_idle_ = false;  // Value of idle() after the previous Advance.
+  // The last step left the feet apart, so a closing step must precede a stand.
+  bool is_walking_ = false;
+  // The request at the head of the queue does not wait for the end of the movement.
+  bool interrupts_ = false;
+  bool is_exact_ = false;            // The current step goes to a requested footprint.
+  int inserted_steps_ = 0;           // Inserted steps in a row, including the current movement.
+  double start_not_before_s_ = 0.0;  // Avatar time.
+  // Avatar time at which the last movement with a velocity ended, or -1.
+  double moved_until_s_ = -1.0;
 
   AvatarOptions options_;
   BaseFrame base_;
   AvatarBody body_;
-  AvatarChange change_;           // of the last Advance
-  AvatarChange next_change_;      // told with the next
-  std::uint64_t request_id_ = 0;  // of the movement or stand under way
+  AvatarChange change_;           // Of the last Advance.
+  AvatarChange next_change_;      // Reported by the next Advance.
+  std::uint64_t request_id_ = 0;  // Of the current movement or stand.
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
-  double ground_rise_m_ = 0.0;  // how much higher the base will be after the movement
-  // What is put back when a movement that was planned is not played. Has its size from the first request on
-  // that may be refused.
-  struct Kept {
+  double ground_rise_m_ = 0.0;  // Height of the base after the movement above its height before.
+  // State to restore if a planned movement is rejected. Allocated by the first request for exact
+  // placement.
+  struct SavedState {
     Movement movement;
     Pose pose;
   };
-  std::vector<Kept> kept_;  // one, or none before; an avatar can be copied
+  std::vector<SavedState> saved_;  // At most one element; a vector so that an avatar can be copied.
 
-  FootState stand_feet_;  // of the library's stand pose
+  FootState stand_feet_;  // Of the library's stand pose.
   FootState feet_;
   Foot last_moved_ = Foot::kRight;
-  std::size_t last_group_ = 0;  // of the movement before; as many as there are groups: a stand
-  WalkProgress walk_;           // of the walk at the queue's head
-  std::vector<MovementRequest> queue_;  // live from queue_head_ on
+  // Group of the previous movement, or the number of groups after a stand.
+  std::size_t last_group_ = 0;
+  WalkProgress walk_;                   // Of the walk at the head of the queue.
+  std::vector<MovementRequest> queue_;  // Elements from queue_head_ on are in use.
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
+  OwnScratch own_scratch_;
 };
 
 }  // namespace stridewire

@@ -51,7 +51,7 @@ void WriteWeights(const Movement& movement, RecordWriter& writer) {
   for (const float weight : movement.weights) writer.F32(weight);
 }
 
-void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDecision& choice,
+void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDecision& decision,
                 RecordWriter& writer) {
   const AvatarBody& body = avatar.body();
   const Movement& movement = body.movement;
@@ -60,7 +60,7 @@ void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDec
   writer.F64(movement.base.heading_rad);
   if ((flags & record::kIsEntered) != 0) writer.F64(movement.start_offset_s);
   if (body.plants_feet) {
-    record::ChoiceFields(writer, flags, body.group().kind, choice);
+    record::DecisionFields(writer, flags, body.group().kind, decision);
   } else {
     record::Vector(writer, movement.base.position_m);
   }
@@ -70,18 +70,18 @@ void WriteBegun(const AvatarSimulation& avatar, unsigned flags, const LandingDec
 
 bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
   const AvatarChange& change = avatar.change();
-  if (change.is_any) {
+  if (change.needs_state) {
     AppendState(avatar, out);
     return true;
   }
   const bool is_any =
-      change.has_left || change.has_begun || change.has_layers || change.is_idle_other;
+      change.has_left || change.has_begun || change.has_layers || change.idle_changed;
   if (!is_any) return false;
 
   const AvatarBody& body = avatar.body();
   unsigned flags = CommonFlags(avatar);
   if (change.has_layers) flags |= record::kLayers;
-  LandingDecision choice;
+  LandingDecision decision;
   if (change.has_left) {
     flags |= record::kLeft;
     if (change.is_left_at_end) flags |= record::kLeftAtEnd;
@@ -93,17 +93,18 @@ bool AppendChange(const AvatarSimulation& avatar, std::vector<std::byte>& out) {
     if (change.begun_keeps_speed) flags |= record::kKeepsSpeed;
     if (body.movement.start_offset_s != 0.0) flags |= record::kIsEntered;
     if (body.plants_feet) {
-      choice = DecisionOf(body.group().kind, body.movement);
-      if (choice.extra_turn_rad != 0.0) flags |= record::kIsSteered;
-      if (choice.is_on_terrain) flags |= record::kOnTerrain;
-      if (choice.aside_m != DVec3(0.0)) flags |= record::kAside;
-      if (choice.root_shift_m != DVec3(0.0)) flags |= record::kRootShift;
+      decision = DecisionOf(body.group().kind, body.movement);
+      if (decision.extra_turn_rad != 0.0) flags |= record::kIsSteered;
+      if (decision.is_on_terrain) flags |= record::kOnTerrain;
+      if (decision.aside_m != DVec3(0.0)) flags |= record::kAside;
+      if (decision.root_shift_m != DVec3(0.0)) flags |= record::kRootShift;
     }
   }
   RecordWriter writer(out);
   writer.Flags(flags);
+  STRIDEWIRE_CHECK(!change.has_begun || avatar.movement() != nullptr);
   if (change.has_left && !change.is_left_at_end) writer.F64(change.left_s);
-  if (change.has_begun) WriteBegun(avatar, flags, choice, writer);
+  if (change.has_begun) WriteBegun(avatar, flags, decision, writer);
   if (change.has_layers) WriteLayers(body.layers, writer);
   return true;
 }

@@ -59,29 +59,29 @@ void PoseFields(Stream& stream, P& pose) {
 }
 
 template <typename Stream, typename P>
-void PrintFields(Stream& stream, P& print) {
+void FootprintFields(Stream& stream, P& print) {
   Vector(stream, print.position_m);
   stream.F64(print.heading_rad);
 }
 
 template <typename Stream, typename L>
-void ChoiceFields(Stream& stream, unsigned flags, MovementKind kind, L& choice) {
-  if ((flags & kIsSteered) != 0) stream.F64(choice.extra_turn_rad);
+void DecisionFields(Stream& stream, unsigned flags, MovementKind kind, L& decision) {
+  if ((flags & kIsSteered) != 0) stream.F64(decision.extra_turn_rad);
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     if (IsStep(kind) && foot != MovingFoot(kind)) continue;
-    Vector(stream, choice.to_m[static_cast<std::size_t>(foot)]);
+    Vector(stream, decision.to_m[static_cast<std::size_t>(foot)]);
   }
   if (!IsStep(kind)) return;
-  stream.F64(choice.turn_rad);
-  stream.F64(choice.height_m);
+  stream.F64(decision.turn_rad);
+  stream.F64(decision.height_m);
   if ((flags & kOnTerrain) != 0) {
-    stream.F64(choice.lift_m);
-    Vector(stream, choice.normal);
-    stream.CheckUnit(choice.normal);
+    stream.F64(decision.lift_m);
+    Vector(stream, decision.normal);
+    stream.CheckUnit(decision.normal);
   }
-  if ((flags & kAside) != 0) stream.F64(choice.aside_m.x), stream.F64(choice.aside_m.z);
+  if ((flags & kAside) != 0) stream.F64(decision.aside_m.x), stream.F64(decision.aside_m.z);
   if ((flags & kRootShift) != 0) {
-    stream.F64(choice.root_shift_m.x), stream.F64(choice.root_shift_m.z);
+    stream.F64(decision.root_shift_m.x), stream.F64(decision.root_shift_m.z);
   }
 }
 
@@ -100,13 +100,13 @@ void CorrectionFields(Stream& stream, C& feet) {
 
 template <typename Stream, typename H>
 void FootLockFields(Stream& stream, H& locks) {
-  for (auto& hold : locks) {
-    PrintFields(stream, hold.print);
-    stream.F64(hold.height_m);
-    stream.F64(hold.turn_rad);
-    Vector(stream, hold.normal);
-    stream.CheckUnit(hold.normal);
-    stream.F64(hold.root_weight);
+  for (auto& lock : locks) {
+    FootprintFields(stream, lock.print);
+    stream.F64(lock.height_m);
+    stream.F64(lock.turn_rad);
+    Vector(stream, lock.normal);
+    stream.CheckUnit(lock.normal);
+    stream.F64(lock.root_weight);
   }
 }
 
@@ -115,29 +115,29 @@ template <typename Stream, typename P>
 void PlanFields(Stream& stream, P& plan) {
   stream.Bool(plan.keeps_above_ground);
   for (std::size_t f = 0; f < 2; ++f) {
-    auto& track = plan.feet[f];
-    PrintFields(stream, track.from);
-    PrintFields(stream, track.to);
-    Vector(stream, track.release_offset_m);
-    stream.F64(track.release_turn_rad);
-    Vector(stream, track.release_velocity_m_s);
-    Vector(stream, track.land_offset_m);
-    Vector(stream, track.land_velocity_m_s);
-    for (auto& height : track.height_m) stream.F64(height);
-    for (auto& turn : track.turn_rad) stream.F64(turn);
-    for (auto& normal : track.normals) {
+    auto& trajectory = plan.feet[f];
+    FootprintFields(stream, trajectory.from);
+    FootprintFields(stream, trajectory.to);
+    Vector(stream, trajectory.release_offset_m);
+    stream.F64(trajectory.release_turn_rad);
+    Vector(stream, trajectory.release_velocity_m_s);
+    Vector(stream, trajectory.land_offset_m);
+    Vector(stream, trajectory.land_velocity_m_s);
+    for (auto& height : trajectory.height_m) stream.F64(height);
+    for (auto& turn : trajectory.turn_rad) stream.F64(turn);
+    for (auto& normal : trajectory.normals) {
       Vector(stream, normal);
       stream.CheckUnit(normal);
     }
-    stream.F64(track.lift_m);
-    Vector(stream, track.aside_m);
-    Vector(stream, track.root_shift_m);
-    auto& rest = plan.residuals[f];
-    Vector(stream, rest.offset_m);
-    Vector(stream, rest.offset_m_s);
-    stream.F64(rest.turn_rad);
-    stream.F64(rest.turn_rad_s);
-    stream.F64(rest.over_s);
+    stream.F64(trajectory.lift_m);
+    Vector(stream, trajectory.aside_m);
+    Vector(stream, trajectory.root_shift_m);
+    auto& residual = plan.residuals[f];
+    Vector(stream, residual.offset_m);
+    Vector(stream, residual.offset_m_s);
+    stream.F64(residual.turn_rad);
+    stream.F64(residual.turn_rad_s);
+    stream.F64(residual.over_s);
   }
   Vector(stream, plan.root_residual_m);
   Vector(stream, plan.root_residual_m_s);

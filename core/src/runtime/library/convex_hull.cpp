@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/check.h"
 #include "stridewire/runtime/motion_library.h"
@@ -21,6 +22,8 @@ namespace {
 
 constexpr std::size_t kMaxCorral = kMaxParameters + 1;
 constexpr int kMaxRounds = 200;
+// Groups of more examples are rare.
+constexpr std::size_t kMaxStoredVertices = 256;
 constexpr double kInside = 1e-9;
 
 using Point = std::array<double, kMaxParameters>;
@@ -94,50 +97,56 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t l = 0; l < d; ++l) sum[l] += points[i * d + l];
   }
-  // Vertices relative to the target, multiplied by the metric. Only the first `count` are used.
-  std::array<Point, MotionLibrary::kMaxExamples> vertices;
-  for (std::size_t l = 0; l < d; ++l) {
-    const double mean = sum[l] / static_cast<double>(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      const double grown = mean + (1.0 + growth) * (points[i * d + l] - mean);
-      vertices[i][l] = (grown - target[l]) * metric[l];
+  Point mean{};
+  for (std::size_t l = 0; l < d; ++l) mean[l] = sum[l] / static_cast<double>(count);
+  // Vertices relative to the target, multiplied by the metric. The first ones are stored; the
+  // others are computed whenever they are needed, so that large groups need no more stack than
+  // small ones.
+  const auto compute_vertex = [&](std::size_t i) {
+    Point vertex{};
+    for (std::size_t l = 0; l < d; ++l) {
+      const double grown = mean[l] + (1.0 + growth) * (points[i * d + l] - mean[l]);
+      vertex[l] = (grown - target[l]) * metric[l];
     }
-  }
+    return vertex;
+  };
+  std::array<Point, kMaxStoredVertices> stored;
+  const std::size_t stored_count = std::min(count, kMaxStoredVertices);
+  for (std::size_t i = 0; i < stored_count; ++i) stored[i] = compute_vertex(i);
+  const auto vertex_at = [&](std::size_t i) {
+    return i < stored_count ? stored[i] : compute_vertex(i);
+  };
+  // Index of the vertex for which `value` is least, and that value.
+  const auto find_least = [&](const auto& value) {
+    std::pair<std::size_t, double> least{0, HUGE_VAL};
+    const auto consider = [&](std::size_t i, double v) {
+      if (v < least.second) least = {i, v};
+    };
+    for (std::size_t i = 0; i < stored_count; ++i) consider(i, value(stored[i]));
+    for (std::size_t i = stored_count; i < count; ++i) consider(i, value(compute_vertex(i)));
+    return least;
+  };
 
-  std::size_t start = 0;
-  double start_norm = HUGE_VAL;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double norm = DotProduct(vertices[i], vertices[i], d);
-    if (norm < start_norm) {
-      start_norm = norm;
-      start = i;
-    }
-  }
+  const auto start =
+      find_least([&](const Point& vertex) { return DotProduct(vertex, vertex, d); }).first;
   Corral corral;
   corral.size = 1;
-  corral.points[0] = vertices[start];
+  corral.points[0] = vertex_at(start);
   corral.lambda[0] = 1.0;
   Point x = corral.points[0];
 
   for (int round = 0; round < kMaxRounds; ++round) {
     const double norm = DotProduct(x, x, d);
     if (norm < kInside * kInside) break;
-    double least = HUGE_VAL;
-    std::size_t candidate = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double along = DotProduct(x, vertices[i], d);
-      if (along < least) {
-        least = along;
-        candidate = i;
-      }
-    }
+    const auto [candidate, least] =
+        find_least([&](const Point& vertex) { return DotProduct(x, vertex, d); });
     if (least > norm - 1e-12 * std::max(1.0, norm)) break;  // No vertex is closer to the origin.
     if (corral.size == d + 1) {  // The corral is full: remove the vertex of least weight.
       const auto smallest = std::min_element(
           corral.lambda.begin(), corral.lambda.begin() + static_cast<long>(corral.size));
       corral.Remove(static_cast<std::size_t>(smallest - corral.lambda.begin()));
     }
-    corral.points[corral.size] = vertices[candidate];
+    corral.points[corral.size] = vertex_at(candidate);
     corral.lambda[corral.size] = 0.0;
     ++corral.size;
 

@@ -12,8 +12,8 @@ namespace stridewire {
 /// hull.
 ///
 /// d is at most kMaxParameters and `count` at most MotionLibrary::kMaxExamples. Uses Wolfe's
-/// algorithm ("Finding the nearest point in a polytope", 1976) with at most 200 rounds. Needs 56
-/// bytes of stack per point and never allocates.
+/// algorithm ("Finding the nearest point in a polytope", 1976) with at most 200 rounds. Uses 16 KB
+/// of stack and never allocates.
 double ProjectOntoHull(std::span<const double> points, std::span<const double> metric,
                        double growth, std::span<const double> target, std::span<double> nearest);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
+
 namespace stridewire {
 namespace {
 
@@ -75,6 +77,8 @@ void BlendKeytimes(std::span<const double> example_keytimes_s, std::span<const f
 TimeWarp::TimeWarp(std::span<const double> keytimes_s, std::span<const int> cells)
     : interval_count_(static_cast<int>(cells.size())) {
   const std::size_t n = cells.size();
+  STRIDEWIRE_CHECK(n >= 1 && n <= static_cast<std::size_t>(kMaxIntervals));
+  STRIDEWIRE_CHECK(keytimes_s.size() == n + 1);
   std::array<double, kMaxIntervals> length{};
   std::array<double, kMaxIntervals> rate{};  // Cells per second in each interval.
   knots_[0].time_s = keytimes_s[0];

@@ -21,21 +21,21 @@ constexpr double kLeastWidthM = 0.08;
 }  // namespace
 
 LocomotionProfile MakeLocomotionProfile(const MotionLibrary& library) {
-  LocomotionProfile gait;
+  LocomotionProfile profile;
   const Pose& stand = library.stand_pose();
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     DVec3 ball = DVec3(BallPosition(library.skeleton(), stand, foot)) -
                  DVec3(stand.root_position_m.x, 0.0, stand.root_position_m.z);
     ball.y = 0.0;
-    gait.stand_feet_m[static_cast<std::size_t>(foot)] = ball;
+    profile.stand_feet_m[static_cast<std::size_t>(foot)] = ball;
   }
-  gait.stand_m = std::max(gait.stand_feet_m[0].x - gait.stand_feet_m[1].x, kLeastWidthM);
+  profile.stand_m = std::max(profile.stand_feet_m[0].x - profile.stand_feet_m[1].x, kLeastWidthM);
 
   double longest_m = 0.0;
   double back_m = 0.0;
   double width_m = 0.0;
   int widths = 0;
-  double narrowest_m = gait.stand_m;
+  double narrowest_m = profile.stand_m;
   for (const MotionGroup& group : library.groups()) {
     if (!IsStep(group.kind)) continue;
     const int end_z = group.FindParameter(ParameterName::kEndZ);
@@ -51,23 +51,23 @@ LocomotionProfile MakeLocomotionProfile(const MotionLibrary& library) {
     const double outward = MovingFoot(group.kind) == Foot::kLeft ? 1.0 : -1.0;
     for (int s = 0; s < group.example_count; ++s) {
       const auto site = group.site(s);
-      const double aside_m = outward * site[static_cast<std::size_t>(x)];
-      if (site[static_cast<std::size_t>(end_z)] < kStrideM || aside_m < kLeastWidthM) continue;
+      const double side_m = outward * site[static_cast<std::size_t>(x)];
+      if (site[static_cast<std::size_t>(end_z)] < kStrideM || side_m < kLeastWidthM) continue;
       if (turn >= 0 && std::fabs(site[static_cast<std::size_t>(turn)]) > kStraightRad) continue;
-      narrowest_m = std::min(narrowest_m, aside_m);
-      width_m += aside_m;
+      narrowest_m = std::min(narrowest_m, side_m);
+      width_m += side_m;
       ++widths;
     }
   }
   if (longest_m > 0.0) {
-    gait.longest_m = longest_m;
-    gait.step_m = std::min(kComfortablePart * longest_m, kMaxComfortableM);
+    profile.longest_m = longest_m;
+    profile.step_m = std::min(kComfortablePart * longest_m, kMaxComfortableM);
   }
-  gait.back_m = 0.75 * back_m;
-  if (widths > 0) width_m = std::min(width_m / widths, gait.stand_m);
-  gait.width_m = widths > 0 ? 0.5 * (narrowest_m + width_m) : 0.7 * gait.stand_m;
-  gait.width_m = std::min(gait.width_m, gait.stand_m);
-  return gait;
+  profile.back_m = 0.75 * back_m;
+  if (widths > 0) width_m = std::min(width_m / widths, profile.stand_m);
+  profile.width_m = widths > 0 ? 0.5 * (narrowest_m + width_m) : 0.7 * profile.stand_m;
+  profile.width_m = std::min(profile.width_m, profile.stand_m);
+  return profile;
 }
 
 }  // namespace stridewire

@@ -13,13 +13,13 @@
 #include <cstring>
 #include <string>
 
+#include "motion_library_generated.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/library/library_file.h"
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/library/transition.h"
 #include "runtime/skeleton/layer_clip.h"
 #include "runtime/skeleton/leg_rig.h"
-#include "motion_library_generated.h"
 
 namespace stridewire {
 namespace {

@@ -20,19 +20,19 @@ constexpr double kPlantedMargin = 0.3;
 constexpr double kStillMargin = 0.0011;
 constexpr double kStillWidth = 1e-4;
 // A joint whose w falls below this may rotate in any direction and uses smallest-three encoding.
-constexpr double kMinSeenW = 0.4;
+constexpr double kMinBoundedW = 0.4;
 // A joint whose mean rotation is below 9 degrees uses the identity as its reference. That saves the
 // encoder a multiplication and needs no more bits.
-constexpr float kLittleTurnedW = 0.997f;
+constexpr float kSmallRotationW = 0.997f;
 
 // Largest error of a joint as an angle. Joints with children get the smaller limit, because their
 // children have to compensate for the error.
-constexpr double kMostInnerRad = 0.002;
-constexpr double kMostOuterRad = 0.004;
+constexpr double kMaxInnerErrorRad = 0.002;
+constexpr double kMaxOuterErrorRad = 0.004;
 
 // Largest error of a joint relative to the root: 1 mm minus the root's own error (2^-15 m along
 // each axis) and a small allowance for single precision.
-constexpr double kLargestAgainstRootM = 0.001 - 0.0000529 - 0.00002;
+constexpr double kMaxErrorToRootM = 0.001 - 0.0000529 - 0.00002;
 
 // Calls `callback` with each rotation of a joint that occurs in the library.
 template <typename Callback>
@@ -85,7 +85,7 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
   RotationRange range;
   range.reference = Normalise(Quat(static_cast<float>(sum.w), static_cast<float>(sum.x),
                                    static_cast<float>(sum.y), static_cast<float>(sum.z)));
-  if (std::abs(range.reference.w) > kLittleTurnedW) range.reference = kIdentityQuat;
+  if (std::abs(range.reference.w) > kSmallRotationW) range.reference = kIdentityQuat;
   const DQuat back = glm::conjugate(DQuat(range.reference));
   DVec3 low(1.0);
   DVec3 high(-1.0);
@@ -99,18 +99,18 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
     least_w = std::min(least_w, sign * d.w);
   });
   const DVec3 width = high - low;
-  const double beside = is_planted ? kPlantedMargin : kMargin;
+  const double base_margin = is_planted ? kPlantedMargin : kMargin;
   for (int c = 0; c < 3; ++c) {
     const bool is_still = width[c] < kStillWidth && !is_planted;
-    const double margin = is_still ? kStillMargin : kMarginOfWidth * width[c] + beside;
+    const double margin = is_still ? kStillMargin : kMarginOfWidth * width[c] + base_margin;
     range.low[c] = static_cast<float>(std::max(-1.0, low[c] - margin));
     range.high[c] = static_cast<float>(std::min(1.0, high[c] + margin));
   }
-  if (least_w < kMinSeenW) return range;
+  if (least_w < kMinBoundedW) return range;
   const double widest = std::max({width.x, width.y, width.z});
   const bool is_rigid = widest < kStillWidth && !is_planted;
   const double sine = std::sqrt(std::max(0.0, 1.0 - least_w * least_w)) +
-                      (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + beside);
+                      (is_rigid ? 2.0 * kStillMargin : kMarginOfWidth * widest + base_margin);
   constexpr auto kLeast = static_cast<double>(RotationQuantization::kMinLeastW);
   range.least_w = std::sqrt(std::max(kLeast * kLeast, 1.0 - sine * sine));
   return range;
@@ -118,19 +118,21 @@ RotationRange RangeOf(const MotionLibrary& library, std::size_t joint, bool is_p
 
 // Distributes bits over the components of all joints. Each bit goes to the component where it
 // reduces the error of the least accurate point most.
-class BitChoice {
+class BitAllocator {
  public:
-  BitChoice(const Skeleton& skeleton, std::span<const RotationRange> ranges, double most_m)
-      : ranges_(ranges), most_m_(most_m), joints_(ranges.size()) {
+  BitAllocator(const Skeleton& skeleton, std::span<const RotationRange> ranges, double max_error_m)
+      : ranges_(ranges), max_error_m_(max_error_m), joints_(ranges.size()) {
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       Joint& joint = joints_[j];
-      joint.is_free = ranges[j].least_w < static_cast<double>(RotationQuantization::kMinLeastW);
-      if (joint.is_free) joint.bits = {RotationQuantization::kMinFreeBits, 0, 0};
+      joint.is_unbounded =
+          ranges[j].least_w < static_cast<double>(RotationQuantization::kMinLeastW);
+      if (joint.is_unbounded) joint.bits = {RotationQuantization::kMinFreeBits, 0, 0};
       joint.angle_rad = AngleOf(j, joint.bits);
-      joint.most_rad = kMostOuterRad;
+      joint.max_error_rad = kMaxOuterErrorRad;
     }
     for (std::size_t j = 1; j < joints_.size(); ++j) {
-      joints_[static_cast<std::size_t>(skeleton.joints[j].parent)].most_rad = kMostInnerRad;
+      joints_[static_cast<std::size_t>(skeleton.joints[j].parent)].max_error_rad =
+          kMaxInnerErrorRad;
     }
     std::vector<bool> has_end(joints_.size(), false);
     for (const EndSite& site : skeleton.end_sites) {
@@ -138,19 +140,19 @@ class BitChoice {
       has_end[static_cast<std::size_t>(site.joint)] = true;
     }
     for (std::size_t j = 0; j < joints_.size(); ++j) {
-      if (joints_[j].most_rad == kMostOuterRad && !has_end[j]) {
+      if (joints_[j].max_error_rad == kMaxOuterErrorRad && !has_end[j]) {
         AddChain(skeleton, static_cast<int>(j), 0.0);
       }
     }
   }
 
-  void GiveBits() {
-    while (GiveOne()) {
+  void Allocate() {
+    while (AddBit()) {
     }
     // Take back bits that turned out to be unnecessary.
     for (std::size_t j = joints_.size(); j-- > 0;) {
       for (std::size_t c = 0; c < 3; ++c) {
-        while (TakeOne(j, c)) {
+        while (RemoveBit(j, c)) {
         }
       }
     }
@@ -160,7 +162,7 @@ class BitChoice {
     PoseQuantization code;
     for (std::size_t j = 0; j < joints_.size(); ++j) {
       RotationQuantization& rotation = code.joints.emplace_back();
-      if (joints_[j].is_free) {
+      if (joints_[j].is_unbounded) {
         rotation.smallest_three_bits = joints_[j].bits[0];
         rotation.least_w = RotationQuantization::kMinLeastW;
         continue;
@@ -184,10 +186,10 @@ class BitChoice {
  private:
   using Bits = std::array<std::uint8_t, 3>;
   struct Joint {
-    bool is_free = false;
+    bool is_unbounded = false;
     Bits bits{};
     double angle_rad = 0.0;
-    double most_rad = 0.0;
+    double max_error_rad = 0.0;
     std::vector<std::size_t> chains;  // Indices of the chains that contain this joint.
   };
   struct Bone {
@@ -222,7 +224,7 @@ class BitChoice {
   // Largest error of a quantized rotation in radians. If a component is off by half a step, then w,
   // which follows from the components, is off by half a step times |v| / w.
   [[nodiscard]] double AngleOf(std::size_t joint, const Bits& bits) const {
-    if (joints_[joint].is_free) {
+    if (joints_[joint].is_unbounded) {
       // The error is largest where all four components are 0.5. Then each of the three encoded ones
       // is off by half of sqrt(1/2) / (2^(b - 1) - 1), and the fourth by the sum of these errors.
       return std::sqrt(6.0) / static_cast<double>((1 << (bits[0] - 1)) - 1);
@@ -236,10 +238,10 @@ class BitChoice {
     return 2.0 * std::sqrt(squared) / (ranges_[joint].least_w - 0.005);
   }
 
-  [[nodiscard]] bool CanTakeMore(std::size_t j, std::size_t component) const {
+  [[nodiscard]] bool CanAddBit(std::size_t j, std::size_t component) const {
     const Joint& joint = joints_[j];
     const int bits = joint.bits[component];
-    if (joint.is_free) return component == 0 && bits < RotationQuantization::kMaxFreeBits;
+    if (joint.is_unbounded) return component == 0 && bits < RotationQuantization::kMaxFreeBits;
     return bits < RotationQuantization::kMaxBits &&
            StepOf(j, static_cast<int>(component), bits + 1) >=
                static_cast<double>(RotationQuantization::kMinStep);
@@ -247,14 +249,14 @@ class BitChoice {
 
   // Finds the component whose error shrinks most with one more bit. Returns the gain in radians per
   // bit, or -1 if no component can take more bits.
-  double BestOf(std::size_t j, std::size_t& component) const {
+  double BestComponent(std::size_t j, std::size_t& component) const {
     const Joint& joint = joints_[j];
     double best = -1.0;
     for (std::size_t c = 0; c < 3; ++c) {
-      if (!CanTakeMore(j, c)) continue;
+      if (!CanAddBit(j, c)) continue;
       Bits more = joint.bits;
       ++more[c];
-      const double gain = (joint.angle_rad - AngleOf(j, more)) / (joint.is_free ? 3.0 : 1.0);
+      const double gain = (joint.angle_rad - AngleOf(j, more)) / (joint.is_unbounded ? 3.0 : 1.0);
       if (gain <= best) continue;
       best = gain;
       component = c;
@@ -262,32 +264,32 @@ class BitChoice {
     return best;
   }
 
-  bool GiveOne() {
+  bool AddBit() {
     std::size_t joint = 0;
     std::size_t component = 0;
     double best = 0.0;
     const Chain* worst = nullptr;
-    double worst_m = most_m_;
+    double worst_m = max_error_m_;
     for (const Chain& chain : chains_) {
       if (const double error_m = ErrorOf(chain); error_m > worst_m) {
         worst = &chain;
         worst_m = error_m;
       }
     }
-    const auto look_at = [&](std::size_t j, double weight) {
+    const auto consider = [&](std::size_t j, double weight) {
       std::size_t c = 0;
-      const double gain = BestOf(j, c) * weight;
+      const double gain = BestComponent(j, c) * weight;
       if (gain <= best) return;
       best = gain;
       joint = j;
       component = c;
     };
     if (worst != nullptr) {
-      for (const Bone& bone : *worst) look_at(bone.joint, bone.length_m);
+      for (const Bone& bone : *worst) consider(bone.joint, bone.length_m);
     }
     if (best <= 0.0) {
       for (std::size_t j = 0; j < joints_.size(); ++j) {
-        if (joints_[j].angle_rad > joints_[j].most_rad) look_at(j, 1.0);
+        if (joints_[j].angle_rad > joints_[j].max_error_rad) consider(j, 1.0);
       }
     }
     if (best <= 0.0) return false;
@@ -296,17 +298,17 @@ class BitChoice {
     return true;
   }
 
-  bool TakeOne(std::size_t j, std::size_t component) {
+  bool RemoveBit(std::size_t j, std::size_t component) {
     Joint& joint = joints_[j];
-    const int least = joint.is_free ? int{RotationQuantization::kMinFreeBits} : 0;
-    if ((joint.is_free && component > 0) || joint.bits[component] <= least) return false;
+    const int least = joint.is_unbounded ? int{RotationQuantization::kMinFreeBits} : 0;
+    if ((joint.is_unbounded && component > 0) || joint.bits[component] <= least) return false;
     const double before_rad = joint.angle_rad;
     --joint.bits[component];
     joint.angle_rad = AngleOf(j, joint.bits);
-    const bool is_enough =
-        joint.angle_rad <= joint.most_rad && std::ranges::all_of(joint.chains, [&](std::size_t c) {
-          return ErrorOf(chains_[c]) <= most_m_;
-        });
+    const bool is_enough = joint.angle_rad <= joint.max_error_rad &&
+                           std::ranges::all_of(joint.chains, [&](std::size_t c) {
+                             return ErrorOf(chains_[c]) <= max_error_m_;
+                           });
     if (is_enough) return true;
     ++joint.bits[component];
     joint.angle_rad = before_rad;
@@ -314,7 +316,7 @@ class BitChoice {
   }
 
   std::span<const RotationRange> ranges_;
-  double most_m_;
+  double max_error_m_;
   std::vector<Joint> joints_;
   std::vector<Chain> chains_;  // From each leaf to the root.
 };
@@ -332,14 +334,14 @@ PoseQuantization ChoosePoseQuantization(const Skeleton& skeleton,
                                         std::span<const RotationRange> ranges,
                                         double largest_error_m) {
   STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
-  BitChoice choice(skeleton, ranges, largest_error_m);
-  choice.GiveBits();
-  return choice.Result();
+  BitAllocator allocator(skeleton, ranges, largest_error_m);
+  allocator.Allocate();
+  return allocator.Result();
 }
 
-std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
-                                             std::span<const RotationRange> ranges,
-                                             double largest_shift_m) {
+std::vector<std::uint16_t> ChooseReducedJoints(const Skeleton& skeleton,
+                                               std::span<const RotationRange> ranges,
+                                               double largest_shift_m) {
   STRIDEWIRE_CHECK(ranges.size() == skeleton.joints.size());
   const std::size_t count = ranges.size();
   std::vector<double> reach_m(count, 0.0);  // Length of the longest chain below each joint.
@@ -353,9 +355,9 @@ std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
     const RotationRange& range = ranges[j];
     double squared = 0.0;
     for (int c = 0; c < 3; ++c) {
-      const double most = std::max(std::abs(static_cast<double>(range.low[c])),
-                                   std::abs(static_cast<double>(range.high[c])));
-      squared += most * most;
+      const double largest = std::max(std::abs(static_cast<double>(range.low[c])),
+                                      std::abs(static_cast<double>(range.high[c])));
+      squared += largest * largest;
     }
     const double sine = std::sqrt(std::min(squared, 1.0 - range.least_w * range.least_w));
     shift_m[j] = 2.0 * sine * reach_m[j] + below_m[j];
@@ -364,20 +366,19 @@ std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
     reach_m[parent] = std::max(reach_m[parent], LengthOf(skeleton.joints[j].offset_m) + reach_m[j]);
     below_m[parent] = std::max(below_m[parent], shift_m[j]);
   }
-  std::vector<std::uint16_t> told;
+  std::vector<std::uint16_t> chosen;
   for (std::size_t j = 0; j < count; ++j) {
-    if (j == 0 || shift_m[j] > largest_shift_m) told.push_back(static_cast<std::uint16_t>(j));
+    if (j == 0 || shift_m[j] > largest_shift_m) chosen.push_back(static_cast<std::uint16_t>(j));
   }
-  return told;
+  return chosen;
 }
 
-std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library) {
-  return ChooseFewerJoints(library.skeleton(), FindRotationRanges(library), kFewerJointsShiftM);
+std::vector<std::uint16_t> ChooseReducedJoints(const MotionLibrary& library) {
+  return ChooseReducedJoints(library.skeleton(), FindRotationRanges(library), kReducedJointsShiftM);
 }
 
 PoseQuantization ChoosePoseQuantization(const MotionLibrary& library) {
-  return ChoosePoseQuantization(library.skeleton(), FindRotationRanges(library),
-                                kLargestAgainstRootM);
+  return ChoosePoseQuantization(library.skeleton(), FindRotationRanges(library), kMaxErrorToRootM);
 }
 
 }  // namespace stridewire

@@ -53,12 +53,12 @@ struct PoseQuantization {
 /// of its largest rotation from the reference times the length of the chain below it, and shifts
 /// add up along a chain. The root and the parents of chosen joints are never left out. The result
 /// is the same on every machine.
-[[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const Skeleton& skeleton,
-                                                           std::span<const RotationRange> ranges,
-                                                           double largest_shift_m);
+[[nodiscard]] std::vector<std::uint16_t> ChooseReducedJoints(const Skeleton& skeleton,
+                                                             std::span<const RotationRange> ranges,
+                                                             double largest_shift_m);
 /// Largest shift of a joint when a library's reduced set of joints is sent.
-inline constexpr double kFewerJointsShiftM = 0.12;
-[[nodiscard]] std::vector<std::uint16_t> ChooseFewerJoints(const MotionLibrary& library);
+inline constexpr double kReducedJointsShiftM = 0.12;
+[[nodiscard]] std::vector<std::uint16_t> ChooseReducedJoints(const MotionLibrary& library);
 
 /// Finds the ranges of a library and chooses the bits so that, with the root position rounded to
 /// 2^-14 m, every joint is within 1 mm of its position in the world.

@@ -4,17 +4,18 @@
 
 namespace stridewire {
 
-/// How one movement goes on where another ended: of the first group the example that ends and of the second
-/// the one that starts most alike.
+/// How well a movement of one group continues after one of another: for the best pair of an example
+/// that ends and an example that starts.
 struct Transition {
-  /// Root mean square over the joints of how far they are apart, both poses brought to the same place, ground
-  /// and heading, and kTransitionVelocityS times the same of their velocities. Metres.
+  /// In metres: root mean square distance of the joints, plus kTransitionVelocityS times that of
+  /// their velocities. The poses are first moved to the same position, ground height and heading.
   float distance_m = 0.0f;
-  std::int32_t end_example = -1;    ///< -1: the stand
-  std::int32_t start_example = -1;  ///< -1: the stand
+  std::int32_t end_example = -1;    ///< -1: the stand.
+  std::int32_t start_example = -1;  ///< -1: the stand.
 };
 
-/// A velocity is as bad as the way it leads in that time: half of what a difference is eased out over.
+/// A difference in velocity counts like the distance it covers in this time, which is half of the
+/// time over which a difference pose fades out.
 inline constexpr double kTransitionVelocityS = 0.1;
 
 }  // namespace stridewire

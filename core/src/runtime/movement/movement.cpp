@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/library/keytimes.h"
+#include "base/check.h"
 #include "runtime/library/cardinal_basis.h"
+#include "runtime/library/keytimes.h"
 
 namespace stridewire {
 double EaseOut(double s) {
@@ -40,10 +41,11 @@ void SetWeights(const MotionGroup& group, int group_index, std::span<const doubl
                      group.dilations, group.linear, group.radial},
                     parameters, weights);
   }
-  TakeWeights(group, weights, movement);
+  ApplyWeights(group, weights, movement);
 }
 
-void TakeWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
+void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement) {
+  STRIDEWIRE_CHECK(weights.size() == static_cast<std::size_t>(group.example_count));
   movement.weights.resize(weights.size());
   movement.heading_change_rad = 0.0;
   for (std::size_t e = 0; e < weights.size(); ++e) {
@@ -59,6 +61,7 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 }
 
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement) {
+  STRIDEWIRE_CHECK(movement.weights.size() == static_cast<std::size_t>(group.example_count));
   movement.base = base;
   movement.extra_turn_rad = 0.0;
   movement.start_offset_s = 0.0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/keytimes.h"
 #include "runtime/plan/foot_sampler.h"
@@ -42,10 +43,11 @@ constexpr double kMaxAsideM = 0.05;
 // foot closer than kPassApartM is pushed outward by up to kMaxPushM. This is checked while the feet
 // are within kPassingM of each other in the walking direction. A step that starts or lands closer
 // than kCrossingM crosses the legs intentionally.
-constexpr double kPassApartM = 0.11;
-constexpr double kLandApartM = 0.05;  // Feet do not land closer unless the request gives the side.
-constexpr double kPassingM = 0.2;
-constexpr double kCrossingM = 0.04;
+constexpr double kMinPassingWidthM = 0.11;
+constexpr double kMinLandingWidthM =
+    0.05;  // Feet do not land closer unless the request gives the side.
+constexpr double kPassingLengthM = 0.2;
+constexpr double kCrossingWidthM = 0.04;
 constexpr double kMaxPushM = 0.08;
 // Fractions of the swing and of the stance at which feet are sampled.
 constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
@@ -72,15 +74,15 @@ double ValueOr(const MotionGroup& group, const ParameterValues& values, Paramete
 
 class Planner {
  public:
-  Planner(const MotionLibrary& library, GridCache& cache, PoseSpan pose, Movement& movement)
+  Planner(const MotionLibrary& library, FootPlanScratch& scratch, PoseSpan pose, Movement& movement)
       : library_(library),
         skeleton_(library.skeleton()),
         rig_(library.leg_rig()),
         group_(library.group(movement.group)),
-        cache_(cache),
+        cache_(scratch.cache()),
         pose_(pose),
         movement_(movement),
-        sampler_(library, cache, pose) {}
+        sampler_(scratch, pose) {}
 
   FeetAt FeetOf(ConstPoseSpan pose) const {
     FeetAt feet;
@@ -145,8 +147,8 @@ class Planner {
   }
 
   // Chooses the footprint of a step's moving foot. Returns the foot at landing before planting.
-  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& wish, Foot moving) {
-    const RequestPlan& request = wish.request;
+  BlendedFoot ChooseLanding(const FootLocks& locks, const LandingTarget& target, Foot moving) {
+    const RequestPlan& request = target.request;
     FootPlan& plan = movement_.feet;
     const auto m = static_cast<std::size_t>(moving);
     const std::size_t x = 1 - m;
@@ -156,30 +158,30 @@ class Planner {
     // If each foot were placed only relative to the other, the walk would drift sideways, because
     // left and right steps of a capture are not equally wide. Steer back towards the line.
     const double aside_m =
-        std::clamp(RotateYaw(-end_heading_rad, wish.line_m - movement_.base.position_m).x,
+        std::clamp(RotateYaw(-end_heading_rad, target.line_m - movement_.base.position_m).x,
                    -kMaxAsideM, kMaxAsideM);
     DVec3 vector{ValueOr(group_, request.applied, ParameterName::kEndX, blended.x + aside_m),
                  GroundRise(ValueOr(group_, request.applied, ParameterName::kEndY, 0.0)),
                  ValueOr(group_, request.applied, ParameterName::kEndZ, blended.z)};
     if (!request.is_side_given) {
       const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
-      vector.x = outward * std::max(outward * vector.x, kLandApartM);
+      vector.x = outward * std::max(outward * vector.x, kMinLandingWidthM);
     }
-    FootTrajectory& track = plan.feet[m];
+    FootTrajectory& trajectory = plan.feet[m];
     const double rise_m = vector.y;
-    track.to.position_m = locks[x].print.position_m + RotateYaw(end_heading_rad, vector);
+    trajectory.to.position_m = locks[x].print.position_m + RotateYaw(end_heading_rad, vector);
     double turn_rad = 0.0;
     const BlendedFoot landing = sampler_.FootAt(kLanding, moving);
     const double landing_rad = landing.heading_rad;
     if (request.exact) {
-      DVec3 residual = request.exact->position_m - track.to.position_m;
+      DVec3 residual = request.exact->position_m - trajectory.to.position_m;
       const double length_m = std::sqrt(residual.x * residual.x + residual.z * residual.z);
       const double part =
           std::min(1.0, request.most_residual_m / std::max(length_m, request.most_residual_m));
       plan.missed_m = (1.0 - part) * DVec3(residual.x, 0.0, residual.z);
       residual.x *= part;
       residual.z *= part;
-      track.to.position_m += residual;
+      trajectory.to.position_m += residual;
       const double wanted_rad = WrapAngle(request.exact->heading_rad - landing_rad);
       turn_rad = std::clamp(wanted_rad, -kMaxFootTurnRad, kMaxFootTurnRad);
       plan.missed_rad = wanted_rad - turn_rad;
@@ -193,12 +195,12 @@ class Planner {
       const double turned_rad = movement_.heading_change_rad + movement_.extra_turn_rad;
       plan.missed_rad = request.turn_rad.value_or(turned_rad) - turned_rad;
     }
-    track.to.heading_rad = landing_rad + turn_rad;
-    track.turn_rad[2] = turn_rad;
-    if (wish.terrain != nullptr) StandOnGround(moving, *wish.terrain, track);
-    track.height_m[2] = track.to.position_m.y - locks[x].print.position_m.y - rise_m +
-                        SlopeRise(rig_.sides[m], track.normals[1]) -
-                        SlopeRise(rig_.sides[x], locks[x].normal);
+    trajectory.to.heading_rad = landing_rad + turn_rad;
+    trajectory.turn_rad[2] = turn_rad;
+    if (target.terrain != nullptr) StandOnGround(moving, *target.terrain, trajectory);
+    trajectory.height_m[2] = trajectory.to.position_m.y - locks[x].print.position_m.y - rise_m +
+                             SlopeRise(rig_.sides[m], trajectory.normals[1]) -
+                             SlopeRise(rig_.sides[x], locks[x].normal);
     return landing;
   }
 
@@ -216,23 +218,23 @@ class Planner {
 
   // Computes offsets and their velocities at release and landing, so that the foot's path is
   // smooth.
-  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& track) {
+  void BlendSwing(Foot foot, const BlendedFoot& landing, FootTrajectory& trajectory) {
     const auto velocity_around = [&](std::size_t time) {
       const DVec3 way_m = sampler_.Ball(time + 1, foot) - sampler_.Ball(time - 1, foot);
       return way_m / (times_s_[time + 1] - times_s_[time - 1]);
     };
-    track.release_velocity_m_s = -velocity_around(kRelease);
+    trajectory.release_velocity_m_s = -velocity_around(kRelease);
     const BlendedFoot released = sampler_.FootAt(kRelease, foot);
-    track.release_offset_m = track.from.position_m - released.ball_m;
-    const FootCorrection at_release = CorrectFoot(movement_, foot, track.release_s, released);
-    track.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
-    track.land_velocity_m_s = -velocity_around(kLanding);
-    track.land_offset_m = track.to.position_m - landing.ball_m;
+    trajectory.release_offset_m = trajectory.from.position_m - released.ball_m;
+    const FootCorrection at_release = CorrectFoot(movement_, foot, trajectory.release_s, released);
+    trajectory.release_turn_rad = at_release.turn_rad - at_release.free_turn_rad;
+    trajectory.land_velocity_m_s = -velocity_around(kLanding);
+    trajectory.land_offset_m = trajectory.to.position_m - landing.ball_m;
   }
 
   // Largest outward push of the swinging foot that is needed to pass the standing leg.
   double PushAside(Foot moving) {
-    const FootTrajectory& track = movement_.feet.foot(moving);
+    const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
     const DVec3 stands = movement_.feet.foot(OtherFoot(moving)).from.position_m;
     const auto vector = [&](const DVec3& ball, double part) {
@@ -240,8 +242,8 @@ class Planner {
       return RotateYaw(-heading, ball - stands);
     };
     // A step that starts or lands across the other foot does so intentionally.
-    if (outward * vector(track.from.position_m, 0.0).x < kCrossingM ||
-        outward * vector(track.to.position_m, 1.0).x < kCrossingM) {
+    if (outward * vector(trajectory.from.position_m, 0.0).x < kCrossingWidthM ||
+        outward * vector(trajectory.to.position_m, 1.0).x < kCrossingWidthM) {
       return 0.0;
     }
     double push_m = 0.0;
@@ -252,9 +254,9 @@ class Planner {
           .ball_m = sampler_.Ball(kSwing + i, moving)};  // The heading does not affect the ball.
       const DVec3 ball = blended.ball_m + CorrectFoot(movement_, moving, time_s, blended).offset_m;
       const DVec3 apart = vector(ball, part);
-      if (std::fabs(apart.z) > kPassingM) continue;
+      if (std::fabs(apart.z) > kPassingLengthM) continue;
       const double lift = 4.0 * part * (1.0 - part);
-      push_m = std::max(push_m, (kPassApartM - outward * apart.x) / (lift * lift));
+      push_m = std::max(push_m, (kMinPassingWidthM - outward * apart.x) / (lift * lift));
     }
     return std::min(push_m, kMaxPushM);
   }
@@ -275,21 +277,22 @@ class Planner {
     return shift * std::min(1.0, kMaxRootShiftM / std::max(length_m, kMaxRootShiftM));
   }
 
-  void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& track) const {
-    const FootSupport support = SupportOf(terrain, rig_.side(foot), track.to);
-    track.to.position_m.y = StandingHeight(support);
-    track.normals[1] = support.normal;
+  void StandOnGround(Foot foot, const Terrain& terrain, FootTrajectory& trajectory) const {
+    const FootSupport support = SupportOf(terrain, rig_.side(foot), trajectory.to);
+    trajectory.to.position_m.y = StandingHeight(support);
+    trajectory.normals[1] = support.normal;
   }
 
   // Lift that the swinging foot needs at the middle of its swing to clear the ground below its
   // sole.
   double LiftOver(Foot moving, const Terrain& terrain) {
-    const FootTrajectory& track = movement_.feet.foot(moving);
+    const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
     LegPose leg;
     double lift_m = 0.0;
     for (const double part : kClearanceSamples) {
-      const double time_s = track.release_s + part * (track.land_s - track.release_s);
+      const double time_s =
+          trajectory.release_s + part * (trajectory.land_s - trajectory.release_s);
       EvaluateMovement(group_, library_.layout(), movement_, time_s, cache_, pose_);
       EvaluateLeg(skeleton_, rig_, pose_, moving, leg);
       const BlendedFoot blended = FootOf(rig_, moving, DVec3(pose_.root_position_m), leg);
@@ -328,7 +331,7 @@ class Planner {
   static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();
   // The end of the movement, without the difference pose.
   static constexpr std::size_t kBlendedEnd = kEntry + 2;
-  static_assert(kBlendedEnd < FootSampler::kMost);
+  static_assert(kBlendedEnd < FootSampler::kMaxTimes);
   std::array<double, kBlendedEnd + 1> times_s_;
 };
 
@@ -358,13 +361,13 @@ FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     EvaluateLeg(skeleton, rig, pose, foot, leg);
     const BlendedFoot blended = FootOf(rig, foot, DVec3(pose.root_position_m), leg);
-    FootLock& hold = locks[static_cast<std::size_t>(foot)];
-    hold.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
+    FootLock& lock = locks[static_cast<std::size_t>(foot)];
+    lock.print = {DVec3(blended.ball_m.x, ground_m, blended.ball_m.z), blended.heading_rad};
     if (terrain == nullptr) continue;
-    const FootSupport support = SupportOf(*terrain, rig.side(foot), hold.print);
-    hold.print.position_m.y = StandingHeight(support);
-    hold.normal = support.normal;
-    hold.height_m = hold.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
+    const FootSupport support = SupportOf(*terrain, rig.side(foot), lock.print);
+    lock.print.position_m.y = StandingHeight(support);
+    lock.normal = support.normal;
+    lock.height_m = lock.print.position_m.y - ground_m + SlopeRise(rig.side(foot), support.normal);
   }
   return locks;
 }
@@ -377,37 +380,40 @@ void StandOn(const FootLocks& locks, Movement& movement) {
   plan = {};
   plan.is_active = true;
   for (std::size_t f = 0; f < 2; ++f) {
-    const FootLock& hold = locks[f];
-    FootTrajectory& track = plan.feet[f];
-    track.from = track.to = hold.print;
-    track.normals.fill(hold.normal);
-    track.height_m.fill(hold.height_m);
-    track.turn_rad.fill(hold.turn_rad);
-    track.root_weight = hold.root_weight;
+    const FootLock& lock = locks[f];
+    FootTrajectory& trajectory = plan.feet[f];
+    trajectory.from = trajectory.to = lock.print;
+    trajectory.normals.fill(lock.normal);
+    trajectory.height_m.fill(lock.height_m);
+    trajectory.turn_rad.fill(lock.turn_rad);
+    trajectory.root_weight = lock.root_weight;
   }
 }
 
 namespace {
 
-// Plans the feet of a movement: for the target `wish` or, if that is null, from the decision
-// `chosen` that another program made. Both cases share this code, so a replica that receives the
+// Plans the feet of a movement: for the target `target` or, if that is null, from the decision
+// `decision` that another program made. Both cases share this code, so a replica that receives the
 // decision computes the same plan.
 std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
-                           const LandingTarget* wish, const LandingDecision& chosen,
-                           const BlendSource& source, GridCache& cache, PoseSpan pose,
+                           const LandingTarget* target, const LandingDecision& decision,
+                           const BlendSource& source, FootPlanScratch& scratch, PoseSpan pose,
                            Movement& movement) {
   const MotionGroup& group = library.group(movement.group);
-  Planner planner(library, cache, pose, movement);
+  STRIDEWIRE_CHECK(&scratch.library() == &library && library.leg_rig().is_usable);
+  GridCache& cache = scratch.cache();
+  Planner planner(library, scratch, pose, movement);
   const bool is_step = IsStep(group.kind);
   const Foot moving = is_step ? MovingFoot(group.kind) : Foot::kLeft;
   const Foot fixed = OtherFoot(moving);
   const auto m = static_cast<std::size_t>(moving);
   const auto x = static_cast<std::size_t>(fixed);
   const SwingTimes times = SwingTimesOf(group.kind, movement);
-  if (wish == nullptr) {
-    movement.extra_turn_rad = chosen.extra_turn_rad;
-  } else if (wish->request.turn_rad) {
-    movement.extra_turn_rad = std::clamp(*wish->request.turn_rad - movement.heading_change_rad,
+  STRIDEWIRE_CHECK(times.release_s < times.land_s && times.land_s <= movement.duration_s());
+  if (target == nullptr) {
+    movement.extra_turn_rad = decision.extra_turn_rad;
+  } else if (target->request.turn_rad) {
+    movement.extra_turn_rad = std::clamp(*target->request.turn_rad - movement.heading_change_rad,
                                          -kMaxExtraTurnRad, kMaxExtraTurnRad);
   }
 
@@ -423,7 +429,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache,
                 movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);
-  const FeetAt was = planner.FeetOf(source.before);
+  const FeetAt previous = planner.FeetOf(source.before);
   Subtract(source.before, movement.difference, movement.difference);
   if (source.earlier) {
     SetDifferenceVelocity(group, library.layout(), source.before, *source.earlier, cache, pose,
@@ -434,22 +440,22 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   FootPlan& plan = movement.feet;
   plan = {};
   plan.is_active = true;
-  plan.keeps_above_ground = wish == nullptr ? chosen.is_on_terrain : wish->terrain != nullptr;
+  plan.keeps_above_ground = target == nullptr ? decision.is_on_terrain : target->terrain != nullptr;
   for (std::size_t f = 0; f < 2; ++f) {
-    FootTrajectory& track = plan.feet[f];
-    const FootLock& hold = locks[f];
-    track.from = track.to = hold.print;
-    track.normals.fill(hold.normal);
+    FootTrajectory& trajectory = plan.feet[f];
+    const FootLock& lock = locks[f];
+    trajectory.from = trajectory.to = lock.print;
+    trajectory.normals.fill(lock.normal);
     // While the difference pose fades, it moves and turns the feet. Compensate for that, so that a
     // foot on the ground neither sinks nor turns. Only the supporting foot may sink to its rest
     // height.
-    const double sinks_m = was[f].ball_m.y - start[f].ball_m.y;
-    const double turns_rad = WrapAngle(was[f].heading_rad - start[f].heading_rad);
+    const double sink_m = previous[f].ball_m.y - start[f].ball_m.y;
+    const double turn_rad = WrapAngle(previous[f].heading_rad - start[f].heading_rad);
     const bool stays_down = is_step && f == x;
-    track.height_m = {hold.height_m, stays_down ? 0.0 : hold.height_m + sinks_m, 0.0};
-    track.turn_rad = {hold.turn_rad, hold.turn_rad + turns_rad, hold.turn_rad + turns_rad};
-    track.height_m[2] = track.height_m[1];
-    track.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
+    trajectory.height_m = {lock.height_m, stays_down ? 0.0 : lock.height_m + sink_m, 0.0};
+    trajectory.turn_rad = {lock.turn_rad, lock.turn_rad + turn_rad, lock.turn_rad + turn_rad};
+    trajectory.height_m[2] = trajectory.height_m[1];
+    trajectory.root_weight = is_step ? (f == x ? 1.0 : 0.0) : 0.5;
   }
   for (const Foot foot : kBoth) {
     if (is_step && foot != moving) continue;
@@ -458,46 +464,47 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
   }
 
   if (is_step) {
-    FootTrajectory& track = plan.feet[m];
+    FootTrajectory& trajectory = plan.feet[m];
     BlendedFoot landing;
-    if (wish == nullptr) {
+    if (target == nullptr) {
       landing = planner.Landing()[m];
-      track.to.position_m = chosen.to_m[m];
-      track.to.heading_rad = landing.heading_rad + chosen.turn_rad;
-      track.turn_rad[2] = chosen.turn_rad;
-      if (chosen.is_on_terrain) track.normals[1] = chosen.normal;
-      track.height_m[2] = chosen.height_m;
+      trajectory.to.position_m = decision.to_m[m];
+      trajectory.to.heading_rad = landing.heading_rad + decision.turn_rad;
+      trajectory.turn_rad[2] = decision.turn_rad;
+      if (decision.is_on_terrain) trajectory.normals[1] = decision.normal;
+      trajectory.height_m[2] = decision.height_m;
     } else {
-      landing = planner.ChooseLanding(locks, *wish, moving);
+      landing = planner.ChooseLanding(locks, *target, moving);
     }
-    planner.BlendSwing(moving, landing, track);
-    if (wish == nullptr) {
-      track.lift_m = chosen.lift_m;
-      track.aside_m = chosen.aside_m;
-      track.root_shift_m = chosen.root_shift_m;
+    planner.BlendSwing(moving, landing, trajectory);
+    if (target == nullptr) {
+      trajectory.lift_m = decision.lift_m;
+      trajectory.aside_m = decision.aside_m;
+      trajectory.root_shift_m = decision.root_shift_m;
       return planner.Entry();
     }
     const double push_m = planner.PushAside(moving);
-    if (wish->terrain != nullptr) track.lift_m = planner.LiftOver(moving, *wish->terrain);
+    if (target->terrain != nullptr) trajectory.lift_m = planner.LiftOver(moving, *target->terrain);
     if (push_m > 0.0) {
-      track.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
-                                DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
+      trajectory.aside_m = RotateYaw(movement.base.heading_rad + 0.5 * movement.heading_change_rad,
+                                     DVec3(moving == Foot::kLeft ? push_m : -push_m, 0.0, 0.0));
     }
-    if (wish->request.root_m) track.root_shift_m = planner.RootShift(*wish->request.root_m);
+    if (target->request.root_m)
+      trajectory.root_shift_m = planner.RootShift(*target->request.root_m);
     return planner.Entry();
   }
 
-  std::array<DVec3, 2> to_m = chosen.to_m;
-  if (wish != nullptr) to_m = planner.ChooseJumpLanding(locks, wish->request);
+  std::array<DVec3, 2> to_m = decision.to_m;
+  if (target != nullptr) to_m = planner.ChooseJumpLanding(locks, target->request);
   const FeetAt landing = planner.Landing();
   for (const Foot foot : kBoth) {
     const auto f = static_cast<std::size_t>(foot);
-    FootTrajectory& track = plan.feet[f];
-    track.to.position_m = to_m[f];
-    track.to.heading_rad = landing[f].heading_rad;
-    track.turn_rad[2] = 0.0;
-    track.height_m[2] = 0.0;
-    planner.BlendSwing(foot, landing[f], track);
+    FootTrajectory& trajectory = plan.feet[f];
+    trajectory.to.position_m = to_m[f];
+    trajectory.to.heading_rad = landing[f].heading_rad;
+    trajectory.turn_rad[2] = 0.0;
+    trajectory.height_m[2] = 0.0;
+    planner.BlendSwing(foot, landing[f], trajectory);
   }
   return planner.Entry();
 }
@@ -505,31 +512,31 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
 }  // namespace
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingTarget& wish, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, &wish, {}, source, cache, pose, movement);
+                               const LandingTarget& target, const BlendSource& source,
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, &target, {}, source, scratch, pose, movement);
 }
 
 std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& locks,
-                               const LandingDecision& choice, const BlendSource& source,
-                               GridCache& cache, PoseSpan pose, Movement& movement) {
-  return Plan(library, locks, nullptr, choice, source, cache, pose, movement);
+                               const LandingDecision& decision, const BlendSource& source,
+                               FootPlanScratch& scratch, PoseSpan pose, Movement& movement) {
+  return Plan(library, locks, nullptr, decision, source, scratch, pose, movement);
 }
 
 LandingDecision DecisionOf(MovementKind kind, const Movement& movement) {
   const FootPlan& plan = movement.feet;
-  LandingDecision choice{.extra_turn_rad = movement.extra_turn_rad,
-                         .is_on_terrain = plan.keeps_above_ground,
-                         .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
-  if (!IsStep(kind)) return choice;
-  const FootTrajectory& track = plan.foot(MovingFoot(kind));
-  choice.turn_rad = track.turn_rad[2];
-  choice.height_m = track.height_m[2];
-  choice.normal = track.normals[1];
-  choice.lift_m = track.lift_m;
-  choice.aside_m = track.aside_m;
-  choice.root_shift_m = track.root_shift_m;
-  return choice;
+  LandingDecision decision{.extra_turn_rad = movement.extra_turn_rad,
+                           .is_on_terrain = plan.keeps_above_ground,
+                           .to_m = {plan.feet[0].to.position_m, plan.feet[1].to.position_m}};
+  if (!IsStep(kind)) return decision;
+  const FootTrajectory& trajectory = plan.foot(MovingFoot(kind));
+  decision.turn_rad = trajectory.turn_rad[2];
+  decision.height_m = trajectory.height_m[2];
+  decision.normal = trajectory.normals[1];
+  decision.lift_m = trajectory.lift_m;
+  decision.aside_m = trajectory.aside_m;
+  decision.root_shift_m = trajectory.root_shift_m;
+  return decision;
 }
 
 FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, double time_s,
@@ -540,13 +547,13 @@ FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement, do
     EvaluateLeg(library.skeleton(), library.leg_rig(), pose, foot, leg);
     const FootCorrection correction = CorrectFoot(
         movement, foot, time_s, FootOf(library.leg_rig(), foot, DVec3(pose.root_position_m), leg));
-    FootLock& hold = locks[static_cast<std::size_t>(foot)];
-    const FootTrajectory& track = movement.feet.foot(foot);
-    hold.print = time_s > track.release_s ? track.to : track.from;
-    hold.height_m = correction.offset_m.y;
-    hold.turn_rad = correction.free_turn_rad;
-    hold.normal = correction.normal;
-    hold.root_weight = correction.root_weight;
+    FootLock& lock = locks[static_cast<std::size_t>(foot)];
+    const FootTrajectory& trajectory = movement.feet.foot(foot);
+    lock.print = time_s > trajectory.release_s ? trajectory.to : trajectory.from;
+    lock.height_m = correction.offset_m.y;
+    lock.turn_rad = correction.free_turn_rad;
+    lock.normal = correction.normal;
+    lock.root_weight = correction.root_weight;
   }
   return locks;
 }

@@ -12,8 +12,34 @@
 
 namespace stridewire {
 namespace {
-
 constexpr std::size_t kBlock = kernels::kBlock;
+}
+
+// Arrays for evaluating one movement at several times, one time per lane.
+struct FootSamplerLanes {
+  static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
+  kernels::GridTimes times{};
+  kernels::GridSamples samples;
+  alignas(64) double base_m[3 * kBlock], heading_rad[kBlock], sine[kBlock], cosine[kBlock],
+      extra_turn_rad[kBlock];
+  alignas(64) float rows[kBlock][4 * (kJoints + 1)];
+  alignas(64) float differences[kJoints * 4 * kBlock];
+  alignas(64) float ease[kJoints * kernels::kDifferenceFloats * kBlock];
+  alignas(64) float velocity[kJoints * 3 * kBlock];
+  alignas(64) float fastest[kBlock], is_inertial[kBlock];
+  alignas(64) float root_ease_m[3 * kBlock], root_ease_m_s[3 * kBlock];
+  alignas(64) float rotations[kJoints * 4 * kBlock];
+};
+
+FootPlanScratch::FootPlanScratch(const MotionLibrary& library)
+    : library_(&library),
+      cache_(std::make_unique<GridCache>(library.layout())),
+      lanes_(std::make_unique<FootSamplerLanes>()) {}
+FootPlanScratch::~FootPlanScratch() = default;
+FootPlanScratch::FootPlanScratch(FootPlanScratch&&) noexcept = default;
+FootPlanScratch& FootPlanScratch::operator=(FootPlanScratch&&) noexcept = default;
+
+namespace {
 
 // Sets all lanes to the same number.
 template <typename Number>
@@ -21,39 +47,17 @@ void Fill(Number* lanes, Number number) {
   std::fill_n(lanes, kBlock, number);
 }
 
-// Arrays for evaluating one movement at several times, one time per lane.
-struct Lanes {
-  static constexpr std::size_t kJoints = LegRig::kMaxJointsOfLegs;
-  kernels::GridTimes times{};
-  kernels::GridPlaces places;
-  alignas(64) double base_m[3 * kBlock], heading_rad[kBlock], sine[kBlock], cosine[kBlock],
-      extra_turn_rad[kBlock];
-  alignas(64) float rows[kBlock][4 * (kJoints + 1)];
-  alignas(64) float differences[kJoints * 4 * kBlock];
-  alignas(64) float ease[kJoints * kernels::kEaseFloats * kBlock];
-  alignas(64) float velocity[kJoints * 3 * kBlock];
-  alignas(64) float fastest[kBlock], is_inertial[kBlock];
-  alignas(64) float root_ease_m[3 * kBlock], root_ease_m_s[3 * kBlock];
-  alignas(64) float rotations[kJoints * 4 * kBlock];
-};
-
-void FindPlaces(const MotionGroup& group, const Movement& movement, std::span<const double> times_s,
-                Lanes& lanes) {
-  kernels::GridTimes& t = lanes.times;
+void SampleGrids(const MotionGroup& group, const Movement& movement,
+                 std::span<const double> times_s, FootSamplerLanes& lanes) {
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    t.time_s[i] = times_s[i];
-    SetPiece(movement.warp.PieceAt(times_s[i]), i, t);
+    SetGridTime(group, movement, times_s[i], i, lanes.times);
   }
-  Fill<double>(t.last_cell, group.grid_point_count - 2);
-  Fill(t.duration_s, movement.warp.duration_s());
-  Fill(t.start_offset_s, movement.start_offset_s);
-  Fill(t.ease_out_s, movement.ease_out_s);
-  kernels::FindInGrids(times_s.size(), t, lanes.places);
+  kernels::ComputeGridSamples(times_s.size(), lanes.times, lanes.samples);
 }
 
 // Collects the difference pose for the joints of the legs.
-void TakeEasing(const Movement& movement, std::span<const int> joints, std::size_t count,
-                Lanes& lanes) {
+void CollectDifferences(const Movement& movement, std::span<const int> joints, std::size_t count,
+                        FootSamplerLanes& lanes) {
   const Pose& difference = movement.difference;
   const auto& velocity = movement.difference_velocity;
   for (std::size_t j = 0; j < joints.size(); ++j) {
@@ -75,9 +79,9 @@ void TakeEasing(const Movement& movement, std::span<const int> joints, std::size
          movement.is_inertial ? velocity.root_m_s[static_cast<int>(c)] : 0.0f);
   }
   Fill(lanes.is_inertial, movement.is_inertial ? 1.0f : 0.0f);
-  kernels::PrepareEase(lanes.differences, joints.size(), count, lanes.ease);
+  kernels::PrepareDifferences(lanes.differences, joints.size(), count, lanes.ease);
   if (movement.is_inertial) {
-    kernels::FindFastest(lanes.velocity, joints.size(), count, lanes.fastest);
+    kernels::FindLargestVelocities(lanes.velocity, joints.size(), count, lanes.fastest);
   }
 }
 
@@ -85,7 +89,7 @@ void TakeEasing(const Movement& movement, std::span<const int> joints, std::size
 
 void FootSampler::Sample(const Movement& movement, std::span<const double> times_s,
                          std::size_t eased) {
-  STRIDEWIRE_CHECK(times_s.size() <= kMost && eased <= times_s.size());
+  STRIDEWIRE_CHECK(times_s.size() <= kMaxTimes && eased <= times_s.size());
   if (SampleTogether(movement, times_s, eased)) return;
   for (std::size_t i = 0; i < times_s.size(); ++i) SampleOne(movement, times_s[i], i < eased, i);
 }
@@ -98,22 +102,18 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   const GridLayout& layout = library_.layout();
   const LegRig& rig = library_.leg_rig();
   const std::span<const int> joints = rig.joints;
-  Lanes lanes;
-  FindPlaces(group, movement, times_s, lanes);
-  std::fill(lanes.places.is_eased + eased, lanes.places.is_eased + kBlock, 0.0f);
-  const bool is_eased = std::ranges::any_of(std::span(lanes.places.is_eased).first(eased),
+  FootSamplerLanes& lanes = scratch_.lanes();
+  SampleGrids(group, movement, times_s, lanes);
+  std::fill(lanes.samples.is_eased + eased, lanes.samples.is_eased + kBlock, 0.0f);
+  const bool is_eased = std::ranges::any_of(std::span(lanes.samples.is_eased).first(eased),
                                             [](float lane) { return lane > 0.0f; });
-  if (is_eased) TakeEasing(movement, joints, times_s.size(), lanes);
+  if (is_eased) CollectDifferences(movement, joints, times_s.size(), lanes);
 
   std::array<const float*, kBlock> rows;
   rows.fill(lanes.rows[0]);
   std::array<float, kMaxRowFloats> row;
   for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const kernels::GridPlaces& at = lanes.places;
-    BlendRow(group, layout, movement,
-             {at.first_point[i],
-              {at.weights[0][i], at.weights[1][i], at.weights[2][i], at.weights[3][i]}},
-             cache_, row.data());
+    BlendRow(group, layout, movement, GridSampleOf(lanes.samples, i), scratch_.cache(), row.data());
     float* to = lanes.rows[i];
     rows[i] = to;
     for (const int joint : joints) {
@@ -129,7 +129,7 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
   Fill(lanes.heading_rad, movement.base.heading_rad);
   kernels::SinCos(lanes.heading_rad, times_s.size(), lanes.sine, lanes.cosine);
   Fill(lanes.extra_turn_rad, movement.extra_turn_rad);
-  const kernels::LaneBlend blend = {
+  const kernels::FinishPosesJob blend = {
       .rows = rows.data(),
       .joint_count = joints.size(),
       .lanes = times_s.size(),
@@ -138,18 +138,18 @@ bool FootSampler::SampleTogether(const Movement& movement, std::span<const doubl
       .sine = lanes.sine,
       .cosine = lanes.cosine,
       .extra_turn_rad = lanes.extra_turn_rad,
-      .steered = lanes.places.steered,
+      .remaining_turn = lanes.samples.remaining_turn,
       .ease = is_eased ? lanes.ease : nullptr,
       .velocity = is_eased && movement.is_inertial ? lanes.velocity : nullptr,
       .fastest = lanes.fastest,
       .root_ease_m = lanes.root_ease_m,
       .root_ease_m_s = lanes.root_ease_m_s,
-      .fraction = lanes.places.fraction,
-      .slope_s = lanes.places.slope_s,
-      .is_eased = lanes.places.is_eased,
+      .fraction = lanes.samples.fraction,
+      .slope_s = lanes.samples.slope_s,
+      .is_eased = lanes.samples.is_eased,
       .is_inertial = lanes.is_inertial};
-  if (!kernels::FinishLanes(blend, roots_m_[0], lanes.rotations)) return false;
-  kernels::FindFeet(rig, lanes.rotations, times_s.size(), balls_m_[0][0], ankles_m_[0][0]);
+  if (!kernels::FinishPoses(blend, roots_m_[0], lanes.rotations)) return false;
+  kernels::ComputeFeet(rig, lanes.rotations, times_s.size(), balls_m_[0][0], ankles_m_[0][0]);
   return true;
 }
 
@@ -157,15 +157,15 @@ void FootSampler::SampleOne(const Movement& movement, double time_s, bool is_eas
   const MotionGroup& group = library_.group(movement.group);
   const LegRig& rig = library_.leg_rig();
   const auto evaluate = is_eased ? EvaluateMovement : EvaluateBlend;
-  evaluate(group, library_.layout(), movement, time_s, cache_, scratch_);
-  const auto put = [i](const Vec3& from, float(&to)[3][kMost]) {
+  evaluate(group, library_.layout(), movement, time_s, scratch_.cache(), pose_);
+  const auto put = [i](const Vec3& from, float(&to)[3][kMaxTimes]) {
     for (std::size_t c = 0; c < 3; ++c) to[c][i] = from[static_cast<int>(c)];
   };
-  put(scratch_.root_position_m, roots_m_);
+  put(pose_.root_position_m, roots_m_);
   LegPose leg;
   for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
     const auto f = static_cast<std::size_t>(foot);
-    EvaluateLeg(library_.skeleton(), rig, scratch_, foot, leg);
+    EvaluateLeg(library_.skeleton(), rig, pose_, foot, leg);
     put(leg.ball_m, balls_m_[f]);
     put(leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)], ankles_m_[f]);
   }

@@ -3,12 +3,13 @@
 #include <cstddef>
 #include <span>
 
-#include "runtime/pose/pose_kernels.h"
 #include "runtime/movement/foot_plan.h"
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
+#include "runtime/plan/plan_scratch.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/pose/pose_kernels.h"
+#include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
 
@@ -17,16 +18,16 @@ namespace stridewire {
 /// by side and only the joints of the legs.
 class FootSampler {
  public:
-  static constexpr std::size_t kMost = kernels::kBlock;  ///< Largest number of times per call.
+  static constexpr std::size_t kMaxTimes = kernels::kBlock;  ///< Largest number of times per call.
 
-  /// Borrows all arguments. The library's leg rig must be usable. `scratch` is a pose of its
-  /// skeleton.
-  FootSampler(const MotionLibrary& library, GridCache& cache, PoseSpan scratch)
-      : library_(library), cache_(cache), scratch_(scratch) {}
+  /// Borrows both arguments. The leg rig of the scratch's library must be usable. `pose` is scratch
+  /// as well: a pose of its skeleton.
+  FootSampler(FootPlanScratch& scratch, PoseSpan pose)
+      : library_(scratch.library()), scratch_(scratch), pose_(pose) {}
 
-  /// Samples up to kMost times of a movement: the first `eased` of them with the difference pose,
-  /// as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache may only
-  /// contain rows of this movement.
+  /// Samples up to kMaxTimes times of a movement: the first `eased` of them with the difference
+  /// pose, as EvaluateMovement does, and the others without it, as EvaluateBlend does. The cache
+  /// may only contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
   /// The ball of a foot at the `i`th time, in world space.
@@ -38,16 +39,16 @@ class FootSampler {
   [[nodiscard]] bool SampleTogether(const Movement& movement, std::span<const double> times_s,
                                     std::size_t eased);
   void SampleOne(const Movement& movement, double time_s, bool is_eased, std::size_t i);
-  [[nodiscard]] Vec3 At(const float (&of)[3][kMost], std::size_t i) const {
+  [[nodiscard]] Vec3 At(const float (&of)[3][kMaxTimes], std::size_t i) const {
     return {of[0][i], of[1][i], of[2][i]};
   }
 
   const MotionLibrary& library_;
-  GridCache& cache_;
-  PoseSpan scratch_;
-  alignas(64) float roots_m_[3][kMost];      // In world space.
-  alignas(64) float balls_m_[2][3][kMost];   // [foot]: relative to the root.
-  alignas(64) float ankles_m_[2][3][kMost];  // [foot]: relative to the root.
+  FootPlanScratch& scratch_;
+  PoseSpan pose_;
+  alignas(64) float roots_m_[3][kMaxTimes];      // In world space.
+  alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: relative to the root.
+  alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: relative to the root.
 };
 
 }  // namespace stridewire

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/check.h"
 #include "runtime/library/contact_keytimes.h"
 #include "runtime/library/convex_hull.h"
 #include "runtime/skeleton/foot_vector.h"
@@ -20,13 +21,13 @@ constexpr double kStartWeight = 4.0;
 // A parameter that the request does not give has a small weight, so that it follows the others.
 constexpr double kFreeWeight = 0.02;
 // Of two groups that fit equally well, the one with fewer parameters is preferred.
-constexpr double kPerParameterM = 1e-3;
+constexpr double kCostPerParameterM = 1e-3;
 // A standing avatar starts with the unexpected foot only if that reduces the cost by this much.
 constexpr double kFootPreferenceM = 0.01;
 
 // Extra cost of a group with turn, side or height parameters for a step that requests none of them.
 // Such parameters take arbitrary values and would bend a straight walk.
-constexpr double kPlainPreferenceM = 0.15;
+constexpr double kStraightPreferenceM = 0.15;
 // Extra cost per metre outside the hull of the examples, even where requests may extrapolate.
 constexpr double kOutsideWeight = 0.25;
 // Tolerances for the start of a step in groups without a start parameter for side or height. Such a
@@ -47,15 +48,17 @@ constexpr double kHeightWeight = 4.0;
 constexpr double kChangeM = 1e-6;
 
 // Requested value of one parameter. If it is not `given`, any value that the examples have will do.
-struct Wish {
+struct ParameterGoal {
   double value = 0.0;
   bool given = false;
   double weight = 1.0;
-  bool natural = false;  // Not given, but the value of the stand pose is preferred.
+  bool prefers_stand_pose = false;  // Not given, but the value of the stand pose is preferred.
 };
-using Wishes = std::array<Wish, kParameterNameCount>;
+using ParameterGoals = std::array<ParameterGoal, kParameterNameCount>;
 
-Wish& At(Wishes& wishes, ParameterName name) { return wishes[static_cast<std::size_t>(name)]; }
+ParameterGoal& At(ParameterGoals& goals, ParameterName name) {
+  return goals[static_cast<std::size_t>(name)];
+}
 
 // True if a group has parameters other than those of straight steps on level ground.
 bool IsGeneral(const MotionGroup& group) {
@@ -69,8 +72,8 @@ bool IsGeneral(const MotionGroup& group) {
 
 // Distance from a target to the box around a group's examples, grown by `growth`. It is a cheap
 // lower bound for the distance to their hull.
-double OutsideRange(const MotionGroup& group, std::span<const double> metric,
-                    std::span<const double> target, double growth) {
+double DistanceOutsideRange(const MotionGroup& group, std::span<const double> metric,
+                            std::span<const double> target, double growth) {
   constexpr double kSlack = 1e-6;  // Ranges and examples are rounded differently.
   double sum = 0.0;
   for (std::size_t l = 0; l < target.size(); ++l) {
@@ -83,11 +86,11 @@ double OutsideRange(const MotionGroup& group, std::span<const double> metric,
   return std::sqrt(sum);
 }
 
-// Plans a request in one group. Returns nullopt if its cost plus `for_itself_m` is not less than
+// Plans a request in one group. Returns nullopt if its cost plus `group_cost_m` is not less than
 // `best_cost_m`.
 std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_index,
-                                       const Wishes& wishes, double natural_side_m,
-                                       double for_itself_m, double best_cost_m) {
+                                       const ParameterGoals& goals, double stand_side_m,
+                                       double group_cost_m, double best_cost_m) {
   const MotionGroup& group = library.group(group_index);
   const std::size_t d = group.parameters.size();
   RequestPlan plan;
@@ -97,13 +100,13 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   std::array<bool, kParameterNameCount> is_spanned{};
   for (std::size_t l = 0; l < d; ++l) {
     const auto name = static_cast<std::size_t>(group.parameters[l].name);
-    const Wish& wish = wishes[name];
+    const ParameterGoal& goal = goals[name];
     is_spanned[name] = true;
-    metric_room[l] = wish.given ? wish.weight : kFreeWeight;
-    plan.requested.values[l] = wish.given ? wish.value : group.parameters[l].centre;
-    if (wish.natural) {
+    metric_room[l] = goal.given ? goal.weight : kFreeWeight;
+    plan.requested.values[l] = goal.given ? goal.value : group.parameters[l].centre;
+    if (goal.prefers_stand_pose) {
       plan.requested.values[l] =
-          std::clamp(natural_side_m, group.parameters[l].min, group.parameters[l].max);
+          std::clamp(stand_side_m, group.parameters[l].min, group.parameters[l].max);
     }
   }
 
@@ -112,28 +115,29 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {
     const auto i = static_cast<std::size_t>(name);
-    if (!wishes[i].given || is_spanned[i]) continue;
-    const double natural = name == ParameterName::kEndX ? natural_side_m : 0.0;
-    const double missed = wishes[i].weight * std::fabs(wishes[i].value - natural);
+    if (!goals[i].given || is_spanned[i]) continue;
+    const double prefers_stand_pose = name == ParameterName::kEndX ? stand_side_m : 0.0;
+    const double missed = goals[i].weight * std::fabs(goals[i].value - prefers_stand_pose);
     if (missed > kChangeM) plan.clamped = true;
     missed_m += missed;
   }
-  double beside_m = 0.0;
+  double start_error_m = 0.0;
   for (const ParameterName name : {ParameterName::kStartX, ParameterName::kStartY}) {
     const auto i = static_cast<std::size_t>(name);
-    if (!wishes[i].given || is_spanned[i]) continue;
-    const double natural = name == ParameterName::kStartX ? natural_side_m : 0.0;
-    beside_m += wishes[i].weight *
-                std::max(0.0, std::fabs(wishes[i].value - natural) -
-                                  (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
+    if (!goals[i].given || is_spanned[i]) continue;
+    const double prefers_stand_pose = name == ParameterName::kStartX ? stand_side_m : 0.0;
+    start_error_m +=
+        goals[i].weight *
+        std::max(0.0, std::fabs(goals[i].value - prefers_stand_pose) -
+                          (name == ParameterName::kStartX ? kStartSlackM : kLevelSlackM));
   }
 
   const std::span<const double> target = std::span(plan.requested.values).first(d);
   const std::span<const double> metric = std::span(metric_room).first(d);
   // Projecting onto a hull is slow. A lower bound on the cost rules out most groups before that.
-  const double least_m = OutsideRange(group, metric, target, kHullGrowth) +
-                         kOutsideWeight * OutsideRange(group, metric, target, 0.0);
-  if (least_m + missed_m + beside_m + for_itself_m >= best_cost_m) return std::nullopt;
+  const double cost_bound_m = DistanceOutsideRange(group, metric, target, kHullGrowth) +
+                              kOutsideWeight * DistanceOutsideRange(group, metric, target, 0.0);
+  if (cost_bound_m + missed_m + start_error_m + group_cost_m >= best_cost_m) return std::nullopt;
 
   const std::span<const double> examples =
       group.sites.first(static_cast<std::size_t>(group.example_count) * d);
@@ -149,30 +153,32 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
   }
   for (std::size_t l = 0; l < d; ++l) {
     const auto name = static_cast<std::size_t>(group.parameters[l].name);
-    if (!wishes[name].given) plan.requested.values[l] = plan.applied.values[l];
+    if (!goals[name].given) plan.requested.values[l] = plan.applied.values[l];
     if (std::fabs(plan.requested.values[l] - plan.applied.values[l]) > kChangeM) {
       plan.clamped = true;
     }
   }
   plan.distance_m += missed_m;
-  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + beside_m;
-  if (plan.cost_m + for_itself_m >= best_cost_m) return std::nullopt;
+  plan.cost_m = plan.distance_m + kOutsideWeight * outside_m + start_error_m;
+  if (plan.cost_m + group_cost_m >= best_cost_m) return std::nullopt;
   return plan;
 }
 
 std::optional<RequestPlan> BestPlan(const MotionLibrary& library, MovementKind kind,
-                                    const Wishes& wishes, double natural_side_m, bool is_plain) {
+                                    const ParameterGoals& goals, double stand_side_m,
+                                    bool is_straight) {
   std::optional<RequestPlan> best;
   double best_cost_m = HUGE_VAL;
   for (std::size_t g = 0; g < library.groups().size(); ++g) {
     const MotionGroup& group = library.groups()[g];
     if (group.kind != kind) continue;
-    double for_itself_m = kPerParameterM * group.parameter_count();
-    if (is_plain && IsGeneral(group)) for_itself_m += kPlainPreferenceM;
-    const auto plan = PlanInGroup(library, static_cast<int>(g), wishes, natural_side_m,
-                                  for_itself_m, best_cost_m);
+    double group_cost_m = kCostPerParameterM * group.parameter_count();
+    if (is_straight && IsGeneral(group)) group_cost_m += kStraightPreferenceM;
+    const auto plan =
+        PlanInGroup(library, static_cast<int>(g), goals, stand_side_m, group_cost_m, best_cost_m);
     if (!plan) continue;
-    best_cost_m = plan->cost_m + for_itself_m;
+    STRIDEWIRE_CHECK(plan->cost_m + group_cost_m < best_cost_m);
+    best_cost_m = plan->cost_m + group_cost_m;
     best = plan;
   }
   return best;
@@ -187,21 +193,21 @@ std::optional<RequestPlan> PlanStep(const MotionLibrary& library, const StepRequ
     const DVec3 start = feet.Vector(foot);
     const double outward = foot == Foot::kLeft ? 1.0 : -1.0;
     const bool is_wide = std::fabs(start.x - stand.Vector(foot).x) > kStartSlackM;
-    Wishes wishes;
-    At(wishes, ParameterName::kStartX) = {start.x, true, kStartWeight};
-    At(wishes, ParameterName::kStartY) = {start.y, true, kStartWeight};
-    At(wishes, ParameterName::kStartZ) = {start.z, true, kStartWeight};
-    At(wishes, ParameterName::kEndX) = {
+    ParameterGoals goals;
+    At(goals, ParameterName::kStartX) = {start.x, true, kStartWeight};
+    At(goals, ParameterName::kStartY) = {start.y, true, kStartWeight};
+    At(goals, ParameterName::kStartZ) = {start.z, true, kStartWeight};
+    At(goals, ParameterName::kEndX) = {
         outward * request.side_m.value_or(0.0), request.side_m.has_value(),
         request.at ? kExactSideWeight : 1.0, !request.side_m && is_wide};
-    At(wishes, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
-    At(wishes, ParameterName::kEndZ) = {request.length_m, true, 1.0};
-    At(wishes, ParameterName::kTurn) = {request.turn_rad, true,
-                                        request.at                ? kExactMetresPerRadian
-                                        : request.turn_rad == 0.0 ? kStraightMetresPerRadian
-                                                                  : kMetresPerRadian};
-    const bool is_plain = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
-    auto plan = BestPlan(library, StepKind(foot), wishes, stand.Vector(foot).x, is_plain);
+    At(goals, ParameterName::kEndY) = {request.height_m, true, kHeightWeight};
+    At(goals, ParameterName::kEndZ) = {request.length_m, true, 1.0};
+    At(goals, ParameterName::kTurn) = {request.turn_rad, true,
+                                       request.at                ? kExactMetresPerRadian
+                                       : request.turn_rad == 0.0 ? kStraightMetresPerRadian
+                                                                 : kMetresPerRadian};
+    const bool is_straight = request.turn_rad == 0.0 && request.height_m == 0.0 && !request.side_m;
+    auto plan = BestPlan(library, StepKind(foot), goals, stand.Vector(foot).x, is_straight);
     if (plan) {
       plan->is_side_given = request.side_m.has_value();
       plan->turn_rad = request.turn_rad;
@@ -235,11 +241,11 @@ std::optional<RequestPlan> PlanFootprint(const MotionLibrary& library, Foot foot
 }
 
 std::optional<RequestPlan> PlanJump(const MotionLibrary& library, const JumpRequest& request) {
-  Wishes wishes;
-  At(wishes, ParameterName::kLength) = {request.length_m, true, 1.0};
-  At(wishes, ParameterName::kHeight) = {request.height_m, true, 1.0};
-  At(wishes, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
-  return BestPlan(library, MovementKind::kJump, wishes, 0.0,
+  ParameterGoals goals;
+  At(goals, ParameterName::kLength) = {request.length_m, true, 1.0};
+  At(goals, ParameterName::kHeight) = {request.height_m, true, 1.0};
+  At(goals, ParameterName::kTurn) = {request.turn_rad, true, kMetresPerRadian};
+  return BestPlan(library, MovementKind::kJump, goals, 0.0,
                   request.turn_rad == 0.0 && request.height_m == 0.0);
 }
 

@@ -4,8 +4,9 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/skeleton/foot_vector.h"
+#include "base/check.h"
 #include "runtime/library/transition.h"
+#include "runtime/skeleton/foot_vector.h"
 
 namespace stridewire {
 namespace {
@@ -20,11 +21,11 @@ constexpr double kFeetApartAsideM = 0.3;
 constexpr float kMaxTransitionM = 0.15f;
 constexpr float kMaxTransitionOfStand = 1.5f;
 // Planting can distribute an error of this size over a swing (RequestPlan::most_residual_m).
-constexpr double kMaxStartMissM = 0.25;
+constexpr double kMaxStartErrorM = 0.25;
 // An inserted step must reduce the cost of a request by at least this much: kWorthAStepM for steps,
 // kWorthClosingM for jumps, whose cost is the distance between the feet.
-constexpr double kWorthAStepM = 0.25;
-constexpr double kWorthClosingM = 0.03;
+constexpr double kMinStepGainM = 0.25;
+constexpr double kMinClosingGainM = 0.03;
 
 class TransitionPathFinder {
  public:
@@ -36,69 +37,72 @@ class TransitionPathFinder {
 
   [[nodiscard]] TransitionPath Find(const std::optional<RequestPlan>& direct,
                                     const Stance& stance) const {
+    STRIDEWIRE_CHECK(stance.group <= library_.groups().size());
+    STRIDEWIRE_CHECK(stance.inserted_steps >= 0 && stance.inserted_steps <= kMaxInsertedSteps);
     if (step_ != nullptr && step_->at) return {direct};
-    const bool can_begin = direct && CanBegin(*direct, stance);
-    const TransitionPath as_it_is{can_begin ? direct : std::nullopt};
-    if (can_begin && !BeginsWithFeetApart(*direct, stance)) return as_it_is;
+    const bool can_start = direct && CanStart(*direct, stance);
+    const TransitionPath without_insertion{can_start ? direct : std::nullopt};
+    if (can_start && !StartsWithFeetApart(*direct, stance)) return without_insertion;
     // If the request can begin now, one inserted step may improve it. If it cannot, insert as many
     // steps as it needs.
-    const double most_cost_m = can_begin ? WorthAStepM(CostM(*direct, stance)) : HUGE_VAL;
-    const int most =
-        std::min(can_begin ? 1 : kMaxInsertedSteps, kMaxInsertedSteps - stance.inserted_steps);
-    for (int steps = 1; steps <= most; ++steps) {
-      if (auto first = FirstOf(steps, stance, most_cost_m)) return {first, true};
+    const double max_cost_m = can_start ? MaxCostAfterStepM(CostM(*direct, stance)) : HUGE_VAL;
+    const int max_steps =
+        std::min(can_start ? 1 : kMaxInsertedSteps, kMaxInsertedSteps - stance.inserted_steps);
+    for (int steps = 1; steps <= max_steps; ++steps) {
+      if (auto first = FindFirstStep(steps, stance, max_cost_m)) return {first, true};
     }
-    return as_it_is;
+    return without_insertion;
   }
 
  private:
-  // Finds the first of `steps` inserted steps after which the request costs at most `most_cost_m`.
-  std::optional<RequestPlan> FirstOf(int steps, const Stance& stance, double most_cost_m) const {
+  // Finds the first of `steps` inserted steps after which the request costs at most `max_cost_m`.
+  std::optional<RequestPlan> FindFirstStep(int steps, const Stance& stance,
+                                           double max_cost_m) const {
     for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
       auto step =
           PlanStep(library_, StepRequest{.foot = foot}, stance.feet, stance.last_moved, false);
-      if (!step || !CanBegin(*step, stance)) continue;
+      if (!step || !CanStart(*step, stance)) continue;
       const Stance after = After(*step, foot);
-      if (steps > 1 ? FirstOf(steps - 1, after, most_cost_m).has_value()
-                    : IsMet(after, most_cost_m)) {
+      if (steps > 1 ? FindFirstStep(steps - 1, after, max_cost_m).has_value()
+                    : IsPossibleAfter(after, max_cost_m)) {
         return step;
       }
     }
     return std::nullopt;
   }
 
-  bool IsMet(const Stance& stance, double most_cost_m) const {
+  bool IsPossibleAfter(const Stance& stance, double max_cost_m) const {
     const auto plan = jump_ != nullptr
                           ? PlanJump(library_, *jump_)
                           : PlanStep(library_, *step_, stance.feet, stance.last_moved, false);
-    return plan && CanBegin(*plan, stance) && CostM(*plan, stance) <= most_cost_m;
+    return plan && CanStart(*plan, stance) && CostM(*plan, stance) <= max_cost_m;
   }
 
   Stance After(const RequestPlan& step, Foot foot) const {
     const MotionGroup& group = library_.group(step.group);
-    const auto end_or = [&](ParameterName name, double otherwise) {
+    const auto end_or = [&](ParameterName name, double fallback) {
       const int l = group.FindParameter(name);
-      return l < 0 ? otherwise : step.applied.values[static_cast<std::size_t>(l)];
+      return l < 0 ? fallback : step.applied.values[static_cast<std::size_t>(l)];
     };
     const DVec3 vector(end_or(ParameterName::kEndX, stand_.Vector(foot).x),
                        end_or(ParameterName::kEndY, 0.0), end_or(ParameterName::kEndZ, 0.0));
     return {{foot == Foot::kLeft ? vector : -vector}, foot, static_cast<std::size_t>(step.group)};
   }
 
-  bool CanBegin(const RequestPlan& plan, const Stance& stance) const {
-    return Meets(stance.group, static_cast<std::size_t>(plan.group)) &&
-           (!BeginsWithFeetApart(plan, stance) || StartMissM(plan, stance) <= kMaxStartMissM);
+  bool CanStart(const RequestPlan& plan, const Stance& stance) const {
+    return FitsAfter(stance.group, static_cast<std::size_t>(plan.group)) &&
+           (!StartsWithFeetApart(plan, stance) || StartErrorM(plan, stance) <= kMaxStartErrorM);
   }
 
   // True if the feet are apart and the movement is a jump or a step of the foot that moved last.
   // Then the other foot should step first.
-  bool BeginsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
+  bool StartsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
     const MovementKind kind = library_.group(plan.group).kind;
     return AreFeetApart(stance.feet, stand_) &&
            (!IsStep(kind) || MovingFoot(kind) == stance.last_moved);
   }
 
-  bool Meets(std::size_t from, std::size_t to) const {
+  bool FitsAfter(std::size_t from, std::size_t to) const {
     const std::size_t stand = library_.groups().size();
     const Transition* transition = library_.FindTransition(from, to);
     if (transition == nullptr || from == stand) return true;
@@ -108,7 +112,7 @@ class TransitionPathFinder {
   }
 
   // Forward distance of the feet from their positions at the start of the movement's examples.
-  double StartMissM(const RequestPlan& plan, const Stance& stance) const {
+  double StartErrorM(const RequestPlan& plan, const Stance& stance) const {
     const MotionGroup& group = library_.group(plan.group);
     const int l = group.FindParameter(ParameterName::kStartZ);
     if (l < 0) return std::fabs(stance.feet.left_from_right_m.z - stand_.left_from_right_m.z);
@@ -126,8 +130,8 @@ class TransitionPathFinder {
   }
 
   // Highest cost after an inserted step that makes the step worthwhile.
-  double WorthAStepM(double cost_m) const {
-    return jump_ != nullptr ? std::max(0.0, cost_m - kWorthClosingM) : cost_m - kWorthAStepM;
+  double MaxCostAfterStepM(double cost_m) const {
+    return jump_ != nullptr ? std::max(0.0, cost_m - kMinClosingGainM) : cost_m - kMinStepGainM;
   }
 
   const MotionLibrary& library_;

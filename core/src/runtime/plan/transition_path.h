@@ -3,50 +3,59 @@
 #include <cstddef>
 #include <optional>
 
+#include "runtime/plan/request_plan.h"
 #include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
-#include "runtime/plan/request_plan.h"
 
 namespace stridewire {
 
-/// Steps of its own an avatar takes in a row at most: before a movement that could not begin without, and
-/// before it stands.
+/// Largest number of steps in a row that an avatar inserts before a movement that cannot start
+/// without them, or before a stand.
 inline constexpr int kMaxInsertedSteps = 3;
 
-/// Feet not where the stand pose has them: forward or aside by more than a stand may. Few libraries have steps
-/// that bring feet together sideways, so a wide stand is left alone for longer.
+/// True if the feet are further from their positions in the stand pose, forward or sideways, than a
+/// stand allows. The sideways limit is larger, because few libraries have steps that bring the feet
+/// together sideways.
 [[nodiscard]] bool AreFeetApart(const FootState& feet, const FootState& stand);
 
-/// What a movement begins from.
+/// The state from which a movement starts.
 struct Stance {
   FootState feet;
   Foot last_moved = Foot::kRight;
-  std::size_t group =
-      0;  ///< Of the movement that ended there; as many as there are groups: the stand
-  int inserted_steps = 0;  ///< That led there
+  /// Group of the previous movement, or the number of groups after a stand.
+  std::size_t group = 0;
+  int inserted_steps = 0;  ///< Number of steps inserted so far.
 };
 
-/// What comes next on the way to a step or jump: the movement asked for, or a step that has to go before it.
+/// The next movement on the path to a requested step or jump: the request itself, or a step to
+/// insert before it.
 struct TransitionPath {
-  std::optional<RequestPlan> plan;  ///< Empty: there is no way
+  std::optional<RequestPlan> plan;  ///< Empty if there is no path.
   bool is_inserted = false;
 };
 
-/// The way of fewest steps, at most kMaxInsertedSteps, each of which brings a foot beside the other or as near
-/// as the library does. `direct` is the movement asked for as it would be from here.
+/// Finds the path with the fewest inserted steps, at most kMaxInsertedSteps. Each inserted step
+/// brings a foot beside the other one, or as close to it as the library allows. `direct` is the
+/// plan of the request from here.
 ///
-/// - A movement may follow if the library's ends and starts meet (Transition::distance_m), at 0.15 m or half as
-///   far again as it is from the stand, from which anything begins.
-/// - Feet that are apart must come together before a jump, and before a step of the foot that moved last the other
-///   one must step. Within 0.25 m of where the movement's examples have them they need not, and do if one step
-///   brings them together by 3 cm, or makes what was asked for better by 0.25 m.
-/// - Footprints are met as they are, by the foot that they are for.
+/// - A movement may follow another if their Transition::distance_m is at most 0.15 m, or at most
+/// 1.5
+///   times its distance from the stand. After a stand every movement is possible.
+/// - If the feet are apart, they must come together before a jump, and before a step of the foot
+///   that moved last. They need not if they are within 0.25 m of their positions in the movement's
+///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
+///   reduces the cost of the request by 0.25 m.
+/// - Steps to footprints are never preceded by inserted steps.
 ///
-/// Searched in breadth: at most 14 calls of PlanStep and 14 more for the request. Never allocates.
-[[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library, const MovementRequest& request,
-                          const std::optional<RequestPlan>& direct, const Stance& stance);
+/// Breadth-first search with at most 14 calls of PlanStep and 14 more for the request. Never
+/// allocates.
+[[nodiscard]] TransitionPath FindTransitionPath(const MotionLibrary& library,
+                                                const MovementRequest& request,
+                                                const std::optional<RequestPlan>& direct,
+                                                const Stance& stance);
 
-/// Why there is none: "no way leads from step_left to jump in this library". Static storage.
+/// The reason why there is no path, for example "this library has no transition path from step_left
+/// to jump". Static storage.
 [[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire

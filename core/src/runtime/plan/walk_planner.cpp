@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/check.h"
 #include "base/trig.h"
 #include "runtime/library/locomotion_profile.h"
 #include "runtime/plan/foot_planner.h"
@@ -12,17 +13,17 @@ namespace stridewire {
 namespace {
 
 // A foot within this distance and angle of its footprint at the goal has arrived.
-constexpr double kThereM = 0.002;
-constexpr double kThereRad = 0.004;
+constexpr double kArrivedM = 0.002;
+constexpr double kArrivedRad = 0.004;
 // The same tolerances without planting, when feet land wherever the blend puts them.
-constexpr double kRoughlyThereM = 0.15;
-constexpr double kRoughlyThereRad = 0.25;
+constexpr double kRoughlyArrivedM = 0.15;
+constexpr double kRoughlyArrivedRad = 0.25;
 
 // Largest distance between the library's own step and the footprint, which planting distributes
 // over the swing. The larger limit applies to small steps and to the second attempt, because
 // libraries without steps in place have to turn and close with the steps they have.
-constexpr double kMaxMissM = 0.16;
-constexpr double kMostMissM = 0.6;
+constexpr double kMaxErrorM = 0.16;
+constexpr double kMaxLooseErrorM = 0.6;
 // A step that goes no further forward than this ends with the body above both feet.
 constexpr double kForwardM = 0.2;
 
@@ -69,7 +70,7 @@ class StepPlanner {
  public:
   StepPlanner(const MotionLibrary& library, const Terrain* terrain, const WalkStance& stance)
       : library_(library),
-        gait_(library.locomotion_profile()),
+        profile_(library.locomotion_profile()),
         terrain_(terrain),
         stance_(stance) {}
 
@@ -85,8 +86,8 @@ class StepPlanner {
     fixed_m_ = stance_.feet[static_cast<std::size_t>(OtherFoot(moving))].position_m;
     const Footprint wanted{step.print.position_m,
                            UnwrapAngle(step.print.heading_rad, stance_.heading_rad)};
-    if (terrain_ == nullptr) return Reach(Level(wanted), step.root_m);
-    if (IsGood(wanted)) return Reach(OnGround(wanted), step.root_m);
+    if (terrain_ == nullptr) return PlanExactStep(Level(wanted), step.root_m);
+    if (IsGood(wanted)) return PlanExactStep(OnGround(wanted), step.root_m);
     if (step.is_last) return std::nullopt;
     int out_of_reach = 0;
     for (const double ring_m : kRingsM) {
@@ -98,7 +99,7 @@ class StepPlanner {
         Footprint print = wanted;
         print.position_m += RotateYaw(way, DVec3(0.0, 0.0, ring_m));
         if (!KeepsApart(print) || !IsGood(print)) continue;
-        if (auto plan = Reach(OnGround(print), step.root_m)) return plan;
+        if (auto plan = PlanExactStep(OnGround(print), step.root_m)) return plan;
         if (++out_of_reach >= kMaxOutOfReach) return std::nullopt;
       }
     }
@@ -106,10 +107,10 @@ class StepPlanner {
   }
 
   // True if both feet can stand at their footprints at the goal.
-  bool GoalIsGood(const WalkSteering& course) {
+  bool GoalIsGood(const WalkSteering& steering) {
     double heights_m[2];
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
-      const Footprint print = OnGround(course.GoalPrint(foot));
+      const Footprint print = OnGround(steering.GoalPrint(foot));
       if (!Carries(foot, print)) return false;
       heights_m[static_cast<std::size_t>(foot)] = print.position_m.y;
     }
@@ -118,7 +119,7 @@ class StepPlanner {
 
   [[nodiscard]] bool has_seen_bad_ground() const { return has_seen_bad_ground_; }
   [[nodiscard]] bool has_seen_heights() const { return has_seen_heights_; }
-  [[nodiscard]] bool is_spent() const { return candidates_ >= kMaxWalkCandidates; }
+  [[nodiscard]] bool is_exhausted() const { return candidates_ >= kMaxWalkCandidates; }
 
  private:
   static constexpr double kPi = 3.14159265358979323846;
@@ -135,8 +136,8 @@ class StepPlanner {
   // True if an alternative footprint is still beside the other foot, not across or far behind it.
   bool KeepsApart(const Footprint& print) const {
     const DVec3 v = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
-    return outward_ * v.x >= 0.08 && outward_ * v.x <= gait_.stand_m + 0.3 &&
-           v.z <= gait_.longest_m && v.z >= -std::max(gait_.back_m, 0.15);
+    return outward_ * v.x >= 0.08 && outward_ * v.x <= profile_.stand_m + 0.3 &&
+           v.z <= profile_.longest_m && v.z >= -std::max(profile_.back_m, 0.15);
   }
 
   bool Carries(Foot foot, const Footprint& print) const {
@@ -146,7 +147,7 @@ class StepPlanner {
   }
 
   bool IsGood(const Footprint& print) {
-    if (is_spent()) return false;
+    if (is_exhausted()) return false;
     ++candidates_;
     const double height_m = terrain_->HeightAt(print.position_m.x, print.position_m.z);
     if (std::fabs(height_m - fixed_m_.y) > kMaxWalkClimbM) {
@@ -171,7 +172,7 @@ class StepPlanner {
 
   // Plans the library's step to a footprint. Returns nullopt if the step misses the footprint by
   // more than planting can distribute over the swing.
-  std::optional<RequestPlan> Reach(const Footprint& print, const DVec3& root_m) const {
+  std::optional<RequestPlan> PlanExactStep(const Footprint& print, const DVec3& root_m) const {
     auto plan =
         PlanFootprint(library_, moving_, print, fixed_m_, stance_.heading_rad, stance_.vector);
     if (!plan) return plan;
@@ -183,23 +184,23 @@ class StepPlanner {
     };
     const bool strides = wanted.z > kForwardM;
     const double natural_x =
-        outward_ * std::clamp(outward_ * wanted.x, gait_.width_m, gait_.stand_m);
-    const double miss_x = applied_or(ParameterName::kEndX, natural_x) - wanted.x;
-    const double miss_z = applied_or(ParameterName::kEndZ, 0.0) - wanted.z;
-    const double miss_rad = std::fabs(applied_or(ParameterName::kTurn, 0.0) -
-                                      (print.heading_rad - stance_.heading_rad));
-    if (std::sqrt(miss_x * miss_x + miss_z * miss_z) >
-            (strides && is_strict_ ? kMaxMissM : kMostMissM) ||
-        miss_rad > kMaxExtraTurnRad) {
+        outward_ * std::clamp(outward_ * wanted.x, profile_.width_m, profile_.stand_m);
+    const double error_x = applied_or(ParameterName::kEndX, natural_x) - wanted.x;
+    const double error_z = applied_or(ParameterName::kEndZ, 0.0) - wanted.z;
+    const double error_rad = std::fabs(applied_or(ParameterName::kTurn, 0.0) -
+                                       (print.heading_rad - stance_.heading_rad));
+    if (std::sqrt(error_x * error_x + error_z * error_z) >
+            (strides && is_strict_ ? kMaxErrorM : kMaxLooseErrorM) ||
+        error_rad > kMaxExtraTurnRad) {
       return std::nullopt;
     }
-    plan->most_residual_m = kMostMissM;
+    plan->most_residual_m = kMaxLooseErrorM;
     if (!strides) plan->root_m = root_m;
     return plan;
   }
 
   const MotionLibrary& library_;
-  const LocomotionProfile& gait_;
+  const LocomotionProfile& profile_;
   const Terrain* terrain_;
   const WalkStance& stance_;
   Foot moving_ = Foot::kLeft;
@@ -211,7 +212,7 @@ class StepPlanner {
   bool has_seen_heights_ = false;
 };
 
-WalkDecision Refuse(const char* reason) {
+WalkDecision Reject(const char* reason) {
   WalkDecision decision;
   decision.outcome = WalkOutcome::kRefused;
   decision.reason = reason;
@@ -223,52 +224,55 @@ WalkDecision Refuse(const char* reason) {
 WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                           const WalkRequest& walk, const WalkStance& stance,
                           WalkProgress& progress) {
-  WalkSteering course(library.locomotion_profile(), walk, stance);
-  course.PassWaypoints(progress.next_waypoint);
-  const double there_m = stance.is_exact ? kThereM : kRoughlyThereM;
-  const double there_rad = stance.is_exact ? kThereRad : kRoughlyThereRad;
+  STRIDEWIRE_CHECK(progress.next_waypoint <= walk.waypoints_m.size());
+  STRIDEWIRE_CHECK(progress.steps >= 0 && progress.steps <= kMaxWalkSteps);
+  STRIDEWIRE_CHECK(progress.steps_without >= 0 && progress.steps_without <= kMaxStepsWithout);
+  WalkSteering steering(library.locomotion_profile(), walk, stance);
+  steering.PassWaypoints(progress.next_waypoint);
+  const double arrived_m = stance.is_exact ? kArrivedM : kRoughlyArrivedM;
+  const double arrived_rad = stance.is_exact ? kArrivedRad : kRoughlyArrivedRad;
   const bool is_last_leg = progress.next_waypoint >= walk.waypoints_m.size();
-  if (is_last_leg && course.IsThere(there_m, there_rad)) return {};
+  if (is_last_leg && steering.HasArrived(arrived_m, arrived_rad)) return {};
 
   const double left =
-      course.LeftM(progress.next_waypoint) + kMetresPerRadianLeft * course.LeftRad();
+      steering.RemainingM(progress.next_waypoint) + kMetresPerRadianLeft * steering.RemainingRad();
   if (left < progress.least_left - kProgressM) {
     progress.least_left = left;
     progress.steps_without = 0;
   } else if (++progress.steps_without > kMaxStepsWithout) {
-    return Refuse("the walk makes no progress towards its goal");
+    return Reject("the walk makes no progress towards its goal");
   }
   if (++progress.steps > kMaxWalkSteps) {
-    return Refuse("the walk needs more than 10000 steps");
+    return Reject("the walk needs more than 10000 steps");
   }
 
   StepPlanner planner(library, terrain, stance);
-  const bool looks_at_goal =
+  const bool checks_goal =
       terrain != nullptr && (progress.steps == 1 || (is_last_leg && left < kGoalInSightM));
-  if (looks_at_goal && !planner.GoalIsGood(course)) {
-    return Refuse("the ground at the goal is too steep or too uneven to stand on");
+  if (checks_goal && !planner.GoalIsGood(steering)) {
+    return Reject("the ground at the goal is too steep or too uneven to stand on");
   }
   // First try steps that the library has, then steps that planting has to change much.
   for (const bool is_strict : {true, false}) {
     planner.Begin(is_strict);
     for (const Attempt& attempt : kAttempts) {
-      for (const Foot moving : course.Feet(progress.next_waypoint)) {
+      for (const Foot moving : steering.FeetToMove(progress.next_waypoint)) {
         const WalkStep step =
-            course.Next(moving, progress.next_waypoint, attempt.part, attempt.bend_rad);
+            steering.NextStep(moving, progress.next_waypoint, attempt.part, attempt.bend_rad);
         if (auto plan = planner.Plan(moving, step)) {
           return {.outcome = WalkOutcome::kStep, .plan = *plan};
         }
       }
-      if (planner.is_spent()) break;
+      if (planner.is_exhausted()) break;
     }
   }
   if (planner.has_seen_heights()) {
-    return Refuse("the ground ahead is too high or too low to step on");
+    return Reject("the ground ahead is too high or too low to step on");
   }
   if (planner.has_seen_bad_ground()) {
-    return Refuse("the ground ahead is too steep or too uneven for a foot");
+    return Reject("the ground ahead is too steep or too uneven for a foot");
   }
-  return Refuse("the library has no step towards the goal");
+  return Reject("the library has no step towards the goal");
 }
 
 }  // namespace stridewire

@@ -5,28 +5,28 @@
 #include <limits>
 #include <optional>
 
-#include "stridewire/runtime/movement_request.h"
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/plan/request_plan.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
 #include "stridewire/runtime/terrain.h"
 
 namespace stridewire {
 
-/// An avatar between two steps, as far as a walk is concerned.
+/// The state of an avatar between two steps of a walk.
 struct WalkStance {
-  std::array<Footprint, 2> feet;  ///< Where they stand, by Foot
-  double heading_rad = 0.0;       ///< Of the body, unwrapped
+  std::array<Footprint, 2> feet;  ///< [foot]: where the feet stand.
+  double heading_rad = 0.0;       ///< Heading of the body, unwrapped.
   Foot last_moved = Foot::kRight;
-  FootState vector;          ///< As PlanStep needs it
-  double last_step_s = 0.0;  ///< How long the step before took; 0: none
-  bool is_exact = true;      ///< Feet land where they are sent; not so without planting
+  FootState vector;          ///< Relative position of the feet, for PlanStep.
+  double last_step_s = 0.0;  ///< Duration of the previous step; 0 if there was none.
+  bool is_exact = true;  ///< Feet land exactly on their footprints; false without foot planting.
 };
 
-/// How far a walk has got; a new one starts with a new value.
+/// Progress of a walk. A new walk starts with a default value.
 struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
-  int steps_without = 0;  ///< Since it last came nearer
+  int steps_without = 0;  ///< Steps since the last progress.
   double least_left = std::numeric_limits<double>::infinity();
 };
 
@@ -34,24 +34,25 @@ enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 
 struct WalkDecision {
   WalkOutcome outcome = WalkOutcome::kArrived;
-  RequestPlan plan;         ///< kStep
-  const char* reason = "";  ///< kRefused: a sentence, static storage
+  RequestPlan plan;         ///< Set for kStep.
+  const char* reason = "";  ///< Set for kRefused: one sentence, static storage.
 };
 
-/// Limits of a walk. Who does not come nearer in kMaxStepsWithout steps gives up.
+/// Limits of a walk. It is rejected after kMaxStepsWithout steps without progress.
 inline constexpr int kMaxWalkSteps = 10'000;
 inline constexpr int kMaxStepsWithout = 16;
-/// Footprints are on ground no steeper than this (cosine of 20 degrees) …
+/// Footprints must be on ground whose normal has at least this y component (cosine of 20 degrees).
 inline constexpr double kLeastWalkNormalY = 0.9396926;
-/// … and no further above or below the foot that stands.
+/// Footprints may be at most this far above or below the standing foot.
 inline constexpr double kMaxWalkClimbM = 0.26;
-/// Footprints whose ground is looked at for one step at most, twice over.
+/// Largest number of footprints whose ground is checked per step, in each of two attempts.
 inline constexpr int kMaxWalkCandidates = 256;
 
-/// The next step of a walk, from where the feet stand: towards the goal in the library's own steps, the
-/// last ones as long as each other, onto ground that carries a foot. Everything is decided anew at each
-/// step, so that a changed ground or goal counts from the next step on. Never allocates; time is bounded by
-/// kMaxWalkCandidates looks at the ground and a few calls of PlanStep.
+/// Plans the next step of a walk: towards the goal, with steps that the library has, onto ground
+/// that supports a foot. The remaining distance is divided into equal steps. Every decision is made
+/// for one step only, so a changed terrain or goal takes effect with the next step. Never
+/// allocates. The time is bounded by kMaxWalkCandidates ground checks and a few calls of PlanStep
+/// per attempt.
 [[nodiscard]] WalkDecision PlanWalkStep(const MotionLibrary& library, const Terrain* terrain,
                                         const WalkRequest& walk, const WalkStance& stance,
                                         WalkProgress& progress);

@@ -52,7 +52,7 @@ double HeadingTo(const DVec3& v) { return Atan2(v.x, v.z); }
 double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
 // Number of equal parts to divide a length into, so that no part is much longer than `one`.
-double Parts(double length, double one) {
+double PartCount(double length, double one) {
   return std::max(1.0, std::ceil(length / one - kStretch));
 }
 
@@ -64,16 +64,16 @@ double TurnWithin(double turn_rad, Foot moving, const TurnLimits& limits) {
 
 }  // namespace
 
-WalkSteering::WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk,
+WalkSteering::WalkSteering(const LocomotionProfile& profile, const WalkRequest& walk,
                            const WalkStance& stance)
-    : gait_(gait), walk_(walk), stance_(stance) {
+    : profile_(profile), walk_(walk), stance_(stance) {
   goal_.position_m = walk.position_m;
   goal_.heading_rad = UnwrapAngle(walk.heading_rad, stance.heading_rad);
 }
 
 DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
-  const DVec3 left = gait_.stand_feet_m[0];
-  const DVec3 right = gait_.stand_feet_m[1];
+  const DVec3 left = profile_.stand_feet_m[0];
+  const DVec3 right = profile_.stand_feet_m[1];
   return {0.5 * (left.x + right.x) + 0.5 * Outward(foot) * width_m, 0.0,
           foot == Foot::kLeft ? left.z : right.z};
 }
@@ -81,8 +81,8 @@ DVec3 WalkSteering::FootOffset(Foot foot, double width_m) const {
 WalkSteering::Body WalkSteering::BodyOver(Foot fixed) const {
   const DVec3 apart =
       RotateYaw(-stance_.heading_rad, At(fixed).position_m - At(OtherFoot(fixed)).position_m);
-  const double width_m =
-      std::clamp(Outward(fixed) * apart.x, std::min(gait_.width_m, gait_.stand_m), gait_.stand_m);
+  const double width_m = std::clamp(Outward(fixed) * apart.x,
+                                    std::min(profile_.width_m, profile_.stand_m), profile_.stand_m);
   Body body;
   body.heading_rad = stance_.heading_rad;
   body.position_m =
@@ -97,7 +97,7 @@ WalkSteering::Body WalkSteering::BodyNow() const {
 }
 
 Footprint WalkSteering::GoalPrint(Foot foot) const {
-  return {goal_.position_m + RotateYaw(goal_.heading_rad, FootOffset(foot, gait_.stand_m)),
+  return {goal_.position_m + RotateYaw(goal_.heading_rad, FootOffset(foot, profile_.stand_m)),
           goal_.heading_rad};
 }
 
@@ -107,7 +107,7 @@ bool WalkSteering::IsAtGoal(Foot foot, double within_m, double within_rad) const
          std::fabs(WrapAngle(At(foot).heading_rad - goal.heading_rad)) <= within_rad;
 }
 
-bool WalkSteering::IsThere(double within_m, double within_rad) const {
+bool WalkSteering::HasArrived(double within_m, double within_rad) const {
   return IsAtGoal(Foot::kLeft, within_m, within_rad) &&
          IsAtGoal(Foot::kRight, within_m, within_rad);
 }
@@ -120,24 +120,24 @@ void WalkSteering::PassWaypoints(std::size_t& next) const {
   }
 }
 
-double WalkSteering::LeftM(std::size_t next_waypoint) const {
-  double left_m = 0.0;
+double WalkSteering::RemainingM(std::size_t next_waypoint) const {
+  double remaining_m = 0.0;
   DVec3 from = BodyNow().position_m;
   for (std::size_t i = next_waypoint; i < walk_.waypoints_m.size(); ++i) {
-    left_m += Length(walk_.waypoints_m[i] - from);
+    remaining_m += Length(walk_.waypoints_m[i] - from);
     from = walk_.waypoints_m[i];
   }
-  return left_m + Length(goal_.position_m - from);
+  return remaining_m + Length(goal_.position_m - from);
 }
 
-double WalkSteering::LeftRad() const {
+double WalkSteering::RemainingRad() const {
   return std::fabs(WrapAngle(goal_.heading_rad - stance_.heading_rad));
 }
 
 double WalkSteering::StepM() const {
-  if (!walk_.speed_m_s) return gait_.step_m;
+  if (!walk_.speed_m_s) return profile_.step_m;
   const double step_s = stance_.last_step_s > 0.0 ? stance_.last_step_s : kFirstStepS;
-  return std::clamp(*walk_.speed_m_s * step_s, kShortestStepM, gait_.longest_m);
+  return std::clamp(*walk_.speed_m_s * step_s, kShortestStepM, profile_.longest_m);
 }
 
 double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const {
@@ -146,38 +146,38 @@ double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const 
   }
   const DVec3 way = goal_.position_m - body.position_m;
   const double straight_rad = HeadingTo(way);
-  const double left_m = Length(way);
-  if (left_m <= (1.0 + kStretch) * StepM()) return straight_rad;
+  const double remaining_m = Length(way);
+  if (remaining_m <= (1.0 + kStretch) * StepM()) return straight_rad;
   const double bend_rad = std::fabs(WrapAngle(goal_.heading_rad - straight_rad));
-  const double curve_m = std::min(kCurvePart * left_m, kCurveM) *
+  const double curve_m = std::min(kCurvePart * remaining_m, kCurveM) *
                          std::clamp((kMaxCurveRad - bend_rad) / kCurveFadeRad, 0.0, 1.0);
   return HeadingTo(way - RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
 // True if stepping sideways or backward, or turning on the spot, takes no more steps than walking.
-bool WalkSteering::Shifts(const Body& body, bool is_last_leg) const {
+bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = goal_.position_m - body.position_m;
-  const double left_m = Length(way);
-  if (left_m > kMaxShiftM) return false;
-  if (left_m < kAtGoalM) return true;
+  const double remaining_m = Length(way);
+  if (remaining_m > kMaxShiftM) return false;
+  if (remaining_m < kAtGoalM) return true;
   const auto turning_steps = [](double turn_rad, double free_rad) {
     return 2.0 * std::max(0.0, std::fabs(turn_rad) - free_rad) /
            (kSpotTurn.out_rad + kSpotTurn.in_rad);
   };
   const double way_rad = HeadingTo(way);
   const double walking = turning_steps(WrapAngle(way_rad - body.heading_rad), kWalkTurn.out_rad) +
-                         left_m / StepM() + 1.0 +
+                         remaining_m / StepM() + 1.0 +
                          turning_steps(WrapAngle(goal_.heading_rad - way_rad), kSpotTurn.out_rad);
   const DVec3 local = RotateYaw(-body.heading_rad, way);
-  const double ahead_m = local.z >= 0.0 ? StepM() : std::max(gait_.back_m, kLeastBackM);
+  const double ahead_m = local.z >= 0.0 ? StepM() : std::max(profile_.back_m, kLeastBackM);
   const double shifting =
       1.0 + std::max({std::fabs(local.z) / ahead_m, 2.0 * std::fabs(local.x) / kSideStepM,
                       turning_steps(WrapAngle(goal_.heading_rad - body.heading_rad), 0.0)});
   return shifting <= walking;
 }
 
-std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
+std::span<const Foot> WalkSteering::FeetToMove(std::size_t next_waypoint) {
   const Foot expected = OtherFoot(stance_.last_moved);
   feet_ = {expected, stance_.last_moved};
   const Body left = BodyOver(Foot::kLeft);
@@ -200,7 +200,7 @@ std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
     first = Foot::kRight;
   } else if (is_last_leg && IsAtGoal(Foot::kRight, kAtGoalM, kAtGoalRad)) {
     first = Foot::kLeft;
-  } else if (Shifts(body, is_last_leg)) {
+  } else if (PrefersSideSteps(body, is_last_leg)) {
     const DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
     if (!towards(local.x, 0.06)) towards(WrapAngle(goal_.heading_rad - body.heading_rad), 0.1);
   } else {
@@ -210,27 +210,27 @@ std::span<const Foot> WalkSteering::Feet(std::size_t next_waypoint) {
   return feet_;
 }
 
-WalkStep WalkSteering::Next(Foot moving, std::size_t next_waypoint, double part,
-                            double bend_rad) const {
+WalkStep WalkSteering::NextStep(Foot moving, std::size_t next_waypoint, double part,
+                                double bend_rad) const {
   const Body body = BodyOver(OtherFoot(moving));
   const bool is_last_leg = next_waypoint >= walk_.waypoints_m.size();
   if (is_last_leg && IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad)) {
-    return part == 1.0 ? LandAtGoal(moving) : LandNearer(moving, part);
+    return part == 1.0 ? StepToGoal(moving) : StepTowardsGoal(moving, part);
   }
-  if (Shifts(body, is_last_leg)) return Shift(body, moving, part, bend_rad);
+  if (PrefersSideSteps(body, is_last_leg)) return SideStep(body, moving, part, bend_rad);
   return Walk(body, moving, next_waypoint, part, bend_rad);
 }
 
-WalkStep WalkSteering::LandAtGoal(Foot moving) const {
+WalkStep WalkSteering::StepToGoal(Foot moving) const {
   const DVec3 fixed_m = BodyOver(OtherFoot(moving)).position_m;
-  const bool is_there = IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad);
-  return {GoalPrint(moving), is_there ? goal_.position_m : 0.5 * (fixed_m + goal_.position_m),
+  const bool is_at_goal = IsAtGoal(OtherFoot(moving), kAtGoalM, kAtGoalRad);
+  return {GoalPrint(moving), is_at_goal ? goal_.position_m : 0.5 * (fixed_m + goal_.position_m),
           true};
 }
 
 // A step that covers the fraction `part` of the distance to the foot's place at the goal.
-WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
-  WalkStep step = LandAtGoal(moving);
+WalkStep WalkSteering::StepTowardsGoal(Foot moving, double part) const {
+  WalkStep step = StepToGoal(moving);
   const Footprint& from = At(moving);
   step.print.position_m = from.position_m + part * (step.print.position_m - from.position_m);
   step.print.heading_rad =
@@ -239,17 +239,18 @@ WalkStep WalkSteering::LandNearer(Foot moving, double part) const {
   return step;
 }
 
-WalkStep WalkSteering::Land(const Body& body, Foot moving) const {
+WalkStep WalkSteering::StepTo(const Body& body, Foot moving) const {
   const DVec3 fixed = At(OtherFoot(moving)).position_m;
   const DVec3 local = RotateYaw(-body.heading_rad, body.position_m - fixed);
   // Long steps place the feet closer together than standing does.
   const double stride = std::clamp(std::fabs(local.z) / 0.35, 0.0, 1.0);
-  const double width_m = gait_.stand_m + (gait_.width_m - gait_.stand_m) * stride;
+  const double width_m = profile_.stand_m + (profile_.width_m - profile_.stand_m) * stride;
   DVec3 vector = local + FootOffset(moving, width_m);
   const double outward = Outward(moving);
   const double least_m = std::min(kLeastApartM, width_m);
-  vector.x = outward * std::clamp(outward * vector.x, least_m, gait_.stand_m + 1.2 * kSideStepM);
-  vector.z = std::clamp(vector.z, -std::max(gait_.back_m, kLeastBackM) - 0.05, gait_.longest_m);
+  vector.x = outward * std::clamp(outward * vector.x, least_m, profile_.stand_m + 1.2 * kSideStepM);
+  vector.z =
+      std::clamp(vector.z, -std::max(profile_.back_m, kLeastBackM) - 0.05, profile_.longest_m);
   WalkStep step;
   step.print.position_m = fixed + RotateYaw(body.heading_rad, vector);
   step.print.heading_rad = body.heading_rad;
@@ -265,42 +266,45 @@ WalkStep WalkSteering::Walk(const Body& body, Foot moving, std::size_t next_wayp
       part *
       TurnWithin(away_rad, moving, std::fabs(away_rad) > kSlowTurnRad ? kSpotTurn : kWalkTurn);
   const double rest_rad = std::fabs(away_rad - turn_rad);
-  const double left_m = LeftM(next_waypoint);
-  const double steps = Parts(left_m, StepM());
+  const double remaining_m = RemainingM(next_waypoint);
+  const double steps = PartCount(remaining_m, StepM());
   if (is_last_leg && steps <= 1.0 && part == 1.0 && bend_rad == 0.0 && rest_rad < 0.1) {
     const double last_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
     const double turned_rad = TurnWithin(last_rad, moving, kWalkTurn);
-    if (turned_rad == last_rad) return LandAtGoal(moving);
-    return Land({goal_.position_m, body.heading_rad + turned_rad}, moving);
+    if (turned_rad == last_rad) return StepToGoal(moving);
+    return StepTo({goal_.position_m, body.heading_rad + turned_rad}, moving);
   }
-  const double step_m = part * left_m / steps * std::clamp(1.0 - rest_rad / kSlowTurnRad, 0.0, 1.0);
+  const double step_m =
+      part * remaining_m / steps * std::clamp(1.0 - rest_rad / kSlowTurnRad, 0.0, 1.0);
   Body next;
   next.heading_rad = body.heading_rad + turn_rad;
   next.position_m = body.position_m + RotateYaw(next.heading_rad, DVec3(0.0, 0.0, step_m));
-  return Land(next, moving);
+  return StepTo(next, moving);
 }
 
-WalkStep WalkSteering::Shift(const Body& body, Foot moving, double part, double bend_rad) const {
+WalkStep WalkSteering::SideStep(const Body& body, Foot moving, double part, double bend_rad) const {
   DVec3 local = RotateYaw(-body.heading_rad, goal_.position_m - body.position_m);
   local = RotateYaw(bend_rad, local);
   const double turn_rad = WrapAngle(goal_.heading_rad - body.heading_rad);
   const double outward = Outward(moving);
   const double aside_m = outward * local.x;
   const double turn_out_rad = outward * turn_rad;
-  const double inner_m = std::max(0.02, gait_.stand_m - kLeastApartM);
+  const double inner_m = std::max(0.02, profile_.stand_m - kLeastApartM);
 
   // Sideways movement and turning take pairs of steps: the outer foot moves, the other follows.
-  const double side_pairs =
-      std::fabs(local.x) <= inner_m && aside_m < 0.0 ? 0.0 : Parts(std::fabs(local.x), kSideStepM);
-  const double turn_pairs = std::fabs(turn_rad) <= kSpotTurn.in_rad && turn_out_rad < 0.0
+  const double side_pairs = std::fabs(local.x) <= inner_m && aside_m < 0.0
                                 ? 0.0
-                                : Parts(std::fabs(turn_rad), kSpotTurn.out_rad + kSpotTurn.in_rad);
+                                : PartCount(std::fabs(local.x), kSideStepM);
+  const double turn_pairs =
+      std::fabs(turn_rad) <= kSpotTurn.in_rad && turn_out_rad < 0.0
+          ? 0.0
+          : PartCount(std::fabs(turn_rad), kSpotTurn.out_rad + kSpotTurn.in_rad);
   const auto steps_of = [](double pairs, bool is_outer) {
     return pairs == 0.0 ? 1.0 : 2.0 * pairs - (is_outer ? 1.0 : 0.0);
   };
-  const double ahead_m = local.z >= 0.0 ? 0.8 * StepM() : std::max(gait_.back_m, kLeastBackM);
+  const double ahead_m = local.z >= 0.0 ? 0.8 * StepM() : std::max(profile_.back_m, kLeastBackM);
   const double steps =
-      std::max({Parts(std::fabs(local.z), ahead_m), steps_of(side_pairs, aside_m >= 0.0),
+      std::max({PartCount(std::fabs(local.z), ahead_m), steps_of(side_pairs, aside_m >= 0.0),
                 steps_of(turn_pairs, turn_out_rad >= 0.0)});
 
   Body next = body;
@@ -319,11 +323,11 @@ WalkStep WalkSteering::Shift(const Body& body, Foot moving, double part, double 
     turned_rad = -std::min(-turn_out_rad, kSpotTurn.in_rad);
   }
   if (steps == 1.0 && part == 1.0 && bend_rad == 0.0 && turned_rad == turn_out_rad) {
-    return LandAtGoal(moving);
+    return StepToGoal(moving);
   }
   next.position_m += RotateYaw(body.heading_rad, part * move);
   next.heading_rad += part * outward * turned_rad;
-  return Land(next, moving);
+  return StepTo(next, moving);
 }
 
 }  // namespace stridewire

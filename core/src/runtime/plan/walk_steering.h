@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <span>
 
-#include "runtime/plan/walk_planner.h"
 #include "runtime/library/locomotion_profile.h"
+#include "runtime/plan/walk_planner.h"
 
 namespace stridewire {
 
@@ -24,23 +24,23 @@ struct WalkStep {
 /// it. Each step moves the body by an equal part of the remaining distance.
 class WalkSteering {
  public:
-  WalkSteering(const LocomotionProfile& gait, const WalkRequest& walk, const WalkStance& stance);
+  WalkSteering(const LocomotionProfile& profile, const WalkRequest& walk, const WalkStance& stance);
 
   /// Advances `next` past all waypoints that have been reached.
   void PassWaypoints(std::size_t& next) const;
 
   /// True if both feet stand at the goal within the tolerances.
-  [[nodiscard]] bool IsThere(double within_m, double within_rad) const;
+  [[nodiscard]] bool HasArrived(double within_m, double within_rad) const;
   /// Remaining distance through the waypoints, and remaining turn.
-  [[nodiscard]] double LeftM(std::size_t next_waypoint) const;
-  [[nodiscard]] double LeftRad() const;
+  [[nodiscard]] double RemainingM(std::size_t next_waypoint) const;
+  [[nodiscard]] double RemainingRad() const;
 
   /// The feet that may step next, the preferred foot first.
-  [[nodiscard]] std::span<const Foot> Feet(std::size_t next_waypoint);
+  [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
   /// The next step of a foot, scaled by `part`, in a direction turned to the left by `bend_rad`.
-  [[nodiscard]] WalkStep Next(Foot moving, std::size_t next_waypoint, double part,
-                              double bend_rad) const;
+  [[nodiscard]] WalkStep NextStep(Foot moving, std::size_t next_waypoint, double part,
+                                  double bend_rad) const;
 
   /// The footprint of a foot at the goal.
   [[nodiscard]] Footprint GoalPrint(Foot foot) const;
@@ -58,17 +58,18 @@ class WalkSteering {
   [[nodiscard]] Body BodyOver(Foot fixed) const;
   [[nodiscard]] Body BodyNow() const;
   [[nodiscard]] bool IsAtGoal(Foot foot, double within_m, double within_rad) const;
-  [[nodiscard]] bool Shifts(const Body& body, bool is_last_leg) const;
+  [[nodiscard]] bool PrefersSideSteps(const Body& body, bool is_last_leg) const;
   [[nodiscard]] double StepM() const;
   [[nodiscard]] double Bearing(const Body& body, std::size_t next_waypoint) const;
   [[nodiscard]] WalkStep Walk(const Body& body, Foot moving, std::size_t next_waypoint, double part,
                               double bend_rad) const;
-  [[nodiscard]] WalkStep Shift(const Body& body, Foot moving, double part, double bend_rad) const;
-  [[nodiscard]] WalkStep Land(const Body& body, Foot moving) const;
-  [[nodiscard]] WalkStep LandAtGoal(Foot moving) const;
-  [[nodiscard]] WalkStep LandNearer(Foot moving, double part) const;
+  [[nodiscard]] WalkStep SideStep(const Body& body, Foot moving, double part,
+                                  double bend_rad) const;
+  [[nodiscard]] WalkStep StepTo(const Body& body, Foot moving) const;
+  [[nodiscard]] WalkStep StepToGoal(Foot moving) const;
+  [[nodiscard]] WalkStep StepTowardsGoal(Foot moving, double part) const;
 
-  const LocomotionProfile& gait_;
+  const LocomotionProfile& profile_;
   const WalkRequest& walk_;
   const WalkStance& stance_;
   Body goal_;

@@ -42,8 +42,8 @@ std::span<const float> GridCache::Row(const MotionGroup& group, std::span<const 
   return row;
 }
 
-void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                 const GridPlace& place, float* row) {
+void UseLargestExample(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
+                       const GridSample& sample, float* row) {
   const auto row_floats = static_cast<std::size_t>(layout.row_floats);
   const std::vector<float>& weights = movement.weights;
   const auto largest =
@@ -56,9 +56,9 @@ void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movem
       float& sum = row[i];
       sum = 0.0f;
       for (int k = 0; k < 4; ++k) {
-        const auto examples = static_cast<std::size_t>(PointOf(group, place, k)) *
+        const auto examples = static_cast<std::size_t>(GridPointOf(group, sample, k)) *
                               static_cast<std::size_t>(group.example_count);
-        sum += place.weights[static_cast<std::size_t>(k)] *
+        sum += sample.weights[static_cast<std::size_t>(k)] *
                group.grid[(examples + largest) * row_floats + i];
       }
     }
@@ -68,12 +68,12 @@ void TakeLargest(const MotionGroup& group, const GridLayout& layout, const Movem
 namespace {
 
 // The position of a pose in its movement, and how much of the difference pose remains there.
-struct Place {
-  GridPlace grid;
-  float fraction;  // Remaining fraction of the difference.
-  float slope_s;   // Seconds by which the velocity of the difference is multiplied.
-  double steered;  // EaseOut of the elapsed fraction of the movement.
-  bool is_eased;   // True while part of the difference remains.
+struct PoseSample {
+  GridSample grid;
+  float fraction;         // Remaining fraction of the difference.
+  float slope_s;          // Seconds by which the velocity of the difference is multiplied.
+  double remaining_turn;  // Fraction of Movement::extra_turn_rad that is still to come.
+  bool is_eased;          // True while part of the difference remains.
 };
 
 using RowScratch = std::array<float, kMaxRowFloats>;
@@ -81,22 +81,22 @@ using RowScratch = std::array<float, kMaxRowFloats>;
 // Normalizes the rotations, adds the rest of the difference pose and transforms the pose into world
 // space.
 void FinishPose(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                const Place& place, RowScratch& row, PoseSpan out) {
-  const bool is_inertial = place.is_eased && movement.is_inertial;
+                const PoseSample& sample, RowScratch& row, PoseSpan out) {
+  const bool is_inertial = sample.is_eased && movement.is_inertial;
   const kernels::RotationBlend rotations = {
       .row = row.data(),
       .joint_count = static_cast<std::size_t>(layout.joint_count),
-      .difference = place.is_eased ? &movement.difference.rotations[0].x : nullptr,
-      .fraction = place.fraction,
+      .difference = sample.is_eased ? &movement.difference.rotations[0].x : nullptr,
+      .fraction = sample.fraction,
       .velocity = is_inertial ? &movement.difference_velocity.joints_rad_s[0].x : nullptr,
-      .seconds = place.slope_s};
+      .seconds = sample.slope_s};
   if (!kernels::BlendRotations(rotations, &out.rotations[0].x)) {
-    TakeLargest(group, layout, movement, place.grid, row.data());
+    UseLargestExample(group, layout, movement, sample.grid, row.data());
     (void)kernels::BlendRotations(rotations, &out.rotations[0].x);
   }
   const GridLayout::Root root = layout.RootOf(row.data());
   const BaseFrame& base = movement.base;
-  const double yaw_rad = root.yaw_rad + movement.extra_turn_rad * (1.0 - place.steered);
+  const double yaw_rad = root.yaw_rad + movement.extra_turn_rad * (1.0 - sample.remaining_turn);
   const std::array<double, 2> angles_rad = {base.heading_rad, 0.5 * (base.heading_rad + yaw_rad)};
   std::array<double, 2> sines;
   std::array<double, 2> cosines;
@@ -108,55 +108,56 @@ void FinishPose(const MotionGroup& group, const GridLayout& layout, const Moveme
   out.rotations[0] =
       Quat(static_cast<float>(cosines[1]), 0.0f, static_cast<float>(sines[1]), 0.0f) *
       out.rotations[0];
-  if (!place.is_eased) return;
-  out.root_position_m += place.fraction * movement.difference.root_position_m;
+  if (!sample.is_eased) return;
+  out.root_position_m += sample.fraction * movement.difference.root_position_m;
   if (movement.is_inertial) {
-    out.root_position_m += place.slope_s * movement.difference_velocity.root_m_s;
+    out.root_position_m += sample.slope_s * movement.difference_velocity.root_m_s;
   }
 }
 
-Place PlaceAt(const MotionGroup& group, const Movement& movement, double time_s) {
+// The same operations as kernels::ComputeGridSamples. For a single time they are faster in scalars.
+PoseSample SampleAt(const MotionGroup& group, const Movement& movement, double time_s) {
   const CellWeights cell =
       CellWeightsAt(movement.warp.GridPosition(time_s), group.grid_point_count);
   const double eased = (time_s - movement.start_offset_s) / movement.ease_out_s;
   return {.grid = {cell.first, cell.weights},
           .fraction = static_cast<float>(EaseOut(eased)),
           .slope_s = static_cast<float>(movement.ease_out_s * EaseOutSlope(eased)),
-          .steered = EaseOut(time_s / movement.warp.duration_s()),
+          .remaining_turn = EaseOut(time_s / movement.warp.duration_s()),
           .is_eased = eased < 1.0};
 }
 
 void EvaluateAt(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
-                const Place& place, GridCache& cache, PoseSpan out) {
+                const PoseSample& sample, GridCache& cache, PoseSpan out) {
   RowScratch row;
-  BlendRow(group, layout, movement, place.grid, cache, row.data());
-  FinishPose(group, layout, movement, place, row, out);
+  BlendRow(group, layout, movement, sample.grid, cache, row.data());
+  FinishPose(group, layout, movement, sample, row, out);
 }
 
 }  // namespace
 
 void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        int point, GridCache& cache, PoseSpan out) {
-  const Place place = {.grid = {point, {1.0f, 0.0f, 0.0f, 0.0f}},
-                       .fraction = 0.0f,
-                       .slope_s = 0.0f,
-                       .steered = 1.0,
-                       .is_eased = false};
+  const PoseSample sample = {.grid = {point, {1.0f, 0.0f, 0.0f, 0.0f}},
+                             .fraction = 0.0f,
+                             .slope_s = 0.0f,
+                             .remaining_turn = 1.0,
+                             .is_eased = false};
   RowScratch row;
   std::ranges::copy(cache.Row(group, movement.weights, point), row.begin());
-  FinishPose(group, layout, movement, place, row, out);
+  FinishPose(group, layout, movement, sample, row, out);
 }
 
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out) {
-  Place place = PlaceAt(group, movement, time_s);
-  place.is_eased = false;
-  EvaluateAt(group, layout, movement, place, cache, out);
+  PoseSample sample = SampleAt(group, movement, time_s);
+  sample.is_eased = false;
+  EvaluateAt(group, layout, movement, sample, cache, out);
 }
 
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out) {
-  EvaluateAt(group, layout, movement, PlaceAt(group, movement, time_s), cache, out);
+  EvaluateAt(group, layout, movement, SampleAt(group, movement, time_s), cache, out);
 }
 
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
@@ -165,7 +166,8 @@ void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, C
   // Before its start, a movement is extrapolated by reflecting its first moments.
   const bool is_reflected = movement.start_offset_s < kBlendStepS;
   EvaluateBlend(group, layout, movement,
-                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache, scratch);
+                movement.start_offset_s + (is_reflected ? kBlendStepS : -kBlendStepS), cache,
+                scratch);
   const auto per_s = static_cast<float>(1.0 / kBlendStepS);
   const Pose& difference = movement.difference;
   const Vec3 entered_m = before.root_position_m - difference.root_position_m;

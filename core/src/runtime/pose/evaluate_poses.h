@@ -11,9 +11,9 @@
 
 namespace stridewire {
 
-/// The examples' weighted sums at the grid points a pose needs. Summing costs n multiply-adds a number;
-/// between grid points the sums are only interpolated. Keeping this or starting from an
-/// empty one gives the same bytes. Some kilobytes, for the stack: it allocates nothing.
+/// Caches the weighted sums of the examples at grid points. A sum costs n multiply-adds per number;
+/// between grid points the sums are only interpolated. Results do not depend on the state of the
+/// cache. Takes 17 KB and never allocates.
 class GridCache {
  public:
   explicit GridCache(const GridLayout& layout)
@@ -22,43 +22,43 @@ class GridCache {
     Clear();
   }
 
-  /// Forgets the rows: the movement changed.
+  /// Removes all rows. Call it when the movement changes.
   void Clear() { points_.fill(-1); }
 
-  /// The sum at a grid point. Its quaternions are not unit: what is interpolated between them is made so.
+  /// The weighted sum at a grid point. Its quaternions are not normalized.
   [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
                                            int point);
 
  private:
-  // Of most movements all points; of the longest rows the four around one place.
+  // Enough for all points of most movements. Of the longest rows, only the four around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
   std::size_t row_floats_;
-  std::size_t slot_count_;  // a power of two
-  std::array<float, 4 * kMaxRowFloats>
-      rows_;                           // point p in slot p % slot_count_; not all are filled
-  std::array<int, kMaxSlots> points_;  // [slot], -1: none
+  std::size_t slot_count_;                     // A power of two.
+  std::array<float, 4 * kMaxRowFloats> rows_;  // Point p is in slot p % slot_count_.
+  std::array<int, kMaxSlots> points_;          // [slot]: the point in it, or -1.
 };
 
-/// The blended pose at a grid point: EvaluateBlend's there. Never allocates.
+/// Evaluates the blended pose at a grid point. Never allocates.
 void EvaluateGridPoint(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                        int point, GridCache& cache, PoseSpan out);
 
-/// The blended pose M(t) in the world, without the difference pose (Eq. (2)). `time_s` is clamped
-/// to the movement. Between grid points C1 (Catmull-Rom). Never allocates.
+/// Evaluates the blended pose M(t) in world space, without the difference pose (Eq. (2)). `time_s`
+/// is clamped to the movement. The motion is C1 (Catmull-Rom). Never allocates.
 void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                    double time_s, GridCache& cache, PoseSpan out);
 
-/// What is displayed: M'(t) = f(s) D + M(t) with s = (t - start_offset_s)/T (Eq. (5)). M'(start_offset_s) = P and
-/// M'(t) = M(t) from T on. If it is inertial, f(s) D is followed by T h(s) V with V the difference's velocity.
+/// Evaluates the pose with the difference pose (Eq. (5)): M'(t) = f(s) D + M(t) with s = (t -
+/// start_offset_s)/T. So M'(start_offset_s) = P, and M'(t) = M(t) for s >= 1. If the movement is
+/// inertial, T h(s) V is added, where V is the velocity of the difference.
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
 
-/// Poses this far apart tell how fast they change.
+/// Velocities are measured between poses that are this far apart.
 inline constexpr double kBlendStepS = 0.004;
 
-/// Sets the velocity of a difference pose that is there, from `before`, which was displayed when the movement
-/// was entered, and `earlier`, kBlendStepS before that. `scratch` has one rotation a joint. Never allocates if
-/// the velocity has room for all joints.
+/// Sets the velocity of a movement's difference pose. `before` is the previous movement's pose at
+/// the start of this one and `earlier` its pose kBlendStepS before that. `scratch` has one rotation
+/// per joint. Does not allocate if the velocity has room for all joints.
 void SetDifferenceVelocity(const MotionGroup& group, const GridLayout& layout, ConstPoseSpan before,
                            ConstPoseSpan earlier, GridCache& cache, PoseSpan scratch,
                            Movement& movement);

@@ -15,59 +15,64 @@ constexpr std::uint32_t kParts = 64;  // Times are grouped into this many parts 
 
 int SampleRunCount(const Movement& movement, double time_s, double step_s, int ticks_apart,
                    int most) {
+  STRIDEWIRE_CHECK(step_s > 0.0 && ticks_apart >= 1 && most >= 1);
   const double apart_s = step_s * ticks_apart;
   const double left = (movement.duration_s() - time_s) / apart_s;
   if (!(left < most)) return most;
   return std::max(1, static_cast<int>(left) + 1);
 }
 
-void EvaluationBatcher::Add(const SampleRun& stretch, int count, std::uint32_t tag) {
+void EvaluationBatcher::Add(const SampleRun& run, int count, std::uint32_t tag) {
   STRIDEWIRE_CHECK(count >= 1 && count <= kMaxCount);
-  const Movement& movement = *stretch.movement;
-  const double part = std::clamp(stretch.time_s / movement.duration_s(), 0.0, 1.0);
+  STRIDEWIRE_CHECK(run.movement != nullptr && run.movement->group >= 0);
+  const Movement& movement = *run.movement;
+  const double part = std::clamp(run.time_s / movement.duration_s(), 0.0, 1.0);
   // Runs without foot planting come first, and longer runs come before shorter ones.
   auto key = movement.feet.is_active ? 1u : 0u;
   key = key << 5 | static_cast<std::uint32_t>(kMaxCount - count);
   key = key << 8 | (static_cast<std::uint32_t>(movement.group) & 0xffu);
   key = key << 6 | static_cast<std::uint32_t>(part * (kParts - 1));
-  items_.push_back({stretch, key, tag, count});
+  items_.push_back({run, key, tag, count});
 }
 
 void EvaluationBatcher::Sort() {
-  places_.resize(items_.size());
+  entries_.resize(items_.size());
   sorted_.resize(items_.size());
   order_.resize(items_.size());
-  for (std::uint32_t i = 0; i < items_.size(); ++i) places_[i] = {items_[i].key, i};
-  const auto pass = [](std::span<const Place> from, std::span<Place> to, int shift) {
+  for (std::uint32_t i = 0; i < items_.size(); ++i) entries_[i] = {items_[i].key, i};
+  const auto pass = [](std::span<const SortEntry> from, std::span<SortEntry> to, int shift) {
     std::array<std::uint32_t, kHalfMask + 2> begins{};
-    for (const Place& place : from) ++begins[(place.key >> shift & kHalfMask) + 1];
+    for (const SortEntry& entry : from) ++begins[(entry.key >> shift & kHalfMask) + 1];
     for (std::size_t i = 1; i < begins.size(); ++i) begins[i] += begins[i - 1];
-    for (const Place& place : from) to[begins[place.key >> shift & kHalfMask]++] = place;
+    for (const SortEntry& entry : from) to[begins[entry.key >> shift & kHalfMask]++] = entry;
   };
-  pass(places_, sorted_, 0);
-  pass(sorted_, places_, kHalfBits);
-  for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = items_[places_[i].item];
+  pass(entries_, sorted_, 0);
+  pass(sorted_, entries_, kHalfBits);
+  for (std::size_t i = 0; i < order_.size(); ++i) order_[i] = items_[entries_[i].item];
 }
 
 std::span<const EvaluationBatcher::Item> EvaluationBatcher::BlockAt(std::size_t begin) const {
+  STRIDEWIRE_CHECK(begin < order_.size() && order_.size() == items_.size());
   std::size_t end = std::min(begin + SoaPose::kLanes, order_.size());
-  const bool is_planted = order_[begin].stretch.movement->feet.is_active;
+  const bool is_planted = order_[begin].run.movement->feet.is_active;
   // Runs with planting come last, so a block ends before the first run that differs from `begin`.
-  while (order_[end - 1].stretch.movement->feet.is_active != is_planted) --end;
+  while (order_[end - 1].run.movement->feet.is_active != is_planted) --end;
+  // The first run of a block decides how many poses are evaluated, so none may be longer.
+  STRIDEWIRE_CHECK(order_[end - 1].count <= order_[begin].count);
   return std::span(order_).subspan(begin, end - begin);
 }
 
 // While one pose of a block is evaluated, prefetches a share of the data of the next two blocks: of
 // the block after next the movements themselves, and of the next block the arrays they point to.
-void EvaluationBatcher::PrefetchBehind(std::size_t end, int pose, int count) const {
+void EvaluationBatcher::PrefetchNext(std::size_t end, int pose, int count) const {
   const std::size_t lanes = SoaPose::kLanes;
   const auto first = static_cast<std::size_t>(pose) * lanes / static_cast<std::size_t>(count);
   const auto last = static_cast<std::size_t>(pose + 1) * lanes / static_cast<std::size_t>(count);
   for (std::size_t i = first; i < last; ++i) {
     if (end + lanes + i < order_.size()) {
-      SoaPoseEvaluator::PrefetchPlaces(*order_[end + lanes + i].stretch.movement);
+      SoaPoseEvaluator::PrefetchMovement(*order_[end + lanes + i].run.movement);
     }
-    if (end + i < order_.size()) SoaPoseEvaluator::Prefetch(order_[end + i].stretch);
+    if (end + i < order_.size()) SoaPoseEvaluator::Prefetch(order_[end + i].run);
   }
 }
 

@@ -26,7 +26,7 @@ class EvaluationBatcher {
   static constexpr int kMaxCount = 32;
 
   struct Item {
-    SampleRun stretch;
+    SampleRun run;
     std::uint32_t key = 0;  ///< Sort key; similar runs have similar keys.
     std::uint32_t tag = 0;  ///< Chosen by the caller, to recognize the run.
     int count = 1;          ///< Number of poses.
@@ -34,7 +34,7 @@ class EvaluationBatcher {
 
   /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate
   /// returns.
-  void Add(const SampleRun& stretch, int count, std::uint32_t tag);
+  void Add(const SampleRun& run, int count, std::uint32_t tag);
   [[nodiscard]] bool empty() const { return items_.empty(); }
 
   /// Evaluates all added runs in blocks of up to SoaPose::kLanes and then removes them. For each
@@ -46,15 +46,15 @@ class EvaluationBatcher {
   void Evaluate(SoaPoseEvaluator& evaluator, Use&& use) {
     Sort();
     const std::span<const Item> all = order_;
-    std::array<SampleRun, SoaPose::kLanes> stretches;
+    std::array<SampleRun, SoaPose::kLanes> runs;
     for (std::size_t begin = 0; begin < all.size();) {
       const std::span<const Item> block = BlockAt(begin);
       const std::size_t end = begin + block.size();
       const int count = block.front().count;
-      for (std::size_t i = 0; i < block.size(); ++i) stretches[i] = block[i].stretch;
-      evaluator.Begin(std::span(stretches).first(block.size()), count);
+      for (std::size_t i = 0; i < block.size(); ++i) runs[i] = block[i].run;
+      evaluator.Begin(std::span(runs).first(block.size()), count);
       for (int pose = 0; pose < count; ++pose) {
-        PrefetchBehind(end, pose, count);
+        PrefetchNext(end, pose, count);
         use(block, pose, evaluator.Next());
       }
       begin = end;
@@ -65,17 +65,17 @@ class EvaluationBatcher {
  private:
   void Sort();
   [[nodiscard]] std::span<const Item> BlockAt(std::size_t begin) const;
-  void PrefetchBehind(std::size_t end, int pose, int count) const;
+  void PrefetchNext(std::size_t end, int pose, int count) const;
 
   // The key of an item and its index in items_.
-  struct Place {
+  struct SortEntry {
     std::uint32_t key;
     std::uint32_t item;
   };
   std::vector<Item> items_;
   std::vector<Item> order_;
-  std::vector<Place> places_;
-  std::vector<Place> sorted_;
+  std::vector<SortEntry> entries_;
+  std::vector<SortEntry> sorted_;
 };
 
 }  // namespace stridewire

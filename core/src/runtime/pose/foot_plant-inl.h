@@ -1,6 +1,6 @@
-// Plants the feet of several avatars at once. The formulas are those of PlantFeetByReference in
-// foot_plan.cpp, where they are explained; a test compares the two. Positions are relative to the
-// base of each movement, so that single precision suffices.
+// Plants the feet of several avatars at once (see PlantFeet). A test compares the result with a
+// plain implementation in double precision, tests/support/reference_evaluation.cpp. Positions are
+// relative to the base of each movement, so that single precision suffices.
 #if defined(STRIDEWIRE_FOOT_PLANT_INL_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef STRIDEWIRE_FOOT_PLANT_INL_H
 #undef STRIDEWIRE_FOOT_PLANT_INL_H
@@ -8,8 +8,8 @@
 #define STRIDEWIRE_FOOT_PLANT_INL_H
 #endif
 
-#include "runtime/pose/simd_math-inl.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/pose/simd_math-inl.h"
 #include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/skeleton/leg_rig.h"
 
@@ -27,7 +27,7 @@ HWY_INLINE Float EaseOutSlope(Float s) {
   return in * r * r;
 }
 // Divides by a constant: multiplies by its reciprocal, which is computed in double precision.
-HWY_INLINE Float Over(Float x, double length) {
+HWY_INLINE Float DivideBy(Float x, double length) {
   return x * Float(static_cast<float>(1.0 / length));
 }
 HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
@@ -35,18 +35,26 @@ HWY_INLINE Float SmoothMax(Float a, Float b, float soft_m) {
   return Float(0.5f) * (a + b + Sqrt(d * d + Float(soft_m * soft_m)));
 }
 
-// A FootTrajectory and its FootResidual, in the layout of PackFootPlan.
-struct Track {
-  SoaVec3 from, to, release_offset, release_velocity, land_offset, land_velocity, aside, height,
-      turn;
+template <typename Number>
+HWY_INLINE Number Constant(double value) {
+  return Number(static_cast<float>(value));
+}
+HWY_INLINE Float OnePlusTwice(Float x) { return Float(1.0f) + x + x; }
+template <typename T>
+HWY_INLINE T AddBoth(T base, T a, T b) {
+  return base + a + b;
+}
+#define STRIDEWIRE_INLINE HWY_INLINE
+#include "runtime/pose/foot_correction-inl.h"
+#undef STRIDEWIRE_INLINE
+
+struct SoaTrajectory : TrajectoryOf<Float, SoaVec3> {
   SoaVec3 normals[2];
-  SoaVec3 rest_offset, rest_velocity, root_shift;
-  Float from_heading, to_heading, release_turn, root_weight, lift, rest_turn, rest_turn_s;
-  Float rest_over_s, release_s, land_s;
 };
 
-HWY_INLINE Track LoadTrack(const float* plan) {
-  Track t;
+// Loads a trajectory in the layout of PackFootPlan.
+HWY_INLINE SoaTrajectory LoadTrajectory(const float* plan) {
+  SoaTrajectory t;
   const auto next = [&]() HWY_ATTR {
     const SoaQuat four = LoadQuat(plan);
     plan += 4 * kBlock;
@@ -63,38 +71,41 @@ HWY_INLINE Track LoadTrack(const float* plan) {
   q = next();
   t.land_offset = XyzOf(q), t.lift = q.w;
   q = next();
-  t.land_velocity = XyzOf(q), t.rest_turn = q.w;
+  t.land_velocity = XyzOf(q), t.residual_turn = q.w;
   q = next();
-  t.aside = XyzOf(q), t.rest_turn_s = q.w;
+  t.aside = XyzOf(q), t.residual_turn_s = q.w;
   q = next();
-  t.height = XyzOf(q), t.rest_over_s = q.w;
+  t.height[0] = q.x, t.height[1] = q.y, t.height[2] = q.z, t.residual_over_s = q.w;
   q = next();
-  t.turn = XyzOf(q), t.release_s = q.w;
+  t.turn[0] = q.x, t.turn[1] = q.y, t.turn[2] = q.z, t.release_s = q.w;
   q = next();
   t.normals[0] = XyzOf(q), t.land_s = q.w;
   t.normals[1] = XyzOf(next());
-  t.rest_offset = XyzOf(next());
-  t.rest_velocity = XyzOf(next());
+  t.residual_offset = XyzOf(next());
+  t.residual_velocity = XyzOf(next());
   t.root_shift = XyzOf(next());
   return t;
 }
 
 // The part of a movement's plan that concerns both feet, and the time to evaluate.
-struct Common {
-  SoaVec3 root_rest, root_rest_velocity;
-  Float steer, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
+struct PlanCommon {
+  SoaVec3 root_residual, root_residual_velocity;
+  Float extra_turn, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
-  Float per_duration, per_ease_out;  // 1 / s
+  Float per_duration, per_ease_out;  // 1 / duration_s and 1 / ease_out_s.
+
+  HWY_INLINE Float OfDuration(Float x) const { return x * per_duration; }
+  HWY_INLINE Float OfEaseOut(Float x) const { return x * per_ease_out; }
 };
 
 // Result of forward kinematics of a leg. Positions are relative to the root, in world axes.
-struct LegLanes {
+struct SoaLeg {
   SoaVec3 positions[kMaxLegChain];
   SoaQuat rotations[kMaxLegChain];
   SoaVec3 ball;
 };
 
-HWY_INLINE SoaVec3 Same(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
+HWY_INLINE SoaVec3 Broadcast(const float* v) { return {Float(v[0]), Float(v[1]), Float(v[2])}; }
 
 // Calls `step` for both legs. Each computation for a leg depends on the previous one, so the two
 // legs alternate: the processor works on one leg while results of the other are pending.
@@ -104,10 +115,12 @@ HWY_INLINE void ForBothFeet(const LegRig& rig, const Step& step) {
   step(rig.bones[1], std::size_t{1});
 }
 
-// `joints` maps places in a leg's chain to joints in `rotations`.
-HWY_INLINE void EvaluateLegs(
-    const LegRig& rig, const float* rotations, SoaQuat root, LegLanes* legs,
-    const std::size_t (LegRig::Bones::*joints)[kMaxLegChain] = &LegRig::Bones::joints) {
+// Maps places in a leg's chain to joints in an array of rotations: those of the skeleton, or those
+// of LegRig::joints alone.
+using JointMap = std::size_t (LegRig::Bones::*)[kMaxLegChain];
+
+HWY_INLINE void EvaluateLegs(const LegRig& rig, const float* rotations, SoaQuat root, SoaLeg* legs,
+                             JointMap joints) {
   std::size_t longest = 0;
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     legs[f].positions[0] = {Float(0.0f), Float(0.0f), Float(0.0f)};
@@ -117,24 +130,26 @@ HWY_INLINE void EvaluateLegs(
   for (std::size_t i = 1; i < longest; ++i) {
     ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
       if (i >= bones.count) return;
-      LegLanes& leg = legs[f];
+      SoaLeg& leg = legs[f];
       leg.positions[i] =
-          leg.positions[i - 1] + Rotate(leg.rotations[i - 1], Same(bones.offsets_m[i]));
+          leg.positions[i - 1] + Rotate(leg.rotations[i - 1], Broadcast(bones.offsets_m[i]));
       leg.rotations[i] =
           Multiply(leg.rotations[i - 1], LoadQuat(rotations + (bones.*joints)[i] * 4 * kBlock));
     });
   }
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const std::size_t last = bones.count - 1;
-    legs[f].ball = legs[f].positions[last] + Rotate(legs[f].rotations[last], Same(bones.ball_m));
+    legs[f].ball =
+        legs[f].positions[last] + Rotate(legs[f].rotations[last], Broadcast(bones.ball_m));
   });
 }
 
-void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-              float* ankles_m) {
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+                 float* ankles_m) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
-    LegLanes legs[2];
-    EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs, &LegRig::Bones::among);
+    SoaLeg legs[2];
+    EvaluateLegs(rig, rotations + lane, LoadQuat(rotations + lane), legs,
+                 &LegRig::Bones::rig_joints);
     ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
       const auto put = [&](SoaVec3 v, float* to) HWY_ATTR {
         StoreLanes(v.x, to);
@@ -147,83 +162,39 @@ void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, floa
   }
 }
 
-struct Correction {
+struct SoaCorrection {
   SoaVec3 offset;
   Float swing;
   SoaQuat turn;  // Rotation of the foot in world axes.
   SoaVec3 root;  // Part of the correction by which the root moves as well.
 };
 
-HWY_INLINE Float Steered(const Common& common, Float at_s) {
-  return common.steer * (Float(1.0f) - EaseOut(at_s * common.per_duration));
-}
-
-HWY_INLINE Correction CorrectFoot(const Common& common, const Track& track, SoaVec3 ball,
-                                  Float heading, Float flatness) {
+HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajectory& trajectory,
+                                     SoaVec3 ball, Float heading, Float flatness) {
+  const auto correction =
+      CorrectTrajectory<Float, SoaVec3>(common, trajectory, ball, heading, flatness);
   const Float one = 1.0f;
-  const Float zero = 0.0f;
-  const Float t = common.time_s;
-  const Mask has_landed = t >= track.land_s;
-  const Mask is_planted = (t <= track.release_s) || has_landed;
-  const Float length = Select(is_planted, one, track.land_s - track.release_s);
-  const Float s = Select(has_landed, one, Select(is_planted, zero, (t - track.release_s) / length));
-  const Float r = one - s;
-
-  Correction c;
-  c.swing = s;
-  const SoaVec3 print = Select(has_landed, track.to, track.from);
-  const Float print_heading = Select(has_landed, track.to_heading, track.from_heading);
-  const Float across = Float(4.0f) * s * r;
-  const SoaVec3 flying = track.release_offset * ((one + s + s) * r * r) +
-                         track.land_offset * (s * s * (one + r + r)) +
-                         (track.release_velocity * r - track.land_velocity * s) * (length * s * r) +
-                         track.aside * (across * across);
-  c.offset = Select(is_planted, print - ball, flying);
-  const Float since_s = t - common.start_offset_s;
-  const Float settled = one - EaseOut(since_s * common.per_ease_out);
-  const Float rise = track.height.z - track.height.y;
-  const Float rise_from = Select(rise > zero, zero, Float(static_cast<float>(kSinkFrom)));
-  const Float risen = one - EaseOut(Over(s - rise_from, 1.0 - kSinkFrom));
-  const Float ends = static_cast<float>(kLiftEnds);
-  const Float lifted =
-      (one - EaseOut(Over(s, kLiftEnds))) * EaseOut(Over(s - (one - ends), kLiftEnds));
-  c.offset.y = track.height.x + settled * (track.height.y - track.height.x) + rise * risen +
-               track.lift * lifted;
-
-  const Float turned = one - EaseOut(s);
-  Float free = track.turn.x + settled * (track.turn.y - track.turn.x) +
-               turned * (track.turn.z - track.turn.y);
-  free =
-      free + (Steered(common, Min(track.land_s, common.duration_s)) * turned - Steered(common, t));
-  const Float rested = since_s / track.rest_over_s;
-  const Float value = EaseOut(rested);
-  const Float slope = track.rest_over_s * EaseOutSlope(rested);
-  c.offset = c.offset + track.rest_offset * value + track.rest_velocity * slope;
-  free = free + value * track.rest_turn + slope * track.rest_turn_s;
-  const Float held = WrapAngle(print_heading - heading - free);
-  const Float hold =
-      one - EaseOut(Over(flatness - Float(static_cast<float>(kHeelUp)), kSoleDown - kHeelUp));
-  const Float turn =
-      Select(is_planted, free + hold * held, free + (one - turned) * track.release_turn);
-
-  const SoaVec3 tilt = track.normals[0] * (one - turned) + track.normals[1] * turned;
+  const SoaVec3 tilt =
+      trajectory.normals[0] * (one - correction.turned) + trajectory.normals[1] * correction.turned;
   const SoaVec3 normal = tilt * (one / Sqrt(Dot(tilt, tilt)));
-  c.turn = Multiply(Normalise({normal.z, zero, -normal.x, one + normal.y}),
-                    YawRotation(WrapAngle(turn)));
-  c.root =
-      c.offset * track.root_weight + track.root_shift * (one - EaseOut(t * common.per_duration));
+  SoaCorrection c;
+  c.offset = correction.offset;
+  c.swing = correction.swing;
+  c.turn = Multiply(Normalise({normal.z, Float(0.0f), -normal.x, one + normal.y}),
+                    YawRotation(WrapAngle(correction.turn)));
+  c.root = c.offset * trajectory.root_weight + correction.root_shift;
   return c;
 }
 
 // Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
 // between the foot and the footprint.
 HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
-                            const LegLanes& leg, SoaVec3 ball, SoaQuat turn) {
+                            const SoaLeg& leg, SoaVec3 ball, SoaQuat turn) {
   const Float dx = ball.x - print.x;
   const Float dz = ball.z - print.z;
   const Float away = Sqrt(dx * dx + dz * dz);
-  const Float near =
-      EaseOut(Over(away - Float(static_cast<float>(kNearPrintM)), kFarFromPrintM - kNearPrintM));
+  const Float near = EaseOut(
+      DivideBy(away - Float(static_cast<float>(kNearPrintM)), kFarFromPrintM - kNearPrintM));
   const Float per_rise = Float(1.0f) / normal.y;
   const auto depth_of = [&](SoaVec3 point, float rest_m) HWY_ATTR {
     const SoaVec3 at = ball + Rotate(turn, point - leg.ball);
@@ -232,9 +203,10 @@ HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& 
     return ground + Float(rest_m) * per_rise - at.y;
   };
   const std::size_t last = bones.count - 1;
-  const SoaVec3 toe_tip = leg.positions[last] + Rotate(leg.rotations[last], Same(bones.toe_tip_m));
+  const SoaVec3 toe_tip =
+      leg.positions[last] + Rotate(leg.rotations[last], Broadcast(bones.toe_tip_m));
   const SoaVec3 heel =
-      leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Same(bones.heel_m));
+      leg.positions[bones.ankle] + Rotate(leg.rotations[bones.ankle], Broadcast(bones.heel_m));
   const Float depth =
       Max(Max(depth_of(leg.ball, bones.ball_height_m), depth_of(heel, bones.ball_height_m)),
           depth_of(toe_tip, bones.toe_height_m));
@@ -252,7 +224,7 @@ HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) 
   const SoaVec3 plane = Cross(thigh, shank) * (Float(1.0f) / scale);
   const Float sine = Sqrt(Dot(plane, plane));
   const Float s =
-      Clamp(Over(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
+      Clamp(DivideBy(Float(kBentSine) - sine, kBentSine - kStraightSine), Float(0.0f), Float(1.0f));
   const SoaVec3 reference = Rotate(hip_rotation, {Float(1.0f), Float(0.0f), Float(0.0f)});
   const Mask is_backward = Dot(plane, reference) < Float(0.0f);
   const Float forward = Select(is_backward, Float(0.0f), Float(1.0f));
@@ -262,29 +234,29 @@ HWY_INLINE SoaVec3 KneeAxis(SoaVec3 thigh, SoaVec3 shank, SoaQuat hip_rotation) 
 
 // Normalizes a quaternion that differs from unit length only by rounding errors. For these, one
 // Newton step is as accurate as a square root and a division.
-HWY_INLINE SoaQuat NearlyUnit(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
+HWY_INLINE SoaQuat Renormalize(SoaQuat q) { return q * (Float(1.5f) - Float(0.5f) * Dot(q, q)); }
 
 // Target position of an ankle, relative to the root, and its rotation in world axes.
-struct AnkleGoal {
+struct AnkleTarget {
   SoaVec3 at_m;
   SoaQuat rotation;
 };
 
 // Solves both legs for the given ankle targets and stores the changed rotations (hips, knees and
 // ankles).
-HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGoal* goals,
-                          float* rotations) {
+HWY_INLINE void SolveLegs(const LegRig& rig, const SoaLeg* legs, const AnkleTarget* targets,
+                          float* rotations, JointMap joints) {
   struct Work {
     SoaVec3 thigh, shank, towards, new_thigh, new_shank;
     Float distance;
     SoaQuat turn_thigh, turn_shank;
   } work[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    const LegLanes& leg = legs[f];
+    const SoaLeg& leg = legs[f];
     Work& w = work[f];
     w.thigh = leg.positions[bones.knee] - leg.positions[bones.hip];
     w.shank = leg.positions[bones.ankle] - leg.positions[bones.knee];
-    const SoaVec3 reach = goals[f].at_m - leg.positions[bones.hip];
+    const SoaVec3 reach = targets[f].at_m - leg.positions[bones.hip];
     w.distance = Sqrt(Dot(reach, reach));
     const Mask is_away = w.distance > Float(1e-6f);
     const Float per_distance = Float(1.0f) / Max(w.distance, Float(1e-6f));
@@ -314,35 +286,35 @@ HWY_INLINE void SolveLegs(const LegRig& rig, const LegLanes* legs, const AnkleGo
     w.turn_shank = Multiply(ShortestArc(Rotate(w.turn_thigh, w.shank), w.new_shank), w.turn_thigh);
   });
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    const LegLanes& leg = legs[f];
+    const SoaLeg& leg = legs[f];
     const Work& w = work[f];
     const auto store = [&](std::size_t place, SoaQuat before, SoaQuat rotation) HWY_ATTR {
-      StoreQuat(NearlyUnit(Multiply(Conjugate(before), rotation)),
-                rotations + bones.joints[place] * 4 * kBlock);
+      StoreQuat(Renormalize(Multiply(Conjugate(before), rotation)),
+                rotations + (bones.*joints)[place] * 4 * kBlock);
     };
     store(bones.hip, leg.rotations[bones.hip - 1],
           Multiply(w.turn_thigh, leg.rotations[bones.hip]));
     store(bones.knee, Multiply(w.turn_thigh, leg.rotations[bones.knee - 1]),
           Multiply(w.turn_shank, leg.rotations[bones.knee]));
-    store(bones.ankle, Multiply(w.turn_shank, leg.rotations[bones.ankle - 1]), goals[f].rotation);
+    store(bones.ankle, Multiply(w.turn_shank, leg.rotations[bones.ankle - 1]), targets[f].rotation);
   });
 }
 
 // Plants the feet of one vector of poses, starting at `lane`.
-void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
+void PlantVector(const LegRig& rig, const PlantPosesJob& block, std::size_t lane, JointMap joints) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
   const std::size_t doubles = hn::Lanes(d);
   const std::size_t width = hn::Lanes(FloatTag());
   const float* plan = block.plan + lane;
   float* rotations = block.rotations + lane;
-  Common common;
+  PlanCommon common;
   {
     const float* at = plan + 2 * kPackedTrajectoryFloats * kBlock;
     SoaQuat q = LoadQuat(at);
-    common.root_rest = XyzOf(q), common.steer = q.w;
+    common.root_residual = XyzOf(q), common.extra_turn = q.w;
     q = LoadQuat(at + 4 * kBlock);
-    common.root_rest_velocity = XyzOf(q), common.duration_s = q.w;
+    common.root_residual_velocity = XyzOf(q), common.duration_s = q.w;
     q = LoadQuat(at + 8 * kBlock);
     common.start_offset_s = q.x, common.ease_out_s = q.y, common.keeps_above_ground = q.z;
     common.plant_fade_s = q.w;
@@ -363,35 +335,36 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
   common.time_s = LoadLanes(times_s);
 
   const SoaQuat root_rotation = LoadQuat(rotations);
-  LegLanes legs[2];
-  Correction corrections[2];
+  SoaLeg legs[2];
+  SoaCorrection corrections[2];
   SoaVec3 ankles[2];
   SoaVec3 shift = {Float(0.0f), Float(0.0f), Float(0.0f)};
   Float headings[2];
   Float flatnesses[2];
-  EvaluateLegs(rig, rotations, root_rotation, legs);
+  EvaluateLegs(rig, rotations, root_rotation, legs, joints);
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
     const SoaVec3 sole = legs[f].ball - legs[f].positions[bones.ankle];
     headings[f] = Atan2(sole.x, sole.z) - Float(bones.toe_out_rad);
     flatnesses[f] = bones.foot_m < kSmallestBoneM
                         ? Float(0.0f)
-                        : Over(Sqrt(sole.x * sole.x + sole.z * sole.z), bones.foot_m);
+                        : DivideBy(Sqrt(sole.x * sole.x + sole.z * sole.z), bones.foot_m);
   });
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    const LegLanes& leg = legs[f];
-    const Track track = LoadTrack(plan + f * kPackedTrajectoryFloats * kBlock);
+    const SoaLeg& leg = legs[f];
+    const SoaTrajectory trajectory = LoadTrajectory(plan + f * kPackedTrajectoryFloats * kBlock);
     const SoaVec3 ball = root + leg.ball;
-    Correction& c = corrections[f];
-    c = CorrectFoot(common, track, ball, headings[f], flatnesses[f]);
+    SoaCorrection& c = corrections[f];
+    c = CorrectFoot(common, trajectory, ball, headings[f], flatnesses[f]);
     const Mask keeps_above = common.keeps_above_ground > Float(0.0f);
     if (Any(keeps_above)) {
       const Float second =
-          Float(1.0f) -
-          EaseOut(Over(c.swing - Float(static_cast<float>(kGroundFrom)), kGroundOver));
+          Float(1.0f) - EaseOut(DivideBy(c.swing - Float(static_cast<float>(kGroundBlendStart)),
+                                         kGroundBlendLength));
       const SoaVec3 at = ball + c.offset;
-      const Float lift = (Float(1.0f) - second) *
-                             DepthBelow(track.from, track.normals[0], bones, leg, at, c.turn) +
-                         second * DepthBelow(track.to, track.normals[1], bones, leg, at, c.turn);
+      const Float lift =
+          (Float(1.0f) - second) *
+              DepthBelow(trajectory.from, trajectory.normals[0], bones, leg, at, c.turn) +
+          second * DepthBelow(trajectory.to, trajectory.normals[1], bones, leg, at, c.turn);
       // The root follows this lift as it follows the other corrections of the foot.
       const Mask is_settling = common.plant_fade_s > Float(0.0f);
       const Float settled =
@@ -400,20 +373,13 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
       const Float lifted =
           Select(keeps_above, Select(is_settling, lift * settled, lift), Float(0.0f));
       c.offset.y = c.offset.y + lifted;
-      c.root.y = c.root.y + lifted * track.root_weight;
+      c.root.y = c.root.y + lifted * trajectory.root_weight;
     }
     ankles[f] = ball + c.offset + Rotate(c.turn, leg.positions[bones.ankle] - leg.ball);
     shift = shift + c.root;
   });
-  const Float since_s = common.time_s - common.start_offset_s;
-  const Float flat = EaseOut(Over(since_s, kRootShiftS));
-  const Float rise =
-      EaseOut(since_s / Max(Float(static_cast<float>(kRootShiftS)),
-                            Float(static_cast<float>(kRootRisePart)) * common.duration_s));
-  const Float speed = common.ease_out_s * EaseOutSlope(since_s * common.per_ease_out);
-  shift = shift +
-          SoaVec3{flat * common.root_rest.x, rise * common.root_rest.y, flat * common.root_rest.z} +
-          common.root_rest_velocity * speed;
+  shift =
+      AddRootResidual<Float>(shift, common, common.root_residual, common.root_residual_velocity);
 
   Float lower = 0.0f;
   for (std::size_t f = 0; f < 2; ++f) {
@@ -452,51 +418,51 @@ void PlantSome(const LegRig& rig, const PlantBlock& block, std::size_t lane) {
     }
   }
   const SoaVec3 moved = LoadVec3(local_m);
-  AnkleGoal goals[2];
+  AnkleTarget targets[2];
   ForBothFeet(rig, [&](const LegRig::Bones& bones, std::size_t f) HWY_ATTR {
-    goals[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
+    targets[f] = {ankles[f] - moved, Multiply(corrections[f].turn, legs[f].rotations[bones.ankle])};
   });
-  SolveLegs(rig, legs, goals, rotations);
+  SolveLegs(rig, legs, targets, rotations, joints);
 }
 
-void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
+void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count) {
   for (std::size_t lane = 0; lane < count; lane += hn::Lanes(FloatTag())) {
-    PlantSome(rig, block, lane);
+    PlantVector(rig, block, lane, &LegRig::Bones::joints);
   }
 }
 
 // Broadcasts each of `count` numbers to all lanes of one vector.
-HWY_INLINE void Spread(const float* from, std::size_t count, float* to) {
+HWY_INLINE void BroadcastAll(const float* from, std::size_t count, float* to) {
   const FloatTag d;
   for (std::size_t i = 0; i < count; ++i) hn::Store(hn::Set(d, from[i]), d, to + i * kBlock);
 }
 
 // Plants the feet of one pose: evaluates the same pose in all lanes of a vector and uses the first.
-void PlantOne(const LegRig& rig, const PlantJob& job) {
+void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
   HWY_ALIGN float plan[kPackedPlanFloats * kBlock];
-  HWY_ALIGN float rotations[kMaxJoints * 4 * kBlock];  // Only the joints of the legs are used.
+  HWY_ALIGN float rotations[LegRig::kMaxJointsOfLegs * 4 * kBlock];
   HWY_ALIGN double time_s[kBlock];
   HWY_ALIGN double base_m[3 * kBlock];
   HWY_ALIGN float root_m[3 * kBlock];
-  Spread(job.plan, kPackedPlanFloats, plan);
-  Spread(job.root_m, 3, root_m);
+  BroadcastAll(job.plan, kPackedPlanFloats, plan);
+  BroadcastAll(job.root_m, 3, root_m);
   for (const LegRig::Bones& bones : rig.bones) {
     for (std::size_t i = 0; i < bones.count; ++i) {
-      const std::size_t joint = bones.joints[i];
-      Spread(job.rotations + 4 * joint, 4, rotations + joint * 4 * kBlock);
+      BroadcastAll(job.rotations + 4 * bones.joints[i], 4,
+                   rotations + bones.rig_joints[i] * 4 * kBlock);
     }
   }
   for (std::size_t i = 0; i < hn::Lanes(FloatTag()); ++i) {
     time_s[i] = job.time_s;
     for (std::size_t c = 0; c < 3; ++c) base_m[c * kBlock + i] = job.base_m[c];
   }
-  PlantSome(rig, {plan, time_s, base_m, root_m, rotations}, 0);
+  PlantVector(rig, {plan, time_s, base_m, root_m, rotations}, 0, &LegRig::Bones::rig_joints);
   for (std::size_t c = 0; c < 3; ++c) job.root_m[c] = root_m[c * kBlock];
   for (const LegRig::Bones& bones : rig.bones) {
     for (const std::size_t place : {bones.hip, bones.knee, bones.ankle}) {
-      const std::size_t joint = bones.joints[place];
       for (std::size_t c = 0; c < 4; ++c) {
-        job.rotations[4 * joint + c] = rotations[(joint * 4 + c) * kBlock];
+        job.rotations[4 * bones.joints[place] + c] =
+            rotations[(bones.rig_joints[place] * 4 + c) * kBlock];
       }
     }
   }

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stridewire/runtime/motion_library.h"
+#include "base/check.h"
 #include "runtime/skeleton/layer_clip.h"
+#include "stridewire/runtime/motion_library.h"
 
 namespace stridewire {
 namespace {
@@ -40,8 +41,9 @@ double SlopeOf(const LayerStack::Playing& p) {
 
 // Starts a blend from the current weight and speed to new ones. The slope that the weight has now
 // fades out within the remaining time of the previous blend, so that the weight does not overshoot.
-void HeadFor(double weight, double speed, double blend_s, LayerStack::Playing& p) {
+void StartBlend(double weight, double speed, double blend_s, LayerStack::Playing& p) {
   const double left_s = std::max(0.0, std::max(p.ease_s, p.slope_s) - p.elapsed_s);
+  STRIDEWIRE_CHECK(p.weight >= 0.0 && p.weight <= 1.0 && blend_s >= 0.0);
   p.slope = SlopeOf(p);
   p.slope_s = std::min(left_s, blend_s);
   p.from_weight = p.weight;
@@ -71,7 +73,7 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
   Playing* on = Find(request.layer, false);
   if (!request.enabled) {
     if (on == nullptr) return {};
-    HeadFor(0.0, on->speed, request.blend_s, *on);
+    StartBlend(0.0, on->speed, request.blend_s, *on);
     on->is_ending = true;
     return {};
   }
@@ -88,17 +90,19 @@ Status LayerStack::Set(const MotionLibrary& library, const LayerRequest& request
     if (playing_.size() == kMaxLayers) {
       return Fail(ErrorCode::kLimitExceeded, "the avatar already plays four layers", kMaxLayers);
     }
-    MakeRoom();
+    Reserve();
     on = &playing_.emplace_back(Playing{.layer = request.layer, .speed = request.speed});
   }
-  HeadFor(request.weight, request.speed, request.blend_s, *on);
+  StartBlend(request.weight, request.speed, request.blend_s, *on);
   on->is_ending = false;
   on->blend_s = request.blend_s;
   on->weight = WeightOf(*on);
+  STRIDEWIRE_CHECK(playing_.size() <= kMaxLayers);
   return {};
 }
 
 void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
+  STRIDEWIRE_CHECK(playing_.size() <= kMaxLayers);
   for (Playing& p : playing_) {
     p.elapsed_s += dt_s;
     p.speed = p.from_speed + (p.to_speed - p.from_speed) * Ease(Progress(p));
@@ -109,7 +113,7 @@ void LayerStack::Advance(const MotionLibrary& library, double dt_s) {
     if (clip.is_looping) {
       p.time_s -= std::floor(p.time_s / duration_s) * duration_s;
     } else if (!p.is_ending && p.time_s + p.blend_s * p.speed >= duration_s) {
-      HeadFor(0.0, p.speed, p.blend_s, p);
+      StartBlend(0.0, p.speed, p.blend_s, p);
       p.is_ending = true;
     }
   }
@@ -125,20 +129,20 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
   constexpr double kLongestS = 1e6;  // Far above the longest clip, which takes ten minutes.
-  const auto could_be = [&](const Playing& p) {
-    const auto is_part = [](double value) { return IsWithin(value, 0.0, 1.0); };
+  const auto is_valid = [&](const Playing& p) {
+    const auto is_fraction = [](double value) { return IsWithin(value, 0.0, 1.0); };
     const auto is_time = [](double value) { return IsWithin(value, 0.0, kLongestS); };
     const auto is_speed = [](double value) { return IsWithin(value, 0.0, kMaxLayerSpeed); };
     return p.layer >= 0 && static_cast<std::size_t>(p.layer) < library.layers().size() &&
-           is_time(p.time_s) && is_part(p.weight) && is_part(p.from_weight) &&
-           is_part(p.to_weight) && is_speed(p.speed) && is_speed(p.from_speed) &&
+           is_time(p.time_s) && is_fraction(p.weight) && is_fraction(p.from_weight) &&
+           is_fraction(p.to_weight) && is_speed(p.speed) && is_speed(p.from_speed) &&
            is_speed(p.to_speed) && std::isfinite(p.slope) && is_time(p.slope_s) &&
            is_time(p.elapsed_s) && is_time(p.ease_s) && is_time(p.blend_s);
   };
-  if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, could_be)) {
+  if (playing.size() > kMaxLayers || !std::ranges::all_of(playing, is_valid)) {
     return Fail(ErrorCode::kOutOfRange, "the layer state is not valid");
   }
-  if (!playing.empty()) MakeRoom();
+  if (!playing.empty()) Reserve();
   playing_.assign(playing.begin(), playing.end());
   return {};
 }

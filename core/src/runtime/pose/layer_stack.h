@@ -4,67 +4,71 @@
 #include <span>
 #include <vector>
 
-#include "stridewire/base/error.h"
 #include "runtime/skeleton/layer_clip.h"
+#include "stridewire/base/error.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
 class MotionLibrary;
 
-/// The layers one avatar plays. Weights ease in and out with a continuous derivative, also when a
-/// request comes while one is on its way. Later layers lie over earlier ones. The first that is set or restored
-/// allocates, unless there is room.
+/// The layers that one avatar plays. Weights ease in and out with continuous derivatives, even if a
+/// request interrupts another one. Later layers are applied on top of earlier ones. The first layer
+/// that is set or restored allocates, unless Reserve was called.
 class LayerStack {
  public:
-  static constexpr std::size_t kMaxLayers = 4;  ///< At a time, those that ease out included.
+  static constexpr std::size_t kMaxLayers = 4;  ///< At a time, including those that ease out.
 
-  /// A layer in play.
+  /// A layer that is playing.
   struct Playing {
     int layer = 0;
-    double time_s = 0.0;     ///< In its clip.
-    double weight = 0.0;     ///< Now.
-    double speed = 1.0;      ///< Now.
-    bool is_ending = false;  ///< On its way out.
-    // Weight and speed go from where they were to their targets over ease_s; what speed the weight had
-    // when it set out runs off over slope_s.
+    double time_s = 0.0;     ///< Time in its clip.
+    double weight = 0.0;     ///< Current weight.
+    double speed = 1.0;      ///< Current speed.
+    bool is_ending = false;  ///< The layer is easing out.
+    // Weight and speed ease from their old to their new values over ease_s. The slope that the
+    // weight had at the start of the blend fades out over slope_s.
     double from_weight = 0.0;
     double to_weight = 0.0;
     double from_speed = 1.0;
     double to_speed = 1.0;
-    double slope = 0.0;  // weight a second
+    double slope = 0.0;  // Weight per second.
     double slope_s = 0.0;
     double elapsed_s = 0.0;
     double ease_s = 0.0;
-    double blend_s = 0.0;  // as asked, for a clip that ends by itself
+    double blend_s = 0.0;  // As requested; used when a non-looping clip ends.
   };
 
-  /// A layer that is on gets the new weight and speed; one that eases out comes back if it is a loop,
-  /// and starts anew beside itself if it is played once. Ending what is not in play is no error.
-  /// kNotFound: no such layer; kOutOfRange: a number not finite or out of its range; kLimitExceeded:
-  /// kMaxLayers are in play. Nothing changes then.
+  /// Starts, changes or ends a layer. A playing layer takes the new weight and speed. A layer that
+  /// is easing out comes back if it loops; otherwise it is started a second time. Ending a layer
+  /// that is not playing has no effect.
+  ///
+  /// kNotFound: there is no such layer. kOutOfRange: a number is not finite or out of its range.
+  /// kLimitExceeded: kMaxLayers are playing. On error nothing changes.
   [[nodiscard]] Status Set(const MotionLibrary& library, const LayerRequest& request);
 
-  /// Goes on by `dt_s`. Clips that are played once ease out towards their end.
+  /// Advances all layers by `dt_s`. Non-looping clips ease out before their end.
   void Advance(const MotionLibrary& library, double dt_s);
 
-  /// Applies all to a pose of the library's skeleton.
+  /// Applies all layers to a pose of the library's skeleton.
   void Apply(const MotionLibrary& library, PoseSpan pose) const;
 
   [[nodiscard]] std::span<const Playing> playing() const { return playing_; }
-  /// For as many as there may be: nothing allocates after it.
-  void MakeRoom() { playing_.reserve(kMaxLayers); }
-  /// Ends all at once; the room stays.
+  /// Allocates memory for kMaxLayers, so that later calls do not allocate.
+  void Reserve() { playing_.reserve(kMaxLayers); }
+  /// Ends all layers at once and keeps the memory.
   void Clear() { playing_.clear(); }
   [[nodiscard]] bool empty() const { return playing_.empty(); }
 
-  /// Goes on from what another stack of the library had in play. kOutOfRange: what no stack has; nothing changes then.
+  /// Replaces the layers by those of another stack of the same library. kOutOfRange: the state is
+  /// not valid; nothing changes then.
   [[nodiscard]] Status Restore(const MotionLibrary& library, std::span<const Playing> playing);
 
  private:
   [[nodiscard]] Playing* Find(int layer, bool is_ending);
 
-  std::vector<Playing> playing_;  // with room for all from the first on: most avatars have none
+  // Has room for kMaxLayers from the first layer on; most avatars have none.
+  std::vector<Playing> playing_;
 };
 
 }  // namespace stridewire

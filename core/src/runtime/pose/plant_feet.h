@@ -8,45 +8,48 @@
 
 namespace stridewire {
 
-/// The root takes this long to come to where the feet of a movement have it.
+/// Time in which the residual of the root fades out.
 inline constexpr double kRootShiftS = 0.25;
-/// In height this part of a movement, where that is longer: a body climbs as long as its leg stretches.
+/// The vertical residual takes this fraction of the movement, if that is longer, because a body
+/// climbs as long as its leg stretches.
 inline constexpr double kRootRisePart = 0.75;
 
-/// Where the blend has a foot.
+/// A foot in the blended pose, before planting.
 struct BlendedFoot {
-  DVec3 ball_m = DVec3(0.0);  ///< In the world
-  double heading_rad = 0.0;   ///< Less the toe-out of the stand pose
-  double flatness = 1.0;      ///< LegPose::Flatness
+  DVec3 ball_m = DVec3(0.0);  ///< In world space.
+  double heading_rad = 0.0;   ///< Minus the toe-out of the stand pose.
+  double flatness = 1.0;      ///< LegPose::Flatness.
 };
 
-/// Of both feet at a time, indexed by Foot.
+/// [foot]: both feet at one time.
 using FeetAt = std::array<BlendedFoot, 2>;
 
-/// Corrections of one foot at a time.
+/// Correction of one foot at one time.
 struct FootCorrection {
   DVec3 offset_m = DVec3(0.0);
   double turn_rad = 0.0;
-  double free_turn_rad = 0.0;  ///< The same had its heading not been held
+  double free_turn_rad = 0.0;  ///< Turn without the heading lock.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
   double root_weight = 0.0;
   DVec3 root_shift_m = DVec3(0.0);
 };
 
-/// How much of `lift_m` is added at a part of the swing: up soon, down late, as who steps over an edge does.
+/// Fraction of `lift_m` that is added at a fraction of the swing. The foot rises early and comes
+/// down late, as when stepping over an edge.
 [[nodiscard]] double LiftShare(double swing);
 
-/// The rotation a correction gives the foot, about its ball and in world axes.
+/// Rotation of a corrected foot about its ball, in world axes.
 [[nodiscard]] Quat TurnOf(const FootCorrection& correction);
 
-/// The corrections of a movement's plan at `time_s` (from its start).
+/// The correction of a foot at `time_s`, according to a movement's plan.
 [[nodiscard]] FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                                          const BlendedFoot& blended);
 
-/// Corrections of both feet of a blended and eased pose, and where they bring the root.
+/// Corrections of both feet, and the resulting shift of the root.
 struct FeetCorrection {
-  std::array<FootCorrection, 2> feet;  ///< Indexed by Foot.
-  DVec3 root_m = DVec3(0.0);           ///< Added to the root, before legs too short lower it
+  std::array<FootCorrection, 2> feet;  ///< [foot]
+  /// Added to the root, before it is lowered for legs that are too short.
+  DVec3 root_m = DVec3(0.0);
 };
 [[nodiscard]] FeetCorrection CorrectFeet(const Movement& movement, double time_s,
                                          const FeetAt& blended);
@@ -54,32 +57,30 @@ struct FeetCorrection {
                                          const Movement& movement, double time_s,
                                          ConstPoseSpan pose);
 
-/// Makes a movement's plan go on from what the one before corrected when the movement was entered and (second) kBlendStepS
-/// earlier. `planned` is what the plan itself corrects when the movement is entered, and kBlendStepS later. The
-/// same twice: from rest.
+/// Sets the residuals of a movement's plan so that the corrections continue smoothly. `before` are
+/// the corrections of the previous movement at the start of this one and kBlendStepS earlier.
+/// `planned` are those of the plan at the start and kBlendStepS later. Two equal elements stand for
+/// zero velocity.
 void ContinueFrom(const std::array<FeetCorrection, 2>& before,
-              const std::array<FeetCorrection, 2>& planned, Movement& movement);
+                  const std::array<FeetCorrection, 2>& planned, Movement& movement);
 
-/// Makes a movement whose feet are planned set in from a pose that was displayed when it was entered and had no feet
-/// planted, the blended and eased one of that time. `pose` is scratch of its size.
+/// Starts a plant fade in a planned movement. `displayed` is the pose at its start, without planted
+/// feet, and also the blended pose of that time. `pose` is scratch of the same size.
 void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& movement, PoseSpan pose);
 
-/// The last of planting: gives a pose whose feet are planted back what has not set in yet (FootPlan::plant_fade_s).
+/// Final step of planting: adds the part of the plant fade that remains (FootPlan::plant_fade_s).
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
-/// A foot of a pose with its root at `root_m`.
+/// A foot of a pose whose root is at `root_m`.
 [[nodiscard]] BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m,
                                  const LegPose& leg);
 
-/// A movement's plan for FootPlan::packed.
+/// Packs a movement's plan for FootPlan::packed.
 [[nodiscard]] PackedFootPlan PackFootPlan(const Movement& movement);
 
-/// Plants the feet of a movement's blended and eased pose: moves the root by the feet's weighted offsets, lowers it
-/// until both legs reach, bends the legs for what remains. Never allocates; same bytes everywhere.
+/// Plants the feet of a blended pose with its difference pose. Shifts the root by the weighted
+/// corrections of the feet, lowers it until both legs reach, and bends the legs accordingly. Never
+/// allocates. Same bytes on every machine.
 void PlantFeet(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
-
-/// The same in plain doubles, for tests and measurements: PlantFeet is within 2e-5 m and rad of it.
-void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
-                          double time_s, PoseSpan pose);
 
 }  // namespace stridewire

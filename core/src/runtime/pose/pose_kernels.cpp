@@ -2,8 +2,8 @@
 
 #include <cstring>
 
-#include "runtime/skeleton/foot_plant_constants.h"
 #include "runtime/movement/foot_plan.h"
+#include "runtime/skeleton/foot_plant_constants.h"
 
 #undef HWY_TARGET_INCLUDE
 // NOLINTNEXTLINE(readability-identifier-naming): Highway's
@@ -92,11 +92,11 @@ void BlendPoints(const float* const* HWY_RESTRICT points, const float* HWY_RESTR
   }
 }
 
-void BlendRun(const GridRun& run) {
+void BlendRows(const BlendRowsJob& run) {
   const auto last = static_cast<std::size_t>(run.point_count) - 1;
   std::size_t next[kBlock] = {};  // Next pose of each lane.
   const auto first_of = [&](std::size_t i) HWY_ATTR {
-    return static_cast<std::size_t>(run.places[next[i]].first_point[run.lane + i]);
+    return static_cast<std::size_t>(run.samples[next[i]].first_point[run.lane + i]);
   };
   const auto ring_of = [&](std::size_t i, std::size_t point)
                            HWY_ATTR { return run.ring + (i * 4 + (point & 3)) * run.row_floats; };
@@ -127,7 +127,7 @@ void BlendRun(const GridRun& run) {
         // Points beyond the last have weight zero, but a row is read for them nevertheless.
         const float* points[4];
         float part[4];
-        const GridPlaces& place = run.places[next[lane]];
+        const GridSamples& place = run.samples[next[lane]];
         for (std::size_t k = 0; k < 4; ++k) {
           points[k] = ring_of(lane, first + k < last ? first + k : last);
           part[k] = place.weights[k][run.lane + lane];
@@ -170,7 +170,7 @@ bool BlendRotations(const RotationBlend& blend, float* HWY_RESTRICT out) {
   return !Any(is_short);
 }
 
-void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) {
+void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
   const hn::Rebind<std::int32_t, DoubleTag> integers;
@@ -203,7 +203,9 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
     u = hn::IfThenElse(hn::Ge(time, end_s), end, u);
     u = hn::IfThenElse(hn::Gt(time, begin_s), u, begin);
 
-    // Weights with the operations of CellWeightsAt.
+    // Catmull-Rom weights. Beyond an end, a missing neighbour is extrapolated as
+    // p_-1 = 3 p_0 - 3 p_1 + p_2. The tangent at the end then is the one-sided second-order
+    // difference.
     const auto last = hn::Load(d, times.last_cell + i);
     const auto cell = hn::Min(hn::Max(hn::Trunc(u), zero), last);
     const auto f = hn::Min(hn::Max(hn::Sub(u, cell), zero), one);
@@ -225,25 +227,26 @@ void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) 
                               auto w = hn::IfThenElse(is_last, at_last, within);
                               w = hn::IfThenElse(is_first, at_first, w);
                               w = hn::IfThenElse(is_pair, pair, w);
-                              hn::Store(hn::DemoteTo(floats, w), floats, places.weights[k] + i);
+                              hn::Store(hn::DemoteTo(floats, w), floats, samples.weights[k] + i);
                             };
     weight(0, hn::Sub(one, f), hn::Add(left, three_before), hn::Add(before, after), before);
     weight(1, f, hn::Sub(right, three_before), hn::Sub(left, three_after), left);
     weight(2, zero, hn::Add(after, before), hn::Add(right, three_after), right);
     weight(3, zero, zero, zero, after);
     hn::Store(hn::DemoteTo(integers, hn::IfThenElse(is_first, zero, hn::Sub(cell, one))), integers,
-              places.first_point + i);
+              samples.first_point + i);
 
-    hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d, places.steered + i);
+    hn::Store(ease_out(hn::Div(time, hn::Load(d, times.duration_s + i))), d,
+              samples.remaining_turn + i);
     const auto over = hn::Load(d, times.ease_out_s + i);
     const auto eased = hn::Div(hn::Sub(time, hn::Load(d, times.start_offset_s + i)), over);
     const auto part = hn::Min(hn::Max(eased, zero), one);
     const auto rest = hn::Sub(one, part);
     hn::Store(hn::DemoteTo(floats, hn::IfThenElseZero(hn::Lt(eased, one), one)), floats,
-              places.is_eased + i);
-    hn::Store(hn::DemoteTo(floats, ease_out(eased)), floats, places.fraction + i);
+              samples.is_eased + i);
+    hn::Store(hn::DemoteTo(floats, ease_out(eased)), floats, samples.fraction + i);
     hn::Store(hn::DemoteTo(floats, hn::Mul(over, hn::Mul(hn::Mul(part, rest), rest))), floats,
-              places.slope_s + i);
+              samples.slope_s + i);
   }
 }
 
@@ -272,17 +275,17 @@ namespace stridewire::kernels {
 
 HWY_EXPORT(SumRows);
 HWY_EXPORT(BlendPoints);
-HWY_EXPORT(BlendRun);
+HWY_EXPORT(BlendRows);
 HWY_EXPORT(BlendRotations);
-HWY_EXPORT(FindInGrids);
+HWY_EXPORT(ComputeGridSamples);
 HWY_EXPORT(SinCos);
 HWY_EXPORT(Transpose);
-HWY_EXPORT(PrepareEase);
-HWY_EXPORT(FindFastest);
-HWY_EXPORT(FinishLanes);
-HWY_EXPORT(FindFeet);
-HWY_EXPORT(PlantLanes);
-HWY_EXPORT(PlantOne);
+HWY_EXPORT(PrepareDifferences);
+HWY_EXPORT(FindLargestVelocities);
+HWY_EXPORT(FinishPoses);
+HWY_EXPORT(ComputeFeet);
+HWY_EXPORT(PlantPoses);
+HWY_EXPORT(PlantPose);
 
 void SumRows(const float* examples, const float* weights, std::size_t count, std::size_t row_floats,
              float* row) {
@@ -294,14 +297,14 @@ void BlendPoints(const float* const points[4], const float weights[4], std::size
   HWY_DYNAMIC_DISPATCH(BlendPoints)(points, weights, row_floats, row);
 }
 
-void BlendRun(const GridRun& run) { HWY_DYNAMIC_DISPATCH(BlendRun)(run); }
+void BlendRows(const BlendRowsJob& run) { HWY_DYNAMIC_DISPATCH(BlendRows)(run); }
 
 bool BlendRotations(const RotationBlend& blend, float* out) {
   return HWY_DYNAMIC_DISPATCH(BlendRotations)(blend, out);
 }
 
-void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places) {
-  HWY_DYNAMIC_DISPATCH(FindInGrids)(count, times, places);
+void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples) {
+  HWY_DYNAMIC_DISPATCH(ComputeGridSamples)(count, times, samples);
 }
 
 void SinCos(const double* angles_rad, std::size_t count, double* sines, double* cosines) {
@@ -312,29 +315,32 @@ void Transpose(const float* const from[kBlock], std::size_t count, std::size_t l
   HWY_DYNAMIC_DISPATCH(Transpose)(from, count, lanes, to);
 }
 
-void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease) {
-  HWY_DYNAMIC_DISPATCH(PrepareEase)(difference, joint_count, lanes, ease);
+void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
+                        float* ease) {
+  HWY_DYNAMIC_DISPATCH(PrepareDifferences)(difference, joint_count, lanes, ease);
 }
 
-void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes,
-                 float* fastest) {
-  HWY_DYNAMIC_DISPATCH(FindFastest)(velocity, joint_count, lanes, fastest);
+void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::size_t lanes,
+                           float* fastest) {
+  HWY_DYNAMIC_DISPATCH(FindLargestVelocities)(velocity, joint_count, lanes, fastest);
 }
 
-bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
-  return HWY_DYNAMIC_DISPATCH(FinishLanes)(blend, root_m, rotations);
+bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
+  return HWY_DYNAMIC_DISPATCH(FinishPoses)(blend, root_m, rotations);
 }
 
-void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-              float* ankles_m) {
-  HWY_DYNAMIC_DISPATCH(FindFeet)(rig, rotations, lanes, balls_m, ankles_m);
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+                 float* ankles_m) {
+  HWY_DYNAMIC_DISPATCH(ComputeFeet)(rig, rotations, lanes, balls_m, ankles_m);
 }
 
-void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count) {
-  HWY_DYNAMIC_DISPATCH(PlantLanes)(rig, block, count);
+void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count) {
+  HWY_DYNAMIC_DISPATCH(PlantPoses)(rig, block, count);
 }
 
-void PlantOne(const LegRig& rig, const PlantJob& job) { HWY_DYNAMIC_DISPATCH(PlantOne)(rig, job); }
+void PlantPose(const LegRig& rig, const PlantPoseJob& job) {
+  HWY_DYNAMIC_DISPATCH(PlantPose)(rig, job);
+}
 
 }  // namespace stridewire::kernels
 

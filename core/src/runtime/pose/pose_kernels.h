@@ -37,21 +37,23 @@ struct GridTimes {
   alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
 /// Positions of poses in their grids, and how much of their difference poses remains.
-struct GridPlaces {
+struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
   alignas(64) float weights[4][kBlock];          ///< Of these points; 0 beyond the last point
-  alignas(64) double steered[kBlock];  ///< EaseOut of the elapsed fraction of the movement
+  alignas(64) double remaining_turn[kBlock];     ///< Fraction of the extra turn still to come
   alignas(64) float is_eased[kBlock];  ///< 1 while part of the difference pose remains, else 0
   alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
   alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
 };
-/// Finds the places of `count` times. Uses doubles and the operations of TimeWarp::GridPosition,
-/// CellWeightsAt and EaseOut, in the same order.
-void FindInGrids(std::size_t count, const GridTimes& times, GridPlaces& places);
+/// Finds the samples of `count` times: Catmull-Rom weights of the four grid points around the
+/// position that the time warp gives. Points beyond the ends of the grid are extrapolated
+/// quadratically. Uses doubles and the operations of TimeWarp::GridPosition and EaseOut, in the
+/// same order.
+void ComputeGridSamples(std::size_t count, const GridTimes& times, GridSamples& samples);
 
 /// A job that blends the poses of several movements of one group: those in the lanes from `lane`
 /// on.
-struct GridRun {
+struct BlendRowsJob {
   const float* grid;  ///< [point][example][row_floats]
   std::size_t examples;
   std::size_t row_floats;
@@ -59,7 +61,7 @@ struct GridRun {
   std::size_t lane;
   std::size_t lanes;
   std::size_t poses;            ///< Number of poses per movement
-  const GridPlaces* places;     ///< [pose]
+  const GridSamples* samples;   ///< [pose]
   const float* const* weights;  ///< [kBlock][example]
   float* ring;                  ///< Scratch: [4][row_floats] for each of `lanes`
   float* rows;                  ///< Output: [pose][kBlock][row_floats]
@@ -67,7 +69,7 @@ struct GridRun {
 
 /// Blends the rows of all poses: SumRows for each grid point, then BlendPoints for each pose.
 /// Movements that need the same grid point read it from the library once.
-void BlendRun(const GridRun& run);
+void BlendRows(const BlendRowsJob& run);
 
 /// Rotations of a blended row and the difference pose that is added to them.
 struct RotationBlend {
@@ -93,17 +95,19 @@ void SinCos(const double* angles_rad, std::size_t count, double* sines, double* 
 /// to[i][lane] = from[lane][i] for `count` floats. `from` has kBlock entries, none of them null.
 void Transpose(const float* const from[kBlock], std::size_t count, std::size_t lanes, float* to);
 
-/// Number of floats per joint that PrepareEase writes: the rotation vector of half the short arc,
-/// and the square of its length.
-inline constexpr std::size_t kEaseFloats = 4;
+/// Number of floats per joint that PrepareDifferences writes: the rotation vector of half the short
+/// arc, and the square of its length.
+inline constexpr std::size_t kDifferenceFloats = 4;
 /// Precomputes, for a difference pose [joint][x y z w][kBlock], the quantities that stay constant
-/// while it fades out: [joint][kEaseFloats][kBlock].
-void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease);
+/// while it fades out: [joint][kDifferenceFloats][kBlock].
+void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
+                        float* ease);
 /// fastest[lane] = the largest squared length of any vector of `velocity`, [joint][x y z][kBlock].
-void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes, float* fastest);
+void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::size_t lanes,
+                           float* fastest);
 
-/// Input of FinishLanes: the blended rows of a block and the difference poses to add to them.
-struct LaneBlend {
+/// Input of FinishPoses: the blended rows of a block and the difference poses to add to them.
+struct FinishPosesJob {
   const float* const* rows;  ///< [kBlock]: rows in the layout of GridLayout
   std::size_t joint_count;
   std::size_t lanes;
@@ -112,32 +116,32 @@ struct LaneBlend {
   const double* sine;            ///< [kBlock]: sine of the heading
   const double* cosine;          ///< [kBlock]: cosine of the heading
   const double* extra_turn_rad;  ///< [kBlock]: Movement::extra_turn_rad
-  const double* steered;         ///< GridPlaces::steered
+  const double* remaining_turn;  ///< GridSamples::remaining_turn
   // Remaining difference poses. Unused if `ease` is null.
-  const float* ease;           ///< Output of PrepareEase; null if no lane has a difference left
-  const float* velocity;       ///< [joint][x y z][kBlock]; null if no lane is inertial
-  const float* fastest;        ///< Output of FindFastest for `velocity`
+  const float* ease;      ///< Output of PrepareDifferences; null if no lane has a difference left
+  const float* velocity;  ///< [joint][x y z][kBlock]; null if no lane is inertial
+  const float* fastest;   ///< Output of FindLargestVelocities for `velocity`
   const float* root_ease_m;    ///< [x y z][kBlock]: difference of the root position
   const float* root_ease_m_s;  ///< [x y z][kBlock]: velocity of that difference
-  const float* fraction;       ///< GridPlaces::fraction
-  const float* slope_s;        ///< GridPlaces::slope_s
-  const float* is_eased;       ///< GridPlaces::is_eased
+  const float* fraction;       ///< GridSamples::fraction
+  const float* slope_s;        ///< GridSamples::slope_s
+  const float* is_eased;       ///< GridSamples::is_eased
   const float* is_inertial;    ///< [kBlock]: 1 if the lane is inertial, else 0; used if it is eased
 };
 
 /// Normalizes rotations, adds the remaining difference poses and transforms the poses into world
 /// space. Writes roots [x y z][kBlock] and rotations [joint][x y z w][kBlock]. Returns false if a
 /// rotation in a row of some lane may be shorter than kSmallestNorm (see BlendRotations).
-[[nodiscard]] bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations);
+[[nodiscard]] bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations);
 
 /// Computes the balls and ankles of both legs, relative to the root and in world axes, each
-/// [foot][x y z][kBlock]. `rotations` has the layout that FinishLanes writes, but only for the
+/// [foot][x y z][kBlock]. `rotations` has the layout that FinishPoses writes, but only for the
 /// joints in LegRig::joints. `rig` must be usable.
-void FindFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
-              float* ankles_m);
+void ComputeFeet(const LegRig& rig, const float* rotations, std::size_t lanes, float* balls_m,
+                 float* ankles_m);
 
 /// A block of poses to plant in place.
-struct PlantBlock {
+struct PlantPosesJob {
   const float* plan;     ///< [kPackedPlanFloats][kBlock]: transposed PackedFootPlan of each lane
   const double* time_s;  ///< [kBlock]: time since the start of the movement
   const double* base_m;  ///< [x y z][kBlock]: base position of the movement
@@ -145,17 +149,17 @@ struct PlantBlock {
   float* rotations;      ///< [joint][x y z w][kBlock]; hips, knees and ankles are changed
 };
 /// Plants the feet of the first `count` lanes, as PlantFeet does. `rig` must be usable.
-void PlantLanes(const LegRig& rig, const PlantBlock& block, std::size_t count);
+void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count);
 
 /// One pose to plant in place.
-struct PlantJob {
+struct PlantPoseJob {
   const float* plan = nullptr;  ///< PackedFootPlan
   double time_s = 0.0;          ///< Time since the start of the movement
   double base_m[3] = {};        ///< Base position of the movement
   float* root_m = nullptr;      ///< [3]: in world space; changed
   float* rotations = nullptr;   ///< [joint] x y z w; hips, knees and ankles are changed
 };
-/// Plants the feet of one pose. The result has the same bytes as that of PlantLanes.
-void PlantOne(const LegRig& rig, const PlantJob& job);
+/// Plants the feet of one pose. The result has the same bytes as that of PlantPoses.
+void PlantPose(const LegRig& rig, const PlantPoseJob& job);
 
 }  // namespace stridewire::kernels

@@ -2,11 +2,11 @@
 // file once per instruction set, which is why it has no ordinary include guard. It uses only
 // additions, multiplications, divisions, square roots and comparisons, each rounded separately, so
 // that all instruction sets produce the same bytes.
-#if defined(STRIDEWIRE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef STRIDEWIRE_LANES_INL_H
-#undef STRIDEWIRE_LANES_INL_H
+#if defined(STRIDEWIRE_SIMD_MATH_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef STRIDEWIRE_SIMD_MATH_INL_H
+#undef STRIDEWIRE_SIMD_MATH_INL_H
 #else
-#define STRIDEWIRE_LANES_INL_H
+#define STRIDEWIRE_SIMD_MATH_INL_H
 #endif
 
 #include <cstddef>
@@ -372,4 +372,4 @@ HWY_INLINE void SinCosOf(DoubleTag d, const double* x, double* sine, double* cos
 }  // namespace stridewire::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#endif  // STRIDEWIRE_LANES_INL_H
+#endif  // STRIDEWIRE_SIMD_MATH_INL_H

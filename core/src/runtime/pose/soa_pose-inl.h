@@ -1,10 +1,10 @@
 // Kernels that process the poses of several movements side by side, one movement per lane.
 // pose_kernels.cpp compiles this file once per instruction set.
-#if defined(STRIDEWIRE_POSE_LANES_INL_H) == defined(HWY_TARGET_TOGGLE)
-#ifdef STRIDEWIRE_POSE_LANES_INL_H
-#undef STRIDEWIRE_POSE_LANES_INL_H
+#if defined(STRIDEWIRE_SOA_POSE_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef STRIDEWIRE_SOA_POSE_INL_H
+#undef STRIDEWIRE_SOA_POSE_INL_H
 #else
-#define STRIDEWIRE_POSE_LANES_INL_H
+#define STRIDEWIRE_SOA_POSE_INL_H
 #endif
 
 #include "runtime/pose/simd_math-inl.h"
@@ -37,19 +37,20 @@ void Transpose(const float* const* from, std::size_t count, std::size_t lanes, f
   }
 }
 
-void PrepareEase(const float* difference, std::size_t joint_count, std::size_t lanes, float* ease) {
+void PrepareDifferences(const float* difference, std::size_t joint_count, std::size_t lanes,
+                        float* ease) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     for (std::size_t j = 0; j < joint_count; ++j) {
       const SoaQuat q = LoadQuat(difference + j * 4 * kBlock + lane);
       const SlerpParts parts = SlerpPartsOf(q);
       StoreQuat({parts.half.x, parts.half.y, parts.half.z, parts.square},
-                ease + j * kEaseFloats * kBlock + lane);
+                ease + j * kDifferenceFloats * kBlock + lane);
     }
   }
 }
 
-void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lanes,
-                 float* fastest) {
+void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::size_t lanes,
+                           float* fastest) {
   for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(FloatTag())) {
     Float most = 0.0f;
     for (std::size_t j = 0; j < joint_count; ++j) {
@@ -61,7 +62,7 @@ void FindFastest(const float* velocity, std::size_t joint_count, std::size_t lan
 }
 
 // How much of the difference poses remains in the lanes of one vector.
-struct Easing {
+struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
   bool are_all = false;  // All lanes are eased and inertial, so no lanes have to be masked out.
@@ -69,23 +70,23 @@ struct Easing {
   Float fraction, half_s;
 };
 
-HWY_INLINE SoaQuat Ease(SoaQuat q, const Easing& easing, const LaneBlend& blend, std::size_t joint,
-                        std::size_t lane) {
-  const SoaQuat ease = LoadQuat(blend.ease + joint * kEaseFloats * kBlock + lane);
-  SoaQuat eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, easing.fraction));
-  if (easing.is_any_inertial) {
-    const SoaVec3 along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * easing.half_s;
+HWY_INLINE SoaQuat AddDifference(SoaQuat q, const DifferenceState& state,
+                                 const FinishPosesJob& blend, std::size_t joint, std::size_t lane) {
+  const SoaQuat ease = LoadQuat(blend.ease + joint * kDifferenceFloats * kBlock + lane);
+  SoaQuat eased = Multiply(q, SlerpOf({.half = XyzOf(ease), .square = ease.w}, state.fraction));
+  if (state.is_any_inertial) {
+    const SoaVec3 along = LoadVec3(blend.velocity + joint * 3 * kBlock + lane) * state.half_s;
     const SoaQuat along_it = Multiply(eased, {along.x, along.y, along.z, Float(1.0f)});
-    if (easing.are_all) return along_it;
-    eased = Select(easing.is_inertial, along_it, eased);
+    if (state.are_all) return along_it;
+    eased = Select(state.is_inertial, along_it, eased);
   }
-  return Select(easing.is_eased, eased, q);
+  return Select(state.is_eased, eased, q);
 }
 
 // Transforms blended roots into world space. `sines` and `cosines` receive those of half the
 // heading of each pose.
-void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, float* root_m,
-                float* sines, float* cosines) {
+void TransformRoots(const FinishPosesJob& blend, const float* local, std::size_t lane,
+                    float* root_m, float* sines, float* cosines) {
   const DoubleTag d;
   const hn::Rebind<float, DoubleTag> floats;
   HWY_ALIGN double half_rad[kBlock];
@@ -107,8 +108,8 @@ void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, fl
     put(0, hn::Add(hn::Mul(c, part(0)), hn::Mul(s, part(2))));
     put(1, part(1));
     put(2, hn::Sub(hn::Mul(c, part(2)), hn::Mul(s, part(0))));
-    const auto yaw = hn::Add(
-        part(3), hn::Mul(of(blend.extra_turn_rad), hn::Sub(hn::Set(d, 1.0), of(blend.steered))));
+    const auto yaw = hn::Add(part(3), hn::Mul(of(blend.extra_turn_rad),
+                                              hn::Sub(hn::Set(d, 1.0), of(blend.remaining_turn))));
     hn::Store(hn::Mul(hn::Set(d, 0.5), hn::Add(of(blend.heading_rad), yaw)), d, half_rad + i);
     SinCosOf(d, half_rad + i, sine + i, cosine + i);
     hn::StoreU(hn::DemoteTo(floats, hn::Load(d, sine + i)), floats, sines + i);
@@ -116,32 +117,32 @@ void PlaceRoots(const LaneBlend& blend, const float* local, std::size_t lane, fl
   }
 }
 
-bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
+bool FinishPoses(const FinishPosesJob& blend, float* root_m, float* rotations) {
   const std::size_t width = hn::Lanes(FloatTag());
   bool is_any_short = false;
   for (std::size_t lane = 0; lane < blend.lanes; lane += width) {
     const Float half = 0.5f;
-    Easing easing;
-    easing.is_eased = easing.is_inertial = {hn::FirstN(FloatTag(), 0)};
-    easing.fraction = easing.half_s = Float(0.0f);
+    DifferenceState state;
+    state.is_eased = state.is_inertial = {hn::FirstN(FloatTag(), 0)};
+    state.fraction = state.half_s = Float(0.0f);
     if (blend.ease != nullptr) {
-      easing.is_eased = LoadLanes(blend.is_eased + lane) > half;
-      easing.is_any = Any(easing.is_eased);
-      easing.fraction = LoadLanes(blend.fraction + lane);
+      state.is_eased = LoadLanes(blend.is_eased + lane) > half;
+      state.is_any = Any(state.is_eased);
+      state.fraction = LoadLanes(blend.fraction + lane);
       if (blend.velocity != nullptr) {
-        easing.is_inertial = easing.is_eased && LoadLanes(blend.is_inertial + lane) > half;
-        easing.is_any_inertial = Any(easing.is_inertial);
-        easing.half_s = half * LoadLanes(blend.slope_s + lane);
-        easing.are_all = !Any(LoadLanes(blend.is_eased + lane) < half ||
-                              LoadLanes(blend.is_inertial + lane) < half);
+        state.is_inertial = state.is_eased && LoadLanes(blend.is_inertial + lane) > half;
+        state.is_any_inertial = Any(state.is_inertial);
+        state.half_s = half * LoadLanes(blend.slope_s + lane);
+        state.are_all = !Any(LoadLanes(blend.is_eased + lane) < half ||
+                             LoadLanes(blend.is_inertial + lane) < half);
       }
     }
     // Adding the difference poses makes rotations longer. Compute the squared length that a
     // rotation of length kSmallestNorm may have afterwards.
     Float shortest = kSmallestNorm * kSmallestNorm;
-    if (easing.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
-    if (easing.is_any_inertial) {
-      const Float along = easing.half_s * easing.half_s * LoadLanes(blend.fastest + lane);
+    if (state.is_any) shortest = shortest * Float(1.01f * kLongestSlerp * kLongestSlerp);
+    if (state.is_any_inertial) {
+      const Float along = state.half_s * state.half_s * LoadLanes(blend.fastest + lane);
       shortest = shortest * (Float(1.0f) + along);
     }
     Float least = shortest;
@@ -156,7 +157,7 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
     for (std::size_t joint = 0; joint < blend.joint_count; ++joint) {
       SoaQuat q = GatherQuats(RowAddress{blend.rows + lane, 4 * joint});
       // Lengths multiply, so a single normalization at the end is enough.
-      if (easing.is_any) q = Ease(q, easing, blend, joint, lane);
+      if (state.is_any) q = AddDifference(q, state, blend, joint, lane);
       if (joint > 0) {
         make_unit(last, to);
         to += 4 * kBlock;
@@ -170,18 +171,18 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
     is_any_short |= Any(least < shortest && is_there);
     HWY_ALIGN float sines[kBlock];
     HWY_ALIGN float cosines[kBlock];
-    PlaceRoots(blend, local, lane, root_m, sines, cosines);
+    TransformRoots(blend, local, lane, root_m, sines, cosines);
     const SoaQuat turn = {Float(0.0f), LoadLanes(sines), Float(0.0f), LoadLanes(cosines)};
     StoreQuat(Multiply(turn, LoadQuat(rotations + lane)), rotations + lane);
-    if (!easing.is_any) continue;
+    if (!state.is_any) continue;
     const SoaVec3 root = LoadVec3(root_m + lane);
-    SoaVec3 eased = root + LoadVec3(blend.root_ease_m + lane) * easing.fraction;
-    if (easing.is_any_inertial) {
-      eased = Select(easing.is_inertial,
+    SoaVec3 eased = root + LoadVec3(blend.root_ease_m + lane) * state.fraction;
+    if (state.is_any_inertial) {
+      eased = Select(state.is_inertial,
                      eased + LoadVec3(blend.root_ease_m_s + lane) * LoadLanes(blend.slope_s + lane),
                      eased);
     }
-    eased = Select(easing.is_eased, eased, root);
+    eased = Select(state.is_eased, eased, root);
     StoreLanes(eased.x, root_m + lane);
     StoreLanes(eased.y, root_m + kBlock + lane);
     StoreLanes(eased.z, root_m + 2 * kBlock + lane);
@@ -193,4 +194,4 @@ bool FinishLanes(const LaneBlend& blend, float* root_m, float* rotations) {
 }  // namespace stridewire::kernels::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#endif  // STRIDEWIRE_POSE_LANES_INL_H
+#endif  // STRIDEWIRE_SOA_POSE_INL_H

@@ -4,10 +4,10 @@
 #include <array>
 
 #include "base/check.h"
-#include "runtime/pose/grid_blend.h"
-#include "runtime/pose/pose_kernels.h"
 #include "base/prefetch.h"
+#include "runtime/pose/grid_blend.h"
 #include "runtime/pose/plant_feet.h"
+#include "runtime/pose/pose_kernels.h"
 
 namespace stridewire {
 
@@ -43,8 +43,8 @@ struct SoaPoseEvaluator::Work {
   struct LaneDoubles {
     alignas(64) double of[kBlock] = {};
   };
-  // Number of movements that BlendRun blends together. Their sums fit into the level-1 cache.
-  static constexpr std::size_t kRun = 8;
+  // Number of movements that BlendRows blends together. Their sums fit into the level-1 cache.
+  static constexpr std::size_t kMaxBlended = 8;
   static float* FloatsOf(std::vector<LaneFloats>& lanes) { return lanes.front().of; }
 
   Work(const MotionLibrary& of_library, int of_max_count)
@@ -52,35 +52,28 @@ struct SoaPoseEvaluator::Work {
         joints(static_cast<std::size_t>(of_library.skeleton().joint_count())),
         row_floats(static_cast<std::size_t>(of_library.layout().row_floats)),
         max_count(of_max_count),
-        places(static_cast<std::size_t>(of_max_count)),
+        samples(static_cast<std::size_t>(of_max_count)),
         times(static_cast<std::size_t>(of_max_count)),
-        ring(kRun * 4 * row_floats / kBlock),
+        ring(kMaxBlended * 4 * row_floats / kBlock),
         rows(static_cast<std::size_t>(of_max_count) * row_floats),
         plan(kPackedPlanFloats),
         transposed(4 * joints),
-        ease(kernels::kEaseFloats * joints),
+        ease(kernels::kDifferenceFloats * joints),
         velocity(3 * joints),
-        none(4 * joints, 0.0f),
+        zeros(4 * joints, 0.0f),
         poses(of_library.skeleton().joint_count()),
-        one(of_library.skeleton().joint_count()) {}
+        scratch(of_library.skeleton().joint_count()) {}
 
-  void FindPlaces();
+  void SampleGrids();
   void BlendRows();
-  void TakePlans();
-  void TakeEasing();
+  void CollectPlans();
+  void CollectDifferences();
   void Finish(std::size_t pose);
   void ApplyPlantFade(std::size_t pose);
   [[nodiscard]] float* RowOf(std::size_t pose, std::size_t lane) {
     return FloatsOf(rows) + (pose * kBlock + lane) * row_floats;
   }
-  [[nodiscard]] GridPlace PlaceOf(std::size_t pose, std::size_t lane) const {
-    const kernels::GridPlaces& of = places[pose];
-    return {of.first_point[lane],
-            {of.weights[0][lane], of.weights[1][lane], of.weights[2][lane], of.weights[3][lane]}};
-  }
-  [[nodiscard]] const Movement& movement(std::size_t lane) const {
-    return *stretches[lane].movement;
-  }
+  [[nodiscard]] const Movement& movement(std::size_t lane) const { return *runs[lane].movement; }
   [[nodiscard]] const MotionGroup& group(std::size_t lane) const {
     return library.group(movement(lane).group);
   }
@@ -91,60 +84,54 @@ struct SoaPoseEvaluator::Work {
   int max_count;
 
   // The block that is being evaluated:
-  std::array<SampleRun, kBlock> stretches;
+  std::array<SampleRun, kBlock> runs;
   std::size_t lanes = 0;
   std::size_t count = 0;
   std::size_t next = 0;
   bool is_planted = false;
-  bool is_eased = false;     // Some lane has a difference pose left at some time.
-  bool is_inertial = false;  // Some of these lanes are inertial.
-  bool settles = false;      // Some lane has a plant fade.
+  bool is_eased = false;        // Some lane has a difference pose left at some time.
+  bool is_inertial = false;     // Some of these lanes are inertial.
+  bool has_plant_fade = false;  // Some lane has a plant fade.
 
-  std::vector<kernels::GridPlaces> places;  // [pose]
-  std::vector<LaneDoubles> times;           // [pose]
-  std::vector<LaneFloats> ring;             // [kRun][4][row_floats]
-  std::vector<LaneFloats> rows;             // [pose][lane][row_floats]
-  kernels::GridTimes grid_times = {};       // Initialized, because unused lanes are computed too.
+  std::vector<kernels::GridSamples> samples;  // [pose]
+  std::vector<LaneDoubles> times;             // [pose]
+  std::vector<LaneFloats> ring;               // [kRun][4][row_floats]
+  std::vector<LaneFloats> rows;               // [pose][lane][row_floats]
+  kernels::GridTimes grid_times = {};         // Initialized, because unused lanes are computed too.
   std::array<LaneDoubles, 3> base_m;
   LaneDoubles heading_rad, sine, cosine, extra_turn_rad;
   std::vector<LaneFloats> plan;        // [kPackedPlanFloats]
   std::vector<LaneFloats> transposed;  // [joint][x y z w]: difference poses
-  std::vector<LaneFloats> ease;        // [joint][kEaseFloats]
+  std::vector<LaneFloats> ease;        // [joint][kDifferenceFloats]
   std::vector<LaneFloats> velocity;    // [joint][x y z]
   std::array<LaneFloats, 3> root_ease_m, root_ease_m_s;
   LaneFloats fastest;
   LaneFloats is_inertial_lane;
-  std::vector<float> none;  // Zeros, for lanes without a difference pose.
+  std::vector<float> zeros;  // Zeros, for lanes without a difference pose.
   SoaPose poses;
-  Pose one;  // scratch
+  Pose scratch;  // scratch
 };
 
 // Finds the position of each pose in its grid.
-void SoaPoseEvaluator::Work::FindPlaces() {
+void SoaPoseEvaluator::Work::SampleGrids() {
   kernels::GridTimes& t = grid_times;
   const auto take_piece = [&](std::size_t i) {
-    SetPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
+    SetWarpPiece(movement(i).warp.PieceAt(t.time_s[i]), i, t);
   };
   for (std::size_t i = 0; i < lanes; ++i) {
-    const Movement& of = movement(i);
-    t.time_s[i] = stretches[i].time_s;
-    take_piece(i);
-    t.last_cell[i] = group(i).grid_point_count - 2;
-    t.duration_s[i] = of.warp.duration_s();
-    t.start_offset_s[i] = of.start_offset_s;
-    t.ease_out_s[i] = of.ease_out_s;
+    SetGridTime(group(i), movement(i), runs[i].time_s, i, t);
   }
   for (std::size_t pose = 0; pose < count; ++pose) {
     if (pose > 0) {
       for (std::size_t i = 0; i < lanes; ++i) {
-        for (int tick = 0; tick < stretches[i].ticks_apart; ++tick) {
-          t.time_s[i] += stretches[i].step_s;
+        for (int tick = 0; tick < runs[i].ticks_apart; ++tick) {
+          t.time_s[i] += runs[i].step_s;
         }
         if (t.time_s[i] >= t.end_s[i]) take_piece(i);
       }
     }
     std::ranges::copy(t.time_s, times[pose].of);
-    kernels::FindInGrids(lanes, t, places[pose]);
+    kernels::ComputeGridSamples(lanes, t, samples[pose]);
   }
 }
 
@@ -153,44 +140,44 @@ void SoaPoseEvaluator::Work::BlendRows() {
   for (std::size_t i = 0; i < lanes; ++i) weights[i] = movement(i).weights.data();
   for (std::size_t i = 0; i < lanes;) {
     std::size_t end = i + 1;
-    while (end < lanes && end - i < kRun && movement(end).group == movement(i).group) ++end;
-    kernels::BlendRun({.grid = group(i).grid.data(),
-                       .examples = static_cast<std::size_t>(group(i).example_count),
-                       .row_floats = row_floats,
-                       .point_count = group(i).grid_point_count,
-                       .lane = i,
-                       .lanes = end - i,
-                       .poses = count,
-                       .places = places.data(),
-                       .weights = weights.data(),
-                       .ring = FloatsOf(ring),
-                       .rows = FloatsOf(rows)});
+    while (end < lanes && end - i < kMaxBlended && movement(end).group == movement(i).group) ++end;
+    kernels::BlendRows({.grid = group(i).grid.data(),
+                        .examples = static_cast<std::size_t>(group(i).example_count),
+                        .row_floats = row_floats,
+                        .point_count = group(i).grid_point_count,
+                        .lane = i,
+                        .lanes = end - i,
+                        .poses = count,
+                        .samples = samples.data(),
+                        .weights = weights.data(),
+                        .ring = FloatsOf(ring),
+                        .rows = FloatsOf(rows)});
     i = end;
   }
 }
 
-void SoaPoseEvaluator::Work::TakePlans() {
-  settles = false;
+void SoaPoseEvaluator::Work::CollectPlans() {
+  has_plant_fade = false;
   std::array<const float*, kBlock> plans;
   for (std::size_t i = 0; i < kBlock; ++i) {
     const FootPlan& feet = movement(i < lanes ? i : 0).feet;
     plans[i] = feet.packed.data();
-    settles |= feet.plant_fade_s > 0.0;
+    has_plant_fade |= feet.plant_fade_s > 0.0;
   }
   kernels::Transpose(plans.data(), kPackedPlanFloats, lanes, FloatsOf(plan));
 }
 
 // Collects the difference poses that have not faded out yet.
-void SoaPoseEvaluator::Work::TakeEasing() {
+void SoaPoseEvaluator::Work::CollectDifferences() {
   is_eased = is_inertial = false;
   std::array<const float*, kBlock> differences;
   std::array<const float*, kBlock> velocities;
-  differences.fill(none.data());
-  velocities.fill(none.data());
+  differences.fill(zeros.data());
+  velocities.fill(zeros.data());
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
     is_inertial_lane.of[i] = 0.0f;
-    if (places[0].is_eased[i] == 0.0f) continue;  // Later poses have no difference left either.
+    if (samples[0].is_eased[i] == 0.0f) continue;  // Later poses have no difference left either.
     is_eased = true;
     differences[i] = &of.difference.rotations[0].x;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -205,17 +192,17 @@ void SoaPoseEvaluator::Work::TakeEasing() {
   }
   if (!is_eased) return;
   kernels::Transpose(differences.data(), 4 * joints, lanes, FloatsOf(transposed));
-  kernels::PrepareEase(FloatsOf(transposed), joints, lanes, FloatsOf(ease));
+  kernels::PrepareDifferences(FloatsOf(transposed), joints, lanes, FloatsOf(ease));
   if (!is_inertial) return;
   kernels::Transpose(velocities.data(), 3 * joints, lanes, FloatsOf(velocity));
-  kernels::FindFastest(FloatsOf(velocity), joints, lanes, fastest.of);
+  kernels::FindLargestVelocities(FloatsOf(velocity), joints, lanes, fastest.of);
 }
 
 void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
   std::array<const float*, kBlock> of_lanes;
   for (std::size_t i = 0; i < kBlock; ++i) of_lanes[i] = RowOf(pose, i);
-  const kernels::GridPlaces& at = places[pose];
-  const kernels::LaneBlend blend = {
+  const kernels::GridSamples& at = samples[pose];
+  const kernels::FinishPosesJob blend = {
       .rows = of_lanes.data(),
       .joint_count = joints,
       .lanes = lanes,
@@ -224,7 +211,7 @@ void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
       .sine = sine.of,
       .cosine = cosine.of,
       .extra_turn_rad = extra_turn_rad.of,
-      .steered = at.steered,
+      .remaining_turn = at.remaining_turn,
       .ease = is_eased ? FloatsOf(ease) : nullptr,
       .velocity = is_eased && is_inertial ? FloatsOf(velocity) : nullptr,
       .fastest = fastest.of,
@@ -234,19 +221,20 @@ void SoaPoseEvaluator::Work::Finish(std::size_t pose) {
       .slope_s = at.slope_s,
       .is_eased = at.is_eased,
       .is_inertial = is_inertial_lane.of};
-  if (kernels::FinishLanes(blend, poses.roots_m(), poses.rotations())) return;
+  if (kernels::FinishPoses(blend, poses.roots_m(), poses.rotations())) return;
   for (std::size_t i = 0; i < lanes; ++i) {
-    TakeLargest(group(i), library.layout(), movement(i), PlaceOf(pose, i), RowOf(pose, i));
+    UseLargestExample(group(i), library.layout(), movement(i), GridSampleOf(samples[pose], i),
+                      RowOf(pose, i));
   }
-  (void)kernels::FinishLanes(blend, poses.roots_m(), poses.rotations());
+  (void)kernels::FinishPoses(blend, poses.roots_m(), poses.rotations());
 }
 
 void SoaPoseEvaluator::Work::ApplyPlantFade(std::size_t pose) {
   for (std::size_t i = 0; i < lanes; ++i) {
     if (movement(i).feet.plant_fade_s == 0.0) continue;
-    poses.Get(i, one);
-    stridewire::ApplyPlantFade(library.leg_rig(), movement(i), times[pose].of[i], one);
-    poses.Set(i, one);
+    poses.Get(i, scratch);
+    stridewire::ApplyPlantFade(library.leg_rig(), movement(i), times[pose].of[i], scratch);
+    poses.Set(i, scratch);
   }
 }
 
@@ -260,18 +248,19 @@ SoaPoseEvaluator& SoaPoseEvaluator::operator=(SoaPoseEvaluator&&) noexcept = def
 
 int SoaPoseEvaluator::max_count() const { return work_->max_count; }
 
-void SoaPoseEvaluator::Begin(std::span<const SampleRun> stretches, int count) {
+void SoaPoseEvaluator::Begin(std::span<const SampleRun> runs, int count) {
   Work& work = *work_;
-  STRIDEWIRE_CHECK(!stretches.empty() && stretches.size() <= kBlock);
+  STRIDEWIRE_CHECK(!runs.empty() && runs.size() <= kBlock);
   STRIDEWIRE_CHECK(count >= 1 && count <= work.max_count);
-  std::ranges::copy(stretches, work.stretches.begin());
-  work.lanes = stretches.size();
+  std::ranges::copy(runs, work.runs.begin());
+  work.lanes = runs.size();
   work.count = static_cast<std::size_t>(count);
   work.next = 0;
-  work.is_planted = stretches.front().movement->feet.is_active;
+  work.is_planted = runs.front().movement->feet.is_active;
   for (std::size_t i = 0; i < work.lanes; ++i) {
     const Movement& movement = work.movement(i);
     STRIDEWIRE_CHECK(movement.feet.is_active == work.is_planted);
+    STRIDEWIRE_CHECK(static_cast<std::size_t>(movement.group) < work.library.groups().size());
     for (std::size_t c = 0; c < 3; ++c) {
       work.base_m[c].of[i] = movement.base.position_m[static_cast<int>(c)];
     }
@@ -279,9 +268,9 @@ void SoaPoseEvaluator::Begin(std::span<const SampleRun> stretches, int count) {
     work.extra_turn_rad.of[i] = movement.extra_turn_rad;
   }
   kernels::SinCos(work.heading_rad.of, work.lanes, work.sine.of, work.cosine.of);
-  work.FindPlaces();
-  work.TakeEasing();
-  if (work.is_planted) work.TakePlans();
+  work.SampleGrids();
+  work.CollectDifferences();
+  if (work.is_planted) work.CollectPlans();
   work.BlendRows();
 }
 
@@ -291,14 +280,14 @@ const SoaPose& SoaPoseEvaluator::Next() {
   const std::size_t pose = work.next++;
   work.Finish(pose);
   if (work.is_planted) {
-    kernels::PlantLanes(work.library.leg_rig(),
+    kernels::PlantPoses(work.library.leg_rig(),
                         {.plan = Work::FloatsOf(work.plan),
                          .time_s = work.times[pose].of,
                          .base_m = work.base_m[0].of,
                          .root_m = work.poses.roots_m(),
                          .rotations = work.poses.rotations()},
                         work.lanes);
-    if (work.settles) work.ApplyPlantFade(pose);
+    if (work.has_plant_fade) work.ApplyPlantFade(pose);
   }
   return work.poses;
 }
@@ -309,17 +298,17 @@ void SoaPoseEvaluator::PrefetchTimes(const Movement& movement) {
   PrefetchBytes(&movement.feet, 1);
 }
 
-void SoaPoseEvaluator::PrefetchPlaces(const Movement& movement) {
+void SoaPoseEvaluator::PrefetchMovement(const Movement& movement) {
   PrefetchBytes(&movement, offsetof(Movement, warp) + 2 * kCacheLineBytes);
   if (movement.feet.is_active) {
     PrefetchBytes(&movement.feet, offsetof(FootPlan, packed) + sizeof(PackedFootPlan));
   }
 }
 
-void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
-  const Movement& movement = *stretch.movement;
+void SoaPoseEvaluator::Prefetch(const SampleRun& run) {
+  const Movement& movement = *run.movement;
   PrefetchBytes(movement.weights.data(), movement.weights.size() * sizeof(float));
-  if (stretch.time_s < movement.start_offset_s + movement.ease_out_s) {
+  if (run.time_s < movement.start_offset_s + movement.ease_out_s) {
     PrefetchBytes(movement.difference.rotations.data(),
                   movement.difference.rotations.size() * sizeof(Quat));
     PrefetchBytes(movement.difference_velocity.joints_rad_s.data(),
@@ -330,20 +319,20 @@ void SoaPoseEvaluator::Prefetch(const SampleRun& stretch) {
 void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs) {
   // A block may contain only poses with planted feet or only poses without.
   for (const bool is_planted : {false, true}) {
-    std::array<SampleRun, kBlock> stretches;
-    std::array<Pose*, kBlock> shown;
+    std::array<SampleRun, kBlock> runs;
+    std::array<Pose*, kBlock> outputs;
     std::size_t lanes = 0;
     const auto evaluate = [&] {
       if (lanes == 0) return;
-      evaluator.Begin(std::span(stretches).first(lanes), 1);
+      evaluator.Begin(std::span(runs).first(lanes), 1);
       const SoaPose& poses = evaluator.Next();
-      for (std::size_t i = 0; i < lanes; ++i) poses.Get(i, *shown[i]);
+      for (std::size_t i = 0; i < lanes; ++i) poses.Get(i, *outputs[i]);
       lanes = 0;
     };
     for (const PoseJob& job : jobs) {
       if (job.movement->feet.is_active != is_planted) continue;
-      stretches[lanes] = {.movement = job.movement, .time_s = job.time_s};
-      shown[lanes++] = job.shown;
+      runs[lanes] = {.movement = job.movement, .time_s = job.time_s};
+      outputs[lanes++] = job.pose;
       if (lanes == kBlock) evaluate();
     }
     evaluate();

@@ -9,24 +9,26 @@
 
 namespace stridewire {
 
-/// Poses of one movement that follow each other. All that can be seen of a movement is settled when it begins, so a
-/// server need not come back to it for every tick: what a pose is made of is brought into the cache, blended and
-/// unpacked once for several of them.
+/// Successive poses of one movement. A movement does not change once it has begun, so a server can
+/// evaluate several ticks at once. It then loads, blends and transposes the movement's data only
+/// once.
 struct SampleRun {
-  const Movement* movement = nullptr;  ///< Its feet, if planted, packed (FootPlan::packed)
-  double time_s = 0.0;                 ///< Of the first pose; clamped to the movement
-  double step_s = 0.0;  ///< From one tick to the next; times are summed up tick by tick
-  int ticks_apart = 1;  ///< From one pose to the next
+  const Movement* movement = nullptr;  ///< If its feet are planted, FootPlan::packed is set.
+  double time_s = 0.0;                 ///< Time of the first pose; clamped to the movement.
+  double step_s = 0.0;                 ///< Length of a tick. Times are summed tick by tick.
+  int ticks_apart = 1;                 ///< Ticks between two poses.
 };
 
-/// Evaluates stretches, up to SoaPose::kLanes side by side: EvaluateMovement's poses with the feet planted, the same
-/// bytes whatever else is evaluated with them. Not thread-safe; allocates when it is made and never again.
+/// Evaluates up to SoaPose::kLanes sample runs side by side, with difference poses and planted
+/// feet. Each pose has the same bytes no matter which others are evaluated with it. Not
+/// thread-safe. Allocates in its constructor only.
 ///
-///   evaluator.Begin(stretches, count);
+///   evaluator.Begin(runs, count);
 ///   for (int i = 0; i < count; ++i) Use(evaluator.Next());
 class SoaPoseEvaluator {
  public:
-  /// `library` outlives it. `max_count`: poses of a stretch, at least 1.
+  /// `library` must outlive the evaluator. `max_count` is the largest number of poses per run, >=
+  /// 1.
   SoaPoseEvaluator(const MotionLibrary& library, int max_count);
   ~SoaPoseEvaluator();
   SoaPoseEvaluator(SoaPoseEvaluator&&) noexcept;
@@ -34,31 +36,31 @@ class SoaPoseEvaluator {
 
   [[nodiscard]] int max_count() const;
 
-  /// Whose `count` poses come next, at least one stretch; either all of them have their feet planted or none. What they
-  /// point to lives until the last of them came.
-  void Begin(std::span<const SampleRun> stretches, int count);
-  /// The next pose of each stretch, in its lane. Other lanes mean nothing.
+  /// Starts the evaluation of `count` poses of at least one run. Either all movements have planted
+  /// feet or none. The movements must stay alive until the last pose has been evaluated.
+  void Begin(std::span<const SampleRun> runs, int count);
+  /// The next pose of each run, in its lane. Other lanes are undefined.
   [[nodiscard]] const SoaPose& Next();
 
-  /// Asks for the memory that is read of a movement: what SampleRunCount and EvaluationBatcher::Add look at, then what Begin
-  /// does, and at last what lies elsewhere.
+  /// Prefetch the memory that evaluation reads: first what SampleRunCount and
+  /// EvaluationBatcher::Add read, then the movement itself, and finally the arrays it points to.
   static void PrefetchTimes(const Movement& movement);
-  static void PrefetchPlaces(const Movement& movement);
-  static void Prefetch(const SampleRun& stretch);
+  static void PrefetchMovement(const Movement& movement);
+  static void Prefetch(const SampleRun& run);
 
  private:
   struct Work;
   std::unique_ptr<Work> work_;
 };
 
-/// One pose that is wanted of a movement.
+/// A request for a single pose of a movement.
 struct PoseJob {
-  const Movement* movement = nullptr;  ///< Its feet, if planted, packed
-  double time_s = 0.0;                 ///< Clamped to the movement
-  Pose* shown = nullptr;               ///< With the feet planted
+  const Movement* movement = nullptr;  ///< If its feet are planted, FootPlan::packed is set.
+  double time_s = 0.0;                 ///< Clamped to the movement.
+  Pose* pose = nullptr;                ///< Output.
 };
 
-/// Single poses, as many side by side as there are lanes. Never allocates.
+/// Evaluates single poses, up to SoaPose::kLanes at a time. Never allocates.
 void EvaluatePoses(SoaPoseEvaluator& evaluator, std::span<const PoseJob> jobs);
 
 }  // namespace stridewire

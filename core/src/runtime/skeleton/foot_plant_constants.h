@@ -19,14 +19,15 @@ inline constexpr double kSoftGroundM = 0.006;
 inline constexpr double kNearPrintM = 0.15;
 inline constexpr double kFarFromPrintM = 0.35;
 // During a swing, the ground to stay above changes from that of the old footprint to that of the
-// new one. The change begins at kGroundFrom and takes kGroundOver, as fractions of the swing.
-inline constexpr double kGroundFrom = 0.3;
-inline constexpr double kGroundOver = 0.4;
+// new one. The change begins at kGroundBlendStart and takes kGroundBlendLength, as fractions of the
+// swing.
+inline constexpr double kGroundBlendStart = 0.3;
+inline constexpr double kGroundBlendLength = 0.4;
 // A foot that lands lower than it started descends after this fraction of the swing. A foot that
 // lands higher finishes its rise by the same fraction before the end of the swing.
-inline constexpr double kSinkFrom = 0.35;
+inline constexpr double kSinkStart = 0.35;
 // Fraction of the swing, at each end, in which the extra lift of a foot fades in and out.
-inline constexpr double kLiftEnds = 0.35;
+inline constexpr double kLiftFade = 0.35;
 // Flatness (LegPose::Flatness) of a standing foot at which its heading lock is zero (kHeelUp) and
 // at which it is complete (kSoleDown).
 inline constexpr double kHeelUp = 0.5;

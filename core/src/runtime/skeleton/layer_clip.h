@@ -11,44 +11,46 @@
 
 namespace stridewire {
 
-inline constexpr int kMaxLayerClips = 64;       ///< A library.
-inline constexpr int kMaxLayerFrames = 18'000;  ///< A clip: ten minutes at 30 a second.
+inline constexpr int kMaxLayerClips = 64;       ///< Per library.
+inline constexpr int kMaxLayerFrames = 18'000;  ///< Per clip: ten minutes at 30 per second.
 inline constexpr std::size_t kMaxLayerNameBytes = 32;
 inline constexpr double kMinLayerFps = 1.0;
 inline constexpr double kMaxLayerFps = 240.0;
 
-/// A clip of a part of the body, played over whatever the legs do (waving, carrying). Its mask has
-/// one weight a joint; joints that are not listed have weight 0. Spans point into the library's bytes.
+/// A clip for part of the body that is played on top of any movement of the legs, such as waving or
+/// carrying. Its mask has one weight per joint; joints that are not listed have weight 0. Spans
+/// point into the library's bytes.
 struct LayerClip {
-  std::string_view name;  ///< IsLayerName().
-  /// Where it was taken from: "wave.bvh 1.00-2.50 s".
+  std::string_view name;  ///< Satisfies IsLayerName().
+  /// Source of the clip, for example "wave.bvh 1.00-2.50 s".
   std::string_view source;
-  double fps = 0.0;                  ///< Keys a second, kMinLayerFps to kMaxLayerFps.
-  bool is_looping = false;           ///< The first key follows the last; else it is played once.
-  std::span<const int> joints;       ///< Rising; no root, no joint that legs hang on.
-  std::span<const float> weights;    ///< [place in joints], in (0, 1].
-  std::span<const float> rotations;  ///< [frame][place in joints][x, y, z, w], local.
+  double fps = 0.0;  ///< Keys per second, kMinLayerFps to kMaxLayerFps.
+  /// True if the first key follows the last; false if the clip is played once.
+  bool is_looping = false;
+  std::span<const int> joints;       ///< In increasing order; not the root and no joint of a leg.
+  std::span<const float> weights;    ///< [index in joints], in (0, 1].
+  std::span<const float> rotations;  ///< [frame][index in joints][x, y, z, w], local.
 
   [[nodiscard]] int frame_count() const {
     return static_cast<int>(rotations.size() / (4 * joints.size()));
   }
-  /// What a loop takes once round, else first key to last.
+  /// Length of one loop, or the time from the first to the last key.
   [[nodiscard]] double duration_s() const {
     return (is_looping ? frame_count() : frame_count() - 1) / fps;
   }
 };
 
-/// 1 to kMaxLayerNameBytes of a-z, A-Z, 0-9, '_', '-', '.'.
+/// True if the name has 1 to kMaxLayerNameBytes characters from a-z, A-Z, 0-9, '_', '-' and '.'.
 [[nodiscard]] bool IsLayerName(std::string_view name);
 
-/// [joint]: true for what layers must leave alone, the root and both legs: every joint from the root
-/// down to a ball, and all that hangs on a hip.
+/// [joint]: true for joints that layers must not affect: the root, every joint from the root to a
+/// ball, and all joints below a hip.
 [[nodiscard]] std::vector<bool> JointsOfLegs(const Skeleton& skeleton);
 
-/// Turns the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask), the
-/// short way round. The clip is C1 between its keys (Catmull-Rom). Time runs round in a loop and stops
-/// at the ends of any other clip; `weight` in [0, 1]. Never allocates. Joints outside the mask keep
-/// their bits.
+/// Rotates the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask),
+/// along the short arc. The clip is C1 between its keys (Catmull-Rom). The time wraps around in a
+/// loop and is clamped in other clips. `weight` is in [0, 1]. Never allocates. Joints outside the
+/// mask keep their bits.
 void ApplyLayer(const LayerClip& clip, double time_s, double weight, PoseSpan pose);
 
 }  // namespace stridewire

@@ -52,7 +52,7 @@ LegRig::Bones BonesOf(const Skeleton& skeleton, Foot foot, const LegRig::Side& s
   bones.count = side.chain.size();
   for (std::size_t i = 0; i < bones.count; ++i) {
     bones.joints[i] = static_cast<std::size_t>(side.chain[i]);
-    bones.among[i] = static_cast<std::size_t>(PlaceOf(joints, side.chain[i]));
+    bones.rig_joints[i] = static_cast<std::size_t>(PlaceOf(joints, side.chain[i]));
     Copy(skeleton.joints[bones.joints[i]].offset_m, bones.offsets_m[i]);
   }
   bones.hip = static_cast<std::size_t>(side.hip);

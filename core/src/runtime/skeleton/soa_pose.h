@@ -7,7 +7,7 @@
 
 namespace stridewire {
 
-/// Poses side by side, one a lane: as vectors make, plant and encode them.
+/// Poses side by side, one per lane, in the layout that the SIMD kernels use.
 class SoaPose {
  public:
   static constexpr std::size_t kLanes = 16;
@@ -15,7 +15,7 @@ class SoaPose {
   explicit SoaPose(int joint_count) : numbers_(3 + 4 * static_cast<std::size_t>(joint_count)) {}
 
   [[nodiscard]] std::size_t joint_count() const { return (numbers_.size() - 3) / 4; }
-  /// [x y z][kLanes], in the world.
+  /// [x y z][kLanes], in world space.
   [[nodiscard]] float* roots_m() { return numbers_[0].of; }
   [[nodiscard]] const float* roots_m() const { return numbers_[0].of; }
   /// [joint][x y z w][kLanes].
@@ -25,12 +25,12 @@ class SoaPose {
   [[nodiscard]] Vec3 root_m(std::size_t lane) const {
     return {numbers_[0].of[lane], numbers_[1].of[lane], numbers_[2].of[lane]};
   }
-  /// One of them; `pose` has joint_count() rotations.
+  /// Copies the pose of one lane. `pose` has joint_count() rotations.
   void Get(std::size_t lane, PoseSpan pose) const;
   void Set(std::size_t lane, ConstPoseSpan pose);
 
  private:
-  // A line of the cache.
+  // One cache line.
   struct alignas(64) Numbers {
     float of[kLanes] = {};
   };

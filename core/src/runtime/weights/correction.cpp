@@ -4,19 +4,18 @@
 #include <array>
 #include <cmath>
 
-#include "runtime/weights/end_poses.h"
+#include "base/check.h"
 #include "runtime/weights/measure.h"
 
 namespace stridewire {
 namespace {
 
-constexpr auto kMaxExamples = static_cast<std::size_t>(MotionLibrary::kMaxExamples);
 constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
 using Vector = std::array<double, kMaxRows>;  // In metres; a radian counts kMetresPerRadian.
 using Matrix = std::array<Vector, kMaxRows>;
 
 // Every example may change by at least this fraction of the mean |w|.
-constexpr double kLeastUse = 0.5;
+constexpr double kMinUsage = 0.5;
 // Weights start to shrink this far below the largest permitted sum of |w|.
 constexpr double kMargin = 0.1;
 // At errors below this, weights shrink less. Then they are a smooth function of the request.
@@ -31,7 +30,7 @@ double Sum(std::span<const double> values) {
   return sum;
 }
 
-double SumOfSizes(std::span<const double> values) {
+double SumOfMagnitudes(std::span<const double> values) {
   double sum = 0.0;
   for (const double value : values) sum += std::fabs(value);
   return sum;
@@ -72,26 +71,26 @@ class WeightStep {
   // `slopes` is J, [d][n], in metres.
   WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
       : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
-    least_use_ = kLeastUse * SumOfSizes(weights) / static_cast<double>(n_);
-    for (std::size_t e = 0; e < n_; ++e) uses_ += Use(e);
+    min_usage_ = kMinUsage * SumOfMagnitudes(weights) / static_cast<double>(n_);
+    for (std::size_t e = 0; e < n_; ++e) total_usage_ += Usage(e);
     for (std::size_t a = 0; a < rows_; ++a) {
       for (std::size_t b = 0; b <= a; ++b) {
         double sum = 0.0;
-        for (std::size_t e = 0; e < n_; ++e) sum += Use(e) * At(a, e) * At(b, e);
+        for (std::size_t e = 0; e < n_; ++e) sum += Usage(e) * At(a, e) * At(b, e);
         factor_[a][b] = sum;
       }
     }
     double trace = 0.0;
     for (std::size_t a = 0; a < rows_; ++a) trace += factor_[a][a];
     for (std::size_t a = 0; a < rows_; ++a) factor_[a][a] += kRidge * trace;
-    is_there_ = Factor(factor_, rows_);
+    is_solvable_ = Factor(factor_, rows_);
   }
 
-  [[nodiscard]] bool is_there() const { return is_there_; }
+  [[nodiscard]] bool is_solvable() const { return is_solvable_; }
 
   // Writes weights [n] that compensate for the error `missing`. The part of the weights that does
   // not affect the parameters shrinks by the fraction `shrinking`.
-  void To(const Vector& missing, double shrinking, std::span<double> out) const {
+  void Solve(const Vector& missing, double shrinking, std::span<double> out) const {
     Vector y = missing;
     y[rows_ - 1] = 1.0 - Sum(weights_);
     if (shrinking > 0.0) {
@@ -103,14 +102,15 @@ class WeightStep {
     for (std::size_t e = 0; e < n_; ++e) {
       double change = 0.0;
       for (std::size_t a = 0; a < rows_; ++a) change += At(a, e) * y[a];
-      out[e] = (1.0 - shrinking) * weights_[e] + Use(e) * change;
+      out[e] = (1.0 - shrinking) * weights_[e] + Usage(e) * change;
     }
-    const double left = (1.0 - Sum(out)) / uses_;  // Correct the sum, which the ridge changes.
-    for (std::size_t e = 0; e < n_; ++e) out[e] += left * Use(e);
+    const double left =
+        (1.0 - Sum(out)) / total_usage_;  // Correct the sum, which the ridge changes.
+    for (std::size_t e = 0; e < n_; ++e) out[e] += left * Usage(e);
   }
 
  private:
-  [[nodiscard]] double Use(std::size_t e) const { return std::fabs(weights_[e]) + least_use_; }
+  [[nodiscard]] double Usage(std::size_t e) const { return std::fabs(weights_[e]) + min_usage_; }
   [[nodiscard]] double At(std::size_t row, std::size_t e) const {
     return row + 1 == rows_ ? 1.0 : slopes_[row * n_ + e];
   }
@@ -119,10 +119,10 @@ class WeightStep {
   std::span<const double> slopes_;
   std::size_t n_;
   std::size_t rows_;
-  double least_use_ = 0.0;
-  double uses_ = 0.0;
+  double min_usage_ = 0.0;
+  double total_usage_ = 0.0;
   Matrix factor_{};
-  bool is_there_ = false;
+  bool is_solvable_ = false;
 };
 
 }  // namespace
@@ -131,45 +131,46 @@ CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group) {
   return {.max_iterations = group.parameter_count() <= 2 ? 3 : 8};
 }
 
-Correction CorrectWeights(const MotionLibrary& library, int group_index,
-                          const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weight_scratch, Movement& movement) {
-  const Correction correction =
-      CorrectWeights(library.skeleton(), library.layout(), library.group(group_index), wanted,
-                     limits, weight_scratch, movement);
-  movement.group = group_index;
-  return correction;
+CorrectionScratch::CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout,
+                                     int max_example_count)
+    : ends_(skeleton, layout) {
+  STRIDEWIRE_CHECK(max_example_count >= 0 && max_example_count <= MotionLibrary::kMaxExamples);
+  const auto n = static_cast<std::size_t>(max_example_count);
+  weights_.resize(n);
+  next_.resize(n);
+  halved_.resize(n);
+  slopes_.resize(n * kMaxParameters);
 }
 
-Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
-                          const MotionGroup& group, const ParameterValues& wanted,
-                          const CorrectionLimits& limits, std::span<double> weight_scratch,
+CorrectionScratch::CorrectionScratch(const MotionLibrary& library)
+    : CorrectionScratch(library.skeleton(), library.layout(), library.max_example_count()) {}
+
+Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
+                          const CorrectionLimits& limits, CorrectionScratch& scratch,
                           Movement& movement) {
   const std::size_t d = group.parameters.size();
   const auto n = static_cast<std::size_t>(group.example_count);
-  const std::span<double> weights = weight_scratch.first(n);
-  // Only the first n elements of each are used.
-  std::array<double, kMaxExamples> next_room;
-  std::array<double, kMaxExamples> halved_room;
-  std::array<double, kMaxParameters * kMaxExamples> slopes_room;
-  const std::span<double> next = std::span(next_room).first(n);
-  const std::span<double> halved = std::span(halved_room).first(n);
-  const std::span<double> slopes = std::span(slopes_room).first(d * n);
+  STRIDEWIRE_CHECK(n <= scratch.weights_.size() && d <= kMaxParameters);
+  const std::span<double> weights = scratch.weights(group);
+  const std::span<double> next = std::span(scratch.next_).first(n);
+  const std::span<double> halved = std::span(scratch.halved_).first(n);
+  const std::span<double> slopes = std::span(scratch.slopes_).first(d * n);
+  EndPoses& ends = scratch.ends_;
+  ends.SetGroup(group);
   Vector unit{};
   for (std::size_t l = 0; l < d; ++l) {
     unit[l] = group.parameters[l].name == ParameterName::kTurn ? kMetresPerRadian : 1.0;
   }
-  EndPoses ends(skeleton, layout, group);
 
-  struct Miss {
+  struct ParameterError {
     Vector missing{};  // p^ - a(w).
     double largest_m = 0.0;
   };
   const auto measure = [&](std::span<const double> w) {
-    TakeWeights(group, w, movement);
+    ApplyWeights(group, w, movement);
     ends.Blend(movement);
     const ParameterValues measured = ends.Measure();
-    Miss error;
+    ParameterError error;
     for (std::size_t l = 0; l < d; ++l) {
       error.missing[l] = unit[l] * (wanted.values[l] - measured.values[l]);
       error.largest_m = std::max(error.largest_m, std::fabs(error.missing[l]));
@@ -178,10 +179,10 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
   };
 
   SetWeights(group, -1, std::span(wanted.values).first(d), weights, movement);
-  Miss best = measure(weights);
+  ParameterError best = measure(weights);
   Correction correction;
   correction.initial_error_m = best.largest_m;
-  const double most = std::max(kMaxCorrectedWeightSum, SumOfSizes(weights));
+  const double max_sum = std::max(kMaxCorrectedWeightSum, SumOfMagnitudes(weights));
   while (correction.iterations < limits.max_iterations && best.largest_m > limits.tolerance_m) {
     ++correction.iterations;
     ends.MeasureSlopes(slopes);
@@ -189,16 +190,16 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
       for (std::size_t e = 0; e < n; ++e) slopes[l * n + e] *= unit[l];
     }
     const WeightStep step(weights, slopes, d);
-    if (!step.is_there()) break;
-    step.To(best.missing, 0.0, next);
-    const double size = SumOfSizes(next);
-    if (size > most - kMargin) {
-      step.To(best.missing, 1.0, halved);
-      const double least = SumOfSizes(halved);
+    if (!step.is_solvable()) break;
+    step.Solve(best.missing, 0.0, next);
+    const double size = SumOfMagnitudes(next);
+    if (size > max_sum - kMargin) {
+      step.Solve(best.missing, 1.0, halved);
+      const double least = SumOfMagnitudes(halved);
       // The new weights depend linearly on how much they shrink, and the sum of |w| is convex. So
       // linear interpolation finds a sufficient amount.
       const double shrinking = least < size
-                                   ? std::min((size - most + kMargin) / (size - least), 1.0) *
+                                   ? std::min((size - max_sum + kMargin) / (size - least), 1.0) *
                                          best.largest_m / (best.largest_m + kShrinkErrorM)
                                    : 0.0;
       for (std::size_t e = 0; e < n; ++e) next[e] += shrinking * (halved[e] - next[e]);
@@ -207,8 +208,8 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
     for (int halvings = 0; halvings <= kMaxHalvings && !is_better; ++halvings) {
       const double part = 1.0 / static_cast<double>(1 << halvings);
       for (std::size_t e = 0; e < n; ++e) halved[e] = weights[e] + part * (next[e] - weights[e]);
-      if (SumOfSizes(halved) > most) continue;
-      const Miss error = measure(halved);
+      if (SumOfMagnitudes(halved) > max_sum) continue;
+      const ParameterError error = measure(halved);
       if (!(error.largest_m < best.largest_m)) continue;
       best = error;
       std::copy(halved.begin(), halved.end(), weights.begin());
@@ -216,8 +217,9 @@ Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
     }
     if (!is_better) break;
   }
-  TakeWeights(group, weights, movement);
+  ApplyWeights(group, weights, movement);
   correction.error_m = best.largest_m;
+  STRIDEWIRE_CHECK(!(correction.error_m > correction.initial_error_m));
   return correction;
 }
 

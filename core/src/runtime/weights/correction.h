@@ -1,9 +1,11 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
+#include "runtime/weights/end_poses.h"
+#include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
@@ -29,9 +31,35 @@ struct Correction {
   int iterations = 0;
 };
 
-/// Sets the group, parameters and weights of a movement so that the movement really has the
-/// parameters p^ given by `wanted` (paper, Section 4; the paper searches for p* with a(p*) = p^
-/// instead). Performs Gauss-Newton iterations on the weights:
+/// Memory for CorrectWeights, allocated once and used for any number of corrections. One per
+/// thread.
+class CorrectionScratch {
+ public:
+  /// For groups of up to `max_example_count` examples. Borrows `skeleton`.
+  CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout, int max_example_count);
+  /// For all groups of a library, which must outlive the scratch.
+  explicit CorrectionScratch(const MotionLibrary& library);
+
+  /// Room for the weights of a group in double precision. Receives the result of CorrectWeights.
+  [[nodiscard]] std::span<double> weights(const MotionGroup& group) {
+    return std::span(weights_).first(static_cast<std::size_t>(group.example_count));
+  }
+
+ private:
+  friend Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
+                                   const CorrectionLimits& limits, CorrectionScratch& scratch,
+                                   Movement& movement);
+
+  EndPoses ends_;
+  std::vector<double> weights_;  // [example]
+  std::vector<double> next_;     // [example]
+  std::vector<double> halved_;   // [example]
+  std::vector<double> slopes_;   // [parameter][example]
+};
+
+/// Sets the parameters and weights of a movement so that the movement really has the parameters p^
+/// given by `wanted` (paper, Section 4; the paper searches for p* with a(p*) = p^ instead).
+/// Performs Gauss-Newton iterations on the weights:
 ///
 ///   w <- w + D J^T y,   [J; 1] D [J; 1]^T y = [p^ - a(w); 0],   J = a'(w) [d][n],
 ///   D = diag(|w| + half of its mean)
@@ -44,17 +72,10 @@ struct Correction {
 /// large is halved up to three times. The best w is kept, so the result is never worse than without
 /// correction. An error remains if no weights within the limit reach p^.
 ///
-/// `weight_scratch`, of size n or more, receives the weights in double precision. Uses 500 KB of
-/// stack, of which 72 bytes per example and 0.4 KB per joint of the legs are touched. Does not
-/// allocate if `movement.weights` has room for the group. Same bytes on every machine.
-Correction CorrectWeights(const MotionLibrary& library, int group_index,
-                          const ParameterValues& wanted, const CorrectionLimits& limits,
-                          std::span<double> weight_scratch, Movement& movement);
-
-/// The same for a group that is not part of a library yet. Sets movement.group to -1.
-Correction CorrectWeights(const Skeleton& skeleton, const GridLayout& layout,
-                          const MotionGroup& group, const ParameterValues& wanted,
-                          const CorrectionLimits& limits, std::span<double> weight_scratch,
+/// Sets movement.group to -1; a caller whose group is part of a library sets the index afterwards.
+/// Does not allocate if `movement.weights` has room for the group. Same bytes on every machine.
+Correction CorrectWeights(const MotionGroup& group, const ParameterValues& wanted,
+                          const CorrectionLimits& limits, CorrectionScratch& scratch,
                           Movement& movement);
 
 }  // namespace stridewire

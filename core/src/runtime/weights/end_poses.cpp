@@ -16,58 +16,56 @@ DVec3 Turn(double sine, double cosine, const DVec3& v) {
 
 }  // namespace
 
-class EndPoses::Gradient {
- public:
-  // Adds the derivative by the four components of a joint's quaternion. The joint index after the
-  // last one stands for the root's position and yaw.
-  void Add(int joint, const DVec3& by_xyz, double by_w) {
-    const auto j = static_cast<std::size_t>(joint);
-    // The chains of the two legs share their first joints, so look for an existing entry.
-    std::size_t i = 0;
-    while (i < joint_count_ && joints_[i].joint != j) ++i;
-    if (i == joint_count_) joints_[joint_count_++] = {j, {}};
-    Parts& parts = joints_[i];
-    parts.by[0] += by_xyz.x;
-    parts.by[1] += by_xyz.y;
-    parts.by[2] += by_xyz.z;
-    parts.by[3] += by_w;
-  }
-  // The derivative by the weight of the example with this row.
-  [[nodiscard]] double Of(const float* row) const {
+void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
+  const auto j = static_cast<std::size_t>(joint);
+  // The chains of the two legs share their first joints, so look for an existing entry.
+  std::size_t i = 0;
+  while (i < joint_count_ && joints_[i].joint != j) ++i;
+  if (i == joint_count_) joints_[joint_count_++] = {j, {}};
+  Parts& parts = joints_[i];
+  parts.by[0] += by_xyz.x;
+  parts.by[1] += by_xyz.y;
+  parts.by[2] += by_xyz.z;
+  parts.by[3] += by_w;
+}
+
+void EndPoses::Gradient::AddTo(const float* rows, std::size_t row_floats,
+                               std::span<double> slopes) const {
+  // Writing a slope changes none of the parts.
+  const Parts* __restrict parts = joints_.data();
+  double* __restrict slope = slopes.data();
+  const std::size_t count = joint_count_;
+  for (std::size_t e = 0; e < slopes.size(); ++e, rows += row_floats) {
     std::array<double, 4> sums{};
-    for (std::size_t i = 0; i < joint_count_; ++i) {
-      const float* at = row + 4 * joints_[i].joint;
-      for (std::size_t c = 0; c < 4; ++c) sums[c] += joints_[i].by[c] * at[c];
+    for (std::size_t i = 0; i < count; ++i) {
+      const float* at = rows + 4 * parts[i].joint;
+      for (std::size_t c = 0; c < 4; ++c) sums[c] += parts[i].by[c] * at[c];
     }
-    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
-  }
-
- private:
-  struct Parts {
-    std::size_t joint;
-    std::array<double, 4> by;
-  };
-  std::size_t joint_count_ = 0;
-  std::array<Parts, 2 * static_cast<std::size_t>(kMaxJoints) + 1> joints_;
-};
-
-EndPoses::EndPoses(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group)
-    : skeleton_(skeleton),
-      layout_(layout),
-      group_(group),
-      sign_(group.kind == MovementKind::kStepRight ? -1.0 : 1.0) {
-  for (std::size_t f = 0; f < 2; ++f) {
-    for (int j = skeleton.legs[f].ball; j >= 0;
-         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-      chains_[f][lengths_[f]++] = j;
-    }
+    slope[e] += (sums[0] + sums[1]) + (sums[2] + sums[3]);
   }
 }
 
+EndPoses::EndPoses(const Skeleton& skeleton, const GridLayout& layout)
+    : skeleton_(skeleton), layout_(layout) {
+  for (std::size_t f = 0; f < 2; ++f) {
+    for (int j = skeleton.legs[f].ball; j >= 0;
+         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+      chains_[f].push_back(j);
+    }
+    for (End& end : ends_) end.links[f].resize(chains_[f].size());
+  }
+  gradient_.SetCapacity(chains_[0].size() + chains_[1].size() + 1);
+}
+
+void EndPoses::SetGroup(const MotionGroup& group) {
+  group_ = &group;
+  sign_ = group.kind == MovementKind::kStepRight ? -1.0 : 1.0;
+}
+
 const float* EndPoses::Rows(bool is_end) const {
-  const std::size_t point = is_end ? static_cast<std::size_t>(group_.grid_point_count - 1) : 0;
-  return &group_.grid[point * static_cast<std::size_t>(group_.example_count) *
-                      static_cast<std::size_t>(layout_.row_floats)];
+  const std::size_t point = is_end ? static_cast<std::size_t>(group_->grid_point_count - 1) : 0;
+  return &group_->grid[point * static_cast<std::size_t>(group_->example_count) *
+                       static_cast<std::size_t>(layout_.row_floats)];
 }
 
 void EndPoses::Blend(const Movement& movement) {
@@ -91,7 +89,7 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
   end.cosine = Cos(yaw_rad);
   for (std::size_t f = 0; f < 2; ++f) {
     DVec3 arm(skeleton_.legs[f].ball_offset_m);
-    for (std::size_t i = 0; i < lengths_[f]; ++i) {
+    for (std::size_t i = 0; i < chains_[f].size(); ++i) {
       const auto j = static_cast<std::size_t>(chains_[f][i]);
       Link& link = end.links[f][i];
       DQuat blended(GridLayout::RotationOf(sum.data(), j));
@@ -110,12 +108,12 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
       link.ball = link.rotation * arm;
       arm = DVec3(skeleton_.joints[j].offset_m) + link.ball;
     }
-    end.arms_m[f] = Turn(end.sine, end.cosine, end.links[f][lengths_[f] - 1].ball);
+    end.arms_m[f] = Turn(end.sine, end.cosine, end.links[f][chains_[f].size() - 1].ball);
   }
 }
 
 ParameterValues EndPoses::Measure() const {
-  return ParametersOf(group_,
+  return ParametersOf(*group_,
                       {.start_m = sign_ * (ends_[0].Ball(0) - ends_[0].Ball(1)),
                        .end_m = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1)),
                        .travel_m = 0.5 * (ends_[1].Ball(0) + ends_[1].Ball(1) - ends_[0].Ball(0) -
@@ -138,7 +136,7 @@ void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
   const DVec3& arm = end.arms_m[foot];
   gradient.Add(layout_.joint_count, along, along.x * arm.z - along.z * arm.x);
   DVec3 g = Turn(-end.sine, end.cosine, along);
-  for (std::size_t i = lengths_[foot]; i-- > 0;) {
+  for (std::size_t i = chains_[foot].size(); i-- > 0;) {
     const Link& link = end.links[foot][i];
     const DVec3 u(link.rotation.x, link.rotation.y, link.rotation.z);
     const double w = link.rotation.w;
@@ -155,28 +153,27 @@ void EndPoses::AddGradient(const End& end, std::size_t foot, const DVec3& along,
   }
 }
 
-void EndPoses::MeasureSlopes(std::span<double> slopes) const {
-  const auto n = static_cast<std::size_t>(group_.example_count);
+void EndPoses::MeasureSlopes(std::span<double> slopes) {
+  const auto n = static_cast<std::size_t>(group_->example_count);
   const auto row_floats = static_cast<std::size_t>(layout_.row_floats);
   const DVec3 apart = sign_ * Turn(-sine_, cosine_, ends_[1].Ball(0) - ends_[1].Ball(1));
   // Changing the weights also rotates the heading frame in which the end is measured.
   const DVec3 by_heading(-apart.z, 0.0, apart.x);
-  for (std::size_t l = 0; l < group_.parameters.size(); ++l) {
+  for (std::size_t l = 0; l < group_->parameters.size(); ++l) {
     const std::span<double> out = slopes.subspan(l * n, n);
     std::fill(out.begin(), out.end(), 0.0);
     const auto add = [&](bool is_end, const DVec3& left, const DVec3& right) {
-      Gradient gradient;
-      AddGradient(ends_[is_end ? 1 : 0], 0, left, gradient);
-      AddGradient(ends_[is_end ? 1 : 0], 1, right, gradient);
-      const float* rows = Rows(is_end);
-      for (std::size_t e = 0; e < n; ++e) out[e] += gradient.Of(rows + e * row_floats);
+      gradient_.Clear();
+      AddGradient(ends_[is_end ? 1 : 0], 0, left, gradient_);
+      AddGradient(ends_[is_end ? 1 : 0], 1, right, gradient_);
+      gradient_.AddTo(Rows(is_end), row_floats, out);
     };
     const auto add_start = [&](const DVec3& axis) { add(false, sign_ * axis, -sign_ * axis); };
     const auto add_end = [&](const DVec3& axis) {
       const DVec3 along = sign_ * Turn(sine_, cosine_, axis);
       add(true, along, -along);
       const double by = glm::dot(axis, by_heading);
-      for (std::size_t e = 0; e < n; ++e) out[e] += by * group_.heading_change_rad[e];
+      for (std::size_t e = 0; e < n; ++e) out[e] += by * group_->heading_change_rad[e];
     };
     const auto add_travel = [&](const DVec3& axis) {
       add(false, -0.5 * axis, -0.5 * axis);
@@ -185,7 +182,7 @@ void EndPoses::MeasureSlopes(std::span<double> slopes) const {
     const DVec3 x(1.0, 0.0, 0.0);
     const DVec3 y(0.0, 1.0, 0.0);
     const DVec3 z(0.0, 0.0, 1.0);
-    switch (group_.parameters[l].name) {
+    switch (group_->parameters[l].name) {
       case ParameterName::kStartX: add_start(x); break;
       case ParameterName::kStartY: add_start(y); break;
       case ParameterName::kStartZ: add_start(z); break;
@@ -193,7 +190,7 @@ void EndPoses::MeasureSlopes(std::span<double> slopes) const {
       case ParameterName::kEndY: add_end(y); break;
       case ParameterName::kEndZ: add_end(z); break;
       case ParameterName::kTurn:
-        std::copy_n(group_.heading_change_rad.begin(), n, out.begin());
+        std::copy_n(group_->heading_change_rad.begin(), n, out.begin());
         break;
       case ParameterName::kLength: add_travel(z); break;
       case ParameterName::kHeight: add_travel(y); break;

@@ -2,22 +2,27 @@
 
 #include <array>
 #include <span>
+#include <vector>
 
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
+#include "stridewire/runtime/motion_library.h"
 #include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
 /// Computes the parameters of a blend from its first and last pose, and their derivatives by the
 /// weights. That is all that weight correction needs. It evaluates only the chains of joints from
-/// the root to the balls of the feet, with the base frame at the origin. Never allocates. Same
-/// bytes on every machine.
+/// the root to the balls of the feet, with the base frame at the origin. Allocates
+/// in its constructor only. Same bytes on every machine.
 class EndPoses {
  public:
-  EndPoses(const Skeleton& skeleton, const GridLayout& layout, const MotionGroup& group);
+  /// Borrows `skeleton`.
+  EndPoses(const Skeleton& skeleton, const GridLayout& layout);
 
-  /// Blends both poses with the weights and the heading change of a movement (see TakeWeights).
+  /// Chooses the group to measure. Borrows it until the next call.
+  void SetGroup(const MotionGroup& group);
+
+  /// Blends both poses with the weights and the heading change of a movement (see ApplyWeights).
   void Blend(const Movement& movement);
 
   /// The parameters of the blend, as MeasureMovement returns them.
@@ -26,7 +31,7 @@ class EndPoses {
   /// Writes J = a'(w), the derivatives of the parameters by each weight at the last blend, to
   /// `slopes` [d][n], in metres or radians. Individual derivatives also change the sum of the
   /// weights, so only combinations that keep the sum are meaningful.
-  void MeasureSlopes(std::span<double> slopes) const;
+  void MeasureSlopes(std::span<double> slopes);
 
  private:
   // A joint of a chain.
@@ -39,7 +44,7 @@ class EndPoses {
     DVec3 ball;  // The same vector in the axes of the parent.
   };
   struct End {
-    std::array<std::array<Link, kMaxJoints>, 2> links;  // [foot], in the order of chains_.
+    std::array<std::vector<Link>, 2> links;  // [foot], in the order of chains_.
     DVec3 root_m;
     double sine = 0.0;  // Sine and cosine of the root's yaw.
     double cosine = 1.0;
@@ -47,22 +52,39 @@ class EndPoses {
     [[nodiscard]] DVec3 Ball(std::size_t foot) const { return root_m + arms_m[foot]; }
   };
   // Derivative of a measurement by the numbers in an example's row.
-  class Gradient;
+  class Gradient {
+   public:
+    void Clear() { joint_count_ = 0; }
+    void SetCapacity(std::size_t joint_count) { joints_.resize(joint_count); }
+    // Adds the derivative by the four components of a joint's quaternion. The joint index after the
+    // last one stands for the root's position and yaw.
+    void Add(int joint, const DVec3& by_xyz, double by_w);
+    // Adds the derivative by the weight of each example, whose rows are at `rows`, to `slopes` [n].
+    void AddTo(const float* rows, std::size_t row_floats, std::span<double> slopes) const;
+
+   private:
+    struct Parts {
+      std::size_t joint;
+      std::array<double, 4> by;
+    };
+    std::size_t joint_count_ = 0;
+    std::vector<Parts> joints_;  // The first joint_count_ are in use.
+  };
 
   void BlendEnd(const Movement& movement, bool is_end);
   void AddGradient(const End& end, std::size_t foot, const DVec3& along, Gradient& gradient) const;
   [[nodiscard]] const float* Rows(bool is_end) const;
 
   const Skeleton& skeleton_;
-  const GridLayout& layout_;
-  const MotionGroup& group_;
-  std::array<std::array<int, kMaxJoints>, 2> chains_;  // [foot]: from the ball's joint to the root.
-  std::array<std::size_t, 2> lengths_{};               // [foot]: length of each chain.
-  double sign_;  // +1 if "left minus right" is "moving minus fixed", else -1.
+  GridLayout layout_;
+  const MotionGroup* group_ = nullptr;
+  std::array<std::vector<int>, 2> chains_;  // [foot]: from the ball's joint to the root.
+  double sign_ = 1.0;  // +1 if "left minus right" is "moving minus fixed", else -1.
   double heading_change_rad_ = 0.0;
   double sine_ = 0.0;  // Sine and cosine of heading_change_rad_.
   double cosine_ = 1.0;
   std::array<End, 2> ends_;  // First pose, last pose.
+  Gradient gradient_;        // Scratch of MeasureSlopes.
 };
 
 }  // namespace stridewire

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "runtime/weights/end_measures.h"
-#include "runtime/skeleton/foot_vector.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/skeleton/foot_vector.h"
+#include "runtime/weights/end_measures.h"
 
 namespace stridewire {
 namespace {

@@ -3,8 +3,8 @@
 #include <span>
 
 #include "runtime/movement/movement.h"
-#include "stridewire/runtime/movement_request.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 

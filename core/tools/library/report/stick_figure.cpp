@@ -6,6 +6,7 @@
 #include "offline/build/parameter_scales.h"
 #include "runtime/weights/correction.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
 
 namespace stridewire {
 namespace {
@@ -67,17 +68,17 @@ const char* StickFigure::PlotCommand() {
 MovementPlayer::MovementPlayer(const MotionLibrary& library, int group_index)
     : library_(library),
       group_index_(group_index),
-      scratch_(static_cast<std::size_t>(library.max_example_count())),
+      scratch_(library),
       cache_(library.layout()),
       pose_(library.skeleton().joint_count()) {}
 
 void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   const MotionGroup& group = library_.group(group_index_);
   if (corrected) {
-    CorrectWeights(library_, group_index_, ValuesOf(parameters), DefaultCorrectionLimits(group),
-                   scratch_, movement_);
+    CorrectWeights(group, ValuesOf(parameters), DefaultCorrectionLimits(group), scratch_, movement_);
+    movement_.group = group_index_;
   } else {
-    SetWeights(group, group_index_, parameters, scratch_, movement_);
+    SetWeights(group, group_index_, parameters, scratch_.weights(group), movement_);
   }
   StartWeighted(group, {}, movement_);
   cache_.Clear();

@@ -4,10 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "stridewire/runtime/motion_library.h"
 #include "runtime/movement/movement.h"
-#include "stridewire/runtime/movement_request.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/correction.h"
+#include "stridewire/runtime/motion_library.h"
+#include "stridewire/runtime/movement_request.h"
 
 namespace stridewire {
 
@@ -52,7 +53,7 @@ class MovementPlayer {
  private:
   const MotionLibrary& library_;
   int group_index_;
-  std::vector<double> scratch_;
+  CorrectionScratch scratch_;
   GridCache cache_;
   Pose pose_;
   Movement movement_;

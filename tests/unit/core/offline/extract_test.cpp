@@ -7,8 +7,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "runtime/skeleton/foot_vector.h"
 #include "runtime/library/keytimes.h"
+#include "runtime/skeleton/foot_vector.h"
 #include "synthetic_walker.h"
 
 namespace stridewire {

@@ -9,11 +9,11 @@
 
 #include "distorted_library.h"
 #include "offline/builtin/builtin_library.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 #include "runtime/weights/measure.h"
 #include "stridewire/offline/library_builder.h"
 #include "test_library.h"
-#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
@@ -134,11 +134,11 @@ TEST_P(RefineInDimensions, KeepsTheAccuracyOfRunTimeCorrection) {
   ASSERT_TRUE(refined.has_value()) << Describe(refined.error());
   const MotionGroup& group = refined->library->group(0);
   std::mt19937 random(seed);
-  std::vector<double> scratch(static_cast<std::size_t>(group.example_count));
+  CorrectionScratch scratch(*refined->library);
   Movement movement;
   for (int i = 0; i < 100; ++i) {
-    const Correction correction = CorrectWeights(*refined->library, 0, PointInHull(group, random),
-                                                 {.max_iterations = 8}, scratch, movement);
+    const Correction correction =
+        CorrectWeights(group, PointInHull(group, random), {.max_iterations = 8}, scratch, movement);
     EXPECT_LT(correction.error_m, 1e-4) << i;
   }
 }

@@ -6,9 +6,9 @@
 #include <limits>
 
 #include "offline/builtin/builtin_library.h"
-#include "runtime/weights/measure.h"
 #include "runtime/movement/movement.h"
 #include "runtime/pose/evaluate_poses.h"
+#include "runtime/weights/measure.h"
 #include "stridewire/offline/open_library.h"
 
 namespace stridewire {

@@ -77,7 +77,8 @@ TEST(AvatarCrowd, GivesEachAvatarThePoseThatItHasAlone) {
     crowd.Advance(pointers, kFrameS);
     for (std::size_t i = 0; i < alone.size(); ++i) {
       alone[i].Advance(kFrameS);
-      ASSERT_TRUE(SameBytes(alone[i].pose(), together[i].pose())) << "tick " << tick << " avatar " << i;
+      ASSERT_TRUE(SameBytes(alone[i].pose(), together[i].pose()))
+          << "tick " << tick << " avatar " << i;
     }
   }
 }

@@ -1,11 +1,10 @@
-#include "runtime/avatar/avatar_simulation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
+#include "runtime/avatar/avatar_simulation.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "stridewire/offline/library_builder.h"
 #include "stridewire/offline/open_library.h"
@@ -284,6 +283,7 @@ TEST_F(AvatarTest, DoesNotPlantFeetIfTheLegsShareAnAnkle) {
 TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
   const auto library = OpenLibrary("builtin").value();
   AvatarSimulation avatar(library, {});
+  PlanScratch scratch(*library);
   EXPECT_FALSE(avatar.is_event_free());
   for (int i = 0; i < 4; ++i)
     ASSERT_TRUE(avatar.Enqueue({.movement = StepRequest{.length_m = 0.5}}));
@@ -294,7 +294,7 @@ TEST(AvatarSimulation, IsEventFreeOnlyWithoutEvents) {
     std::vector<std::uint32_t> places{7};
     const std::uint64_t revision = avatar.revision();
     const double time_s = avatar.time_s();
-    AvatarSimulation::AdvanceStates({&one, 1}, 1.0 / 60.0, &places);
+    AvatarSimulation::AdvanceStates({&one, 1}, 1.0 / 60.0, scratch, &places);
     EXPECT_EQ(avatar.time_s(), time_s + 1.0 / 60.0);
     EXPECT_EQ(places.empty(), avatar.is_event_free());
     if (!avatar.is_event_free()) {

@@ -11,13 +11,13 @@
 
 #include "counted_memory.h"
 #include "distorted_library.h"
-#include "runtime/weights/end_poses.h"
 #include "runtime/avatar/avatar_simulation.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/terrain/foot_support.h"
+#include "runtime/weights/end_poses.h"
 #include "runtime/weights/measure.h"
 #include "stridewire/runtime/terrain.h"
 #include "test_library.h"
-#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {
@@ -25,14 +25,19 @@ namespace {
 // Scratch objects for corrections and measurements.
 struct Scratch {
   explicit Scratch(const MotionLibrary& library)
-      : weights(static_cast<std::size_t>(library.max_example_count())),
+      : correction(library),
+        weights(static_cast<std::size_t>(library.max_example_count())),
         cache(library.layout()),
         pose(library.skeleton().joint_count()) {
     movement.weights.reserve(static_cast<std::size_t>(library.max_example_count()));
   }
   Correction Correct(const MotionLibrary& library, const ParameterValues& wanted,
                      const CorrectionLimits& limits) {
-    return CorrectWeights(library, 0, wanted, limits, weights, movement);
+    const Correction result =
+        CorrectWeights(library.group(0), wanted, limits, correction, movement);
+    movement.group = 0;
+    std::ranges::copy(correction.weights(library.group(0)), weights.begin());
+    return result;
   }
   // Measures a movement with these parameters independently of the correction.
   ParameterValues Measure(const MotionLibrary& library, const ParameterValues& parameters,
@@ -64,6 +69,7 @@ struct Scratch {
     return sum;
   }
 
+  CorrectionScratch correction;
   std::vector<double> weights;
   GridCache cache;
   Pose pose;
@@ -149,8 +155,9 @@ TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
   for (int i = 0; i < 5; ++i) {
     static_cast<void>(scratch.Measure(*library, PointInHull(group, random)));
     std::copy_n(scratch.weights.begin(), n, weights.begin());
-    TakeWeights(group, weights, scratch.movement);
-    EndPoses ends(library->skeleton(), library->layout(), group);
+    ApplyWeights(group, weights, scratch.movement);
+    EndPoses ends(library->skeleton(), library->layout());
+    ends.SetGroup(group);
     ends.Blend(scratch.movement);
     ends.MeasureSlopes(slopes);
     for (std::size_t e = 1; e < n; ++e) {
@@ -159,7 +166,7 @@ TEST_P(InDimensions, DerivativesMatchFiniteDifferences) {
         std::vector<double> w = weights;
         w[e] += by;
         w[0] -= by;
-        TakeWeights(group, w, scratch.movement);
+        ApplyWeights(group, w, scratch.movement);
         return scratch.MeasureAsIs(*library);
       };
       const ParameterValues more = measured(kStep);

@@ -10,9 +10,9 @@
 
 #include "runtime/library/cardinal_basis.h"
 #include "runtime/movement/movement.h"
+#include "runtime/pose/evaluate_poses.h"
 #include "stridewire/offline/library_builder.h"
 #include "test_library.h"
-#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

@@ -8,9 +8,9 @@
 #include <numeric>
 #include <random>
 
+#include "runtime/pose/evaluate_poses.h"
 #include "runtime/skeleton/foot_vector.h"
 #include "test_library.h"
-#include "runtime/pose/evaluate_poses.h"
 
 namespace stridewire {
 namespace {

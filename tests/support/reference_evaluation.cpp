@@ -1,10 +1,14 @@
-#include "runtime/pose/reference_evaluation.h"
+#include "reference_evaluation.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
 #include "runtime/pose/cell_weights.h"
+#include "runtime/pose/plant_feet.h"
+#include "runtime/skeleton/foot_plant_constants.h"
+#include "runtime/skeleton/leg_rig.h"
 
 namespace stridewire {
 namespace {
@@ -156,6 +160,128 @@ void EvaluateMovementBySampling(const MotionGroup& group, const GridLayout& layo
   for (Quat& q : sum.rotations) q = Normalise(q);
   ToWorld(sum, movement, time_s, out);
   AddDifference(movement, time_s, out);
+}
+
+namespace {
+
+double SmoothMax(double a, double b, double soft_m) {
+  const double d = a - b;
+  return 0.5 * (a + b + std::sqrt(d * d + soft_m * soft_m));
+}
+
+// Elapsed fraction of the foot's swing, 0 before release and 1 after landing.
+double SwingAt(const FootTrajectory& trajectory, double time_s) {
+  if (time_s <= trajectory.release_s) return 0.0;
+  if (time_s >= trajectory.land_s) return 1.0;
+  return (time_s - trajectory.release_s) / (trajectory.land_s - trajectory.release_s);
+}
+
+// Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
+// between the foot and the footprint.
+double DepthBelow(const Footprint& footprint, const Vec3& normal, const LegRig::Side& side,
+                  const LegPose& leg, const DVec3& ball, const Quat& turn) {
+  const DVec3 print = footprint.position_m;
+  const double away_m =
+      std::sqrt((ball.x - print.x) * (ball.x - print.x) + (ball.z - print.z) * (ball.z - print.z));
+  const double near = EaseOut((away_m - kNearPrintM) / (kFarFromPrintM - kNearPrintM));
+  if (near <= 0.0) return 0.0;
+  const auto depth_of = [&](const Vec3& point, double rest_m) {
+    const DVec3 at = ball + DVec3(turn * (point - leg.ball_m));
+    const double ground_m =
+        print.y - (normal.x * (at.x - print.x) + normal.z * (at.z - print.z)) / normal.y;
+    return ground_m + rest_m / normal.y - at.y;
+  };
+  const double depth_m =
+      std::max({depth_of(leg.ball_m, side.ball_height_m), depth_of(leg.heel_m, side.ball_height_m),
+                depth_of(leg.toe_tip_m, side.toe_height_m)});
+  return near * SmoothMax(0.0, depth_m, kSoftGroundM);
+}
+
+// Height by which to raise a foot so that its sole stays above the ground that it leaves and the
+// ground that it lands on.
+double LiftOutOfGround(const FootTrajectory& trajectory, double time_s, const LegRig::Side& side,
+                       const LegPose& leg, const DVec3& ball, const Quat& turn) {
+  const double second =
+      1.0 - EaseOut((SwingAt(trajectory, time_s) - kGroundBlendStart) / kGroundBlendLength);
+  double lift_m = 0.0;
+  if (second < 1.0) {
+    lift_m +=
+        (1.0 - second) * DepthBelow(trajectory.from, trajectory.normals[0], side, leg, ball, turn);
+  }
+  if (second > 0.0)
+    lift_m += second * DepthBelow(trajectory.to, trajectory.normals[1], side, leg, ball, turn);
+  return lift_m;
+}
+
+}  // namespace
+
+void PlantFeetByReference(const Skeleton& skeleton, const LegRig& rig, const Movement& movement,
+                          double time_s, PoseSpan pose) {
+  const FootPlan& plan = movement.feet;
+  if (!plan.is_active) return;
+  struct Side {
+    LegPose leg;
+    FootCorrection correction;
+    Quat turn = kIdentityQuat;  // Rotation of the foot in world axes.
+    DVec3 ankle_m{0.0};         // Target position of the ankle in the world.
+  };
+  std::array<Side, 2> sides;
+  const DVec3 root = DVec3(pose.root_position_m);
+  const double settled = plan.plant_fade_s > 0.0
+                             ? 1.0 - EaseOut((time_s - movement.start_offset_s) / plan.plant_fade_s)
+                             : 1.0;
+  // The root moves with the corrections of the feet, and with what lifts them out of the ground.
+  DVec3 shift = CorrectFeet(skeleton, rig, movement, time_s, pose).root_m;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    Side& side = sides[static_cast<std::size_t>(foot)];
+    EvaluateLeg(skeleton, rig, pose, foot, side.leg);
+    const BlendedFoot blended = FootOf(rig, foot, root, side.leg);
+    side.correction = CorrectFoot(movement, foot, time_s, blended);
+    side.turn = TurnOf(side.correction);
+    if (plan.keeps_above_ground) {
+      const double lift_m =
+          settled * LiftOutOfGround(plan.foot(foot), time_s, rig.side(foot), side.leg,
+                                    blended.ball_m + side.correction.offset_m, side.turn);
+      side.correction.offset_m.y += lift_m;
+      shift.y += side.correction.root_weight * lift_m;
+    }
+    const Vec3 ankle = side.leg.positions_m[static_cast<std::size_t>(rig.side(foot).ankle)];
+    side.ankle_m =
+        blended.ball_m + side.correction.offset_m + DVec3(side.turn * (ankle - side.leg.ball_m));
+  }
+
+  // Lower the root until both legs can reach their ankle targets.
+  double lower_m = 0.0;
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Side& side = sides[static_cast<std::size_t>(foot)];
+    const LegRig::Side& bones = rig.side(foot);
+    const Vec3 hip = side.leg.positions_m[static_cast<std::size_t>(bones.hip)];
+    const Vec3 blended = side.leg.positions_m[static_cast<std::size_t>(bones.ankle)] - hip;
+    const double length_m = static_cast<double>(bones.thigh_m) + bones.shank_m;
+    const double blended_m = std::sqrt(glm::dot(blended, blended));
+    const double allowed_m = std::min(SmoothMax(blended_m, kEasyExtension * length_m, kSoftM),
+                                      kLongestExtension * length_m);
+    const DVec3 reach = side.ankle_m - (root + shift + DVec3(hip));
+    const double flat_squared = reach.x * reach.x + reach.z * reach.z;
+    const double drop_squared = allowed_m * allowed_m - flat_squared;
+    // Lowering the root cannot reach a foot that is too far away horizontally. Limit how far it
+    // goes down for such a foot.
+    const double deepest_m = 0.5 * length_m;
+    const double drop_m = std::sqrt(std::max(drop_squared, deepest_m * deepest_m));
+    lower_m = SmoothMax(lower_m, -reach.y - drop_m, kSoftLowerM);
+  }
+  shift.y -= lower_m;
+
+  pose.root_position_m = Vec3(root + shift);
+  const DVec3 moved = DVec3(pose.root_position_m);
+  for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
+    const Side& side = sides[static_cast<std::size_t>(foot)];
+    const LegRig::Side& bones = rig.side(foot);
+    const auto ankle = static_cast<std::size_t>(bones.ankle);
+    const auto target = Vec3(side.ankle_m - moved);
+    SolveLeg(rig, foot, side.leg, target, side.turn * side.leg.world_rotations[ankle], pose);
+  }
+  ApplyPlantFade(rig, movement, time_s, pose);
 }
 
 }  // namespace stridewire

@@ -1,0 +1,124 @@
+// The correction of one foot (see FootTrajectory), written once for two number types: double for
+// the planner and Float, a SIMD vector of floats, for the kernels.
+//
+// plant_feet.cpp and foot_plant-inl.h include this file inside a namespace, so it has no include
+// guard. Before that, they define STRIDEWIRE_INLINE and the arithmetic of their number type:
+// Constant, Select, Min, Max, DivideBy, WrapAngle, EaseOut and EaseOutSlope. Two operations have
+// another order of additions per number type, so that movements keep the bits they always had:
+// OnePlusTwice(x) = 1 + 2x and AddBoth(a, b, c) = a + b + c.
+//
+// A `Timing` has the members time_s, start_offset_s, duration_s, ease_out_s and extra_turn, and the
+// functions OfDuration(x) = x / duration_s and OfEaseOut(x) = x / ease_out_s.
+
+// A FootTrajectory and its FootResidual.
+template <typename Number, typename Vector>
+struct TrajectoryOf {
+  Vector from, to, release_offset, release_velocity, land_offset, land_velocity, aside;
+  Number height[3], turn[3];
+  Vector residual_offset, residual_velocity, root_shift;
+  Number from_heading, to_heading, release_turn, root_weight, lift, residual_turn, residual_turn_s;
+  Number residual_over_s, release_s, land_s;
+};
+
+template <typename Number, typename Vector>
+struct CorrectionOf {
+  Vector offset;
+  Number swing;       // Elapsed fraction of the swing: 0 before release, 1 after landing.
+  Number turned;      // Fraction of the change in heading and tilt that is complete.
+  Number turn;        // Added to the heading, radians.
+  Number free_turn;   // The same if the heading were not locked.
+  Vector root_shift;  // Part of FootTrajectory::root_shift_m.
+};
+
+// Share of the lift that is added at a fraction of the swing.
+template <typename Number>
+STRIDEWIRE_INLINE Number LiftShareOf(Number swing) {
+  const Number one = Constant<Number>(1.0);
+  const Number fade = Constant<Number>(kLiftFade);
+  return (one - EaseOut(DivideBy(swing, kLiftFade))) *
+         EaseOut(DivideBy(swing - (one - fade), kLiftFade));
+}
+
+// Extra turn of the body (Movement::extra_turn_rad) that is complete at a time.
+template <typename Number, typename Timing>
+STRIDEWIRE_INLINE Number ExtraTurnAt(const Timing& timing, Number at_s) {
+  return timing.extra_turn * (Constant<Number>(1.0) - EaseOut(timing.OfDuration(at_s)));
+}
+
+template <typename Number, typename Vector, typename Timing>
+STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
+    const Timing& timing, const TrajectoryOf<Number, Vector>& trajectory, const Vector& ball,
+    Number heading, Number flatness) {
+  const Number zero = Constant<Number>(0.0);
+  const Number one = Constant<Number>(1.0);
+  const Number t = timing.time_s;
+  const auto has_landed = t >= trajectory.land_s;
+  const auto is_planted = (t <= trajectory.release_s) || has_landed;
+  const Number length = Select(is_planted, one, trajectory.land_s - trajectory.release_s);
+  const Number s =
+      Select(has_landed, one, Select(is_planted, zero, (t - trajectory.release_s) / length));
+  const Number r = one - s;
+
+  CorrectionOf<Number, Vector> c;
+  c.swing = s;
+  // A planted ball stays on its footprint. A swinging one follows a cubic Hermite curve.
+  const Vector print = Select(has_landed, trajectory.to, trajectory.from);
+  const Number across = Constant<Number>(4.0) * s * r;
+  const Vector flying =
+      trajectory.release_offset * (OnePlusTwice(s) * r * r) +
+      trajectory.land_offset * (s * s * OnePlusTwice(r)) +
+      (trajectory.release_velocity * r - trajectory.land_velocity * s) * (length * s * r) +
+      trajectory.aside * (across * across);
+  c.offset = Select(is_planted, print - ball, flying);
+
+  // A foot that steps up rises early in the swing; a foot that steps down descends late.
+  const Number since_s = t - timing.start_offset_s;
+  const Number settled = one - EaseOut(timing.OfEaseOut(since_s));
+  const auto& height = trajectory.height;
+  const Number rise = height[2] - height[1];
+  const Number rise_start = Select(rise > zero, zero, Constant<Number>(kSinkStart));
+  const Number risen = one - EaseOut(DivideBy(s - rise_start, 1.0 - kSinkStart));
+  c.offset.y = height[0] + settled * (height[1] - height[0]) + rise * risen +
+               trajectory.lift * LiftShareOf(s);
+
+  // The extra turn of the body does not rotate a standing foot. During its swing, the foot catches
+  // up with the turn that the body will have made by the time it lands.
+  c.turned = one - EaseOut(s);
+  const auto& turn = trajectory.turn;
+  Number free = turn[0] + settled * (turn[1] - turn[0]) + c.turned * (turn[2] - turn[1]);
+  free = free + (ExtraTurnAt(timing, Min(trajectory.land_s, timing.duration_s)) * c.turned -
+                 ExtraTurnAt(timing, t));
+
+  const Number faded = since_s / trajectory.residual_over_s;
+  const Number value = EaseOut(faded);
+  const Number slope = trajectory.residual_over_s * EaseOutSlope(faded);
+  c.offset =
+      AddBoth(c.offset, trajectory.residual_offset * value, trajectory.residual_velocity * slope);
+  free = AddBoth(free, value * trajectory.residual_turn, slope * trajectory.residual_turn_s);
+  c.free_turn = free;
+
+  // The heading of a standing foot is locked while its sole is on the ground, and free with the
+  // heel up: seen from above, a foot on its toes is too short to have a heading.
+  const Number print_heading = Select(has_landed, trajectory.to_heading, trajectory.from_heading);
+  const Number error = WrapAngle(print_heading - heading - free);
+  const Number lock =
+      one - EaseOut(DivideBy(flatness - Constant<Number>(kHeelUp), kSoleDown - kHeelUp));
+  c.turn =
+      Select(is_planted, free + lock * error, free + (one - c.turned) * trajectory.release_turn);
+  c.root_shift = trajectory.root_shift * (one - EaseOut(timing.OfDuration(t)));
+  return c;
+}
+
+// Adds what remains of the root's residual to its shift. The height takes longer than the
+// horizontal part, because a body climbs as long as its leg stretches.
+template <typename Number, typename Vector, typename Timing>
+STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timing,
+                                         const Vector& residual, const Vector& velocity) {
+  const Number since_s = timing.time_s - timing.start_offset_s;
+  const Number flat = EaseOut(DivideBy(since_s, kRootShiftS));
+  const Number rise = EaseOut(since_s / Max(Constant<Number>(kRootShiftS),
+                                            Constant<Number>(kRootRisePart) * timing.duration_s));
+  const Number seconds = timing.ease_out_s * EaseOutSlope(timing.OfEaseOut(since_s));
+  return AddBoth(shift, Vector{flat * residual.x, rise * residual.y, flat * residual.z},
+                 velocity * seconds);
+}
