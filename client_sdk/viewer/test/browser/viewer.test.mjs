@@ -101,7 +101,7 @@ test('shows walking avatars with the same poses as the C++ client', async () => 
     const ours = await page.evaluate(([times, avatar]) => {
       const {world} = window.stridewire.worlds[0];
       const received = new Set([...world.recording.streams.values()].flatMap(
-        ({moments, first}) => moments.slice(first))
+        ({ticks, first}) => ticks.slice(first))
         .filter(({parts}) => parts.some(({avatars}) => avatars.includes(avatar)))
         .map(({timeS}) => timeS));
       const out = {

@@ -209,7 +209,7 @@ test('shows the reason if a goal cannot be reached', async () => {
     await page.mouse.click(goal.x, goal.y);
     const {reason} = await waitFor('the walk is rejected', () => events.slice(from).find(
       (event) => event.type === 'rejected' && event.avatar === avatar));
-    assert.match(reason, /edge/);
+    assert.match(reason, /too steep or too uneven/);
     const [where, other] = closed ? ['.toast', '.message'] : ['.message', '.toast'];
     await waitFor('the reason is shown', async () => await page.locator(where).isVisible() &&
       await page.locator(where).textContent() === `Avatar ${avatar} stopped: ${reason}.`);
