@@ -102,11 +102,10 @@ TEST_P(FootPlant, RandomStepsLandOnTheirFootprintsAndStayThere) {
   const Trail trail = RandomTrail(walker, library, 1000, seed);
   const auto synthesis = Synthesize({.library = library, .requests = trail.requests, .fps = kFps});
   ASSERT_TRUE(synthesis.has_value());
-  const auto unplanted =
-      Synthesize({.library = library,
-                  .requests = trail.requests,
-                  .fps = kFps,
-                  .options = {.foot_planting = false}});
+  const auto unplanted = Synthesize({.library = library,
+                                     .requests = trail.requests,
+                                     .fps = kFps,
+                                     .options = {.foot_planting = false}});
   ASSERT_TRUE(unplanted.has_value());
   const Skeleton& skeleton = library->skeleton();
   const Clip clip = ThroughBvh(skeleton, synthesis->clip);

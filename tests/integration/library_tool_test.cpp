@@ -231,7 +231,8 @@ TEST_F(LibraryTool, RejectsDamagedLibraries) {
   damaged[whole.size() / 2] ^= 0x10;
   std::string other_version = whole;
   other_version[8] = 77;
-  ExpectFailure({"inspect", folder_.Write("damaged.swl", damaged)}, 2, "damaged.swl: the file is damaged");
+  ExpectFailure({"inspect", folder_.Write("damaged.swl", damaged)}, 2,
+                "damaged.swl: the file is damaged");
   ExpectFailure({"inspect", folder_.Write("version.swl", other_version)}, 2, "version");
   ExpectFailure({"inspect", folder_.Write("short.swl", whole.substr(0, whole.size() - 1))}, 2,
                 "truncated");

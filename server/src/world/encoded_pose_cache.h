@@ -22,7 +22,7 @@ struct PoseScratch {
 
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;  ///< For up to EncodedPoseCache::kMaxTicksAhead poses.
-  PlanScratch plan;  ///< For starting movements.
+  PlanScratch plan;            ///< For starting movements.
   EvaluationBatcher batcher;
   SoaPose stored;  ///< Poses given to EncodedPoseCache::Store.
   Pose pose;

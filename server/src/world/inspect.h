@@ -2,7 +2,6 @@
 
 #include <cstddef>
 
-#include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/messages.h"
 

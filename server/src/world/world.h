@@ -6,7 +6,6 @@
 #include <string>
 
 #include "base/check.h"
-#include "stridewire/protocol/messages.h"
 #include "runtime/avatar/avatar_simulation.h"
 #include "stridewire/protocol/messages.h"
 #include "stridewire/runtime/motion_library.h"

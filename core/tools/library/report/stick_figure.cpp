@@ -4,7 +4,6 @@
 
 #include "gnuplot.h"
 #include "offline/build/parameter_scales.h"
-#include "runtime/weights/correction.h"
 #include "runtime/pose/evaluate_poses.h"
 #include "runtime/weights/correction.h"
 
@@ -75,7 +74,8 @@ MovementPlayer::MovementPlayer(const MotionLibrary& library, int group_index)
 void MovementPlayer::Start(std::span<const double> parameters, bool corrected) {
   const MotionGroup& group = library_.group(group_index_);
   if (corrected) {
-    CorrectWeights(group, ValuesOf(parameters), DefaultCorrectionLimits(group), scratch_, movement_);
+    CorrectWeights(group, ValuesOf(parameters), DefaultCorrectionLimits(group), scratch_,
+                   movement_);
     movement_.group = group_index_;
   } else {
     SetWeights(group, group_index_, parameters, scratch_.weights(group), movement_);

@@ -125,8 +125,8 @@ TEST(RepairGlitches, DescribesEachJointOnce) {
       DescribeRepairs(figure.capture.skeleton, report, figure.capture.clip.fps);
   ASSERT_EQ(sentences.size(), 1u);
   EXPECT_THAT(sentences[0], ::testing::AllOf(::testing::StartsWith("LeftLeg turns 6"),
-                                        ::testing::HasSubstr("0.75 s"),
-                                        ::testing::EndsWith("with 2 smaller flips")));
+                                             ::testing::HasSubstr("0.75 s"),
+                                             ::testing::EndsWith("with 2 smaller flips")));
 }
 
 }  // namespace
