@@ -8,26 +8,27 @@
 
 namespace stridewire {
 
-/// What kind of thing went wrong, for code that reacts to it. People read `Describe()`.
+/// Kind of an error, for code that reacts to it. Describe() returns a text for people.
 enum class ErrorCode : std::uint8_t {
-  kInvalidArgument,  ///< A value that makes no sense here, whatever the state.
-  kOutOfRange,       ///< A number outside its stated range, or not finite.
-  kShapeMismatch,    ///< Two things that must have the same size do not.
-  kNotFound,         ///< A name, id or file that is not there.
-  kMalformed,        ///< Bytes or text that do not follow their format.
-  kUnsupported,      ///< Understood, but this build cannot do it.
-  kVersionMismatch,  ///< Made by another version of the format.
-  kLimitExceeded,    ///< A stated limit was reached.
-  kIllConditioned,   ///< A system of equations that has no trustworthy solution.
-  kIo,               ///< The operating system said no.
+  kInvalidArgument,  ///< A value is invalid regardless of the state of the object.
+  kOutOfRange,       ///< A number is outside its documented range or not finite.
+  kShapeMismatch,    ///< Two arrays or objects that must have the same size differ in size.
+  kNotFound,         ///< A name, id or file does not exist.
+  kMalformed,        ///< Bytes or text do not follow their format.
+  kUnsupported,      ///< The request is valid, but this build or library does not support it.
+  kVersionMismatch,  ///< The data has another version of the format.
+  kLimitExceeded,    ///< A documented limit was exceeded.
+  kIllConditioned,   ///< A system of equations has no numerically reliable solution.
+  kIo,               ///< An operating system call failed.
 };
 
-/// A failure: a code, a fixed sentence, and where. Runtime code leaves `where` empty, so that
-/// failing allocates nothing; code that reads files fills it with `file:line` or a field's name.
+/// An error with its code, a fixed sentence and its location. Runtime code leaves `where` empty, so
+/// that reporting an error does not allocate. Code that reads files sets `where` to "file:line" or
+/// to the name of a field.
 struct Error {
   ErrorCode code = ErrorCode::kInvalidArgument;
-  const char* text = "";    ///< Static storage; a sentence without the closing full stop.
-  std::int64_t index = -1;  ///< The offending index or value, -1 if there is none.
+  const char* text = "";    ///< A sentence without its full stop, in static storage.
+  std::int64_t index = -1;  ///< The offending index or value; -1 if there is none.
   std::string where;        ///< File and line, option or field; may be empty.
 };
 
@@ -35,22 +36,22 @@ template <typename T>
 using Expected = std::expected<T, Error>;
 using Status = std::expected<void, Error>;
 
-/// `return Fail(ErrorCode::kOutOfRange, "time is not finite");`
+/// Creates an error to return: `return Fail(ErrorCode::kOutOfRange, "time is not finite");`
 [[nodiscard]] inline std::unexpected<Error> Fail(ErrorCode code, const char* text,
                                                  std::int64_t index = -1) {
   return std::unexpected(Error{code, text, index, {}});
 }
 
-/// As above, naming a file and line, an option or a field.
+/// Creates an error that also contains its location: a file and line, an option or a field.
 [[nodiscard]] inline std::unexpected<Error> Fail(ErrorCode code, const char* text,
                                                  std::string where, std::int64_t index = -1) {
   return std::unexpected(Error{code, text, index, std::move(where)});
 }
 
-/// One sentence for a person: "walk.bvh:12: expected a joint name (3)".
+/// Formats an error as one sentence, for example "walk.bvh:12: expected a joint name (3)".
 [[nodiscard]] std::string Describe(const Error& error);
 
-/// Stable lower-case name of a code, e.g. "out_of_range".
+/// Returns the stable lower-case name of a code, for example "out_of_range".
 [[nodiscard]] std::string_view ErrorCodeName(ErrorCode code);
 
 }  // namespace stridewire

@@ -32,7 +32,7 @@ struct FootprintError {
   double turn_rad = 0.0;    ///< Difference of their headings, >= 0.
 };
 
-/// Something that happened to an avatar during Advance. The type says which fields are set.
+/// Something that happened to an avatar during Advance. The type determines which fields are set.
 struct AvatarEvent {
   AvatarEventType type = AvatarEventType::kIdle;
   std::uint64_t request_id = 0;  ///< 0 for a step that the avatar inserted itself.
@@ -79,8 +79,8 @@ struct AvatarOptions {
 
 class AvatarSimulation;
 
-/// A character that plays requests one after the other: base frame, queue of requests, movement
-/// under way, displayed pose.
+/// A character that plays requests one after the other. Its state consists of a base frame, a queue
+/// of requests, the current movement and the displayed pose.
 ///
 /// Time is an argument: only Advance moves the avatar. The same library, start, requests and time
 /// steps give the same pose bytes on every machine. Not thread-safe; avatars share nothing but the
@@ -90,7 +90,8 @@ class Avatar {
   static constexpr int kMaxQueue = 1024;
   static constexpr std::size_t kMaxEventsPerAdvance = 16;
 
-  /// The avatar stands at `start` in the library's stand pose. `library` must not be null.
+  /// Creates an avatar that stands at `start` in the library's stand pose. `library` must not be
+  /// null.
   Avatar(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
          const AvatarOptions& options = {});
   ~Avatar();
@@ -106,18 +107,19 @@ class Avatar {
   /// Drops the requests that have not started and returns their number.
   int CancelQueue();
 
-  /// Starts, changes or ends a layer with the next Advance. kNotFound: no such layer; kOutOfRange:
-  /// a number is not finite or out of its range; kLimitExceeded: four layers are playing.
+  /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
+  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if four layers
+  /// are already playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Turns foot planting on or off, from the next movement on. kUnsupported: the skeleton of the
-  /// library does not support foot planting.
+  /// Enables or disables foot planting for the movements that start from now on. Fails with
+  /// kUnsupported if the library's skeleton does not support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
 
-  /// Replaces the ground. Feet that stand keep their place until their next step.
+  /// Replaces the terrain. Standing feet keep their positions until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain);
 
   /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
@@ -128,7 +130,7 @@ class Avatar {
   [[nodiscard]] ConstPoseSpan pose() const;
   /// Events of the last Advance, in order. Valid until the next Advance.
   [[nodiscard]] std::span<const AvatarEvent> events() const;
-  /// Base frame of the movement under way, or of the stand.
+  /// Base frame of the current movement or stand.
   [[nodiscard]] const BaseFrame& base() const;
   /// Number of requests that have not started.
   [[nodiscard]] int queue_size() const;
@@ -153,8 +155,8 @@ class AvatarCrowd {
   AvatarCrowd(AvatarCrowd&&) noexcept;
   AvatarCrowd& operator=(AvatarCrowd&&) noexcept;
 
-  /// As Avatar::Advance for each avatar. All of them must use the library given to the constructor,
-  /// and each may be listed once only.
+  /// Advances each avatar like Avatar::Advance. All avatars must use the library that was passed to
+  /// the constructor, and none may be listed twice.
   void Advance(std::span<Avatar* const> avatars, double dt_s);
 
  private:

@@ -9,9 +9,10 @@
 
 namespace stridewire {
 
-/// Sampled motion M(t) = {t(t), r_j(t)}: frame f is at f / fps seconds.
+/// Sampled motion M(t) = {t(t), r_j(t)}: root positions and joint rotations over time. The time of
+/// frame f is f / fps seconds.
 struct Clip {
-  double fps = 0.0;
+  double fps = 0.0;  ///< Frames per second, in (0, 10000].
   int joint_count = 0;
   std::vector<Vec3> root_positions_m;  ///< [frame]
   std::vector<Quat> rotations;         ///< [frame * joint_count + joint]
@@ -39,17 +40,20 @@ struct Clip {
                      kIdentityQuat);
   }
 
-  /// kOutOfRange: fps not in (0, 10000], no frame, no joint; kShapeMismatch: rotation count;
-  /// kInvalidArgument: a number not finite or a rotation off unit length by more than 1e-3
-  /// (index: the frame).
+  /// Errors: kOutOfRange if fps is not in (0, 10000] or there are no frames or no joints.
+  /// kShapeMismatch if the number of rotations is not frames times joints. kInvalidArgument, with
+  /// the frame as index, if a number is not finite or the length of a rotation differs from 1 by
+  /// more than 1e-3.
   [[nodiscard]] Status Validate() const;
 };
 
-/// Flips quaternions so that each joint's track is continuous in sign over time.
+/// Negates quaternions where necessary, so that those of each joint do not change sign from one
+/// frame to the next.
 void MakeSignContinuous(Clip& clip);
 
-/// Pose at `time_s`, clamped to the clip: C1 (Catmull-Rom on positions and on sign-continuous
-/// rotations, then normalised). Linear 30 Hz would kink the velocity at every sample.
+/// Samples the pose at `time_s`, clamped to the duration of the clip. Interpolates positions and
+/// sign-continuous rotations with Catmull-Rom splines, so that velocities are continuous even at
+/// 30 frames per second.
 void SampleClip(const Clip& clip, double time_s, PoseSpan out);
 
 }  // namespace stridewire

@@ -24,10 +24,11 @@ enum class MovementKind : std::uint8_t {
   kStepLeft = 0,   ///< The left foot moves.
   kStepRight = 1,  ///< The right foot moves.
   kJump = 2,
-  kStand = 3,  ///< Holding a pose; has no group.
+  kStand = 3,  ///< Standing still. No group of a library has this kind.
 };
 
-[[nodiscard]] std::string_view MovementKindName(MovementKind kind);  ///< "step_left", …
+/// Returns the name of a kind, for example "step_left".
+[[nodiscard]] std::string_view MovementKindName(MovementKind kind);
 [[nodiscard]] constexpr bool IsStep(MovementKind kind) { return kind <= MovementKind::kStepRight; }
 [[nodiscard]] constexpr MovementKind StepKind(Foot foot) {
   return foot == Foot::kLeft ? MovementKind::kStepLeft : MovementKind::kStepRight;
@@ -36,9 +37,10 @@ enum class MovementKind : std::uint8_t {
   return step == MovementKind::kStepLeft ? Foot::kLeft : Foot::kRight;
 }
 
-/// Parameters a group may have. The first seven are a general step's, in this order (method,
-/// Section 6): moving foot minus fixed foot at the start in the start's heading frame, the same at
-/// the end in the end's heading frame, heading change. Feet are measured at the balls.
+/// Parameters that a group may have. General steps have the first seven in this order (method,
+/// Section 6): the vector from the fixed to the moving foot in the first pose, the same vector in
+/// the last pose, and the change of heading. Each vector is in the heading frame of its pose and is
+/// measured between the balls of the feet.
 enum class ParameterName : std::uint8_t {
   kStartX = 0,
   kStartY = 1,
@@ -47,33 +49,36 @@ enum class ParameterName : std::uint8_t {
   kEndY = 4,
   kEndZ = 5,
   kTurn = 6,
-  kLength = 7,  ///< Jump: forward distance between the feet's centres before and after.
-  kHeight = 8,  ///< Jump: height of the landing above the start.
+  kLength = 7,  ///< Jump: forward distance from the centre of the feet before to that after.
+  kHeight = 8,  ///< Jump: height of the landing place above the start.
 };
 inline constexpr int kParameterNameCount = 9;
 inline constexpr int kMaxParameters = 7;
 
-/// With its unit: "start_z_m", "turn_rad", "length_m".
+/// Returns the name of a parameter with its unit, for example "start_z_m" or "turn_rad".
 [[nodiscard]] std::string_view ParameterText(ParameterName name);
 
 struct Parameter {
   ParameterName name = ParameterName::kStartZ;
-  double min = 0.0;
-  double max = 0.0;
-  double centre = 0.0;  ///< Subtracted before the linear part (Section 3: rank deficiency).
-  double scale = 1.0;   ///< Parameters are divided by it before distances are taken; > 0.
+  double min = 0.0;  ///< Smallest value among the examples.
+  double max = 0.0;  ///< Largest value among the examples.
+  /// Subtracted from values before the linear part is evaluated (Section 3: rank deficiency).
+  double centre = 0.0;
+  double scale = 1.0;  ///< Values are divided by it before distances are computed; > 0.
 };
 
-/// Grid row: one example's pose at one grid point, as floats
+/// Layout of a grid row, which stores the pose of one example at one grid point as floats:
 ///   [joint] x y z w,  root x y z, root yaw,  zeros up to a multiple of 16.
-/// Joint 0's quaternion is the root rotation with its yaw taken off on the left (r = q_yaw * rest); the yaw is an
-/// unwrapped scalar, so examples may differ by more than half a turn. Positions and yaw are relative to the base frame.
+/// The root rotation r is split into r = q_yaw * rest. The quaternion of joint 0 is `rest`, and the
+/// yaw is stored as an angle. It is not wrapped, so examples may differ by more than half a turn.
+/// Positions and yaw are relative to the base frame.
 struct GridLayout {
   int joint_count = 0;
   int row_floats = 0;
   explicit constexpr GridLayout(int joints = 0)
       : joint_count(joints), row_floats((4 * (joints + 1) + 15) / 16 * 16) {}
-  /// Of a row of an example it is unit; of a sum of rows it need not be.
+  /// Returns the rotation of a joint. It has unit length in a row of an example, but not in a
+  /// weighted sum of rows.
   [[nodiscard]] static Quat RotationOf(const float* row, std::size_t joint) {
     const float* q = row + 4 * joint;
     return {q[3], q[0], q[1], q[2]};
@@ -102,60 +107,64 @@ struct GridLayout {
   }
 };
 
-/// The longest row of a grid.
+/// Number of floats in the longest possible grid row.
 inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 
-/// Examples that can be blended with each other: one kind, one set of parameters, the same number
-/// of keytimes, one grid. All spans point into the library's bytes.
+/// Examples that can be blended with each other. They have the same kind, parameters, number of
+/// keytimes and grid. All spans point into the bytes of the library.
 ///
-/// Sites are the examples, then the pseudoexamples; everything about weights is in site order.
+/// Sites are the points in parameter space where weights are prescribed: first the examples, then
+/// the pseudoexamples. n is the number of examples, m the number of sites and d the number of
+/// parameters.
 struct MotionGroup {
   MovementKind kind = MovementKind::kStepLeft;
-  std::vector<Parameter> parameters;     ///< d of them
-  int example_count = 0;                 ///< n
-  int site_count = 0;                    ///< m >= n
-  std::span<const double> sites;         ///< [site][parameter], in physical units
-  std::span<const double> site_weights;  ///< [site - n][example]: rows D of the pseudoexamples
-  std::span<const double> dilations;     ///< [site], scaled units
-  double radius_factor = 1.0;            ///< Of the examples' dilations; refinement starts from it
-  std::span<const double> linear;        ///< [1 + d][example]: a, row 0 the constant
-  std::span<const double> radial;        ///< [site][example]: r
-  std::span<const int> cells;            ///< [interval]: grid cells of each keytime interval
-  int grid_point_count = 0;              ///< sum of cells + 1
-  std::span<const double> keytimes_s;    ///< [example][interval + 1], K_0 = 0
-  std::span<const double> heading_change_rad;  ///< [example]: stride heading at the end
-  std::span<const float> grid;             ///< [grid point][example][row_floats], 64-byte aligned
-  std::vector<std::string_view> sources;   ///< [example]: "16_21.bvh 0.93-1.47 s"
-  std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if made by mirroring
+  std::vector<Parameter> parameters;           ///< d parameters.
+  int example_count = 0;                       ///< n.
+  int site_count = 0;                          ///< m >= n.
+  std::span<const double> sites;               ///< [site][parameter], in metres or radians.
+  std::span<const double> site_weights;        ///< [site - n][example]: weights of pseudoexamples.
+  std::span<const double> dilations;           ///< [site], in units of Parameter::scale.
+  double radius_factor = 1.0;                  ///< Factor in the dilations of the examples.
+  std::span<const double> linear;              ///< [1 + d][example]: a. Row 0 is the constant.
+  std::span<const double> radial;              ///< [site][example]: r.
+  std::span<const int> cells;                  ///< Grid cells per keytime interval.
+  int grid_point_count = 0;                    ///< Sum of `cells`, plus 1.
+  std::span<const double> keytimes_s;          ///< [example][interval + 1], with K_0 = 0.
+  std::span<const double> heading_change_rad;  ///< [example]: heading at the end, from 0.
+  std::span<const float> grid;             ///< [grid point][example][row_floats], 64-byte aligned.
+  std::vector<std::string_view> sources;   ///< [example]: for example "16_21.bvh 0.93-1.47 s".
+  std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
 
   [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
   [[nodiscard]] int interval_count() const { return static_cast<int>(cells.size()); }
-  /// Index of a parameter in this group, -1 if the group does not have it.
+  /// Returns the index of a parameter in this group, or -1.
   [[nodiscard]] int FindParameter(ParameterName name) const;
   [[nodiscard]] std::span<const double> site(int s) const {
     return sites.subspan(static_cast<std::size_t>(s) * parameters.size(), parameters.size());
   }
 };
 
-/// An immutable library of examples: a view of verified bytes (a mapped `.swl` file or memory).
-/// Shared between threads by `shared_ptr<const>`.
+/// An immutable library of examples. It is a view of verified bytes, either a mapped `.swl` file or
+/// memory. Threads may share it.
 ///
-/// File: a 64-byte header (magic, version, payload size, XXH3-128 of the payload), then one
-/// FlatBuffers table (`core/schema/motion_library.fbs`) whose float arrays are 64-byte aligned.
+/// The file has a 64-byte header (magic, version, payload size, XXH3-128 hash of the payload) and a
+/// payload, which is one FlatBuffers table (`core/schema/motion_library.fbs`). Its float arrays are
+/// aligned to 64 bytes.
 class MotionLibrary {
  public:
   static constexpr int kFormatVersion = 3;
   static constexpr std::size_t kMaxFileBytes = std::size_t{1} << 30;
   static constexpr int kMaxGroups = 256;
-  static constexpr int kMaxExamples = 4096;    ///< A group.
-  static constexpr int kMaxGridPoints = 4096;  ///< A group.
+  static constexpr int kMaxExamples = 4096;    ///< Per group.
+  static constexpr int kMaxGridPoints = 4096;  ///< Per group.
 
-  /// Verifies header, hash, FlatBuffers structure and meaning before anything is used.
-  /// kMalformed, kVersionMismatch, kLimitExceeded, kIo; `where` names the file.
+  /// Opens a library file. Verifies its header, hash and FlatBuffers structure and validates all
+  /// values before it uses any. Errors: kMalformed, kVersionMismatch, kLimitExceeded or kIo, with
+  /// the file in `where`.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> Open(
       const std::filesystem::path& path);
 
-  /// The same on bytes in memory; copies them.
+  /// Same as Open, for bytes in memory. Copies the bytes.
   [[nodiscard]] static Expected<std::shared_ptr<const MotionLibrary>> FromBytes(
       std::span<const std::byte> bytes);
 
@@ -169,27 +178,28 @@ class MotionLibrary {
   [[nodiscard]] const MotionGroup& group(int index) const {
     return groups_[static_cast<std::size_t>(index)];
   }
-  /// Clips to be played over the movement, names all different; kMaxLayerClips at most.
+  /// Clips that can be played over movements, at most kMaxLayerClips. Their names are unique.
   [[nodiscard]] std::span<const LayerClip> layers() const;
-  /// Index of the layer of that name, -1 if there is none.
+  /// Returns the index of the layer with this name, or -1.
   [[nodiscard]] int FindLayer(std::string_view name) const;
-  /// How movements go on where others ended: [from][to] of all groups and, behind them, the stand. Empty in a
-  /// library made before there were any.
+  /// Transitions between movements as a table [from][to]. Each index is a group, or the number of
+  /// groups for the stand. Empty if the library file contains no transitions.
   [[nodiscard]] std::span<const Transition> transitions() const;
-  /// One of them; `from` and `to` are groups, or as many as there are groups: the stand. Null if the library
-  /// has none.
+  /// Returns the transition between two groups. The number of groups as index means the stand.
+  /// Returns null if the library file contains no transitions.
   [[nodiscard]] const Transition* FindTransition(std::size_t from, std::size_t to) const;
-  /// Pose avatars stand in when they are put into a world: base frame at the root, y above ground.
+  /// Pose of an avatar that has just been spawned, relative to its base frame. The root is at
+  /// x = z = 0 with heading 0, and y is above the ground.
   [[nodiscard]] const Pose& stand_pose() const { return stand_pose_; }
-  /// The skeleton's legs, for planting.
+  /// Geometry of the skeleton's legs, for foot planting.
   [[nodiscard]] const LegRig& leg_rig() const { return *leg_rig_; }
-  /// How its examples walk, for walks to a place.
+  /// Typical lengths and widths of the library's steps, from which walks are planned.
   [[nodiscard]] const LocomotionProfile& locomotion_profile() const { return *locomotion_profile_; }
-  /// 32 lower-case hex digits: XXH3-128 of the payload.
+  /// XXH3-128 hash of the payload, as 32 lower-case hexadecimal digits.
   [[nodiscard]] const std::string& hash() const { return hash_; }
-  /// The whole file, header included: what `Open` read and what may be written elsewhere.
+  /// Content of the library file, including its header.
   [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }
-  /// Largest example count over the groups; sizes scratch memory.
+  /// Largest number of examples in a group. Callers size scratch memory with it.
   [[nodiscard]] int max_example_count() const { return max_example_count_; }
 
  private:

@@ -11,107 +11,116 @@
 
 namespace stridewire {
 
-/// Where a movement starts: a point on the ground that carries the avatar and a heading. The poses of
-/// a movement are relative to it: world = position_m + R_y(heading_rad) * local.
+/// Coordinate frame in which a movement starts: a point on the ground under the avatar, and a
+/// heading. Poses of the movement are relative to it:
+/// world = position_m + R_y(heading_rad) * local.
 struct BaseFrame {
   DVec3 position_m = DVec3(0.0);
   double heading_rad = 0.0;  ///< Not wrapped: 2 pi is one full turn to the left.
 };
 
-/// The place where a foot stands: the point of the ground below the ball of the foot.
+/// Position and heading of a standing foot. The position is the point on the ground below the ball
+/// of the foot.
 struct Footprint {
   DVec3 position_m = DVec3(0.0);
   /// Direction from heel to ball, minus the toe-out of that foot in the stand pose.
   double heading_rad = 0.0;
 };
 
-/// A footprint asked for. Without a heading: that of the avatar when the step begins.
+/// A requested footprint. Without `heading_rad`, the foot gets the heading that the avatar has when
+/// the step begins.
 struct FootprintRequest {
   DVec3 position_m = DVec3(0.0);
   std::optional<double> heading_rad;
 };
 
-/// One step: where the moving foot lands relative to the fixed one.
+/// Requests one step. The moving foot lands either relative to the fixed foot, or at a position in
+/// the world (`at`).
 struct StepRequest {
-  std::optional<Foot> foot;      ///< Left out: the other foot than last time.
-  double length_m = 0.0;         ///< Forward distance between the feet at the end; 0 closes.
-  std::optional<double> side_m;  ///< Fixed to moving foot, positive to the moving foot's own side.
-  double height_m = 0.0;         ///< Moving above fixed foot at the end.
-  double turn_rad = 0.0;         ///< Change of heading, left positive.
-  /// Instead of all of these: where the moving foot lands in the world.
+  std::optional<Foot> foot;  ///< Moving foot. Default: the foot that did not move last.
+  double length_m = 0.0;     ///< Forward distance between the feet at the end; 0: side by side.
+  /// Sideways distance from the fixed to the moving foot, positive to the side of the moving foot.
+  std::optional<double> side_m;
+  double height_m = 0.0;  ///< Height of the moving foot above the fixed foot at the end.
+  double turn_rad = 0.0;  ///< Change of heading; positive turns left.
+  /// Footprint of the moving foot in the world. It replaces length, side, height and turn.
   std::optional<FootprintRequest> at;
-  /// Only with `at`: if that is out of reach when the step is about to start, it is rejected instead of landing
-  /// as near as it can.
+  /// Only with `at`. If the footprint is out of reach when the step is about to start, the request
+  /// is rejected. Otherwise the foot lands as close to the footprint as possible.
   bool exact_only = false;
 };
 
 struct JumpRequest {
-  double length_m = 0.0;
-  double height_m = 0.0;
-  double turn_rad = 0.0;
+  double length_m = 0.0;  ///< Forward distance.
+  double height_m = 0.0;  ///< Height of the landing place above the start.
+  double turn_rad = 0.0;  ///< Change of heading; positive turns left.
 };
 
-/// Stands for a while; a walking avatar closes its feet first.
+/// Requests standing still for `seconds`. A walking avatar first brings its feet together.
 struct StandRequest {
   double seconds = 0.0;
 };
 
-/// A walk to a place in as many steps as it takes (walk_planner.h). Its steps carry the request's id; a
-/// finished stand with that id says that it has arrived, a rejected one why it can not.
+/// Requests a walk to a place, with as many steps as necessary (walk_planner.h). Events of its steps
+/// have the id of the request. On arrival a kFinished event of kind kStand with this id follows; if
+/// the walk fails, a kRejected event with the reason.
 struct WalkRequest {
-  DVec3 position_m = DVec3(0.0);    ///< Of the base frame; y is the ground's, whatever it says
-  double heading_rad = 0.0;         ///< Of the base frame
-  std::vector<DVec3> waypoints_m;   ///< Passed on the way, in order; at most kMaxWaypoints
-  std::optional<double> speed_m_s;  ///< As near as the library's steps come to it
+  DVec3 position_m = DVec3(0.0);    ///< Base frame at the end. y is ignored; the ground sets it.
+  double heading_rad = 0.0;         ///< Heading of the base frame at the end.
+  std::vector<DVec3> waypoints_m;   ///< Points to pass in this order; at most kMaxWaypoints.
+  std::optional<double> speed_m_s;  ///< Approximated as closely as the library's steps allow.
 };
 
-/// When a request begins, and what becomes of those before it.
+/// When a request begins, and whether it replaces the requests before it.
 enum class Interrupt : std::uint8_t {
-  kNone,           ///< After all that is queued
-  kAfterMovement,  ///< After the movement under way; what is queued is dropped, a stand or walk ends
-  /// At once if both feet stand, else when they have landed; what is queued is dropped. A step of the foot
-  /// that swings takes it to its own footprint, if there is swing enough left (AvatarSimulation::kLeastSwingLeft). Who
-  /// is to stand finishes the movement first.
+  kNone,  ///< After all queued requests.
+  /// After the current movement. A current stand or walk ends. The queue is dropped.
+  kAfterMovement,
+  /// At once if both feet stand, otherwise as soon as they have landed. The queue is dropped. If a
+  /// step of the swinging foot is requested early enough in the swing
+  /// (AvatarSimulation::kLeastSwingLeft), the foot is redirected to the new footprint. A stand
+  /// request waits for the end of the movement.
   kNow,
 };
 
 struct MovementRequest {
-  std::uint64_t id = 0;  ///< The caller's; comes back in events.
+  std::uint64_t id = 0;  ///< Chosen by the caller and repeated in events.
   std::variant<StepRequest, JumpRequest, StandRequest, WalkRequest> movement;
   Interrupt interrupt = Interrupt::kNone;
 };
 
-/// Starts, changes or ends one of the library's layer clips on top of the movement.
+/// Starts, changes or ends a layer clip of the library, which plays over the movements.
 struct LayerRequest {
   int layer = 0;         ///< Index in MotionLibrary::layers().
   bool enabled = true;   ///< False ends the layer; weight and speed are then ignored.
-  double weight = 1.0;   ///< (0, 1]; multiplies the joint mask of the clip.
-  double blend_s = 0.3;  ///< Seconds until weight and speed are reached, [0, kMaxLayerBlendS].
-  double speed = 1.0;    ///< Playback speed, [kMinLayerSpeed, kMaxLayerSpeed]; 1 is as recorded.
+  double weight = 1.0;   ///< Factor on the joint weights of the clip, in (0, 1].
+  double blend_s = 0.3;  ///< Seconds until weight and speed are reached, in [0, kMaxLayerBlendS].
+  double speed = 1.0;    ///< Playback speed, kMinLayerSpeed to kMaxLayerSpeed; 1: as recorded.
 };
 inline constexpr double kMaxLayerBlendS = 10.0;
 inline constexpr double kMinLayerSpeed = 0.1;
 inline constexpr double kMaxLayerSpeed = 4.0;
 
-/// Limits on what may be asked for, far outside what any library spans: meaning, not taste.
-inline constexpr double kMaxRequestLengthM = 10.0;  ///< Lengths, sides and heights, either sign.
+/// Limits on requests. They only reject nonsense and are far wider than the range of any library.
+inline constexpr double kMaxRequestLengthM = 10.0;  ///< Magnitude of lengths, sides and heights.
 inline constexpr double kMaxRequestTurnRad = 3.2;
 inline constexpr double kMaxStandS = 3600.0;
-inline constexpr double kMaxWalkPositionM =
-    1e6;  ///< Each coordinate of goals, waypoints, footprints.
-inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Of goals and footprints.
+/// Largest magnitude of a coordinate of a goal, waypoint or footprint.
+inline constexpr double kMaxWalkPositionM = 1e6;
+inline constexpr double kMaxWalkHeadingRad = 1e4;  ///< Heading of a goal or footprint, magnitude.
 inline constexpr double kMinWalkSpeedMPerS = 0.05;
 inline constexpr double kMaxWalkSpeedMPerS = 5.0;
 inline constexpr std::size_t kMaxWaypoints = 64;
 
-/// kOutOfRange: a number not finite or beyond its limit; kInvalidArgument: nothing is there that must be
-/// met; kUnsupported: the library has no movement of that kind.
+/// Checks a request. Errors: kOutOfRange if a number is not finite or exceeds its limit;
+/// kInvalidArgument if `exact_only` is set without `at`; kUnsupported if the library has no movement
+/// of the requested kind.
 [[nodiscard]] Status ValidateRequest(const MotionLibrary& library, const MovementRequest& request);
 
-/// Parameter values in the order of the group they belong to; `count` = its parameter count.
+/// Values of the parameters of a group, in the order of MotionGroup::parameters.
 struct ParameterValues {
   std::array<double, kMaxParameters> values{};
-  int count = 0;
+  int count = 0;  ///< Number of values used.
 };
 
 }  // namespace stridewire

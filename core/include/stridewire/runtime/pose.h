@@ -9,9 +9,9 @@
 
 namespace stridewire {
 
-/// Borrowed pose: root translation and one local rotation a joint. rotations[0] is the root's, in
-/// the frame the pose is meant in (the world, or a base frame); the others are relative to their
-/// parent. The paper's posture with translations of the root only.
+/// Borrowed pose: the position of the root and one rotation per joint. rotations[0] is that of the
+/// root, relative to the world or to a base frame. The others are relative to the parent joint.
+/// This is the posture of the paper, in which only the root has a translation.
 struct ConstPoseSpan {
   const Vec3& root_position_m;
   std::span<const Quat> rotations;
@@ -24,7 +24,7 @@ struct PoseSpan {
   operator ConstPoseSpan() const { return {root_position_m, rotations}; }
 };
 
-/// Owned pose.
+/// A pose that owns its rotations.
 struct Pose {
   Vec3 root_position_m = Vec3(0.0f);
   std::vector<Quat> rotations;
@@ -36,26 +36,28 @@ struct Pose {
   operator ConstPoseSpan() const { return {root_position_m, rotations}; }  // NOLINT
 };
 
-/// Joint positions and world rotations of a pose. `positions` and `world_rotations` hold one value
-/// a joint. Never allocates.
+/// Computes the positions and world rotations of all joints. `positions` and `world_rotations` must
+/// have one element per joint. Never allocates.
 void ForwardKinematics(const Skeleton& skeleton, ConstPoseSpan pose, std::span<Vec3> positions,
                        std::span<Quat> world_rotations);
 
-/// World position of the ball of a foot. Walks up from the foot to the root; never allocates.
+/// Returns the world position of the ball of a foot. Evaluates only the joints from the root to the
+/// foot. Never allocates.
 [[nodiscard]] Vec3 BallPosition(const Skeleton& skeleton, ConstPoseSpan pose, Foot foot);
 
-/// World position of a point given in a joint's frame.
+/// Returns the world position of a point given in the frame of a joint.
 [[nodiscard]] Vec3 PointPosition(const Skeleton& skeleton, ConstPoseSpan pose, int joint,
                                  const Vec3& offset_m);
 
 /// Pose arithmetic (paper, Section 5). Sums do not commute:
 ///   A + B = {t_A + t_B, r_B r_A},  A - B = {t_A - t_B, r_B^-1 r_A},  c A = {c t_A, slerp(1, r_A, c)}
-/// so that (A - B) + B = A. All poses have the same number of joints; `out` may alias an input.
+/// so that (A - B) + B = A. All poses must have the same number of joints. `out` may alias an
+/// input.
 void Add(ConstPoseSpan a, ConstPoseSpan b, PoseSpan out);
 void Subtract(ConstPoseSpan a, ConstPoseSpan b, PoseSpan out);
 void Scale(float c, ConstPoseSpan a, PoseSpan out);
 
-/// Largest angle between equal joints of two poses, radians.
+/// Returns the largest angle between the rotations of the same joint in two poses, in radians.
 [[nodiscard]] double LargestJointAngle(ConstPoseSpan a, ConstPoseSpan b);
 
 }  // namespace stridewire

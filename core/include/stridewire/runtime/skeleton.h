@@ -9,7 +9,7 @@
 
 namespace stridewire {
 
-/// Left and right as the figure has them; a step is named after the foot that moves.
+/// Left or right foot, from the point of view of the figure. A step is named after the moving foot.
 enum class Foot : std::uint8_t { kLeft = 0, kRight = 1 };
 
 [[nodiscard]] constexpr Foot OtherFoot(Foot foot) {
@@ -19,29 +19,30 @@ enum class Foot : std::uint8_t { kLeft = 0, kRight = 1 };
 struct Joint {
   std::string name;
   int parent = -1;  ///< Index of the parent, always smaller than its own; -1 for the root.
-  Vec3 offset_m = Vec3(0.0f);  ///< Where the joint sits in its parent's frame; unused for the root.
+  Vec3 offset_m = Vec3(0.0f);  ///< Position in the frame of the parent; unused for the root.
 };
 
-/// The tip of a chain (BVH `End Site`): no rotation of its own.
+/// The end of a chain of joints (BVH `End Site`). It has no rotation.
 struct EndSite {
-  int joint = 0;
-  Vec3 offset_m = Vec3(0.0f);
+  int joint = 0;               ///< Index of the last joint of the chain.
+  Vec3 offset_m = Vec3(0.0f);  ///< Position in the frame of that joint.
 };
 
-/// The joints of one leg, as indices. `ball` carries the ball of the foot, where feet are measured
-/// (over a step ankles drift 6.5 cm by foot roll, balls 3.6); a figure without a toe joint has it
-/// on the ankle with an offset.
+/// Indices of the joints of one leg. Positions of feet are measured at the ball, because a standing
+/// foot rolls: during a step the ankle drifts by 6.5 cm, the ball only by 3.6 cm. If the skeleton
+/// has no toe joint, `ball` is the ankle and `ball_offset_m` the position of the ball.
 struct Leg {
   int hip = -1;
   int knee = -1;
   int ankle = -1;
   int ball = -1;
-  Vec3 ball_offset_m = Vec3(0.0f);     ///< The ball in the frame of joint `ball`.
-  Vec3 toe_tip_offset_m = Vec3(0.0f);  ///< The tip of the toes in the frame of joint `ball`.
+  Vec3 ball_offset_m = Vec3(0.0f);     ///< Ball of the foot, in the frame of joint `ball`.
+  Vec3 toe_tip_offset_m = Vec3(0.0f);  ///< Tip of the toes, in the frame of joint `ball`.
 };
 
-/// A tree of joints, root first, parents before children. At identity rotations the figure faces
-/// +Z with +Y up. Only the root moves; every other joint keeps its offset.
+/// A tree of joints. The root is first and parents precede their children. If all rotations are the
+/// identity, the figure faces +Z with +Y up. Only the root has a translation; all other joints keep
+/// their offsets.
 struct Skeleton {
   std::vector<Joint> joints;
   std::vector<EndSite> end_sites;
@@ -50,11 +51,12 @@ struct Skeleton {
   [[nodiscard]] int joint_count() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] const Leg& leg(Foot foot) const { return legs[static_cast<int>(foot)]; }
 
-  /// Index of the joint of that name, -1 if there is none.
+  /// Returns the index of the joint with this name, or -1.
   [[nodiscard]] int FindJoint(std::string_view name) const;
 
-  /// kOutOfRange: no joint, more than kMaxJoints, a parent not before its child, a leg's joint
-  /// index outside; kInvalidArgument: an offset is not finite, a name is empty or stands twice.
+  /// Errors: kOutOfRange if there are no joints or more than kMaxJoints, if a joint precedes its
+  /// parent, or if a joint index of a leg is invalid. kInvalidArgument if an offset is not finite,
+  /// or a name is empty or a duplicate.
   [[nodiscard]] Status Validate() const;
 };
 

@@ -12,104 +12,108 @@
 
 namespace stridewire {
 
-/// Limits on a terrain; beyond one of them Terrain::Make fails.
+/// Limits on a terrain. Terrain::Make fails if one of them is exceeded.
 inline constexpr std::int32_t kMaxTerrainColumns = 1024;
 inline constexpr std::int32_t kMaxTerrainRows = 1024;
 inline constexpr std::size_t kMaxTerrainBoxes = 65'536;
-inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Of the ground, either sign.
-inline constexpr double kMinTerrainCellM = 0.01;   ///< Between two samples of a height field.
+inline constexpr double kMaxTerrainHeightM = 1e4;  ///< Magnitude of ground heights.
+inline constexpr double kMinTerrainCellM = 0.01;   ///< Distance of samples of a height field.
 inline constexpr double kMaxTerrainCellM = 1e3;
-inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Each coordinate, either sign.
-/// How many boxes may meet one cell of the index that a terrain makes for itself: what bounds the
-/// time of a query. Reached only where hundreds of boxes lie over one another.
+inline constexpr double kMaxTerrainPositionM = 1e6;  ///< Magnitude of each coordinate.
+/// Largest number of boxes that intersect one cell of the terrain's spatial index, which bounds the
+/// time of a query. Only terrains in which hundreds of boxes overlap exceed it.
 inline constexpr std::size_t kMaxTerrainBoxesPerCell = 256;
 
-/// A place on the ground, seen from above.
+/// Horizontal position, in metres.
 struct GroundPoint {
   double x = 0.0;
   double z = 0.0;
   bool operator==(const GroundPoint&) const = default;
 };
 
-/// Heights at the corners of a grid: sample (column, row) lies at origin + cell (column, row), so
-/// the field covers (columns - 1) x (rows - 1) cells, its border included. Between the samples the
-/// ground is bilinear.
+/// Heights at the corners of grid cells. Sample (column, row) is at origin + cell * (column, row),
+/// so the field covers (columns - 1) x (rows - 1) cells, including its border. Heights between
+/// samples are interpolated bilinearly.
 struct HeightField {
-  GroundPoint origin_m;      ///< Sample (0, 0), where x and z are least.
-  double cell_m = 0.0;       ///< From one sample to the next; kMinTerrainCellM to kMaxTerrainCellM.
-  std::int32_t columns = 0;  ///< Samples along x, 2 to kMaxTerrainColumns.
-  std::int32_t rows = 0;     ///< Samples along z, 2 to kMaxTerrainRows.
-  std::vector<float> heights_m;  ///< [row][column]: row by row, x fastest.
+  GroundPoint origin_m;          ///< Position of sample (0, 0), which has the smallest x and z.
+  double cell_m = 0.0;           ///< Distance of samples, kMinTerrainCellM to kMaxTerrainCellM.
+  std::int32_t columns = 0;      ///< Samples along x, 2 to kMaxTerrainColumns.
+  std::int32_t rows = 0;         ///< Samples along z, 2 to kMaxTerrainRows.
+  std::vector<float> heights_m;  ///< [row][column], in metres.
   bool operator==(const HeightField&) const = default;
 };
 
-/// A block with upright sides and a flat top; its borders belong to it.
+/// A block with vertical sides and a flat top, for example a stair tread. Points on its border are
+/// inside.
 struct TerrainBox {
   GroundPoint min_m;
-  GroundPoint max_m;      ///< Above `min_m` in both.
-  double height_m = 0.0;  ///< Of its top, in the world.
+  GroundPoint max_m;      ///< Both coordinates must exceed those of `min_m`.
+  double height_m = 0.0;  ///< World height of the top.
   bool operator==(const TerrainBox&) const = default;
 };
 
-/// The ground of a world as it is written down, sent and drawn. Nothing at all: flat at y = 0.
+/// Describes the ground of a world, for files, messages and rendering. If empty, the ground is flat
+/// at y = 0.
 struct TerrainData {
   std::optional<HeightField> height_field;
   std::vector<TerrainBox> boxes;
   bool operator==(const TerrainData&) const = default;
 };
 
-/// The ground that feet land on: a height field where there is one, y = 0 elsewhere, and boxes
-/// standing in it.
+/// The ground that feet land on: a height field, y = 0 outside of it, and boxes.
 ///
 ///   height(x, z) = max(field(x, z) or 0, tops of all boxes that contain (x, z))
 ///
-/// Immutable; share it between avatars and threads. Queries never allocate, use no trigonometry of
-/// the C library (same bytes on every machine), and look only at what lies near, through a uniform
-/// grid over the boxes. A coordinate that is not finite is outside of everything.
+/// Immutable, so avatars and threads may share it. Queries never allocate and give the same bytes on
+/// every machine. They find nearby boxes in a uniform grid. A position that is not finite is
+/// outside the field and all boxes.
 class Terrain {
  public:
-  /// Checks and indexes. `where` of an error names the field, e.g. "boxes[3].max_m".
-  /// kOutOfRange: a number not finite or beyond its limit, or max_m not above min_m;
-  /// kShapeMismatch: heights_m has not columns x rows numbers; kLimitExceeded: too many boxes, all
-  /// together or over one another.
+  /// Validates `data` and builds the spatial index.
+  ///
+  /// Errors, with the field in `where`, for example "boxes[3].max_m": kOutOfRange if a number is not
+  /// finite or exceeds its limit, or max_m does not exceed min_m. kShapeMismatch if the size of
+  /// heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total or in one
+  /// cell of the index.
   [[nodiscard]] static Expected<std::shared_ptr<const Terrain>> Make(TerrainData data);
 
   [[nodiscard]] const TerrainData& data() const { return data_; }
 
-  /// Height of the ground in metres.
+  /// Returns the height of the ground in metres.
   [[nodiscard]] double HeightAt(double x_m, double z_m) const;
 
-  /// Unit normal of the ground: up on a box's top (also where it is level with the field) and
-  /// outside of the field, else that of the bilinear patch of the cell (x, z) is in. It is not
-  /// continuous from cell to cell; a point on the border of two belongs to the one with larger
-  /// coordinates, at the field's end to the last.
+  /// Returns the unit normal of the ground. It is vertical outside the field and on a box, also if
+  /// the box is level with the field. In the field it is the normal of the bilinear cell that
+  /// contains the point, and is not continuous between cells. A point on the border of two cells
+  /// belongs to the one with larger coordinates, at the end of the field to the last cell.
   [[nodiscard]] Vec3 NormalAt(double x_m, double z_m) const;
 
-  /// Highest ground in the closed disc. Exact for boxes and the field's outline; a field's highest
-  /// is taken over the square around the disc, so it may be told too high but never too low.
-  /// A radius <= 0 is a point. Time grows with the square of the radius.
+  /// Returns an upper bound for the height of the ground in a closed disc. It is exact for boxes and
+  /// for y = 0 outside the field. For the field it is the maximum over the square that encloses the
+  /// disc. A radius <= 0 means a point. The time grows with the square of the radius.
   [[nodiscard]] double HighestWithin(double x_m, double z_m, double radius_m) const;
 
-  /// Lowest ground in the disc (its greatest lower bound): what boxes cover together does not
-  /// count, so the seam of two slabs is no gap. Exact for boxes and the field's outline as long as
-  /// at most 32 boxes meet the disc; else it may be told too low but never too high, as with a
-  /// field, whose lowest is taken over squares.
+  /// Returns a lower bound for the height of the ground in a disc. Ground that is covered by boxes
+  /// does not count, so the seam between two adjacent boxes is not a gap. The result is exact for
+  /// boxes and for y = 0 outside the field if at most 32 boxes intersect the disc. Otherwise, and
+  /// for the field, whose minimum is taken over squares, it may be too low.
   [[nodiscard]] double LowestWithin(double x_m, double z_m, double radius_m) const;
 
  private:
-  /// Cells [first, last] of a grid along both axes; `first` > `last` where there are none.
+  /// Cells [first, last] of a grid along both axes. Empty if `first` > `last`.
   struct CellRange {
     std::int32_t first_x = 0;
     std::int32_t last_x = -1;
     std::int32_t first_z = 0;
     std::int32_t last_z = -1;
   };
-  /// x and z from `min` to `max`.
+  /// Horizontal rectangle from `min` to `max`.
   struct Rectangle {
     GroundPoint min;
     GroundPoint max;
   };
-  /// A cell of the field: its corners' heights, [x][z], and where in it a point is, 0 to 1 each way.
+  /// Heights at the corners of a field cell, h[x][z], and the position (s, t) of a point in the
+  /// cell, 0 to 1 along each axis.
   struct Patch {
     double h00, h10, h01, h11;
     double s, t;
@@ -125,20 +129,20 @@ class Terrain {
   [[nodiscard]] bool TryIndex(std::int32_t cells_x, std::int32_t cells_z);
   [[nodiscard]] CellRange IndexCells(const Rectangle& area) const;
   [[nodiscard]] bool InField(double x_m, double z_m) const;
-  [[nodiscard]] Patch PatchAt(double x_m, double z_m) const;  ///< Of a point in the field.
+  [[nodiscard]] Patch PatchAt(double x_m, double z_m) const;  ///< The point must be in the field.
   [[nodiscard]] double FieldHeight(double x_m, double z_m) const;
   [[nodiscard]] Extremes FieldExtremes(const Rectangle& area) const;
-  /// Index of the highest box that contains the point, -1 if there is none.
+  /// Returns the index of the highest box that contains the point, or -1.
   [[nodiscard]] std::int64_t HighestBoxAt(double x_m, double z_m) const;
-  /// Calls `visit(box)` once for each box that may meet `area`.
+  /// Calls `visit(box)` once for each box that may intersect `area`.
   template <typename Visit>
   void VisitBoxes(const Rectangle& area, Visit&& visit) const;
 
   TerrainData data_;
-  GroundPoint field_max_m_;  ///< Last sample of the field.
+  GroundPoint field_max_m_;  ///< Position of the last sample of the field.
 
-  // The grid over the boxes: cell (i, j) holds boxes_[starts_[c]] to boxes_[starts_[c + 1] - 1],
-  // c = j cells_x_ + i, highest first.
+  // Grid over the boxes. Cell (i, j) has the index c = j * cells_x_ + i and contains the boxes
+  // boxes_[starts_[c]] to boxes_[starts_[c + 1] - 1], the highest first.
   Rectangle bounds_;
   std::int32_t cells_x_ = 0;
   std::int32_t cells_z_ = 0;
