@@ -77,7 +77,8 @@ Json SelectionToJson(const std::vector<GroupSelection>& selections) {
 
 void PrintFile(const Extraction& extraction) {
   if (!extraction.error.empty()) {
-    std::printf("%s: left out\n", extraction.path.c_str());  // The reason is on stderr.
+    // PrintError has already printed the reason on stderr.
+    std::printf("%s: left out\n", extraction.path.c_str());
     return;
   }
   std::printf("%s: %d frames at %.0f per second; %d left and %d right steps, %d jumps\n",

@@ -29,7 +29,7 @@ int PrintOutputError(const Error& error);
 // Returns true if both paths name the same existing file.
 [[nodiscard]] bool IsSameFile(const std::filesystem::path& a, const std::filesystem::path& b);
 
-// Writes a file such that a partial file is never visible, see ReplaceFile.
+// Writes a file such that a partial file is never visible. See ReplaceFile.
 [[nodiscard]] Status WriteFile(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace stridewire

@@ -19,7 +19,7 @@ struct BuildCommand {
   std::optional<double> unit_m;  // Empty: detected.
   std::string left_ankle, right_ankle, left_ball, right_ball;
   std::string up;
-  std::optional<double> fps;  // Empty: the Frame Time of each file.
+  std::optional<double> fps;  // Frames per second. Empty: the Frame Time of each file.
 };
 int RunBuild(const BuildCommand& command);
 
@@ -65,9 +65,10 @@ int RunReport(const ReportCommand& command);
 struct AddLayersCommand {
   std::string library;
   std::string out;
-  std::vector<std::string> loops;   // NAME=FILE[:FROM_S:TO_S]
-  std::vector<std::string> once;    // Same format.
-  std::vector<std::string> joints;  // Empty: the upper body.
+  std::vector<std::string> loops;  // NAME=FILE[:FROM_S:TO_S]
+  std::vector<std::string> once;   // Same format.
+  // Names of the joints that the layer animates. Empty: the upper body.
+  std::vector<std::string> joints;
   bool json = false;
 };
 int RunAddLayers(const AddLayersCommand& command);

@@ -8,8 +8,8 @@
 
 namespace stridewire {
 
-// The output of `inspect --json`. With `examples` it contains all sites and weights, so that other
-// programs can recompute the interpolation.
+// Returns the output of `inspect --json`. With `examples` it contains all sites and weights, so
+// that other programs can recompute the interpolation.
 [[nodiscard]] nlohmann::ordered_json LibraryToJson(const MotionLibrary& library, bool examples);
 
 // {"start_z_m": ..., "end_z_m": ...}

@@ -15,7 +15,7 @@ volatile std::sig_atomic_t g_is_raised = 0;
 void Raise(int) { g_is_raised = 1; }
 
 constexpr auto kUpdateInterval = std::chrono::milliseconds(200);
-// Before this, the estimate of the time left is too uncertain to print.
+// Before this time, the estimate of the remaining time is too uncertain to print.
 constexpr auto kFirstUpdate = std::chrono::milliseconds(500);
 
 }  // namespace
@@ -24,7 +24,8 @@ InterruptSignal::InterruptSignal() {
   g_is_raised = 0;
   struct sigaction action{};
   action.sa_handler = Raise;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);  // The second signal has its default effect.
+  // Restores the default handler, so that a second signal ends the program.
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
   sigemptyset(&action.sa_mask);
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);

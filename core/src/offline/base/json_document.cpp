@@ -26,7 +26,8 @@ class DocumentBuilder final : public nlohmann::json_sax<nlohmann::json> {
     return Append(value) != nullptr;
   }
   bool string(string_t& value) override { return Append(std::move(value)) != nullptr; }
-  bool binary(binary_t& /*value*/) override { return false; }  // Not in JSON text.
+  // Binary values do not occur in JSON text.
+  bool binary(binary_t& /*value*/) override { return false; }
   bool start_object(std::size_t /*size*/) override { return Open(nlohmann::json::object()); }
   bool start_array(std::size_t /*size*/) override { return Open(nlohmann::json::array()); }
   bool end_object() override { return Close(); }

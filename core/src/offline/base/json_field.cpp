@@ -24,7 +24,8 @@ std::string Printable(const std::string& key) {
 Status CheckKeys(const JsonField& field, std::initializer_list<const char*> known) {
   if (!field.value.is_object()) {
     std::string where = field.where;
-    if (where.ends_with(": ")) where.resize(where.size() - 2);  // The whole document.
+    // An empty path means the whole document.
+    if (where.ends_with(": ")) where.resize(where.size() - 2);
     return Fail(ErrorCode::kMalformed, "expected an object", std::move(where));
   }
   for (const auto& item : field.value.items()) {
@@ -73,7 +74,7 @@ Expected<std::string> ReadTextFile(const std::filesystem::path& path, std::size_
   }
   std::ifstream stream(path, std::ios::binary);
   if (!stream) return Fail(ErrorCode::kIo, "cannot open the file", name);
-  // Reads up to the limit instead of asking for the size, since a pipe has none.
+  // Reads up to the limit instead of asking for the file size, because a pipe has no size.
   std::string text(max_bytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) return Fail(ErrorCode::kIo, "cannot read the file", name);

@@ -16,7 +16,7 @@ struct JsonField {
   const nlohmann::json& value;
   std::string where;
 
-  /// Returns null if there is no such key.
+  /// Returns null if the key does not exist.
   [[nodiscard]] const nlohmann::json* Find(const char* key) const {
     const auto found = value.find(key);
     return found == value.end() ? nullptr : &*found;
@@ -33,11 +33,11 @@ struct JsonLimit {
   const char* text;
 };
 
-/// Checks that the field is an object that contains no other keys than `known`.
+/// Checks that the field is an object whose keys are all in `known`.
 [[nodiscard]] Status CheckKeys(const JsonField& field, std::initializer_list<const char*> known);
 
-/// Reads a number. Errors: kMalformed if the value is not a number, kOutOfRange. On error `out`
-/// remains unchanged.
+/// Reads a number. Errors: kMalformed if the value is not a number, kOutOfRange if it is outside
+/// the limit. On error `out` remains unchanged.
 [[nodiscard]] Status ReadNumberAt(const nlohmann::json& value, std::string where,
                                   const JsonLimit& limit, double& out);
 

@@ -14,7 +14,7 @@
 namespace stridewire {
 namespace {
 
-// Tolerance for grid points on the boundary of the hull, in scaled parameters.
+// Points this close to the hull count as inside, in scaled parameters.
 constexpr double kInside = 1e-6;
 
 std::vector<double> Axis(const Parameter& parameter, int count) {

@@ -28,9 +28,9 @@ struct ErrorMap {
   double max_error_m = 0.0;        ///< Largest error on the map; the group may have larger ones.
 };
 
-/// Measures an error map. Parameters without axis are constant at their mean over the examples.
-/// Uses all processors; the result does not depend on their number. Error: kOutOfRange for an
-/// option or the group.
+/// Measures an error map. Each parameter without an axis has its mean value over the examples. Uses
+/// all processors; the result does not depend on their number. Error: kOutOfRange for an option or
+/// the group.
 [[nodiscard]] Expected<ErrorMap> MeasureErrorMap(const MotionLibrary& library, int group_index,
                                                  const ErrorMapOptions& options = {});
 

@@ -13,10 +13,11 @@ namespace stridewire {
 namespace {
 
 constexpr int kMinCells = 2;
-constexpr int kMaxCells = 400;  // Per interval; kMaxIntervals of them fit into the grid.
+// Limit per interval. kMaxIntervals times this number fits into the grid.
+constexpr int kMaxCells = 400;
 constexpr double kGrowth = 1.15;
 constexpr int kMaxRounds = 20;
-constexpr int kSamples = 24;  // Per interval and example.
+constexpr int kSamples = 24;  // Number of samples per interval and example.
 static_assert(kMaxCells * kMaxIntervals < MotionLibrary::kMaxGridPoints);
 
 struct IntervalLength {
@@ -38,7 +39,8 @@ IntervalLength LengthOf(const RawGroup& group, std::size_t interval) {
 std::vector<double> StoredErrors(const RawExample& example, const std::vector<int>& cells,
                                  const GridLayout& layout) {
   const GridExample stored = ResampleOnGrid(example, cells, layout);
-  // Uses a group with one example, to measure with the code that plays it.
+  // Puts each example into a group of its own, so that the error is measured with the code that
+  // plays it.
   MotionGroup alone;
   alone.example_count = 1;
   alone.cells = cells;
@@ -87,8 +89,8 @@ std::vector<int> ChooseCells(const RawGroup& group, double fps, const GridLayout
     most[i] = std::max(cells[i], cells_at(length.max_s, clip_fps));
   }
   for (int round = 0; round < kMaxRounds; ++round) {
-    // If the mean error of an example is too large, its intervals with an error above the mean
-    // grow.
+    // If the mean error of an example is too large, add cells to those of its intervals whose error
+    // is above the mean.
     std::vector<bool> grows(intervals, false);
     for (const RawExample& example : group.examples) {
       const std::vector<double> errors = StoredErrors(example, cells, layout);

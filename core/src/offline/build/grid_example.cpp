@@ -60,7 +60,8 @@ GridExample ResampleOnGrid(const RawExample& example, std::span<const int> cells
     SampleClip(clip, warp.TimeAt(p), pose);
     float* row = &result.rows[static_cast<std::size_t>(p) * row_floats];
     double wrapped_rad = yaw_rad;
-    HeadingOf(pose.rotations[0], wrapped_rad);  // Keeps the last yaw if the root is near vertical.
+    // If the root is nearly vertical, HeadingOf leaves the previous yaw unchanged.
+    HeadingOf(pose.rotations[0], wrapped_rad);
     yaw_rad = UnwrapAngle(wrapped_rad, yaw_rad);
     pose.rotations[0] = YawRotation(-yaw_rad) * pose.rotations[0];
     for (std::size_t j = 0; j < pose.rotations.size(); ++j) {

@@ -54,7 +54,7 @@ class GroupProbe {
 // The error e over the hull of the examples of a group.
 struct HullSurvey {
   double min_m = 0.0;
-  double mean_m = 0.0;  // Over the samples.
+  double mean_m = 0.0;  // Mean over the samples.
   double max_m = 0.0;
   double weight_sum_max = 0.0;
   std::vector<HullPoint> points;  // One per sample.
@@ -62,8 +62,8 @@ struct HullSurvey {
 };
 
 // Evaluates all samples and climbs from the worst ones by steepest ascent inside the hull. The
-// starting points keep a distance from each other. Uses one thread per probe; the result does not
-// depend on their number.
+// starting points have a minimum distance from each other. Uses one thread per probe; the result
+// does not depend on their number.
 [[nodiscard]] HullSurvey SurveyHull(const MotionGroup& group,
                                     std::span<const ParameterValues> samples,
                                     std::span<GroupProbe> probes);

@@ -46,7 +46,8 @@ struct LayerCut {
 [[nodiscard]] Expected<RawLayer> CutLayer(const Capture& capture, const Skeleton& skeleton,
                                           const LayerCut& cut);
 
-/// Layers in the form of a library: resampled to about kLayerKeysPerSecond, masked joints only.
+/// Converts layers to the form in which a library stores them: resampled to about
+/// kLayerKeysPerSecond, with the masked joints only.
 class StoredLayers {
  public:
   [[nodiscard]] std::span<const LayerClip> views() const { return views_; }
@@ -71,7 +72,7 @@ class StoredLayers {
 [[nodiscard]] Expected<StoredLayers> StoreLayers(std::span<const RawLayer> layers,
                                                  const Skeleton& skeleton);
 
-/// Returns a library with layers added; they replace layers with the same name. Errors as
+/// Returns a library with layers added; they replace layers with the same name. Errors: those of
 /// StoreLayers.
 [[nodiscard]] Expected<std::shared_ptr<const MotionLibrary>> AddLayers(
     const MotionLibrary& library, std::span<const RawLayer> layers);

@@ -54,9 +54,9 @@ Others OthersOf(const MotionGroup& group, int left_out, double cluster_diameter_
   return others;
 }
 
-// The group with sites made of the other examples. It keeps the motion of all examples, but the
-// weight of the one that is left out is 0. Each site stands for a blend of examples, so a blend of
-// sites is a blend of examples as well.
+// A group whose sites are the other examples. It keeps the motion of all examples, but the weight
+// of the one that is left out is 0. Each site stands for a blend of examples, so a blend of sites
+// is a blend of examples as well.
 struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
@@ -64,7 +64,8 @@ struct GroupOfOthers {
   MotionGroup group;  // Spans into the other members.
 };
 
-// `shares` [site][example]: the blend that each site stands for.
+// Fits a group to sites. `shares` [site][example] is the blend of examples that each site
+// represents.
 std::unique_ptr<GroupOfOthers> FitOthers(const MotionGroup& original, std::span<const double> sites,
                                          std::span<const double> shares, bool is_smooth) {
   const std::vector<double> scales = ScalesOf(original);

@@ -11,7 +11,8 @@
 namespace stridewire {
 namespace {
 
-constexpr std::size_t kEveryPoint = 2;  // Every other grid point; the others are similar.
+// Only every other grid point is compared; the points in between are similar.
+constexpr std::size_t kEveryPoint = 2;
 
 }  // namespace
 
@@ -90,7 +91,9 @@ LeftOutError LeftOutProbe::Measure(const BlendSet& set, const GridExample& targe
       const std::size_t at = begin + 4 * j;
       float* q = &blend_.rows[at];
       const float norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-      if (norm < 0.1f) {  // The rotations cancel each other: uses those of the first example.
+      // If the rotations cancel each other, their mean is undefined, so use those of the first
+      // example.
+      if (norm < 0.1f) {
         for (std::size_t c = 0; c < 4; ++c) {
           q[c] = set.examples.front()->rows[at + c];
         }

@@ -12,10 +12,11 @@ namespace stridewire {
 
 // The error with which a set of examples reproduces an example outside the set.
 struct LeftOutError {
-  double pose_m = 0.0;      // Mean distance of joints at equal generic times.
-  double miss_m = 0.0;      // Distance of its parameters from the hull of the set, grown by 10 %.
-  double outside_m = 0.0;   // Distance from the hull itself.
-  double duration_s = 0.0;  // Synthesized minus original duration.
+  double pose_m = 0.0;  // Mean distance of joints at equal generic times.
+  // Distance of the example's parameters from the hull of the set, grown by 10 %.
+  double miss_m = 0.0;
+  double outside_m = 0.0;   // Distance of the example's parameters from the hull of the set itself.
+  double duration_s = 0.0;  // Synthesized duration minus original duration.
   [[nodiscard]] double worst_m() const { return pose_m > miss_m ? pose_m : miss_m; }
 };
 

@@ -149,8 +149,8 @@ struct StoredGroup {
   }
 };
 
-// Replaces the selected examples by smooth functions of their parameters. Uses all examples except
-// outliers.
+// Replaces the selected examples by smooth functions of their parameters, which are fitted to all
+// examples except outliers.
 std::optional<Smoothness> Smooth(const RawGroup& group, std::vector<GridExample> found,
                                  const GroupSelection& selection, const std::vector<int>& cells,
                                  const GridLayout& layout, const Skeleton& skeleton,
@@ -177,7 +177,7 @@ Status FitWeights(std::span<const double> scales, StoredGroup& stored) {
   return {};
 }
 
-// Same for smooth examples, with wider radii.
+// Fits the weights of smooth examples, which allow wider radii.
 Status FitSmoothWeights(std::span<const double> scales, StoredGroup& stored,
                         double& radius_factor) {
   Expected<SmoothBasis> wide = FitSmoothBasis(stored.sites, scales);
@@ -208,11 +208,11 @@ void NoteSelection(const GroupSelection& selection, std::size_t stored, const No
 
 }  // namespace
 
-// Averaging: captured steps with equal parameters differ by centimetres, which would make weights
-// jump. Bound: on subject 16 a bound of 2.5 cm keeps a fifth of the straight and half of the
-// general steps, and left-out steps are reproduced as well as with all steps; with 4 cm they are 5
-// to 10 % worse. Outliers: five deviations drop a recovery after a jump and the last step before a
-// sharp turn; three would also drop first steps.
+// Averaging is necessary because captured steps with equal parameters differ by centimetres, which
+// would make weights jump. The bound is a compromise: on subject 16 a bound of 2.5 cm keeps a fifth
+// of the straight and half of the general steps, and left-out steps are reproduced as well as with
+// all steps; with 4 cm they are 5 to 10 % worse. Outliers: five deviations drop a recovery after a
+// jump and the last step before a sharp turn; three would also drop first steps.
 LibraryBuilder LibraryBuilder::Selecting() {
   LibraryBuilder builder;
   builder.cluster_diameter = 0.05;
@@ -231,7 +231,7 @@ Expected<std::shared_ptr<const MotionLibrary>> LibraryBuilder::Build(const RawLi
   }
   const GridLayout layout(joint_count);
 
-  std::vector<std::unique_ptr<StoredGroup>> groups;  // Own the data of `views`.
+  std::vector<std::unique_ptr<StoredGroup>> groups;  // Own the data that `views` refers to.
   std::vector<MotionGroup> views;
   for (std::size_t g = 0; g < raw.groups.size(); ++g) {
     const RawGroup& group = raw.groups[g];

@@ -103,8 +103,8 @@ Expected<std::shared_ptr<const MotionLibrary>> WriteLibrary(const LibraryContent
   const auto groups_offset = builder.CreateVector(groups);
   std::vector<flatbuffers::Offset<fb::Layer>> layers;
   for (const LayerClip& layer : content.layers) layers.push_back(AddLayer(builder, layer));
-  // Omits the field if there are no layers, so that such libraries keep the bytes of older
-  // versions.
+  // Omits the field if there are no layers, so that libraries without layers have the same bytes as
+  // before layers existed.
   const auto layers_offset = layers.empty() ? 0 : builder.CreateVector(layers);
   std::vector<fb::Transition> transitions;
   for (const Transition& t : FindTransitions(content)) {

@@ -18,7 +18,8 @@ namespace {
 // Residual of a pseudoexample. Weights are floats, which limits positions of feet to about 1 um.
 constexpr double kMaxResidualM = 5e-6;
 constexpr CorrectionLimits kSolve = {.max_iterations = 40, .tolerance_m = 1e-6};
-// The largest error must decrease by this share; smaller changes are noise of the survey.
+// An improvement counts only if the largest error decreases by this share. Smaller changes are
+// noise of the survey.
 constexpr double kMinGain = 1e-3;
 // Margin for points between the samples, where the sum of |w| may be larger.
 constexpr double kSampledWeightShare = 0.96;
@@ -26,16 +27,17 @@ constexpr std::array kOwnRadiusFactors = {1.0, 1.5, 2.0, 0.7};
 constexpr std::uint32_t kOtherSeed = 0x9e3779b9;
 constexpr int kMaxChecks = 10;
 constexpr std::size_t kNearSamples = 60;
-constexpr std::size_t kHotSamples = 64;  // Checked first, since most additions fail there.
+// Number of samples that are checked first, because most additions fail there.
+constexpr std::size_t kHotSamples = 64;
 
-// Sites of a group: its examples and the pseudoexamples found so far.
+// The sites of a group: its examples, and the pseudoexamples that have been found so far.
 struct Sites {
   std::vector<double> parameters;
   std::vector<double> pseudo_weights;
   std::vector<double> radius_factors;
 };
 
-// The group with other sites than in its library: the same motion with new weights.
+// A group that has the motion of the library's group, but other sites and therefore other weights.
 struct Candidate {
   Sites sites;
   CardinalBasis basis;
@@ -100,15 +102,16 @@ GroupQuality QualityOf(const HullSurvey& survey, double condition) {
           .condition = condition};
 }
 
-// One pass of the amended rule.
+// One pass of the amended rule (see Refine).
 struct Pass {
   RadiusRule radii = RadiusRule::kExamples;
-  double radius_factor = 1.0;   // Factor on the radii of the examples.
-  bool accepts_any = false;     // Also adds sites that increase the error, which may fall later.
+  double radius_factor = 1.0;  // Factor on the radii of the examples.
+  // Also adds sites that increase the error, because later sites may reduce it again.
+  bool accepts_any = false;
   bool tries_own_radii = true;  // Tries several radii for a new site.
 };
 
-// Run in this order until the error is reached.
+// Passes in the order in which they are run, until one reaches the requested error.
 constexpr std::array kAmendedPasses = {
     Pass{}, Pass{RadiusRule::kAllSites, 1.0, true, false}, Pass{RadiusRule::kAllSites, 1.0, true},
     Pass{RadiusRule::kExamples, 2.0}, Pass{RadiusRule::kExamples, 3.0}};
@@ -154,7 +157,7 @@ class GroupRefiner {
         if (!wider) break;
         start = *wider;
         start_survey = SurveyHull(start->group, samples_, probes_);
-        // Even wider radii would only be worse.
+        // If this radius exceeds the limits, even wider radii exceed them as well.
         if (!IsWithinBounds(start_survey, start->basis.condition)) break;
       }
       Expected<Outcome> outcome = RunPass(pass, std::move(start), std::move(start_survey));
@@ -174,7 +177,7 @@ class GroupRefiner {
       if (best.report.end == RefineEnd::kErrorReached) break;
     }
     if (!is_bare && best.report.after.max_error_m > before.max_error_m) {
-      // With other samples, no pass improved the group.
+      // Measured with other samples, no pass improved the group.
       best.candidate = *plain;
       best.report = {.before = before,
                      .after = before,
@@ -187,8 +190,8 @@ class GroupRefiner {
   }
 
  private:
-  // Measures with other samples, since refinement improves the error at its own samples in
-  // particular and samples may miss a peak.
+  // Measures with samples that refinement has not used. Refinement reduces the error at its own
+  // samples most, and they may miss a peak.
   void Verify(const MotionGroup& group, GroupQuality& quality) const {
     const std::vector<ParameterValues> others =
         SampleHull(group, 2 * options_.samples, options_.seed + kOtherSeed);
@@ -232,8 +235,8 @@ class GroupRefiner {
     }
   }
 
-  // Returns true if samples of another seed find an error above the limit. Then it adds the worst
-  // of them to the samples and updates `survey`.
+  // Measures the group with samples of another seed. If they contain errors above the limit, adds
+  // the worst of them to the samples, updates `survey` and returns true.
   bool OtherSamplesFindMore(const Candidate& current, int check, HullSurvey& survey) {
     const std::vector<ParameterValues> others = SampleHull(
         current.group, 2 * options_.samples, options_.seed + static_cast<std::uint32_t>(check));

@@ -20,14 +20,15 @@ enum class RefineRule : std::uint8_t {
 /// Defines the radius of a site.
 enum class RadiusRule : std::uint8_t {
   kExamples,  ///< Distance to the nearest other example; for a pseudoexample, to the nearest site.
-  kAllSites,  ///< Distance to the nearest other site. Pseudoexamples make radii shrink.
+  /// Distance to the nearest other site, so pseudoexamples reduce the radii of their neighbours.
+  kAllSites,
 };
 
-/// Limits of the amended rule. A group that exceeds them without pseudoexamples keeps its own
-/// values.
+/// Limits of the amended rule. If a group exceeds a limit even without pseudoexamples, its own
+/// value is the limit.
 inline constexpr double kMaxRefinedWeightSum = 2.5;  ///< Sum of |w| over the hull.
 inline constexpr double kMaxRefinedCondition = 1e3;
-/// Minimum distance of a pseudoexample from every site, in scaled parameters.
+/// Minimum distance between a pseudoexample and any other site, in scaled parameters.
 inline constexpr double kMinPseudoexampleDistance = 0.03;
 
 struct RefineOptions {

@@ -16,7 +16,8 @@ namespace {
 
 constexpr std::size_t kOutlierExamplesMin = 8;
 constexpr std::size_t kExamplesPerOutlier = 10;
-constexpr double kInsideM = 1e-3;            // Points nearer to the hull count as inside.
+// Points that are at most this far outside the hull count as inside.
+constexpr double kInsideM = 1e-3;
 constexpr double kDeviationOfMad = 1.4826;   // Ratio of standard deviation and MAD.
 constexpr double kMinPoseDeviationM = 2e-3;  // Smaller spreads are not significant.
 constexpr double kMinDurationDeviationS = 5e-3;
@@ -50,7 +51,8 @@ class Candidates {
     return errors;
   }
 
-  // Returns the error of each example of `of` when it is reproduced from all the others of them.
+  // Returns the error of each example in `of` when it is reproduced from all other examples in
+  // `of`.
   [[nodiscard]] std::vector<LeftOutError> LeaveOneOut(const std::vector<int>& of) {
     std::vector<LeftOutError> errors(of.size());
     ParallelFor(static_cast<int>(of.size()), 1, ThreadCount(0), [&](int k, int thread) {
@@ -96,7 +98,7 @@ class Candidates {
 
   const std::vector<GridExample>& examples_;
   std::vector<std::vector<Vec3>> truths_;
-  std::vector<LeftOutProbe> probes_;  // One per thread.
+  std::vector<LeftOutProbe> probes_;  // One probe per thread.
 };
 
 struct Deviation {
@@ -179,8 +181,8 @@ std::vector<int> ChooseFew(Candidates& candidates, std::span<const double> units
     chosen.insert(std::ranges::upper_bound(chosen, worst), worst);
     order.push_back(worst);
   }
-  // The first candidates were added with little knowledge; removes those that have become
-  // redundant.
+  // The first candidates were chosen before the others were known, so some of them have become
+  // redundant. Removes those.
   for (bool changed = true; changed;) {
     changed = false;
     for (std::size_t k = 0; k < order.size() && chosen.size() > 1; ++k) {

@@ -30,8 +30,8 @@ struct Smoothness {
   double radius = 0.0;  // Radius of the kernel, in scales of the parameters.
 };
 
-// Minimum number of examples per coefficient of the linear part. With fewer examples, individual
-// variation cannot be separated from the influence of the parameters.
+// Smoothing requires at least this number of examples per coefficient of the linear part. With
+// fewer examples, it could not separate individual variation from the influence of the parameters.
 inline constexpr int kExamplesPerCoefficient = 4;
 
 // A group with the smooth weights of some of its examples. It has the motion of all examples; the
@@ -68,16 +68,16 @@ struct SmoothGroup {
                                                          std::span<const double> products);
 
 // Replaces the poses and times of `examples` by those of the smooth movements with the same
-// parameters, made of all examples of the group, and measures their parameters again. `examples`
-// must have the parameters and cells of the group. Returns nullopt and changes nothing if there are
-// too few examples. An example whose parameters cannot be reproduced within 0.1 mm remains
-// unchanged.
+// parameters, which are blends of all examples of the group, and measures their parameters again.
+// `examples` must have the parameters and cells of the group. Returns nullopt and changes nothing
+// if there are too few examples. An example whose parameters cannot be reproduced within 0.1 mm
+// remains unchanged.
 std::optional<Smoothness> SmoothExamples(const MotionGroup& group, const GridLayout& layout,
                                          const Skeleton& skeleton,
                                          std::vector<GridExample>& examples);
 
-// The weights of a library over smooth examples [count][d]: those of CardinalBasisFit. With three
-// or more parameters, radii are up to 1.5 times as wide, as far as the sum of |w| at samples stays
+// Fits the weights of a library to smooth examples [count][d], with CardinalBasisFit. With three or
+// more parameters, radii are up to 1.5 times as wide, as far as the sum of |w| at samples stays
 // within 2.4 (kMaxCorrectedWeightSum allows 2.5) and the condition below 1000. The reason is that
 // the nearest of a few scattered sites in many dimensions is much nearer than most, and with radii
 // of that distance only the linear part would act in most of the hull.

@@ -62,7 +62,8 @@ class MomentReader {
     return group.keytimes_s.subspan(static_cast<std::size_t>(example) * keys, keys);
   }
 
-  // The velocity is the difference to the grid point `beside`, which is `away_s` later.
+  // Computes the velocity from the difference to the grid point `beside`, whose time is `away_s`
+  // later.
   Moment MomentOf(const MotionGroup& group, int example, int point, int beside, double away_s,
                   double heading_rad, double ground_m) {
     STRIDEWIRE_CHECK(point >= 0 && point < group.grid_point_count && away_s != 0.0);

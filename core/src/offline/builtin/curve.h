@@ -18,8 +18,8 @@ class Curve {
 
   Curve() : Curve({{0.0, 0.0}}) {}
 
-  /// `knots` must be non-empty and sorted by time. A knot less than 1e-9 s after its predecessor is
-  /// ignored.
+  /// `knots` must be non-empty and sorted by time. Ignores knots less than 1e-9 s after their
+  /// predecessor.
   explicit Curve(const std::vector<Knot>& knots);
 
   [[nodiscard]] double At(double time_s) const;

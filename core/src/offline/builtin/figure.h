@@ -64,7 +64,7 @@ struct FigurePose {
   FigurePose() { rotations.fill(DQuat(1.0, 0.0, 0.0, 0.0)); }
 };
 
-/// Returns +1 for the left side (+X) and -1 for the right side.
+/// Returns +1 for the left side (+X) and -1 for the right side (-X).
 [[nodiscard]] constexpr double SideSign(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
 /// Rotations about the axes, in radians. RotateX with a positive angle lowers the toes.

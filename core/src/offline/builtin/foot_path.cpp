@@ -8,7 +8,8 @@
 namespace stridewire::builtin {
 namespace {
 
-constexpr double kClearanceM = 0.017;  // 15 mm, plus what is lost by blending.
+// Clearance of 15 mm, plus the part of it that blending loses.
+constexpr double kClearanceM = 0.017;
 constexpr double kLiftStepM = 0.004;
 constexpr double kMinLiftM = -0.08;
 constexpr double kMaxLiftM = 0.30;
@@ -88,7 +89,7 @@ Curve MakeToeBend(const StepTiming& timing) {
   const double straight_s = timing.toe_off_s + 0.45 * timing.swing_s();
   const double strike = StrikePitch(timing);
   if (strike >= 0.0) return Curve({{timing.toe_off_s, bend, 0.0}, {straight_s, 0.0, 0.0}});
-  // Toes that land first are flat on the ground then.
+  // If the toes land first, they are flat on the ground from then on.
   return Curve({{timing.toe_off_s, bend, 0.0},
                 {straight_s, 0.0, 0.0},
                 {timing.toe_off_s + 0.7 * timing.swing_s(), 0.0, 0.0},
@@ -230,7 +231,9 @@ void FootPaths::BowSwingAroundFixedFoot() {
   double best_m = 0.0, widest_m = 0.0;
   for (bow_m_ = 0.0; bow_m_ < kMaxBowM; bow_m_ += kBowStepM) {
     const double nearest_m = NearestApproach();
-    if (nearest_m <= widest_m + 1e-3) continue;  // The landing position may be the nearest one.
+    // This detour does not increase the smallest distance, for example because the feet are closest
+    // at landing.
+    if (nearest_m <= widest_m + 1e-3) continue;
     widest_m = nearest_m;
     best_m = bow_m_;
     if (widest_m >= kFootWidthM) break;

@@ -51,8 +51,8 @@ GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
   state.speed_mps = 0.95 * mean_speed;
   state.vigour = std::min(1.0, mean_speed / 1.4);
   state.strike_pitch_rad = flat ? 0.0 : 22.0 * kDegree * Tanh(length_m / 0.5);
-  // A compromise between 68 tanh(L / 0.5) and the pitch with the smallest errors of blended
-  // lengths.
+  // Compromise between 68 tanh(L / 0.5) and the pitch that gives blended step lengths the smallest
+  // errors.
   const Curve toe_off_deg({{0.0, 0.0}, {0.35, 30.0}, {0.55, 54.0}, {0.75, 61.5}, {0.9, 64.5}});
   state.toe_off_pitch_rad = (toe_off_deg.At(length_m) + kRiseHeel_deg_m * rise_m) * kDegree;
   state.toe_rock_rad = 0.65 * state.toe_off_pitch_rad;
@@ -61,7 +61,8 @@ GaitState MakeGaitState(double length_m, double rise_m, bool flat) {
   state.pelvis_drop_m = drop.At(length_m);
   const Curve ahead({{0.0, 0.02}, {0.35, 0.240}, {0.55, 0.405}, {0.75, 0.4955}, {0.9, 0.59}});
   state.pelvis_ahead_m = ahead.At(length_m);
-  // Peak to peak 7.0 cm at 0.7 m/s and 3.9 cm at 1.6 m/s (Orendurff et al. 2004).
+  // The pelvis moves by 7.0 cm peak to peak at 0.7 m/s and by 3.9 cm at 1.6 m/s (Orendurff et al.
+  // 2004).
   state.sway_m = 0.5 * (0.070 - (mean_speed - 0.7) / 0.9 * 0.031);
   return state;
 }

@@ -21,15 +21,17 @@ inline constexpr double kClipFps = 120.0;
 ///   rear   -0.42 b     -0.72 b      -b
 struct GaitState {
   double length_m = 0.0;
-  double half_support_s = 0.0;    ///< From heel-strike to the state, and from the state to toe-off.
-  double speed_mps = 0.0;         ///< Forward speed of the pelvis.
-  double vigour = 0.0;            ///< min(1, speed / 1.4 m/s); scales motion of the upper body.
-  double strike_pitch_rad = 0.0;  ///< a.
+  /// Time from heel-strike to the state, and from the state to toe-off.
+  double half_support_s = 0.0;
+  double speed_mps = 0.0;          ///< Forward speed of the pelvis.
+  double vigour = 0.0;             ///< min(1, speed / 1.4 m/s); scales motion of the upper body.
+  double strike_pitch_rad = 0.0;   ///< a.
   double toe_off_pitch_rad = 0.0;  ///< b, positive.
   double toe_rock_rad = 0.0;       ///< Angle of the toes about their tip at toe-off.
   double pelvis_drop_m = 0.0;      ///< Height of the pelvis below standing.
-  double pelvis_ahead_m = 0.0;     ///< Pelvis ahead of the rear ankle with a flat foot.
-  double sway_m = 0.0;             ///< Sideways amplitude of a step between two such states.
+  /// Distance of the pelvis in front of the rear ankle, if that foot is flat.
+  double pelvis_ahead_m = 0.0;
+  double sway_m = 0.0;  ///< Sideways amplitude of a step between two such states.
 
   [[nodiscard]] bool standing() const { return length_m == 0.0; }
   [[nodiscard]] double front_pitch_rad() const { return 0.32 * strike_pitch_rad; }
@@ -41,8 +43,8 @@ struct GaitState {
   [[nodiscard]] double front_ball_back_m() const;
 };
 
-/// `rise_m`: height difference of the feet, which takes additional time (kRiseTime_s_m). `flat`:
-/// see StepShape.
+/// `rise_m`: height difference of the feet, which takes additional time (kRiseTime_s_m). `flat` is
+/// StepShape::flat.
 [[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0, bool flat = false);
 
 inline constexpr double kRiseTime_s_m = 0.6;  ///< Seconds per metre.

@@ -24,8 +24,8 @@ std::string Degrees(double angle_rad) {
   return std::to_string(static_cast<int>(std::floor(angle_rad / kDegree + 0.5)));
 }
 
-// Returns for example "generated step 0.35 to 0.55 m" and appends what differs from a straight
-// step.
+// Describes a step, for example "generated step 0.35 to 0.55 m". If it is not straight, the text
+// also contains its other parameters.
 std::string Describe(const StepShape& shape) {
   std::string text = "generated step " + Centimetres(std::fabs(shape.start_m.z)) + " to " +
                      Centimetres(shape.end_m.z) + " m";
@@ -42,7 +42,7 @@ std::string Describe(const StepShape& shape) {
 constexpr double kWalkTurnRad = 40.0 * kDegree;
 constexpr double kSpotTurnRad = 60.0 * kDegree;
 
-// Returns the sideways position of the ball of a foot that turned outwards on the spot.
+// Returns the sideways position of the ball of a foot that has turned outwards on the spot.
 double OpenSide(double turn_rad) {
   return NaturalSide() + (0.26 - NaturalSide()) * std::min(1.0, turn_rad / kSpotTurnRad + 0.2);
 }
@@ -77,7 +77,7 @@ class Groups {
 void AddClimbingSteps(double direction, RawLibrary& library) {
   constexpr double kRiseM = 0.25;
   constexpr double kTurnRad = 35.0 * kDegree;
-  // Heights of the moving above the fixed foot at both ends, in units of kRiseM.
+  // Heights of the moving foot above the fixed foot at both ends, in units of kRiseM.
   struct Climb {
     double start, end;
   };
@@ -168,7 +168,7 @@ void AddTurningSteps(RawLibrary& library) {
       }
     }
   }
-  // Steps that continue after an outward turn.
+  // Adds steps that continue after an outward turn.
   const double open_m = OpenSide(kSpotTurnRad);
   add(open_m, 0.0, 0.0, 0.0);
   add(open_m, 0.0, 0.0, kSpotTurnRad);

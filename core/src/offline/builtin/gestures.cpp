@@ -108,7 +108,7 @@ void AddGestures(RawLibrary& library) {
   RawLayer carry = MakeLoop("carry", 3.0, Carrying);
   IncludeArm(Foot::kLeft, carry);
   IncludeArm(Foot::kRight, carry);
-  // The spine blends from the motion of the legs below to that of the load above.
+  // The spine blends from the motion of the legs below it to that of the load above it.
   carry.weights[kLowerBack] = 0.25f;
   carry.weights[kSpine] = 0.5f;
   carry.weights[kSpine1] = 0.75f;

@@ -65,7 +65,8 @@ class JumpPath {
     for (double& time_s : times_) time_s = ToWholeFrames(time_s);
     STRIDEWIRE_CHECK(std::ranges::is_sorted(times_));
     const double flight_s = landing_s() - toe_off_s();
-    velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;  // For the rounded flight time.
+    // Vertical velocity for the rounded flight time.
+    velocity_.y = 0.5 * kGravity * flight_s - lower_m / flight_s;
   }
 
   void PlanBody() {
@@ -100,7 +101,7 @@ class JumpPath {
 
   void PlanFeet() {
     const double push_s = toe_off_s() - lowest_s();
-    // The ankles finish the push: at toe-off they rise almost as fast as the body.
+    // The ankles extend last: at toe-off they rise almost as fast as the body.
     toe_off_pitch_rad_ = (36.0 + 11.0 * length_m_) * kDegree;
     const double rate = 0.75 * velocity_.y / kBallAheadOfAnkleM;
     push_pitch_ = Curve({{0.0, 0.0, 0.0},
@@ -110,11 +111,13 @@ class JumpPath {
     landing_pitch_ = Curve({{landing_s(), strike, -strike / 0.12}, {landing_s() + 0.09, 0.0, 0.0}});
   }
 
-  // Plans the centre of mass: down and forwards over the balls, a parabola in flight, down again.
+  // Plans the path of the centre of mass: down and forwards over the balls, a parabola in flight,
+  // and down again after landing.
   void PlanCentre() {
     const FigurePose standing = StandingPose();
     DVec3 rest = BodyCentre(figure_, standing);
-    rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;  // From the balls.
+    // Measure the position from the balls of the feet.
+    rest.z += MakeGaitState(0.0).pelvis_ahead_m - StandingBall(Foot::kLeft).z;
 
     // At toe-off the centre is ahead of the balls and as high as the legs allow.
     const double toe_off_z = -0.02 + 0.19 * length_m_;
@@ -171,7 +174,7 @@ class JumpPath {
   [[nodiscard]] LegAim AimAt(double time_s) const {
     const FigurePose pose = PoseWithCentre(time_s, Centre(time_s));
     const DVec3 leg = PoseOfFoot(Foot::kLeft, time_s, pose).ankle_m -
-                      pose.root_m;  // The hips are at the root's z.
+                      pose.root_m;  // The hips have the same z as the root.
     return {std::sqrt(leg.y * leg.y + leg.z * leg.z), Atan2(leg.z, -leg.y)};
   }
 
@@ -248,7 +251,8 @@ class JumpPath {
   double length_m_;
   std::array<double, 6> times_{};
   Curve lean_, arm_, elbow_, push_pitch_, landing_pitch_;
-  Curve leg_length_, leg_angle_, flight_pitch_, flight_toe_bend_;  // Over the flight, 0 to 1.
+  // Curves over the fraction of the flight, 0 to 1.
+  Curve leg_length_, leg_angle_, flight_pitch_, flight_toe_bend_;
   Curve centre_y_before_, centre_z_before_, centre_y_after_, centre_z_after_;
   DVec3 velocity_ = DVec3(0.0), toe_off_centre_ = DVec3(0.0);
   double toe_off_pitch_rad_ = 0.0;

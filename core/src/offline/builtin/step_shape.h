@@ -7,7 +7,8 @@ namespace stridewire::builtin {
 /// Relative positions of the feet at both ends of a step: the seven parameters of a general step
 /// (paper, Section 6). Measured from ball to ball, in metres and radians.
 struct StepShape {
-  /// Moving minus fixed foot at the start, in the heading frame of the start; z <= 0.
+  /// Vector from the fixed to the moving foot at the start, in the heading frame of the start; z <=
+  /// 0.
   DVec3 start_m = DVec3(0.0);
   DVec3 end_m = DVec3(0.0);  ///< Same at the end, in the heading frame of the end; z >= 0.
   double turn_rad = 0.0;     ///< Change of heading; positive is left.

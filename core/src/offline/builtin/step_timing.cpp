@@ -16,13 +16,14 @@ StepTiming MakeStepTiming(const StepShape& shape) {
   timing.start = MakeGaitState(start_length_m, start_rise_m, shape.flat);
   timing.end = MakeGaitState(end_length_m, end_rise_m, shape.flat);
   const bool partial = timing.start.standing() || timing.end.standing();
-  // Steps sideways and on the spot do not swing through; they have their own duration.
+  // Sideways steps and steps on the spot have their own duration, since the leg does not swing
+  // through.
   const bool in_place = timing.start.standing() && timing.end.standing();
   const double level_s = in_place ? 0.62
                                   : SteadyStepTime(partial ? std::max(start_length_m, end_length_m)
                                                            : 0.5 * (start_length_m + end_length_m));
   const double step_s = level_s + kRiseTime_s_m * 0.5 * (start_rise_m + end_rise_m);
-  // From standing, the weight first moves over the fixed foot; before standing, the body comes to
+  // After standing, the weight first moves over the fixed foot. Before standing, the body comes to
   // rest.
   const double weight_shift_s = in_place ? 0.24 : 0.30;
   const double settling_s = 0.12 * step_s + (in_place ? 0.10 : 0.15);

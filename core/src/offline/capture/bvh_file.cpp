@@ -327,7 +327,8 @@ class Parser {
         std::from_chars(count.data(), count.data() + count.size(), declared_frames_);
     if (code == std::errc::result_out_of_range && end == count.data() + count.size() &&
         count.front() != '-') {
-      declared_frames_ = INT64_MAX;  // No file can have that many rows.
+      // A value that does not fit counts as INT64_MAX; no file can have that many rows.
+      declared_frames_ = INT64_MAX;
     } else if (code != std::errc() || end != count.data() + count.size() || declared_frames_ < 1) {
       return Malformed("Frames: expected an integer of at least 1");
     }
@@ -348,7 +349,8 @@ class Parser {
   Status ParseRows() {
     const std::size_t channels = static_cast<std::size_t>(file_.channel_count);
     const std::int64_t joints = static_cast<std::int64_t>(file_.joints.size());
-    // A number takes at least two characters, including its separator.
+    // A number takes at least two characters including its separator, which limits the number of
+    // rows.
     const std::size_t most_rows = (text_.size() - at_) / (2 * channels) + 1;
     file_.values.reserve(channels *
                          std::min(most_rows, static_cast<std::size_t>(declared_frames_)));

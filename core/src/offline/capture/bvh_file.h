@@ -18,7 +18,7 @@ struct BvhChannel {
 struct BvhJoint {
   std::string name;
   int parent = -1;
-  int line = 0;               ///< The line of its OFFSET.
+  int line = 0;               ///< Line number of the joint's OFFSET.
   DVec3 offset = DVec3(0.0);  ///< In file units.
   std::vector<BvhChannel> channels;
   int first_channel = 0;  ///< Index of its first number in the row of a frame.
@@ -36,8 +36,9 @@ struct BvhFile {
   std::vector<BvhEndSite> end_sites;
   int channel_count = 0;
   int frame_count = 0;
-  double frame_time_s = 0.0;        ///< As written; any finite number.
-  double frame_time_digit_s = 0.0;  ///< Value of one unit in its last written digit.
+  double frame_time_s = 0.0;  ///< Frame time as written in the file; any finite number.
+  /// Value of one unit in the last written digit of the frame time.
+  double frame_time_digit_s = 0.0;
   int frame_time_line = 0;
   std::vector<float> values;  ///< [frame * channel_count + channel]; degrees or file units.
   std::vector<std::string> notes;

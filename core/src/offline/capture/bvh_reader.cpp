@@ -32,7 +32,8 @@ constexpr double kFastTurnRadS = 10.5;   // 600 degrees/s.
 constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.
 constexpr double kMinTravelM = 0.15;
-constexpr double kFootEndIsBall = 0.2;    // Nearer End Sites are the ball; in leg lengths.
+// An End Site nearer than this to the ankle is the ball of the foot; in leg lengths.
+constexpr double kFootEndIsBall = 0.2;
 constexpr double kBallShare = 2.0 / 3.0;  // Position of the ball between ankle and toe tip.
 
 struct KnownUnit {
@@ -278,7 +279,7 @@ class Reader {
                     "right_ankle");
       }
     } else if (FindLegsByName(joints(), found_)) {
-      // The normal case needs no note.
+      // Detection by shape gets a note; detection by names is the normal case and needs none.
     } else if (FindLegsByShape(joints(), found_)) {
       Note("legs were detected by shape, since the joint names do not identify them");
     } else {
@@ -586,7 +587,8 @@ class Reader {
         accelerations.push_back(glm::length(d) * scale);
       }
     }
-    if (travel_m < kMinTravelM) return;  // A standing figure is inconclusive.
+    // A figure that stands still does not reveal its frame rate.
+    if (travel_m < kMinTravelM) return;
     const auto p99 =
         accelerations.begin() +
         static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(accelerations.size() - 1));
@@ -598,7 +600,7 @@ class Reader {
         *p99, file_.frame_time_s));
   }
 
-  // Fills in `leg`, in metres and our axes.
+  // Sets the foot of `leg`, in metres and our axes.
   void SetFoot(const FoundLeg& found, Leg& leg) {
     STRIDEWIRE_CHECK(found.hip >= 0 && found.hip < found.knee && found.knee < found.ankle);
     STRIDEWIRE_CHECK(found.ball < 0 || found.ball >= found.ankle);

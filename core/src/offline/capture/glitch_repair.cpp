@@ -12,9 +12,12 @@ namespace stridewire {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr double kJumpRad_s = 1800.0 * kDegree;  // Arms reach about 1000 degrees/s in a jump.
-constexpr double kJumpMinRad = 12.0 * kDegree;   // Ignores noise at 240 Hz and above.
-constexpr double kJumpMaxRad = 60.0 * kDegree;   // At 30 Hz, 1800 degrees/s would allow too much.
+// Faster rotations are glitches. Arms reach about 1000 degrees/s in a jump.
+constexpr double kJumpRad_s = 1800.0 * kDegree;
+// Smaller rotations are not glitches, but noise at 240 Hz and above.
+constexpr double kJumpMinRad = 12.0 * kDegree;
+// Larger rotations per frame are always glitches. At 30 Hz, 1800 degrees/s would allow too much.
+constexpr double kJumpMaxRad = 60.0 * kDegree;
 constexpr double kSpikeS = 0.04;
 constexpr double kSpreadS = 0.08;
 constexpr double kLimbEndM = 0.15;
@@ -138,7 +141,8 @@ void RepairRootPath(int first_frame, Clip& clip, GlitchReport& report) {
     }
     off[static_cast<std::size_t>(f)] = glm::length(path[static_cast<std::size_t>(f)] - median);
   }
-  // In a fast walk the root moves 2 cm per frame at 120 Hz, but so does the median.
+  // In a fast walk the root moves 2 cm per frame at 120 Hz, but the median moves by the same
+  // amount.
   for (int f = first_frame + 1; f + 1 < end; ++f) {
     if (off[static_cast<std::size_t>(f)] <= limit) continue;
     int last = f;

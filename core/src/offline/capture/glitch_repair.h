@@ -9,17 +9,19 @@
 
 namespace stridewire {
 
-/// A joint that turned, or a root that moved, faster than a body can.
+/// A joint that rotated, or a root that moved, faster than a human body can.
 struct JointFlip {
   int joint = 0;
-  FrameRange frames;       ///< The replaced frames, or those around the flip.
+  /// The replaced frames, or the frames around a jump that was not repaired.
+  FrameRange frames;
   double angle_rad = 0.0;  ///< Largest rotation between two successive frames; 0 for the root path.
   double distance_m = 0.0;  ///< Largest distance of the root from its path.
 };
 
 struct GlitchReport {
   std::vector<JointFlip> repaired;
-  std::vector<JointFlip> left;  ///< Not repaired. Movements that contain them are not usable.
+  /// Jumps that were not repaired. Movements that contain them are not usable.
+  std::vector<JointFlip> left;
 };
 
 /// Repairs capture glitches of a few frames in place. Frames before `first_frame` are ignored.

@@ -116,7 +116,8 @@ Error Rejected(const AvatarEvent& event, std::span<const MovementRequest> reques
           PathOf(static_cast<std::size_t>(request - requests.begin()), layers)};
 }
 
-// Sets the layers that start before a movement, including those left over from earlier movements.
+// Sets the layers that start before a movement, including those that have not been set before
+// earlier movements.
 Status SetLayers(std::span<const LayerCue> layers, std::size_t before, std::size_t& next,
                  AvatarSimulation& avatar) {
   for (; next < layers.size() && layers[next].before <= before; ++next) {
@@ -213,7 +214,8 @@ Expected<Synthesis> Synthesize(const SynthesisInput& input) {
 
   Pose scratch(joint_count);
   GridCache cache(library->layout());
-  std::vector<std::optional<Footprint>> requested;  // Per movement; only of planted steps.
+  // Requested footprint per movement. Set only for planted steps.
+  std::vector<std::optional<Footprint>> requested;
   std::set<std::uint64_t> walks;
   for (const MovementRequest& request : requests) {
     if (std::holds_alternative<WalkRequest>(request.movement)) walks.insert(request.id);

@@ -10,7 +10,8 @@
 
 namespace stridewire {
 
-inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;  ///< Size of a file.
+/// Largest size of a terrain file.
+inline constexpr std::size_t kMaxTerrainFileBytes = std::size_t{16} << 20;
 
 /// Reads a terrain from a JSON file:
 ///

@@ -15,7 +15,9 @@ namespace {
 
 constexpr std::size_t kExamplesPerParameter = 3;
 constexpr std::size_t kMinForAnArea = std::size(kStraightStepParameters) + 1;
-constexpr std::size_t kOutlierFreeMin = 4;  // With this many examples, extremes are ignored.
+// With at least this many examples, the lowest and the highest value are ignored as possible
+// outliers.
+constexpr std::size_t kOutlierFreeMin = 4;
 
 // Examples of one kind with all their parameters, before they become a group.
 struct Pool {
@@ -39,7 +41,7 @@ std::vector<std::size_t> SpannedParameters(const Pool& pool, std::span<const Par
                                            bool with_height, const AssembleOptions& options) {
   struct Candidate {
     std::size_t index;
-    double spread;  // In units of the smallest spread that counts.
+    double spread;  // Spread of the values, in units of the smallest spread that counts.
     bool fixed;
   };
   std::vector<Candidate> candidates;
@@ -121,8 +123,9 @@ class Assembler {
   }
 
  private:
-  // Returns the shift that brings the resting balls of a capture to the height of the library.
-  // Markers may displace a foot (by up to 2 cm), so the foot with the smaller difference decides.
+  // Returns the vertical shift that brings the balls of the standing feet of a capture to the
+  // height of the library. Markers may displace a foot (by up to 2 cm), so the foot with the
+  // smaller difference decides.
   [[nodiscard]] double Shift(const Extraction& file) const {
     if (!file.has_contacts) return 0.0;
     const double left = ball_height_m_[0] - file.ball_height_m[0];
@@ -169,7 +172,7 @@ class Assembler {
       const std::size_t level_count = level_steps[f].examples.size();
       if (all_steps[f].examples.size() <= level_count) all_steps[f].examples.clear();
       if (level_count <= straight_count) level_steps[f].examples.clear();
-      // Fewer examples lie on a line; no weights could produce parameters beside it.
+      // Two examples lie on a line, so no weights could reproduce parameters beside it.
       const bool has_all = !all_steps[f].examples.empty();
       if (has_all && level_count < kMinForAnArea) level_steps[f].examples.clear();
       if ((has_all || !level_steps[f].examples.empty()) && straight_count < kMinForAnArea) {

@@ -15,7 +15,7 @@ struct AssembleOptions {
   bool steps = true;
   bool jumps = true;
   bool mirror = false;          ///< Also add the mirror image of every step, for the other foot.
-  bool unsettled_jumps = true;  ///< Keep jumps that end in motion.
+  bool unsettled_jumps = true;  ///< Keep jumps after which the figure continues to move.
   /// A group gets a parameter only if its examples spread over at least this range. With four or
   /// more examples the lowest and the highest value are ignored, since they may be outliers.
   double spread_min_m = 0.05;

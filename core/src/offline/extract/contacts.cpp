@@ -9,8 +9,8 @@
 namespace stridewire {
 namespace {
 
-constexpr double kLongContactS = 0.3;   // Slow moments of swings and jumps are shorter.
-constexpr double kFreeFallM_s2 = -5.0;  // The figure falls if its pelvis accelerates like this.
+constexpr double kLongContactS = 0.3;   // Shorter contacts may be slow moments of swings and jumps.
+constexpr double kFreeFallM_s2 = -5.0;  // A figure whose pelvis accelerates like this is falling.
 constexpr double kBallAtRestM_s = 0.3;  // A slower ball belongs to a flat foot.
 
 using Flags = std::vector<char>;

@@ -9,13 +9,16 @@ namespace stridewire {
 /// Thresholds for ground contacts. They fit adults recorded in metres and were tuned on twelve
 /// captured walks. For example, a maximum speed of 0.35 instead of 0.8 m/s loses half of the steps.
 struct ContactOptions {
-  double speed_max_m_s = 0.8;       ///< A point stands only if it is slower than this.
-  double height_max_m = 0.06;       ///< A point stands only below this, above its resting height.
-  double resting_percentile = 3.0;  ///< Percentile of the height of a point: its resting height.
+  double speed_max_m_s = 0.8;  ///< A point stands only if it is slower than this.
+  /// A point stands only if it is at most this far above its resting height.
+  double height_max_m = 0.06;
+  /// The resting height of a point is this percentile of its heights.
+  double resting_percentile = 3.0;
   double smooth_s = 0.04;
-  double gap_min_s = 0.05;       ///< Shorter gaps between contacts are filled.
-  double contact_min_s = 0.07;   ///< Shorter contacts are dropped.
-  double raised_floor_m = 0.10;  ///< If resting balls differ by more, there are several floors.
+  double gap_min_s = 0.05;      ///< Shorter gaps between contacts are filled.
+  double contact_min_s = 0.07;  ///< Shorter contacts are dropped.
+  /// If the heights of resting balls differ by more than this, the capture has several floors.
+  double raised_floor_m = 0.10;
 };
 
 /// A time span during which a foot is on the ground, in frames of the BodyTracks.

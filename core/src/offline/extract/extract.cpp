@@ -19,7 +19,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kStandingYawS = 0.2;
-constexpr double kJumpStraightMaxRad = 0.35;  // Jumps that turn by less count as straight ahead.
+// Jumps that turn by less count as jumps straight ahead.
+constexpr double kJumpStraightMaxRad = 0.35;
 
 double HeadingBetween(const DVec3& from, const DVec3& to) {
   return std::atan2(to.x - from.x, to.z - from.z);
@@ -88,7 +89,7 @@ class Extractor {
     return clip_.Validate();
   }
 
-  // Measures everything again on a figure with other bone lengths.
+  // Repeats all measurements on a figure with other bone lengths.
   void Retarget() {
     const double own = LegLength(capture_.skeleton);
     const double scale = own > 0.0 ? LegLength(out_.skeleton) / own : 1.0;

@@ -14,21 +14,22 @@ namespace stridewire {
 struct ExtractOptions {
   ContactOptions contacts;
   SegmentOptions segments;
-  // A step is straight if all four conditions hold.
+  // Steps that satisfy the following four conditions are straight.
   double straight_turn_max_rad = 0.0698;  ///< Limit on the turn of the stride heading; 4 degrees.
   /// Limit on the angle between the motion of the root and the heading; 15 degrees. Beyond it are
   /// side and backward steps.
   double straight_drift_max_rad = 0.262;
-  double level_rise_max_m = 0.05;  ///< Limit on the difference of the ground under the feet.
+  /// Limit on the difference between the heights of the ground under the two feet.
+  double level_rise_max_m = 0.05;
   /// Limit on the sideways distance of the moving from the fixed foot, on its own side.
   double straight_side_max_m = 0.35;
   /// If the root moves farther than this, its direction determines the heading more accurately than
   /// the pelvis.
   double displacement_heading_min_m = 0.2;
-  /// Skeleton of the examples, with the same joint tree as the capture. Null: that of the capture.
-  /// If bone lengths differ, contacts and segments are still detected on the capture's own figure.
-  /// Then the path of the root is scaled by the ratio of leg lengths and everything is measured
-  /// again.
+  /// Skeleton of the examples, with the same joint tree as the capture. If null, examples get the
+  /// skeleton of the capture. If bone lengths differ, contacts and segments are still detected on
+  /// the capture's own figure. Then the path of the root is scaled by the ratio of leg lengths and
+  /// everything is measured again.
   const Skeleton* target = nullptr;
 };
 
@@ -36,7 +37,7 @@ struct ExtractOptions {
 struct ExtractedExample {
   MovementKind kind = MovementKind::kStepLeft;
   RawExample example;
-  bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
+  bool settled = true;  ///< Jumps: false if the figure still moves at the end.
   bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
 };
 
@@ -62,13 +63,15 @@ struct Extraction {
 
   Skeleton skeleton;                             ///< Skeleton of the examples.
   std::vector<ExtractedExample> straight_steps;  ///< start_z and end_z; heading change 0.
-  std::vector<ExtractedExample> general_steps;   ///< All steps with the seven parameters.
-  std::vector<ExtractedExample> jump_examples;   ///< Length, height and turn.
+  /// All steps, each with the seven parameters of a general step.
+  std::vector<ExtractedExample> general_steps;
+  std::vector<ExtractedExample> jump_examples;  ///< Length, height and turn.
   double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the floor, by foot.
   bool has_contacts = false;             ///< False if no foot ever stood; then the heights are 0.
 
   struct Stand {
-    Pose pose;            ///< At x = z = 0 with heading 0; y is above the ground.
+    /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
+    Pose pose;
     double unrest = 0.0;  ///< Deviation from still, upright standing; smaller is better.
   };
   std::optional<Stand> stand;  ///< The stillest moment with both feet on the same ground.

@@ -13,7 +13,8 @@ namespace stridewire {
 namespace {
 
 constexpr double kHalfSupportDefaultS = 0.08;
-constexpr double kHalfSupportMinShare = 0.5;  // Of the usual half support, at cut-off ends.
+// Least part of the usual half support that must remain where the recording cuts it off.
+constexpr double kHalfSupportMinShare = 0.5;
 
 // One lift of a foot with the contacts around it.
 struct Swing {
@@ -134,7 +135,8 @@ class StepFinder {
       half = std::min<double>(frames, usual_half_);
       if (half < kHalfSupportMinShare * usual_half_) return 0;
     }
-    // Fast steps may have no frame with both feet on the ground; then one frame is the best choice.
+    // Fast steps may have no frame with both feet on the ground. Then a support of one frame is the
+    // closest approximation.
     return std::max(1, static_cast<int>(std::min(half, options_.standing_max_s * tracks_.fps)));
   }
 
@@ -150,7 +152,7 @@ Segmentation Segment(const BodyTracks& tracks, const FootContacts& contacts,
   STRIDEWIRE_CHECK(tracks.fps > 0.0);
   Segmentation result;
   std::vector<FrameRange> held;
-  std::vector<FrameRange> explained;  // Flights that are jumps or were already rejected.
+  std::vector<FrameRange> explained;  // Flights that are jumps or have already been rejected.
   for (const FrameRange& flight : FlightRanges(tracks, contacts)) {
     JumpFinding finding = FindJump(tracks, contacts, flight, options);
     if (finding.jump) {

@@ -16,7 +16,8 @@ namespace stridewire {
 struct JumpFinding {
   std::optional<JumpSegment> jump;
   std::string reason;
-  bool held = false;  ///< Both feet are in the air, but the figure does not fall.
+  /// Both feet are in the air, but the figure does not fall, for example because it hangs on a bar.
+  bool held = false;
 };
 [[nodiscard]] JumpFinding FindJump(const BodyTracks& tracks, const FootContacts& contacts,
                                    const FrameRange& flight, const SegmentOptions& options);

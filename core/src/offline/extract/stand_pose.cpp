@@ -17,7 +17,8 @@ constexpr double kSameGroundM = 0.03;
 // Penalties that are added to the mean joint speed in m/s.
 constexpr double kStridePerM = 2.0;  // One foot is in front of the other.
 constexpr double kCrouchPerM = 4.0;  // The pelvis is lower than in usual standing.
-constexpr double kLeanPerM = 2.0;    // The pelvis is not above the feet, or the head not above it.
+// The pelvis is not above the feet, or the head is not above the pelvis.
+constexpr double kLeanPerM = 2.0;
 
 double StandHeight(const BodyTracks& tracks) {
   std::vector<double> heights;

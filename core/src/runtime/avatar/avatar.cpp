@@ -38,7 +38,8 @@ struct AvatarCrowd::Scratch {
   std::shared_ptr<const MotionLibrary> library;
   SoaPoseEvaluator evaluator;
   PlanScratch plan;
-  std::vector<AvatarSimulation*> simulations;  // of the avatars of one Advance
+  // Simulations of the avatars that are passed to Advance.
+  std::vector<AvatarSimulation*> simulations;
 };
 
 AvatarCrowd::AvatarCrowd(std::shared_ptr<const MotionLibrary> library)

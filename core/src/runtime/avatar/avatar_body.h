@@ -13,8 +13,8 @@
 namespace stridewire {
 
 /// The displayed state of an avatar and everything its next movement depends on. AvatarSimulation,
-/// which makes decisions, and AvatarReplica, which receives them, share this part. Times are
-/// relative to the start of the movement.
+/// which decides how an avatar moves, and AvatarReplica, which receives these decisions, share this
+/// part. Times are relative to the start of the movement.
 struct AvatarBody {
   explicit AvatarBody(std::shared_ptr<const MotionLibrary> of_library);
 
@@ -24,15 +24,15 @@ struct AvatarBody {
   Pose layered_pose;  ///< Pose with layers; empty until the first layer is set.
   bool has_layers = false;
   bool plants_feet = false;  ///< True if the displayed feet are planted, or would be while moving.
-  bool begins_planting = false;  ///< The next movement is the first one with planted feet.
+  bool begins_planting = false;  ///< True if the next movement is the first one with planted feet.
   Pose blended_pose;  ///< Pose without planting at the time the movement ended or was interrupted.
   /// Source of the next blend: foot corrections at the end of the previous movement and, if its
   /// velocity is kept, kBlendStepS before that. `earlier_pose` is the blended pose at that earlier
   /// time.
   std::array<FeetCorrection, 2> earlier_feet;
   Pose earlier_pose;
-  Movement movement;  ///< Current movement, or the last one.
-  FootLocks locks;    ///< Where the feet stood when the movement began.
+  Movement movement;  ///< The current movement, or the previous one while standing.
+  FootLocks locks;    ///< Positions and headings of the feet when the movement began.
 
   [[nodiscard]] ConstPoseSpan DisplayedPose() const { return has_layers ? layered_pose : pose; }
   [[nodiscard]] const MotionGroup& group() const { return library->group(movement.group); }

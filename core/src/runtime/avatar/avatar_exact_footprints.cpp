@@ -87,7 +87,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
   return false;
 }
 
-// Finds a footprint close to one that was missed that the avatar's step can meet exactly.
+// Finds the footprint nearest to the missed one that the avatar can reach exactly.
 FootprintError AvatarSimulation::NearestInReach(const Footprint& asked,
                                                 const FootprintError& missed, double swing_part,
                                                 PlanScratch& scratch) {
@@ -149,8 +149,8 @@ FootprintError AvatarSimulation::LandingErrorFrom(const Footprint& asked) {
     const DVec3 from_other_m = error_m - (planted[x].ball_m - planned[x].ball_m);
     if (glm::dot(from_other_m, from_other_m) > glm::dot(error_m, error_m)) error_m = from_other_m;
     if (body_.movement.feet.keeps_above_ground && std::fabs(error_m.y) < kLiftedM) error_m.y = 0.0;
-    // The heights of the balls follow the blend, so compare them with the plan, not with the
-    // request.
+    // The heights of the balls follow the blended pose, so they are compared with the plan instead
+    // of the request.
     const DVec3 away_m(asked.position_m.x - planned[m].ball_m.x - error_m.x, -error_m.y,
                        asked.position_m.z - planned[m].ball_m.z - error_m.z);
     const double turn_rad = WrapAngle(asked.heading_rad - planted[m].heading_rad);

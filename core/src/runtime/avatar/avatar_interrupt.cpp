@@ -10,8 +10,8 @@
 
 namespace stridewire {
 
-// Movement time at which both feet are on the ground: now, if they are, else when the swing ends. A
-// jump that has begun is always completed.
+// Returns the movement time at which both feet are on the ground: the current time if they already
+// are, otherwise the end of the swing. A jump that has begun is always completed.
 double AvatarSimulation::LandingTime() const {
   const SwingTimes swing = SwingTimesOf(group().kind, body_.movement);
   return IsStep(group().kind) && movement_time_s_ <= swing.release_s
@@ -24,8 +24,8 @@ double AvatarSimulation::MovementEnd() const {
                                           : body_.movement.duration_s();
 }
 
-// True if the request at the head of the queue can redirect the current swing: it moves the foot
-// that is in the air, and enough of the swing is left.
+// Returns true if the request at the head of the queue can redirect the current swing: it moves the
+// foot that is in the air, and enough of the swing is left.
 bool AvatarSimulation::RedirectsSwing() const {
   if (!interrupts_ || IsStartDelayed() || !IsStep(group().kind) ||
       body_.plants_feet != foot_planting()) {

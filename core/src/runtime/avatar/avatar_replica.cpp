@@ -298,7 +298,8 @@ void AvatarReplica::ReadState(unsigned flags, Reader& reader) {
 
 void AvatarReplica::AdvanceAll(std::span<AvatarReplica* const> replicas, double dt_s,
                                SoaPoseEvaluator& evaluator) {
-  constexpr std::size_t kAtOnce = 16;  // As in AvatarSimulation::AdvanceAll.
+  // Number of replicas that are evaluated together, as in AvatarSimulation::AdvanceAll.
+  constexpr std::size_t kAtOnce = 16;
   std::array<PoseJob, kAtOnce> jobs;
   while (!replicas.empty()) {
     const auto block = replicas.first(std::min(replicas.size(), kAtOnce));

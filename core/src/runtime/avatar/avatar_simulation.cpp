@@ -228,7 +228,7 @@ void AvatarSimulation::AdvanceState(double dt_s, PlanScratch& scratch) {
   next_event_s_ = NextEventTime();
 }
 
-// Movement time of the next event. Returns -1 if the last Advance was not event-free.
+// Returns the movement time of the next event, or -1 if the last Advance was not event-free.
 double AvatarSimulation::NextEventTime() const {
   const bool is_event_free = is_moving_ && !interrupts_ && body_.layers.empty() &&
                              events_.empty() && change_ == AvatarChange{};
@@ -400,13 +400,15 @@ void AvatarSimulation::StartWalkStep(PlanScratch& scratch) {
   }
 }
 
-// Position of a foot between two movements: its footprint, or the ball if feet are not planted.
+// Returns the position of a foot between two movements: its footprint, or the ball if feet are not
+// planted.
 DVec3 AvatarSimulation::StandingPosition(Foot foot) const {
   return body_.plants_feet ? body_.locks[static_cast<std::size_t>(foot)].print.position_m
                            : DVec3(BallPosition(body_.library->skeleton(), body_.pose, foot));
 }
 
-// Height of the ground where a step would land above the ground at the standing foot, in metres.
+// Returns the height of the ground where a step would land above the ground at the standing foot,
+// in metres.
 double AvatarSimulation::RiseAhead(const StepRequest& step) const {
   const Foot foot = step.foot.value_or(OtherFoot(last_moved_));
   const auto f = static_cast<std::size_t>(foot);

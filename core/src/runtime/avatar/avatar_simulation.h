@@ -24,19 +24,21 @@
 
 namespace stridewire {
 
-/// What happened to an avatar's movement during an Advance. Movement records are made from this.
+/// What happened to an avatar's movement during an Advance. Movement records are derived from this.
 struct AvatarChange {
   /// A change record cannot express what happened; send the whole state.
   bool needs_state = false;
-  bool has_left = false;        ///< The previous movement ended or was interrupted.
-  bool has_begun = false;       ///< A movement began and is still in progress.
-  bool has_layers = false;      ///< SetLayer was called.
-  bool idle_changed = false;    ///< idle() changed.
-  bool is_left_at_end = false;  ///< The previous movement ended at its end; it was not interrupted.
+  bool has_left = false;      ///< The previous movement ended or was interrupted.
+  bool has_begun = false;     ///< A movement began and is still in progress.
+  bool has_layers = false;    ///< SetLayer was called.
+  bool idle_changed = false;  ///< idle() changed.
+  /// True if the previous movement was completed, false if it was interrupted.
+  bool is_left_at_end = false;
   /// The new movement began in the middle of the previous one's swing.
   bool is_redirected = false;
-  bool left_keeps_speed = false;   ///< Argument of AvatarBody::CaptureBlendSource.
-  bool begun_keeps_speed = false;  ///< Argument of AvatarBody::BlendIn.
+  /// Argument of AvatarBody::CaptureBlendSource for the previous movement.
+  bool left_keeps_speed = false;
+  bool begun_keeps_speed = false;  ///< Argument of AvatarBody::BlendIn for the new movement.
   double left_s = 0.0;             ///< Time within the previous movement at which it was left.
 
   bool operator==(const AvatarChange&) const = default;
@@ -53,7 +55,7 @@ class AvatarSimulation {
   static constexpr int kMaxQueue = Avatar::kMaxQueue;
   static constexpr std::size_t kMaxEventsPerAdvance = Avatar::kMaxEventsPerAdvance;
 
-  /// The avatar stands at `start` in the library's stand pose.
+  /// Creates an avatar that stands at `start` in the library's stand pose.
   AvatarSimulation(std::shared_ptr<const MotionLibrary> library, const BaseFrame& start,
                    const AvatarOptions& options = {});
 
@@ -81,17 +83,17 @@ class AvatarSimulation {
   /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.
   void Teleport(const BaseFrame& start);
 
-  /// Turns foot planting on or off, from the next movement on and without a jump. Until that
-  /// movement starts, swings are not redirected. While planting is off, queued requests for exact
-  /// placement are rejected when their turn comes. kUnsupported: this skeleton does not support
-  /// foot planting.
+  /// Enables or disables foot planting, without a visible jump, from the next movement on. Until
+  /// that movement starts, swings are not redirected. While planting is off, queued requests for
+  /// exact placement are rejected when their turn comes. kUnsupported: this skeleton does not
+  /// support foot planting.
   [[nodiscard]] Status SetFootPlanting(bool enabled);
   /// The last setting; false if the skeleton does not support foot planting.
   [[nodiscard]] bool foot_planting() const {
     return options_.foot_planting && body_.library->leg_rig().is_usable;
   }
 
-  /// Replaces the ground. Standing feet keep their places until their next step.
+  /// Replaces the terrain. Standing feet keep their positions until their next step.
   void SetTerrain(std::shared_ptr<const Terrain> terrain) { options_.terrain = std::move(terrain); }
 
   /// Advances time by `dt_s` in (0, 1] seconds: finishes and starts movements, updates the pose.
@@ -227,12 +229,13 @@ class AvatarSimulation {
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;
   bool was_idle_ = false;  // Value of idle() after the previous Advance.
-  // The last step left the feet apart, so a closing step must precede a stand.
+  // True if the last step left the feet apart, so that a closing step must precede a stand.
   bool is_walking_ = false;
-  // The request at the head of the queue does not wait for the end of the movement.
+  // True if the request at the head of the queue does not wait for the end of the movement.
   bool interrupts_ = false;
-  bool is_exact_ = false;            // The current step goes to a requested footprint.
-  int inserted_steps_ = 0;           // Inserted steps in a row, including the current movement.
+  bool is_exact_ = false;  // True if the current step goes to a requested footprint.
+  // Number of steps that were inserted in a row, including the current movement.
+  int inserted_steps_ = 0;
   double start_not_before_s_ = 0.0;  // Avatar time.
   // Avatar time at which the last movement with a velocity ended, or -1.
   double moved_until_s_ = -1.0;
@@ -240,12 +243,13 @@ class AvatarSimulation {
   AvatarOptions options_;
   BaseFrame base_;
   AvatarBody body_;
-  AvatarChange change_;           // Of the last Advance.
-  AvatarChange next_change_;      // Reported by the next Advance.
-  std::uint64_t request_id_ = 0;  // Of the current movement or stand.
+  AvatarChange change_;           // Changes during the last Advance.
+  AvatarChange next_change_;      // Changes since the last Advance, which the next Advance reports.
+  std::uint64_t request_id_ = 0;  // Request id of the current movement or stand.
   double stand_left_s_ = 0.0;
   AvatarEvent started_;
-  double ground_rise_m_ = 0.0;  // Height of the base after the movement above its height before.
+  // Height of the base frame after the movement minus its height before the movement.
+  double ground_rise_m_ = 0.0;
   // State to restore if a planned movement is rejected. Allocated by the first request for exact
   // placement.
   struct SavedState {
@@ -254,13 +258,14 @@ class AvatarSimulation {
   };
   std::vector<SavedState> saved_;  // At most one element; a vector so that an avatar can be copied.
 
-  FootState stand_feet_;  // Of the library's stand pose.
+  FootState stand_feet_;  // Relative position of the feet in the library's stand pose.
   FootState feet_;
   Foot last_moved_ = Foot::kRight;
   // Group of the previous movement, or the number of groups after a stand.
   std::size_t last_group_ = 0;
-  WalkProgress walk_;                   // Of the walk at the head of the queue.
-  std::vector<MovementRequest> queue_;  // Elements from queue_head_ on are in use.
+  WalkProgress walk_;  // Progress of the walk at the head of the queue.
+  // The queue consists of the elements from index queue_head_ on.
+  std::vector<MovementRequest> queue_;
   std::size_t queue_head_ = 0;
   std::vector<AvatarEvent> events_;
   OwnScratch own_scratch_;

@@ -17,24 +17,26 @@ enum Flag : std::uint16_t {
   kIsState = 1 << 0,
   kMoves = 1 << 1,   // Change: a movement began. State: a movement is in progress.
   kIsIdle = 1 << 2,  // AvatarSimulation::idle().
-  kPlants = 1 << 3,  // AvatarBody::plants_feet.
-  kLayers = 1 << 4,  // Layers follow. A state without this flag has no layers.
+  kPlants = 1 << 3,  // Value of AvatarBody::plants_feet.
+  kLayers = 1 << 4,  // The record contains layers. A state without this flag has no layers.
   // Changes only:
-  kLeft = 1 << 5,            // The previous movement ended or was interrupted.
-  kLeftAtEnd = 1 << 6,       // It ended at its end, so its time is omitted.
-  kIsRedirected = 1 << 7,    // It was redirected in mid-swing; the foot locks stay the same.
-  kLeftKeepsSpeed = 1 << 8,  // Argument of AvatarBody::CaptureBlendSource.
+  kLeft = 1 << 5,       // The previous movement ended or was interrupted.
+  kLeftAtEnd = 1 << 6,  // The previous movement was completed, so its end time is omitted.
+  // The previous movement was redirected in mid-swing; the foot locks remain unchanged.
+  kIsRedirected = 1 << 7,
+  // Argument of AvatarBody::CaptureBlendSource for the previous movement.
+  kLeftKeepsSpeed = 1 << 8,
   // Argument of AvatarBody::BlendIn. In the state of a standing avatar: the next movement keeps the
   // speed of the previous one.
   kKeepsSpeed = 1 << 9,
   // If a movement began:
   kIsEntered = 1 << 10,  // It began at a time later than 0.
-  kIsSteered = 1 << 11,  // LandingDecision::extra_turn_rad follows.
-  kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; lift_m and normal follow.
-  kAside = 1 << 13,      // LandingDecision::aside_m follows.
-  kRootShift = 1 << 14,  // LandingDecision::root_shift_m follows.
+  kIsSteered = 1 << 11,  // The record contains LandingDecision::extra_turn_rad.
+  kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
+  kAside = 1 << 13,      // The record contains LandingDecision::aside_m.
+  kRootShift = 1 << 14,  // The record contains LandingDecision::root_shift_m.
   // State of a standing avatar only:
-  kBeginsPlanting = 1 << 15,  // AvatarBody::begins_planting.
+  kBeginsPlanting = 1 << 15,  // Value of AvatarBody::begins_planting.
 };
 
 template <typename Stream, typename V>

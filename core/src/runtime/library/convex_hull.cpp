@@ -116,7 +116,7 @@ double ProjectOntoHull(std::span<const double> points, std::span<const double> m
   const auto vertex_at = [&](std::size_t i) {
     return i < stored_count ? stored[i] : compute_vertex(i);
   };
-  // Index of the vertex for which `value` is least, and that value.
+  // Returns the index of the vertex with the smallest `value`, and that value.
   const auto find_least = [&](const auto& value) {
     std::pair<std::size_t, double> least{0, HUGE_VAL};
     const auto consider = [&](std::size_t i, double v) {

@@ -50,11 +50,11 @@ class TimeWarp {
   /// `keytimes_s` must increase; `cells` has one positive count per interval.
   TimeWarp(std::span<const double> keytimes_s, std::span<const int> cells);
 
-  /// Grid position u in [0, cell_count] at `time_s` (clamped).
+  /// Returns the grid position u in [0, cell_count] at `time_s`, which is clamped to the movement.
   [[nodiscard]] double GridPosition(double time_s) const;
-  /// The inverse, by bisection to 1e-12 s. Too slow for use in every tick.
+  /// Inverts GridPosition, by bisection to 1e-12 s. Too slow for use in every tick.
   [[nodiscard]] double TimeAt(double grid_position) const;
-  /// Generic time at `time_s`: GridPosition in units of keytime intervals.
+  /// Returns the generic time at `time_s`: GridPosition in units of keytime intervals.
   [[nodiscard]] double GenericTimeAt(double time_s) const;
 
   [[nodiscard]] int interval_count() const { return interval_count_; }
@@ -68,7 +68,7 @@ class TimeWarp {
     double begin, end;              ///< Grid positions at both ends.
     double begin_slope, end_slope;  ///< Grid positions per second at both ends.
   };
-  /// The piece that contains `time_s`, or the first or last one for times outside.
+  /// Returns the piece that contains `time_s`, or the first or last piece for times outside.
   [[nodiscard]] Piece PieceAt(double time_s) const {
     std::size_t i = 0;
     for (int k = 1; k < interval_count_; ++k) {

@@ -24,9 +24,9 @@ struct LibraryHash {
 };
 
 [[nodiscard]] LibraryHash HashPayload(std::span<const std::byte> payload);
-/// The hash as 32 lower-case hexadecimal digits.
+/// Returns the hash as 32 lower-case hexadecimal digits.
 [[nodiscard]] std::string HashText(const LibraryHash& hash);
-/// The header for a payload, in the current format version.
+/// Returns the header for a payload, in the current format version.
 [[nodiscard]] std::array<std::byte, kLibraryHeaderBytes> MakeLibraryHeader(
     std::span<const std::byte> payload);
 

@@ -29,8 +29,10 @@ constexpr double kUnitTolerance = 1e-3;
 constexpr double kLargestNumber = 1e9;
 
 // Limits that no human movement comes near. Larger values would lose too much precision in floats.
-constexpr double kMaxParameter = 100.0;  // Metres or radians.
-constexpr double kMaxRootM = 1000.0;     // From the base frame, along each axis.
+// Largest absolute value of a parameter, in metres or radians.
+constexpr double kMaxParameter = 100.0;
+// Largest distance of the root from the base frame, along each axis.
+constexpr double kMaxRootM = 1000.0;
 constexpr double kMaxYawRad = 100.0;
 constexpr double kMaxMovementS = 600.0;
 constexpr double kMinScale = 1e-7;
@@ -47,7 +49,7 @@ constexpr double kSumTolerance = 1e-7;
 
 Vec3 ToVec3(const fb::Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
-// True if the number is finite and small enough that later arithmetic cannot overflow.
+// Returns true if the number is finite and small enough that later arithmetic cannot overflow.
 template <typename T>
 bool IsSane(T value) {
   return std::isfinite(value) && std::fabs(static_cast<double>(value)) <= kLargestNumber;
@@ -99,7 +101,7 @@ Expected<Skeleton> LoadSkeleton(const fb::Skeleton& from) {
   return skeleton;
 }
 
-// True if movements of that kind may have that parameter.
+// Returns true if movements of this kind may have this parameter.
 bool NameFitsKind(ParameterName name, MovementKind kind) {
   if (IsStep(kind)) return name <= ParameterName::kTurn;
   return name == ParameterName::kTurn || name == ParameterName::kLength ||

@@ -65,7 +65,7 @@ double LengthOf(const Vec3& v) {
   return std::sqrt(d.x * d.x + d.y * d.y + d.z * d.z);
 }
 
-// The joints that foot planting rotates, about any axis.
+// Returns the joints that foot planting rotates, about any axis.
 std::vector<bool> PlantedJoints(const Skeleton& skeleton) {
   std::vector<bool> planted(skeleton.joints.size(), false);
   for (const Leg& leg : skeleton.legs) {
@@ -221,8 +221,8 @@ class BitAllocator {
            static_cast<double>(1 << bits);
   }
 
-  // Largest error of a quantized rotation in radians. If a component is off by half a step, then w,
-  // which follows from the components, is off by half a step times |v| / w.
+  // Returns the largest error of a quantized rotation in radians. If a component is off by half a
+  // step, then w, which follows from the components, is off by half a step times |v| / w.
   [[nodiscard]] double AngleOf(std::size_t joint, const Bits& bits) const {
     if (joints_[joint].is_unbounded) {
       // The error is largest where all four components are 0.5. Then each of the three encoded ones

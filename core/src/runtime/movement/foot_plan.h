@@ -25,12 +25,13 @@ struct FootTrajectory {
   double release_s = kNever;
   double land_s = kNever;  ///< Stands on `to` from this time on.
   DVec3 release_offset_m = DVec3(0.0);
-  double release_turn_rad = 0.0;  ///< What the heading lock adds to the heading at release.
-  DVec3 release_velocity_m_s = DVec3(0.0);  ///< Of the offset.
+  /// Turn that the heading lock adds to the heading of the foot at release.
+  double release_turn_rad = 0.0;
+  DVec3 release_velocity_m_s = DVec3(0.0);  ///< Velocity of the offset at release.
   DVec3 land_offset_m = DVec3(0.0);
   DVec3 land_velocity_m_s = DVec3(0.0);
-  // Added to the height and heading of the blend: at t = 0, after the difference pose has faded,
-  // and from landing on.
+  // Corrections of the height and heading of the blended foot: at t = 0, after the difference pose
+  // has faded, and from landing on.
   std::array<double, 3> height_m{};
   std::array<double, 3> turn_rad{};
   /// Ground normals at `from` and `to`.
@@ -39,7 +40,8 @@ struct FootTrajectory {
   /// Sideways offset in the middle of the swing, to pass the other foot.
   DVec3 aside_m = DVec3(0.0);
   double root_weight = 0.0;  ///< How much the root follows this foot; 1 for both feet together.
-  DVec3 root_shift_m = DVec3(0.0);  ///< Added to the root by the end of the movement.
+  /// Shift of the root that is complete at the end of the movement.
+  DVec3 root_shift_m = DVec3(0.0);
 
   [[nodiscard]] bool IsPlanted(double time_s) const {
     return time_s <= release_s || time_s >= land_s;
@@ -53,7 +55,7 @@ struct FootResidual {
   DVec3 offset_m_s = DVec3(0.0);
   double turn_rad = 0.0;
   double turn_rad_s = 0.0;
-  double over_s = 0.2;  ///< It is zero after this time.
+  double over_s = 0.2;  ///< Time after which the residual is zero.
 };
 
 /// A foot plan in the layout that the planting kernels read: groups of four floats, with positions
@@ -75,7 +77,9 @@ struct FootPlan {
   std::array<FootTrajectory, 2> feet;     ///< [foot]
   std::array<FootResidual, 2> residuals;  ///< [foot]
   DVec3 root_residual_m =
-      DVec3(0.0);  ///< Residual of the root, which may follow another foot than before.
+      /// Residual of the root. It is separate, because the root may have followed the other foot
+      /// before.
+      DVec3(0.0);
   DVec3 root_residual_m_s = DVec3(0.0);
   /// On terrain, soles are lifted out of the ground that they leave and land on. On level ground
   /// the blend keeps them out well enough, and knees move less without the lift.
@@ -83,9 +87,12 @@ struct FootPlan {
   /// Displayed pose minus planted pose when the plant fade began.
   Vec3 plant_fade_root_m = Vec3(0.0f);
   std::array<std::array<Quat, 3>, 2>
-      plant_fade_rotations{};   ///< [foot]: the same for hip, knee and ankle.
+      /// [foot]: displayed minus planted rotations of hip, knee and ankle when the plant fade
+      /// began.
+      plant_fade_rotations{};
   DVec3 missed_m = DVec3(0.0);  ///< Horizontal vector from the planned to the requested footprint.
-  double missed_rad = 0.0;      ///< The same for the heading.
+  /// Difference between the headings of the planned and the requested footprint.
+  double missed_rad = 0.0;
 
   [[nodiscard]] const FootTrajectory& foot(Foot f) const {
     return feet[static_cast<std::size_t>(f)];

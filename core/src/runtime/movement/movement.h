@@ -19,7 +19,7 @@ namespace stridewire {
 /// A movement may turn this much more or less than its examples.
 inline constexpr double kMaxExtraTurnRad = 0.3;
 
-/// Longest time over which a difference pose fades out (T in Section 5 of the paper).
+/// Longest time over which a difference pose fades out (T in Section 5 of the paper), in seconds.
 inline constexpr double kEaseOutS = 0.2;
 
 /// Velocity of a pose: for each joint a rotation vector per second, in the joint's own frame.
@@ -37,7 +37,8 @@ struct Movement {
   BaseFrame base;
   /// Turn in addition to that of the examples, eased over the movement.
   double extra_turn_rad = 0.0;
-  double start_offset_s = 0.0;       ///< Time at which it begins; above 0 if it redirected a swing.
+  /// Movement time at which it begins; above 0 if it continues a redirected swing.
+  double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration).
   std::vector<float> weights;        ///< [example], sum 1.
   Pose difference;                   ///< D = P - M(start_offset_s), in world space.
@@ -62,10 +63,10 @@ void StartMovement(const MotionGroup& group, int group_index, std::span<const do
 void SetWeights(const MotionGroup& group, int group_index, std::span<const double> parameters,
                 std::span<double> weight_scratch, Movement& movement);
 
-/// Sets other weights [n] of the group, and the heading change that follows from them.
+/// Replaces the weights [n] of a movement, and sets the heading change that follows from them.
 void ApplyWeights(const MotionGroup& group, std::span<const double> weights, Movement& movement);
 
-/// The rest of StartMovement, for a movement with group, parameters and weights.
+/// Completes StartMovement for a movement whose group, parameters and weights are set.
 void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& movement);
 
 /// f(s) = 3(1-s)^2 - 2(1-s)^3: 1 for s <= 0, 0 for s >= 1.
@@ -75,9 +76,9 @@ void StartWeighted(const MotionGroup& group, const BaseFrame& base, Movement& mo
 /// through any value and slope at 0 that ends at rest.
 [[nodiscard]] double EaseOutSlope(double s);
 
-/// Base frame after the movement: below the displayed root at its end, with the heading turned by
-/// the blended change. The paper uses the displayed heading, which swings with the pelvis and lets
-/// walks drift.
+/// Returns the base frame after the movement: below the displayed root at its end, with the heading
+/// turned by the blended change. The paper uses the displayed heading instead, which swings with
+/// the pelvis and lets walks drift.
 [[nodiscard]] BaseFrame BaseAfter(const Movement& movement, ConstPoseSpan end_pose);
 
 }  // namespace stridewire

@@ -45,7 +45,7 @@ constexpr double kMaxAsideM = 0.05;
 // than kCrossingM crosses the legs intentionally.
 constexpr double kMinPassingWidthM = 0.11;
 constexpr double kMinLandingWidthM =
-    0.05;  // Feet do not land closer unless the request gives the side.
+    0.05;  // Feet do not land closer than this sideways, unless the request specifies the side.
 constexpr double kPassingLengthM = 0.2;
 constexpr double kCrossingWidthM = 0.04;
 constexpr double kMaxPushM = 0.08;
@@ -54,14 +54,14 @@ constexpr std::array<double, 5> kSwingSamples{0.25, 0.375, 0.5, 0.625, 0.75};
 
 constexpr std::array<double, 5> kStanceSamples{0.1, 0.3, 0.5, 0.7, 0.9};
 
-// Additional height of the ball's centre above the ground on a slope. The centre is at a fixed
-// distance from the ground plane, so the vertical distance grows with the slope.
+// Returns the additional height of the ball's centre above the ground on a slope. The centre is at
+// a fixed distance from the ground plane, so the vertical distance grows with the slope.
 double SlopeRise(const LegRig::Side& side, const Vec3& normal) {
   return side.ball_height_m * (1.0 / normal.y - 1.0);
 }
 
-// Height of the ground under a sole. The sole rests on the highest bump within it, except for
-// walls, which a step should not be placed at in the first place.
+// Returns the height of the ground under a sole. The sole rests on the highest bump below it. Walls
+// are ignored, because a step should not be placed on a wall in the first place.
 double StandingHeight(const FootSupport& support) {
   return support.plane_height_m + (support.rise_m < kBumpM ? support.rise_m : 0.0);
 }
@@ -116,7 +116,7 @@ class Planner {
   }
   FeetAt Landing() const { return KeyPoseAt(kLanding); }
   std::array<FeetAt, 2> Entry() const { return {KeyPoseAt(kEntry), KeyPoseAt(kEntry + 1)}; }
-  // Vector from one ball to the other at the end of the blend.
+  // Returns the vector from one ball to the other at the end of the blend.
   DVec3 EndVector(Foot from, Foot to) const {
     return sampler_.Ball(kBlendedEnd, to) - sampler_.Ball(kBlendedEnd, from);
   }
@@ -232,7 +232,7 @@ class Planner {
     trajectory.land_offset_m = trajectory.to.position_m - landing.ball_m;
   }
 
-  // Largest outward push of the swinging foot that is needed to pass the standing leg.
+  // Returns the outward push that the swinging foot needs to pass the standing leg.
   double PushAside(Foot moving) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const double outward = moving == Foot::kLeft ? 1.0 : -1.0;
@@ -261,7 +261,7 @@ class Planner {
     return std::min(push_m, kMaxPushM);
   }
 
-  // The shift that moves the root above `place_m` by the end of the movement.
+  // Returns the shift that moves the root above `place_m` by the end of the movement.
   DVec3 RootShift(const DVec3& place_m) {
     const double end_s = movement_.duration_s();
     EvaluateMovement(group_, library_.layout(), movement_, end_s, cache_, pose_);
@@ -283,8 +283,8 @@ class Planner {
     trajectory.normals[1] = support.normal;
   }
 
-  // Lift that the swinging foot needs at the middle of its swing to clear the ground below its
-  // sole.
+  // Returns the lift that the swinging foot needs at the middle of its swing, so that its sole
+  // clears the ground.
   double LiftOver(Foot moving, const Terrain& terrain) {
     const FootTrajectory& trajectory = movement_.feet.foot(moving);
     const LegRig::Side& side = rig_.side(moving);
@@ -327,7 +327,7 @@ class Planner {
   static constexpr std::size_t kRelease = 1;
   static constexpr std::size_t kLanding = 4;
   static constexpr std::size_t kSwing = 6;
-  // Two times: the entry, and kBlendStepS later.
+  // Indices of two times: the start of the movement, and kBlendStepS later.
   static constexpr std::size_t kEntry = kSwing + kSwingSamples.size();
   // The end of the movement, without the difference pose.
   static constexpr std::size_t kBlendedEnd = kEntry + 2;

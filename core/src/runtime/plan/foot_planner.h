@@ -13,7 +13,8 @@
 
 namespace stridewire {
 
-/// Where a foot stands between two movements, and what planting adds to the blend there.
+/// Position and heading of a foot that stands between two movements, and the corrections that
+/// planting adds to the blended foot there.
 struct FootLock {
   Footprint print;
   double height_m = 0.0;
@@ -28,7 +29,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 [[nodiscard]] FootLocks FootLocksOf(const Skeleton& skeleton, const LegRig& rig, ConstPoseSpan pose,
                                     double ground_m, const Terrain* terrain);
 
-/// How a foot would stand on a footprint.
+/// Returns how the ground would support a foot on a footprint.
 [[nodiscard]] FootSupport SupportOf(const Terrain& terrain, const LegRig::Side& side,
                                     const Footprint& print);
 
@@ -37,7 +38,7 @@ void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Where a movement should bring the feet.
 struct LandingTarget {
-  /// Its applied end is reached exactly, or its footprint if it has one.
+  /// Its `applied` parameters or, if it has one, its footprint are reached exactly.
   const RequestPlan& request;
   /// Null: level ground at the height that the library and the request give.
   const Terrain* terrain;
@@ -48,12 +49,13 @@ struct LandingTarget {
 
 /// The pose that a movement blends from.
 struct BlendSource {
-  ConstPoseSpan before;                  ///< Blended pose with difference pose, without planting.
-  std::optional<ConstPoseSpan> earlier;  ///< The same kBlendStepS earlier, if the velocity is kept.
+  ConstPoseSpan before;  ///< Blended pose with difference pose, without planting.
+  /// The pose kBlendStepS before `before`, if the velocity is kept.
+  std::optional<ConstPoseSpan> earlier;
 };
 
-/// Largest difference between the heading of a requested footprint and that of the library's step.
-/// A larger one is approached this far. For the position see RequestPlan::most_residual_m.
+/// Planting changes the heading of the library's step by at most this angle to match a requested
+/// footprint. For the position see RequestPlan::most_residual_m.
 inline constexpr double kMaxFootTurnRad = 0.35;
 /// Largest shift of the root for a step that ends in a stand.
 inline constexpr double kMaxRootShiftM = 0.4;
@@ -77,14 +79,14 @@ struct LandingDecision {
   std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};  ///< [foot]: where the feet that move land.
   // The following members are used for steps only.
   double turn_rad = 0.0;  ///< Turn of the foot at landing, relative to that of the library's step.
-  double height_m = 0.0;  ///< Added to the blend's height at landing.
+  double height_m = 0.0;  ///< Correction of the height of the blended foot at landing.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Ground normal at landing, on terrain.
   double lift_m = 0.0;                   ///< FootTrajectory::lift_m
   DVec3 aside_m = DVec3(0.0);            ///< FootTrajectory::aside_m
   DVec3 root_shift_m = DVec3(0.0);       ///< FootTrajectory::root_shift_m
 };
 
-/// The decisions for a movement that has been planned.
+/// Returns the decisions for a movement that has been planned.
 [[nodiscard]] LandingDecision DecisionOf(MovementKind kind, const Movement& movement);
 
 /// Repeats a plan from its decisions, with the same bits. The weights and the heading of the
@@ -93,12 +95,12 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
                                const LandingDecision& decision, const BlendSource& source,
                                FootPlanScratch& scratch, PoseSpan pose, Movement& movement);
 
-/// The foot locks at a time of a planned movement at which both feet stand. `pose` is the blended
-/// pose with its difference pose at that time.
+/// Returns the foot locks at a time of a planned movement at which both feet stand. `pose` is the
+/// blended pose with its difference pose at that time.
 [[nodiscard]] FootLocks FootLocksAt(const MotionLibrary& library, const Movement& movement,
                                     double time_s, ConstPoseSpan pose);
 
-/// Times at which the moving feet leave the ground and land, whether planted or not.
+/// Returns the times at which the moving feet leave the ground and land, whether planted or not.
 struct SwingTimes {
   double release_s = 0.0;
   double land_s = 0.0;

@@ -30,9 +30,9 @@ class FootSampler {
   /// may only contain rows of this movement.
   void Sample(const Movement& movement, std::span<const double> times_s, std::size_t eased);
 
-  /// The ball of a foot at the `i`th time, in world space.
+  /// Returns the ball of a foot at the `i`th time, in world space.
   [[nodiscard]] DVec3 Ball(std::size_t i, Foot foot) const;
-  /// A foot at the `i`th time.
+  /// Returns a foot at the `i`th time.
   [[nodiscard]] BlendedFoot FootAt(std::size_t i, Foot foot) const;
 
  private:
@@ -46,9 +46,9 @@ class FootSampler {
   const MotionLibrary& library_;
   FootPlanScratch& scratch_;
   PoseSpan pose_;
-  alignas(64) float roots_m_[3][kMaxTimes];      // In world space.
-  alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: relative to the root.
-  alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: relative to the root.
+  alignas(64) float roots_m_[3][kMaxTimes];      // Positions of the root in world space.
+  alignas(64) float balls_m_[2][3][kMaxTimes];   // [foot]: balls relative to the root.
+  alignas(64) float ankles_m_[2][3][kMaxTimes];  // [foot]: ankles relative to the root.
 };
 
 }  // namespace stridewire

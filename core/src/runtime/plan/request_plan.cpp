@@ -47,12 +47,14 @@ constexpr double kExactMetresPerRadian = 1.0;
 constexpr double kHeightWeight = 4.0;
 constexpr double kChangeM = 1e-6;
 
-// Requested value of one parameter. If it is not `given`, any value that the examples have will do.
+// Requested value of one parameter. If `given` is false, any value within the range of the examples
+// is acceptable.
 struct ParameterGoal {
   double value = 0.0;
   bool given = false;
   double weight = 1.0;
-  bool prefers_stand_pose = false;  // Not given, but the value of the stand pose is preferred.
+  // No value is requested, but that of the stand pose is preferred.
+  bool prefers_stand_pose = false;
 };
 using ParameterGoals = std::array<ParameterGoal, kParameterNameCount>;
 
@@ -70,11 +72,12 @@ bool IsGeneral(const MotionGroup& group) {
   return false;
 }
 
-// Distance from a target to the box around a group's examples, grown by `growth`. It is a cheap
-// lower bound for the distance to their hull.
+// Returns the distance from a target to the box around a group's examples, grown by `growth`. It is
+// a cheap lower bound for the distance to their hull.
 double DistanceOutsideRange(const MotionGroup& group, std::span<const double> metric,
                             std::span<const double> target, double growth) {
-  constexpr double kSlack = 1e-6;  // Ranges and examples are rounded differently.
+  // Tolerance for the different rounding of parameter ranges and examples.
+  constexpr double kSlack = 1e-6;
   double sum = 0.0;
   for (std::size_t l = 0; l < target.size(); ++l) {
     const Parameter& parameter = group.parameters[l];
@@ -110,7 +113,7 @@ std::optional<RequestPlan> PlanInGroup(const MotionLibrary& library, int group_i
     }
   }
 
-  // A requested value for which the group has no parameter is missed completely.
+  // If the group lacks the parameter of a requested value, the whole value counts as the error.
   double missed_m = 0.0;
   for (const ParameterName name :
        {ParameterName::kEndX, ParameterName::kEndY, ParameterName::kTurn, ParameterName::kHeight}) {

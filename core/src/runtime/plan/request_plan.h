@@ -12,7 +12,7 @@ namespace stridewire {
 struct FootState {
   DVec3 left_from_right_m = DVec3(0.0);
 
-  /// Moving foot minus fixed foot.
+  /// Returns the vector from the fixed foot to the moving foot.
   [[nodiscard]] DVec3 Vector(Foot moving) const {
     return moving == Foot::kLeft ? left_from_right_m : -left_from_right_m;
   }
@@ -21,17 +21,20 @@ struct FootState {
 /// A request translated to a group of the library and parameters of that group.
 struct RequestPlan {
   int group = -1;
-  ParameterValues requested;  ///< The request in parameters of the group.
-  ParameterValues applied;    ///< Nearest point to it in the hull of the examples, grown by 10 %.
-  bool extrapolated = false;  ///< `applied` is outside the hull itself.
+  ParameterValues requested;  ///< Parameters of the group that correspond to the request.
+  /// The point in the hull of the examples, grown by 10 %, that is nearest to `requested`.
+  ParameterValues applied;
+  bool extrapolated = false;       ///< True if `applied` is outside the hull itself.
   std::optional<Footprint> exact;  ///< Footprint requested by a step.
   /// Largest error of the footprint that planting distributes over the swing.
   double most_residual_m = 0.25;
   std::optional<DVec3> root_m;     ///< Steps: where the root should be at the end, seen from above.
   std::optional<double> turn_rad;  ///< Steps: the requested change of heading.
-  bool is_side_given = false;      ///< Steps: the request specified the side.
-  bool clamped = false;            ///< `applied` differs from `requested` by more than 1e-6.
-  double distance_m = 0.0;  ///< Distance of the group from the request; a radian counts as 0.5 m.
+  bool is_side_given = false;      ///< Steps: true if the request specified the side.
+  /// True if `applied` differs from `requested` by more than 1e-6.
+  bool clamped = false;
+  /// Distance of `applied` from `requested` in metres; a radian counts as 0.5 m.
+  double distance_m = 0.0;
   /// `distance_m` plus costs for extrapolation and for the positions of the feet.
   double cost_m = 0.0;
 };

@@ -55,7 +55,8 @@ class TransitionPathFinder {
   }
 
  private:
-  // Finds the first of `steps` inserted steps after which the request costs at most `max_cost_m`.
+  // Finds the first of up to `steps` inserted steps after which the request costs at most
+  // `max_cost_m`.
   std::optional<RequestPlan> FindFirstStep(int steps, const Stance& stance,
                                            double max_cost_m) const {
     for (const Foot foot : {OtherFoot(stance.last_moved), stance.last_moved}) {
@@ -94,8 +95,8 @@ class TransitionPathFinder {
            (!StartsWithFeetApart(plan, stance) || StartErrorM(plan, stance) <= kMaxStartErrorM);
   }
 
-  // True if the feet are apart and the movement is a jump or a step of the foot that moved last.
-  // Then the other foot should step first.
+  // Returns true if the feet are apart and the movement is a jump or a step of the foot that moved
+  // last. Then the other foot should step first.
   bool StartsWithFeetApart(const RequestPlan& plan, const Stance& stance) const {
     const MovementKind kind = library_.group(plan.group).kind;
     return AreFeetApart(stance.feet, stand_) &&
@@ -111,7 +112,8 @@ class TransitionPathFinder {
                     kMaxTransitionOfStand * library_.FindTransition(stand, to)->distance_m);
   }
 
-  // Forward distance of the feet from their positions at the start of the movement's examples.
+  // Returns the forward distance between the feet and their positions at the start of the
+  // movement's examples.
   double StartErrorM(const RequestPlan& plan, const Stance& stance) const {
     const MotionGroup& group = library_.group(plan.group);
     const int l = group.FindParameter(ParameterName::kStartZ);
@@ -120,8 +122,8 @@ class TransitionPathFinder {
                      plan.applied.values[static_cast<std::size_t>(l)]);
   }
 
-  // Cost of a request in metres. For a jump it is how much further apart than in a stand the feet
-  // are.
+  // Returns the cost of a request in metres. For a jump this is how much further apart the feet are
+  // than in a stand.
   double CostM(const RequestPlan& plan, const Stance& stance) const {
     if (jump_ == nullptr) return plan.cost_m;
     const DVec3 apart = stance.feet.left_from_right_m - stand_.left_from_right_m;
@@ -129,7 +131,7 @@ class TransitionPathFinder {
         {0.0, std::fabs(apart.z) - kFeetApartForwardM, std::fabs(apart.x) - kFeetApartAsideM});
   }
 
-  // Highest cost after an inserted step that makes the step worthwhile.
+  // Returns the highest cost after an inserted step at which inserting the step is worthwhile.
   double MaxCostAfterStepM(double cost_m) const {
     return jump_ != nullptr ? std::max(0.0, cost_m - kMinClosingGainM) : cost_m - kMinStepGainM;
   }

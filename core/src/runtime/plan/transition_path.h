@@ -13,9 +13,9 @@ namespace stridewire {
 /// without them, or before a stand.
 inline constexpr int kMaxInsertedSteps = 3;
 
-/// True if the feet are further from their positions in the stand pose, forward or sideways, than a
-/// stand allows. The sideways limit is larger, because few libraries have steps that bring the feet
-/// together sideways.
+/// Returns true if the feet are further from their positions in the stand pose, forward or
+/// sideways, than a stand allows. The sideways limit is larger, because few libraries have steps
+/// that bring the feet together sideways.
 [[nodiscard]] bool AreFeetApart(const FootState& feet, const FootState& stand);
 
 /// The state from which a movement starts.
@@ -39,8 +39,7 @@ struct TransitionPath {
 /// plan of the request from here.
 ///
 /// - A movement may follow another if their Transition::distance_m is at most 0.15 m, or at most
-/// 1.5
-///   times its distance from the stand. After a stand every movement is possible.
+///   1.5 times its distance from the stand. After a stand every movement is possible.
 /// - If the feet are apart, they must come together before a jump, and before a step of the foot
 ///   that moved last. They need not if they are within 0.25 m of their positions in the movement's
 ///   examples. Then a step is inserted only if it brings the feet closer together by 3 cm or
@@ -54,8 +53,8 @@ struct TransitionPath {
                                                 const std::optional<RequestPlan>& direct,
                                                 const Stance& stance);
 
-/// The reason why there is no path, for example "this library has no transition path from step_left
-/// to jump". Static storage.
+/// Returns the reason why there is no path, for example "this library has no transition path from
+/// step_left to jump". Static storage.
 [[nodiscard]] const char* NoPathReason(MovementKind from, MovementKind to);
 
 }  // namespace stridewire

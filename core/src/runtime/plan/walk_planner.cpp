@@ -43,7 +43,7 @@ constexpr int kMaxOutOfReach = 3;
 
 // Variations of a step to try in turn: shorter steps, then steps towards either side.
 struct Attempt {
-  double part;      // Fraction of the full step.
+  double part;      // Fraction of the full step length.
   double bend_rad;  // Change of the walking direction, left positive.
 };
 constexpr std::array<Attempt, 11> kAttempts{{{1.0, 0.0},
@@ -106,7 +106,7 @@ class StepPlanner {
     return std::nullopt;
   }
 
-  // True if both feet can stand at their footprints at the goal.
+  // Returns true if both feet can stand at their footprints at the goal.
   bool GoalIsGood(const WalkSteering& steering) {
     double heights_m[2];
     for (const Foot foot : {Foot::kLeft, Foot::kRight}) {
@@ -133,7 +133,8 @@ class StepPlanner {
     return print;
   }
 
-  // True if an alternative footprint is still beside the other foot, not across or far behind it.
+  // Returns true if an alternative footprint is still beside the other foot, not across or far
+  // behind it.
   bool KeepsApart(const Footprint& print) const {
     const DVec3 v = RotateYaw(-print.heading_rad, print.position_m - fixed_m_);
     return outward_ * v.x >= 0.08 && outward_ * v.x <= profile_.stand_m + 0.3 &&

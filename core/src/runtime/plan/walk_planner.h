@@ -14,7 +14,7 @@ namespace stridewire {
 
 /// The state of an avatar between two steps of a walk.
 struct WalkStance {
-  std::array<Footprint, 2> feet;  ///< [foot]: where the feet stand.
+  std::array<Footprint, 2> feet;  ///< [foot]: positions and headings of the feet.
   double heading_rad = 0.0;       ///< Heading of the body, unwrapped.
   Foot last_moved = Foot::kRight;
   FootState vector;          ///< Relative position of the feet, for PlanStep.
@@ -26,7 +26,7 @@ struct WalkStance {
 struct WalkProgress {
   std::size_t next_waypoint = 0;
   int steps = 0;
-  int steps_without = 0;  ///< Steps since the last progress.
+  int steps_without = 0;  ///< Number of steps since the walk last made progress.
   double least_left = std::numeric_limits<double>::infinity();
 };
 
@@ -34,8 +34,9 @@ enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 
 struct WalkDecision {
   WalkOutcome outcome = WalkOutcome::kArrived;
-  RequestPlan plan;         ///< Set for kStep.
-  const char* reason = "";  ///< Set for kRefused: one sentence, static storage.
+  RequestPlan plan;  ///< The planned step; set for kStep.
+  /// Set for kRefused: why the walk ends, as one sentence in static storage.
+  const char* reason = "";
 };
 
 /// Limits of a walk. It is rejected after kMaxStepsWithout steps without progress.

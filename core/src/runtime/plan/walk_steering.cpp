@@ -51,7 +51,8 @@ double Length(const DVec3& v) { return std::sqrt(v.x * v.x + v.z * v.z); }
 double HeadingTo(const DVec3& v) { return Atan2(v.x, v.z); }
 double Outward(Foot foot) { return foot == Foot::kLeft ? 1.0 : -1.0; }
 
-// Number of equal parts to divide a length into, so that no part is much longer than `one`.
+// Returns the number of equal parts into which a length is divided, so that no part is much longer
+// than `one`.
 double PartCount(double length, double one) {
   return std::max(1.0, std::ceil(length / one - kStretch));
 }
@@ -154,7 +155,8 @@ double WalkSteering::Bearing(const Body& body, std::size_t next_waypoint) const 
   return HeadingTo(way - RotateYaw(goal_.heading_rad, DVec3(0.0, 0.0, curve_m)));
 }
 
-// True if stepping sideways or backward, or turning on the spot, takes no more steps than walking.
+// Returns true if stepping sideways or backward, or turning on the spot, takes no more steps than
+// walking.
 bool WalkSteering::PrefersSideSteps(const Body& body, bool is_last_leg) const {
   if (!is_last_leg) return false;
   const DVec3 way = goal_.position_m - body.position_m;
@@ -228,7 +230,7 @@ WalkStep WalkSteering::StepToGoal(Foot moving) const {
           true};
 }
 
-// A step that covers the fraction `part` of the distance to the foot's place at the goal.
+// Returns a step that covers the fraction `part` of the distance to the foot's place at the goal.
 WalkStep WalkSteering::StepTowardsGoal(Foot moving, double part) const {
   WalkStep step = StepToGoal(moving);
   const Footprint& from = At(moving);

@@ -13,7 +13,8 @@ namespace stridewire {
 struct WalkStep {
   Footprint print;  ///< Target without a height. Its heading is that of the body afterwards.
   DVec3 root_m = DVec3(0.0);  ///< Position of the body after the step if the avatar stops there.
-  bool is_last = false;       ///< The footprint is at the goal, so no alternative is acceptable.
+  /// True if the footprint is at the goal, so that no alternative is acceptable.
+  bool is_last = false;
 };
 
 /// Computes where the next steps of a walk should lead. It assumes level ground and feet that reach
@@ -29,20 +30,21 @@ class WalkSteering {
   /// Advances `next` past all waypoints that have been reached.
   void PassWaypoints(std::size_t& next) const;
 
-  /// True if both feet stand at the goal within the tolerances.
+  /// Returns true if both feet stand at the goal within the tolerances.
   [[nodiscard]] bool HasArrived(double within_m, double within_rad) const;
-  /// Remaining distance through the waypoints, and remaining turn.
+  /// Return the remaining distance through the waypoints, and the remaining turn.
   [[nodiscard]] double RemainingM(std::size_t next_waypoint) const;
   [[nodiscard]] double RemainingRad() const;
 
-  /// The feet that may step next, the preferred foot first.
+  /// Returns the feet that may step next, the preferred foot first.
   [[nodiscard]] std::span<const Foot> FeetToMove(std::size_t next_waypoint);
 
-  /// The next step of a foot, scaled by `part`, in a direction turned to the left by `bend_rad`.
+  /// Returns the next step of a foot, scaled by `part`, in a direction turned to the left by
+  /// `bend_rad`.
   [[nodiscard]] WalkStep NextStep(Foot moving, std::size_t next_waypoint, double part,
                                   double bend_rad) const;
 
-  /// The footprint of a foot at the goal.
+  /// Returns the footprint of a foot at the goal.
   [[nodiscard]] Footprint GoalPrint(Foot foot) const;
 
  private:

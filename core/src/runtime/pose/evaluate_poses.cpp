@@ -21,8 +21,8 @@ Vec3 NoFaster(const Vec3& velocity, float most) {
   return speed > most ? velocity * (most / speed) : velocity;
 }
 
-// A small rotation as a rotation vector. The length is approximate (2 sin(angle / 2)), which avoids
-// trigonometry that differs between machines.
+// Converts a small rotation to a rotation vector. The length is approximate (2 sin(angle / 2)),
+// which avoids trigonometry that differs between machines.
 Vec3 RotationVector(const Quat& q) {
   const float sign = q.w < 0.0f ? -2.0f : 2.0f;
   return sign * Vec3(q.x, q.y, q.z);
@@ -70,8 +70,9 @@ namespace {
 // The position of a pose in its movement, and how much of the difference pose remains there.
 struct PoseSample {
   GridSample grid;
-  float fraction;         // Remaining fraction of the difference.
-  float slope_s;          // Seconds by which the velocity of the difference is multiplied.
+  float fraction;  // Remaining fraction of the difference pose.
+  // Factor in seconds by which the velocity of the difference pose is multiplied.
+  float slope_s;
   double remaining_turn;  // Fraction of Movement::extra_turn_rad that is still to come.
   bool is_eased;          // True while part of the difference remains.
 };

@@ -25,17 +25,18 @@ class GridCache {
   /// Removes all rows. Call it when the movement changes.
   void Clear() { points_.fill(-1); }
 
-  /// The weighted sum at a grid point. Its quaternions are not normalized.
+  /// Returns the weighted sum at a grid point. Its quaternions are not normalized.
   [[nodiscard]] std::span<const float> Row(const MotionGroup& group, std::span<const float> weights,
                                            int point);
 
  private:
-  // Enough for all points of most movements. Of the longest rows, only the four around a time fit.
+  // This is enough for all points of most movements. If rows have the maximum length, only the four
+  // points around a time fit.
   static constexpr std::size_t kMaxSlots = 32;
   std::size_t row_floats_;
-  std::size_t slot_count_;                     // A power of two.
+  std::size_t slot_count_;                     // Number of slots, a power of two.
   std::array<float, 4 * kMaxRowFloats> rows_;  // Point p is in slot p % slot_count_.
-  std::array<int, kMaxSlots> points_;          // [slot]: the point in it, or -1.
+  std::array<int, kMaxSlots> points_;          // [slot]: grid point stored in the slot, or -1.
 };
 
 /// Evaluates the blended pose at a grid point. Never allocates.
@@ -48,8 +49,8 @@ void EvaluateBlend(const MotionGroup& group, const GridLayout& layout, const Mov
                    double time_s, GridCache& cache, PoseSpan out);
 
 /// Evaluates the pose with the difference pose (Eq. (5)): M'(t) = f(s) D + M(t) with s = (t -
-/// start_offset_s)/T. So M'(start_offset_s) = P, and M'(t) = M(t) for s >= 1. If the movement is
-/// inertial, T h(s) V is added, where V is the velocity of the difference.
+/// start_offset_s) / T. Therefore M'(start_offset_s) = P, and M'(t) = M(t) for s >= 1. If the
+/// movement is inertial, T h(s) V is added, where V is the velocity of the difference.
 void EvaluateMovement(const MotionGroup& group, const GridLayout& layout, const Movement& movement,
                       double time_s, GridCache& cache, PoseSpan out);
 

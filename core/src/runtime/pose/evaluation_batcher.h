@@ -10,8 +10,8 @@
 
 namespace stridewire {
 
-/// Number of poses of a movement before its end, 1 to `most`, starting at `time_s` and spaced
-/// `ticks_apart` ticks of `step_s` seconds.
+/// Returns the number of poses, 1 to `most`, that a movement still has before its end. They start
+/// at `time_s` and are `ticks_apart` ticks of `step_s` seconds apart.
 [[nodiscard]] int SampleRunCount(const Movement& movement, double time_s, double step_s,
                                  int ticks_apart, int most);
 
@@ -28,8 +28,8 @@ class EvaluationBatcher {
   struct Item {
     SampleRun run;
     std::uint32_t key = 0;  ///< Sort key; similar runs have similar keys.
-    std::uint32_t tag = 0;  ///< Chosen by the caller, to recognize the run.
-    int count = 1;          ///< Number of poses.
+    std::uint32_t tag = 0;  ///< Identifies the run for the caller.
+    int count = 1;          ///< Number of poses in the run.
   };
 
   /// Adds a run of `count` poses, 1 to kMaxCount. Its movement must stay alive until Evaluate
@@ -67,7 +67,7 @@ class EvaluationBatcher {
   [[nodiscard]] std::span<const Item> BlockAt(std::size_t begin) const;
   void PrefetchNext(std::size_t end, int pose, int count) const;
 
-  // The key of an item and its index in items_.
+  // Sort key of an item and its index in items_.
   struct SortEntry {
     std::uint32_t key;
     std::uint32_t item;

@@ -10,7 +10,7 @@
 // A `Timing` has the members time_s, start_offset_s, duration_s, ease_out_s and extra_turn, and the
 // functions OfDuration(x) = x / duration_s and OfEaseOut(x) = x / ease_out_s.
 
-// A FootTrajectory and its FootResidual.
+// Data of a FootTrajectory and its FootResidual.
 template <typename Number, typename Vector>
 struct TrajectoryOf {
   Vector from, to, release_offset, release_velocity, land_offset, land_velocity, aside;
@@ -26,11 +26,11 @@ struct CorrectionOf {
   Number swing;       // Elapsed fraction of the swing: 0 before release, 1 after landing.
   Number turned;      // Fraction of the change in heading and tilt that is complete.
   Number turn;        // Added to the heading, radians.
-  Number free_turn;   // The same if the heading were not locked.
-  Vector root_shift;  // Part of FootTrajectory::root_shift_m.
+  Number free_turn;   // Turn that would be added if the heading were not locked.
+  Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
 };
 
-// Share of the lift that is added at a fraction of the swing.
+// Returns the share of the lift that is added at a fraction of the swing.
 template <typename Number>
 STRIDEWIRE_INLINE Number LiftShareOf(Number swing) {
   const Number one = Constant<Number>(1.0);
@@ -39,7 +39,7 @@ STRIDEWIRE_INLINE Number LiftShareOf(Number swing) {
          EaseOut(DivideBy(swing - (one - fade), kLiftFade));
 }
 
-// Extra turn of the body (Movement::extra_turn_rad) that is complete at a time.
+// Returns the part of the body's extra turn (Movement::extra_turn_rad) that is complete at a time.
 template <typename Number, typename Timing>
 STRIDEWIRE_INLINE Number ExtraTurnAt(const Timing& timing, Number at_s) {
   return timing.extra_turn * (Constant<Number>(1.0) - EaseOut(timing.OfDuration(at_s)));
@@ -109,7 +109,7 @@ STRIDEWIRE_INLINE CorrectionOf<Number, Vector> CorrectTrajectory(
   return c;
 }
 
-// Adds what remains of the root's residual to its shift. The height takes longer than the
+// Adds the remaining part of the root's residual to its shift. The height takes longer than the
 // horizontal part, because a body climbs as long as its leg stretches.
 template <typename Number, typename Vector, typename Timing>
 STRIDEWIRE_INLINE Vector AddRootResidual(const Vector& shift, const Timing& timing,

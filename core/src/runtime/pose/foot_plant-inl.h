@@ -186,8 +186,8 @@ HWY_INLINE SoaCorrection CorrectFoot(const PlanCommon& common, const SoaTrajecto
   return c;
 }
 
-// Depth of a sole below the ground plane of a footprint, in metres. Fades to zero with the distance
-// between the foot and the footprint.
+// Returns the depth of a sole below the ground plane of a footprint, in metres. It fades to zero
+// with the distance between the foot and the footprint.
 HWY_INLINE Float DepthBelow(SoaVec3 print, SoaVec3 normal, const LegRig::Bones& bones,
                             const SoaLeg& leg, SoaVec3 ball, SoaQuat turn) {
   const Float dx = ball.x - print.x;

@@ -12,12 +12,12 @@ namespace stridewire {
 
 /// The four grid points between which a pose is interpolated.
 struct GridSample {
-  int first_point;               ///< First of the four points.
+  int first_point;               ///< Index of the first of the four points.
   std::array<float, 4> weights;  ///< Weight of each point.
 };
 
-/// Index of point `k` of a sample. Indices beyond the last grid point return that point: their
-/// weight is zero, but the row is still read.
+/// Returns the index of point `k` of a sample. For indices beyond the last grid point, returns the
+/// last point: their weight is zero, but the row is still read.
 [[nodiscard]] inline int GridPointOf(const MotionGroup& group, const GridSample& sample, int k) {
   return std::min(sample.first_point + k, group.grid_point_count - 1);
 }
@@ -44,7 +44,7 @@ inline void SetGridTime(const MotionGroup& group, const Movement& movement, doub
   times.ease_out_s[lane] = movement.ease_out_s;
 }
 
-/// The sample of one lane.
+/// Returns the sample of one lane.
 [[nodiscard]] inline GridSample GridSampleOf(const kernels::GridSamples& samples,
                                              std::size_t lane) {
   return {samples.first_point[lane],

@@ -15,7 +15,7 @@ bool IsWithin(double value, double low, double high) { return value >= low && va
 // Eases from 0 to 1 with zero slope at both ends.
 double Ease(double u) { return u >= 1.0 ? 1.0 : u * u * (3.0 - 2.0 * u); }
 
-// Elapsed fraction of the current blend.
+// Returns the elapsed fraction of the current blend.
 double Progress(const LayerStack::Playing& p) {
   return p.elapsed_s >= p.ease_s ? 1.0 : p.elapsed_s / p.ease_s;
 }
@@ -128,7 +128,8 @@ void LayerStack::Apply(const MotionLibrary& library, PoseSpan pose) const {
 }
 
 Status LayerStack::Restore(const MotionLibrary& library, std::span<const Playing> playing) {
-  constexpr double kLongestS = 1e6;  // Far above the longest clip, which takes ten minutes.
+  // Limit on the time in a clip. It is far above the longest clip, which takes ten minutes.
+  constexpr double kLongestS = 1e6;
   const auto is_valid = [&](const Playing& p) {
     const auto is_fraction = [](double value) { return IsWithin(value, 0.0, 1.0); };
     const auto is_time = [](double value) { return IsWithin(value, 0.0, kLongestS); };

@@ -17,26 +17,27 @@ class MotionLibrary;
 /// that is set or restored allocates, unless Reserve was called.
 class LayerStack {
  public:
-  static constexpr std::size_t kMaxLayers = 4;  ///< At a time, including those that ease out.
+  /// Largest number of layers that play at the same time, including those that ease out.
+  static constexpr std::size_t kMaxLayers = 4;
 
   /// A layer that is playing.
   struct Playing {
     int layer = 0;
-    double time_s = 0.0;     ///< Time in its clip.
+    double time_s = 0.0;     ///< Time in the layer's clip.
     double weight = 0.0;     ///< Current weight.
     double speed = 1.0;      ///< Current speed.
-    bool is_ending = false;  ///< The layer is easing out.
+    bool is_ending = false;  ///< True while the layer eases out.
     // Weight and speed ease from their old to their new values over ease_s. The slope that the
     // weight had at the start of the blend fades out over slope_s.
     double from_weight = 0.0;
     double to_weight = 0.0;
     double from_speed = 1.0;
     double to_speed = 1.0;
-    double slope = 0.0;  // Weight per second.
+    double slope = 0.0;  // Slope of the weight per second at the start of the blend.
     double slope_s = 0.0;
     double elapsed_s = 0.0;
     double ease_s = 0.0;
-    double blend_s = 0.0;  // As requested; used when a non-looping clip ends.
+    double blend_s = 0.0;  // Blend time as requested; used when a non-looping clip ends.
   };
 
   /// Starts, changes or ends a layer. A playing layer takes the new weight and speed. A layer that
@@ -67,7 +68,7 @@ class LayerStack {
  private:
   [[nodiscard]] Playing* Find(int layer, bool is_ending);
 
-  // Has room for kMaxLayers from the first layer on; most avatars have none.
+  // Gets room for kMaxLayers when the first layer starts; most avatars have none.
   std::vector<Playing> playing_;
 };
 

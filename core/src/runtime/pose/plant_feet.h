@@ -16,8 +16,8 @@ inline constexpr double kRootRisePart = 0.75;
 
 /// A foot in the blended pose, before planting.
 struct BlendedFoot {
-  DVec3 ball_m = DVec3(0.0);  ///< In world space.
-  double heading_rad = 0.0;   ///< Minus the toe-out of the stand pose.
+  DVec3 ball_m = DVec3(0.0);  ///< Position of the ball in world space.
+  double heading_rad = 0.0;   ///< Heading of the foot minus the toe-out of the stand pose.
   double flatness = 1.0;      ///< LegPose::Flatness.
 };
 
@@ -28,27 +28,27 @@ using FeetAt = std::array<BlendedFoot, 2>;
 struct FootCorrection {
   DVec3 offset_m = DVec3(0.0);
   double turn_rad = 0.0;
-  double free_turn_rad = 0.0;  ///< Turn without the heading lock.
+  double free_turn_rad = 0.0;  ///< Turn that the foot would have without the heading lock.
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);
   double root_weight = 0.0;
   DVec3 root_shift_m = DVec3(0.0);
 };
 
-/// Fraction of `lift_m` that is added at a fraction of the swing. The foot rises early and comes
-/// down late, as when stepping over an edge.
+/// Returns the fraction of `lift_m` that is added at a fraction of the swing. The foot rises early
+/// and comes down late, as when stepping over an edge.
 [[nodiscard]] double LiftShare(double swing);
 
-/// Rotation of a corrected foot about its ball, in world axes.
+/// Returns the rotation of a corrected foot about its ball, in world axes.
 [[nodiscard]] Quat TurnOf(const FootCorrection& correction);
 
-/// The correction of a foot at `time_s`, according to a movement's plan.
+/// Returns the correction of a foot at `time_s`, according to a movement's plan.
 [[nodiscard]] FootCorrection CorrectFoot(const Movement& movement, Foot foot, double time_s,
                                          const BlendedFoot& blended);
 
 /// Corrections of both feet, and the resulting shift of the root.
 struct FeetCorrection {
   std::array<FootCorrection, 2> feet;  ///< [foot]
-  /// Added to the root, before it is lowered for legs that are too short.
+  /// Shift of the root, before it is lowered for legs that are too short.
   DVec3 root_m = DVec3(0.0);
 };
 [[nodiscard]] FeetCorrection CorrectFeet(const Movement& movement, double time_s,
@@ -71,7 +71,7 @@ void BeginPlantFade(const LegRig& rig, ConstPoseSpan displayed, Movement& moveme
 /// Final step of planting: adds the part of the plant fade that remains (FootPlan::plant_fade_s).
 void ApplyPlantFade(const LegRig& rig, const Movement& movement, double time_s, PoseSpan pose);
 
-/// A foot of a pose whose root is at `root_m`.
+/// Returns a foot of a pose whose root is at `root_m`.
 [[nodiscard]] BlendedFoot FootOf(const LegRig& rig, Foot foot, const DVec3& root_m,
                                  const LegPose& leg);
 

@@ -106,7 +106,7 @@ void BlendRows(const BlendRowsJob& run) {
     const float* examples = run.grid + point * run.examples * run.row_floats;
     const float* weights[kBlock];
     float* sums[kBlock];
-    std::size_t passing[kBlock];  // Lanes that need this point.
+    std::size_t passing[kBlock];  // Lanes that need the current point.
     std::size_t count = 0;
     for (std::size_t i = 0; i < run.lanes; ++i) {
       if (next[i] == run.poses || point < first_of(i)) continue;

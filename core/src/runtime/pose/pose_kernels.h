@@ -33,14 +33,15 @@ struct GridTimes {
   alignas(64) double begin[kBlock], end[kBlock];
   alignas(64) double begin_slope[kBlock], end_slope[kBlock];
   alignas(64) double last_cell[kBlock];  ///< Number of grid points minus 2
-  /// Members of Movement with the same names.
+  /// Copies of the members of Movement that have these names.
   alignas(64) double duration_s[kBlock], start_offset_s[kBlock], ease_out_s[kBlock];
 };
 /// Positions of poses in their grids, and how much of their difference poses remains.
 struct GridSamples {
   alignas(64) std::int32_t first_point[kBlock];  ///< First of the four points to interpolate
-  alignas(64) float weights[4][kBlock];          ///< Of these points; 0 beyond the last point
-  alignas(64) double remaining_turn[kBlock];     ///< Fraction of the extra turn still to come
+  /// Weights of these points; 0 beyond the last point
+  alignas(64) float weights[4][kBlock];
+  alignas(64) double remaining_turn[kBlock];  ///< Fraction of the extra turn still to come
   alignas(64) float is_eased[kBlock];  ///< 1 while part of the difference pose remains, else 0
   alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
   alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s

@@ -160,7 +160,7 @@ HWY_INLINE SlerpParts SlerpPartsOf(SoaQuat q) {
 constexpr float kLongestSlerp = 1.12f;
 HWY_INLINE SoaQuat SlerpOf(SlerpParts parts, Float fraction) {
   const Float square = parts.square * (fraction * fraction);
-  Float sine = 2.061795443e-03f;  // Divided by half the angle.
+  Float sine = 2.061795443e-03f;  // Sine divided by half the angle
   sine = sine * square - Float(1.216445714e-01f);
   sine = sine * square + Float(1.0f);
   Float cosine = -1.004631922e-04f;

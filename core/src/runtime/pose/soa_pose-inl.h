@@ -65,7 +65,8 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;
-  bool are_all = false;  // All lanes are eased and inertial, so no lanes have to be masked out.
+  // True if all lanes are eased and inertial, so that no lanes have to be masked out.
+  bool are_all = false;
   Mask is_eased, is_inertial;
   Float fraction, half_s;
 };

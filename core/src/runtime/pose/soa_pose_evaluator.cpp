@@ -89,9 +89,9 @@ struct SoaPoseEvaluator::Work {
   std::size_t count = 0;
   std::size_t next = 0;
   bool is_planted = false;
-  bool is_eased = false;        // Some lane has a difference pose left at some time.
-  bool is_inertial = false;     // Some of these lanes are inertial.
-  bool has_plant_fade = false;  // Some lane has a plant fade.
+  bool is_eased = false;        // True if some lane still has a difference pose at some time.
+  bool is_inertial = false;     // True if some of these lanes are inertial.
+  bool has_plant_fade = false;  // True if some lane has a plant fade.
 
   std::vector<kernels::GridSamples> samples;  // [pose]
   std::vector<LaneDoubles> times;             // [pose]

@@ -39,7 +39,7 @@ class SoaPoseEvaluator {
   /// Starts the evaluation of `count` poses of at least one run. Either all movements have planted
   /// feet or none. The movements must stay alive until the last pose has been evaluated.
   void Begin(std::span<const SampleRun> runs, int count);
-  /// The next pose of each run, in its lane. Other lanes are undefined.
+  /// Returns the next pose of each run, in the lane of the run. Other lanes are undefined.
   [[nodiscard]] const SoaPose& Next();
 
   /// Prefetch the memory that evaluation reads: first what SampleRunCount and
@@ -56,7 +56,7 @@ class SoaPoseEvaluator {
 /// A request for a single pose of a movement.
 struct PoseJob {
   const Movement* movement = nullptr;  ///< If its feet are planted, FootPlan::packed is set.
-  double time_s = 0.0;                 ///< Clamped to the movement.
+  double time_s = 0.0;                 ///< Time of the pose; clamped to the movement.
   Pose* pose = nullptr;                ///< Output.
 };
 

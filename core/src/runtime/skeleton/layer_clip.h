@@ -11,8 +11,9 @@
 
 namespace stridewire {
 
-inline constexpr int kMaxLayerClips = 64;       ///< Per library.
-inline constexpr int kMaxLayerFrames = 18'000;  ///< Per clip: ten minutes at 30 per second.
+inline constexpr int kMaxLayerClips = 64;  ///< Per library.
+/// Frames per clip: ten minutes at 30 frames per second.
+inline constexpr int kMaxLayerFrames = 18'000;
 inline constexpr std::size_t kMaxLayerNameBytes = 32;
 inline constexpr double kMinLayerFps = 1.0;
 inline constexpr double kMaxLayerFps = 240.0;
@@ -25,26 +26,28 @@ struct LayerClip {
   /// Source of the clip, for example "wave.bvh 1.00-2.50 s".
   std::string_view source;
   double fps = 0.0;  ///< Keys per second, kMinLayerFps to kMaxLayerFps.
-  /// True if the first key follows the last; false if the clip is played once.
+  /// True for a loop, in which the first key follows the last; false if the clip is played once.
   bool is_looping = false;
-  std::span<const int> joints;       ///< In increasing order; not the root and no joint of a leg.
+  /// Joints that the clip animates, in increasing order. Neither the root nor a joint of a leg.
+  std::span<const int> joints;
   std::span<const float> weights;    ///< [index in joints], in (0, 1].
   std::span<const float> rotations;  ///< [frame][index in joints][x, y, z, w], local.
 
   [[nodiscard]] int frame_count() const {
     return static_cast<int>(rotations.size() / (4 * joints.size()));
   }
-  /// Length of one loop, or the time from the first to the last key.
+  /// Returns the length of one loop, or the time from the first to the last key.
   [[nodiscard]] double duration_s() const {
     return (is_looping ? frame_count() : frame_count() - 1) / fps;
   }
 };
 
-/// True if the name has 1 to kMaxLayerNameBytes characters from a-z, A-Z, 0-9, '_', '-' and '.'.
+/// Returns true if the name has 1 to kMaxLayerNameBytes characters from a-z, A-Z, 0-9, '_', '-' and
+/// '.'.
 [[nodiscard]] bool IsLayerName(std::string_view name);
 
-/// [joint]: true for joints that layers must not affect: the root, every joint from the root to a
-/// ball, and all joints below a hip.
+/// [joint]: true for joints that layers must not affect: the root, all joints between the root and
+/// the balls of the feet, and all joints below a hip.
 [[nodiscard]] std::vector<bool> JointsOfLegs(const Skeleton& skeleton);
 
 /// Rotates the joints of `pose` towards the clip at `time_s`: r slerp(1, r^-1 c, weight * mask),

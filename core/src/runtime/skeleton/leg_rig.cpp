@@ -15,14 +15,14 @@ int PlaceOf(const std::vector<int>& chain, int joint) {
   return it == chain.end() ? -1 : static_cast<int>(it - chain.begin());
 }
 
-// The shortest rotation that turns the direction `from` into `to`, without trigonometry.
+// Returns the shortest rotation that turns the direction `from` into `to`, without trigonometry.
 Quat ShortestArc(const Vec3& from, const Vec3& to) {
   const float scale = std::sqrt(glm::dot(from, from) * glm::dot(to, to));
   const Vec3 axis = glm::cross(from, to);
   return Normalise(Quat(scale + glm::dot(from, to), axis.x, axis.y, axis.z));
 }
 
-// The axis of the knee. A positive rotation about it moves the shank backward.
+// Returns the axis of the knee. A positive rotation about it moves the shank backward.
 Vec3 KneeAxis(const Vec3& thigh, const Vec3& shank, const Quat& hip_rotation) {
   const float scale = std::sqrt(glm::dot(thigh, thigh) * glm::dot(shank, shank));
   const Vec3 plane = glm::cross(thigh, shank) / scale;

@@ -17,15 +17,17 @@ struct LegRig {
     int hip = 0;             ///< Indices in `chain`.
     int knee = 0;
     int ankle = 0;
-    float thigh_m = 0.0f;  ///< Hip to knee; joints in between do not bend.
-    float shank_m = 0.0f;  ///< Knee to ankle.
+    float thigh_m = 0.0f;  ///< Distance from hip to knee. Joints in between do not bend.
+    float shank_m = 0.0f;  ///< Distance from knee to ankle.
     /// Height of the ball's centre above the ground in the stand pose.
     double ball_height_m = 0.0;
     /// Direction from ankle to ball in the stand pose, relative to its heading.
     double toe_out_rad = 0.0;
-    double toe_height_m = 0.0;  ///< Height of the tip of the toes above that ground.
-    Vec3 heel_m = Vec3(0.0f);   ///< Below and behind the ankle, in its frame, as high as the ball.
-    double toe_m = 0.0;         ///< Horizontal distance from the ball to the tip of the toes.
+    /// Height of the tip of the toes above the ground in the stand pose.
+    double toe_height_m = 0.0;
+    /// Position of the heel in the frame of the ankle: below and behind it, as high as the ball.
+    Vec3 heel_m = Vec3(0.0f);
+    double toe_m = 0.0;   ///< Horizontal distance from the ball to the tip of the toes.
     double foot_m = 0.0;  ///< Horizontal distance from the ankle to the ball in the stand pose.
   };
   /// A side and its offsets in flat arrays, for the planting kernels.
@@ -61,7 +63,9 @@ struct LegRig {
 };
 
 inline constexpr double kSoleBehindAnkleM =
-    0.06;  ///< Skeletons have no heel; it is assumed to be this far behind the ankle.
+    /// Distance of the heel behind the ankle. It is an assumption, because skeletons have no heel
+    /// joint.
+    0.06;
 
 [[nodiscard]] LegRig MakeLegRig(const Skeleton& skeleton, ConstPoseSpan stand_pose);
 
@@ -74,10 +78,10 @@ struct LegPose {
   Vec3 toe_tip_m = Vec3(0.0f);
   Vec3 heel_m = Vec3(0.0f);
 
-  /// Heading of the foot: direction from ankle to ball.
+  /// Returns the heading of the foot: the direction from ankle to ball.
   [[nodiscard]] double FootHeading(const LegRig::Side& side) const;
-  /// Horizontal fraction of the foot's length: 1 with the sole on the ground as in the stand pose,
-  /// less with the heel up, and 0 if the ball is at the ankle.
+  /// Returns the horizontal fraction of the foot's length: 1 with the sole on the ground as in the
+  /// stand pose, less with the heel up, and 0 if the ball is at the ankle.
   [[nodiscard]] double Flatness(const LegRig::Side& side) const;
 };
 

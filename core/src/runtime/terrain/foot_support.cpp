@@ -11,7 +11,7 @@ namespace stridewire {
 namespace {
 
 // Sample points of a sole: rows from heel to toe, columns from one side to the other.
-constexpr int kHeelRows = 6;  // Rows behind the ball's row.
+constexpr int kHeelRows = 6;  // Number of rows of sample points behind the row of the ball.
 constexpr int kToeRows = 3;
 constexpr int kRows = kHeelRows + 1 + kToeRows;
 constexpr int kColumns = 5;

@@ -15,7 +15,8 @@ namespace {
 // holds more than kFewBoxes.
 constexpr std::int32_t kMaxIndexCellsPerAxis = 1024;
 constexpr std::size_t kFewBoxes = 16;
-constexpr double kMinIndexedM = 1e-6;  // Smallest extent that cell sizes are computed from.
+// Smallest extent of the indexed area. It prevents cells of size zero.
+constexpr double kMinIndexedM = 1e-6;
 constexpr std::size_t kMaxIndexEntries = std::size_t{4} << 20;
 
 // LowestWithin considers at most this many boxes. The header documents the number.
@@ -72,13 +73,13 @@ Status CheckBox(const TerrainBox& box, const std::string& where) {
   return {};
 }
 
-// Index of the cell that contains `offset`, clamped to [0, cells - 1]. `offset` may be infinite but
-// not NaN.
+// Returns the index of the cell that contains `offset`, clamped to [0, cells - 1]. `offset` may be
+// infinite but not NaN.
 std::int32_t CellOf(double offset, std::int32_t cells) {
   return static_cast<std::int32_t>(std::clamp(offset, 0.0, static_cast<double>(cells - 1)));
 }
 
-// Index of a cell in a row-major array.
+// Returns the index of a cell in a row-major array.
 std::size_t CellIndex(std::int32_t column, std::int32_t row, std::int32_t columns) {
   return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
          static_cast<std::size_t>(column);
@@ -88,7 +89,7 @@ bool Contains(const TerrainBox& box, double x, double z) {
   return x >= box.min_m.x && x <= box.max_m.x && z >= box.min_m.z && z <= box.max_m.z;
 }
 
-// Squared distance from a point to a rectangle; 0 if the point is inside.
+// Returns the squared distance from a point to a rectangle, or 0 if the point is inside.
 double DistanceSquared(const GroundPoint& min, const GroundPoint& max, double x, double z) {
   const double dx = std::max({min.x - x, 0.0, x - max.x});
   const double dz = std::max({min.z - z, 0.0, z - max.z});

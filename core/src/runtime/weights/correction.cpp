@@ -11,7 +11,8 @@ namespace stridewire {
 namespace {
 
 constexpr std::size_t kMaxRows = kMaxParameters + 1;  // Rows of [J; 1].
-using Vector = std::array<double, kMaxRows>;  // In metres; a radian counts kMetresPerRadian.
+// Error per parameter in metres; a radian counts as kMetresPerRadian.
+using Vector = std::array<double, kMaxRows>;
 using Matrix = std::array<Vector, kMaxRows>;
 
 // Every example may change by at least this fraction of the mean |w|.

@@ -16,8 +16,8 @@ struct CorrectionLimits {
   double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
 };
 
-/// The limits for starting a movement: 3 iterations for groups with one or two parameters (straight
-/// steps, jumps) and 8 iterations for others.
+/// Returns the limits for starting a movement: 3 iterations for groups with one or two parameters
+/// (straight steps, jumps) and 8 iterations for others.
 [[nodiscard]] CorrectionLimits DefaultCorrectionLimits(const MotionGroup& group);
 
 /// Limit on the sum of |w| after correction. If the sum is already larger without correction, that
@@ -35,12 +35,13 @@ struct Correction {
 /// thread.
 class CorrectionScratch {
  public:
-  /// For groups of up to `max_example_count` examples. Borrows `skeleton`.
+  /// Allocates memory for groups of up to `max_example_count` examples. Borrows `skeleton`.
   CorrectionScratch(const Skeleton& skeleton, const GridLayout& layout, int max_example_count);
-  /// For all groups of a library, which must outlive the scratch.
+  /// Allocates memory for all groups of a library, which must outlive the scratch.
   explicit CorrectionScratch(const MotionLibrary& library);
 
-  /// Room for the weights of a group in double precision. Receives the result of CorrectWeights.
+  /// Returns room for the weights of a group in double precision. It contains the result of
+  /// CorrectWeights.
   [[nodiscard]] std::span<double> weights(const MotionGroup& group) {
     return std::span(weights_).first(static_cast<std::size_t>(group.example_count));
   }

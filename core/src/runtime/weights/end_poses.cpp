@@ -31,7 +31,7 @@ void EndPoses::Gradient::Add(int joint, const DVec3& by_xyz, double by_w) {
 
 void EndPoses::Gradient::AddTo(const float* rows, std::size_t row_floats,
                                std::span<double> slopes) const {
-  // Writing a slope changes none of the parts.
+  // Lets the compiler assume that writing a slope changes none of the parts.
   const Parts* __restrict parts = joints_.data();
   double* __restrict slope = slopes.data();
   const std::size_t count = joint_count_;
@@ -95,7 +95,8 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
       DQuat blended(GridLayout::RotationOf(sum.data(), j));
       double norm = std::sqrt(glm::dot(blended, blended));
       link.per_norm = 1.0 / norm;
-      if (norm < kernels::kSmallestNorm) {  // As in EvaluateBlend.
+      // A sum of rotations that is too short has no direction; handled as in EvaluateBlend.
+      if (norm < kernels::kSmallestNorm) {
         const auto largest = static_cast<std::size_t>(
             std::max_element(movement.weights.begin(), movement.weights.end()) -
             movement.weights.begin());

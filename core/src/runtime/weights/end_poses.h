@@ -25,7 +25,7 @@ class EndPoses {
   /// Blends both poses with the weights and the heading change of a movement (see ApplyWeights).
   void Blend(const Movement& movement);
 
-  /// The parameters of the blend, as MeasureMovement returns them.
+  /// Returns the parameters of the blend, as MeasureMovement does.
   [[nodiscard]] ParameterValues Measure() const;
 
   /// Writes J = a'(w), the derivatives of the parameters by each weight at the last blend, to
@@ -68,7 +68,7 @@ class EndPoses {
       std::array<double, 4> by;
     };
     std::size_t joint_count_ = 0;
-    std::vector<Parts> joints_;  // The first joint_count_ are in use.
+    std::vector<Parts> joints_;  // Only the first joint_count_ elements are in use.
   };
 
   void BlendEnd(const Movement& movement, bool is_end);
@@ -83,8 +83,8 @@ class EndPoses {
   double heading_change_rad_ = 0.0;
   double sine_ = 0.0;  // Sine and cosine of heading_change_rad_.
   double cosine_ = 1.0;
-  std::array<End, 2> ends_;  // First pose, last pose.
-  Gradient gradient_;        // Scratch of MeasureSlopes.
+  std::array<End, 2> ends_;  // The first and the last pose.
+  Gradient gradient_;        // Scratch memory of MeasureSlopes.
 };
 
 }  // namespace stridewire

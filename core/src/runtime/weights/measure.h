@@ -22,8 +22,9 @@ namespace stridewire {
                                               const MotionGroup& group, const Movement& movement,
                                               GridCache& cache, PoseSpan pose);
 
-/// Largest difference between two parameter vectors of a group, in metres; a radian counts as
-/// kMetresPerRadian. This is the norm of the paper's interpolation error e(p) = |p - a(p)|.
+/// Returns the largest difference between two parameter vectors of a group, in metres; a radian
+/// counts as kMetresPerRadian. This is the norm of the paper's interpolation error e(p) = |p -
+/// a(p)|.
 [[nodiscard]] double LargestDifference(const MotionGroup& group, const ParameterValues& a,
                                        const ParameterValues& b);
 

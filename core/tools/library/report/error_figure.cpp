@@ -10,7 +10,8 @@
 namespace stridewire {
 namespace {
 
-// Cividis: lightness increases evenly, and the hues remain distinct for colour-blind readers.
+// The colour map Cividis: lightness increases evenly, and the hues remain distinct for colour-blind
+// readers.
 constexpr const char* kPalette =
     "set palette defined (0 '#00224e', 0.25 '#414d6b', 0.5 '#7c7b78', 0.75 '#bcae6c', "
     "1 '#fee838')\n";

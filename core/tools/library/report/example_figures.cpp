@@ -23,7 +23,7 @@ std::vector<int> InOrder(const MotionGroup& group, const FigureAxes& axes) {
     const std::span<const double> site = group.site(e);
     const auto value = [&](int l) {
       const auto at = static_cast<std::size_t>(l);
-      // A step becomes longer as its start moves further back.
+      // A step becomes longer as its start position moves further back.
       const bool is_start = group.parameters[at].name <= ParameterName::kStartZ;
       return (is_start ? -site[at] : site[at]) / group.parameters[at].scale;
     };

@@ -33,9 +33,10 @@ struct ReportPicture {
 struct Report {
   std::string html;
   std::vector<ReportPicture> pictures;
-  Refinement refinement;                  // With the amended rule.
-  std::vector<InterpolationError> plain;  // Per group, without pseudoexamples.
-  std::vector<LeaveOneOut> realism;       // Per group of ReportOptions::captured.
+  Refinement refinement;                  // Result of refinement with the amended rule.
+  std::vector<InterpolationError> plain;  // [group]: errors without pseudoexamples.
+  // [group of ReportOptions::captured]: differences between synthesized and captured movements.
+  std::vector<LeaveOneOut> realism;
 };
 
 // Chooses the axes of a group's figures: the named parameters if the group has them, then start_z

@@ -44,7 +44,7 @@ class MovementPlayer {
  public:
   MovementPlayer(const MotionLibrary& library, int group_index);
 
-  // Starts a movement with these parameters. If `corrected`, its weights are corrected at first.
+  // Starts a movement with these parameters. If `corrected`, corrects its weights first.
   void Start(std::span<const double> parameters, bool corrected);
 
   [[nodiscard]] const Movement& movement() const { return movement_; }

@@ -14,7 +14,7 @@ namespace {
 constexpr double kFps = 60.0;
 constexpr double kPoseSpacingM = 0.3;
 constexpr double kMaxPixelsPerMetre = 220.0;
-constexpr double kSlabM = 0.3;  // Length of a slab.
+constexpr double kSlabM = 0.3;  // Length of a drawn slab.
 
 // The requested position of a step, relative to the foot beside it.
 struct Slab {
@@ -36,7 +36,7 @@ std::vector<Slab> SlabsOf(const Synthesis& synthesis, const MotionLibrary& libra
                                synthesis.clip.frame_count() - 1);
     const DVec3 fixed =
         BallPosition(library.skeleton(), synthesis.clip.frame(frame), OtherFoot(moving));
-    // If the request has no side_m, the slab is drawn where the foot landed.
+    // If the request has no side_m, the slab is drawn where the foot has landed.
     const DVec3 ball = BallPosition(library.skeleton(), synthesis.clip.frame(frame), moving);
     const double own_side = moving == Foot::kLeft ? 1.0 : -1.0;
     const double side = step->side_m ? own_side * *step->side_m
