@@ -60,7 +60,7 @@ class GameServer {
   bool Handle(const stridewire_event& event) {
     switch (event.type) {
       case STRIDEWIRE_EVENT_WORLD_JOINED:
-        // After a lost session the client library spawns the avatars again.
+        // Avatars are spawned once only: after a lost session the client library spawns them again.
         if (!spawned_) Spawn();
         break;
       case STRIDEWIRE_EVENT_REPLY:
@@ -71,7 +71,7 @@ class GameServer {
         }
         break;
       case STRIDEWIRE_EVENT_ITEM:
-        // The library has no jumps.
+        // The library has no jumps, so stop requesting them.
         if (event.status == STRIDEWIRE_NO_MOVEMENT) can_jump_ = false;
         refused_ += event.status != STRIDEWIRE_OK;
         break;
@@ -171,7 +171,8 @@ class GameServer {
   Client& client_;
   const Settings& settings_;
   std::mt19937_64 random_;
-  std::vector<std::uint64_t> last_requests_;  // per avatar: the last request, or 0 if accepted
+  // Last request per avatar, or 0 if it has been accepted.
+  std::vector<std::uint64_t> last_requests_;
   stridewire_world world_ = 0;
   std::uint64_t join_command_ = 0;
   std::uint64_t request_id_ = 0;

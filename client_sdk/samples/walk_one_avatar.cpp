@@ -38,8 +38,9 @@ int main(int argc, char** argv) {
       while (client->PollEvent(event)) {
         std::printf("event %d: %s\n", event.type,
                     event.text[0] != '\0' ? event.text : stridewire_status_name(event.status));
-        if (event.type != STRIDEWIRE_EVENT_IDLE) continue;  // Request more when it is idle.
-        std::vector<stridewire_movement> movements;         // Four steps and a pause.
+        // Wait until the avatar is idle, and then request more movements.
+        if (event.type != STRIDEWIRE_EVENT_IDLE) continue;
+        std::vector<stridewire_movement> movements;  // Request four steps and a pause.
         for (int i = 0; i < 4; ++i) movements.push_back(Step(avatar, ++request, 0.55));
         movements.push_back(Stand(avatar, ++request, 0.5));
         (void)client->Request(world, movements);

@@ -65,7 +65,8 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
   }
   try {
     SessionOptions s;
-    protocol::Hello hello;  // Checked here, because the server would reject it later.
+    // Check the options as a Hello message, because the server would reject invalid ones later.
+    protocol::Hello hello;
     hello.client_name = o.client_name != nullptr ? o.client_name : "";
     hello.auth_token = o.auth_token != nullptr ? o.auth_token : "";
     if (!protocol::Check(hello)) return STRIDEWIRE_INVALID_ARGUMENT;
@@ -92,7 +93,8 @@ stridewire_status stridewire_client_create(const stridewire_client_options* opti
     return STRIDEWIRE_OK;
   } catch (const std::bad_alloc&) {
     return STRIDEWIRE_OUT_OF_MEMORY;
-  } catch (const std::exception&) {  // No thread or file descriptor left.
+    // The system could not create another thread or file descriptor.
+  } catch (const std::exception&) {
     return STRIDEWIRE_OUT_OF_MEMORY;
   }
 }

@@ -15,14 +15,14 @@ struct stridewire_client {
       : session(options), network(mutex, changed, session) {}
 
   std::mutex mutex;
-  std::condition_variable changed;  ///< Notified after events were queued or the state changed.
+  std::condition_variable changed;  ///< Notified when events were queued or the state has changed.
   stridewire::client::Session session;
   stridewire::client::NetworkThread network;
 };
 
 namespace stridewire::client {
 
-/// Range check that rejects NaN.
+/// Checks that a number is in a range. Rejects NaN.
 template <typename T>
 bool InRange(T value, T least, T most) {
   return value >= least && value <= most;

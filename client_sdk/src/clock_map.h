@@ -18,7 +18,8 @@ class ClockMap {
   static constexpr int kBuckets = 8;
   static constexpr double kBucket_s = 0.5;
   static constexpr double kWindow_s = kBuckets * kBucket_s;
-  static constexpr double kSlew = 0.02;  ///< Seconds per second.
+  /// Largest rate of change of the offset, in seconds per second.
+  static constexpr double kSlew = 0.02;
   static constexpr double kSnap_s = 0.25;
   static constexpr double kSettle_s = 1.0;
 
@@ -45,7 +46,7 @@ class ClockMap {
   std::array<Bucket, kBuckets> buckets_;
   bool ready_ = false;
   double first_local_s_ = 0.0;
-  double at_local_s_ = 0.0;  ///< Local time of `offset_s_`.
+  double at_local_s_ = 0.0;  ///< Local time for which `offset_s_` is valid.
   double offset_s_ = 0.0;
   double target_offset_s_ = 0.0;  ///< Smallest offset in the window.
 };

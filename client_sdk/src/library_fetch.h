@@ -56,21 +56,21 @@ class LibraryFetch {
   [[nodiscard]] std::optional<protocol::FetchLibrary> TakeRequest(
       const std::function<bool(const std::string& hash)>& may_request);
   void OnPiece(const protocol::LibraryPiece& piece);
-  /// The pending request will not be answered.
+  /// Must be called when the connection is lost, because the pending request will not be answered.
   void OnConnectionLost();
 
  private:
   struct Entry {
     enum class State : std::uint8_t { kToOpen, kOpening, kFetching, kToVerify, kVerifying, kReady };
     State state = State::kToOpen;
-    std::vector<std::byte> file;  // received so far
+    std::vector<std::byte> file;  // Bytes that have been received so far.
     std::shared_ptr<const MotionLibrary> library;
     std::optional<Error> error;
   };
 
   std::string folder_;
   std::map<std::string, Entry> entries_;
-  std::string requested_;  // hash of the pending request; empty: none
+  std::string requested_;  // Hash of the pending request; empty: none.
   std::uint64_t nonce_ = 0;
 };
 

@@ -24,10 +24,10 @@ class NetworkThread {
   /// Sets the server for the next attempt to connect. The caller holds the mutex.
   void SetTarget(std::string host, std::uint16_t port);
 
-  /// Makes the thread look at the session soon. Callable from any thread.
+  /// Makes the thread process the session soon. Callable from any thread.
   void Wake();
 
-  /// Seconds since the construction, on a clock that never decreases.
+  /// Returns the seconds since the construction, on a clock that never decreases.
   [[nodiscard]] double Now() const;
 
  private:

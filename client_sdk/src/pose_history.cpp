@@ -55,14 +55,14 @@ std::optional<std::size_t> PoseHistory::FirstAfterTick(std::uint64_t tick) const
 
 namespace {
 
-/// Weights of the cubic Hermite interpolation at u, 0 to 1.
+/// Weights of cubic Hermite interpolation at u, which is 0 to 1.
 struct Hermite {
   explicit Hermite(float u)
       : slope_0(u * (1.0f - u) * (1.0f - u)),
         value_1(u * u * (3.0f - 2.0f * u)),
         slope_1(u * u * (u - 1.0f)) {}
   float slope_0;
-  float value_1;  ///< The weight of the value at 0 is 1 - value_1.
+  float value_1;  ///< Weight of the value at u = 1. That of the value at u = 0 is 1 - value_1.
   float slope_1;
 };
 
@@ -94,7 +94,8 @@ std::optional<PoseHistory::Sampled> PoseHistory::Sample(double time_s, Vec3& roo
   }
 
   // The slopes at i and j are those of the secants before -> j and i -> after next, scaled to the
-  // interval. Without a neighbour, i or j takes its place, which gives the secant of the interval.
+  // interval. If a neighbour is missing, i or j takes its place, which results in the secant of the
+  // interval.
   const std::size_t before = i > 0 && !stamp(i).discontinuity ? i - 1 : i;
   const std::size_t beyond = j + 1 < size_ && !stamp(j + 1).discontinuity ? j + 1 : j;
   const double length_s = stamp(j).time_s - stamp(i).time_s;

@@ -15,7 +15,7 @@ namespace stridewire::client {
 /// only. A full buffer drops its oldest pose.
 class PoseHistory {
  public:
-  /// Both arguments are above 0.
+  /// `capacity` (in poses) and `joint_count` must be above 0.
   PoseHistory(std::size_t capacity, std::size_t joint_count);
 
   /// Returns the memory of a history in bytes.
@@ -38,8 +38,8 @@ class PoseHistory {
 
   /// How Sample computed a pose.
   struct Sampled {
-    std::size_t index = 0;      ///< The newest pose at or before the time.
-    bool interpolated = false;  ///< False: pose `index` is returned unchanged.
+    std::size_t index = 0;      ///< Index of the newest pose at or before the sampled time.
+    bool interpolated = false;  ///< False if pose `index` is returned unchanged.
   };
 
   /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first

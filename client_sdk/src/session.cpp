@@ -163,7 +163,7 @@ void Session::CloseWithError(stridewire_status status, std::string_view text) {
 }
 
 void Session::Reset() {
-  ++connection_number_;  // An open socket does not belong to the session any more.
+  ++connection_number_;  // After this, an open socket does not belong to the session any more.
   unanswered_.clear();
   worlds_.clear();
   command_count_ = 0;

@@ -38,7 +38,7 @@ class Session : public SessionCommands {
   void StartConnecting(double now_s);
   void OnConnected(double now_s);
   void OnBytes(std::span<const std::byte> bytes, double now_s);
-  /// The attempt to connect has failed, or the connection was lost.
+  /// Must be called when the attempt to connect has failed or the connection was lost.
   void OnLost(stridewire_status status, std::string_view text, double now_s);
   /// Handles timeouts and sends pings.
   void AdvanceTime(double now_s);
@@ -48,7 +48,7 @@ class Session : public SessionCommands {
   [[nodiscard]] std::uint64_t connection_number() const { return connection_number_; }
   /// Moves the pending output to `bytes`. Returns false if there is none.
   [[nodiscard]] bool TakeOutput(std::vector<std::byte>& bytes);
-  /// The bytes from the last TakeOutput were written.
+  /// Must be called when the bytes from the last TakeOutput have been written.
   void OnOutputWritten();
 
  private:
@@ -66,7 +66,8 @@ class Session : public SessionCommands {
   void Handle(const protocol::LibraryPiece& message, double now_s);
   void Handle(const protocol::Goodbye& message, double now_s);
   template <typename Message>
-  void Handle(const Message& message, double now_s);  ///< Messages that a server must not send.
+  /// Rejects messages that a server must not send.
+  void Handle(const Message& message, double now_s);
 
   void OnJoinReply(World& world, const protocol::Reply& reply, double now_s);
   void OnSpawnReply(World& world, const protocol::Spawn& spawn, const protocol::Reply& reply);

@@ -11,7 +11,8 @@ namespace stridewire::client {
 
 namespace {
 
-// Memory of an avatar that the client evaluates, besides its pose history. Limits their number.
+// Estimated memory of an avatar that the client evaluates, besides its pose history. It limits the
+// number of such avatars.
 constexpr std::size_t kReplicaBytes = std::size_t{16} << 10;
 
 }  // namespace
@@ -39,7 +40,8 @@ void SessionCommands::Pump() {
     if (status) {
       ++commands_resent_;
     } else {
-      // It was encoded before, so the server has lowered its limits. The server reports the gap.
+      // The command was encoded before, so this fails only if the server has lowered its limits.
+      // The server then reports the gap.
       last_text_ = Describe(status.error());
     }
   }
@@ -161,7 +163,7 @@ void SessionCommands::FailUnsent(World& world, stridewire_status status, std::st
 void SessionCommands::FailAll(stridewire_status status, std::string_view text) {
   for (const auto& [seq, command] : std::exchange(unanswered_, {})) {
     if (std::holds_alternative<protocol::JoinWorld>(command.message))
-      continue;  // Answered below, with their worlds.
+      continue;  // These commands are answered below, together with their worlds.
     Answer(command, status, text);
   }
   for (auto& [handle, world] : worlds_) {

@@ -89,12 +89,12 @@ void Session::RestoreSession() {
     if (std::holds_alternative<protocol::JoinWorld>(command.message)) continue;
     if (std::holds_alternative<protocol::LeaveWorld>(command.message) ||
         std::holds_alternative<protocol::StopObserving>(command.message)) {
-      Answer(command, STRIDEWIRE_OK);  // There is nothing to leave or stop in a new session.
+      Answer(command, STRIDEWIRE_OK);  // In a new session there is nothing to leave or stop.
       continue;
     }
     if (const auto* observe = std::get_if<protocol::Observe>(&command.message)) {
       if (observe->replace) {
-        Answer(command, STRIDEWIRE_OK);  // Its subscription is restored below.
+        Answer(command, STRIDEWIRE_OK);  // The subscription is restored below.
         continue;
       }
       if (worlds_.at(command.world).subscriptions.contains(observe->subscription)) {
@@ -102,7 +102,7 @@ void Session::RestoreSession() {
         continue;
       }
     }
-    if (command.own) continue;  // Created again below.
+    if (command.own) continue;  // The session's own commands are created again below.
     Answer(command, STRIDEWIRE_SESSION_LOST, "the session was lost before the server answered");
   }
 
@@ -132,10 +132,11 @@ void Session::RestoreSession() {
 
     std::deque<Command> first;
     for (auto& [id, subscription] : world.subscriptions) {
-      if (subscription.unsent) continue;  // Its Observe is still in `unsent`.
+      if (subscription.unsent) continue;  // The subscription's Observe is still in `unsent`.
       subscription.unsent = true;
       if (const auto found = unanswered_observes.find(id); found != unanswered_observes.end()) {
-        found->second.message = subscription.message;  // The region may have moved.
+        // Use the latest message, because the region may have moved.
+        found->second.message = subscription.message;
         first.push_back(std::move(found->second));
       } else {
         first.push_back(Command{0, handle, true, 0, subscription.message});
@@ -196,7 +197,8 @@ void Session::Handle(const protocol::Reply& message, double now_s) {
                           now_s);
   }
   const auto found = unanswered_.find(message.seq);
-  if (found == unanswered_.end()) return;  // A second Reply, after a resume.
+  // Ignore a second Reply, which may arrive after a resume.
+  if (found == unanswered_.end()) return;
   const Command command = std::move(found->second);
   unanswered_.erase(found);
   World& world = worlds_.at(command.world);
@@ -360,7 +362,8 @@ void Session::Handle(const protocol::Events& message, double now_s) {
                           now_s);
   }
   if (message.number != 0) {
-    if (message.number <= last_events_number_) return;  // Already received before the resume.
+    // Ignore a message that was received before the resume.
+    if (message.number <= last_events_number_) return;
     last_events_number_ = message.number;
   }
   stridewire_world handle = 0;
@@ -465,7 +468,7 @@ void Session::Handle(const protocol::Pong& message, double now_s) {
 
 void Session::Handle(const protocol::Goodbye& message, double now_s) {
   const stridewire_status status = ToStatus(message.code);
-  resume_token_.clear();  // The session has ended.
+  resume_token_.clear();  // The session has ended, so it cannot be resumed.
   const int hundred = static_cast<int>(status) / 100;
   if (hundred < 3 || status == STRIDEWIRE_REPLACED) return CloseWithError(status, message.text);
   LoseConnection(status, message.text, now_s);

@@ -37,7 +37,7 @@ struct SessionOptions {
   double ping_interval_s = 1.0;
   double render_delay_s = 0.1;
   bool respawn = false;
-  std::string library_folder;  ///< Cache of libraries. Empty: no cache.
+  std::string library_folder;  ///< Folder that caches libraries. Empty: no cache.
   std::uint64_t seed = 1;
 };
 
@@ -90,7 +90,7 @@ class SessionState {
   struct Command {
     std::uint64_t id = 0;
     stridewire_world world = 0;
-    bool own = false;  ///< The session created it after a lost session.
+    bool own = false;  ///< True if the session itself created the command, after a lost session.
     std::size_t bytes = 0;
     CommandMessage message;
   };
@@ -107,12 +107,14 @@ class SessionState {
     protocol::Role role = protocol::Role::kController;
     protocol::WorldId server_id = 0;  ///< 0: unknown.
     std::uint64_t join_command = 0;
-    bool join_answered = false;  ///< The application has received its REPLY.
+    bool join_answered = false;  ///< True if the application has received the REPLY to its join.
     std::deque<Command> unsent;
     std::map<protocol::SubscriptionId, Subscription> subscriptions;
     std::map<protocol::AvatarId, protocol::Placement>
-        spawned;                             ///< Own avatars with their last base frames.
-    std::uint64_t last_dropped_batches = 0;  ///< Count in the last Lagging.
+        /// Avatars that this client has spawned, with their last base frames.
+        spawned;
+    /// Number of dropped batches in the last Lagging message.
+    std::uint64_t last_dropped_batches = 0;
     std::unique_ptr<WorldView> view;
     std::unique_ptr<ReplicaSet> replicas;  ///< Not null while movements are observed.
     std::optional<protocol::TerrainInfo> terrain;
@@ -147,10 +149,10 @@ class SessionState {
   std::uint64_t next_command_ = 1;
   std::map<protocol::Seq, Command> unanswered_;
   protocol::Seq resend_from_ = 0;  ///< First command to send again after a resume; 0: none.
-  std::size_t command_count_ = 0;  ///< Unsent and unanswered commands of the application.
+  std::size_t command_count_ = 0;  ///< Number of unsent and unanswered commands of the application.
   std::size_t command_bytes_ = 0;
 
-  // State of the session on the server.
+  // The following members are the state of the session on the server.
   bool had_session_ = false;
   std::vector<std::byte> resume_token_;  ///< Empty if the server has ended the session.
   protocol::Seq next_seq_ = 1;
@@ -158,7 +160,7 @@ class SessionState {
   protocol::ServerLimits limits_;
   double tick_hz_ = 60.0;
 
-  // State of the connection.
+  // The following members are the state of the connection.
   std::uint64_t connection_number_ = 0;
   double next_attempt_s_ = 0.0;
   double deadline_s_ = 0.0;  ///< Timeout of kConnecting, kGreeting and kClosing.
@@ -166,13 +168,14 @@ class SessionState {
   double heard_s_ = 0.0;
   double next_ping_s_ = 0.0;
   std::uint64_t ping_nonce_ = 0;
-  std::set<std::uint64_t> pending_pings_;  ///< Pings of the application without Pong; at most 64.
+  /// Pings of the application that have no Pong yet; at most 64.
+  std::set<std::uint64_t> pending_pings_;
   std::optional<protocol::FrameReader> reader_;
   protocol::Encoder encoder_;
   std::vector<std::byte> output_;
 
   WorldView::Counts counts_;
-  std::deque<double> rtts_s_;  ///< Of the last 16 pings.
+  std::deque<double> rtts_s_;  ///< Round-trip times of the last 16 pings.
   std::uint64_t bytes_received_ = 0;
   std::uint64_t bytes_sent_ = 0;
   std::uint64_t dropped_batches_ = 0;

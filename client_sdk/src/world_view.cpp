@@ -133,7 +133,8 @@ void WorldView::Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3
     ++counts.poses;
     track.epoch = epoch_;
     track.gone = false;
-  } else if (stamp.tick != track.seen_tick) {  // A second subscription sends equal ticks.
+    // The tick of a pose can repeat, if a second subscription contains the avatar.
+  } else if (stamp.tick != track.seen_tick) {
     ++counts.refused;
   }
   track.shard = lane.first;

@@ -35,8 +35,9 @@ class WorldView : public PoseSink {
   struct Counts {
     std::uint64_t batches = 0;
     std::uint64_t poses = 0;
-    std::uint64_t refused = 0;  ///< Poses without memory, or not newer than the last.
-    std::uint64_t missing = 0;  ///< Missing batches, from gaps in the ticks.
+    /// Poses that were refused for lack of memory or because they were not newer than the last one.
+    std::uint64_t refused = 0;
+    std::uint64_t missing = 0;  ///< Missing batches, estimated from gaps in the ticks.
   };
 
   WorldView(std::size_t pose_history, PoseBudget& budget)
@@ -52,7 +53,7 @@ class WorldView : public PoseSink {
   [[nodiscard]] const std::string& library_hash() const { return library_hash_; }
   [[nodiscard]] const std::vector<std::string>& layers() const { return layers_; }
 
-  /// Removes description and poses.
+  /// Removes the description and all poses.
   void Clear();
   void ClearPoses();
 
@@ -60,7 +61,7 @@ class WorldView : public PoseSink {
   /// subscription, because the server cannot flag those in batches that clients share.
   void Break() { ++epoch_; }
 
-  /// Stores poses of these avatars only; std::nullopt: of all.
+  /// Stores only poses of these avatars; std::nullopt: of all avatars.
   void SetFilter(std::optional<std::set<protocol::AvatarId>> filter);
 
   /// Stores the poses of a batch. `every_n_ticks` is the requested interval, which is needed to
@@ -116,7 +117,8 @@ class WorldView : public PoseSink {
   void Push(Track& track, const Lane& lane, PoseStamp stamp, const Vec3& root_position_m,
             std::span<const Quat> rotations, Counts& counts);
 
-  /// After the last part of a batch: avatars of its shard and mode that were not in it are gone.
+  /// Must be called after the last part of a batch. Marks avatars of its shard and mode that were
+  /// not in it as gone.
   void MarkMissingAsGone(const protocol::PoseBatchInfo& info);
   /// Erases avatars that have been gone for longer than kKeepGone_s.
   void EraseGone(double time_s);
@@ -132,11 +134,11 @@ class WorldView : public PoseSink {
   std::optional<std::set<protocol::AvatarId>> filter_;
   Tracks tracks_;
   std::map<Lane, Shard> shards_;
-  std::map<protocol::AvatarId, std::uint64_t> left_;  // tick at which an avatar left the region
+  std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
-  std::uint64_t replica_every_n_ticks_ = 1;  // set while Apply(Movements) runs
-  Counts* replica_counts_ = nullptr;         // set while Apply(Movements) runs
+  std::uint64_t replica_every_n_ticks_ = 1;  // Set while Apply(Movements) runs.
+  Counts* replica_counts_ = nullptr;         // Set while Apply(Movements) runs.
 };
 
 }  // namespace stridewire::client

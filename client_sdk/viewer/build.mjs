@@ -47,6 +47,6 @@ for (const [placeholder, [name, extension, contents]] of Object.entries(files)) 
   pages.forEach((page, i) => (pages[i] = page.replaceAll(`%${placeholder}%`, `/assets/${file}`)));
 }
 for (const file of await readdir(assets)) {
-  if (!written.has(file)) await rm(join(assets, file));  // From an earlier build.
+  if (!written.has(file)) await rm(join(assets, file));  // Removes files of an earlier build.
 }
 await Promise.all(names.map((name, i) => writeFile(join(out, name), pages[i])));

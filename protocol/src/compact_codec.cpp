@@ -180,7 +180,8 @@ Status CheckReducedJoints(std::span<const std::uint16_t> joints,
   for (std::size_t i = 1; i < joints.size(); ++i) {
     if (joints[i] >= parents.size()) return wrong("no such joint", i);
     if (joints[i] <= joints[i - 1]) return wrong("joints are not ascending", i);
-    // A parent that does not precede its child is reported elsewhere (Check(WorldInfo), Make).
+    // Ignores a parent that does not precede its child. Check(WorldInfo) and Make report that
+    // error.
     const std::int16_t parent = parents[joints[i]];
     if (parent < 0 ||
         !std::ranges::binary_search(joints.first(i), static_cast<std::uint16_t>(parent))) {

@@ -8,14 +8,14 @@
 
 namespace stridewire::protocol {
 
-/// Rows of the numbers of a pose: three for the root, one that is 0, then four per joint.
+/// Number of rows of a pose's numbers: three for the root, one that is 0, and four per joint.
 inline constexpr std::uint16_t kZeroRow = 3;
 inline constexpr std::size_t kJointRows = 4;
 
 /// The constant inputs of the encoder.
 struct CompactPlan {
   std::span<const CompactJoint> joints;
-  std::span<const std::uint16_t> order;  // All joints, each after its parent.
+  std::span<const std::uint16_t> order;  // Indices of all joints, each after its parent.
   std::span<const CompactPart> parts;    // Parts of a multiple of four words.
 };
 

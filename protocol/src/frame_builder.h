@@ -20,7 +20,7 @@ namespace stridewire::protocol {
                                 std::vector<std::byte>& frame);
 void EndFrame(std::size_t size, std::vector<std::byte>& frame);
 
-/// Upper bound of the bytes of a batch besides its lists: table, vtable, vector lengths and
+/// Upper bound for the size of a batch without its lists: table, vtable, vector lengths and
 /// padding.
 inline constexpr std::size_t kPoseBatchOverheadBytes = 128;
 

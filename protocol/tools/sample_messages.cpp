@@ -60,11 +60,11 @@ std::vector<RotationQuantization> RotationCodes() {
   return codes;
 }
 
-// All joints except feet and head.
+// Indices of all joints except feet and head.
 const std::vector<std::uint16_t> kReducedJoints = {0, 1, 2, 4, 5};
 
-// Poses that the codes can represent, except that of the second avatar, whose left knee rotates
-// about another axis.
+// Poses within the range of the rotation codes. Only the second pose is outside: its left knee
+// rotates about another axis.
 struct CompactArrays {
   PoseBatchInfo info{3, 1, 2, 4, 123'456, 2057.6, PoseMode::kCompact, 8};
   std::vector<AvatarId> avatars = {1, 1001, 2001};
@@ -73,7 +73,8 @@ struct CompactArrays {
 
   explicit CompactArrays(PoseMode mode) {
     info.mode = mode;
-    if (mode == PoseMode::kCompactRoot) flags[1] = 0;  // The root always fits.
+    // In this mode a pose contains only its root, which always fits.
+    if (mode == PoseMode::kCompactRoot) flags[1] = 0;
     const CompactCodec& codec = *SampleCodecs().Find(mode);
     const std::vector<RotationQuantization> codes = RotationCodes();
     CompactCodec::Block block;

@@ -17,15 +17,16 @@ class PoseSink {
  public:
   virtual ~PoseSink() = default;
 
-  /// An avatar has a new pose. `pose` is valid until the call returns.
+  /// Called when an avatar has a new pose. `pose` is valid until the call returns.
   virtual void OnPose(protocol::AvatarId avatar, std::uint16_t shard, const PoseStamp& stamp,
                       ConstPoseSpan pose) = 0;
 
-  /// The avatar was removed, left the subscription, or its state was lost with a message.
+  /// Called when an avatar was removed, left the subscription, or lost its state with a missing
+  /// message.
   virtual void OnGone(protocol::AvatarId avatar) = 0;
 
-  /// The set evaluates only avatars for which this returns true. If the answer changes to true, the
-  /// avatar appears when the server sends its next state.
+  /// The set evaluates only avatars for which this function returns true. If the result changes to
+  /// true, the avatar appears when the server sends its next state.
   [[nodiscard]] virtual bool Wants(protocol::AvatarId) const { return true; }
 };
 
@@ -56,12 +57,13 @@ class ReplicaSet {
  private:
   struct Avatar {
     std::unique_ptr<AvatarReplica> replica;
-    bool discontinuity = true;  // the next pose must not be interpolated from the previous one
+    // True if the next pose must not be interpolated from the previous one.
+    bool discontinuity = true;
   };
   struct Shard {
     bool is_synchronized = false;
-    std::uint64_t step = 0;           // the last complete step
-    std::uint16_t parts_applied = 0;  // parts of the next step
+    std::uint64_t step = 0;           // Number of the last complete step.
+    std::uint16_t parts_applied = 0;  // Number of parts of the next step that have been applied.
     std::map<protocol::AvatarId, Avatar> avatars;
   };
 
@@ -75,7 +77,7 @@ class ReplicaSet {
   std::shared_ptr<const MotionLibrary> library_;
   double tick_s_;
   std::size_t max_avatars_;
-  std::size_t avatar_count_ = 0;  // of all shards
+  std::size_t avatar_count_ = 0;  // Number of avatars of all shards.
   std::map<std::uint16_t, Shard> shards_;
   std::vector<AvatarReplica*> scratch_;
   SoaPoseEvaluator evaluator_;

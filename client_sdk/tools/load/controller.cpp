@@ -8,7 +8,7 @@
 namespace stridewire::load {
 namespace {
 
-constexpr double kSpacingM = 3.0;  // between spawned avatars
+constexpr double kSpacingM = 3.0;  // Distance between spawned avatars.
 constexpr double kFirstPlanWithinS = 2.0;
 constexpr double kPauseBetweenChoreographiesS = 0.5;
 constexpr std::int64_t kRetryNs = 5'000'000;
@@ -108,7 +108,7 @@ void Controller::OnReply(const protocol::Reply& reply) {
 }
 
 protocol::Placement Controller::Place(protocol::AvatarId number) const {
-  // Avatars form a square around the origin, or around the start of the choreography.
+  // Places the avatars in a square around the origin, or around the start of the choreography.
   const std::size_t index = run_.layout.IndexIn(number);
   const auto side = static_cast<std::size_t>(
       std::max(1.0, std::ceil(std::sqrt(static_cast<double>(walkers_.size())))));

@@ -20,9 +20,10 @@ namespace stridewire::load {
 struct ControllerCounts {
   std::uint64_t requests_sent = 0;
   std::uint64_t requests_accepted = 0;
-  std::uint64_t requests_rejected = 0;  ///< In the Reply, or later by an event.
+  /// Number of requests that were rejected, in the Reply or later by an event.
+  std::uint64_t requests_rejected = 0;
   std::map<protocol::StatusCode, std::uint64_t> rejected_by_code;
-  LatencyHistogram send_late;  ///< Delay from the planned to the actual sending.
+  LatencyHistogram send_late;  ///< Delay between the planned and the actual sending of a request.
 };
 
 /// A simulated game server. It spawns the avatars of one world, requests movements according to a
@@ -59,8 +60,9 @@ class Controller final : public Session {
   };
   struct Walker {
     Wanderer wanderer;
-    std::size_t next = 0;     ///< Choreography: index of the next movement.
-    std::size_t waiting = 0;  ///< Choreography: requested but not started.
+    std::size_t next = 0;  ///< Choreography: index of the avatar's next movement.
+    /// Choreography: number of movements that were requested but have not started.
+    std::size_t waiting = 0;
   };
   struct Due {
     std::int64_t at_ns = 0;
@@ -95,7 +97,7 @@ class Controller final : public Session {
 
   RunState& run_;
   const int world_;
-  LatencyProbes* probes_;  ///< Null: no observer measures latency here.
+  LatencyProbes* probes_;  ///< Latency probes. Null: no observer measures latency here.
   protocol::WorldId world_id_ = 0;
   std::map<protocol::Seq, Pending> pending_;
   std::size_t spawned_count_ = 0;

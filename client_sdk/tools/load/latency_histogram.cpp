@@ -7,7 +7,7 @@
 namespace stridewire::load {
 namespace {
 
-constexpr int kExactBits = 8;  // Values below 256 have bins of their own.
+constexpr int kExactBits = 8;  // Values below 2^kExactBits have bins of their own.
 constexpr int kBinsPerOctave = 1 << (kExactBits - 1);
 constexpr std::size_t kExactBins = std::size_t{1} << kExactBits;
 

@@ -25,13 +25,15 @@ class LatencyProbes {
   void Schedule(std::size_t avatar, std::uint64_t request, std::int64_t scheduled_ns,
                 std::int64_t now_ns);
 
-  /// The movement of a request has started at `tick`. Requests without a probe are ignored.
+  /// Must be called when the movement of a request has started at `tick`. Requests without a probe
+  /// are ignored.
   void Started(std::size_t avatar, std::uint64_t request, std::uint64_t tick);
 
-  /// The server has rejected a request. Its probe is closed without a measurement.
+  /// Must be called when the server has rejected a request. Closes its probe without a measurement.
   void Rejected(std::size_t avatar, std::uint64_t request);
 
-  /// A pose has arrived. `changed` states whether it differs from the previous one.
+  /// Must be called when a pose has arrived. `changed` states whether it differs from the previous
+  /// one.
   void Pose(std::size_t avatar, std::uint64_t tick, std::int64_t arrived_ns, bool changed);
 
   /// Closes the probe of an avatar without a measurement, because its observer was dropped
@@ -49,10 +51,10 @@ class LatencyProbes {
 
  private:
   struct Probe {
-    std::uint64_t request = 0;  ///< 0: the probe is closed.
+    std::uint64_t request = 0;  ///< Request that the probe measures. 0: the probe is closed.
     std::int64_t scheduled_ns = 0;
     std::uint64_t started_tick = 0;  ///< 0: unknown.
-    // First and last changed pose that arrived before the `started` event.
+    // Ticks of the first and last changed pose that arrived before the `started` event.
     std::uint64_t first_tick = 0;
     std::int64_t first_ns = 0;
     std::uint64_t last_tick = 0;

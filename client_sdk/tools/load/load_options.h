@@ -43,8 +43,9 @@ struct LoadOptions {
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   protocol::PoseDetail detail = protocol::PoseDetail::kAll;
   std::string library = "builtin";  ///< Library of the server's worlds, for mode movement.
-  std::string choreography;         ///< File name. Empty: the avatars wander.
-  bool observe_all = true;          ///< True: each observer watches all worlds. False: one world.
+  std::string choreography;         ///< File of the choreography. Empty: the avatars wander.
+  /// True if each observer watches all worlds, false if it watches one world.
+  bool observe_all = true;
   double churn_per_s = 0.0;
   int threads = 1;
   int verify_one_in = 1;  ///< Observers decode and check every n-th batch.

@@ -26,27 +26,28 @@ struct LoadReport {
   int partial_avatars = 0;  ///< Avatars per partial observer.
   protocol::PoseMode mode = protocol::PoseMode::kQuantised;
   std::uint64_t seed = 0;
-  double seconds = 0.0;                ///< Duration of the measurement.
-  std::uint64_t poses_received = 0;    ///< By all observers, at measured ticks.
-  std::uint64_t poses_expected = 0;    ///< Observed avatars x measured ticks, of all observers.
+  double seconds = 0.0;              ///< Duration of the measurement.
+  std::uint64_t poses_received = 0;  ///< Poses that all observers received at measured ticks.
+  /// Expected poses: observed avatars times measured ticks, summed over all observers.
+  std::uint64_t poses_expected = 0;
   std::uint64_t poses_invalid = 0;     ///< Received poses that failed a check.
-  std::uint64_t bytes_received = 0;    ///< Frames of measured batches, with headers.
-  std::uint64_t batches_dropped = 0;   ///< Dropped by the server for slow observers.
+  std::uint64_t bytes_received = 0;    ///< Bytes of the frames of measured batches, with headers.
+  std::uint64_t batches_dropped = 0;   ///< Batches that the server dropped for slow observers.
   std::optional<double> moving_share;  ///< Share of received poses that were not standing.
-  std::optional<Quantiles> tick_ms;    ///< From the server's metrics; empty without them.
+  std::optional<Quantiles> tick_ms;    ///< Durations from the server's metrics; empty without them.
   std::optional<std::uint64_t> ticks_missed;
-  std::optional<Quantiles> step_latency_ms;  ///< Empty if no step was measured.
+  std::optional<Quantiles> step_latency_ms;  ///< Latency of steps; empty if no step was measured.
   std::uint64_t steps_measured = 0;
   std::uint64_t requests_sent = 0;
   std::uint64_t requests_accepted = 0;
   std::uint64_t requests_rejected = 0;
   std::uint64_t reconnects = 0;
   int threads = 1;
-  double own_cpu_s = 0.0;  ///< Processor time of this program in the measurement.
+  double own_cpu_s = 0.0;  ///< Processor time that this program used during the measurement.
   Quantiles own_loop_late_ms;
   Quantiles own_send_late_ms;
   std::vector<std::string> errors;
-  bool failed = false;  ///< An error other than slowness occurred: exit code 1.
+  bool failed = false;  ///< True if an error other than slowness occurred. The exit code is then 1.
 };
 
 /// Formats a report as JSON on one line, without a newline.

@@ -91,7 +91,8 @@ class Worker {
       if (code) return;
       const std::int64_t now_ns = NowNs();
       late_.RecordNs(now_ns - next_poll_ns_);
-      next_poll_ns_ = std::max(next_poll_ns_, now_ns - kPollIntervalNs);  // No burst after a stall.
+      // Prevents a burst of polls after a stall.
+      next_poll_ns_ = std::max(next_poll_ns_, now_ns - kPollIntervalNs);
       for (std::size_t i = poll_count_ % kPollGroups; i < sessions_.size(); i += kPollGroups) {
         sessions_[i]->Poll(now_ns);
       }

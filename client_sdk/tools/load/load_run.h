@@ -13,9 +13,11 @@
 namespace stridewire::load {
 
 // A run takes at most this much longer than its measurement.
-inline constexpr double kSetUpTimeoutS = 30.0;  ///< Until all observers see all avatars.
-inline constexpr double kGraceS = 1.0;          ///< For steps in progress at the end.
-inline constexpr double kScrapeTimeoutS = 2.0;  ///< For each of two reads of the metrics.
+/// Longest time until all observers see all avatars.
+inline constexpr double kSetUpTimeoutS = 30.0;
+inline constexpr double kGraceS = 1.0;  ///< Longest time for steps in progress at the end.
+/// Longest time for each of two reads of the metrics.
+inline constexpr double kScrapeTimeoutS = 2.0;
 
 /// Loads a server and returns the measurements. Failures are in `errors` and `failed` of the
 /// report. Blocks for `seconds` plus the times above. If `choreography` is null, the avatars

@@ -27,8 +27,8 @@ Observer::Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint&
   }
 }
 
-// Each as far from the next one as the last of them, and one further than those of the observer
-// before.
+// Selects avatars whose indices are evenly spaced. Each observer starts one avatar further than the
+// previous one.
 void Observer::SelectAvatars(std::size_t which) {
   const std::size_t all = avatar_count_;
   const std::size_t some = std::min(static_cast<std::size_t>(run_.options.partial_avatars), all);
@@ -47,7 +47,8 @@ void Observer::SelectAvatars(std::size_t which) {
 }
 
 std::optional<std::size_t> Observer::IndexIn(const World& world, protocol::AvatarId number) const {
-  if (!run_.layout.IsOurs(world.index, number)) return std::nullopt;  // Not an avatar of this run.
+  // The id does not belong to an avatar of this run.
+  if (!run_.layout.IsOurs(world.index, number)) return std::nullopt;
   if (world.watched.empty()) return run_.layout.IndexIn(number);
   const auto found = std::ranges::lower_bound(world.watched, number);
   if (found == world.watched.end() || *found != number) return std::nullopt;
@@ -154,7 +155,8 @@ void Observer::OnLost(const std::string& why, bool by_us) {
       seen = Seen{.away_since = seen.away_since == 0 && by_us ? last + 1 : seen.away_since};
     }
     world.first_tick = 0;
-    for (Stream& stream : world.streams) stream.tick = 0;  // A restarted server counts from 0.
+    // A restarted server counts its ticks from 0.
+    for (Stream& stream : world.streams) stream.tick = 0;
     if (probes_ != nullptr && by_us) {
       for (std::size_t i = 0; i < world.seen.size(); ++i) {
         probes_->Abandon(run_.layout.Number(world.index, i) - 1);
@@ -335,7 +337,8 @@ void Observer::Measure(World& world, const protocol::PoseBatch& batch, std::size
                        std::span<const std::byte> pose, std::int64_t now_ns) {
   const protocol::AvatarId number = batch.avatars[i];
   const std::size_t index = run_.layout.IndexIn(number);
-  if (pose.size() > world.max_pose_bytes) return;  // The pose is invalid.
+  // No valid pose is this large.
+  if (pose.size() > world.max_pose_bytes) return;
   std::byte* const last = world.last_poses.data() + index * world.max_pose_bytes;
   const bool changed =
       world.last_sizes[index] != pose.size() || std::memcmp(last, pose.data(), pose.size()) != 0;

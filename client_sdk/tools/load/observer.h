@@ -23,7 +23,8 @@ struct ObserverCounts {
   std::uint64_t poses_received = 0;
   std::uint64_t poses_moving = 0;
   std::uint64_t poses_invalid = 0;
-  std::uint64_t poses_excused = 0;  ///< Not expected, because the observer was dropped (--churn).
+  /// Poses that were not expected, because the observer was dropped (--churn).
+  std::uint64_t poses_excused = 0;
   std::uint64_t bytes_received = 0;
   std::uint64_t batches_dropped = 0;
 };
@@ -47,9 +48,9 @@ class Observer final : public Session {
   Observer(ThreadContext& context, const boost::asio::ip::tcp::endpoint& server, RunState& run,
            int index, LatencyProbes* probes);
 
-  /// Returns whether it has received a pose of every observed avatar.
+  /// Returns whether the observer has received a pose of every observed avatar.
   [[nodiscard]] bool sees_all() const { return sees_all_.load(); }
-  /// Returns whether it has received the last tick of the window from every shard.
+  /// Returns whether the observer has received the last tick of the window from every shard.
   [[nodiscard]] bool saw_last_tick() const { return saw_last_tick_.load(); }
   [[nodiscard]] std::uint64_t latest_tick() const { return latest_tick_.load(); }
 
@@ -62,8 +63,8 @@ class Observer final : public Session {
   /// State of an observed avatar.
   struct Seen {
     std::uint64_t tick = 0;        ///< Tick of the last pose on this connection; 0: none.
-    std::uint64_t root_tick = 0;   ///< Tick of `root_m`; 0: unknown.
-    std::uint64_t away_since = 0;  ///< First tick missed because of a drop; 0: none.
+    std::uint64_t root_tick = 0;   ///< Tick of the pose that `root_m` belongs to; 0: unknown.
+    std::uint64_t away_since = 0;  ///< First tick that was missed because of a drop; 0: none.
     Vec3 root_m = Vec3(0.0f);
   };
 
@@ -77,17 +78,19 @@ class Observer final : public Session {
   struct World {
     int index = 0;
     std::size_t joint_count = 0;
-    std::vector<protocol::AvatarId> watched;  ///< Ascending ids; empty: all.
-    std::vector<Seen> seen;                   ///< One per observed avatar.
-    std::uint64_t first_tick = 0;             ///< First tick on this connection; 0: none.
-    protocol::CompactCodecs codecs;           ///< Codecs of compact poses.
+    /// Ascending ids of the observed avatars; empty: all.
+    std::vector<protocol::AvatarId> watched;
+    std::vector<Seen> seen;          ///< State of each observed avatar.
+    std::uint64_t first_tick = 0;    ///< First tick on this connection; 0: none.
+    protocol::CompactCodecs codecs;  ///< Codecs of compact poses.
     /// Bytes of the last pose of each avatar, to detect changes. Used to measure latency.
     std::vector<std::byte> last_poses;
     std::vector<std::size_t> last_sizes;
     std::size_t max_pose_bytes = 0;
     std::vector<Stream> streams;
     std::unique_ptr<client::ReplicaSet> replicas;  ///< Not null in mode movement.
-    std::uint64_t batches_dropped = 0;             ///< Reported by the server on this connection.
+    /// Number of dropped batches that the server reported on this connection.
+    std::uint64_t batches_dropped = 0;
   };
 
   void OnWelcome() override;
@@ -129,7 +132,7 @@ class Observer final : public Session {
   std::map<protocol::Seq, std::size_t> pending_observes_;  ///< -> worlds_
   std::uint64_t seen_count_ = 0;
   std::uint64_t batch_number_ = 0;
-  bool was_dropped_ = false;  ///< The last connection was dropped by this program.
+  bool was_dropped_ = false;  ///< True if this program dropped the last connection.
   std::vector<Quat> rotations_;
   ObserverCounts counts_;
   std::atomic<bool> sees_all_{false};

@@ -83,13 +83,16 @@ struct RunState {
   }
 
   const LoadOptions& options;
-  const Choreography* choreography;                    ///< Null: the avatars wander.
-  const std::shared_ptr<const MotionLibrary> library;  ///< Not null in mode movement.
+  /// Choreography of the avatars. Null: they wander.
+  const Choreography* choreography;
+  /// Library for evaluating poses. Not null in mode movement.
+  const std::shared_ptr<const MotionLibrary> library;
   const Layout layout;
   TickWindow window;
   ErrorLog errors;
   std::atomic<bool> failed{false};
-  std::atomic<bool> is_ending{false};  ///< From now on, lost connections are not errors.
+  /// True once the run is ending. Lost connections are then not errors.
+  std::atomic<bool> is_ending{false};
   std::atomic<double> tick_hz{60.0};
 };
 

@@ -180,7 +180,8 @@ Expected<ServerMetrics> ScrapeServerMetrics(const Address& address, double timeo
 Quantiles TicksBetween(const ServerMetrics& before, const ServerMetrics& after) {
   Quantiles ticks;
   ticks.max = 1e3 * (after.tick_max_s > before.tick_max_s
-                         ? after.tick_max_s  // The new maximum is from this interval.
+                         // The maximum has increased, so it was reached in this interval.
+                         ? after.tick_max_s
                          : after.tick_max_since_scrape_s);
   const auto count_below = [&](double bound, double count) {
     const auto earlier = before.tick_bins.find(bound);

@@ -13,8 +13,9 @@ namespace stridewire::load {
 
 /// Values from one read of the server's /metrics page.
 struct ServerMetrics {
-  std::map<double, double> tick_bins;  ///< Upper bound in seconds -> cumulative count, all shards.
-  double tick_max_s = 0.0;             ///< Maximum since the server started.
+  /// Tick durations of all shards: upper bound in seconds -> cumulative count.
+  std::map<double, double> tick_bins;
+  double tick_max_s = 0.0;  ///< Longest tick since the server started.
   double tick_max_since_scrape_s = 0.0;
   double ticks_missed = 0.0;
   double avatars = 0.0;

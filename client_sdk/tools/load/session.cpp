@@ -54,7 +54,7 @@ void Session::Open() {
 void Session::SendGoodbye() {
   if (state_ != State::kReady || !writing_.empty()) return;
   if (!context_.encoder.Encode(protocol::Goodbye{}, waiting_)) return;
-  // Best effort: the session does not wait until the Goodbye is sent.
+  // An error is ignored, because the session does not wait until the Goodbye is sent.
   boost::system::error_code ignored;
   socket_->write_some(asio::buffer(waiting_), ignored);
 }
@@ -87,7 +87,7 @@ void Session::Lose(const std::string& why) {
 }
 
 void Session::Close() {
-  ++connection_;  // Pending handlers of the old connection do nothing.
+  ++connection_;  // From now on, pending handlers of the old connection do nothing.
   if (socket_) {
     boost::system::error_code ignored;
     (void)socket_->close(ignored);

@@ -16,7 +16,7 @@
 
 namespace stridewire::load {
 
-/// Current time of the steady clock in nanoseconds.
+/// Returns the current time of the steady clock in nanoseconds.
 [[nodiscard]] inline std::int64_t NowNs() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())
@@ -46,8 +46,9 @@ struct ThreadContext {
 class Session {
  public:
   static constexpr std::size_t kMaxWaitingBytes = std::size_t{16}
-                                                  << 20;  ///< Limit of unsent bytes.
-  static constexpr double kConnectTimeoutS = 5.0;         ///< From connecting to Welcome.
+                                                  << 20;  ///< Maximum number of unsent bytes.
+  /// Longest time from the attempt to connect to Welcome.
+  static constexpr double kConnectTimeoutS = 5.0;
 
   Session(ThreadContext& context, boost::asio::ip::tcp::endpoint server, std::string name);
   virtual ~Session() = default;
@@ -88,14 +89,14 @@ class Session {
   [[nodiscard]] const protocol::Welcome& welcome() const { return welcome_; }
   [[nodiscard]] ThreadContext& context() { return context_; }
 
-  /// A new session has begun. No world is joined.
+  /// Called when a new session has begun. No world is joined yet.
   virtual void OnWelcome() = 0;
   /// Handles every message except Welcome, Pong, Goodbye and fatal errors. `frame_bytes` includes
   /// the header.
   virtual void OnMessage(protocol::Message& message, std::size_t frame_bytes,
                          std::int64_t now_ns) = 0;
-  /// The connection was lost or could not be established; `by_us` if Drop caused it. The session
-  /// reconnects. Failed attempts to reconnect cause no further call.
+  /// Called when the connection was lost or could not be established; `by_us` is true if Drop
+  /// caused it. The session reconnects. Failed attempts to reconnect cause no further call.
   virtual void OnLost(const std::string& why, bool by_us) = 0;
 
   /// Closes the connection because of an error and reconnects later.
@@ -129,7 +130,7 @@ class Session {
   protocol::Welcome welcome_;
   protocol::Seq next_seq_ = 1;
   std::uint64_t next_nonce_ = 1;
-  std::int64_t deadline_ns_ = 0;  ///< Timeout, or time of the next attempt.
+  std::int64_t deadline_ns_ = 0;  ///< End of the timeout, or time of the next attempt.
   std::int64_t received_ns_ = 0;
   std::int64_t sent_ns_ = 0;
   double back_off_s_ = 0.0;

@@ -15,9 +15,9 @@ class SmallRandom {
  public:
   explicit SmallRandom(std::uint64_t seed) : state_(seed) {}
   [[nodiscard]] std::uint64_t Next();
-  /// Uniform in [min, max).
+  /// Returns a number with uniform distribution in [min, max).
   [[nodiscard]] double Uniform(double min, double max);
-  /// Uniform in [min, max], both included.
+  /// Returns an integer with uniform distribution in [min, max], both included.
   [[nodiscard]] int Integer(int min, int max);
 
  private:
@@ -26,8 +26,10 @@ class SmallRandom {
 
 /// Movements to request at once, and the time until the next plan.
 struct WanderPlan {
-  std::vector<Movement> movements;  ///< The first is a step or jump, never a stand.
-  double period_s = 0.0;            ///< Time until the next plan. Longer than these movements.
+  /// Movements to request. The first one is a step or jump, never a stand.
+  std::vector<Movement> movements;
+  /// Time until the next plan, in seconds. It is longer than these movements take.
+  double period_s = 0.0;
 };
 
 /// Plans random movements of an avatar: 6 to 16 steps with turns and sometimes a pause, or a jump.

@@ -108,7 +108,7 @@ class Recorder {
     return {};
   }
 
-  /// Ends the recording early, or fails if nothing was recorded.
+  /// Ends the recording early. Returns an error if nothing was recorded.
   Status End(std::string why) {
     if (frame_count() == 0) return Fail(ErrorCode::kIo, "nothing was recorded", std::move(why));
     recording_.cut_short = std::move(why);
@@ -135,7 +135,7 @@ class Recorder {
     recording_.clip.joint_count = recording_.skeleton.joint_count();
     hz_ = skeleton.tick_hz;
     const double frames = std::max(1.0, std::round(options_.seconds * hz_));
-    // Limits the memory, because the tick rate comes from the server.
+    // Too many frames. The limit is necessary because the tick rate comes from the server.
     if (frames > kMaxFrames) {
       return Fail(ErrorCode::kLimitExceeded, "too many frames", "--seconds",
                   static_cast<std::int64_t>(frames));

@@ -13,7 +13,7 @@
 
 namespace stridewire::record {
 
-/// What to record.
+/// What to record, and from which server.
 struct Options {
   std::string host;
   std::uint16_t port = 0;
@@ -21,9 +21,10 @@ struct Options {
   std::uint32_t avatar = 0;
   double seconds = 0.0;
   stridewire_pose_mode mode = STRIDEWIRE_FULL;
-  double timeout_s = 10.0;  ///< Longest wait for connection, avatar and each pose.
+  double timeout_s = 10.0;  ///< Longest time to wait for the connection, the avatar and each pose.
   std::string token;
-  std::string library_folder;  ///< Cache of libraries for STRIDEWIRE_MOVEMENT. Empty: none.
+  /// Folder that caches libraries for STRIDEWIRE_MOVEMENT. Empty: no cache.
+  std::string library_folder;
 };
 
 /// A run of frames that were not received.
@@ -35,14 +36,16 @@ struct Gap {
 /// A recorded motion.
 struct Recording {
   Skeleton skeleton;
-  Clip clip;  ///< One frame per tick.
+  Clip clip;  ///< Recorded motion with one frame per tick.
   std::string library_hash;
   std::uint64_t first_tick = 0;
-  std::uint64_t ticks_missing = 0;  ///< Ticks not received; interpolated from their neighbours.
-  std::vector<Gap> gaps;            ///< Positions of the missing frames: the first kMaxGaps.
+  /// Number of ticks that were not received. They are interpolated from their neighbours.
+  std::uint64_t ticks_missing = 0;
+  /// Runs of missing frames; at most kMaxGaps of them are listed.
+  std::vector<Gap> gaps;
   std::uint64_t discontinuities = 0;
   std::uint64_t bytes_received = 0;
-  std::string cut_short;  ///< Why the recording is too short. Empty: it is complete.
+  std::string cut_short;  ///< Reason why the recording is too short. Empty: it is complete.
 };
 
 inline constexpr std::size_t kMaxGaps = 1000;

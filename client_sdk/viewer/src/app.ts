@@ -40,15 +40,18 @@ import type {WalkHost} from './walk_tool.js';
 import type {AvatarSelection, WorldPane} from './world_pane.js';
 import {WorldPanes} from './world_panes.js';
 
-/** How often panels read the state of avatars, and the page reads the layout of its elements. */
+/**
+ * Interval at which panels read the states of avatars, and the page reads the layout of its
+ * elements.
+ */
 const panelUpdateIntervalMs = 250;
-/** How often the list of worlds is requested from the server. */
+/** Interval at which the list of worlds is requested from the server. */
 const serverInfoIntervalMs = 4000;
-/** How much of the recording the playback slider covers. */
+/** Part of the recording that the playback slider covers, in seconds. */
 const playbackRangeS = 20;
-/** The selection ends when its avatar has not been drawn for this long. */
+/** The selection ends when its avatar has not been drawn for this time. */
 const selectionTimeoutMs = 3000;
-/** How long a message over the scene stays. */
+/** Time for which a message is shown over the scene. */
 const toastMs = 8000;
 /** Pointer distance, in CSS pixels, within which a click selects an avatar. */
 const pickReachPx = 28;
@@ -67,7 +70,7 @@ export class App {
   framesDrawn = 0;
   /** Smoothed time between frames. */
   frameMs = 0;
-  /** When the first avatars were drawn, in milliseconds after navigation; 0: not yet. */
+  /** Time at which the first avatars were drawn, in milliseconds after navigation; 0: not yet. */
   firstFigureMs = 0;
   /** Server time that the last frame shows. A seek takes effect with the next frame. */
   drawnTimeS = 0;
@@ -89,7 +92,7 @@ export class App {
   private lastPanelUpdateMs = -1e9;
   private lastFrameMs = 0;
   private selected: AvatarSelection | null = null;
-  /** How long the selected avatar has not been drawn. */
+  /** Time for which the selected avatar has not been drawn. */
   private missingMs = 0;
   private lastSelectionCheckMs = 0;
   /** The pane that the user clicked last. It receives commands if no avatar is selected. */
@@ -140,7 +143,7 @@ export class App {
     this.panes = this.worldPanes.panes;
     this.camera = new CameraControl(this.panes);
     this.status = new ConnectionStatus(this.client, host, this.panes);
-    // Connecting takes a while, so it starts before the scene is made.
+    // Connects before creating the scene, because connecting takes a while.
     this.client.connect();
     void this.worldPanes.fetchServerInfo();
     this.canvas = h('canvas', {
@@ -305,7 +308,7 @@ export class App {
 
   // ---- selection and commands
 
-  /** Avatar 0: clears the selection. */
+  /** Selects an avatar; 0 clears the selection. */
   private select(pane: WorldPane | null, avatar: number): void {
     for (const each of this.panes) {
       each.view.selectedAvatar = each === pane ? avatar : 0;
@@ -364,7 +367,7 @@ export class App {
       performance.now() > this.toastUntilMs || this.sidePanels.isOpen('commands');
   }
 
-  /** The pane whose world receives commands. */
+  /** Returns the pane whose world receives commands. */
   private commandedPane(): WorldPane | null {
     return this.selected?.pane ?? this.activePane ?? this.panes[0] ?? null;
   }
@@ -451,7 +454,7 @@ export class App {
       this.renderer.setSize(width, height, false);
       this.overlay.resize(width, height);
     }
-    // The area that panels leave free.
+    // Computes the area that panels leave free.
     let [x0, x1, y0, y1] = [0, width, this.top.offsetHeight, height - this.bottom.offsetHeight];
     const {sidePanels} = this;
     if (isNarrowPage()) {

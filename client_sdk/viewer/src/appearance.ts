@@ -14,7 +14,7 @@ export class Appearance {
   /** Canvas pixels per CSS pixel. */
   pixelRatio: number;
   private figures: 'auto' | FigureStyle;
-  /** The user's choice; null: the quality level decides. */
+  /** The user's choice; null if the quality level decides. */
   private shadows: boolean | null = null;
   private level = -1;
 
@@ -66,7 +66,7 @@ export class Appearance {
     return `${options.coarse && options.style === 'bodies' ? 'simplified ' : ''}${options.style}` +
       (settings.scale < 1 ? ` at ${(settings.scale * 100).toFixed(0)} % resolution` : '');
   }
-  /** Why the quality is lowered; empty if it is not. */
+  /** Returns why the quality was lowered; empty if it was not. */
   loweredReason(): string {
     if (!this.quality.lowered) return '';
     return this.info.software ? 'the browser renders in software' : 'frames took too long';

@@ -12,17 +12,17 @@ export interface CommandHost {
   selection(): AvatarSelection | null;
   /** The world that receives commands. */
   commandedPane(): WorldPane | null;
-  /** Avatar 0: clears the selection. */
+  /** Selects an avatar; 0 clears the selection. */
   select(pane: WorldPane | null, avatar: number): void;
   /** Moves the camera so that all avatars are in view. */
   frameAllAvatars(): void;
-  /** Shows the present again if the user was looking at the recording. */
+  /** Returns to the live view if the user was looking at the recording. */
   goLive(): void;
   /** Shows a message to the user. */
   notify(text: string): void;
   /** Called after the queues of these avatars have been cleared. */
   onCancelled(pane: WorldPane, avatars: readonly number[]): void;
-  /** Shows in the panel that the terrain is none of the sample terrains. */
+  /** Shows in the panel that the world has none of the sample terrains. */
   resetTerrainChoice(): void;
 }
 
@@ -38,9 +38,9 @@ export class AvatarCommands {
   /** The world whose terrain this page is changing. */
   private terrainRequestedFor: World | null = null;
   private terrainChoiceWorld: World | null = null;
-  /** Layers that play as far as the page knows; each entry is "avatar layer". */
+  /** Layers that play, as far as the page knows. Each entry is "avatar layer". */
   private readonly playingLayers = new WeakMap<World, Set<string>>();
-  /** Avatars whose foot planting is off as far as the page knows. */
+  /** Avatars whose foot planting is disabled, as far as the page knows. */
   private readonly unplantedAvatars = new WeakMap<World, Set<number>>();
   /** While above 0, reported states may be older than a toggle and are ignored. */
   private recentToggles = 0;
@@ -85,14 +85,15 @@ export class AvatarCommands {
     });
   }
 
-  /** The panel keeps its choice if this page has changed the terrain, and resets it otherwise. */
+  /** If this page has changed the terrain, the panel keeps its choice; otherwise it resets it. */
   onTerrainChanged(world: World): void {
     if (this.terrainRequestedFor !== world) this.host.resetTerrainChoice();
     this.terrainRequestedFor = null;
   }
 
   /**
-   * Call with the world that receives commands. If it is another one, the panel's choice is reset.
+   * Must be called with the world that receives commands. If this is another world than before,
+   * resets the panel's choice.
    */
   setTerrainChoiceWorld(world: World): void {
     if (world === this.terrainChoiceWorld) return;
@@ -200,8 +201,8 @@ export class AvatarCommands {
   }
 
   /**
-   * Spawns avatars on a spiral, outside those that are there already. The server removes them when
-   * the page closes.
+   * Spawns avatars on a spiral, outside the avatars that already exist. The server removes them
+   * when the page closes.
    */
   async spawn(pane: WorldPane | null, count: number, walkRandomly: boolean): Promise<void> {
     if (!pane) return;

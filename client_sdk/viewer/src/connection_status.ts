@@ -1,4 +1,4 @@
-// Shows the state of the connection in a word, and problems in a sentence that says what to do.
+// Shows the state of the connection in one word, and explains problems and what to do about them.
 
 import {h, setText} from './dom.js';
 import type {Client} from './sdk.js';
@@ -29,7 +29,7 @@ export class ConnectionStatus {
     setText(this.noticeText, text);
   }
 
-  /** Empty if there is no problem. */
+  /** Returns the text that describes the problem; empty if there is none. */
   private problemText(): string {
     const {state, lastError} = this.client;
     if (state === 'waiting' || (state === 'connecting' && lastError !== '')) {

@@ -9,7 +9,7 @@ export class EmptyWorldCard {
     this.element.hidden = true;
   }
 
-  /** `worldName`: the empty world, or null to hide the card. */
+  /** `worldName` is the name of the empty world, or null to hide the card. */
   update(worldName: string | null): void {
     if (this.element.hidden === (worldName === null)) return;
     this.element.hidden = worldName === null;

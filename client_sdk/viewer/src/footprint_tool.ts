@@ -11,17 +11,17 @@ import type {AvatarSelection, WorldPane} from './world_pane.js';
 export interface FootprintHost {
   readonly panes: readonly WorldPane[];
   selection(): AvatarSelection | null;
-  /** Whether the page shows the present, not the recording. */
+  /** Returns whether the page is live, so that it does not show the recording. */
   live(): boolean;
-  /** The last state of the selected avatar that the server reported. */
+  /** Returns the last state of the selected avatar that the server reported. */
   inspected(): Inspector['state'];
-  /** The world that receives commands. */
+  /** Returns the pane whose world receives commands. */
   commandedPane(): WorldPane | null;
-  /** The avatars that receive commands. */
+  /** Returns the avatars that receive commands. */
   targets(): number[];
-  /** Whether a step is rejected if the foot cannot reach the exact point. */
+  /** Returns whether a step is rejected if the foot cannot reach the exact point. */
   exactOnly(): boolean;
-  /** The pane at a point of the page. */
+  /** Returns the pane at a point of the page. */
   paneAt(x: number, y: number): WorldPane | null;
   goLive(): void;
   /** Shows a message to the user. */
@@ -35,7 +35,7 @@ interface Footprint {
 
 /** Radius around an outline's centre within which it can be dragged, in CSS pixels. */
 const grabPx = 18;
-/** How long the nearest reachable footprint of a rejected step is outlined. */
+/** Time for which the nearest reachable footprint of a rejected step is outlined. */
 const nearestShownMs = 8000;
 
 export class FootprintTool {
@@ -101,7 +101,7 @@ export class FootprintTool {
     this.update();
   }
 
-  /** Planned landings of the feet in the current movement of the inspected avatar. */
+  /** Returns the planned landings of the feet in the current movement of the inspected avatar. */
   private upcomingLandings(pane: WorldPane): Footprint[] {
     const selection = this.host.selection();
     const state = selection?.pane === pane && this.host.live() ? this.host.inspected() : null;
@@ -109,7 +109,7 @@ export class FootprintTool {
     return state.movement.landings.map(({positionM, headingRad}) => ({atM: positionM, headingRad}));
   }
 
-  /** Steps with a footprint in the queue of the inspected avatar. */
+  /** Returns the queued steps of the inspected avatar that have a footprint. */
   private queuedFootprints(pane: WorldPane): QueuedRequest[] {
     const selection = this.host.selection();
     const state = selection?.pane === pane && this.host.live() ? this.host.inspected() : null;
@@ -186,7 +186,7 @@ export class FootprintTool {
         this.host.notify('Too late: the step has already started.');
         return;
       }
-      // The server reports only the first 16 requests; the others would be lost.
+      // The server reports only the first 16 requests, so the others would be lost.
       if (queueSize > queue.length) {
         this.host.notify('The queue is too long to move a footprint.');
         return;

@@ -14,7 +14,7 @@ export class FrameLimiter {
   /** Call once per animation frame. Returns whether to draw it. */
   shouldDraw(nowMs: number): boolean {
     if (nowMs < this.dueMs) return false;
-    // Frames that were missed during a pause are not made up for.
+    // After a pause, missed frames are not drawn later.
     const late = nowMs - this.dueMs > 2 * this.intervalMs;
     this.dueMs = (late ? nowMs : this.dueMs) + this.intervalMs;
     return true;

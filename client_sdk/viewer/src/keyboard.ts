@@ -13,7 +13,7 @@ export interface KeyTargets {
   readonly playbackControls: PlaybackControls;
   selectNext(step: number): void;
   toggleFollow(): void;
-  /** Cancels what the user is entering, or else deselects. */
+  /** Cancels the current input of the user or, if there is none, clears the selection. */
   escape(): void;
   spawn(): void;
   showHelp(): void;

@@ -42,11 +42,11 @@ if (!info) {
       get inspected() {
         return app.inspected;
       },
-      /** Position of an avatar's root in CSS pixels, or null if it is not visible. */
+      /** Returns the position of an avatar's root in CSS pixels, or null if it is not visible. */
       place(world: string, avatar: number) {
         return app.avatarOnPage(world, avatar);
       },
-      /** Copies of the poses that the last frame shows, one entry per world. */
+      /** Returns copies of the poses that the last frame shows, one entry per world. */
       sampled() {
         return app.panes.map(({world, view}) => ({
           world: world.name,

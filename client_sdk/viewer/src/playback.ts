@@ -1,11 +1,12 @@
-// The time that the page shows: live, slow motion, paused, or an earlier part of the recording.
+// The times that the page can show. Playback is live, in slow motion, paused, or in an earlier part
+// of the recording.
 
 export interface TimeRange {
   readonly firstS: number;
   readonly lastS: number;
 }
 
-/** Playback at full speed becomes live when it is less than this behind the live time. */
+/** Playback at full speed becomes live when it is less than this time behind the live view. */
 const liveMarginS = 0.02;
 
 export class Playback {

@@ -1,4 +1,4 @@
-// How the server sends poses to the page, and how many bytes that takes.
+// Options for how the server sends poses to the page, and measurements of their size.
 
 import type {PoseDetail, PoseMode, Statistics} from './sdk.js';
 
@@ -17,7 +17,7 @@ export function observationFor({mode, detail, everyNTicks}: PoseStream) {
   return {mode, detail: mode === 'full' ? 'all' as const : detail, everyNTicks, withEvents: true};
 }
 
-/** A name for users, for example "Quantised, root only, ¼ rate". */
+/** Returns a name for users, for example "Quantised, root only, ¼ rate". */
 export function streamName(stream: PoseStream): string {
   const {mode, detail, everyNTicks} = observationFor(stream);
   return (mode === 'full' ? 'Full' : 'Quantised') +
@@ -33,7 +33,7 @@ export interface StreamCost {
   readonly bytesPerS: number;
 }
 
-/** After a change of stream, poses of the old one may arrive for this long. */
+/** Time after a change of stream during which poses of the old one may arrive. */
 const settleMs = 500;
 const windowMs = 1000;
 

@@ -48,18 +48,18 @@ export const levelCount = hardwareLevels.length;
 const targetFrameMs = {software: 40, hardware: 19};
 const windowMs = 1000;
 const minFramesPerWindow = 4;
-/** After this many slow measuring windows in a row, quality is lowered. */
+/** Quality is lowered after this number of slow measuring windows in a row. */
 const slowWindowsToLower = 2;
 /**
- * After this long without slow frames, a finer level is tried again. The wait doubles each time
- * that level is too slow.
+ * A finer level is tried again after this time without slow frames. The wait doubles each time that
+ * level is too slow.
  */
 const firstRetryMs = 8000;
 const longestRetryMs = 240_000;
 
 /**
- * Up to this many avatars, a software renderer spends most of its time on the rest of the page.
- * Drawing lines would not help, so that level 3 (bodies) is the coarsest.
+ * With at most this number of avatars, a software renderer spends most of its time on the rest of
+ * the page. Drawing lines would not help, so level 3 (bodies) is then the coarsest.
  */
 const smallCrowd = 24;
 const coarsestForSmallCrowd = 3;

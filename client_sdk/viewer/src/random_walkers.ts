@@ -1,5 +1,6 @@
-// Avatars that walk at random: whenever one is about to run out of movements, it is sent a few
-// steps, and sometimes a jump or a pause. Avatars that are far from the origin turn towards it.
+// Avatars that walk at random: whenever an avatar is about to run out of movements, the page
+// requests a few steps, and sometimes a jump or a pause. Avatars that are far from the origin turn
+// towards it.
 
 import type {MovementRequest, World, WorldEvent} from './sdk.js';
 
@@ -75,14 +76,16 @@ export class RandomWalkers {
   }
 }
 
-/** Movements for an avatar whose base frame is at `x`, `z` (metres) and faces `headingRad`. */
+/**
+ * Returns movements for an avatar whose base frame is at `x`, `z` (metres) and faces `headingRad`.
+ */
 export function randomMovements(
   avatar: number, x: number, z: number, headingRad: number,
   random: () => number): MovementRequest[] {
   const dice = random();
   if (dice < 0.08) return [{avatar, type: 'stand', seconds: 0.6 + random() * 1.2}];
   const distanceM = Math.hypot(x, z);
-  // Angle from the heading to the direction of the origin; positive to the left.
+  // Returns the angle from the heading to the direction of the origin; positive to the left.
   let homeRad = Math.atan2(-x, -z) - headingRad;
   homeRad = Math.atan2(Math.sin(homeRad), Math.cos(homeRad));
   const turnRad = distanceM > homeRadiusM ?

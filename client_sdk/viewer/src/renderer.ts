@@ -12,8 +12,8 @@ export interface RendererInfo {
 }
 
 /**
- * Uses a temporary WebGL context, because options of the real one depend on the result. Returns
- * null if the browser has no WebGL 2.
+ * Detects the renderer. Uses a temporary WebGL context, because options of the real one depend on
+ * the result. Returns null if the browser has no WebGL 2.
  */
 export function detectRenderer(): RendererInfo | null {
   const context = document.createElement('canvas').getContext('webgl2');
@@ -25,7 +25,7 @@ export function detectRenderer(): RendererInfo | null {
   return {name, software: /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name)};
 }
 
-/** Canvas pixels per CSS pixel at full resolution. */
+/** Returns the canvas pixels per CSS pixel at full resolution. */
 export function fullPixelRatio(info: RendererInfo): number {
   return info.software ? 1 : Math.min(devicePixelRatio || 1, 2);
 }

@@ -2,7 +2,9 @@
 
 import type {Terrain, TerrainBox} from './sdk.js';
 
-/** Boxes are sorted into a grid with this many cells per side, so that heights are fast to find. */
+/**
+ * Number of cells per side of the grid in which boxes are stored, so that heights are found fast.
+ */
 const cellsPerSide = 96;
 
 export class TerrainSurface {
@@ -49,7 +51,10 @@ export class TerrainSurface {
     return this.cells.length > 0;
   }
 
-  /** Height in metres: the highest of the height field and the boxes there, or 0 outside them. */
+  /**
+   * Returns the height in metres: the highest of the height field and the boxes at this point, or 0
+   * outside them.
+   */
   heightAt(x: number, z: number): number {
     if (this.source === null) return 0;
     let height = this.fieldHeightAt(x, z);

@@ -1,6 +1,6 @@
 /**
- * Generic time of a movement `timeS` seconds after its start: the index of the last keytime passed
- * plus the fraction of the way to the next one. Clamped to 0 and the last index.
+ * Returns the generic time of a movement `timeS` seconds after its start: the index of the last
+ * keytime passed plus the fraction of the way to the next one. Clamped to 0 and the last index.
  */
 export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number {
   const last = keytimesS.length - 1;
@@ -15,8 +15,8 @@ export function genericTime(keytimesS: ArrayLike<number>, timeS: number): number
 }
 
 /**
- * Of `states`, sorted by time, the last one that is not later than `timeS`. If all are later, the
- * first one; if there are none, null.
+ * Returns the last of `states`, which are sorted by time, that is not later than `timeS`. If all
+ * are later, returns the first one; if there are none, null.
  */
 export function stateAt<T extends {readonly timeS: number}>(
   states: readonly T[], timeS: number): T | null {

@@ -1,5 +1,6 @@
-// The walk tool: a click on the ground sends the selected avatar there, a drag also sets the
-// heading at the goal. Goals, headings and waypoints are drawn on the ground until the walk ends.
+// The walk tool: a click on the ground requests a walk of the selected avatar to that point, and a
+// drag also sets the heading at the goal. Goals, headings and waypoints are drawn on the ground
+// until the walk ends.
 
 import {pointText} from './dom.js';
 import type {FootprintHost} from './footprint_tool.js';
@@ -34,15 +35,18 @@ interface Walk extends Goal {
 }
 
 const maxWaypoints = 64;
-/** The page tracks this many walks. If there are more, it forgets the oldest. */
+/** The page tracks at most this number of walks. If there are more, it forgets the oldest. */
 const maxWalks = 64;
 /** A drag that is shorter than this sets no heading, in CSS pixels. */
 const dragPx = 8;
-/** A touch that rests longer than this sets a waypoint. */
+/** A touch that is held longer than this sets a waypoint. */
 const longPressMs = 600;
 /** For goals closer than this, the avatar keeps its heading. */
 const minHeadingDistanceM = 0.5;
-/** How often to check that a walk is still queued, because another client may have cancelled it. */
+/**
+ * Interval at which the page checks that a walk is still queued, because another client may have
+ * cancelled it.
+ */
 const pollIntervalMs = 500;
 /** An inspection reply may overtake events, so one missed poll does not prove that a walk ended. */
 const maxMissedPolls = 3;
@@ -123,7 +127,9 @@ export class WalkTool {
 
   // ---- goals
 
-  /** The avatar that a walk in this world is for; 0 if there is not exactly one. */
+  /**
+   * Returns the selected avatar, to which walks in this world apply; 0 if there is not exactly one.
+   */
   private target(pane: WorldPane): number {
     const avatars = this.host.targets();
     return avatars.length === 1 && this.host.commandedPane() === pane ? avatars[0]! : 0;
@@ -186,7 +192,7 @@ export class WalkTool {
     });
   }
 
-  /** The direction of arrival, or the present heading if the goal is very close. */
+  /** Use the direction of arrival, or the current heading if the goal is very close. */
   private defaultHeading(
     pane: WorldPane, avatar: number, atM: Vec3, waypointsM: readonly Vec3[]): number {
     const location = pane.view.locate(avatar);
@@ -219,7 +225,7 @@ export class WalkTool {
     this.update();
   }
 
-  /** Call when the pane closes. Null: the session is lost, so all walks have ended. */
+  /** Must be called when the pane closes. Null: the session is lost, so all walks have ended. */
   clear(pane: WorldPane | null): void {
     this.removeWalks((walk) => pane === null || walk.pane === pane);
     if (pane === null || this.press?.pane === pane) this.press = null;
@@ -269,7 +275,8 @@ export class WalkTool {
   // ---- decals
 
   /**
-   * Goals of this page's walks, and of walks that other clients requested for the inspected avatar.
+   * Returns the goals of this page's walks, and of walks that other clients requested for the
+   * inspected avatar.
    */
   private goalsIn(pane: WorldPane): Goal[] {
     if (!this.host.live()) return [];

@@ -7,7 +7,7 @@ import type {Client, Subscription, World} from './sdk.js';
 import type {WorldPane} from './world_pane.js';
 
 const maxPanes = 4;
-/** There are buttons for at most this many worlds. */
+/** Buttons are shown for at most this number of worlds. */
 const maxButtons = 12;
 
 /** The parts of `/info.json` that the page uses. */

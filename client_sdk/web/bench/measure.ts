@@ -1,4 +1,4 @@
-// Measures bytes per second, time per pose and per call, and memory against a real server.
+// Measures received bytes per second, time per pose and per call, and memory, with a real server.
 import WebSocket from 'ws';
 import {Client} from '../src/client';
 import {createCrowdPose} from '../src/pose_buffers';

@@ -57,7 +57,7 @@ export interface ClientOptions {
   /** Memory limit in bytes of all these poses. Avatars that do not fit are left out and counted in
    * `Statistics.posesRefused`. Default 256 MiB. */
   maxPoseBytes?: number;
-  /** Length of `World.recording`, 0 to 3600. 0 disables recording. Default 20. */
+  /** Length of `World.recording` in seconds, 0 to 3600. 0 disables recording. Default 20. */
   recordingS?: number;
   /** Memory limit in bytes of the poses in one world's recording. Default 192 MiB. */
   maxRecordingBytes?: number;
@@ -76,15 +76,25 @@ export interface ClientOptions {
 export interface ClientListeners {
   /** `Client.state` has changed. */
   state: (state: ClientState) => void;
-  /** The session is ready. `resumed`: the previous session continues; otherwise a new one began. */
+  /**
+   * Called when the session is ready. If `resumed`, the previous session continues; otherwise a new
+   * one has begun.
+   */
   connected: (resumed: boolean) => void;
-  /** The server no longer has the previous session. Sent commands fail with `session_lost`; the
-   * client joins its worlds and starts its subscriptions again. */
+  /**
+   * Called when the server no longer has the previous session. Sent commands fail with
+   * `session_lost`; the client joins its worlds and starts its subscriptions again.
+   */
   sessionLost: () => void;
-  /** A message from the server for the user. Also reports commands of the client itself that failed
-   * after a lost session. */
+  /**
+   * Called with a message from the server for the user. Also reports commands of the client itself
+   * that failed after a lost session.
+   */
   notice: (code: number, text: string) => void;
-  /** The connection failed or was lost. The client tries again unless its state is `closed`. */
+  /**
+   * Called when the connection failed or was lost. The client tries again unless its state is
+   * `closed`.
+   */
   error: (code: number, text: string) => void;
 }
 
@@ -98,8 +108,10 @@ export interface Statistics {
   /** Pose messages received. */
   batchesReceived: number;
   posesReceived: number;
-  /** Received poses that were discarded, because they were old or their avatar did not fit into
-   * `maxPoseBytes`. */
+  /**
+   * Received poses that were discarded because they were old or their avatar did not fit into
+   * `maxPoseBytes`.
+   */
   posesRefused: number;
   /** Pose messages that did not arrive, according to gaps in the ticks. */
   batchesMissing: number;
@@ -131,7 +143,7 @@ export interface Statistics {
   /** Smoothed time from the sampled time to the newest received pose. Negative if samples are newer
    * than all poses, so that poses are held. */
   interpolationDelayS: number;
-  /** Samples for times after the newest received pose of their avatar. */
+  /** Number of samples for times after the newest received pose of their avatar. */
   heldSamples: number;
   /** Mean time in nanoseconds to decode and store a pose. */
   decodeNsPerPose: number;

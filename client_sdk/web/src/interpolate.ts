@@ -6,7 +6,7 @@ export interface Keys {
   /** Array that contains each of the four poses. */
   readonly roots: [Float32Array, Float32Array, Float32Array, Float32Array];
   readonly rotations: [Float32Array, Float32Array, Float32Array, Float32Array];
-  /** Index of each pose in its array, in poses. */
+  /** Index of each pose in its array, counted in poses. */
   readonly places: [number, number, number, number];
   readonly timesS: [number, number, number, number];
 }
@@ -86,7 +86,7 @@ export function interpolate(keys: Keys, timeS: number, jointCount: number, rootO
   }
 }
 
-/** Copies the pose with index `place`. The output is as in `interpolate`. */
+/** Copies the pose with index `place`. The output is the same as that of `interpolate`. */
 export function copyPose(roots: Float32Array, rotations: Float32Array, place: number,
                          jointCount: number, rootOut: Float32Array, rootAt: number,
                          out: Float32Array, outAt: number): void {

@@ -30,7 +30,8 @@ export function createCrowdPose(count = 0, jointCount = 0): CrowdPose {
 /** Grows `out` until `count` avatars fit into it. Keeps its contents. @internal */
 export function reserve(out: CrowdPose, count: number, jointCount: number): void {
   if (out.avatars.length < count) {
-    // A quarter more than needed, so that a growing crowd does not reallocate for every avatar.
+    // Allocates a quarter more than necessary, so that a growing crowd does not reallocate for
+    // every avatar.
     const capacity = Math.ceil(count * 1.25);
     out.avatars = copyInto(new Uint32Array(capacity), out.avatars);
     out.flags = copyInto(new Uint8Array(capacity), out.flags);

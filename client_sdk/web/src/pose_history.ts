@@ -50,7 +50,7 @@ export class PoseHistory {
     return this.flags[slot]!;
   }
 
-  /** True if a pose of this tick and time is newer than all stored poses. */
+  /** Returns whether a pose of this tick and time is newer than all stored poses. */
   accepts(tick: number, timeS: number): boolean {
     return this.count === 0 || (tick > this.newestTick && timeS > this.newestTimeS);
   }

@@ -6,9 +6,9 @@ import {PoseFlag, type CrowdPose, type Recording, type WorldEvent} from './types
 import type {BatchMode, PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
-/** How long after the last batch of its stream an avatar can be sampled. */
+/** Time after the last batch of its stream for which an avatar can be sampled. */
 const keepS = 2;
-/** Decoded ticks to cache per stream. Playback in either direction needs four of them. */
+/** Number of decoded ticks to cache per stream. Playback in either direction needs four of them. */
 const maxDecodedTicks = 8;
 /** Estimated memory of an event. */
 const eventBytes = 400;

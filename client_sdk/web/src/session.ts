@@ -393,7 +393,7 @@ export class Session {
 
   // ---- Calls of the network. Times must not decrease.
 
-  /** True if a connection attempt is due; then call startConnecting. */
+  /** Returns true if a connection attempt is due; then call startConnecting. */
   connectDue(nowS: number): boolean {
     return this.stateNow === 'waiting' && nowS >= this.nextAttemptS;
   }
@@ -403,13 +403,13 @@ export class Session {
     return this.connection;
   }
 
-  /** True if this state needs a socket. Otherwise the network closes it. */
+  /** Returns true if this state needs a socket. If not, the network closes it. */
   get needsSocket(): boolean {
     return this.stateNow === 'connecting' || this.stateNow === 'handshake' ||
         this.stateNow === 'ready' || this.stateNow === 'closing';
   }
 
-  /** Next time at which to call advanceTime or connectDue; Infinity: never. */
+  /** Returns the next time at which to call advanceTime or connectDue; Infinity: never. */
   get nextTimeS(): number {
     switch (this.stateNow) {
       case 'waiting': return this.nextAttemptS;
@@ -577,7 +577,7 @@ export class Session {
     // First the commands that the server may have received already, in order.
     while (this.resendFrom !== 0n && this.pending < maxOutputBytes) {
       let next: Command | undefined;
-      for (const [seq, command] of this.unanswered) {  // In order of seq.
+      for (const [seq, command] of this.unanswered) {  // Commands are sent again in order of seq.
         if (seq < this.resendFrom) continue;
         next = command;
         this.resendFrom = seq + 1n;
@@ -613,7 +613,7 @@ export class Session {
     message.seq = this.nextSeq;
     if ('world' in message) message.world = world.serverId;
     if (!this.send(message)) {
-      // The message exceeds the server's limit. Its seq was not used.
+      // The message exceeds the server's limit. Its seq has not been used.
       if (message.type === 'Observe') {
         world.subscriptions.delete(message.subscription);
         world.updateFilter();
@@ -865,7 +865,7 @@ export class Session {
 
   private onReply(message: ReplyMessage): void {
     const command = this.unanswered.get(message.seq);
-    if (command === undefined) return;  // A second reply, after a resume.
+    if (command === undefined) return;  // Ignore a second reply, which may arrive after a resume.
     this.unanswered.delete(message.seq);
     const {world, message: asked} = command;
     if (asked.type === 'JoinWorld') return this.onJoinReply(world, message);
@@ -980,7 +980,8 @@ export class Session {
 
   private onEvents(message: Events): void {
     if (message.number !== 0n) {
-      if (message.number <= this.lastEventsNumber) return;  // Sent again after a resume.
+      // Ignore events that were sent again after a resume.
+      if (message.number <= this.lastEventsNumber) return;
       this.lastEventsNumber = message.number;
     }
     const world = this.findWorld(message.world);
@@ -1061,7 +1062,7 @@ export class Session {
   }
 
   private onGoodbye(message: Goodbye, nowS: number): void {
-    this.resumeToken = new Uint8Array(0);  // The session has ended.
+    this.resumeToken = new Uint8Array(0);  // The session has ended, so it cannot be resumed.
     if (message.code < 300 || message.code === Status.replaced) {
       return this.closeForGood(message.code, message.text);
     }

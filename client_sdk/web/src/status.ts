@@ -1,7 +1,7 @@
 /**
- * Status codes, the same as in stridewire/client.h. The hundreds say who can act: 1xx the caller,
- * 2xx the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49
- * belong to the protocol; codes x50 to x99 come only from client libraries.
+ * Status codes, the same as in stridewire/client.h. The hundreds state who can correct the problem:
+ * 1xx the caller, 2xx the author of the data, 3xx the network, 4xx the operator of the server.
+ * Codes x00 to x49 belong to the protocol; codes x50 to x99 come only from client libraries.
  */
 export const Status = {
   ok: 0,

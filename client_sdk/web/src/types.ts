@@ -233,10 +233,10 @@ export interface AvatarState {
   readonly tick: number;
   /** Server time of the tick. */
   readonly timeS: number;
-  /** Base frame: position and heading where the current movement started. */
+  /** Base frame: position and heading at the start of the current movement. */
   readonly basePositionM: Vec3;
   readonly baseHeadingRad: number;
-  /** Null if the avatar is idle. */
+  /** The current movement; null if the avatar is idle. */
   readonly movement: CurrentMovement | null;
   /** Number of requests in the queue, without the current movement. */
   readonly queueSize: number;
@@ -262,7 +262,7 @@ export interface PlayingLayer {
   readonly ending: boolean;
 }
 
-/** Where a foot of the current movement will land. */
+/** The planned landing of a foot in the current movement. */
 export interface Landing {
   readonly foot: Foot;
   /** World position of the ball of the foot, on the ground. */
@@ -332,7 +332,7 @@ export interface Region {
   rings?: readonly RegionRing[];
 }
 
-/** What to receive of a world: the argument of `World.observe`. */
+/** Describes which poses and events to receive from a world: the argument of `World.observe`. */
 export interface Observation {
   mode: PoseMode;
   /** Ids of the avatars to observe. Absent or empty: all avatars of the world. */
@@ -463,7 +463,7 @@ export interface Pose {
 
 /** Bits of `CrowdPose.flags`. */
 export const PoseFlag = {
-  /** This is a received pose that does not continue the previous one. */
+  /** The received pose does not continue the previous one. */
   discontinuity: 1,
   /** The avatar stands and its queue is empty. */
   standing: 2,
@@ -515,14 +515,14 @@ export interface World {
   readonly name: string;
   readonly role: Role;
   readonly state: WorldState;
-  /** Null until the server has sent it. */
+  /** The skeleton of the avatars; null until the server has sent it. */
   readonly skeleton: Skeleton | null;
   /** Hash of the world's motion library; empty until the server has sent it. */
   readonly libraryHash: string;
   /** Names of the motion library's layers, for `setLayers`. */
   readonly layers: readonly string[];
   readonly recording: Recording;
-  /** The ground. Null if it is flat at height 0. A change replaces the object. */
+  /** The ground of the world. Null if it is flat at height 0. A change replaces the object. */
   readonly terrain: Terrain | null;
   /** The server's first reply to joining. */
   readonly joined: Promise<Reply>;
@@ -558,7 +558,7 @@ export interface World {
   /** Calls `listener` for each event of that name. Returns a function that removes it. */
   on<K extends keyof WorldListeners>(name: K, listener: WorldListeners[K]): () => void;
 
-  /** Ids of the avatars whose poses arrive, ascending. A change replaces the array. */
+  /** Returns the ids of the avatars whose poses arrive, ascending. A change replaces the array. */
   avatars(): Uint32Array;
   /** Computes the pose of an avatar at a server time, usually `Client.renderTimeS()`. */
   sample(avatar: number, timeS: number, out: Pose): PoseKind;
@@ -569,15 +569,17 @@ export interface World {
 
 /** Arguments of the listeners that `World.on` accepts. */
 export interface WorldListeners {
-  /** Something happened to an avatar. */
+  /** Called when something has happened to an avatar. */
   event: (event: WorldEvent) => void;
-  /** `World.avatars()` has changed. */
+  /** Called when `World.avatars()` has changed. */
   avatars: (avatars: Uint32Array) => void;
-  /** `World.terrain` has changed. */
+  /** Called when `World.terrain` has changed. */
   terrain: (terrain: Terrain | null) => void;
-  /** `World.state` or `World.skeleton` has changed. */
+  /** Called when `World.state` or `World.skeleton` has changed. */
   state: (state: WorldState) => void;
-  /** The server dropped data because the client reads too slowly. Both numbers are totals since
-   * joining. */
+  /**
+   * Called when the server dropped data because the client reads too slowly. Both numbers are
+   * totals since joining.
+   */
   lagging: (droppedBatches: number, droppedEvents: number) => void;
 }

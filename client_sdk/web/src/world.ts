@@ -38,11 +38,11 @@ export class WorldHandle implements World {
   answerJoin: ((reply: Reply) => void) | null = null;
   /** Commands that have not been sent, in order. */
   unsent: Command[] = [];
-  /** By subscription number. */
+  /** Subscriptions by number. */
   readonly subscriptions = new Map<number, ActiveSubscription>();
   /** Avatars that this client has spawned, with their last known base frames. */
   readonly spawned = new Map<number, SpawnEntry>();
-  /** Totals of the last Lagging message. */
+  /** Total from the last Lagging message. */
   reportedDroppedBatches = 0;
   reportedDroppedEvents = 0;
   /** `view.version` and `terrain` of the last notification to listeners. */

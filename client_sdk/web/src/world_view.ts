@@ -8,9 +8,12 @@ import {Malformed} from './wire/malformed';
 import type {PoseBatch} from './wire/messages';
 import {PoseReader} from './wire/pose_codec';
 
-/** How long the poses of a removed avatar can still be sampled. */
+/** Time for which the poses of a removed avatar can still be sampled. */
 const keepRemovedS = 2;
-/** How long to remember that an avatar left the region. Late poses arrive within a few ticks. */
+/**
+ * Time for which the view remembers that an avatar left the region. Late poses arrive within a few
+ * ticks.
+ */
 const keepLeftTicks = 600;
 const maxStreams = 1024;
 
@@ -25,7 +28,7 @@ export interface PoseCounts {
   poses: number;
   refused: number;
   missing: number;
-  /** Samples for times after the newest received pose of their avatar. */
+  /** Number of samples for times after the newest received pose of their avatar. */
   held: number;
   decodeMs: number;
 }
@@ -52,7 +55,7 @@ interface StreamState {
 
 /** The avatars of a world and their received poses. */
 export class WorldView {
-  /** Joints of the skeleton; 0 until it is known. */
+  /** Number of joints of the skeleton; 0 until it is known. */
   jointCount = 0;
   private readonly tracks = new Map<number, Track>();
   private readonly streams = new Map<number, StreamState>();
@@ -112,7 +115,7 @@ export class WorldView {
     }
   }
 
-  /** True if the filter admits the avatar. */
+  /** Returns whether the filter admits the avatar. */
   wants(avatar: number): boolean {
     return this.filter === null || this.filter.has(avatar);
   }
@@ -161,7 +164,7 @@ export class WorldView {
           this.markListOutdated();
         }
       } else if (batch.tick !== track.lastTick) {
-        // Not counted at the same tick: two subscriptions may contain the same avatar.
+        // A repeated tick is not counted, because two subscriptions may contain the same avatar.
         ++this.counts.refused;
       }
       track.stream = stream;

@@ -150,7 +150,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     response_.set(http::field::server, std::string("stridewired/") + kVersion);
     if (answer_.status != 304) response_.set(http::field::content_type, answer_.content_type);
     response_.set(http::field::cache_control, answer_.cache_control);
-    // Browsers must not guess another content type.
+    // Prevents browsers from guessing another content type.
     response_.set("X-Content-Type-Options", "nosniff");
     if (answer_.status == 405) response_.set(http::field::allow, "GET, HEAD");
     for (const auto& [name, value] : answer_.headers) response_.set(name, value);
@@ -175,12 +175,12 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
   }
 
   HttpServer& server_;
-  std::shared_ptr<int> connections_;  // may outlive the server
+  std::shared_ptr<int> connections_;  // Shared, because it may outlive the server.
   beast::tcp_stream stream_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
   HttpAnswer answer_;
-  http::response<http::span_body<const char>> response_;  // refers to the bytes of answer_
+  http::response<http::span_body<const char>> response_;  // Refers to the bytes of answer_.
 };
 
 HttpServer::HttpServer(int max_connections, ThreadMetrics& metrics)

@@ -19,9 +19,9 @@ namespace stridewire::server {
 
 /// A request.
 struct HttpQuery {
-  std::string_view path;           ///< As received, without the query after '?'.
+  std::string_view path;           ///< Path as received, without the query after '?'.
   std::string_view fields;         ///< The query, such as "a=1&b=2".
-  std::string_view if_none_match;  ///< Empty if the header is missing.
+  std::string_view if_none_match;  ///< Value of the header If-None-Match; empty if it is missing.
 };
 
 /// A response.
@@ -87,7 +87,7 @@ class HttpServer {
   SlowPage slow_page_;
   int waiting_requests_ = 0;
   boost::asio::thread_pool worker_{
-      1};  // declared last, so that its thread ends before other members are destroyed
+      1};  // Declared last, so that its thread ends before other members are destroyed.
 };
 
 }  // namespace stridewire::server

@@ -14,7 +14,7 @@ namespace stridewire::server {
 /// The libraries that a configuration names, each loaded once. Immutable after loading.
 class Libraries {
  public:
-  /// Errors name the file.
+  /// Loads all libraries of a configuration. Errors contain the file.
   [[nodiscard]] static Expected<Libraries> Load(const Config& config);
 
   /// Adds a library under a name.

@@ -315,7 +315,7 @@ HttpAnswer ErrorsPage(const MotionLibrary& library, int group_index, std::string
   };
   const auto [x0, x1] = range(px);
   const auto [y0, y1] = range(py);
-  Json errors = Json::array();  // row by row, at the centres of cells; null: out of range
+  Json errors = Json::array();  // Errors row by row, at the centres of cells. Null: out of range.
   double largest_m = 0.0;
   for (int row = 0; row < cells; ++row) {
     for (int column = 0; column < cells; ++column) {

@@ -101,7 +101,7 @@ void Shard::ScheduleTick() {
 void Shard::Tick() {
   const auto begin = Clock::now();
   const std::uint64_t tick = clock_.TickAt(begin);
-  if (tick <= tick_) return;  // the timer fired slightly early
+  if (tick <= tick_) return;  // The timer has fired slightly early.
   metrics_.tick_late.Observe(std::chrono::duration<double>(begin - clock_.Due(tick)).count());
 
   // A late tick is published once. Avatars catch up on the missed time, up to a limit. Beyond it,
@@ -165,7 +165,7 @@ void Shard::Publish() {
     }
     PublishPoses(*world);
   }
-  // The own outbox is posted as well, because sending is not part of the tick.
+  // The shard's own outbox is posted as well, because sending is not part of the tick.
   for (auto& [shard, outbox] : std::exchange(outboxes_, {})) {
     shards_.at(static_cast<std::size_t>(shard))->Post(std::move(outbox));
   }
@@ -357,7 +357,7 @@ void Shard::AdoptNow(Arrival&& arrival) {
 }
 
 void Shard::DestroySession(SessionId session) {
-  // The session is the caller, so it is destroyed later.
+  // The session itself is the caller, so it is destroyed later.
   asio::post(context_, [this, session] {
     const auto it = sessions_.find(session);
     if (it == sessions_.end() || !it->second->is_ended()) return;

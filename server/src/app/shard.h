@@ -114,15 +114,16 @@ class Shard : public SessionHost {
 
   std::uint64_t tick_ = 0;
   CommandInbox inbox_;
-  std::vector<InspectRequest> inspect_requests_;  // answered after the next tick
-  std::vector<StatesRequest> states_requests_;    // answered after the next tick
+  std::vector<InspectRequest> inspect_requests_;  // Requests that are answered after the next tick.
+  std::vector<StatesRequest> states_requests_;    // Requests that are answered after the next tick.
   std::map<WorldId, std::unique_ptr<WorldShard>> worlds_;
-  std::map<const MotionLibrary*, std::weak_ptr<PoseScratch>> scratch_;  // of the libraries in use
+  // Scratch memory of the libraries in use.
+  std::map<const MotionLibrary*, std::weak_ptr<PoseScratch>> scratch_;
   std::map<SessionId, std::unique_ptr<Session>> sessions_;
   InterestTracker interests_;  // of sessions_
   protocol::Encoder encoder_;
   protocol::PoseBatchComposer composer_;
-  std::map<int, ShardOutbox> outboxes_;  // by receiving shard; only those with contents
+  std::map<int, ShardOutbox> outboxes_;  // Outboxes by receiving shard; only those with contents.
   std::vector<std::weak_ptr<Connection>> connections_;
   bool is_draining_ = false;
 };

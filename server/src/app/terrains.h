@@ -14,8 +14,8 @@ namespace stridewire::server {
 /// The terrain files that a configuration names, each read once. Immutable after loading.
 class Terrains {
  public:
-  /// Errors name the file and the invalid member. Fails with kLimitExceeded if a terrain does not
-  /// fit into a message of max_bulk_bytes.
+  /// Reads all terrains of a configuration. Errors contain the file and the invalid member. Fails
+  /// with kLimitExceeded if a terrain does not fit into a message of max_bulk_bytes.
   [[nodiscard]] static Expected<Terrains> Load(const Config& config);
 
   /// Adds a terrain under the name of a file.

@@ -20,7 +20,8 @@ namespace stridewire::server {
 class ViewerFiles {
  public:
   static constexpr std::size_t kMaxFiles = 256;
-  static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;  ///< For all files together.
+  /// Maximum size of all files together.
+  static constexpr std::size_t kMaxBytes = std::size_t{64} << 20;
 
   ViewerFiles() = default;
 
@@ -43,11 +44,11 @@ class ViewerFiles {
  private:
   struct File {
     std::string content_type;
-    std::string tag;  ///< Including the quotes.
+    std::string tag;  ///< Entity tag, including its quotes.
     bool is_immutable = false;
     std::shared_ptr<const std::string> content;
   };
-  std::map<std::string, File, std::less<>> files_;  ///< By path, such as "/assets/a.js".
+  std::map<std::string, File, std::less<>> files_;  ///< Files by path, such as "/assets/a.js".
   std::size_t bytes_ = 0;
 };
 

@@ -37,11 +37,11 @@ Outcome<std::shared_ptr<World>> WorldDirectory::Join(std::string_view name) {
   const std::string& library = has_library ? configured->second.library : config_.library;
   world->library = libraries_.Find(library);
   world->quantizations = libraries_.FindQuantizations(library);
-  STRIDEWIRE_CHECK(world->library != nullptr);  // Libraries::Load has loaded all of them
+  STRIDEWIRE_CHECK(world->library != nullptr);  // Libraries::Load has loaded all libraries.
   if (is_configured && !configured->second.terrain.empty()) {
     auto world_terrain =
         MakeWorldTerrain(world->id, terrains_.Find(configured->second.terrain), encoder_);
-    STRIDEWIRE_CHECK(world_terrain.has_value());  // Terrains::Load has checked the size
+    STRIDEWIRE_CHECK(world_terrain.has_value());  // Terrains::Load has checked the size.
     world->terrain.Set(*std::move(world_terrain));
   }
   worlds_.emplace(world->name, Entry{world, 1});

@@ -27,7 +27,8 @@ std::string NumberText(double value) {
   char buffer[32];
   const auto result = std::to_chars(buffer, buffer + sizeof(buffer), value);
   std::string text(buffer, result.ptr);
-  // TOML distinguishes floats from integers. The reader accepts both; this makes the type clear.
+  // Formats a float such that it contains a point or an exponent. TOML distinguishes floats from
+  // integers; the reader accepts both.
   if (text.find_first_of(".e") == std::string::npos) text += ".0";
   return text;
 }
@@ -62,7 +63,8 @@ ConfigKey Address(const char* name, const char* help, Endpoint Config::* member)
           .get = [member](const Config& config) { return ToText(config.*member); }};
 }
 
-// A list of strings, separated by commas. `check` rejects items that contain a comma.
+// Converts between text and a list of strings, separated by commas. `check` rejects items that
+// contain a comma.
 ConfigKey List(const char* name, const char* help, std::vector<std::string> Config::* member,
                Status (*check)(std::string_view)) {
   return {.name = name,
@@ -107,7 +109,7 @@ ConfigKey Flag(const char* name, const char* help, bool Config::* member) {
           .get = [member](const Config& config) { return config.*member ? "true" : "false"; }};
 }
 
-// A number that is a member of `Owner`, which is Config or Limits.
+// A key for a number that is a member of `Owner`, which is Config or Limits.
 template <typename Owner, typename T>
 ConfigKey Number(const char* name, const char* help, T Owner::* member, T min, T max) {
   constexpr bool kIsLimit = std::is_same_v<Owner, Limits>;
@@ -145,7 +147,7 @@ ConfigKey Number(const char* name, const char* help, T Owner::* member, T min, T
               }};
 }
 
-// A page's origin: scheme://host or scheme://host:port, without a path.
+// Checks the origin of a page: scheme://host or scheme://host:port, without a path.
 Status CheckOrigin(std::string_view origin) {
   constexpr std::string_view kSchemeEnd = "://";
   const auto at = origin.find(kSchemeEnd);

@@ -44,14 +44,16 @@ struct Config {
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for stored worlds; the server writes nothing yet.
   double tick_hz = 60.0;
-  int shards = 0;  ///< 0: one per processor.
+  int shards = 0;  ///< Number of shards. 0: one per processor.
   int max_catch_up_ticks = 10;
-  bool run_time_correction = true;  ///< Correct the blend weights of each movement.
-  bool foot_planting = true;        ///< Keep feet fixed on the ground between landing and lifting.
-  double interest_cell_m = 8.0;     ///< Cell size of the grid that finds the avatars of a region.
+  bool run_time_correction = true;  ///< Whether to correct the blend weights of each movement.
+  /// Whether to keep feet fixed on the ground between landing and lifting.
+  bool foot_planting = true;
+  double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
   bool allow_insecure = false;
-  bool open_worlds = true;  ///< Create a world that the file does not name when a client joins it.
-  bool persistent = false;  ///< For worlds that the file does not name.
+  /// Whether to create a world that the file does not name when a client joins it.
+  bool open_worlds = true;
+  bool persistent = false;  ///< WorldConfig::persistent of worlds that the file does not name.
   std::string log_level = "info";
   double drain_timeout_s = 5.0;
   Limits limits;
@@ -66,17 +68,19 @@ struct ConfigKey {
   std::string section;  ///< "" or "limits"
   std::string help;
   std::string range;     ///< Allowed values of a number, such as "1 to 1000"; empty otherwise.
-  bool is_text = false;  ///< The file contains the value in quotes.
+  bool is_text = false;  ///< True if the file contains the value in quotes.
   bool is_flag = false;
-  bool is_list = false;  ///< A TOML array of strings in the file, comma-separated elsewhere.
+  /// True if the value is an array of strings in TOML, and comma-separated text elsewhere.
+  bool is_list = false;
   std::function<Status(Config&, std::string_view)> set;
   std::function<std::string(const Config&)> get;
 
   /// Sets the value from text. The error contains `where` and the allowed range.
   [[nodiscard]] Status Set(Config& config, std::string_view value, std::string where) const;
 
-  [[nodiscard]] std::string option() const;       ///< "--tick-hz"
-  [[nodiscard]] std::string environment() const;  ///< "STRIDEWIRE_TICK_HZ"
+  [[nodiscard]] std::string option() const;  ///< "--tick-hz"
+  /// Name of the environment variable, for example "STRIDEWIRE_TICK_HZ".
+  [[nodiscard]] std::string environment() const;
 };
 
 /// Returns all keys except those of worlds, in the order of --print-config.

@@ -20,17 +20,19 @@ struct Limits {
   int max_handshakes = 256;            ///< Connections whose client has not sent Hello yet.
   int max_sessions = 1024;             ///< Attached and detached sessions.
   int max_sessions_per_address = 256;  ///< Sessions and handshakes per client address.
-  double handshake_timeout_s = 5.0;    ///< From accept to a complete Hello.
-  double idle_timeout_s = 30.0;        ///< Without received bytes; 0: no timeout.
-  double write_timeout_s = 30.0;       ///< Without progress of a pending write.
-  double resume_window_s = 60.0;       ///< A detached session waits this long; 0: no resuming.
+  /// Longest time from accepting a connection to a complete Hello.
+  double handshake_timeout_s = 5.0;
+  double idle_timeout_s = 30.0;   ///< Longest time without received bytes; 0: no timeout.
+  double write_timeout_s = 30.0;  ///< Longest time without progress of a pending write.
+  /// Time for which a detached session waits for its client; 0: sessions cannot be resumed.
+  double resume_window_s = 60.0;
 
   // Worlds and avatars.
   int max_worlds = 256;
   int max_worlds_per_session = 64;
   int max_subscriptions = 64;      ///< Per session.
   int max_named_avatars = 65'536;  ///< Avatar ids in all subscriptions of a session.
-  int max_avatars = 65'536;        ///< In all worlds.
+  int max_avatars = 65'536;        ///< Maximum number of avatars in all worlds together.
   int max_avatars_per_world = 16'384;
   int max_queue = 256;  ///< Waiting requests per avatar.
 
@@ -45,10 +47,11 @@ struct Limits {
   // Memory of one session.
   /// Outgoing messages except poses and movements. Movements have a second budget of this size.
   std::size_t control_buffer_bytes = std::size_t{4} << 20;
-  int observer_backlog_ticks = 4;  ///< Waiting pose batches per world, mode and shard.
+  int observer_backlog_ticks = 4;  ///< Pose batches that may wait per world, mode and shard.
   std::size_t reply_cache_bytes = std::size_t{4} << 20;
   std::size_t event_replay_bytes = std::size_t{1} << 20;  ///< Events stored for a lost connection.
-  std::size_t socket_send_buffer_bytes = 0;               ///< SO_SNDBUF; 0: the system's default.
+  /// Value of SO_SNDBUF; 0: the default of the system.
+  std::size_t socket_send_buffer_bytes = 0;
 
   int max_http_connections = 64;
 };

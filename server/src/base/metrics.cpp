@@ -33,7 +33,8 @@ void TimeHistogram::Observe(double time_s) {
   bins_[static_cast<std::size_t>(bin)].Add();
   sum_ns_.Add(time_ns);
   if (time_ns > max_ns_.value()) max_ns_.Set(time_ns);
-  // A reader may reset this value to 0 concurrently; the larger value must not get lost.
+  // A reader may reset this value to 0 at the same time. The loop ensures that the larger value is
+  // not lost.
   std::uint64_t recent = recent_max_ns_.load(std::memory_order_relaxed);
   while (recent < time_ns && !recent_max_ns_.compare_exchange_weak(recent, time_ns)) {
   }

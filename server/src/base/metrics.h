@@ -40,7 +40,7 @@ class TimeHistogram {
   [[nodiscard]] double TakeRecentMax();
 
  private:
-  std::array<Count, kUpperBoundsS.size() + 1> bins_;  // the last bin is above all bounds
+  std::array<Count, kUpperBoundsS.size() + 1> bins_;  // The last bin counts times above all bounds.
   Count sum_ns_;
   Count max_ns_;
   std::atomic<std::uint64_t> recent_max_ns_{0};
@@ -51,20 +51,20 @@ class TimeHistogram {
 /// processors prefetch lines in pairs.
 struct alignas(128) ThreadMetrics {
   Count avatars;
-  Count regions;  ///< Observed by sessions of this shard.
+  Count regions;  ///< Regions that sessions of this shard observe.
   Count sessions_attached;
   Count sessions_websocket;  ///< Attached sessions over WebSocket.
   Count sessions_detached;
   Count ticks;
   Count ticks_missed;
-  Count ticks_slipped;      ///< Missed ticks that avatars did not catch up on.
+  Count ticks_slipped;      ///< Number of missed ticks that avatars did not catch up on.
   Count cpu_ns;             ///< CPU time of the thread in ns; shards only.
   TimeHistogram tick;       ///< Duration of a tick, from commands to published batches.
   TimeHistogram tick_late;  ///< Delay between the due time and the start of a tick.
   Count poses_encoded;
   Count movements_encoded;
   Count poses_sent;
-  Count batches_composed;  ///< For one session or one set of rows.
+  Count batches_composed;  ///< Batches that were composed for one session or one set of rows.
   Count batches_sent;
   Count batches_dropped;
   Count pose_errors;
@@ -109,7 +109,8 @@ class Metrics {
   [[nodiscard]] std::string Text();
 
  private:
-  std::vector<std::unique_ptr<ThreadMetrics>> threads_;  // of the shards, then of the main thread
+  // The shards' metrics, followed by those of the main thread.
+  std::vector<std::unique_ptr<ThreadMetrics>> threads_;
   Count worlds_;
 };
 

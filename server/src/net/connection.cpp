@@ -123,7 +123,7 @@ void Connection::OnReceived(const error_code& error, const Transport::Chunk& chu
     return;
   }
   if (is_closing_) {
-    Read();  // discard further bytes until the peer closes
+    Read();  // Receive and discard further bytes until the peer closes.
     return;
   }
   unread_ = chunk.bytes;

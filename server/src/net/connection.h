@@ -102,7 +102,7 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   void Watch();
   void BeginLinger();
 
-  std::unique_ptr<Transport> transport_;  // null after Release
+  std::unique_ptr<Transport> transport_;  // Null after Release.
   const TransportKind kind_;
   boost::asio::steady_timer timer_;
   const Limits limits_;
@@ -112,11 +112,12 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   protocol::FrameReader reader_;
   std::vector<std::byte> read_buffer_;
   std::span<const std::byte> unread_;
-  bool is_text_ = false;          // the current WebSocket message is a text message
-  bool is_message_over_ = false;  // unread_ contains the end of the WebSocket message
+  bool is_text_ = false;          // True if the current WebSocket message is a text message.
+  bool is_message_over_ = false;  // True if unread_ contains the end of the WebSocket message.
   std::optional<protocol::FrameView>
-      whole_;                           // complete frame, before the end of its WebSocket message
-  std::vector<std::byte> handed_over_;  // the bytes given to Start
+      // A complete frame, until the end of its WebSocket message has arrived.
+      whole_;
+  std::vector<std::byte> handed_over_;  // The bytes that were passed to Start.
   bool is_reading_ = false;
   bool is_processing_ = false;
   bool is_paused_ = false;

@@ -24,7 +24,8 @@ std::string_view WithoutDefaultPort(std::string_view scheme, std::string_view au
                                    : authority;
 }
 
-// True for IP addresses and localhost: names that a page cannot make point to another address.
+// Returns true for IP addresses and localhost. A web page's owner cannot make these names point to
+// another address.
 bool IsFixedHost(std::string_view authority) {
   std::string_view host = authority;
   if (host.starts_with('[')) {
@@ -51,7 +52,7 @@ bool OriginPolicy::Allows(std::optional<std::string_view> origin, std::string_vi
   if (std::ranges::find(allowed_, from) != allowed_.end()) return true;
   const auto at = from.find(kSchemeEnd);
   if (at == std::string::npos)
-    return false;  // "null" is sent by pages without an origin, such as local files
+    return false;  // Pages without an origin, such as local files, send "null".
   const std::string_view scheme = std::string_view(from).substr(0, at);
   if (scheme != "http" && scheme != "https") return false;
   const std::string_view page =

@@ -15,9 +15,10 @@ PortableSocket::~PortableSocket() {
 
 void PortableSocket::Prepare(Traffic& traffic, std::size_t send_buffer_bytes) {
   traffic_ = &traffic;
-  error_code ignored;  // a socket that fails here also fails on the first read
+  // An error can be ignored, because the first read of the socket reports it as well.
+  error_code ignored;
   socket_->set_option(asio::ip::tcp::no_delay(true), ignored);
-  socket_->non_blocking(true, ignored);  // for synchronous calls as well
+  socket_->non_blocking(true, ignored);  // Non-blocking mode is used for synchronous calls as well.
   if (send_buffer_bytes > 0) {
     socket_->set_option(asio::socket_base::send_buffer_size(static_cast<int>(send_buffer_bytes)),
                         ignored);
@@ -48,7 +49,7 @@ bool PortableSocket::Attach(asio::io_context& context) {
   socket_.emplace(context);
   error_code error;
   socket_->assign(protocol_, detached_, error);
-  if (error) return false;  // the destructor closes the descriptor
+  if (error) return false;  // The destructor closes the descriptor.
   detached_ = -1;
   return true;
 }

@@ -19,7 +19,8 @@ class PortableSocket {
   using executor_type = Socket::executor_type;  // NOLINT(readability-identifier-naming)
 
   explicit PortableSocket(Socket socket) : socket_(std::move(socket)) {
-    boost::system::error_code ignored;  // a socket that fails here also fails on first use
+    // An error can be ignored, because the first use of the socket reports it as well.
+    boost::system::error_code ignored;
     const auto local = socket_->local_endpoint(ignored);
     protocol_ = local.protocol();
   }
@@ -98,7 +99,7 @@ class PortableSocket {
     boost::beast::websocket::async_teardown(role, *socket.socket_, std::forward<Handler>(handler));
   }
 
-  std::optional<Socket> socket_;  // empty between Detach and Attach
+  std::optional<Socket> socket_;  // Empty between Detach and Attach.
   Socket::protocol_type protocol_ = Socket::protocol_type::v4();
   Socket::native_handle_type detached_ = -1;
   Traffic* traffic_ = nullptr;

@@ -8,7 +8,7 @@
 namespace stridewire::server {
 namespace {
 
-// Frames of each kind per write. A system call accepts 1024 buffers (IOV_MAX).
+// Maximum number of frames of each kind per write. A system call accepts 1024 buffers (IOV_MAX).
 constexpr std::size_t kMaxGatheredFrames = 64;
 
 }  // namespace

@@ -19,7 +19,7 @@ struct PoseFrames {
   WorldId world = 0;
   protocol::PoseMode mode = protocol::PoseMode::kFull;
   int shard = 0;
-  std::uint64_t avatar_count = 0;  ///< In all frames together.
+  std::uint64_t avatar_count = 0;  ///< Number of avatars in all frames together.
   std::vector<SharedFrame> frames;
 };
 
@@ -42,7 +42,7 @@ struct PoseFrames {
 /// replies by pausing to read commands. Frames are shared by all connections that send them.
 class SendQueue {
  public:
-  /// Movements have a budget of `control_budget_bytes` of their own.
+  /// Creates an empty queue. Movements have a second budget of `control_budget_bytes`.
   SendQueue(std::size_t control_budget_bytes, int backlog_ticks);
 
   /// Always accepts the frame. The caller is responsible for watching control_bytes().
@@ -119,8 +119,8 @@ class SendQueue {
   std::deque<QueuedMovements> movements_;
   std::size_t movement_bytes_ = 0;
   std::map<LaneKey, Lane> lanes_;
-  std::size_t waiting_batches_ = 0;  // frames in all lanes
-  LaneKey last_lane_;                // where the last Gather stopped
+  std::size_t waiting_batches_ = 0;  // Number of frames in all lanes.
+  LaneKey last_lane_;                // Lane at which the last Gather stopped.
 };
 
 }  // namespace stridewire::server

@@ -67,7 +67,7 @@ class Transport {
   struct Chunk {
     std::span<const std::byte> bytes;
     bool ends_message = false;
-    bool is_text = false;  ///< The message is a text message.
+    bool is_text = false;  ///< True if the bytes belong to a text message.
   };
 
   /// Receives the results of operations. A pending operation keeps its user alive.

@@ -101,7 +101,7 @@ class WebSocketTransport final : public Transport {
   }
 
   websocket::stream<PortableSocket> stream_;
-  std::optional<UpgradeRequest> request_;  // until it is answered
+  std::optional<UpgradeRequest> request_;  // Set until the request has been answered.
   std::span<const SharedFrame> unsent_;
 };
 

@@ -18,8 +18,9 @@ class EventReplay {
 
   struct Stored {
     std::uint64_t number = 0;       ///< Number of the message, ascending.
-    std::uint64_t event_count = 0;  ///< Events in the message.
-    bool was_sent = false;  ///< Given to a connection, which may have failed before sending.
+    std::uint64_t event_count = 0;  ///< Number of events in the message.
+    /// True if the message was passed to a connection, which may have failed before sending it.
+    bool was_sent = false;
     SharedFrame frame;
   };
 

@@ -90,7 +90,8 @@ Handshakes::Handshakes(boost::asio::io_context& context, const Limits& limits,
   handshake_limits_.max_control_bytes =
       std::min(limits.max_control_bytes, protocol::kMaxHelloBytes);
   handshake_limits_.max_bulk_bytes = handshake_limits_.max_control_bytes;
-  handshake_limits_.idle_timeout_s = 0.0;  // handshake_timeout_s applies instead
+  // The handshake has its own timeout, handshake_timeout_s.
+  handshake_limits_.idle_timeout_s = 0.0;
 }
 
 Handshakes::~Handshakes() = default;
@@ -102,7 +103,9 @@ void Handshakes::Accept(std::unique_ptr<Transport> transport,
   const std::string address = remote.to_string();
   if (handshakes_.size() >= static_cast<std::size_t>(limits_.max_handshakes)) {
     metrics_.Reached(Limit::kHandshakes);
-    return;  // closes the connection without a message, which would only help a flood
+    // Closes the connection without a message. Sending one would only make a flood of connections
+    // more expensive.
+    return;
   }
   int& count = address_counts_[address];
   if (count >= limits_.max_sessions_per_address) {

@@ -44,7 +44,7 @@ class Handshakes {
   SessionDirectory& directory_;
   Adopt adopt_;
   std::map<Handshake*, std::shared_ptr<Handshake>> handshakes_;
-  std::map<std::string, int> address_counts_;  // handshakes per client address
+  std::map<std::string, int> address_counts_;  // Number of handshakes per client address.
   bool is_closed_ = false;
 };
 

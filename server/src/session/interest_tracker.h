@@ -41,7 +41,8 @@ class InterestTracker {
   const Sessions& sessions_;
   Broadcast broadcast_;
   std::map<WorldId, std::vector<Session*>> watchers_;
-  std::map<WorldId, Interest> sent_;  // as last broadcast; one entry per world with watchers
+  // Interests as last broadcast; one entry per world with watchers.
+  std::map<WorldId, Interest> sent_;
   std::set<WorldId> changed_selections_;
 };
 

@@ -55,11 +55,13 @@ class MovementFeed {
  private:
   std::shared_ptr<World> world_;
   bool covers_all_ = false;
-  std::vector<AvatarId> selected_;    // ascending
-  std::vector<AvatarId> deselected_;  // ascending; not yet reported to the client as gone
-  std::shared_ptr<const std::vector<AvatarId>> states_of_;  // ascending; null: all
-  AvatarId next_ = 0;                // first id of states_of_ whose state is missing; 0: none
-  std::uint32_t pending_nonce_ = 0;  // of the pending request; 0: none
+  std::vector<AvatarId> selected_;  // ascending
+  // Ascending ids that have not been reported to the client as gone yet.
+  std::vector<AvatarId> deselected_;
+  // Ascending ids whose states are needed; null: all avatars.
+  std::shared_ptr<const std::vector<AvatarId>> states_of_;
+  AvatarId next_ = 0;                // First id of states_of_ whose state is missing; 0: none.
+  std::uint32_t pending_nonce_ = 0;  // Nonce of the pending request; 0: none.
   bool is_lost_ = false;
 };
 

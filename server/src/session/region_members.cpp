@@ -39,7 +39,8 @@ void RegionMembers::CombineIntervals() {
 
 const RegionMembers::Ring& RegionMembers::RingAt(double distance_m2) const {
   auto ring = rings_.begin();
-  while (distance_m2 > ring->outer_m * ring->outer_m) ++ring;  // the last ring is unbounded
+  // The last ring is unbounded, so the loop ends.
+  while (distance_m2 > ring->outer_m * ring->outer_m) ++ring;
   return *ring;
 }
 
@@ -122,13 +123,13 @@ RegionMembers::Change RegionMembers::Update(const Snapshot& snapshot) {
   left_.clear();
   due_.clear();
   std::size_t kept = 0;
-  const bool is_uniform = ring_count_ == 1;  // the usual case
+  const bool is_uniform = ring_count_ == 1;  // Usually a region has one ring.
   for (const auto& [row, distance_m2] : near_) {
     const AvatarId id = (*shard.avatars)[row];
     const Ring& ring = is_uniform ? rings_[0] : RingAt(distance_m2);
     const bool is_of_mode = is_uniform || ring.mode == mode;
     if (!shard.is_member[row]) {
-      // Just after a region has moved, the shard may not have encoded this pose yet.
+      // Directly after a region has moved, the shard may not have encoded this pose yet.
       if (!is_of_mode || !has_pose(row)) continue;
       entered_.push_back(id);
       due_.push_back(row);

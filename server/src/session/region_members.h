@@ -53,7 +53,8 @@ class RegionMembers {
   /// The result of an update, valid until the next call. All ids and rows are ascending.
   struct Change {
     std::span<const AvatarId> entered;
-    std::span<const AvatarId> left;      ///< Including avatars that were removed from the world.
+    /// Avatars that have left, including those that were removed from the world.
+    std::span<const AvatarId> left;
     std::span<const std::uint32_t> due;  ///< Rows whose poses must be sent.
   };
   /// `delivery` must contain positions, and its mode must be one of modes().
@@ -71,8 +72,8 @@ class RegionMembers {
   };
   struct ShardMembers {
     std::vector<AvatarId> members;
-    protocol::PoseRows::Avatars avatars;  // all avatars of the shard
-    std::vector<bool> is_member;          // by row of `avatars`
+    protocol::PoseRows::Avatars avatars;  // All avatars of the shard.
+    std::vector<bool> is_member;          // True for members, by row of `avatars`.
   };
   /// The parts of a delivery that an update needs.
   struct Snapshot {
@@ -80,7 +81,7 @@ class RegionMembers {
     std::uint64_t tick;
     const protocol::PoseRows::Avatars& avatars;
     const SpatialGrid& grid;
-    const protocol::PoseRows* rows;  // null: treat all avatars as if they had poses
+    const protocol::PoseRows* rows;  // Rows of poses. Null: treat all avatars as if they had poses.
     protocol::PoseMode mode;
   };
   [[nodiscard]] Change Update(const Snapshot& snapshot);
@@ -92,12 +93,14 @@ class RegionMembers {
   protocol::GroundPoint centre_m_;
   double radius_m_ = 0.0;
   double leave_radius_m_ = 0.0;
-  std::array<Ring, protocol::kMaxRateRings + 1> rings_;  // the last ring is unbounded
+  // Rings from the inside out; the last one is unbounded.
+  std::array<Ring, protocol::kMaxRateRings + 1> rings_;
   std::size_t ring_count_ = 0;
-  std::array<std::uint16_t, kSentModes.size() + 1> intervals_{};  // by mode, including kMovement
+  // Intervals by mode, including kMovement.
+  std::array<std::uint16_t, kSentModes.size() + 1> intervals_{};
   std::map<int, ShardMembers> shards_;
-  // Scratch memory and the data of the last Change.
-  std::vector<std::pair<std::uint32_t, double>> near_;  // row, squared distance
+  // Scratch memory, and the arrays to which the last Change refers.
+  std::vector<std::pair<std::uint32_t, double>> near_;  // Rows and squared distances.
   std::vector<AvatarId> now_;
   std::vector<AvatarId> entered_;
   std::vector<AvatarId> left_;

@@ -21,11 +21,11 @@ namespace stridewire::server {
 class ReplyCache {
  public:
   enum class Verdict : std::uint8_t {
-    kNew,        ///< The next command: execute it.
-    kPending,    ///< Accepted, but not answered yet: ignore it.
-    kAnswered,   ///< Send the stored reply again.
-    kForgotten,  ///< Executed, but its reply is not stored any more.
-    kGap,        ///< A command before this one is missing.
+    kNew,        ///< The next command; the session executes it.
+    kPending,    ///< The command was accepted, but not answered yet; the session ignores it.
+    kAnswered,   ///< The command was answered; the session sends the stored reply again.
+    kForgotten,  ///< The command was executed, but its reply is not stored any more.
+    kGap,        ///< A command with a smaller number is missing.
   };
   struct Answer {
     SharedFrame reply;   ///< Null while the command is pending.
@@ -53,9 +53,9 @@ class ReplyCache {
  private:
   std::size_t max_count_;
   std::size_t max_bytes_;
-  protocol::Seq first_seq_ = 1;  // seq of answers_[0]
+  protocol::Seq first_seq_ = 1;  // Sequence number of answers_[0].
   std::deque<Answer> answers_;
-  std::size_t bytes_ = 0;  // of all stored replies
+  std::size_t bytes_ = 0;  // Size of all stored replies.
 };
 
 }  // namespace stridewire::server

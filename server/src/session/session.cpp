@@ -166,7 +166,8 @@ void Session::Housekeep(Clock::time_point now) {
     return;
   }
   for (auto& [id, membership] : context_.worlds) {
-    // Only one at a time, so that they do not accumulate for a client that does not read.
+    // Repeats one reply at a time, so that replies do not accumulate for a client that does not
+    // read.
     if (context_.connection->queue().control_empty()) stream_.SendLagging(membership);
   }
   UpdatePause();
@@ -217,7 +218,7 @@ void Session::OnTerrainRefused(protocol::Seq seq, Refusal refusal) {
 void Session::OnMessage(protocol::Message&& message) {
   ThreadMetrics& metrics = context_.host.metrics();
   message_tokens_.AdvanceTime(context_.host.clock().ServerTime(Clock::now()));
-  static_cast<void>(message_tokens_.Take(1.0));  // UpdatePause pauses reading if none is left
+  static_cast<void>(message_tokens_.Take(1.0));  // If no token is left, UpdatePause pauses reading.
   std::visit(
       [&]<typename Received>(Received& received) {
         if constexpr (SessionCommands::IsCommand<Received>()) {
@@ -304,7 +305,7 @@ void Session::SendLibraryPiece(const protocol::FetchLibrary& message) {
   if (message.offset > file.size()) {
     return refuse(StatusCode::kOutOfRange, "the offset is beyond the end of the library");
   }
-  // Room for the other members of the message, if the frame limit is small.
+  // Room for the other members of the message, in case the frame limit is small.
   constexpr std::size_t kOverheadBytes = 512;
   const std::size_t max_bytes = std::min(
       protocol::kMaxPieceBytes, context_.host.config().limits.max_bulk_bytes - kOverheadBytes);

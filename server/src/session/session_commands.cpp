@@ -33,7 +33,7 @@ void Distribute(std::vector<Item>&& items, std::vector<Part>& parts) {
   }
 }
 
-// A refused item takes less than 256 bytes of a Reply.
+// Upper bound for the size of a refused item in a Reply.
 constexpr std::size_t kReplyItemBytes = 256;
 // Heights and boxes of a terrain that count as one item. The largest terrain then uses half of the
 // default burst.
@@ -484,7 +484,7 @@ void SessionCommands::Answer(Seq seq, StatusCode code, std::string text) {
 void SessionCommands::Answer(Reply&& reply, WorldId joined) {
   STRIDEWIRE_CHECK(!pending_.contains(reply.seq));
   const SharedFrame frame = EncodeFrame(context_.host.encoder(), reply);
-  STRIDEWIRE_CHECK(frame != nullptr);  // because of MaxItems
+  STRIDEWIRE_CHECK(frame != nullptr);  // MaxItems ensures that the Reply fits into a frame.
   const std::size_t forgotten = replies_.Store(reply.seq, frame, joined);
   if (forgotten > 0 && replies_.bytes() > context_.host.config().limits.reply_cache_bytes / 2) {
     context_.host.metrics().Reached(Limit::kReplyCache, forgotten);

@@ -70,7 +70,7 @@ class SessionCommands {
  private:
   /// A command that waits for results.
   struct Pending {
-    int outstanding = 0;  // shards that have not answered
+    int outstanding = 0;  // Number of shards that have not answered.
     std::size_t item_count = 0;
     protocol::Role role = protocol::Role::kController;  // of a JoinWorld
     protocol::Reply reply;
@@ -114,7 +114,7 @@ class SessionCommands {
   SessionContext& context_;
   SessionStream& stream_;
   std::map<protocol::Seq, Pending> pending_;
-  std::size_t pending_items_ = 0;  // sum of Pending::item_count
+  std::size_t pending_items_ = 0;  // Sum of Pending::item_count of all pending commands.
   ReplyCache replies_;
   TokenBucket request_tokens_;
 };

@@ -18,7 +18,7 @@ struct Membership {
   protocol::Role role = protocol::Role::kController;
   std::uint64_t dropped_batches = 0;
   std::uint64_t dropped_events = 0;
-  std::uint64_t reported_drops = 0;  ///< Sum of the two when Lagging was last sent.
+  std::uint64_t reported_drops = 0;  ///< Sum of the two drop counts when Lagging was last sent.
 };
 
 /// The state that the parts of a session share: Session, SessionCommands and SessionStream.

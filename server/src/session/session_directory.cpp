@@ -16,7 +16,8 @@ constexpr std::size_t kTokenBytes = 32;
 std::vector<std::byte> RandomBytes(std::size_t count) {
   std::vector<std::byte> bytes(count);
   const ssize_t got = getrandom(bytes.data(), bytes.size(), 0);
-  STRIDEWIRE_CHECK(got == static_cast<ssize_t>(count));  // getrandom always returns up to 256 bytes
+  // For up to 256 bytes, getrandom always returns all of them.
+  STRIDEWIRE_CHECK(got == static_cast<ssize_t>(count));
   return bytes;
 }
 

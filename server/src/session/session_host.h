@@ -38,9 +38,9 @@ class SessionHost {
   virtual void SendToServer(ServerMessage message) = 0;
   /// Destroys an ended session after the current call has returned.
   virtual void DestroySession(SessionId session) = 0;
-  /// The session needs more or less of this world than before.
+  /// Called when the session needs more or less of this world than before.
   virtual void InterestChanged(const std::shared_ptr<World>& world) = 0;
-  /// The session has moved its region and needs the same otherwise.
+  /// Called when the session has moved its region, but otherwise needs the same as before.
   virtual void SelectionChanged(WorldId world) = 0;
 };
 

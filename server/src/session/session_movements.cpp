@@ -12,7 +12,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// Bytes of states that are requested at a time, per shard.
+// Size of the states that are requested at a time, per shard.
 constexpr std::size_t kStatesBytes = 100'000;
 
 }  // namespace

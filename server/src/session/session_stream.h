@@ -32,7 +32,7 @@ class SharedMovements {
   const MovementDelivery& delivery_;
   protocol::Encoder& encoder_;
   std::vector<SharedFrame> frames_;
-  std::vector<SharedFrame> empty_frames_;  // null until needed
+  std::vector<SharedFrame> empty_frames_;  // Null until the frame is needed.
 };
 
 /// One PoseDelivery and the batches that sessions compose from it.
@@ -123,10 +123,11 @@ class SessionStream {
 
   SessionContext& context_;
   Subscriptions subscriptions_;
-  std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;  // by world and avatars' shard
+  // Feeds by world and by the avatars' shard.
+  std::map<std::pair<WorldId, int>, MovementFeed> movement_feeds_;
   std::uint32_t states_nonce_ = 0;
   EventReplay event_replay_;
-  std::uint64_t events_number_ = 0;  // of the last Events message
+  std::uint64_t events_number_ = 0;  // Number of the last Events message.
 };
 
 }  // namespace stridewire::server

@@ -23,10 +23,11 @@ class Subscriptions {
  public:
   struct Subscription {
     WorldId world = 0;
-    protocol::PoseMode mode = protocol::PoseMode::kFull;  ///< With a region: beyond its rings.
+    /// Mode of the poses. With a region, the mode beyond its rings.
+    protocol::PoseMode mode = protocol::PoseMode::kFull;
     std::uint16_t every_n_ticks = 1;
     bool with_events = false;
-    std::vector<AvatarId> avatars;  ///< Empty: all avatars, or those of the region.
+    std::vector<AvatarId> avatars;  ///< Ids to observe. Empty: all avatars, or those of the region.
     std::optional<RegionMembers> region;
   };
   /// The part of a delivery that the session sends to its client.
@@ -47,7 +48,8 @@ class Subscriptions {
   /// Returns the removed subscription, or nullopt if `id` does not exist.
   std::optional<Subscription> Remove(protocol::SubscriptionId id);
   void RemoveWorld(WorldId world);
-  /// The client may have missed messages: empty batches are sent again, even if nothing changed.
+  /// Must be called if the client may have missed messages. Empty batches are then sent again, even
+  /// if nothing has changed.
   void RepeatEmptyBatches();
 
   [[nodiscard]] bool WantsEvents(WorldId world) const;
@@ -86,14 +88,14 @@ class Subscriptions {
   using Key = std::pair<WorldId, protocol::PoseMode>;
   /// The selected rows of one shard.
   struct ShardRows {
-    protocol::PoseRows::Avatars avatars;  // for which `rows` is valid
+    protocol::PoseRows::Avatars avatars;  // The avatars for which `rows` is valid.
     std::vector<std::uint32_t> rows;
-    bool was_empty = false;  // the last batch contained no poses
+    bool was_empty = false;  // True if the last batch contained no poses.
   };
   /// All subscriptions of one world and mode together.
   struct Channel {
     SendInterval interval;
-    std::vector<AvatarId> selected;  // ascending; empty: all
+    std::vector<AvatarId> selected;  // Ascending ids; empty: all avatars.
     std::map<int, ShardRows> shards;
   };
 

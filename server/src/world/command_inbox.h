@@ -33,7 +33,8 @@ class CommandInbox {
  private:
   std::size_t max_spawns_per_tick_;
   std::vector<WorldCommand> commands_;
-  std::map<SessionId, CommandResult> partial_results_;  // of Spawns that take several ticks
+  // Results of Spawns that take several ticks.
+  std::map<SessionId, CommandResult> partial_results_;
 };
 
 }  // namespace stridewire::server

@@ -202,7 +202,7 @@ void EncodedPoseCache::FinishStep() {
                                 static_cast<int>(max_count));
     poses += static_cast<std::size_t>(item.count);
   }
-  // A whole crowd may need poses at once, because somebody starts to observe it or because it was
+  // A whole crowd may need poses at once, because a client starts to observe it or because it was
   // interrupted. Then slots outside their phase get only one pose, so that a tick evaluates hardly
   // more than two poses per avatar.
   const bool is_crowd_new = poses > 2 * avatar_count_ + kLanes * kMaxTicksAhead;
@@ -292,7 +292,8 @@ EncodedPoseCache::Encoded EncodedPoseCache::FindOverflow(std::uint32_t slot, std
   if ((flags >> mode & 1u) == 0) {
     return {{BytesOf(slot, pose) + modes_[mode].offset, modes_[mode].codec->pose_bytes()}};
   }
-  // Count the uncompressed poses that were stored before: earlier poses, then earlier modes.
+  // Skip the uncompressed poses that were stored before this one: those of earlier poses, then
+  // those of earlier modes.
   constexpr unsigned kUncompressed = (1u << kMaxModes) - 1;
   auto before = static_cast<std::size_t>(std::popcount(flags & kUncompressed & ((1u << mode) - 1)));
   for (std::size_t p = 0; p < pose; ++p) {

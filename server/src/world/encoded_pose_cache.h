@@ -21,10 +21,10 @@ struct PoseScratch {
   explicit PoseScratch(std::shared_ptr<const MotionLibrary> of_library);
 
   std::shared_ptr<const MotionLibrary> library;
-  SoaPoseEvaluator evaluator;  ///< For up to EncodedPoseCache::kMaxTicksAhead poses.
-  PlanScratch plan;            ///< For starting movements.
+  SoaPoseEvaluator evaluator;  ///< Evaluates up to EncodedPoseCache::kMaxTicksAhead poses per run.
+  PlanScratch plan;            ///< Scratch memory for starting movements.
   EvaluationBatcher batcher;
-  SoaPose stored;  ///< Poses given to EncodedPoseCache::Store.
+  SoaPose stored;  ///< Poses that were passed to EncodedPoseCache::Store.
   Pose pose;
   static constexpr std::size_t kMaxModes = 4;
   std::array<protocol::CompactCodec::Block, kMaxModes> blocks;
@@ -111,7 +111,7 @@ class EncodedPoseCache {
 
    private:
     friend class EncodedPoseCache;
-    EncodedPoseCache* cache_ = nullptr;  // null until the first Schedule or Store
+    EncodedPoseCache* cache_ = nullptr;  // Null until the first Schedule or Store.
     std::uint32_t index_ = 0;
   };
 
@@ -153,8 +153,10 @@ class EncodedPoseCache {
   void FinishStep();
 
   struct Encoded {
-    std::span<const std::byte> bytes;  ///< Empty if the pose cannot be encoded in any format.
-    bool is_uncompressed = false;      ///< In the format of kQuantised (kPoseUncompressed).
+    /// Bytes of the pose. Empty if it cannot be encoded in any format.
+    std::span<const std::byte> bytes;
+    /// True if the pose is in the format of kQuantised (kPoseUncompressed).
+    bool is_uncompressed = false;
   };
   /// Returns the pose of this step, which the slot must contain. `mode` must be one of SetModes.
   [[nodiscard]] Encoded Find(const Slot& slot, protocol::PoseMode mode) const;
@@ -178,26 +180,26 @@ class EncodedPoseCache {
   struct Mode {
     protocol::PoseMode mode;
     const protocol::CompactCodec* codec;
-    std::size_t offset;  // in the bytes of a pose
-    std::size_t pieces;  // argument of CompactCodec::Block::StreamBytes
+    std::size_t offset;  // Position of the mode's bytes within the bytes of a slot.
+    std::size_t pieces;  // Argument of CompactCodec::Block::StreamBytes.
   };
   // State of one slot; read in every tick.
   struct SlotState {
     enum Kind : std::uint8_t { kEmpty, kScheduled, kTimed, kConstant };
-    std::uint64_t first_step = 0;  // of the poses, if timed
-    std::uint32_t revision = 0;    // low bits of the avatar's revision
-    std::uint8_t count = 0;        // poses: 0 if empty or scheduled, 1 if constant
+    std::uint64_t first_step = 0;  // Step of the first pose, if timed.
+    std::uint32_t revision = 0;    // Low bits of the avatar's revision.
+    std::uint8_t count = 0;        // Number of poses: 0 if empty or scheduled, 1 if constant.
     std::uint8_t first_plane = 0;
     Kind kind = kEmpty;
     std::uint8_t has_overflow : 1 = 0;  // see Overflow
-    std::uint8_t backoff : 2 = 0;       // at most kMaxTicksAhead >> backoff poses are evaluated
+    std::uint8_t backoff : 2 = 0;       // At most kMaxTicksAhead >> backoff poses are evaluated.
   };
   static_assert(sizeof(SlotState) == 16);
   // Poses of a slot that a mode cannot represent. They are stored uncompressed, if possible.
   struct Overflow {
-    // By pose. Bit m: uncompressed in mode m; bit m + kMaxModes: not encodable in mode m.
+    // Flags by pose. Bit m: uncompressed in mode m; bit m + kMaxModes: not encodable in mode m.
     std::array<std::uint8_t, kMaxTicksAhead> flags{};
-    std::vector<std::byte> bytes;  // uncompressed poses, by pose and mode
+    std::vector<std::byte> bytes;  // Uncompressed poses, ordered by pose and mode.
   };
   struct Scheduled {
     std::uint32_t slot;
@@ -206,7 +208,7 @@ class EncodedPoseCache {
     bool is_in_phase;
   };
 
-  // Index of the pose of the current step. At least `count` if there is none.
+  // Returns the index of the pose of the current step, or at least `count` if there is none.
   [[nodiscard]] std::size_t PoseIndex(const SlotState& state) const {
     if (state.kind == SlotState::kConstant) return 0;
     const std::uint64_t steps = step_ - state.first_step;
@@ -233,7 +235,7 @@ class EncodedPoseCache {
   void Allocate(Slot& slot);
   void Release(std::uint32_t slot);
   [[nodiscard]] std::uint8_t NextBackoff(const SlotState& state, std::uint64_t revision) const;
-  // Transition to timed or constant.
+  // Changes the state of a slot to timed or constant.
   void Fill(std::uint32_t slot, std::uint64_t revision, std::size_t count, SlotState::Kind kind);
   void EncodeStored();
   // Encodes the poses in `lanes` and writes them as pose number `pose` of `slots`. Lanes whose slot
@@ -246,22 +248,24 @@ class EncodedPoseCache {
   std::shared_ptr<PoseScratch> scratch_;
   const protocol::CompactCodecs* codecs_;
   std::vector<Mode> modes_;
-  std::size_t pose_bytes_;  // in all modes: whole cache lines, or a root
+  // Size of a pose in all modes together: whole cache lines, or one root position.
+  std::size_t pose_bytes_;
   std::size_t uncompressed_bytes_;
   int steps_apart_ = 1;
-  std::size_t ring_size_ = kMaxTicksAhead;  // planes in use, except kConstantPlane
+  std::size_t ring_size_ = kMaxTicksAhead;  // Number of planes in use, except kConstantPlane.
   std::uint64_t step_ = 0;
-  std::uint8_t plane_ = 0;  // of the current step
+  std::uint8_t plane_ = 0;  // Plane of the current step.
   double step_s_ = 0.0;
   std::size_t avatar_count_ = 0;
 
   std::vector<SlotState> slots_;
-  std::array<std::vector<Line>, kMaxTicksAhead + 1> planes_;  // pose_bytes_ per slot
-  std::unordered_map<std::uint32_t, Overflow> overflow_;      // by slot
-  std::vector<std::uint32_t> free_;                           // slots without an avatar
+  // The planes; each has pose_bytes_ per slot.
+  std::array<std::vector<Line>, kMaxTicksAhead + 1> planes_;
+  std::unordered_map<std::uint32_t, Overflow> overflow_;  // by slot
+  std::vector<std::uint32_t> free_;                       // Slots without an avatar.
 
   std::vector<Scheduled> scheduled_;
-  std::array<std::uint32_t, kLanes> stored_slots_{};  // by lane of PoseScratch::stored
+  std::array<std::uint32_t, kLanes> stored_slots_{};  // Slot of each lane of PoseScratch::stored.
   std::size_t stored_count_ = 0;
 };
 

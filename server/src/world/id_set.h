@@ -44,7 +44,8 @@ class IdSet {
   }
 
  private:
-  static constexpr AvatarId kSmallIds = 1u << 20;  // at most 128 KB of bits
+  // Ids below this are stored as bits, which take at most 128 KB.
+  static constexpr AvatarId kSmallIds = 1u << 20;
   std::vector<std::uint64_t> bits_;
   std::vector<AvatarId> large_;
 };

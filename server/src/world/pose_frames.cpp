@@ -23,7 +23,7 @@ std::vector<SharedFrame> ComposeFrames(protocol::PoseBatchComposer& composer,
   std::size_t fitting = composer.CountThatFit(rows, picked);
   if (fitting == picked.size()) return {compose(picked, 0, 1)};
   while (!picked.empty() && parts.size() < protocol::kMaxBatchParts) {
-    STRIDEWIRE_CHECK(fitting > 0);  // any frame limit has room for poses of kMaxJoints
+    STRIDEWIRE_CHECK(fitting > 0);  // Every frame limit has room for poses of kMaxJoints joints.
     parts.push_back(picked.first(fitting));
     picked = picked.subspan(fitting);
     fitting = composer.CountThatFit(rows, picked);

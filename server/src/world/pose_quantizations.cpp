@@ -15,7 +15,7 @@ std::shared_ptr<const PoseQuantizations> MakePoseQuantizations(const MotionLibra
   }
   std::vector<std::uint16_t> reduced = ChooseReducedJoints(library);
   auto codecs = protocol::CompactCodecs::Make(joints, parents, reduced);
-  STRIDEWIRE_CHECK(codecs.has_value());  // the chosen quantizations are always valid
+  STRIDEWIRE_CHECK(codecs.has_value());  // The chosen quantizations are always valid.
   return std::make_shared<const PoseQuantizations>(std::move(joints), std::move(reduced),
                                                    *std::move(codecs));
 }

@@ -115,7 +115,7 @@ struct StatesRequest {
   int from_shard = 0;  ///< The shard of the session.
   SessionId session = 0;
   std::uint32_t nonce = 0;
-  AvatarId first = 0;            ///< Smallest id to send.
+  AvatarId first = 0;            ///< Smallest id whose state is sent.
   std::size_t enough_bytes = 0;  ///< The shard stops after the state that exceeds this size.
   std::shared_ptr<const std::vector<AvatarId>> avatars;  ///< Ascending ids; null: all avatars.
 };
@@ -142,14 +142,15 @@ struct RegionFilter {
   double x = 0.0;
   double z = 0.0;
   double outer_m = 0.0;
-  double inner_m = 0.0;  ///< Avatars at this distance or nearer are excluded, unless it is 0.
+  double inner_m = 0.0;  ///< Avatars at this distance or nearer are excluded. 0: none are excluded.
   /// Other rings of the same region use other modes. Deliveries are then needed even if no avatar
   /// is in this ring, because the positions tell which avatars have left the region.
   bool is_one_of_several = false;
   bool operator==(const RegionFilter&) const = default;
 };
 
-/// How often poses are sent, in ticks: in every tick that the interval divides. 0: never.
+/// Intervals at which poses are sent, in ticks: they are sent in every tick that the interval
+/// divides. 0: never.
 struct SendInterval {
   std::uint16_t all = 0;     ///< For sessions that observe all avatars.
   std::uint16_t subset = 0;  ///< For sessions that observe selected avatars or a region.
@@ -183,7 +184,8 @@ struct PoseDelivery {
   int from_shard = 0;
   std::uint64_t tick = 0;
   std::uint32_t avatar_count = 0;  ///< In `parts`.
-  std::vector<SharedFrame> parts;  ///< A batch of all avatars; empty if no session observes all.
+  /// Batch of all avatars; empty if no session observes all avatars.
+  std::vector<SharedFrame> parts;
   /// The encoded poses from which sessions compose smaller batches. Contains at least the poses of
   /// selected avatars and regions.
   std::shared_ptr<const protocol::PoseRows> rows;

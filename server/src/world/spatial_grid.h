@@ -41,7 +41,7 @@ class SpatialGrid {
  private:
   struct Entry {
     std::int64_t column = 0;
-    std::int64_t cell = 0;  // within the column
+    std::int64_t cell = 0;  // Index of the cell within the column.
     std::uint32_t row = 0;
     float x = 0.0f;
     float z = 0.0f;
@@ -52,7 +52,7 @@ class SpatialGrid {
   [[nodiscard]] std::size_t LowerBound(std::int64_t column, std::int64_t cell) const;
 
   double cells_per_m_ = 1.0;
-  std::vector<Entry> entries_;  // sorted by column, then cell, then row
+  std::vector<Entry> entries_;  // Entries sorted by column, then cell, then row.
 };
 
 }  // namespace stridewire::server

@@ -15,7 +15,8 @@ class TickClock {
   TickClock(Clock::time_point epoch, double tick_hz) : epoch_(epoch), tick_hz_(tick_hz) {}
 
   [[nodiscard]] Clock::time_point Due(std::uint64_t tick) const {
-    // Whole seconds are added separately, so that the rounding error stays small after years.
+    // Whole seconds are added separately, so that the rounding error remains small even after
+    // years.
     const double seconds = static_cast<double>(tick) / tick_hz_;
     const double whole = std::floor(seconds);
     return epoch_ + std::chrono::seconds(static_cast<std::int64_t>(whole)) +

@@ -25,12 +25,12 @@ struct World {
   std::string name;
   std::shared_ptr<const MotionLibrary> library;
   std::shared_ptr<const PoseQuantizations> quantizations;  ///< Of `library`.
-  bool persistent = false;  ///< Avatars outlive the session that spawned them.
+  bool persistent = false;  ///< True if avatars outlive the session that spawned them.
   AvatarOptions avatar_options;
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
 
   std::atomic<std::int64_t> avatar_count{0};  ///< Avatars that exist or are being spawned.
-  std::atomic<AvatarId> last_id{0};           ///< Largest avatar id of any Spawn.
+  std::atomic<AvatarId> last_id{0};           ///< Largest avatar id that any Spawn has used.
   TerrainSlot
       terrain;  ///< The latest terrain. Each shard applies it to its avatars at a given tick.
 };

@@ -17,24 +17,24 @@ class WorldInterest {
 
   /// What a shard needs in a given tick.
   struct Demand {
-    bool all = false;     ///< A batch of all avatars.
-    bool subset = false;  ///< Poses of selected avatars or regions.
+    bool all = false;     ///< True if a batch of all avatars is needed.
+    bool subset = false;  ///< True if poses of selected avatars or regions are needed.
   };
   [[nodiscard]] Demand DemandOf(int shard, protocol::PoseMode mode, std::uint64_t tick) const;
 
   [[nodiscard]] bool WantsEvents(int shard) const { return Of(shard).events; }
   [[nodiscard]] bool WantsMovements(int shard) const { return Of(shard).movements; }
 
-  // Combined over all shards:
+  // The following functions combine all shards:
 
   [[nodiscard]] bool empty() const;
   [[nodiscard]] bool events() const { return events_; }
   [[nodiscard]] bool movements() const { return movements_; }
   [[nodiscard]] bool movement_regions() const { return movement_regions_; }
-  /// True if any session observes poses in this mode.
+  /// Returns true if any session observes poses in this mode.
   [[nodiscard]] bool IsObserved(protocol::PoseMode mode) const;
   [[nodiscard]] bool HasRegions(protocol::PoseMode mode) const;
-  /// True if a region has rings of this mode and of other modes.
+  /// Returns true if a region has rings of this mode and of other modes.
   [[nodiscard]] bool HasMixedRegions(protocol::PoseMode mode) const;
   /// Returns the observed compact modes, in the order of kSentModes.
   [[nodiscard]] std::vector<protocol::PoseMode> CompactModes() const;

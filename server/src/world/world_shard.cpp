@@ -330,7 +330,7 @@ void WorldShard::SetInterest(const Interest& interest) {
 std::shared_ptr<const std::vector<protocol::Event>> WorldShard::TakeEvents() {
   if (events_.empty()) return nullptr;
   auto events = std::make_shared<const std::vector<protocol::Event>>(std::exchange(events_, {}));
-  events_.reserve(events->size());  // the next tick probably has as many
+  events_.reserve(events->size());  // The next tick probably has as many events.
   return events;
 }
 
@@ -347,10 +347,10 @@ protocol::Movements WorldShard::EmptyMovements() const {
           .server_time_s = clock_.TickTime(tick_)};
 }
 
-// True if the frame limit could be exceeded by one more record of the maximum size.
+// True if one more record of the maximum size could exceed the frame limit.
 bool WorldShard::IsFull(const protocol::Movements& message) const {
   constexpr std::size_t kOverheadBytes = 256;
-  constexpr std::size_t kAvatarBytes = 9;  // id, flags and end
+  constexpr std::size_t kAvatarBytes = 9;  // Size of an avatar's id, flags and end.
   return message.avatars.size() == protocol::kMaxItems ||
          message.records.size() + (message.avatars.size() + 1) * kAvatarBytes + kOverheadBytes +
                  MaxRecordBytes(*world_->library) >

@@ -31,9 +31,11 @@ struct WorldShardDef {
   std::shared_ptr<World> world;
   int shard = 0;
   int shard_count = 1;
-  int max_queue = 256;                                   ///< Waiting requests per avatar.
-  std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;  ///< Payload of a Movements message.
-  const TickClock& clock;                                ///< Copied.
+  /// Maximum number of waiting requests per avatar.
+  int max_queue = 256;
+  /// Largest payload of a Movements message.
+  std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;
+  const TickClock& clock;  ///< Copied.
   AvatarBudget& budget;
   ThreadMetrics& metrics;
   /// Scratch memory of the world's library and of this thread. If null, the WorldShard allocates
@@ -66,8 +68,8 @@ class WorldShard {
   [[nodiscard]] std::shared_ptr<const std::vector<protocol::Event>> TakeEvents();
 
   /// Encodes the poses of `tick` in `mode`: of all avatars, with a complete batch, if `all` is
-  /// true; otherwise of selected avatars and regions. Returns false if nobody needs the delivery,
-  /// because it has no poses and the previous one had none either.
+  /// true; otherwise of selected avatars and regions. Returns false if no session needs the
+  /// delivery, because neither it nor the previous one has poses.
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool all,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 
@@ -144,8 +146,8 @@ class WorldShard {
   const TickClock clock_;
   AvatarBudget& budget_;
   ThreadMetrics& metrics_;
-  EncodedPoseCache cache_;             // must outlive avatars_, which own its slots
-  std::map<AvatarId, Entry> avatars_;  // ordered, so that batches and events are ordered
+  EncodedPoseCache cache_;             // Must outlive avatars_, which own its slots.
+  std::map<AvatarId, Entry> avatars_;  // Ordered, so that batches and events are ordered.
 
   // Arrays of all avatars in the order of avatars_. Rows are indices of these arrays. They are
   // rebuilt by OrderedAvatars after avatars were added or removed.
@@ -155,18 +157,20 @@ class WorldShard {
   protocol::PoseRows::Avatars ids_;
   std::vector<std::uint32_t> all_rows_;
 
-  std::vector<std::uint32_t> eventful_;  // rows that may have events after the last step
+  std::vector<std::uint32_t> eventful_;  // Rows that may have events after the last step.
   std::vector<protocol::Event> events_;
-  std::uint64_t step_ = 0;                       // steps since this object was created
-  std::uint64_t tick_ = 0;                       // of the current or last Advance
-  std::uint16_t steps_left_ = 0;                 // of the current Advance
-  std::shared_ptr<const WorldTerrain> terrain_;  // null: flat ground
-  std::deque<TerrainPart> next_terrains_;        // ordered by tick
+  std::uint64_t step_ = 0;  // Number of steps since this object was created.
+  std::uint64_t tick_ = 0;  // Tick of the current or last Advance.
+  // Number of steps that are left in the current Advance.
+  std::uint16_t steps_left_ = 0;
+  std::shared_ptr<const WorldTerrain> terrain_;  // Null: flat ground.
+  // Terrains that apply at later ticks, ordered by tick.
+  std::deque<TerrainPart> next_terrains_;
 
   // Movements.
   bool last_step_had_avatars_ = false;
-  std::vector<AvatarId> removed_;               // since the last step
-  std::vector<protocol::Movements> movements_;  // since the last TakeMovements
+  std::vector<AvatarId> removed_;               // Avatars that were removed since the last step.
+  std::vector<protocol::Movements> movements_;  // Movements since the last TakeMovements.
 
   // Poses.
   WorldInterest interest_;
@@ -174,11 +178,12 @@ class WorldShard {
   std::array<std::vector<std::uint32_t>, kSentModes.size()> selected_rows_;  // by mode
   std::array<bool, kSentModes.size()> last_had_poses_{};                     // by mode
   std::array<RowsPool, kSentModes.size()> rows_;                             // by mode
-  std::shared_ptr<const SpatialGrid> grid_;                                  // at grid_tick_
+  // Positions of the avatars at grid_tick_.
+  std::shared_ptr<const SpatialGrid> grid_;
   std::uint64_t grid_tick_ = 0;
   // Scratch memory.
   std::vector<std::uint32_t> picked_rows_;
-  std::vector<std::uint8_t> is_picked_;  // by row; all 0 between calls
+  std::vector<std::uint8_t> is_picked_;  // Flags by row; all 0 between calls.
   std::vector<AvatarSimulation*> evaluated_;
 };
 

@@ -12,7 +12,7 @@ using protocol::PoseMode;
 
 namespace {
 
-// How many avatars ahead of the current one are prefetched.
+// Number of avatars by which prefetching is ahead of processing.
 constexpr std::size_t kPrefetchDistance = 16;
 
 }  // namespace
@@ -130,7 +130,8 @@ bool WorldShard::Encode(PoseMode mode, std::uint64_t tick, bool all,
       Prefetch(*ordered[picked[i + kPrefetchDistance]].entry);
     }
     std::uint8_t flags = 0;
-    // The flag is set long enough to be in a batch of the observer with the longest interval.
+    // The flag stays set for the longest interval of any observer, so that every observer receives
+    // it.
     if (tick < entry.spawn_tick + interest_.max_interval()) flags |= protocol::kPoseDiscontinuity;
     if (entry.avatar.idle()) flags |= protocol::kPoseStanding;
     rows.SkipTo(picked[i]);

@@ -68,10 +68,10 @@ extern "C" {
 /// Maximum number of rings of a region.
 #define STRIDEWIRE_MAX_RATE_RINGS 4
 
-/// Result of a call or command. The hundreds tell who can act: 1xx the caller, 2xx the author of
-/// the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also occur in the
-/// protocol, codes x50 to x99 only in this library. Future versions may add codes, so handle an
-/// unknown code by its hundreds.
+/// Result of a call or command. The hundreds state who can correct the problem: 1xx the caller, 2xx
+/// the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also
+/// occur in the protocol, codes x50 to x99 only in this library. Future versions may add codes, so
+/// handle an unknown code by its hundreds.
 ///
 /// The _MAX enumerator of this and other enums only fixes the size of the type. It is not a value.
 typedef enum stridewire_status {
@@ -123,7 +123,8 @@ typedef enum stridewire_status {
 /// Returns a stable lower-case name such as "no_such_avatar", or "unknown" for an unknown code.
 const char* stridewire_status_name(stridewire_status status);
 
-/// Returns a sentence that describes a code, or the hundreds of an unknown code. Never NULL.
+/// Returns a sentence that describes a code. For an unknown code, it describes the class given by
+/// the hundreds. Never NULL.
 const char* stridewire_status_text(stridewire_status status);
 
 /// Returns the version of the library, for example "0.1.0".
@@ -139,8 +140,9 @@ typedef uint32_t stridewire_world;
 
 /// Settings of a client. Call stridewire_client_options_init to fill in the defaults.
 typedef struct stridewire_client_options {
-  size_t struct_bytes;   ///< sizeof(stridewire_client_options); set by _init.
-  uint32_t abi_version;  ///< STRIDEWIRE_ABI_VERSION; set by _init.
+  /// sizeof(stridewire_client_options); set by stridewire_client_options_init.
+  size_t struct_bytes;
+  uint32_t abi_version;  ///< STRIDEWIRE_ABI_VERSION; set by stridewire_client_options_init.
   /// Capacity of the event queue, 16 to 2^24. A full queue drops its oldest event. Default 65536.
   uint32_t max_events;
   /// Maximum number of unanswered commands, 1 to 2^20. Further commands fail with COMMANDS_FULL.
@@ -248,7 +250,7 @@ stridewire_status stridewire_client_leave_world(stridewire_client* client, strid
 typedef struct stridewire_spawn {
   /// Id of the avatar in its world. 0: the server chooses an id and reports it in an ITEM event.
   uint32_t avatar;
-  double position_m[3];  ///< Position of the base frame.
+  double position_m[3];  ///< World position of the base frame.
   double heading_rad;    ///< Heading of the base frame.
 } stridewire_spawn;
 
@@ -281,9 +283,11 @@ typedef enum stridewire_foot {
 
 /// When a requested movement begins, and whether it replaces queued movements.
 typedef enum stridewire_interrupt {
-  STRIDEWIRE_QUEUED = 0,          ///< After all queued movements.
-  STRIDEWIRE_AFTER_MOVEMENT = 1,  ///< After the current movement. The queue is dropped.
-  STRIDEWIRE_NOW = 2,             ///< As soon as the feet allow. The queue is dropped.
+  STRIDEWIRE_QUEUED = 0,  ///< The movement begins after all queued movements.
+  /// The movement begins after the current movement. The queue is dropped.
+  STRIDEWIRE_AFTER_MOVEMENT = 1,
+  /// The movement begins as soon as the feet allow it. The queue is dropped.
+  STRIDEWIRE_NOW = 2,
   STRIDEWIRE_INTERRUPT_MAX = 0x7fffffff
 } stridewire_interrupt;
 
@@ -302,7 +306,8 @@ typedef struct stridewire_movement {
   double turn_rad;   ///< Step, jump: change of heading.
   double seconds;    ///< Stand: duration.
   uint8_t has_side;  ///< Step: 0 leaves the sideways distance to the server.
-  uint8_t has_at;    ///< Step: 1 places the foot at `at_m` and ignores length, side, height, turn.
+  /// Step: 1 places the foot at `at_m` and ignores length, side, height and turn.
+  uint8_t has_at;
   uint8_t has_heading;  ///< Step with `has_at`: 0 leaves the heading of the foot to the server.
   /// Step with `has_at`: world position of the ball of the foot. Walk: its destination.
   double at_m[3];
@@ -310,7 +315,7 @@ typedef struct stridewire_movement {
   double heading_rad;
   /// Walk: x, y, z of each waypoint, 3 * waypoint_count numbers.
   const double* waypoints_m;
-  size_t waypoint_count;  ///< Walk: at most STRIDEWIRE_MAX_WAYPOINTS.
+  size_t waypoint_count;  ///< Walk: number of waypoints, at most STRIDEWIRE_MAX_WAYPOINTS.
   uint8_t has_speed;      ///< Walk: 0 leaves the speed to the server.
   /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows.
   double speed_m_s;
@@ -334,7 +339,7 @@ stridewire_status stridewire_client_cancel(stridewire_client* client, stridewire
 
 /// Heights on a regular grid, interpolated bilinearly. The height outside the grid is 0.
 typedef struct stridewire_height_field {
-  double origin_m[2];      ///< x and z of the first sample.
+  double origin_m[2];      ///< World x and z of the first sample.
   double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
   uint32_t columns;        ///< Samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
   uint32_t rows;           ///< Samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
@@ -345,15 +350,17 @@ typedef struct stridewire_height_field {
 typedef struct stridewire_terrain_box {
   double min_m[2];  ///< Smallest x and z.
   double max_m[2];  ///< Largest x and z.
-  double height_m;  ///< y of the top.
+  double height_m;  ///< World height of the top.
 } stridewire_terrain_box;
 
 /// Terrain of a world. Its height at a point is the maximum of the height field and of all boxes
 /// there. Without height field and boxes the terrain is flat at y = 0.
 typedef struct stridewire_terrain_def {
-  const stridewire_height_field* height_field;  ///< NULL: no height field.
-  const stridewire_terrain_box* boxes;          ///< May be NULL if `box_count` is 0.
-  size_t box_count;                             ///< At most STRIDEWIRE_MAX_TERRAIN_BOXES.
+  const stridewire_height_field* height_field;  ///< Heights of the ground. NULL: no height field.
+  /// Array of boxes. May be NULL if `box_count` is 0.
+  const stridewire_terrain_box* boxes;
+  /// Number of boxes, at most STRIDEWIRE_MAX_TERRAIN_BOXES.
+  size_t box_count;
 } stridewire_terrain_def;
 
 /// Replaces the terrain of a world for all its avatars. The server replies OUT_OF_RANGE or
@@ -368,7 +375,7 @@ typedef struct stridewire_layer {
   uint32_t avatar;   ///< Id of the avatar, not 0.
   const char* name;  ///< Name of the layer, 1 to STRIDEWIRE_MAX_NAME_BYTES bytes.
   uint8_t fade_out;  ///< 1: fade the layer out and end it. `weight` and `speed` are then ignored.
-  double weight;     ///< Above 0, at most 1.
+  double weight;     ///< Weight of the layer, above 0 and at most 1.
   double blend_s;    ///< Time until weight and speed reach their new values, 0 to 10.
   double speed;      ///< Playback speed, 0.1 to 4. 1 plays as recorded.
 } stridewire_layer;
@@ -382,7 +389,7 @@ stridewire_status stridewire_client_set_layers(stridewire_client* client, stride
 /// Foot planting of a group of avatars.
 typedef struct stridewire_planting {
   const uint32_t* avatars;  ///< Ids of the avatars.
-  size_t avatar_count;      ///< 1 to STRIDEWIRE_MAX_ITEMS.
+  size_t avatar_count;      ///< Number of avatars, 1 to STRIDEWIRE_MAX_ITEMS.
   /// 1: feet stand still where they land (the state after a spawn). 0: feet move as in the
   /// examples.
   uint8_t enabled;
@@ -397,7 +404,7 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
 
 /// How the server sends poses.
 typedef enum stridewire_pose_mode {
-  STRIDEWIRE_FULL = 0,  ///< As float32, without loss.
+  STRIDEWIRE_FULL = 0,  ///< The server sends float32 values, without loss.
   /// Compressed. The error of each joint and end site is at most 1 mm.
   STRIDEWIRE_QUANTISED = 1,
   /// The server sends movements, about 150 bytes per step, and the client evaluates the poses. They
@@ -422,7 +429,8 @@ typedef enum stridewire_pose_detail {
 
 /// Within `to_m` of a region's centre, the server sends poses every `every_n_ticks` ticks.
 typedef struct stridewire_rate_ring {
-  double to_m;             ///< Outer radius. Above 0, and above that of the previous ring.
+  /// Outer radius. It must be above 0 and above the outer radius of the previous ring.
+  double to_m;
   uint16_t every_n_ticks;  ///< 1 to 3600.
 } stridewire_rate_ring;
 
@@ -434,7 +442,7 @@ typedef struct stridewire_region {
   double leave_m;
   /// Rings from the inside out. Beyond them, the rate and detail of the observation apply.
   const stridewire_rate_ring* rings;
-  size_t ring_count;  ///< At most STRIDEWIRE_MAX_RATE_RINGS.
+  size_t ring_count;  ///< Number of rings, at most STRIDEWIRE_MAX_RATE_RINGS.
   /// Detail of each ring, or NULL for the detail of the observation. Requires STRIDEWIRE_QUANTISED.
   const stridewire_pose_detail* ring_details;
 } stridewire_region;
@@ -442,11 +450,13 @@ typedef struct stridewire_region {
 /// Which poses and events a client receives from a world.
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
-  uint16_t every_n_ticks;         ///< Interval of poses in ticks, 1 to 3600.
-  uint8_t with_events;            ///< 1: also receive the world's events. Controllers always do.
-  const uint32_t* avatars;        ///< Avatars to observe. NULL: all.
-  size_t avatar_count;            ///< 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
-  stridewire_pose_detail detail;  ///< Not 0 only with STRIDEWIRE_QUANTISED.
+  uint16_t every_n_ticks;   ///< Interval of poses in ticks, 1 to 3600.
+  uint8_t with_events;      ///< 1: also receive the world's events. Controllers always do.
+  const uint32_t* avatars;  ///< Ids of the avatars to observe. NULL: all avatars.
+  /// Number of ids: 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
+  size_t avatar_count;
+  /// Detail of the poses. Other values than 0 require STRIDEWIRE_QUANTISED.
+  stridewire_pose_detail detail;
   /// Observes the avatars inside a region. NULL: none. `avatars` must then be NULL. The events
   /// ENTERED and LEFT report changes. A region must be the only observation of its world
   /// (NOT_ALLOWED).
@@ -477,35 +487,37 @@ stridewire_status stridewire_client_ping(stridewire_client* client);
 
 /// Type of an event. The comments list the fields of stridewire_event that the type uses.
 typedef enum stridewire_event_type {
-  // About the connection.
+  // Events about the connection. This one uses resumed.
   STRIDEWIRE_EVENT_CONNECTED = 0,        ///< resumed
-  STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< status, text. The client tries again.
-  STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< status, text. The client reconnects.
+  STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
+  STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
   STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server has no session of this client any more.
-  STRIDEWIRE_EVENT_CLOSED = 4,           ///< status, text. The client does not try again.
-  /// world. The skeleton is available. Repeated after SESSION_LOST.
+  STRIDEWIRE_EVENT_CLOSED = 4,           ///< Uses status, text. The client does not try again.
+  /// Uses world. The skeleton is available. Repeated after SESSION_LOST.
   STRIDEWIRE_EVENT_WORLD_JOINED = 5,
-  STRIDEWIRE_EVENT_REPLY = 6,  ///< command, status, accepted, text
-  /// command, item_index, avatar, request_id, status, text. Reports an item that the server
+  STRIDEWIRE_EVENT_REPLY = 6,  ///< Uses command, status, accepted, text.
+  /// Uses command, item_index, avatar, request_id, status, text. Reports an item that the server
   /// refused, or the avatar id that it chose. Precedes the REPLY.
   STRIDEWIRE_EVENT_ITEM = 7,
-  /// dropped_batches, dropped_events. This client reads too slowly.
+  /// Uses dropped_batches, dropped_events. This client reads too slowly.
   STRIDEWIRE_EVENT_LAGGING = 8,
-  STRIDEWIRE_EVENT_NOTICE = 9,  ///< status, text. A message of the server that ends nothing.
-  STRIDEWIRE_EVENT_PONG = 10,   ///< rtt_s, tick, time_s
-  /// world. Its terrain has changed; see stridewire_client_get_terrain.
+  /// Uses status, text. A message of the server that does not end the connection.
+  STRIDEWIRE_EVENT_NOTICE = 9,
+  STRIDEWIRE_EVENT_PONG = 10,  ///< Uses rtt_s, tick, time_s.
+  /// Uses world. Its terrain has changed; see stridewire_client_get_terrain.
   STRIDEWIRE_EVENT_TERRAIN = 11,
 
-  // About an avatar. All of these also use world, avatar, tick and time_s.
-  STRIDEWIRE_EVENT_ACCEPTED = 32,  ///< request_id. The request was queued.
-  /// request_id, kind, group, requested, applied, extrapolated, clamped. A movement has started.
+  // Events about an avatar. All of them also use world, avatar, tick and time_s.
+  STRIDEWIRE_EVENT_ACCEPTED = 32,  ///< Uses request_id. The server has queued the request.
+  /// Uses request_id, kind, group, requested, applied, extrapolated, clamped. A movement has
+  /// started.
   STRIDEWIRE_EVENT_STARTED = 33,
-  STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< foot, position_m. A foot has landed.
-  /// request_id, kind, base, cut_short. A movement has ended. `base` is the new base frame.
+  STRIDEWIRE_EVENT_FOOT_STRIKE = 34,  ///< Uses foot, position_m. A foot has landed.
+  /// Uses request_id, kind, base, cut_short. A movement has ended. `base` is the new base frame.
   STRIDEWIRE_EVENT_FINISHED = 35,
-  STRIDEWIRE_EVENT_IDLE = 36,  ///< base. The avatar stands and its queue is empty.
-  /// request_id, status, text. A queued request turned out to be impossible. If `exact_only` was
-  /// the reason, also foot, kind and position_m, the nearest point in reach.
+  STRIDEWIRE_EVENT_IDLE = 36,  ///< Uses base. The avatar stands and its queue is empty.
+  /// Uses request_id, status, text. The avatar could not execute a queued request. If `exact_only`
+  /// was the reason, also uses foot, kind and position_m, the nearest point in reach.
   STRIDEWIRE_EVENT_REJECTED = 37,
   STRIDEWIRE_EVENT_SPAWNED = 38,  ///< base
   STRIDEWIRE_EVENT_REMOVED = 39,
@@ -599,7 +611,7 @@ typedef struct stridewire_leg {
 typedef struct stridewire_skeleton {
   uint32_t joint_count;
   uint32_t end_site_count;
-  stridewire_leg legs[2];  ///< Left leg, right leg.
+  stridewire_leg legs[2];  ///< Left leg, then right leg.
   double tick_hz;          ///< Ticks per second of the server.
   /// Hash of the motion library in hexadecimal digits.
   char library_hash[STRIDEWIRE_MAX_NAME_BYTES + 1];
@@ -633,9 +645,9 @@ stridewire_status stridewire_client_list_layers(stridewire_client* client, strid
 
 /// Size of a world's terrain.
 typedef struct stridewire_terrain {
-  double origin_m[2];  ///< x and z of the first height sample.
+  double origin_m[2];  ///< World x and z of the first height sample.
   double cell_m;       ///< Distance between neighbouring samples.
-  uint32_t columns;    ///< Samples along x. 0: the terrain has no height field.
+  uint32_t columns;    ///< Number of samples along x. 0: the terrain has no height field.
   uint32_t rows;       ///< Samples along z.
   uint32_t box_count;
 } stridewire_terrain;
@@ -721,10 +733,11 @@ stridewire_status stridewire_client_next_pose(stridewire_client* client, stridew
 typedef struct stridewire_statistics {
   uint64_t bytes_received;
   uint64_t bytes_sent;
-  uint64_t batches_received;  ///< Pose batches and movement messages.
+  uint64_t batches_received;  ///< Number of pose batches and movement messages.
   uint64_t poses_received;
-  uint64_t poses_refused;    ///< Poses dropped for lack of memory or because they were not newer.
-  uint64_t batches_missing;  ///< Estimated from gaps in the ticks of each shard.
+  uint64_t poses_refused;  ///< Poses dropped for lack of memory or because they were not newer.
+  /// Number of missing batches, estimated from gaps in the ticks of each shard.
+  uint64_t batches_missing;
   uint64_t dropped_batches;  ///< Batches that the server reported as dropped.
   uint64_t events_received;
   uint64_t events_dropped;  ///< Events dropped because the event queue was full.

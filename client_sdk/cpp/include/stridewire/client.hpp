@@ -45,7 +45,7 @@ struct Position {
   }
 };
 
-/// A step with the given parameters; all others are 0.
+/// Creates a request for a step with the given parameters; all others are 0.
 inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, double length_m,
                                 double turn_rad = 0.0,
                                 stridewire_foot foot = STRIDEWIRE_FOOT_AUTO) {
@@ -58,8 +58,8 @@ inline stridewire_movement Step(std::uint32_t avatar, std::uint64_t request_id, 
   m.turn_rad = turn_rad;
   return m;
 }
-/// A step that places the ball of the foot at a world position. Without `heading_rad` the server
-/// chooses the heading of the foot.
+/// Creates a request for a step that places the ball of the foot at a world position. Without
+/// `heading_rad` the server chooses the heading of the foot.
 inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id,
                                   const Position& at,
                                   std::optional<double> heading_rad = std::nullopt,
@@ -71,17 +71,18 @@ inline stridewire_movement StepTo(std::uint32_t avatar, std::uint64_t request_id
   m.heading_rad = heading_rad.value_or(0.0);
   return m;
 }
-/// The same step, but rejected if its position is out of reach.
+/// Changes a step request such that the server rejects it if its position is out of reach.
 inline stridewire_movement ExactOnly(stridewire_movement step_to) {
   step_to.exact_only = 1;
   return step_to;
 }
-/// The same movement, but it interrupts the current one and drops the queue.
+/// Changes a request such that it interrupts the current movement and drops the queue.
 inline stridewire_movement Now(stridewire_movement movement) {
   movement.interrupt = STRIDEWIRE_NOW;
   return movement;
 }
-/// A walk to a world position and heading. Without `speed_m_s` the server chooses the speed.
+/// Creates a request for a walk to a world position and heading. Without `speed_m_s` the server
+/// chooses the speed.
 inline stridewire_movement WalkTo(std::uint32_t avatar, std::uint64_t request_id,
                                   const Position& destination, double heading_rad,
                                   std::optional<double> speed_m_s = std::nullopt) {
@@ -95,7 +96,7 @@ inline stridewire_movement WalkTo(std::uint32_t avatar, std::uint64_t request_id
   m.speed_m_s = speed_m_s.value_or(0.0);
   return m;
 }
-/// A jump straight ahead.
+/// Creates a request for a jump straight ahead.
 inline stridewire_movement Jump(std::uint32_t avatar, std::uint64_t request_id, double length_m) {
   stridewire_movement m{};
   m.avatar = avatar;
@@ -104,7 +105,7 @@ inline stridewire_movement Jump(std::uint32_t avatar, std::uint64_t request_id, 
   m.length_m = length_m;
   return m;
 }
-/// Standing for a given time.
+/// Creates a request to stand for a given time.
 inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id, double seconds) {
   stridewire_movement m{};
   m.avatar = avatar;
@@ -114,13 +115,13 @@ inline stridewire_movement Stand(std::uint32_t avatar, std::uint64_t request_id,
   return m;
 }
 
-/// A layer that starts, or that changes its weight and speed. `name` must outlive the call to
-/// SetLayers.
+/// Creates a change that starts a layer, or sets its weight and speed. `name` must outlive the call
+/// to SetLayers.
 inline stridewire_layer StartLayer(std::uint32_t avatar, const char* name, double weight = 1.0,
                                    double blend_s = 0.3, double speed = 1.0) {
   return {avatar, name, 0, weight, blend_s, speed};
 }
-/// A layer that fades out and ends. `name` must outlive the call to SetLayers.
+/// Creates a change that fades a layer out and ends it. `name` must outlive the call to SetLayers.
 inline stridewire_layer FadeOutLayer(std::uint32_t avatar, const char* name, double blend_s = 0.3) {
   return {avatar, name, 1, 1.0, blend_s, 1.0};
 }
@@ -139,7 +140,7 @@ static_assert(sizeof(Quaternion) == 4 * sizeof(float),
 struct Pose : stridewire_pose {
   Pose() : stridewire_pose() {}
   bool missing() const { return kind == STRIDEWIRE_POSE_MISSING; }
-  std::vector<Quaternion> rotations;  ///< One per joint; empty if the pose is missing.
+  std::vector<Quaternion> rotations;  ///< One rotation per joint; empty if the pose is missing.
 };
 
 /// The skeleton of a world, with its joints and end sites.
@@ -177,7 +178,7 @@ class Client {
     return *this;
   }
 
-  /// The handle, for C functions that have no method here. This object keeps the ownership.
+  /// Returns the handle, for C functions that have no method here. This object keeps the ownership.
   stridewire_client* get() const { return handle_; }
 
   Result Connect(const std::string& host, std::uint16_t port) {
@@ -302,7 +303,7 @@ class Client {
       if (status == STRIDEWIRE_OK) return status;
     }
   }
-  /// Names of the layers in a world's library. Empty before the event WORLD_JOINED.
+  /// Returns the names of the layers in a world's library. Empty before the event WORLD_JOINED.
   std::vector<std::string> ListLayers(stridewire_world world) const {
     std::vector<stridewire_layer_name> names;
     std::size_t count = 0;
@@ -329,7 +330,7 @@ class Client {
       if (status == STRIDEWIRE_OK) return status;
     }
   }
-  /// Ids of the avatars whose poses arrive, in ascending order.
+  /// Returns the ids of the avatars whose poses arrive, in ascending order.
   std::vector<std::uint32_t> ListAvatars(stridewire_world world) const {
     std::vector<std::uint32_t> avatars;
     std::size_t count = 0;
@@ -341,13 +342,13 @@ class Client {
     return avatars;
   }
 
-  /// Server time in seconds. Empty before the first pose or pong.
+  /// Returns the server time in seconds. Empty before the first pose or pong.
   std::optional<double> ServerTime() const {
     double time_s = 0.0;
     if (stridewire_client_server_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;
     return time_s;
   }
-  /// Time at which to sample poses, in seconds. Empty before the first pose or pong.
+  /// Returns the time at which to sample poses, in seconds. Empty before the first pose or pong.
   std::optional<double> RenderTime() const {
     double time_s = 0.0;
     if (stridewire_client_render_time(handle_, &time_s) != STRIDEWIRE_OK) return std::nullopt;

@@ -3,7 +3,7 @@
 import type {Clip} from './library_client.js';
 import {genericTime} from '../timeline.js';
 
-/** The time in seconds at which a movement reaches a generic time. */
+/** Returns the time in seconds at which a movement reaches a generic time. */
 export function timeAtGenericTime(keytimesS: readonly number[], generic: number): number {
   const last = keytimesS.length - 1;
   const i = Math.max(0, Math.min(last - 1, Math.floor(generic)));
@@ -11,7 +11,7 @@ export function timeAtGenericTime(keytimesS: readonly number[], generic: number)
   return keytimesS[i]! + share * (keytimesS[i + 1]! - keytimesS[i]!);
 }
 
-/** The time of `to` that has the same generic time as `timeS` of `from`. */
+/** Returns the time in `to` that has the same generic time as `timeS` in `from`. */
 export function matchingTime(from: Clip, to: Clip, timeS: number): number {
   if (from.keytimes_s.length !== to.keytimes_s.length) return timeS;
   return timeAtGenericTime(to.keytimes_s, genericTime(from.keytimes_s, timeS));

@@ -22,10 +22,10 @@ export interface Parameter {
 }
 /** An example or pseudoexample as a point in parameter space. */
 export interface Site {
-  /** Its parameters, in the order of `Group.parameters`. */
+  /** Parameters of the site, in the order of `Group.parameters`. */
   readonly p: readonly number[];
   readonly is_example: boolean;
-  /** Where an example comes from, for example the capture that it was cut from. */
+  /** Origin of an example, for example the capture that it was cut from. */
   readonly source?: string;
   readonly mirrored?: boolean;
 }
@@ -138,7 +138,10 @@ function parametersText(p: readonly number[]): string {
   return p.map((value) => value.toFixed(5)).join(',');
 }
 
-/** Executes one request at a time. Of requests that arrive in the meantime, it keeps the newest. */
+/**
+ * Executes one request at a time. If several requests arrive in the meantime, it keeps only the
+ * newest.
+ */
 export class LatestRequest<T> {
   private waiting: T | null = null;
   private busy = false;

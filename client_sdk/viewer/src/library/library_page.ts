@@ -11,7 +11,7 @@ import type {Clip, Group, GroupEntry, LibraryEntry, LibraryClient, Step} from '.
 import {ParameterPlane, parameterLabel, scaleColour} from './parameter_plane.js';
 import {StepPreview} from './step_preview.js';
 
-/** Cells per side of the error map. */
+/** Number of cells per side of the error map. */
 const mapCells = 48;
 /** Pause at the end of the movement, before it repeats. */
 const loopPauseS = 0.45;
@@ -48,7 +48,7 @@ export class LibraryPage {
   private speed = 1;
   private lastMs = 0;
   private theme: ThemeName;
-  /** Counts requested examples, so that outdated responses are ignored. */
+  /** Number of requested examples. It identifies outdated responses, which are ignored. */
   private exampleRequest = 0;
   private readonly colours = makeColours();
   private readonly librarySelect = h('select', {id: 'library', 'aria-label': 'Library'});
@@ -374,7 +374,9 @@ export class LibraryPage {
   }
 }
 
-/** For example "Left step: 14 examples + 20 pseudoexamples, end forward, turn". */
+/**
+ * Describes a group, for example "Left step: 14 examples + 20 pseudoexamples, end forward, turn".
+ */
 function groupLabel(group: GroupEntry): string {
   const kinds: Readonly<Record<string, string>> =
     {step_left: 'Left step', step_right: 'Right step', jump: 'Jump'};
@@ -384,11 +386,11 @@ function groupLabel(group: GroupEntry): string {
 }
 
 /**
- * Indices of the two parameters with the widest range over the examples, in ascending order. If
- * there is only one parameter, its index twice.
+ * Returns the indices of the two parameters with the widest range over the examples, in ascending
+ * order. If there is only one parameter, its index twice.
  */
 export function widestParameters(group: Group): [number, number] {
-  // A turn by one radian counts as much as half a metre.
+  // A turn of one radian counts as half a metre.
   const spread = group.parameters.map(({min, max, name}, l) =>
     ({l, width: (max - min) * (name === 'turn_rad' ? 0.5 : 1)}));
   spread.sort((a, b) => b.width - a.width);
@@ -396,7 +398,7 @@ export function widestParameters(group: Group): [number, number] {
   return [pair[0]!, pair[1] ?? pair[0]!];
 }
 
-/** A round number of millimetres that is not below the largest error. */
+/** Returns a round number of millimetres that is not below the largest error. */
 export function roundScaleTop(largestMm: number): number {
   const power = 10 ** Math.floor(Math.log10(Math.max(largestMm, 1e-3)));
   return [1, 1.5, 2, 3, 5, 7.5, 10].map((k) => k * power).find((v) => v >= largestMm * 0.999)!;

@@ -42,9 +42,9 @@ export class ParameterPlane {
   private dragging = false;
 
   constructor(private readonly actions: {
-    /** The user has moved the cross to these values of the two parameters. */
+    /** Called when the user has moved the cross to these values of the two parameters. */
     onMove(x: number, y: number): void;
-    /** The user has clicked the site with this index. */
+    /** Called when the user has clicked the site with this index. */
     onSelect(site: number): void;
   }) {
     this.element = h('canvas', {
@@ -61,7 +61,7 @@ export class ParameterPlane {
     this.element.addEventListener('keydown', (e) => this.key(e));
   }
 
-  /** Range of an axis: the range of the examples, extended by 10 % at each end. */
+  /** Returns the range of an axis: the range of the examples, extended by 10 % at each end. */
   range(axis: 'x' | 'y'): [number, number] {
     const index = axis === 'x' ? this.x : this.y;
     const parameter = this.group?.parameters[index];
@@ -76,7 +76,7 @@ export class ParameterPlane {
     return this.x === this.y;
   }
 
-  /** Position of parameters in CSS pixels within the canvas. */
+  /** Returns the position of parameters in CSS pixels within the canvas. */
   toPixels(p: readonly number[]): {x: number; y: number} {
     const {width, height} = this.plotSize();
     const [x0, x1] = this.range('x');
@@ -283,7 +283,7 @@ const labels: Readonly<Record<string, string>> = {
   end_x_m: 'End sideways (m)', end_y_m: 'End height (m)', end_z_m: 'End forward (m)',
   turn_rad: 'Turn (rad)', length_m: 'Length (m)', height_m: 'Height (m)',
 };
-/** A parameter's name for users, with its unit in parentheses. */
+/** Returns the label of a parameter, with its unit in parentheses. */
 export function parameterLabel(name: string): string {
   return labels[name] ?? name;
 }

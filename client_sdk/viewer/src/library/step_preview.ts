@@ -100,7 +100,10 @@ export class StepPreview {
     this.renderer.render(this.scene, this.view.camera);
   }
 
-  /** Position for a label above avatar `index`, in CSS pixels, or null if it is not drawn. */
+  /**
+   * Returns the position for a label above avatar `index`, in CSS pixels, or null if it is not
+   * drawn.
+   */
   labelPosition(index: number): {x: number; y: number} | null {
     const {crowd} = this;
     if (!crowd || index >= crowd.count) return null;

@@ -25,7 +25,7 @@ export interface CommandActions {
   togglePlanting(): void;
 }
 
-/** How long a message stays in the panel. */
+/** Time for which a message stays in the panel. */
 const messageMs = 8000;
 
 const sampleTerrains: readonly (readonly [SampleTerrainName, string])[] = [
@@ -149,7 +149,7 @@ export class CommandPanel {
     this.toolRow.hidden = this.terrainRow.hidden = !connected;
     if (this.tool !== null && this.toolButtons[this.tool].hidden) this.toggleTool(this.tool);
   }
-  /** `on`: whether foot planting is on for all avatars that receive commands. */
+  /** `on` is true if foot planting is enabled for all avatars that receive commands. */
   setPlanting(supported: boolean, on: boolean): void {
     this.plantingButton.hidden = !supported;
     setPressed(this.plantingButton, on);
@@ -170,7 +170,7 @@ export class CommandPanel {
     }
     for (const [name, element] of this.layerButtons) setPressed(element, isPlaying(name));
   }
-  /** Activates the tool instead of the other one, or deactivates it. */
+  /** Activates the tool and deactivates the other one. If it is active, deactivates it. */
   toggleTool(tool: ClickTool): void {
     if (this.toolButtons[tool].hidden && this.tool !== tool) return;
     this.tool = this.tool === tool ? null : tool;
@@ -207,7 +207,7 @@ export class CommandPanel {
     this.actions.walkTo(
       point.x, point.z, Number.isFinite(headingDeg) ? headingDeg * Math.PI / 180 : null);
   }
-  /** Shows that the world's terrain is none of the sample terrains. */
+  /** Shows that the world has none of the sample terrains. */
   resetTerrainChoice(): void {
     this.terrainSelect.value = '';
   }

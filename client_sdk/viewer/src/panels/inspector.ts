@@ -5,9 +5,9 @@ import {degrees, h, pointText, setText, svg} from '../dom.js';
 import type {AvatarState, MovementState, QueuedRequest, World} from '../sdk.js';
 import {genericTime, stateAt} from '../timeline.js';
 
-/** How often the state is requested from the server. */
+/** Interval at which the state is requested from the server. */
 const requestIntervalMs = 200;
-/** How long states are kept for playback; slightly longer than the recording. */
+/** Time for which states are kept for playback; slightly longer than the recording. */
 const historyS = 22;
 
 const movementNames: Readonly<Record<string, string>> = {

@@ -1,10 +1,11 @@
 import {h, setText} from '../dom.js';
 
-/** One minute, with two values per second. */
+/** Number of values for one minute, with two values per second. */
 const maxValues = 120;
 
 /**
- * A line plot of the last minute, with the newest value as text. The axis scales to the largest.
+ * A line plot of the last minute, with the newest value as text. The axis ends at the largest
+ * value.
  */
 export class Plot {
   readonly element: HTMLElement;

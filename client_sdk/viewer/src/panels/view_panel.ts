@@ -22,7 +22,7 @@ export class ViewPanel {
   private readonly detailChoice: HTMLFieldSetElement;
   private readonly costs = h('tbody');
 
-  /** `initial`: the values that the controls show initially. */
+  /** `initial` contains the values that the controls show initially. */
   constructor(actions: ViewActions, initial: {
     figures: FigureChoice; quality: QualityChoice; stream: PoseStream;
   }) {
@@ -54,7 +54,10 @@ export class ViewPanel {
   setChecked(name: Toggle, on: boolean): void {
     this.checkboxes.get(name)!.checked = on;
   }
-  /** Enables the choice of joints: only for quantised poses and servers that support it. */
+  /**
+   * Enables or disables the choice of joints, which requires quantised poses and a server that
+   * supports it.
+   */
   setDetailEnabled(on: boolean): void {
     this.detailChoice.disabled = !on;
   }

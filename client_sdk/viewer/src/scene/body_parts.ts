@@ -44,21 +44,21 @@ export interface LegParts {
   readonly knee: Anchor;
   readonly ankle: Anchor;
   readonly ball: Anchor;
-  /** Tip of the toes. */
+  /** Position of the tip of the toes. */
   readonly toe: Vec;
 }
 export interface BodyParts {
   /** Joint positions in the rest pose, 3 numbers per joint; the root is at the origin. */
   readonly rest: Float32Array;
-  /** Child joints of each joint. */
+  /** Indices of the children of each joint. */
   readonly children: readonly (readonly number[])[];
   /** Height of the lowest point. */
   readonly groundY: number;
   readonly heightM: number;
-  /** From the root to the head's joint, each higher than the one before. */
+  /** Anchors from the root to the head's joint, each higher than the one before. */
   readonly trunk: readonly Anchor[];
   readonly head: Anchor;
-  /** Height of the top of the head. */
+  /** Height of the top of the head, in metres. */
   readonly crownY: number;
   readonly arms: readonly ArmParts[];
   readonly legs: readonly LegParts[];
@@ -265,7 +265,7 @@ function vec(a: ArrayLike<number>): Vec {
   return [a[0] ?? 0, a[1] ?? 0, a[2] ?? 0];
 }
 
-/** The longest chain of unused joints that starts at `from`, by the sum of bone lengths. */
+/** Returns the longest chain of unused joints that starts at `from`, by the sum of bone lengths. */
 function longestChain(
   from: number, children: readonly (readonly number[])[], at: (j: number) => Vec,
   used: Uint8Array): number[] {

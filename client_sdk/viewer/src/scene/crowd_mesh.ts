@@ -96,7 +96,7 @@ void main() {
   gl_Position = projectionMatrix * seen;
 }`;
 
-// For coarse bodies, which are lit per vertex.
+// Fragment shader for coarse bodies, which are lit per vertex.
 const coarseFragment = /* glsl */ `
 precision mediump float;
 in vec3 vColour;
@@ -147,7 +147,7 @@ export interface Lights {
   shade: THREE.Vector4;
 }
 
-/** A colour that depends only on the avatar's id. Consecutive ids have different hues. */
+/** Returns a colour that depends only on the avatar's id. Consecutive ids have different hues. */
 export function shirtColour(avatar: number, out: THREE.Color): THREE.Color {
   const hue = (avatar * 0.61803398875 + 0.07) % 1;
   const shift = (avatar * 0.754877666) % 1;
@@ -284,7 +284,7 @@ export class CrowdMesh {
     this.terrainHeightAttribute.needsUpdate = true;
   }
 
-  /** Segments of a limb's cross-section: fewer for larger crowds. */
+  /** Returns the number of segments of a limb's cross-section. Larger crowds have fewer. */
   private desiredSegments(): number {
     if (this.coarse) return this.count > 24 ? 4 : 5;
     return this.count > 300 ? 6 : this.count > 60 ? 8 : 12;

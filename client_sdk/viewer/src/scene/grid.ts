@@ -8,9 +8,9 @@ export interface TerrainColours {
   near: THREE.Color;
   /** Colour in the far distance, which is also the background. */
   far: THREE.Color;
-  /** Lines every metre. */
+  /** Colour of the lines every metre. */
   line: THREE.Color;
-  /** Lines every five metres. */
+  /** Colour of the lines every five metres. */
   strong: THREE.Color;
 }
 
@@ -45,7 +45,8 @@ void main() {
   colour = vec4(mix(c, far, smoothstep(0.12, 1.0, d)), 1.0);
 }`;
 
-// For software renderers: a plane of one colour, and line primitives instead of lines per pixel.
+// Simplified grid for software renderers: a plane of one colour, and line primitives instead of
+// lines computed per pixel.
 const plainVertex = /* glsl */ `
 precision highp float;
 uniform mat4 viewMatrix;
@@ -150,8 +151,8 @@ export class Grid {
 }
 
 /**
- * Grid lines in a square with sides of 2 * `half` metres. `every` 1: lines every metre except the
- * strong ones; `every` 5: only the strong lines, every five metres.
+ * Returns grid lines in a square with sides of 2 * `half` metres. `every` 1: lines every metre
+ * except the strong ones; `every` 5: only the strong lines, every five metres.
  */
 function gridLineGeometry(half: number, every: number): THREE.BufferGeometry {
   const positions: number[] = [];

@@ -44,7 +44,7 @@ void main() {
   colour = vec4(vData.rgb, vData.a * a);
 }`;
 
-// The outline of a footprint, where a foot will land.
+// Fragment shader for the outline of a footprint, where a foot will land.
 const plannedFragment = /* glsl */ `
 precision highp float;
 in vec2 vAt;
@@ -60,7 +60,8 @@ void main() {
   colour = vec4(vData.rgb, vData.a * a);
 }`;
 
-// A decal of a walk. `data.w` selects the shape: 0 goal, 1 heading arrow, 2 waypoint.
+// Fragment shader for a decal of a walk. `data.w` selects the shape: 0 goal, 1 heading arrow, 2
+// waypoint.
 const goalFragment = /* glsl */ `
 precision highp float;
 in vec2 vAt;
@@ -147,7 +148,7 @@ export class GroundDecals {
     }
     const places = this.position.array as Float32Array;
     const data = this.data.array as Float32Array;
-    // Heading 0 faces +Z; positive headings turn left, towards +X.
+    // A heading of 0 faces +Z, and positive headings turn left, towards +X.
     const cos = Math.cos(headingRad) * halfSizeM;
     const sin = Math.sin(headingRad) * halfSizeM;
     let at = i * 12;

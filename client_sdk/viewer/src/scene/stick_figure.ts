@@ -7,7 +7,7 @@ import type {SkeletonLike, Vec} from './body_parts.js';
 import {Region} from './body_mesh.js';
 
 export interface StickFigure {
-  /** Joints and extra points together. */
+  /** Number of joints and extra points together. */
   readonly pointCount: number;
   /** Pairs of point indices. */
   readonly lines: readonly number[];
@@ -17,7 +17,7 @@ export interface StickFigure {
   readonly joints: Uint16Array;
   /** For each of the other points, the joint that it moves with. */
   readonly extraJoints: Uint16Array;
-  /** Their positions in the rest pose, 3 numbers per point. */
+  /** Positions of the extra points in the rest pose, 3 numbers per point. */
   readonly extraRest: Float32Array;
 }
 

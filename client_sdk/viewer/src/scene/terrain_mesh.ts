@@ -71,7 +71,7 @@ void main() { colour = vec4(vColour, 1.0); }`;
 const maxCells = {software: 96, hardware: 384};
 /** Upper limit of boxes drawn. If there are more, the smallest are left out. */
 const maxBoxes = {software: 2000, hardware: 20_000};
-/** Lines are this much above the surface, so that they are not hidden by it. */
+/** Height of the lines above the surface, so that the surface does not hide them. */
 const liftM = 0.004;
 
 export class TerrainMesh {
@@ -147,7 +147,8 @@ class MeshData {
 }
 
 /**
- * Indices of at most `cells` + 1 evenly spaced samples of `count`, including the first and last.
+ * Returns the indices of at most `cells` + 1 evenly spaced samples of `count`, including the first
+ * and last.
  */
 function sampledIndices(count: number, cells: number): number[] {
   const every = Math.max(1, Math.ceil((count - 1) / cells));

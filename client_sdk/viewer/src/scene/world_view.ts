@@ -23,11 +23,14 @@ import {TerrainMesh} from './terrain_mesh.js';
 const decalCapacity = 8192;
 const maxPlannedFootprints = 64;
 const maxGoalDecals = 1024;
-/** Half the width of a decal. A heading arrow is larger while the user drags it. */
+/** Half the width of a decal, in metres. A heading arrow is larger while the user drags it. */
 const goalSizeM = 0.24;
 const waypointSizeM = 0.17;
 const arrowSizeM = {heading: 0.16, draggedHeading: 0.26} as const;
-/** A foot counts as planted if its ball moves slower than this and is closer to the ground. */
+/**
+ * A foot counts as planted if the speed of its ball and its height above the ground are below these
+ * limits.
+ */
 const plantedSpeedMPerS = 0.22;
 const plantedHeightM = 0.14;
 
@@ -176,7 +179,9 @@ export class WorldView {
     this.goals.upload(count);
   }
 
-  /** The terrain beneath a point of the page, or null if there is none within 120 m. */
+  /**
+   * Returns the terrain point beneath a point of the page, or null if there is none within 120 m.
+   */
   terrainPointAt(x: number, y: number): [number, number, number] | null {
     const {viewCamera: {camera}, viewport} = this;
     const origin = point.setFromMatrixPosition(camera.matrixWorld);
@@ -233,7 +238,7 @@ export class WorldView {
     return crowd.count;
   }
 
-  /** Index of an avatar in the crowd's arrays, or -1 if it is not drawn. */
+  /** Returns the index of an avatar in the crowd's arrays, or -1 if it is not drawn. */
   indexOf(avatar: number): number {
     const crowd = this.crowd;
     if (!crowd || avatar === 0) return -1;
@@ -241,7 +246,7 @@ export class WorldView {
     return -1;
   }
 
-  /** Position and heading of an avatar's root, or null if it is not drawn. */
+  /** Returns the position and heading of an avatar's root, or null if it is not drawn. */
   locate(avatar: number): {x: number; z: number; headingRad: number} | null {
     const i = this.indexOf(avatar);
     if (i < 0 || !this.crowd) return null;
@@ -263,7 +268,9 @@ export class WorldView {
     this.viewCamera.moveTo(x, this.terrain.heightAt(x, z) + this.crowd.heightM * 0.5, z);
   }
 
-  /** Centre and radius, in metres, of the area where avatars are; null if there are none. */
+  /**
+   * Returns centre and radius, in metres, of the area where avatars are; null if there are none.
+   */
   bounds(): {x: number; z: number; radius: number} | null {
     const crowd = this.crowd;
     if (!crowd || crowd.count === 0) return null;
@@ -295,7 +302,8 @@ export class WorldView {
   }
 
   /**
-   * The avatar with the joint nearest to a point of the page within `reachPx`; 0 if there is none.
+   * Returns the avatar with the joint nearest to a point of the page within `reachPx`; 0 if there
+   * is none.
    */
   pick(x: number, y: number, reachPx: number): number {
     const crowd = this.crowd;
@@ -314,7 +322,7 @@ export class WorldView {
           depth = projected.z;
         }
       }
-      // Of two avatars that overlap, the one closer to the camera wins.
+      // If two avatars overlap, selects the one closer to the camera.
       const cost = near + depth * 4;
       if (near <= reachPx && cost < bestCost) {
         bestCost = cost;
@@ -339,7 +347,7 @@ export class WorldView {
     return true;
   }
 
-  /** The position of a world point on the page, or null if it is behind the camera. */
+  /** Returns the position of a world point on the page, or null if it is behind the camera. */
   projectToPage(point: readonly [number, number, number]): {x: number; y: number} | null {
     return this.project(point, 0) ? {x: projected.x, y: projected.y} : null;
   }

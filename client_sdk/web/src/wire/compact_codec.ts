@@ -53,7 +53,10 @@ export function checkFewerJoints(joints: readonly number[], parents: readonly nu
 export class CompactCodec {
   readonly jointCount: number;
   readonly poseBytes: number;
-  /** Per joint: free bits, then bits of x, y, z. All 0 for joints that poses do not contain. */
+  /**
+   * Bits per joint: first for "smallest three", then for x, y, z. All 0 for joints that poses do
+   * not contain.
+   */
   private readonly bits: Uint8Array;
   /** Per joint: reference x, y, z, w; low x, y, z; step x, y, z; square of the smallest valid w. */
   private readonly numbers: Float64Array;
@@ -70,7 +73,7 @@ export class CompactCodec {
     let count = 0;
     codes.forEach((code, j) => {
       if (told.length > 0 && !told.includes(j)) {
-        this.numbers.set(code.reference, 11 * j);  // With zeros elsewhere, w becomes 1.
+        this.numbers.set(code.reference, 11 * j);  // If all other numbers are 0, w becomes 1.
         return;
       }
       const {freeBits} = code;
@@ -98,7 +101,7 @@ export class CompactCodec {
       if (steps > maxRootSteps || steps < -maxRootSteps) return false;
       rootM[rootAt + i] = steps * rootStepM;
     }
-    let held = 0;  // Number of unread bits in `window`, from the lowest.
+    let held = 0;  // Number of unread bits in `window`, which are its lowest bits.
     let window = 0;
     for (let j = 0, n = 0, to = rotationsAt; j < bits.length; j += 4, n += 11, to += 4) {
       const free = bits[j]!;

@@ -41,7 +41,8 @@ function buildTerrain(b: Builder, terrain: Terrain): number {
     field = wire.HeightField.endHeightField(b);
   }
   wire.Terrain.startBoxesVector(b, terrain.boxes.length);
-  for (let i = terrain.boxes.length - 1; i >= 0; --i) {  // Vectors are written from the end.
+  // FlatBuffers vectors are written from back to front.
+  for (let i = terrain.boxes.length - 1; i >= 0; --i) {
     const {minM, maxM, heightM} = terrain.boxes[i]!;
     wire.TerrainBox.createTerrainBox(b, ...minM, ...maxM, heightM);
   }
@@ -54,7 +55,8 @@ function buildTerrain(b: Builder, terrain: Terrain): number {
 
 function buildRegion(b: Builder, region: RegionEntry): number {
   wire.Region.startRingsVector(b, region.rings.length);
-  for (let i = region.rings.length - 1; i >= 0; --i) {  // Vectors are written from the end.
+  // FlatBuffers vectors are written from back to front.
+  for (let i = region.rings.length - 1; i >= 0; --i) {
     wire.RateRing.createRateRing(b, region.rings[i]!.toM, region.rings[i]!.everyNTicks);
   }
   const rings = b.endVector();
@@ -111,7 +113,8 @@ function build(b: Builder, m: ClientMessage): number {
         wire.RequestItem.addFoot(b, footChoices.indexOf(item.foot));
         wire.RequestItem.addLengthM(b, item.lengthM);
         if (item.sideM !== null) {
-          b.forceDefaults(true);  // A side of 0 differs from an absent one.
+          // Writes values that equal the default, because a side of 0 differs from an absent one.
+          b.forceDefaults(true);
           wire.RequestItem.addSideM(b, item.sideM);
           b.forceDefaults(false);
         }

@@ -121,7 +121,8 @@ export class PoseReader {
       const c = from[at + 2]!;
       const d = from[at + 3]!;
       const squared = a * a + b * b + c * c + d * d;
-      good = good && squared >= leastSquared && squared <= mostSquared;  // False for NaN.
+      // The comparison is false for NaN.
+      good = good && squared >= leastSquared && squared <= mostSquared;
       const to = rotationsAt + i;
       rotations[to] = a;
       rotations[to + 1] = b;

@@ -43,7 +43,7 @@ class Verifier {
   private vector(at: number, size: number, align: number): number {
     if (!this.inside(at, 4, 4)) return -1;
     const count = this.view.getUint32(at, true);
-    const bytes = count * size;  // Exact: count is below 2^32 and size is small.
+    const bytes = count * size;  // The product is exact: count is below 2^32 and size is small.
     return this.inside(at + 4, bytes, 1) && (at + 4) % align === 0 ? count : -1;
   }
 

@@ -5,7 +5,8 @@
 
 namespace stridewire::protocol {
 
-/// Checks the rules of STANDARD.md, "Meaning". Encoder and decoder both call it. Error codes:
+/// Checks that a message follows the rules of STANDARD.md, "Meaning". Encoder and decoder both call
+/// it. Error codes:
 ///   kOutOfRange     a number is not finite, or an id is 0
 ///   kMalformed      an enumerator is unknown, or a text is not UTF-8
 ///   kLimitExceeded  too many items, or a text is too long

@@ -26,21 +26,24 @@ namespace stridewire::protocol {
 struct CompactJoint {
   float reference[4] = {};  ///< x, y, z, w
   float low[3] = {};
-  float step[3] = {};          ///< If "smallest three", step[0] applies to all components.
+  /// If the joint uses "smallest three", step[0] applies to all components.
+  float step[3] = {};
   float inverse_step[3] = {};  ///< 1 / step
   std::int32_t bits[3] = {};
-  std::int32_t smallest_three_bits = 0;  ///< 0: not encoded as "smallest three".
+  /// Bits per component with "smallest three" encoding; 0: another encoding.
+  std::int32_t smallest_three_bits = 0;
   float least_w = 0.0f;
-  std::int32_t parent = -1;    ///< -1 for the root.
-  bool has_reference = false;  ///< `reference` is not the identity.
+  std::int32_t parent = -1;    ///< Index of the parent joint; -1 for the root.
+  bool has_reference = false;  ///< True if `reference` is not the identity.
   bool has_children = false;
-  bool is_omitted = false;  ///< The pose does not contain the joint. It is decoded to `reference`.
+  /// True if poses do not contain the joint. It is then decoded to `reference`.
+  bool is_omitted = false;
 };
 
 /// The part of one number that a 32-bit word of a pose contains.
 struct CompactPart {
   std::uint16_t row = 0;  ///< Index of the number among the numbers of a pose.
-  std::int8_t left = 0;   ///< Bits by which the number is shifted left; right if negative.
+  std::int8_t left = 0;   ///< Bits by which the number is shifted left, or right if negative.
   bool ends_word = false;
 };
 
@@ -141,8 +144,8 @@ class CompactCodec {
   CompactCodec() = default;
 
   std::vector<CompactJoint> joints_;
-  std::vector<std::uint16_t> order_;  // order in which joints are encoded
-  std::vector<CompactPart> parts_;    // parts of all words of a pose
+  std::vector<std::uint16_t> order_;  // Order in which joints are encoded
+  std::vector<CompactPart> parts_;    // Parts of all 32-bit words of a pose
   std::size_t pose_bytes_ = 0;
 };
 

@@ -13,7 +13,7 @@ namespace stridewire::protocol {
 
 /// Message types in the frame header. Numbers are never reused.
 enum class MessageType : std::uint16_t {
-  // Client to server.
+  // Messages from client to server.
   kHello = 1,
   kJoinWorld = 2,
   kLeaveWorld = 3,
@@ -29,9 +29,9 @@ enum class MessageType : std::uint16_t {
   kSetLayers = 13,
   kSetPlanting = 14,
   kFetchLibrary = 15,
-  // In both directions.
+  // Messages in both directions.
   kGoodbye = 32,
-  // Server to client.
+  // Messages from server to client.
   kWelcome = 64,
   kWorldInfo = 65,
   kReply = 66,
@@ -80,7 +80,7 @@ inline constexpr std::array<std::byte, 4> kFrameMagic = {std::byte{'S'}, std::by
 inline constexpr std::uint16_t kFrameVersion = 1;
 inline constexpr std::size_t kPayloadAlignment = 8;
 
-/// The fields of a frame header that vary.
+/// The variable fields of a frame header.
 struct FrameHeader {
   MessageType type = MessageType::kHello;
   std::uint32_t payload_bytes = 0;
@@ -89,7 +89,7 @@ struct FrameHeader {
 /// A frame whose payload is borrowed.
 struct FrameView {
   MessageType type = MessageType::kHello;
-  std::span<const std::byte> payload;  ///< Aligned to 8 bytes.
+  std::span<const std::byte> payload;  ///< Payload, aligned to 8 bytes.
 };
 
 /// Writes a frame header.

@@ -23,7 +23,7 @@ namespace stridewire::protocol {
 /// frame, so a header alone cannot make it allocate a large buffer. Not thread-safe.
 class FrameReader {
  public:
-  /// `sender` is the peer. Types that it may not send are errors.
+  /// `sender` is the side that sends the frames. Types that it may not send are errors.
   explicit FrameReader(Sender sender, const FrameLimits& limits = {});
 
   /// Consumes bytes from the front of `bytes` up to the end of one frame. Returns an empty optional
@@ -43,7 +43,8 @@ class FrameReader {
   FrameLimits limits_;
   std::vector<std::byte> buffer_;
   std::optional<FrameHeader> header_;  ///< Header of the frame in `buffer_`.
-  bool frame_given_ = false;           ///< The frame in `buffer_` was returned.
+  /// True if the frame in `buffer_` has been returned to the caller.
+  bool frame_given_ = false;
   std::optional<Error> error_;
 };
 

@@ -24,9 +24,10 @@
 /// avatar exists or a step is possible, and it replies item by item.
 namespace stridewire::protocol {
 
-using WorldId = std::uint32_t;         ///< Assigned by the server, never 0.
-using AvatarId = std::uint32_t;        ///< Unique in its world, never 0.
-using SubscriptionId = std::uint32_t;  ///< Chosen by the client, unique in its session, never 0.
+using WorldId = std::uint32_t;   ///< Assigned by the server, never 0.
+using AvatarId = std::uint32_t;  ///< Unique within its world, never 0.
+/// Chosen by the client; unique within its session, never 0.
+using SubscriptionId = std::uint32_t;
 using RequestId = std::uint64_t;  ///< Chosen by the client. 0: a step that the server inserted.
 
 /// Sequence number of a command in its session: 1, 2, 3, ... (STATE_MACHINE.md, "Commands").
@@ -62,10 +63,10 @@ struct Hello {
   std::uint16_t protocol_min = kProtocolVersion;  ///< At least 1, at most protocol_max.
   std::uint16_t protocol_max = kProtocolVersion;
   std::string client_name;  ///< For the server's log, 1 to kMaxNameBytes.
-  std::string auth_token;   ///< May be empty.
+  std::string auth_token;   ///< Secret that a server may require; may be empty.
   std::vector<std::byte>
       resume_token;  ///< From Welcome, to resume a session. Empty: a new session.
-  std::uint64_t last_events_number = 0;  ///< On resume: the last received Events::number.
+  std::uint64_t last_events_number = 0;  ///< When resuming: the last received Events::number.
   bool operator==(const Hello&) const = default;
 };
 
@@ -121,13 +122,15 @@ struct Footprint {
 /// A requested step, either by parameters or to a footprint.
 struct StepMovement {
   FootChoice foot = FootChoice::kAuto;
-  double length_m = 0.0;         ///< Forward distance between the feet at the end.
-  std::optional<double> side_m;  ///< From fixed to moving foot, positive to the moving foot's side.
-  double height_m = 0.0;         ///< Height of the moving foot above the fixed foot at the end.
-  double turn_rad = 0.0;         ///< Change of heading.
+  double length_m = 0.0;  ///< Forward distance between the feet at the end.
+  /// Sideways distance from the fixed to the moving foot, positive towards the moving foot's side.
+  std::optional<double> side_m;
+  double height_m = 0.0;  ///< Height of the moving foot above the fixed foot at the end.
+  double turn_rad = 0.0;  ///< Change of heading.
   /// Target of the foot. If present, length, side, height and turn are not encoded.
   std::optional<Footprint> at;
-  /// Only with `at`: reject the step, when it is about to start, if `at` is out of reach.
+  /// Only with `at`. True: if `at` is out of reach when the step is about to start, the step is
+  /// rejected.
   bool exact_only = false;
   bool operator==(const StepMovement&) const = default;
 };
@@ -151,7 +154,7 @@ struct StandMovement {
 struct WalkMovement {
   DVec3 position_m = DVec3(0.0);   ///< Destination of the base frame. The terrain gives its height.
   double heading_rad = 0.0;        ///< Heading of the base frame at the destination.
-  std::vector<DVec3> waypoints_m;  ///< Passed in order; at most kMaxWaypoints.
+  std::vector<DVec3> waypoints_m;  ///< Positions to pass, in this order; at most kMaxWaypoints.
   std::optional<double> speed_m_s;  ///< Absent: the server chooses.
   bool operator==(const WalkMovement&) const = default;
 };
@@ -159,7 +162,7 @@ struct WalkMovement {
 /// One requested movement of one avatar.
 struct RequestItem {
   AvatarId avatar = 0;       ///< Not 0.
-  RequestId request_id = 0;  ///< Not 0. Events repeat it.
+  RequestId request_id = 0;  ///< Chosen by the client, not 0. Events repeat it.
   std::variant<StepMovement, JumpMovement, StandMovement, WalkMovement> movement;
   Interrupt interrupt = Interrupt::kNone;
   bool operator==(const RequestItem&) const = default;
@@ -184,7 +187,7 @@ struct CancelQueue {
   bool operator==(const CancelQueue&) const = default;
 };
 
-/// Horizontal coordinates in metres.
+/// Horizontal position in metres.
 struct GroundPoint {
   double x = 0.0;
   double z = 0.0;
@@ -195,9 +198,9 @@ struct GroundPoint {
 struct HeightFieldInfo {
   GroundPoint origin_m;          ///< Position of the first sample.
   double cell_m = 0.0;           ///< Distance between neighbouring samples.
-  std::uint16_t columns = 0;     ///< Along x, 2 to kMaxTerrainColumns.
-  std::uint16_t rows = 0;        ///< Along z, 2 to kMaxTerrainColumns.
-  std::vector<float> heights_m;  ///< columns * rows heights, row by row along x.
+  std::uint16_t columns = 0;     ///< Number of samples along x, 2 to kMaxTerrainColumns.
+  std::uint16_t rows = 0;        ///< Number of samples along z, 2 to kMaxTerrainColumns.
+  std::vector<float> heights_m;  ///< columns * rows heights; x varies fastest.
   bool operator==(const HeightFieldInfo&) const = default;
 };
 
@@ -205,7 +208,7 @@ struct HeightFieldInfo {
 struct TerrainBoxInfo {
   GroundPoint min_m;
   GroundPoint max_m;
-  double height_m = 0.0;  ///< y of the top.
+  double height_m = 0.0;  ///< World height of the top.
   bool operator==(const TerrainBoxInfo&) const = default;
 };
 
@@ -259,7 +262,8 @@ struct SetPlanting {
 
 /// Within `to_m` of a region's centre, the server sends poses every `every_n_ticks` ticks.
 struct RateRing {
-  double to_m = 0.0;                ///< Outer radius. Above 0, and above that of the previous ring.
+  /// Outer radius. It must be above 0 and above the outer radius of the previous ring.
+  double to_m = 0.0;
   std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
   bool operator==(const RateRing&) const = default;
 };
@@ -283,14 +287,15 @@ struct Observe {
   Seq seq = 0;
   WorldId world = 0;
   SubscriptionId subscription = 0;  ///< Not 0.
-  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or kMovement.
-  std::vector<AvatarId> avatars;  ///< Empty: all. Ids of avatars that do not exist yet are allowed.
+  PoseMode mode = PoseMode::kFull;  ///< One of kFull, kQuantised and kMovement.
+  /// Ids to observe, also of avatars that do not exist yet. Empty: all avatars.
+  std::vector<AvatarId> avatars;
   std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
-  bool with_events = false;         ///< Also receive the events of the world.
+  bool with_events = false;         ///< True: the session also receives the events of the world.
   /// Observes the avatars inside this region. `avatars` must then be empty.
   std::optional<Region> region;
   bool replace = false;  ///< Replaces the region of the existing subscription with this id.
-  /// Detail of kQuantised poses; kAll in other modes.
+  /// Detail of kQuantised poses. It must be kAll in other modes.
   PoseDetail detail = PoseDetail::kAll;
   bool operator==(const Observe&) const = default;
 };
@@ -307,7 +312,7 @@ struct StopObserving {
 struct Ping {
   static constexpr MessageType kType = MessageType::kPing;
   std::uint64_t nonce = 0;
-  double time_s = 0.0;  ///< Time of the client's clock. Pong repeats it.
+  double time_s = 0.0;  ///< Time on the client's clock. Pong repeats it.
   bool operator==(const Ping&) const = default;
 };
 
@@ -351,10 +356,13 @@ struct ServerLimits {
   std::uint32_t max_bulk_bytes = static_cast<std::uint32_t>(kMaxBulkBytes);
   std::uint32_t max_items = static_cast<std::uint32_t>(kMaxItems);
   std::uint32_t max_avatars_per_world = 0;
-  std::uint32_t max_queue = 0;               ///< Queued requests per avatar.
-  std::uint32_t reply_memory = kReplyCache;  ///< Replies that the server stores per session.
-  double idle_timeout_s = 0.0;   ///< The server closes a connection after this silence. 0: never.
-  double resume_window_s = 0.0;  ///< Time in which a lost session can be resumed. 0: not at all.
+  std::uint32_t max_queue = 0;  ///< Queued requests per avatar.
+  /// Number of replies that the server stores per session.
+  std::uint32_t reply_memory = kReplyCache;
+  /// The server closes a connection on which it receives nothing for this time. 0: never.
+  double idle_timeout_s = 0.0;
+  /// Time for which the server keeps a session without a connection. 0: it cannot be resumed.
+  double resume_window_s = 0.0;
   bool operator==(const ServerLimits&) const = default;
 };
 
@@ -363,10 +371,12 @@ struct Welcome {
   static constexpr MessageType kType = MessageType::kWelcome;
   std::uint16_t protocol = kProtocolVersion;  ///< Protocol version of the connection.
   std::uint64_t session = 0;                  ///< Not 0.
-  std::vector<std::byte> resume_token;        ///< Secret for Hello after a lost connection.
-  bool resumed = false;                       ///< False: the session is new.
-  Seq last_seq = 0;                           ///< Last command that the server accepted; 0 if new.
-  double tick_hz = 60.0;                      ///< Above 0.
+  /// Secret with which Hello resumes the session after a lost connection.
+  std::vector<std::byte> resume_token;
+  bool resumed = false;  ///< False: the session is new.
+  /// Last command that the server has accepted; 0 for a new session.
+  Seq last_seq = 0;
+  double tick_hz = 60.0;  ///< Above 0.
   std::string server_name;
   std::string server_version;
   ServerLimits limits;
@@ -375,8 +385,9 @@ struct Welcome {
 
 /// A joint of a skeleton.
 struct JointInfo {
-  std::string name;            ///< Unique in the skeleton.
-  std::int16_t parent = -1;    ///< Below the joint's own index. -1 for the root, joint 0.
+  std::string name;  ///< Unique in the skeleton.
+  /// Index of the parent, smaller than the joint's own index. -1 for the root, which is joint 0.
+  std::int16_t parent = -1;
   Vec3 offset_m = Vec3(0.0f);  ///< Position relative to the parent.
   bool operator==(const JointInfo&) const = default;
 };
@@ -403,7 +414,7 @@ struct LegInfo {
 struct SkeletonInfo {
   std::vector<JointInfo> joints;  ///< 1 to kMaxJoints
   std::vector<EndSiteInfo> end_sites;
-  std::array<LegInfo, 2> legs;  ///< Left leg, right leg.
+  std::array<LegInfo, 2> legs;  ///< Left leg, then right leg.
   bool operator==(const SkeletonInfo&) const = default;
 };
 
@@ -418,7 +429,7 @@ struct WorldInfo {
   std::uint64_t tick = 0;
   std::string library_hash;  ///< XXH3-128 of the library's payload in hexadecimal digits.
   SkeletonInfo skeleton;
-  std::vector<std::string> layers;  ///< Names for SetLayers.
+  std::vector<std::string> layers;  ///< Names of the layers, for SetLayers.
   /// Quantization of each joint in compact poses.
   std::vector<RotationQuantization> rotation_codes;
   /// Joints of PoseDetail::kReduced in ascending order (CheckReducedJoints).
@@ -428,7 +439,7 @@ struct WorldInfo {
 
 /// Result of one item of a command.
 struct ReplyItem {
-  std::uint32_t index = 0;  ///< Position in the command's items or avatars.
+  std::uint32_t index = 0;  ///< Index in the command's list of items or avatars.
   AvatarId avatar = 0;
   RequestId request_id = 0;  ///< Only in the Reply to a Request.
   StatusCode code = StatusCode::kOk;
@@ -461,13 +472,15 @@ inline constexpr std::uint8_t kPoseUncompressed = 4;
 struct PoseBatchInfo {
   WorldId world = 0;
   std::uint16_t shard = 0;
-  std::uint16_t part = 0;   ///< Below `parts`.
-  std::uint16_t parts = 1;  ///< Above 1 if the avatars of the shard do not fit in one frame.
+  std::uint16_t part = 0;  ///< Below `parts`.
+  /// Number of frames of this batch. It is above 1 if the avatars of the shard do not fit in one
+  /// frame.
+  std::uint16_t parts = 1;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;       ///< Server time of the tick.
-  PoseMode mode = PoseMode::kFull;  ///< kFull, kQuantised or a compact mode.
+  PoseMode mode = PoseMode::kFull;  ///< One of kFull, kQuantised and the compact modes.
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
-  bool is_partial = false;          ///< An avatar that is not in the batch may still exist.
+  bool is_partial = false;          ///< True if an avatar that is not in the batch may still exist.
   bool operator==(const PoseBatchInfo&) const = default;
 };
 
@@ -494,12 +507,12 @@ struct PoseBatch {
 
 /// Type of an event. The comments list the fields of Event that the type uses.
 enum class EventType : std::uint8_t {
-  kAccepted = 0,    ///< request_id. The request was queued.
-  kStarted = 1,     ///< request_id, kind, group, requested, applied, extrapolated, clamped
-  kFootStrike = 2,  ///< request_id, foot, position_m
-  kFinished = 3,    ///< request_id, kind, base (the new base frame), cut_short
-  kIdle = 4,        ///< base. The avatar stands and its queue is empty.
-  kRejected = 5,    ///< request_id, code, reason. The request turned out to be impossible.
+  kAccepted = 0,    ///< Uses request_id. The server has queued the request.
+  kStarted = 1,     ///< Uses request_id, kind, group, requested, applied, extrapolated, clamped.
+  kFootStrike = 2,  ///< Uses request_id, foot, position_m.
+  kFinished = 3,    ///< Uses request_id, kind, base (the new base frame), cut_short.
+  kIdle = 4,        ///< Uses base. The avatar stands and its queue is empty.
+  kRejected = 5,    ///< Uses request_id, code, reason. The avatar could not execute the request.
   kSpawned = 6,     ///< base
   kRemoved = 7,
   kEntered = 8,  ///< The avatar has entered the region that this session observes.
@@ -541,7 +554,7 @@ struct Event {
 struct Events {
   static constexpr MessageType kType = MessageType::kEvents;
   WorldId world = 0;
-  std::uint64_t number = 0;  ///< 1, 2, 3, ... in the session.
+  std::uint64_t number = 0;  ///< Consecutive number of the message in the session, starting with 1.
   std::uint64_t tick = 0;
   std::vector<Event> events;  ///< 1 to kMaxItems
   bool operator==(const Events&) const = default;
@@ -601,18 +614,21 @@ struct CurrentMovement {
   std::int16_t group = -1;
   double started_s = 0.0;          ///< Server time of the start.
   std::vector<double> keytimes_s;  ///< Relative to the start; the first is 0. At most kMaxKeytimes.
-  double generic_time = 0.0;       ///< 0 to number of keytimes - 1 (paper, Eq. (3)).
-  double ease_out_s = 0.0;         ///< Duration of the difference pose.
+  /// Generic time, 0 to the number of keytimes - 1 (paper, Eq. (3)).
+  double generic_time = 0.0;
+  /// Time after the start at which the difference pose has faded out.
+  double ease_out_s = 0.0;
   ParameterSet requested;
   ParameterSet applied;
   bool extrapolated = false;
   bool clamped = false;
-  std::vector<float> weights;  ///< One per example of the group, at most kMaxWeights.
+  std::vector<float> weights;  ///< One weight per example of the group, at most kMaxWeights.
   std::vector<std::uint8_t>
       parameter_names;  ///< Parameters of the group; names as in ParameterSet.
   /// Parameters of the examples, example by example. May be empty.
   std::vector<float> sites;
-  std::vector<Landing> landings;  ///< Feet that have not landed yet, at most kMaxLandings.
+  /// Landings of the feet that are still in the air, at most kMaxLandings.
+  std::vector<Landing> landings;
   bool operator==(const CurrentMovement&) const = default;
 };
 
@@ -622,16 +638,18 @@ struct AvatarState {
   std::uint64_t nonce = 0;
   WorldId world = 0;
   AvatarId avatar = 0;
-  StatusCode code = StatusCode::kOk;  ///< If not kOk, only `text` follows.
+  /// Result of the query. If it is not kOk, only `text` follows.
+  StatusCode code = StatusCode::kOk;
   std::string text;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;
   Placement base;
   std::optional<CurrentMovement> movement;
   std::uint32_t queue_size = 0;
-  std::vector<RequestItem> queue;    ///< The first kMaxInspectedRequests queued requests.
-  bool planting_enabled = true;      ///< See SetPlanting.
-  std::vector<PlayingLayer> layers;  ///< At most kMaxPlayingLayers. Later layers are on top.
+  std::vector<RequestItem> queue;  ///< The first kMaxInspectedRequests queued requests.
+  bool planting_enabled = true;    ///< See SetPlanting.
+  /// Layers that the avatar plays, at most kMaxPlayingLayers. Later layers are on top.
+  std::vector<PlayingLayer> layers;
   bool operator==(const AvatarState&) const = default;
 };
 
@@ -657,12 +675,13 @@ struct Movements {
   WorldId world = 0;
   std::uint16_t shard = 0;
   std::uint16_t part = 0;        ///< Below `parts`.
-  std::uint16_t parts = 1;       ///< Messages that contain the changes of this step.
+  std::uint16_t parts = 1;       ///< Number of messages that contain the changes of this step.
   std::uint16_t more_steps = 0;  ///< Steps that follow before the poses of `tick` are displayed.
   std::uint64_t step = 0;        ///< Step number of the shard. A gap makes all its avatars unknown.
   std::uint64_t tick = 0;
-  double server_time_s = 0.0;       ///< Server time of the tick.
-  bool states = false;              ///< True: states after `step`. False: changes in `step`.
+  double server_time_s = 0.0;  ///< Server time of the tick.
+  /// True: the records are states after `step`. False: the records are changes in `step`.
+  bool states = false;
   std::vector<AvatarId> avatars;    ///< 0 to kMaxItems ids, none of them 0.
   std::vector<std::uint8_t> flags;  ///< One per avatar.
   std::vector<std::uint32_t> ends;  ///< End of each avatar's record in `records`, in bytes.
@@ -680,12 +699,14 @@ struct Movements {
 struct LibraryPiece {
   static constexpr MessageType kType = MessageType::kLibraryPiece;
   std::uint64_t nonce = 0;
-  StatusCode code = StatusCode::kOk;  ///< If not kOk, only `text` and `hash` follow.
+  /// Result of the request. If it is not kOk, only `text` and `hash` follow.
+  StatusCode code = StatusCode::kOk;
   std::string text;
   std::string hash;
   std::uint64_t total_bytes = 0;  ///< Size of the library file.
   std::uint64_t offset = 0;
-  std::vector<std::byte> bytes;  ///< At most kMaxPieceBytes. Empty at the end of the file.
+  /// Content of the piece, at most kMaxPieceBytes. Empty at the end of the file.
+  std::vector<std::byte> bytes;
   bool operator==(const LibraryPiece&) const = default;
 };
 

@@ -38,7 +38,7 @@ class PoseBatchReader {
   std::size_t compact_bytes_;
   std::size_t index_ = 0;
   std::size_t at_ = 0;
-  PoseMode mode_ = PoseMode::kFull;  // layout of the current pose
+  PoseMode mode_ = PoseMode::kFull;  // Layout of the current pose
   std::span<const std::byte> pose_;
 };
 

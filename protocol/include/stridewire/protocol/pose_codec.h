@@ -14,8 +14,9 @@ enum class PoseMode : std::uint8_t {
   kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
   kQuantised = 1,  ///< Root as 3 x int32 in fixed point; 48 bits per joint ("smallest three").
   kMovement = 2,   ///< Movement records instead of poses (Movements).
-  /// Bits per joint as the library requires (compact_codec.h). The server sends it, kCompactReduced
-  /// and kCompactRoot to subscriptions of kQuantised. A client cannot request these three modes.
+  /// The joints have as many bits as the library requires (compact_codec.h). The server sends this
+  /// mode, kCompactReduced and kCompactRoot to subscriptions of kQuantised. A client cannot request
+  /// these three modes.
   kCompact = 3,
   kCompactReduced = 4,  ///< Compact poses of PoseDetail::kReduced.
   kCompactRoot = 5,     ///< Compact poses of PoseDetail::kRoot.

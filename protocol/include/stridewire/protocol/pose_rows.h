@@ -64,11 +64,11 @@ class PoseRows {
   std::vector<std::uint8_t> flags_;
   std::vector<std::size_t> begins_;
   std::vector<std::byte>
-      bytes_;  // may be longer than the rows, so that it is not zeroed for every tick
+      bytes_;  // It may be longer than the rows, so that it is not cleared for every tick.
   std::size_t pose_count_ = 0;
 
   std::span<std::byte> Room(std::size_t begin, std::size_t length);
-  const CompactCodec* codec_ = nullptr;  // not null in compact modes
+  const CompactCodec* codec_ = nullptr;  // Not null in compact modes
   CompactCodec::Block block_;
 };
 

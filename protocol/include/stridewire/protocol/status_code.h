@@ -5,8 +5,8 @@
 
 namespace stridewire::protocol {
 
-/// Result of a command. The hundreds tell who can act. Future versions may add codes, so a receiver
-/// treats an unknown code by its hundreds.
+/// Result of a command. The hundreds state who can correct the problem. Future versions may add
+/// codes, so a receiver treats an unknown code by its hundreds.
 enum class StatusCode : std::uint16_t {
   kOk = 0,
   // 100 to 199: the caller made an invalid request.
@@ -22,15 +22,17 @@ enum class StatusCode : std::uint16_t {
   kAvatarExists = 109,
   kNoSuchSubscription = 110,
   kSubscriptionExists = 111,
-  kBadSequence = 112,        ///< The `seq` of a command leaves a gap.
-  kForgotten = 113,          ///< The Reply to this old `seq` is no longer stored.
+  /// The `seq` of a command is not the next one, so a command is missing.
+  kBadSequence = 112,
+  /// The command was executed before, but its Reply is no longer stored.
+  kForgotten = 113,
   kUnexpectedMessage = 114,  ///< The state of the session does not allow the message.
   kAlreadyJoined = 115,
   // 200 to 299: the data is invalid.
   kMalformed = 200,   ///< The bytes violate the standard.
   kNoMovement = 201,  ///< The library has no such movement or layer.
   // 300 to 399: the network failed.
-  kTimeout = 300,  ///< Nothing was received for too long.
+  kTimeout = 300,  ///< Nothing was received for longer than the timeout.
   kTooSlow = 301,  ///< The peer does not read fast enough.
   // 400 to 499: the server failed.
   kLimitReached = 400,
