@@ -32,13 +32,14 @@ struct Settings {
   std::uint16_t port = 7420;
   std::string world = "plaza";
   std::uint32_t avatars = 4;
-  double seconds = 0.0;  // 0: until Ctrl-C
+  double seconds = 0.0;  // Duration of the run in seconds; 0: until Ctrl-C
   double report_s = 10.0;
   std::uint64_t seed = 1;
   std::array<double, 2> step_m = {0.35, 0.7};
   std::array<double, 2> jump_m = {0.4, 1.2};
   double turn_rad = 0.0;
-  double home_m = 0.0;  // 0: no limit
+  // Distance from the start at which avatars turn back, in metres; 0: no limit
+  double home_m = 0.0;
 };
 
 volatile std::sig_atomic_t stop_requested = 0;

@@ -13,7 +13,7 @@ namespace stridewire::client {
 /// the number of dropped events in the next event that is taken.
 class EventQueue {
  public:
-  /// `capacity` is above 0.
+  /// Creates an empty queue. `capacity` must be above 0.
   explicit EventQueue(std::size_t capacity) : capacity_(capacity) {}
 
   void Push(const stridewire_event& event);

@@ -116,7 +116,8 @@ class SessionState {
     /// Number of dropped batches in the last Lagging message.
     std::uint64_t last_dropped_batches = 0;
     std::unique_ptr<WorldView> view;
-    std::unique_ptr<ReplicaSet> replicas;  ///< Not null while movements are observed.
+    /// Evaluates poses from movements. Not null while movements are observed.
+    std::unique_ptr<ReplicaSet> replicas;
     std::optional<protocol::TerrainInfo> terrain;
   };
 
@@ -154,7 +155,8 @@ class SessionState {
 
   // The following members are the state of the session on the server.
   bool had_session_ = false;
-  std::vector<std::byte> resume_token_;  ///< Empty if the server has ended the session.
+  /// Secret for resuming the session. Empty if the server has ended the session.
+  std::vector<std::byte> resume_token_;
   protocol::Seq next_seq_ = 1;
   std::uint64_t last_events_number_ = 0;
   protocol::ServerLimits limits_;

@@ -450,7 +450,8 @@ Status Check(const WorldInfo& m) {
   if (!m.reduced_joints.empty()) {
     std::vector<std::int16_t> parents;
     for (const JointInfo& joint : m.skeleton.joints) parents.push_back(joint.parent);
-    if (m.rotation_codes.empty()) parents.clear();  // Without codes there are no reduced joints.
+    // Reduced joints are allowed only if there are rotation codes.
+    if (m.rotation_codes.empty()) parents.clear();
     if (const Status status = CheckReducedJoints(m.reduced_joints, parents); !status) {
       const Error& error = status.error();
       found.Wrong(error.code, error.text, "WorldInfo.fewer_joints", error.index);

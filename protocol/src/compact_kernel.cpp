@@ -161,7 +161,8 @@ void EncodeCompact(const CompactPlan& plan, const CompactWork& work) {
         hn::StoreU(e.z, d, error + 2 * kBlock);
       };
       if (joint.smallest_three_bits > 0) {
-        // "Smallest three" as in quantise_kernel.cpp, with a variable number of bits.
+        // Encodes with "smallest three" as in quantise_kernel.cpp, but with a variable number of
+        // bits.
         V largest = q.x;
         VI index = hn::Zero(di);
         const auto take = [&](V component, int number) HWY_ATTR {

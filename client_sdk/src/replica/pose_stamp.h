@@ -6,7 +6,7 @@
 
 namespace stridewire::client {
 
-/// Everything about a pose except its joints.
+/// Metadata of a pose: all its properties except root position and rotations.
 struct PoseStamp {
   std::uint64_t tick = 0;
   double time_s = 0.0;         ///< Server time in seconds.

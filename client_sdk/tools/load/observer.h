@@ -88,7 +88,8 @@ class Observer final : public Session {
     std::vector<std::size_t> last_sizes;
     std::size_t max_pose_bytes = 0;
     std::vector<Stream> streams;
-    std::unique_ptr<client::ReplicaSet> replicas;  ///< Not null in mode movement.
+    /// Evaluates poses from movements. Not null in mode movement.
+    std::unique_ptr<client::ReplicaSet> replicas;
     /// Number of dropped batches that the server reported on this connection.
     std::uint64_t batches_dropped = 0;
   };

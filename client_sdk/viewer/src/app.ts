@@ -407,7 +407,7 @@ export class App {
     if (remember) rememberTheme(name);
   }
 
-  /** `avatars`: the number of avatars in all panes. */
+  /** `avatars` is the number of avatars in all panes. */
   private updateEmptyCard(avatars: number): void {
     const world = this.commandedPane()?.world;
     const empty = this.client.state === 'ready' && avatars === 0 && world !== undefined &&

@@ -60,7 +60,7 @@ export class Appearance {
     return true;
   }
 
-  /** For example "lines at 60 % resolution". */
+  /** Describes how avatars are drawn, for example "lines at 60 % resolution". */
   describe(): string {
     const {options, quality: {settings}} = this;
     return `${options.coarse && options.style === 'bodies' ? 'simplified ' : ''}${options.style}` +

@@ -76,7 +76,7 @@ export class StreamCosts {
     return true;
   }
 
-  /** Sorted by bytes per second, the most expensive stream first. */
+  /** Costs per stream, sorted by bytes per second, the most expensive stream first. */
   get costs(): readonly StreamCost[] {
     return [...this.measured]
       .map(([name, cost]) => ({name, active: name === this.current, ...cost}))

@@ -26,7 +26,7 @@ const coarseDetail =
 const minimalDetail =
   {scale: 0.6, shadows: false, coarse: true, simplified: true, maxFootprints: 1500};
 
-/** Sorted from the finest level to the cheapest. */
+/** Quality levels, sorted from the finest to the cheapest. */
 const hardwareLevels: readonly QualityLevel[] = [
   {style: 'bodies', ...fineDetail},
   {style: 'bodies', ...fineDetail, scale: 0.8},

@@ -72,7 +72,7 @@ export class Client {
     return this.session.state;
   }
 
-  /** Why the connection last failed or was lost; empty if it never did. */
+  /** Reason why the connection last failed or was lost; empty if that never happened. */
   get lastError(): string {
     return this.session.lastError;
   }

@@ -20,7 +20,7 @@ export type ClientState =
 export interface WebSocketLike {
   /** The client sets it to `arraybuffer`. */
   binaryType: string;
-  /** 1 if the connection is open. */
+  /** State of the connection; 1 if it is open. */
   readonly readyState: number;
   /** Bytes that have not been sent yet. */
   readonly bufferedAmount: number;
@@ -74,7 +74,7 @@ export interface ClientOptions {
 
 /** Arguments of the listeners that `Client.on` accepts. */
 export interface ClientListeners {
-  /** `Client.state` has changed. */
+  /** Called when `Client.state` has changed. */
   state: (state: ClientState) => void;
   /**
    * Called when the session is ready. If `resumed`, the previous session continues; otherwise a new

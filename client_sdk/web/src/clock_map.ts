@@ -5,7 +5,7 @@ const bucketS = 0.5;
 const slewRate = 0.02;
 /** Larger differences from the target offset are corrected at once. */
 const snapS = 0.25;
-/** For this long after the first sample, smaller offsets are adopted at once. */
+/** Time after the first sample during which smaller offsets are adopted at once. */
 const settleS = 1;
 
 /**

@@ -122,7 +122,7 @@ export class Session {
 
   // State of the session.
   private hadSession = false;
-  /** Empty if there is no session to resume. */
+  /** Secret for resuming the session; empty if there is no session to resume. */
   private resumeToken: Uint8Array = new Uint8Array(0);
   private nextSeq = 1n;
   private lastEventsNumber = 0n;
@@ -818,7 +818,8 @@ export class Session {
   private wantAgain(world: WorldHandle, observing: ReadonlyMap<number, Command>): void {
     const first: Command[] = [];
     for (const [id, wanted] of world.subscriptions) {
-      if (wanted.unsent) continue;  // Its Observe is among the unsent commands.
+      // The Observe of this subscription is among the unsent commands.
+      if (wanted.unsent) continue;
       wanted.unsent = true;
       const asked = observing.get(id);
       first.push({world, message: {...wanted.message}, answer: asked?.answer ?? null});

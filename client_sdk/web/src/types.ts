@@ -84,9 +84,9 @@ export interface ReplyItem {
   readonly index: number;
   /** Id of the avatar. For a spawn without an id this is the id chosen by the server. */
   readonly avatar: number;
-  /** 0n unless the item is a movement request. */
+  /** Id of the movement request; 0n for other items. */
   readonly requestId: bigint;
-  /** One of `Status`, 0 if the item succeeded. */
+  /** Result of the item, one of `Status`; 0 if the item succeeded. */
   readonly code: number;
   readonly status: string;
   readonly text: string;
@@ -122,7 +122,7 @@ export interface TerrainBox {
  */
 export interface Terrain {
   readonly heightField: HeightField | null;
-  /** At most 65536. */
+  /** Boxes on the ground, at most 65536. */
   readonly boxes: readonly TerrainBox[];
 }
 
@@ -141,11 +141,11 @@ export interface SpawnItem {
  */
 export interface LayerRequest {
   readonly avatar: number;
-  /** One of `World.layers`. */
+  /** Name of the layer, one of `World.layers`. */
   readonly layer: string;
   /** False fades the layer out and ends it; `weight` and `speed` are then ignored. Default true. */
   readonly enabled?: boolean;
-  /** Above 0, at most 1. Default 1. */
+  /** Weight of the layer, above 0 and at most 1. Default 1. */
   readonly weight?: number;
   /** Time over which weight and speed change, 0 to 10. Default 0.3. */
   readonly blendS?: number;
@@ -210,18 +210,18 @@ export interface QueuedRequest {
   readonly requestId: bigint;
   readonly type: MovementType;
   readonly foot: Foot | 'auto';
-  /** Null unless the request is a walk or a step to a position. */
+  /** Destination; null unless the request is a walk or a step to a position. */
   readonly atM: Vec3 | null;
-  /** Null: the server chooses. */
+  /** Requested heading; null if the server chooses it. */
   readonly headingRad: number | null;
   readonly lengthM: number;
-  /** Null: the usual distance of the motion library. */
+  /** Requested sideways distance; null for the usual distance of the motion library. */
   readonly sideM: number | null;
   readonly heightM: number;
   readonly turnRad: number;
   readonly seconds: number;
   readonly waypointsM: readonly Vec3[];
-  /** Null: a comfortable speed. */
+  /** Requested walking speed; null for a comfortable speed. */
   readonly speedMPerS: number | null;
   readonly interrupt: Interrupt;
   readonly exactOnly: boolean;
@@ -250,7 +250,7 @@ export interface AvatarState {
 
 /** A layer that is active on an avatar. */
 export interface PlayingLayer {
-  /** One of `World.layers`. */
+  /** Name of the layer, one of `World.layers`. */
   readonly layer: string;
   /** Current weight, 0 to 1. */
   readonly weight: number;
@@ -312,7 +312,7 @@ export interface RegionRing {
   outerRadiusM: number;
   /** The server sends one pose per this many ticks, 1 to 3600. */
   everyNTicks: number;
-  /** Absent: the detail of the observation. Requires mode `quantised`. */
+  /** Detail of the poses. Absent: the detail of the observation. Requires mode `quantised`. */
   detail?: PoseDetail;
 }
 
@@ -405,7 +405,7 @@ export interface WorldEvent {
 export interface EndSite {
   /** Index of the joint that the end site belongs to. */
   readonly joint: number;
-  /** Relative to the joint, in the joint's frame. */
+  /** Position relative to the joint, in the joint's frame. */
   readonly offsetM: Vec3;
 }
 

@@ -16,10 +16,10 @@ inline constexpr int kExitBadInput = 2;  // An option, a file or one of its fiel
 // Prints one line on stderr and returns `exit_code`.
 int PrintError(const std::string& sentence, int exit_code = kExitBadInput);
 
-// For errors in options and input files, including files that cannot be read.
+// Prints an error in an option or input file, for example a file that cannot be read.
 int PrintInputError(const Error& error);
 
-// For errors while writing output.
+// Prints an error that occurred while writing output.
 int PrintOutputError(const Error& error);
 
 // Checks before the work starts whether a file can be written at `path`. Rejects anything but a

@@ -27,7 +27,7 @@ std::string_view View(beast::string_view text) { return {text.data(), text.size(
 
 }  // namespace
 
-/// One connection and its requests.
+/// Handles one connection and its requests.
 class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
  public:
   Visit(HttpServer& server, boost::asio::ip::tcp::socket socket)
@@ -136,7 +136,7 @@ class HttpServer::Visit : public std::enable_shared_from_this<Visit> {
     auto socket = stream_.release_socket();
     beast::error_code error;
     const auto remote = socket.remote_endpoint(error);
-    if (error) return;  // the peer has closed the connection
+    if (error) return;  // The peer has closed the connection.
     server_.stream_->on_stream(MakeWebSocketTransport(std::move(socket), parser_->release()),
                                remote.address());
   }
@@ -209,7 +209,7 @@ void HttpServer::ServeStream(std::string path, OriginPolicy policy, std::functio
 void HttpServer::Accept(boost::asio::ip::tcp::socket socket) {
   if (*connections_ >= max_connections_) {
     metrics_.Reached(Limit::kHttpConnections);
-    return;  // closes the connection
+    return;  // The destructor of the socket closes the connection.
   }
   std::make_shared<Visit>(*this, std::move(socket))->Read();
 }

@@ -29,7 +29,8 @@ struct HttpAnswer {
   unsigned status = 200;
   std::string content_type = "text/plain; charset=utf-8";
   std::string body;
-  std::shared_ptr<const std::string> shared_body;  ///< If not null, used instead of `body`.
+  /// Body that is shared between responses. If not null, it is used instead of `body`.
+  std::shared_ptr<const std::string> shared_body;
   std::string cache_control = "no-store";
   std::vector<std::pair<std::string, std::string>> headers;  ///< Additional headers.
 

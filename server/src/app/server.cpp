@@ -93,7 +93,7 @@ Status Server::Start() {
   listener_.Start([this](auto socket) {
     boost::system::error_code error;
     const auto remote = socket.remote_endpoint(error);
-    if (error) return;  // the peer has closed the connection
+    if (error) return;  // The peer has closed the connection.
     handshakes_.Accept(MakeTcpTransport(std::move(socket)), remote.address());
   });
   ScheduleHousekeeping();

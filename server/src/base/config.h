@@ -26,7 +26,7 @@ struct Endpoint {
 
 /// The settings of section [worlds.NAME].
 struct WorldConfig {
-  std::string library;      ///< "builtin" or a file; empty: the default library.
+  std::string library;      ///< Motion library: "builtin" or a file. Empty: the default library.
   std::string terrain;      ///< A terrain file; empty: flat ground.
   bool persistent = false;  ///< Avatars outlive the session that spawned them.
   bool operator==(const WorldConfig&) const = default;
@@ -39,8 +39,10 @@ struct Config {
   Endpoint listen = {"127.0.0.1", 7420};
   Endpoint http = {"127.0.0.1", 7421};
   bool http_enabled = true;
-  std::vector<std::string> allowed_origins;  ///< Pages of other servers that may open a stream.
-  std::string viewer_dir;  ///< Empty: the viewer that was installed with the program.
+  /// Origins of pages of other servers that may open a stream.
+  std::vector<std::string> allowed_origins;
+  /// Folder of the viewer. Empty: the viewer that was installed with the program.
+  std::string viewer_dir;
   std::string library = "builtin";
   std::string data_dir;  ///< Reserved for stored worlds; the server writes nothing yet.
   double tick_hz = 60.0;

@@ -17,9 +17,11 @@ struct Limits {
   std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;        ///< Payload of a bulk message.
 
   // Connections and sessions.
-  int max_handshakes = 256;            ///< Connections whose client has not sent Hello yet.
-  int max_sessions = 1024;             ///< Attached and detached sessions.
-  int max_sessions_per_address = 256;  ///< Sessions and handshakes per client address.
+  /// Maximum number of connections whose client has not sent Hello yet.
+  int max_handshakes = 256;
+  int max_sessions = 1024;  ///< Maximum number of attached and detached sessions.
+  /// Maximum number of sessions and handshakes per client address.
+  int max_sessions_per_address = 256;
   /// Longest time from accepting a connection to a complete Hello.
   double handshake_timeout_s = 5.0;
   double idle_timeout_s = 30.0;   ///< Longest time without received bytes; 0: no timeout.
@@ -49,7 +51,8 @@ struct Limits {
   std::size_t control_buffer_bytes = std::size_t{4} << 20;
   int observer_backlog_ticks = 4;  ///< Pose batches that may wait per world, mode and shard.
   std::size_t reply_cache_bytes = std::size_t{4} << 20;
-  std::size_t event_replay_bytes = std::size_t{1} << 20;  ///< Events stored for a lost connection.
+  /// Size of the events that are stored for a lost connection.
+  std::size_t event_replay_bytes = std::size_t{1} << 20;
   /// Value of SO_SNDBUF; 0: the default of the system.
   std::size_t socket_send_buffer_bytes = 0;
 

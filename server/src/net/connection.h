@@ -22,15 +22,15 @@ class ConnectionHandler {
  public:
   virtual ~ConnectionHandler() = default;
   virtual void OnMessage(protocol::Message&& message) = 0;
-  /// The peer sent invalid bytes. The connection does not read anything after them.
+  /// Called when the peer has sent invalid bytes. The connection does not read anything after them.
   virtual void OnBadFrame(const Error& error) = 0;
-  /// Frames were sent, so the send queue has room again.
+  /// Called when frames were sent, so that the send queue has room again.
   virtual void OnSent() {}
-  /// No bytes were received for idle_timeout_s.
+  /// Called when no bytes were received for idle_timeout_s.
   virtual void OnIdle() {}
-  /// A pending write made no progress for write_timeout_s.
+  /// Called when a pending write has made no progress for write_timeout_s.
   virtual void OnStuck() {}
-  /// The connection is closed. This is the last call.
+  /// Called when the connection is closed. This is the last call.
   virtual void OnClosed() = 0;
 };
 

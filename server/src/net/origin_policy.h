@@ -19,7 +19,7 @@ namespace stridewire::server {
 /// configured its DNS that way (DNS rebinding).
 class OriginPolicy {
  public:
-  /// `is_loopback`: the server listens on a loopback address.
+  /// `is_loopback` is true if the server listens on a loopback address.
   OriginPolicy(std::vector<std::string> allowed, bool is_loopback);
 
   [[nodiscard]] bool Allows(std::optional<std::string_view> origin, std::string_view host) const;

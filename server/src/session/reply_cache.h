@@ -28,7 +28,7 @@ class ReplyCache {
     kGap,        ///< A command with a smaller number is missing.
   };
   struct Answer {
-    SharedFrame reply;   ///< Null while the command is pending.
+    SharedFrame reply;   ///< The encoded Reply; null while the command is pending.
     WorldId joined = 0;  ///< The world of a successful JoinWorld, otherwise 0.
   };
 

@@ -72,7 +72,7 @@ class SessionCommands {
   struct Pending {
     int outstanding = 0;  // Number of shards that have not answered.
     std::size_t item_count = 0;
-    protocol::Role role = protocol::Role::kController;  // of a JoinWorld
+    protocol::Role role = protocol::Role::kController;  // Role that a JoinWorld requested.
     protocol::Reply reply;
   };
 

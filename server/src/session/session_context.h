@@ -25,7 +25,8 @@ struct Membership {
 struct SessionContext {
   SessionHost& host;
   SessionIdentity identity;
-  std::shared_ptr<Connection> connection;  ///< Null while the session waits for its client.
+  /// Connection of the client; null while the session waits for its client.
+  std::shared_ptr<Connection> connection;
   std::map<WorldId, Membership> worlds;
 
   [[nodiscard]] Membership* FindWorld(WorldId world) {

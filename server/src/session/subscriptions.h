@@ -43,7 +43,7 @@ class Subscriptions {
   /// Returns the sum of the numbers of avatars that the subscriptions select.
   [[nodiscard]] std::size_t selected_count() const { return selected_count_; }
 
-  /// `id` must be new.
+  /// Adds a subscription. `id` must be new.
   void Add(protocol::SubscriptionId id, Subscription&& subscription);
   /// Returns the removed subscription, or nullopt if `id` does not exist.
   std::optional<Subscription> Remove(protocol::SubscriptionId id);

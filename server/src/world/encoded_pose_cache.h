@@ -186,13 +186,14 @@ class EncodedPoseCache {
   // State of one slot; read in every tick.
   struct SlotState {
     enum Kind : std::uint8_t { kEmpty, kScheduled, kTimed, kConstant };
-    std::uint64_t first_step = 0;  // Step of the first pose, if timed.
+    std::uint64_t first_step = 0;  // Step of the first pose if the state is timed.
     std::uint32_t revision = 0;    // Low bits of the avatar's revision.
     std::uint8_t count = 0;        // Number of poses: 0 if empty or scheduled, 1 if constant.
     std::uint8_t first_plane = 0;
     Kind kind = kEmpty;
     std::uint8_t has_overflow : 1 = 0;  // see Overflow
-    std::uint8_t backoff : 2 = 0;       // At most kMaxTicksAhead >> backoff poses are evaluated.
+    // Exponent of the backoff: at most kMaxTicksAhead >> backoff poses are evaluated.
+    std::uint8_t backoff : 2 = 0;
   };
   static_assert(sizeof(SlotState) == 16);
   // Poses of a slot that a mode cannot represent. They are stored uncompressed, if possible.

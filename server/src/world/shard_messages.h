@@ -79,9 +79,10 @@ struct TerrainPart {
 /// A command that a shard executes at its next tick.
 struct WorldCommand {
   std::shared_ptr<World> world;
-  int from_shard = 0;  ///< The shard of the session.
+  int from_shard = 0;  ///< Shard of the session, which receives the result.
   SessionId session = 0;
-  protocol::Seq seq = 0;  ///< 0: the session does not expect a result.
+  /// Sequence number of the command. 0: the session does not expect a result.
+  protocol::Seq seq = 0;
   std::variant<SpawnPart, RequestPart, RemovePart, CancelPart, ReleasePart, TerrainPart, LayerPart,
                PlantingPart>
       part;
@@ -92,7 +93,8 @@ struct CommandResult {
   SessionId session = 0;
   protocol::Seq seq = 0;
   std::uint32_t accepted = 0;
-  std::vector<protocol::ReplyItem> items;  ///< As in Reply, for the items of this shard.
+  /// Items of the Reply that concern avatars of this shard.
+  std::vector<protocol::ReplyItem> items;
 };
 
 /// Asks for the state of one avatar after the next tick (protocol message InspectAvatar).
@@ -117,7 +119,8 @@ struct StatesRequest {
   std::uint32_t nonce = 0;
   AvatarId first = 0;            ///< Smallest id whose state is sent.
   std::size_t enough_bytes = 0;  ///< The shard stops after the state that exceeds this size.
-  std::shared_ptr<const std::vector<AvatarId>> avatars;  ///< Ascending ids; null: all avatars.
+  /// Ascending ids of the avatars whose states are requested; null: all avatars.
+  std::shared_ptr<const std::vector<AvatarId>> avatars;
 };
 struct StatesResult {
   WorldId world = 0;
@@ -125,7 +128,7 @@ struct StatesResult {
   SessionId session = 0;
   std::uint32_t nonce = 0;
   AvatarId next = 0;  ///< `first` of the next request; 0: no avatars are left.
-  SharedFrame frame;  ///< Null if there are no states.
+  SharedFrame frame;  ///< Encoded states. Null if there are none.
 };
 
 /// The modes in which poses are sent, in the order of their values.
@@ -152,8 +155,8 @@ struct RegionFilter {
 /// Intervals at which poses are sent, in ticks: they are sent in every tick that the interval
 /// divides. 0: never.
 struct SendInterval {
-  std::uint16_t all = 0;     ///< For sessions that observe all avatars.
-  std::uint16_t subset = 0;  ///< For sessions that observe selected avatars or a region.
+  std::uint16_t all = 0;     ///< Interval for sessions that observe all avatars.
+  std::uint16_t subset = 0;  ///< Interval for sessions that observe selected avatars or a region.
   bool operator==(const SendInterval&) const = default;
 };
 
@@ -246,7 +249,7 @@ struct TerrainChange {
   int from_shard = 0;
   SessionId session = 0;
   protocol::Seq seq = 0;
-  std::optional<protocol::TerrainInfo> terrain;  ///< nullopt: flat ground.
+  std::optional<protocol::TerrainInfo> terrain;  ///< The new terrain; nullopt: flat ground.
 };
 struct TerrainRefusal {
   SessionId session = 0;

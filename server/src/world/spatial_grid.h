@@ -13,7 +13,7 @@ class SpatialGrid {
   /// Clears the grid. `cell_m` must be positive; `count` is the expected number of avatars.
   void Begin(double cell_m, std::size_t count);
   void Add(std::uint32_t row, float x, float z);
-  /// Must be called after the last Add.
+  /// Prepares the grid for queries. Must be called after the last Add.
   void Sort();
 
   /// Calls `function(row, x, z)` for all avatars within `reach_m` of (x, z) along both axes, in

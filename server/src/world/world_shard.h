@@ -110,7 +110,7 @@ class WorldShard {
     Entry* entry;
   };
 
-  // world_shard.cpp: commands and ticks.
+  // Commands and ticks, in world_shard.cpp.
   void Spawn(const WorldCommand& command, const SpawnPart& part, std::uint64_t tick,
              CommandResult& result);
   void Request(const RequestPart& part, std::uint64_t tick, CommandResult& result);
@@ -163,7 +163,7 @@ class WorldShard {
   std::uint64_t tick_ = 0;  // Tick of the current or last Advance.
   // Number of steps that are left in the current Advance.
   std::uint16_t steps_left_ = 0;
-  std::shared_ptr<const WorldTerrain> terrain_;  // Null: flat ground.
+  std::shared_ptr<const WorldTerrain> terrain_;  // Terrain in use; null: flat ground.
   // Terrains that apply at later ticks, ordered by tick.
   std::deque<TerrainPart> next_terrains_;
 

@@ -15,7 +15,7 @@ namespace stridewire::server {
 /// The terrain of a world and its WorldTerrain message, which is encoded once and shared by all
 /// sessions. Immutable.
 struct WorldTerrain {
-  std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground at height 0.
+  std::shared_ptr<const Terrain> terrain;  ///< The ground; null: flat ground at height 0.
   SharedFrame frame;
 };
 

@@ -297,26 +297,28 @@ typedef struct stridewire_movement {
   uint64_t request_id;  ///< Chosen by the application, not 0. Events repeat it.
   stridewire_movement_type type;
   stridewire_foot foot;  ///< Step: the moving foot.
-  /// Step: forward distance between the feet at its end. Jump: distance.
+  /// Step: forward distance between the feet at its end, in metres. Jump: forward distance, in
+  /// metres.
   double length_m;
   /// Step, if `has_side`: sideways distance between the feet, positive towards the moving foot's
   /// side.
   double side_m;
   double height_m;   ///< Step, jump: height difference between start and end.
-  double turn_rad;   ///< Step, jump: change of heading.
+  double turn_rad;   ///< Step, jump: change of heading, positive to the left.
   double seconds;    ///< Stand: duration.
-  uint8_t has_side;  ///< Step: 0 leaves the sideways distance to the server.
+  uint8_t has_side;  ///< Step: 1 uses `side_m`, 0 leaves the sideways distance to the server.
   /// Step: 1 places the foot at `at_m` and ignores length, side, height and turn.
   uint8_t has_at;
-  uint8_t has_heading;  ///< Step with `has_at`: 0 leaves the heading of the foot to the server.
+  /// Step with `has_at`: 1 uses `heading_rad`, 0 leaves the heading of the foot to the server.
+  uint8_t has_heading;
   /// Step with `has_at`: world position of the ball of the foot. Walk: its destination.
   double at_m[3];
   /// Step with `has_at` and `has_heading`: heading of the foot. Walk: heading at the destination.
   double heading_rad;
-  /// Walk: x, y, z of each waypoint, 3 * waypoint_count numbers.
+  /// Walk: coordinates x, y, z of each waypoint, 3 * waypoint_count numbers.
   const double* waypoints_m;
   size_t waypoint_count;  ///< Walk: number of waypoints, at most STRIDEWIRE_MAX_WAYPOINTS.
-  uint8_t has_speed;      ///< Walk: 0 leaves the speed to the server.
+  uint8_t has_speed;      ///< Walk: 1 uses `speed_m_s`, 0 leaves the speed to the server.
   /// Walk with `has_speed`: speed, 0.05 to 5. The server comes as close as the library allows.
   double speed_m_s;
   stridewire_interrupt interrupt;
@@ -450,8 +452,9 @@ typedef struct stridewire_region {
 /// Which poses and events a client receives from a world.
 typedef struct stridewire_observation {
   stridewire_pose_mode mode;
-  uint16_t every_n_ticks;   ///< Interval of poses in ticks, 1 to 3600.
-  uint8_t with_events;      ///< 1: also receive the world's events. Controllers always do.
+  uint16_t every_n_ticks;  ///< Interval of poses in ticks, 1 to 3600.
+  /// 1: the client also receives the world's events. Controllers always receive them.
+  uint8_t with_events;
   const uint32_t* avatars;  ///< Ids of the avatars to observe. NULL: all avatars.
   /// Number of ids: 0 if `avatars` is NULL, at most STRIDEWIRE_MAX_ITEMS.
   size_t avatar_count;
@@ -546,8 +549,9 @@ typedef struct stridewire_parameters {
 typedef struct stridewire_event {
   stridewire_event_type type;
   stridewire_status status;
-  uint64_t command;     ///< Number of the command that caused the event.
-  uint64_t request_id;  ///< 0 for a movement that the server inserted.
+  uint64_t command;  ///< Number of the command that caused the event.
+  /// Request to which the event belongs. 0 for a movement that the server inserted.
+  uint64_t request_id;
   uint64_t tick;
   double time_s;  ///< Server time of the tick.
   stridewire_world world;
@@ -700,9 +704,10 @@ typedef struct stridewire_pose {
   double time_s;  ///< Server time of this pose.
   double held_s;  ///< HELD: seconds since the last received pose.
   float root_position_m[3];
-  uint8_t discontinuity;  ///< RAW: 1 if the pose must not be interpolated from the previous one.
-  uint8_t standing;       ///< 1: the avatar stands and its queue is empty.
-  uint8_t detail;         ///< stridewire_pose_detail of the received pose.
+  /// RAW: 1 if clients must not interpolate between the previous pose and this one.
+  uint8_t discontinuity;
+  uint8_t standing;  ///< 1: the avatar stands and its queue is empty.
+  uint8_t detail;    ///< The received pose's detail, a stridewire_pose_detail.
   /// Set by the caller. Receives 4 numbers per joint. The root's rotation is relative to the world,
   /// all others are relative to the parent joint. May be NULL if `joint_capacity` is 0.
   float* rotations_xyzw;

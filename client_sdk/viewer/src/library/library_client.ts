@@ -37,7 +37,7 @@ export interface Group {
 /** A movement as frames, relative to its base frame. */
 export interface Clip {
   readonly times_s: readonly number[];
-  /** 3 numbers per frame. */
+  /** Root positions, 3 numbers per frame. */
   readonly roots_m: readonly number[];
   /** Quaternions, 4 numbers per joint and frame. */
   readonly rotations: readonly number[];
@@ -85,7 +85,10 @@ interface SkeletonJson {
 
 /** Requests fail with an Error whose message can be shown to the user. */
 export class LibraryClient {
-  /** `base`: empty for the server that served this page, or "http://host:port". */
+  /**
+   * `base` is the beginning of URLs: empty for the server that served this page, or
+   * "http://host:port".
+   */
   constructor(private readonly base: string) {}
 
   libraries(): Promise<LibraryEntry[]> {

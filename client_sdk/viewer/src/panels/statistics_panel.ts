@@ -36,7 +36,7 @@ export class StatisticsPanel {
   private fetching = false;
   private lastMs = 0;
 
-  /** `describe` returns the text beneath the plots. */
+  /** The function `describe` returns the text beneath the plots. */
   constructor(
     private readonly metricsUrl: string, private readonly statistics: () => Statistics,
     private readonly describe: () => string) {

@@ -50,7 +50,7 @@ class MeshBuilder {
   readonly regions: number[] = [];
   readonly indices: number[] = [];
 
-  /** `coarse`: half as many rings, and no small parts. */
+  /** If `coarse`, builds half as many rings and no small parts. */
   constructor(readonly coarse: boolean) {}
 
   vertex(p: Vec, weights: SkinWeights, region: number): number {

@@ -174,7 +174,7 @@ export class CrowdMesh {
   private readonly uniforms: Record<string, THREE.IUniform>;
   private readonly jointCount: number;
   private readonly colour = new THREE.Color();
-  /** For each index, the avatar whose colours have been uploaded there. */
+  /** [index]: avatar whose colours have been uploaded at this index. */
   private readonly colouredAvatars: number[] = [];
   private geometry: THREE.InstancedBufferGeometry | null = null;
   private mesh: THREE.Mesh | null = null;
@@ -192,7 +192,7 @@ export class CrowdMesh {
   private shadows = true;
   private capacity = 0;
 
-  /** `cpuSkinning`: use `CpuSkinnedCrowd` for coarse bodies without shadows. */
+  /** If `cpuSkinning`, uses `CpuSkinnedCrowd` for coarse bodies without shadows. */
   constructor(
     skeleton: SkeletonLike, style: FigureStyle, lights: Lights,
     private readonly cpuSkinning = false) {

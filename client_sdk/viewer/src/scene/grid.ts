@@ -83,7 +83,7 @@ export class Grid {
   private readonly uniforms: Record<string, THREE.IUniform>;
   private fineLines: THREE.Object3D | null = null;
 
-  /** `software`: whether the CPU renders. */
+  /** `software` is true if the CPU renders. */
   constructor(colours: TerrainColours, software: boolean) {
     this.uniforms = {
       near: {value: colours.near}, far: {value: colours.far}, line: {value: colours.line},

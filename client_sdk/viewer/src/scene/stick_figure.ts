@@ -11,11 +11,11 @@ export interface StickFigure {
   readonly pointCount: number;
   /** Pairs of point indices. */
   readonly lines: readonly number[];
-  /** For each point, the `Region` of lines that end there. */
+  /** [point]: `Region` of the lines that end at this point. */
   readonly regions: Uint8Array;
   /** Joint indices of the first points. */
   readonly joints: Uint16Array;
-  /** For each of the other points, the joint that it moves with. */
+  /** [extra point]: index of the joint that it moves with. */
   readonly extraJoints: Uint16Array;
   /** Positions of the extra points in the rest pose, 3 numbers per point. */
   readonly extraRest: Float32Array;

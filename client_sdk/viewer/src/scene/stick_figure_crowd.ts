@@ -20,7 +20,9 @@ export class StickFigureCrowd {
   private readonly jointCount: number;
   private readonly geometry: CpuCrowdGeometry;
 
-  /** `capacity`: number of avatars. `simplified`: about half as many lines. */
+  /**
+   * `capacity` is the number of avatars. If `simplified`, figures have about half as many lines.
+   */
   constructor(
     skeleton: SkeletonLike, private readonly lights: StickFigureLights, capacity: number,
     simplified: boolean) {

@@ -77,7 +77,7 @@ const liftM = 0.004;
 export class TerrainMesh {
   readonly object = new THREE.Group();
 
-  /** `software`: whether the CPU renders. */
+  /** `software` is true if the CPU renders. */
   constructor(
     terrain: TerrainSurface, colours: TerrainColours, sun: THREE.Vector3, software: boolean) {
     const {source} = terrain;

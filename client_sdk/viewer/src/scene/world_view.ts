@@ -52,7 +52,7 @@ export interface ViewOptions {
   maxFootprints: number;
   footprints: boolean;
   plantedFeet: boolean;
-  /** Whether the CPU renders. Terrain and crowd are then drawn in simpler ways. */
+  /** True if the CPU renders. Terrain and crowd are then drawn in simpler ways. */
   readonly software: boolean;
 }
 
@@ -96,7 +96,7 @@ export class WorldView {
   private planted = new Uint8Array(0);
   private previousTimeS = 0;
   private live = true;
-  /** By avatar: the heading of its last footprint. */
+  /** Heading of the last footprint of each avatar, by avatar id. */
   private readonly lastFootHeadings = new Map<number, number>();
   private readonly unsubscribe: (() => void)[];
   private readonly planned = makePlannedFootprints(maxPlannedFootprints);

@@ -105,7 +105,7 @@ export function cancelQueue(avatars: readonly number[]): CancelQueue {
   return {type: 'CancelQueue', seq: 0n, world: 0, avatars: avatarList(avatars, 1, 'avatars')};
 }
 
-/** `nextId` returns an id for a request that has none. */
+/** The function `nextId` returns an id for a request that has none. */
 export function request(items: readonly MovementRequest[], nextId: () => bigint): Request {
   return {
     type: 'Request',
@@ -283,7 +283,7 @@ function tickInterval(value: number, field: string, index = -1): number {
   return value;
 }
 
-/** `mode` and `beyond` are mode and detail of the observation. */
+/** `mode` and `beyond` are the mode and the detail of the observation. */
 export function region(asked: Region, mode: Observe['mode'], beyond: PoseDetail): RegionEntry {
   if (asked === null || typeof asked !== 'object') {
     throw new Malformed('expected an object', 'region');

@@ -74,7 +74,7 @@ export interface RegionEntry {
   radiusM: number;
   leaveM: number | null;
   rings: {toM: number; everyNTicks: number}[];
-  /** One per ring. Empty: the detail of the Observe message everywhere. */
+  /** Detail of each ring. Empty: all rings have the detail of the Observe message. */
   ringDetails: PoseDetail[];
 }
 export interface StopObserving {
@@ -143,7 +143,7 @@ export interface WorldInfo {
   /** Joints in poses of detail `reduced`, ascending. Empty: the server has no such detail. */
   fewerJoints: number[];
 }
-/** How a joint's rotation is encoded, see protocol/STANDARD.md, "Poses". */
+/** Describes how a joint's rotation is encoded, see protocol/STANDARD.md, "Poses". */
 export interface RotationCode {
   /** x, y, z, w. */
   reference: readonly [number, number, number, number];

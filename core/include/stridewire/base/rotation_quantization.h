@@ -20,10 +20,11 @@ struct RotationQuantization {
   static constexpr float kMinLeastW = 0.3f;
 
   Quat reference = kIdentityQuat;
-  Vec3 low = Vec3(0.0f);               ///< In [-1, 1].
-  Vec3 step = Vec3(1.0f);              ///< kMinStep to 2; unused without bits.
-  std::array<std::uint8_t, 3> bits{};  ///< 0 to kMaxBits per component.
-  /// 0, or kMinFreeBits to kMaxFreeBits for smallest-three encoding.
+  Vec3 low = Vec3(0.0f);  ///< Smallest value of each component, in [-1, 1].
+  /// Difference between successive values, kMinStep to 2; unused if a component has no bits.
+  Vec3 step = Vec3(1.0f);
+  std::array<std::uint8_t, 3> bits{};  ///< Bits of each component, 0 to kMaxBits.
+  /// Bits per component of smallest-three encoding, kMinFreeBits to kMaxFreeBits; 0: not used.
   std::uint8_t smallest_three_bits = 0;
   float least_w = 1.0f;  ///< Lower bound for d's w, kMinLeastW to 1.
   bool operator==(const RotationQuantization&) const = default;

@@ -17,8 +17,8 @@ namespace stridewire {
 /// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y up,
 /// facing +Z at identity rotations.
 struct Capture {
-  std::string path;   ///< As the caller gave it.
-  Skeleton skeleton;  ///< With both legs identified.
+  std::string path;   ///< Path of the file, as passed by the caller.
+  Skeleton skeleton;  ///< Skeleton whose legs have both been identified.
   Clip clip;
   double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
   int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
@@ -30,7 +30,8 @@ struct Capture {
 /// counts that its header declares.
 inline constexpr std::uint64_t kMaxBvhBytes = std::uint64_t{512} << 20;
 inline constexpr int kMaxBvhDepth = 128;  ///< Levels of nested joints.
-inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;  ///< Frames times joints.
+/// Maximum number of frames times joints.
+inline constexpr std::int64_t kMaxBvhRotations = std::int64_t{1} << 25;
 inline constexpr double kMaxBvhNumber = 1e7;  ///< Largest magnitude of any number in the file.
 
 inline constexpr std::size_t kMaxBvhNameBytes = 256;  ///< Longest name of a joint, in bytes.
@@ -45,10 +46,10 @@ struct BvhReadOptions {
   std::optional<double> fps;     ///< Replaces `Frame Time`; frames per second, in (0, 10000].
   /// Name of the left ankle joint; empty: detected. Set both ankles or neither.
   std::string left_ankle;
-  std::string right_ankle;  ///< Same for the right ankle.
+  std::string right_ankle;  ///< Name of the right ankle joint; empty: detected.
   /// Name of a toe joint below `left_ankle`; empty: detected.
   std::string left_ball;
-  std::string right_ball;  ///< Same for the right toe joint.
+  std::string right_ball;  ///< Name of a toe joint below `right_ankle`; empty: detected.
 };
 
 /// Reads a BVH file and converts it to Stridewire's conventions: metres, +Y up, facing +Z at

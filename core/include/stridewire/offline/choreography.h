@@ -50,7 +50,7 @@ inline constexpr double kMaxChoreographyHeadingRad = 1e4;  ///< Magnitude of the
 ///   stops the layer when the following movement begins.
 struct Choreography {
   BaseFrame start;
-  std::shared_ptr<const Terrain> terrain;  ///< Null: flat ground.
+  std::shared_ptr<const Terrain> terrain;  ///< Terrain of the world; null: flat ground.
   /// Together with `layers` 1 to kMaxChoreographyMovements entries. The id of a request is its
   /// position in the JSON list, counted from 1 and including layers.
   std::vector<MovementRequest> movements;

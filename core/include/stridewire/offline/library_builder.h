@@ -21,9 +21,9 @@ struct SelectionOptions {
   /// radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
   /// A step is an outlier if its pose or duration differs from what all other steps predict for its
-  /// parameters by this many deviations (1.4826 MAD) more than usual. Only steps inside the hull of
-  /// the others are tested, in groups of at least eight, and at most one in ten is removed: steps at
-  /// the edge of the hull are rare, not wrong. 0 disables the test.
+  /// parameters by this number of deviations (1.4826 MAD) more than usual. Only steps inside the
+  /// hull of the others are tested, in groups of at least eight, and at most one in ten is removed:
+  /// steps at the edge of the hull are rare, not wrong. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 
@@ -35,7 +35,7 @@ enum class ExampleFate : std::uint8_t {
   kOutlier     ///< Left out because it differs from all other examples.
 };
 
-/// "kept", "averaged", "redundant" or "outlier".
+/// Returns "kept", "averaged", "redundant" or "outlier".
 [[nodiscard]] std::string_view ExampleFateName(ExampleFate fate);
 
 /// What LibraryBuilder did with one extracted example, and why.

@@ -15,9 +15,10 @@ namespace stridewire {
 struct RawExample {
   Clip clip;
   std::vector<double> keytimes_s;   ///< K_0 = 0 < ... < K_n.
-  std::vector<double> parameters;   ///< One value per RawGroup::parameters.
+  std::vector<double> parameters;   ///< One value per parameter in RawGroup::parameters.
   double heading_change_rad = 0.0;  ///< Heading at the end relative to the start.
-  std::string source;               ///< "16_21.bvh 0.93-1.47 s" or "generated start 0.35 end 0.55".
+  /// Origin of the example: "16_21.bvh 0.93-1.47 s" or "generated start 0.35 end 0.55".
+  std::string source;
   bool mirrored = false;
 };
 
@@ -31,8 +32,9 @@ struct RawGroup {
 /// A clip for a LayerClip, which is blended over movements. It animates all joints of the skeleton.
 struct RawLayer {
   std::string name;
-  Clip clip;                   ///< If `is_looping`, the last frame equals the first.
-  std::vector<float> weights;  ///< One per joint, in [0, 1]; 0 for the root and the legs.
+  /// Motion of the layer. If `is_looping`, its last frame equals the first.
+  Clip clip;
+  std::vector<float> weights;  ///< Weight of each joint, in [0, 1]; 0 for the root and the legs.
   bool is_looping = true;
   std::string source;
 };
@@ -40,7 +42,8 @@ struct RawLayer {
 /// The editable form of a motion library. LibraryBuilder turns it into an immutable MotionLibrary.
 struct RawLibrary {
   Skeleton skeleton;
-  Pose stand_pose;  ///< Root at x = z = 0 with heading 0; y is above the ground.
+  /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.
+  Pose stand_pose;
   std::vector<RawGroup> groups;
   std::vector<RawLayer> layers;
 };

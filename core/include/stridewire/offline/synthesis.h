@@ -25,7 +25,8 @@ struct PlantRecord {
 /// Describes one played movement. Times are seconds since the start of the choreography.
 struct MovementRecord {
   MovementKind kind = MovementKind::kStand;
-  std::uint64_t request_id = 0;  ///< 0: the planner inserted this movement, e.g. a closing step.
+  /// Id of the request; 0 if the planner inserted this movement, for example a closing step.
+  std::uint64_t request_id = 0;
   int group = -1;
   double start_s = 0.0;
   double end_s = 0.0;
@@ -35,7 +36,7 @@ struct MovementRecord {
   /// sum w_i p_i over the examples: the parameters used for the blend. The weight correction
   /// chooses them so that `measured` meets `applied`.
   ParameterValues corrected;
-  ParameterValues measured;  ///< a(p) of the synthesized movement.
+  ParameterValues measured;  ///< Parameters measured on the synthesized movement, a(p).
   bool extrapolated = false;
   bool clamped = false;
   std::vector<float> weights;
@@ -43,15 +44,16 @@ struct MovementRecord {
   /// Steps only: horizontal distance of the moving foot from its target when it first stands.
   /// Without planting: distance between the measured and the requested end parameters.
   double landing_error_m = 0.0;
-  double landing_error_rad = 0.0;  ///< Same, for the heading of the foot.
-  BaseFrame base;                  ///< Base frame after the movement.
+  /// Difference between the heading of that foot and that of its target.
+  double landing_error_rad = 0.0;
+  BaseFrame base;  ///< Base frame after the movement.
 };
 
 /// The outcome of one walk.
 struct WalkRecord {
   std::uint64_t request_id = 0;
   bool arrived = false;
-  std::string reason;  ///< Why the walk failed; empty if `arrived`.
+  std::string reason;  ///< Reason why the walk failed; empty if `arrived`.
   double end_s = 0.0;
   BaseFrame base;  ///< Base frame at the end of the walk.
 };

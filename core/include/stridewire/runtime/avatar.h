@@ -28,19 +28,22 @@ enum class AvatarEventType : std::uint8_t {
 /// How far a step would have missed a footprint that it had to hit exactly.
 struct FootprintError {
   Footprint nearest;        ///< Nearest footprint in reach.
-  double distance_m = 0.0;  ///< From `nearest` to the requested footprint, >= 0.
-  double turn_rad = 0.0;    ///< Difference of their headings, >= 0.
+  double distance_m = 0.0;  ///< Distance from `nearest` to the requested footprint, >= 0.
+  double turn_rad = 0.0;    ///< Difference between the headings of the two footprints, >= 0.
 };
 
 /// Something that happened to an avatar during Advance. The type determines which fields are set.
 struct AvatarEvent {
   AvatarEventType type = AvatarEventType::kIdle;
-  std::uint64_t request_id = 0;  ///< 0 for a step that the avatar inserted itself.
+  /// Id of the request; 0 for a step that the avatar inserted itself.
+  std::uint64_t request_id = 0;
   MovementKind kind = MovementKind::kStand;
-  int group = -1;                ///< Index in MotionLibrary::groups(); -1 for a stand.
-  double time_s = 0.0;           ///< Seconds from the construction of the avatar to the event.
-  ParameterValues requested;     ///< kStarted: parameters as requested.
-  ParameterValues applied;       ///< kStarted: after clamping to what the examples span.
+  int group = -1;  ///< Index in MotionLibrary::groups(); -1 for a stand.
+  /// Time of the event in seconds since the construction of the avatar.
+  double time_s = 0.0;
+  ParameterValues requested;  ///< kStarted: parameters as requested.
+  /// kStarted: parameters after clamping to the range of the examples.
+  ParameterValues applied;
   bool extrapolated = false;     ///< kStarted: `applied` lies outside the hull of the examples.
   bool clamped = false;          ///< kStarted: `applied` differs from `requested`.
   bool is_cut_short = false;     ///< kFinished: another request interrupted the movement.
@@ -48,8 +51,10 @@ struct AvatarEvent {
   Vec3 position_m = Vec3(0.0f);  ///< kFootStrike: ball of that foot, in the world.
   BaseFrame base;                ///< kFinished: base frame after the movement.
   ErrorCode code = ErrorCode::kUnsupported;  ///< kRejected
-  const char* reason = "";                   ///< kRejected: one sentence, static storage.
-  std::optional<FootprintError> missed;      ///< kRejected: set for footprints only.
+  /// kRejected: reason as one sentence in static storage.
+  const char* reason = "";
+  /// kRejected: set only if the request was a step to a footprint.
+  std::optional<FootprintError> missed;
 };
 
 /// Describes a kRejected event in one sentence of at most 200 bytes, for example "the footprint is

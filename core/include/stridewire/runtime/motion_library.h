@@ -118,21 +118,28 @@ inline constexpr std::size_t kMaxRowFloats = GridLayout(kMaxJoints).row_floats;
 /// parameters.
 struct MotionGroup {
   MovementKind kind = MovementKind::kStepLeft;
-  std::vector<Parameter> parameters;           ///< d parameters.
-  int example_count = 0;                       ///< n.
-  int site_count = 0;                          ///< m >= n.
-  std::span<const double> sites;               ///< [site][parameter], in metres or radians.
-  std::span<const double> site_weights;        ///< [site - n][example]: weights of pseudoexamples.
-  std::span<const double> dilations;           ///< [site], in units of Parameter::scale.
-  double radius_factor = 1.0;                  ///< Factor in the dilations of the examples.
-  std::span<const double> linear;              ///< [1 + d][example]: a. Row 0 is the constant.
-  std::span<const double> radial;              ///< [site][example]: r.
-  std::span<const int> cells;                  ///< Grid cells per keytime interval.
-  int grid_point_count = 0;                    ///< Sum of `cells`, plus 1.
-  std::span<const double> keytimes_s;          ///< [example][interval + 1], with K_0 = 0.
-  std::span<const double> heading_change_rad;  ///< [example]: heading at the end, from 0.
-  std::span<const float> grid;             ///< [grid point][example][row_floats], 64-byte aligned.
-  std::vector<std::string_view> sources;   ///< [example]: for example "16_21.bvh 0.93-1.47 s".
+  std::vector<Parameter> parameters;  ///< d parameters.
+  int example_count = 0;              ///< n.
+  int site_count = 0;                 ///< m >= n.
+  /// [site][parameter]: parameters of the sites, in metres or radians.
+  std::span<const double> sites;
+  std::span<const double> site_weights;  ///< [site - n][example]: weights of pseudoexamples.
+  /// [site]: radius of influence, in units of Parameter::scale.
+  std::span<const double> dilations;
+  double radius_factor = 1.0;  ///< Factor in the dilations of the examples.
+  /// [1 + d][example]: coefficients a of the linear part. Row 0 is the constant.
+  std::span<const double> linear;
+  /// [site][example]: coefficients r of the radial functions.
+  std::span<const double> radial;
+  std::span<const int> cells;          ///< Grid cells per keytime interval.
+  int grid_point_count = 0;            ///< Sum of `cells`, plus 1.
+  std::span<const double> keytimes_s;  ///< [example][interval + 1]: keytimes, with K_0 = 0.
+  /// [example]: heading at the end of the example; it starts at 0.
+  std::span<const double> heading_change_rad;
+  /// [grid point][example][row_floats]: rows of the grid, 64-byte aligned.
+  std::span<const float> grid;
+  /// [example]: origin, for example "16_21.bvh 0.93-1.47 s".
+  std::vector<std::string_view> sources;
   std::span<const std::uint8_t> mirrored;  ///< [example]: 1 if it is a mirrored copy, else 0.
 
   [[nodiscard]] int parameter_count() const { return static_cast<int>(parameters.size()); }
@@ -217,7 +224,7 @@ class MotionLibrary {
   std::unique_ptr<const LocomotionProfile> locomotion_profile_;
   std::string hash_;
   int max_example_count_ = 0;
-  std::span<const std::byte> bytes_;  // mapped or allocated, 64-byte aligned
+  std::span<const std::byte> bytes_;  // Mapped or allocated memory, 64-byte aligned.
   bool is_mapped_ = false;
 };
 

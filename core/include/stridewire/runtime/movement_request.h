@@ -16,7 +16,7 @@ namespace stridewire {
 /// world = position_m + R_y(heading_rad) * local.
 struct BaseFrame {
   DVec3 position_m = DVec3(0.0);
-  double heading_rad = 0.0;  ///< Not wrapped: 2 pi is one full turn to the left.
+  double heading_rad = 0.0;  ///< Heading without wrapping: 2 pi is one full turn to the left.
 };
 
 /// Position and heading of a standing foot. The position is the point on the ground below the ball

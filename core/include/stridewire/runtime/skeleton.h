@@ -46,7 +46,7 @@ struct Leg {
 struct Skeleton {
   std::vector<Joint> joints;
   std::vector<EndSite> end_sites;
-  Leg legs[2];  ///< Indexed by Foot.
+  Leg legs[2];  ///< The two legs, indexed by Foot.
 
   [[nodiscard]] int joint_count() const { return static_cast<int>(joints.size()); }
   [[nodiscard]] const Leg& leg(Foot foot) const { return legs[static_cast<int>(foot)]; }

@@ -39,7 +39,7 @@ struct HeightField {
   double cell_m = 0.0;           ///< Distance of samples, kMinTerrainCellM to kMaxTerrainCellM.
   std::int32_t columns = 0;      ///< Samples along x, 2 to kMaxTerrainColumns.
   std::int32_t rows = 0;         ///< Samples along z, 2 to kMaxTerrainRows.
-  std::vector<float> heights_m;  ///< [row][column], in metres.
+  std::vector<float> heights_m;  ///< [row][column]: heights of the samples, in metres.
   bool operator==(const HeightField&) const = default;
 };
 

@@ -54,10 +54,10 @@ class GroupProbe {
 // The error e over the hull of the examples of a group.
 struct HullSurvey {
   double min_m = 0.0;
-  double mean_m = 0.0;  // Mean over the samples.
+  double mean_m = 0.0;  // Mean error over the samples.
   double max_m = 0.0;
   double weight_sum_max = 0.0;
-  std::vector<HullPoint> points;  // One per sample.
+  std::vector<HullPoint> points;  // Measurements at the samples, one per sample.
   std::vector<HullPoint> peaks;   // Local maxima found from the worst samples, largest first.
 };
 

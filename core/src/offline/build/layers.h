@@ -33,8 +33,9 @@ inline constexpr double kLoopBlendS = 0.4;  ///< Longest blend that closes a cap
 /// The part of a capture that becomes a layer, and how it plays.
 struct LayerCut {
   std::string name;
-  std::optional<double> from_s;  ///< Empty: the first usable frame of the capture.
-  std::optional<double> to_s;    ///< Empty: the end of the capture.
+  /// Start of the cut. Empty: the first usable frame of the capture.
+  std::optional<double> from_s;
+  std::optional<double> to_s;  ///< End of the cut. Empty: the end of the capture.
   bool is_looping = true;
 };
 

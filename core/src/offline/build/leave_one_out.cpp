@@ -168,7 +168,8 @@ class Comparer {
         pose_(library.skeleton().joint_count()) {}
 
   // Returns the weights [example] that an avatar would use: with parameters projected onto the hull
-  // of the others, and corrected. Empty if they cannot be solved. `products`: see MovementProducts.
+  // of the others, and corrected. Empty if they cannot be solved. `products` is the result of
+  // MovementProducts.
   std::vector<double> CardinalWeights(const Others& others, std::span<const double> products,
                                       std::span<const double> wanted) {
     const auto smoothness = ChooseSmoothness(group_, others.examples, products);

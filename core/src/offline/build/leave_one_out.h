@@ -12,9 +12,10 @@ namespace stridewire {
 
 /// Methods that synthesize a movement with given parameters from examples.
 enum class BlendMethod : std::uint8_t {
-  kCardinal = 0,         ///< Weights by cardinal basis functions (paper, Section 3).
-  kNearest = 1,          ///< The nearest example without changes.
-  kInverseDistance = 2,  ///< The nearest d + 1 weighted by 1 / distance, as in blend spaces.
+  kCardinal = 0,  ///< Weights by cardinal basis functions (paper, Section 3).
+  kNearest = 1,   ///< The nearest example without changes.
+  /// The nearest d + 1 examples, weighted by 1 / distance, as in blend spaces.
+  kInverseDistance = 2,
 };
 inline constexpr int kBlendMethodCount = 3;
 /// Returns "cardinal", "nearest" or "inverse_distance".
@@ -22,8 +23,9 @@ inline constexpr int kBlendMethodCount = 3;
 
 /// Mean differences between synthesized and captured movements.
 struct LeftOutMean {
-  double pose_m = 0.0;                          ///< Distance of joints at equal generic times.
-  std::array<double, kBodyPartCount> part_m{};  ///< Same, for the joints of one part of the body.
+  double pose_m = 0.0;  ///< Distance of joints at equal generic times.
+  /// Distance of the joints of each part of the body.
+  std::array<double, kBodyPartCount> part_m{};
   double foot_m = 0.0;       ///< Distance of the ball of the moving foot; both feet in a jump.
   double keytime_s = 0.0;    ///< Difference of keytimes, without the first.
   double parameter_m = 0.0;  ///< Largest difference of a requested and a synthesized parameter.
@@ -31,7 +33,8 @@ struct LeftOutMean {
 
 struct LeaveOneOut {
   int movements = 0;
-  std::array<LeftOutMean, kBlendMethodCount> means;  ///< Indexed by BlendMethod.
+  /// Means of each method, indexed by BlendMethod.
+  std::array<LeftOutMean, kBlendMethodCount> means;
   /// Share of the movements for which kCardinal is nearer to the capture than this method, 0 to 1.
   std::array<double, kBlendMethodCount> wins{};
 };

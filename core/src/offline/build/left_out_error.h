@@ -20,7 +20,7 @@ struct LeftOutError {
   [[nodiscard]] double worst_m() const { return pose_m > miss_m ? pose_m : miss_m; }
 };
 
-// Examples to blend, and the basis of their weights as in a library. Borrows the examples.
+// Examples that are blended, and the basis of their weights as in a library. Borrows the examples.
 struct BlendSet {
   std::vector<const GridExample*> examples;
   CardinalBasis basis;

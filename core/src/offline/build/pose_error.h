@@ -28,9 +28,10 @@ inline constexpr int kBodyPartCount = 4;
 
 /// Distances between the joints of two movements, in metres.
 struct PoseError {
-  double mean_m = 0.0;                          ///< Mean over all joints and all poses.
-  std::array<double, kBodyPartCount> part_m{};  ///< Mean over one part; 0 if it has no joints.
-  double max_m = 0.0;                           ///< Largest distance of a joint.
+  double mean_m = 0.0;  ///< Mean distance over all joints and all poses.
+  /// Mean distance over one part of the body; 0 if it has no joints.
+  std::array<double, kBodyPartCount> part_m{};
+  double max_m = 0.0;  ///< Largest distance of a joint.
 };
 
 /// Compares movements pose by pose. Both must be normalised: the root starts at x = z = 0 with

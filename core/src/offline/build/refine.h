@@ -33,11 +33,12 @@ inline constexpr double kMinPseudoexampleDistance = 0.03;
 
 struct RefineOptions {
   RefineRule rule = RefineRule::kAmended;
-  double max_error_m = 0.01;    ///< Groups with smaller errors are not refined.
-  int max_pseudoexamples = 32;  ///< Per group; 0 to kMaxPseudoexamples.
-  int samples = 3000;           ///< Samples of the hull; 1 to kMaxSamples.
+  double max_error_m = 0.01;  ///< Groups with smaller errors are not refined.
+  /// Maximum number of pseudoexamples per group, 0 to kMaxPseudoexamples.
+  int max_pseudoexamples = 32;
+  int samples = 3000;  ///< Samples of the hull; 1 to kMaxSamples.
   std::uint32_t seed = 1;
-  int threads = 0;  ///< 0: one per processor. Does not affect the result.
+  int threads = 0;  ///< Number of threads; 0: one per processor. It does not affect the result.
   /// Called repeatedly, on the thread that called Refine, with the estimated share of the work that
   /// is done, 0 to 1. Returns false to stop.
   std::function<bool(double)> progress;
@@ -56,7 +57,7 @@ struct GroupQuality {
   double condition = 1.0;       ///< Condition of the radial part.
 };
 
-/// Why the refinement of a group ended.
+/// Reason why the refinement of a group ended.
 enum class RefineEnd : std::uint8_t {
   kErrorReached,  ///< The largest error is below max_error_m.
   kCountReached,  ///< The group has max_pseudoexamples.
@@ -66,8 +67,8 @@ enum class RefineEnd : std::uint8_t {
 [[nodiscard]] std::string_view RefineEndText(RefineEnd end);
 
 struct GroupRefinement {
-  GroupQuality before;  ///< Without pseudoexamples; measured with samples of another seed.
-  GroupQuality after;   ///< Same, with pseudoexamples.
+  GroupQuality before;  ///< Quality without pseudoexamples, measured with samples of another seed.
+  GroupQuality after;   ///< Quality with pseudoexamples, measured with the same samples.
   double pseudoexample_error_m = 0.0;        ///< Largest error at a pseudoexample.
   RadiusRule radii = RadiusRule::kExamples;  ///< Radius rule of the best pass, see Refine.
   double radius_factor = 1.0;                ///< Factor on the radii of the examples.
@@ -78,7 +79,7 @@ struct GroupRefinement {
 
 struct Refinement {
   std::shared_ptr<const MotionLibrary> library;
-  std::vector<GroupRefinement> groups;  ///< In the order of the library.
+  std::vector<GroupRefinement> groups;  ///< One entry per group, in the order of the library.
 };
 
 /// Adds pseudoexamples, which are sites with weights instead of motion, where the error of

@@ -18,8 +18,9 @@ constexpr std::size_t kOutlierExamplesMin = 8;
 constexpr std::size_t kExamplesPerOutlier = 10;
 // Points that are at most this far outside the hull count as inside.
 constexpr double kInsideM = 1e-3;
-constexpr double kDeviationOfMad = 1.4826;   // Ratio of standard deviation and MAD.
-constexpr double kMinPoseDeviationM = 2e-3;  // Smaller spreads are not significant.
+constexpr double kDeviationOfMad = 1.4826;  // Ratio of standard deviation and MAD.
+// Smaller spreads are treated as this spread, because they are not significant.
+constexpr double kMinPoseDeviationM = 2e-3;
 constexpr double kMinDurationDeviationS = 5e-3;
 
 // The examples of a group, or averages of them, with the data needed to compare them.

@@ -26,7 +26,7 @@ struct Selected {
 //
 // The result does not depend on the number of threads.
 struct SelectExamplesJob {
-  const std::vector<GridExample>& examples;  // With aligned hemispheres.
+  const std::vector<GridExample>& examples;  // Examples with aligned hemispheres.
   std::span<const double> units;             // Metres per unit of each parameter.
   double diameter = 0.0;                     // Metres.
   const SelectionOptions& options;

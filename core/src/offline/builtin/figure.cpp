@@ -9,7 +9,7 @@ namespace {
 struct JointRow {
   const char* name;
   int parent;
-  double x, y, z;  // Metres in the frame of the parent.
+  double x, y, z;  // Position in the frame of the parent, in metres.
 };
 
 constexpr double kShoulderOutM = 0.13 * kStatureM;

@@ -21,7 +21,8 @@ double ToWholeFrames(double time_s) { return std::floor(time_s * kClipFps + 0.5)
 
 double SteadyStepTime(double length_m) {
   const double speed = Power(length_m / (0.463 * kStatureM), 1.0 / 0.43);  // Statures per second.
-  const double cadence = 129.6 * Power(speed, 0.57);                       // Steps per minute.
+  // Steps per minute in steady walking.
+  const double cadence = 129.6 * Power(speed, 0.57);
   return std::clamp(60.0 / cadence, 0.42, 0.75);
 }
 

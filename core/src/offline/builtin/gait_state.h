@@ -47,6 +47,7 @@ struct GaitState {
 /// StepShape::flat.
 [[nodiscard]] GaitState MakeGaitState(double length_m, double rise_m = 0.0, bool flat = false);
 
-inline constexpr double kRiseTime_s_m = 0.6;  ///< Seconds per metre.
+/// Additional time per height difference, in seconds per metre.
+inline constexpr double kRiseTime_s_m = 0.6;
 
 }  // namespace stridewire::builtin

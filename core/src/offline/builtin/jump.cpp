@@ -168,7 +168,8 @@ class JumpPath {
   }
 
   struct LegAim {
-    double length_m, angle_rad;  // From hip to ankle, seen from the side; forward is positive.
+    // Length and angle of the line from hip to ankle, seen from the side; forward is positive.
+    double length_m, angle_rad;
   };
 
   [[nodiscard]] LegAim AimAt(double time_s) const {
@@ -178,7 +179,7 @@ class JumpPath {
     return {std::sqrt(leg.y * leg.y + leg.z * leg.z), Atan2(leg.z, -leg.y)};
   }
 
-  // At landing the centre of mass is behind the feet.
+  // Landing position of the centre of mass, which is behind the feet.
   [[nodiscard]] double landing_z() const { return 0.84 * length_m_ - 0.08; }
 
   // Returns the height of the centre of mass, `z_m` ahead, at which the legs have this knee angle.

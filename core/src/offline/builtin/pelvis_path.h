@@ -29,7 +29,7 @@ class PelvisPath {
   Foot moving_;
   StepTiming timing_;
   Curve across_, forward_, sway_, yaw_, roll_, tilt_, height_;
-  std::vector<double> lowered_m_;  // At equal time intervals over the step.
+  std::vector<double> lowered_m_;  // Lowering of the pelvis at equal time intervals over the step.
 };
 
 }  // namespace stridewire::builtin

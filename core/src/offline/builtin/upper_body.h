@@ -7,12 +7,13 @@ namespace stridewire::builtin {
 /// Angles of the body above the pelvis in radians. With all angles 0, the figure stands at
 /// attention.
 struct UpperBody {
-  double thorax_yaw = 0.0;   ///< In the frame of the example; positive is left.
-  double thorax_roll = 0.0;  ///< In the frame of the example; positive lifts the left side.
-  double thorax_lean = 0.0;  ///< In the frame of the example; positive is forward.
-  double head_yaw = 0.0;     ///< In the frame of the example; positive is left.
-  double head_nod = 0.0;     ///< In the frame of the example; positive is forward.
-  double arm_flexion[2] = {0.0, 0.0};  ///< Indexed by Foot; positive is forward.
+  double thorax_yaw = 0.0;   ///< Yaw in the frame of the example; positive is left.
+  double thorax_roll = 0.0;  ///< Roll in the frame of the example; positive lifts the left side.
+  double thorax_lean = 0.0;  ///< Lean in the frame of the example; positive is forward.
+  double head_yaw = 0.0;     ///< Yaw in the frame of the example; positive is left.
+  double head_nod = 0.0;     ///< Nod in the frame of the example; positive is forward.
+  /// Flexion of each arm, indexed by Foot; positive is forward.
+  double arm_flexion[2] = {0.0, 0.0};
   double arm_abduction = 0.0;
   double elbow_flexion[2] = {0.0, 0.0};
 };

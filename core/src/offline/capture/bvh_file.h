@@ -19,7 +19,7 @@ struct BvhJoint {
   std::string name;
   int parent = -1;
   int line = 0;               ///< Line number of the joint's OFFSET.
-  DVec3 offset = DVec3(0.0);  ///< In file units.
+  DVec3 offset = DVec3(0.0);  ///< The joint's OFFSET, in file units.
   std::vector<BvhChannel> channels;
   int first_channel = 0;  ///< Index of its first number in the row of a frame.
 };
@@ -40,7 +40,8 @@ struct BvhFile {
   /// Value of one unit in the last written digit of the frame time.
   double frame_time_digit_s = 0.0;
   int frame_time_line = 0;
-  std::vector<float> values;  ///< [frame * channel_count + channel]; degrees or file units.
+  /// [frame * channel_count + channel]: channel values in degrees or file units.
+  std::vector<float> values;
   std::vector<std::string> notes;
 };
 

@@ -26,8 +26,9 @@
 namespace stridewire {
 namespace {
 
-constexpr double kSnapCos = 0.906;       // Directions within 25 degrees of an axis snap to it.
-constexpr int kSampledFrames = 64;       // Frames sampled to determine directions.
+constexpr double kSnapCos = 0.906;  // Directions within 25 degrees of an axis snap to it.
+// Number of frames that are sampled to determine directions.
+constexpr int kSampledFrames = 64;
 constexpr double kFastTurnRadS = 10.5;   // 600 degrees/s.
 constexpr double kStandingHipsM = 0.95;  // Hip height of a standing adult.
 constexpr double kSlowestFeetMS2 = 6.0;  // See NoteSlowMotion.

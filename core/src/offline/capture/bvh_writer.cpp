@@ -51,7 +51,7 @@ std::string BvhName(const std::string& name) {
 }
 
 struct Angles {
-  double z = 0.0, y = 0.0, x = 0.0;  // Radians; R = Rz Ry Rx.
+  double z = 0.0, y = 0.0, x = 0.0;  // Angles in radians, with R = Rz Ry Rx.
 };
 
 // Decomposes a rotation into Euler angles. Of the two solutions, returns the one nearer to the

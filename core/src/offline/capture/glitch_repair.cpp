@@ -85,7 +85,7 @@ void RepairJoint(const Skeleton& skeleton, int joint, int first_frame, Clip& cli
   for (int f = first_frame; f + 1 < end; ++f) {
     const double angle = jump(f);
     if (angle <= limit) continue;
-    // If the joint returns soon, all frames in between are bad.
+    // If the joint soon returns to its earlier rotation, all frames in between are glitches.
     int back = -1;
     double largest = angle;
     for (int g = f + 1; g < std::min(f + 1 + spike, end - 1); ++g) {

@@ -19,8 +19,9 @@ struct FoundLeg {
 };
 
 struct FoundLegs {
-  FoundLeg legs[2];         ///< Indexed by Foot.
-  bool sides_known = true;  ///< False: detected by shape, so left and right may be swapped.
+  FoundLeg legs[2];  ///< The two legs, indexed by Foot.
+  /// False if the legs were detected by shape, so that left and right may be swapped.
+  bool sides_known = true;
 };
 
 enum class Side { kNone, kLeft, kRight };

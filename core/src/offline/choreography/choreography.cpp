@@ -52,7 +52,7 @@ Status ReadPosition(const JsonField& field, const char* key, DVec3& out) {
   return ReadPosition(*field.Find(key), field.WhereOf(key), out);
 }
 
-/// Reads a step with `at_m`, which excludes length, side, height and turn.
+/// Reads a step with `at_m`. Such a step must not have a length, side, height or turn.
 Status ReadFootprint(const JsonField& field, FootprintRequest& at) {
   for (const char* key : {"length_m", "side_m", "height_m", "turn_rad"}) {
     if (field.Find(key) != nullptr) {

@@ -160,7 +160,7 @@ class Assembler {
     constexpr Foot kFeet[] = {Foot::kLeft, Foot::kRight};
     const auto all = [](const ExtractedExample&) { return true; };
     const auto level = [](const ExtractedExample& e) { return e.level; };
-    std::array<Pool, 2> straight_steps;  // Indexed by foot.
+    std::array<Pool, 2> straight_steps;  // Pools of straight steps, indexed by foot.
     std::array<Pool, 2> level_steps;
     std::array<Pool, 2> all_steps;
     for (std::size_t f = 0; f < 2; ++f) {

@@ -19,7 +19,7 @@ struct AssembleOptions {
   /// A group gets a parameter only if its examples spread over at least this range. With four or
   /// more examples the lowest and the highest value are ignored, since they may be outliers.
   double spread_min_m = 0.05;
-  double spread_min_rad = 0.0873;  ///< Same for angles; 5 degrees.
+  double spread_min_rad = 0.0873;  ///< Minimum range of a parameter that is an angle; 5 degrees.
   ExtractOptions extract;          ///< The assembler sets `target`.
 };
 

@@ -19,10 +19,10 @@ struct BodyTracks {
 
   FrameRange frames;  ///< Frames of the clip, without an artificial pose at the start.
   double fps = 0.0;
-  FootTrajectory feet[2];  ///< Indexed by Foot.
+  FootTrajectory feet[2];  ///< Trajectories of the two feet, indexed by Foot.
   std::vector<DVec3> pelvis_m;
   std::vector<double> pelvis_speed_m_s;  ///< Speed along the path smoothed over 60 ms.
-  std::vector<double> pelvis_yaw_rad;    ///< Unwrapped; positive is left.
+  std::vector<double> pelvis_yaw_rad;    ///< Unwrapped yaw of the pelvis; positive is left.
 
   [[nodiscard]] int size() const { return static_cast<int>(pelvis_m.size()); }
   [[nodiscard]] const FootTrajectory& foot(Foot f) const { return feet[static_cast<int>(f)]; }

@@ -9,9 +9,11 @@
 namespace stridewire {
 namespace {
 
-constexpr double kLongContactS = 0.3;   // Shorter contacts may be slow moments of swings and jumps.
+// Shorter contacts may be slow moments within swings and jumps.
+constexpr double kLongContactS = 0.3;
 constexpr double kFreeFallM_s2 = -5.0;  // A figure whose pelvis accelerates like this is falling.
-constexpr double kBallAtRestM_s = 0.3;  // A slower ball belongs to a flat foot.
+// A ball that moves slower than this belongs to a flat foot.
+constexpr double kBallAtRestM_s = 0.3;
 
 using Flags = std::vector<char>;
 

@@ -15,8 +15,8 @@ struct ContactOptions {
   /// The resting height of a point is this percentile of its heights.
   double resting_percentile = 3.0;
   double smooth_s = 0.04;
-  double gap_min_s = 0.05;      ///< Shorter gaps between contacts are filled.
-  double contact_min_s = 0.07;  ///< Shorter contacts are dropped.
+  double gap_min_s = 0.05;      ///< Gaps between contacts that are shorter than this are filled.
+  double contact_min_s = 0.07;  ///< Contacts that are shorter than this are dropped.
   /// If the heights of resting balls differ by more than this, the capture has several floors.
   double raised_floor_m = 0.10;
 };
@@ -28,8 +28,11 @@ struct Contact {
 };
 
 struct FootContacts {
-  std::vector<Contact> feet[2];  ///< Indexed by Foot; sorted by time and disjoint.
-  bool single_floor = true;      ///< False on stairs and blocks, where the height test is not used.
+  /// Contacts of each foot, sorted by time and disjoint; indexed by Foot.
+  std::vector<Contact> feet[2];
+  /// True if the capture has a single floor; false on stairs and blocks, where the height test is
+  /// not used.
+  bool single_floor = true;
 
   [[nodiscard]] const std::vector<Contact>& foot(Foot f) const { return feet[static_cast<int>(f)]; }
 };

@@ -37,7 +37,7 @@ struct ExtractOptions {
 struct ExtractedExample {
   MovementKind kind = MovementKind::kStepLeft;
   RawExample example;
-  bool settled = true;  ///< Jumps: false if the figure still moves at the end.
+  bool settled = true;  ///< Jumps: false if the figure is still moving at the end.
   bool level = true;    ///< Steps: true if the ground at all three footholds is equal within 5 cm.
 };
 
@@ -61,13 +61,15 @@ struct Extraction {
   std::vector<std::string> notes;  ///< Notes of the reader, and repaired joint flips.
   std::string error;               ///< Non-empty: the whole capture is not usable.
 
-  Skeleton skeleton;                             ///< Skeleton of the examples.
-  std::vector<ExtractedExample> straight_steps;  ///< start_z and end_z; heading change 0.
-  /// All steps, each with the seven parameters of a general step.
+  Skeleton skeleton;  ///< Skeleton of the examples.
+  /// Straight steps with the parameters start_z and end_z. Their heading change is 0.
+  std::vector<ExtractedExample> straight_steps;
+  /// All steps, with the seven parameters of a general step.
   std::vector<ExtractedExample> general_steps;
-  std::vector<ExtractedExample> jump_examples;  ///< Length, height and turn.
+  std::vector<ExtractedExample> jump_examples;  ///< Jumps with length, height and turn.
   double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the floor, by foot.
-  bool has_contacts = false;             ///< False if no foot ever stood; then the heights are 0.
+  /// False if no foot ever stood on the ground. Then the heights are 0.
+  bool has_contacts = false;
 
   struct Stand {
     /// Standing pose with the root at x = z = 0 and heading 0; y is above the ground.

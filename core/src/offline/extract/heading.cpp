@@ -15,7 +15,7 @@ constexpr double kStepDefaultS = 0.55;
 constexpr double kStepMinS = 0.25;
 constexpr double kStepMaxS = 1.0;
 
-// Standard deviations of the priors for the fit at the ends.
+// The fit at the ends of a recording uses priors with these standard deviations.
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kNoiseRad = 4.0 * kDegree;
 constexpr double kSlopeRad_s = 50.0 * kDegree;

@@ -149,7 +149,8 @@ class ShapePairs {
   const Skeleton& skeleton_;
   std::vector<std::vector<int>> children_;
   std::vector<int> partners_;
-  std::vector<double> costs_;  // [a][b]; negative: not computed yet.
+  // [a][b]: cost of the pair; negative if it has not been computed yet.
+  std::vector<double> costs_;
 };
 
 }  // namespace

@@ -21,7 +21,7 @@ struct SegmentOptions {
   double feet_apart_max_s = 0.15;     ///< In a jump, both feet leave and land within this time.
   /// Steps that end less than this before the figure hangs on something are rejected.
   double reaching_s = 0.7;
-  double letting_go_s = 1.0;  ///< Same for steps that start less than this after it.
+  double letting_go_s = 1.0;  ///< Same limit for steps that start after the figure has let go.
   double still_m_s = 0.1;     ///< The figure stands still if its pelvis is slower than this.
 };
 
@@ -35,7 +35,7 @@ struct StepSegment {
   int end = 0;
   int fixed_contact = 0;   ///< Index of the contact of the fixed foot that contains the swing.
   int before_contact = 0;  ///< Index of the contact of the moving foot before the swing.
-  int after_contact = 0;   ///< Same, after the swing.
+  int after_contact = 0;   ///< Index of the contact of the moving foot after the swing.
 };
 
 /// A jump from standing to standing, in frames of the tracks.
@@ -46,9 +46,9 @@ struct JumpSegment {
   int landing = 0;
   int absorb = 0;  ///< Lowest pelvis after landing.
   int end = 0;
-  bool settled = true;             ///< False if the figure walks on before it comes to rest.
+  bool settled = true;             ///< False if the figure walks on without coming to rest.
   int before_contact[2] = {0, 0};  ///< Indices of the contacts before the flight, by foot.
-  int after_contact[2] = {0, 0};   ///< Same, after the flight.
+  int after_contact[2] = {0, 0};   ///< Indices of the contacts after the flight, by foot.
 };
 
 /// A range of frames that looked like a movement but is not usable.
@@ -58,7 +58,7 @@ struct RejectedSpan {
 };
 
 struct Segmentation {
-  std::vector<StepSegment> steps;  ///< Sorted by start.
+  std::vector<StepSegment> steps;  ///< Steps, sorted by their start.
   std::vector<JumpSegment> jumps;
   std::vector<RejectedSpan> rejected;
 };

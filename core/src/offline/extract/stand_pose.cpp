@@ -15,9 +15,11 @@ namespace {
 constexpr double kWindowS = 0.1;  // Speeds are averaged over this time to reduce noise.
 constexpr double kSameGroundM = 0.03;
 // Penalties that are added to the mean joint speed in m/s.
-constexpr double kStridePerM = 2.0;  // One foot is in front of the other.
-constexpr double kCrouchPerM = 4.0;  // The pelvis is lower than in usual standing.
-// The pelvis is not above the feet, or the head is not above the pelvis.
+// Penalty per metre by which one foot is in front of the other.
+constexpr double kStridePerM = 2.0;
+// Penalty per metre by which the pelvis is lower than in usual standing.
+constexpr double kCrouchPerM = 4.0;
+// Penalty per metre by which the pelvis is not above the feet, or the head not above the pelvis.
 constexpr double kLeanPerM = 2.0;
 
 double StandHeight(const BodyTracks& tracks) {

@@ -133,7 +133,7 @@ void AvatarBody::ApplyLayers() {
   has_layers = !layers.empty();
   if (!has_layers) return;
   STRIDEWIRE_CHECK(layered_pose.rotations.size() == pose.rotations.size());
-  layered_pose = pose;  // Both have the same size, so this does not allocate.
+  layered_pose = pose;  // Both poses have the same size, so this does not allocate.
   layers.Apply(*library, layered_pose);
 }
 

@@ -68,7 +68,7 @@ bool AvatarSimulation::PlanRequested(const MovementRequest& request, const Reque
     return false;
   }
   STRIDEWIRE_CHECK(saved_.size() == 1 && plan.exact.has_value());
-  saved_.front().pose = body_.pose;  // Both have the same size, so this does not allocate.
+  saved_.front().pose = body_.pose;  // Both poses have the same size, so this does not allocate.
   std::swap(body_.movement, saved_.front().movement);
   PlanMovement(plan, swing_part, scratch);
   FootprintError missed = LandingErrorFrom(*plan.exact);

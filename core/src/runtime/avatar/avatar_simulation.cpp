@@ -81,7 +81,8 @@ Status AvatarSimulation::Enqueue(const MovementRequest& request, double start_de
       saved_.resize(1);
       saved_.front().pose = Pose(body_.library->skeleton().joint_count());
       Reserve(*body_.library, saved_.front().movement);
-      events_.reserve(kMaxEventsPerAdvance);  // One tick may reject many requests.
+      // A single tick may reject many requests, so the list must be able to grow.
+      events_.reserve(kMaxEventsPerAdvance);
     }
   }
   const double earlier_start_s = start_not_before_s_;

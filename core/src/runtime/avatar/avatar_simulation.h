@@ -256,7 +256,8 @@ class AvatarSimulation {
     Movement movement;
     Pose pose;
   };
-  std::vector<SavedState> saved_;  // At most one element; a vector so that an avatar can be copied.
+  // Contains at most one element. It is a vector so that an avatar can be copied.
+  std::vector<SavedState> saved_;
 
   FootState stand_feet_;  // Relative position of the feet in the library's stand pose.
   FootState feet_;

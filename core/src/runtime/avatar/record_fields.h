@@ -29,8 +29,8 @@ enum Flag : std::uint16_t {
   // Argument of AvatarBody::BlendIn. In the state of a standing avatar: the next movement keeps the
   // speed of the previous one.
   kKeepsSpeed = 1 << 9,
-  // If a movement began:
-  kIsEntered = 1 << 10,  // It began at a time later than 0.
+  // Flags for a movement that began:
+  kIsEntered = 1 << 10,  // The movement began at a time later than 0.
   kIsSteered = 1 << 11,  // The record contains LandingDecision::extra_turn_rad.
   kOnTerrain = 1 << 12,  // LandingDecision::is_on_terrain; the record contains lift_m and normal.
   kAside = 1 << 13,      // The record contains LandingDecision::aside_m.

@@ -24,8 +24,8 @@ struct CardinalBasis {
   int example_count = 0;          ///< n >= 1
   std::vector<double> centres;    ///< [d]
   std::vector<double> scales;     ///< [d], > 0
-  std::vector<double> sites;      ///< [site][d], in metres and radians
-  std::vector<double> dilations;  ///< [site], after division by `scales`
+  std::vector<double> sites;      ///< [site][d]: parameters of the sites, in metres and radians.
+  std::vector<double> dilations;  ///< [site]: radii d_j, in scaled parameters.
   std::vector<double> linear;     ///< [1 + d][n]
   std::vector<double> radial;     ///< [site][n]
   double condition = 1.0;         ///< Condition number of R, estimated in the 1-norm.
@@ -45,10 +45,12 @@ inline constexpr double kMaxCondition = 1e6;
 struct CardinalBasisFit {
   int parameter_count = 0;
   int example_count = 0;
-  std::span<const double> sites;           ///< [site][d]: examples, then pseudoexamples
+  /// [site][d]: parameters of the examples, followed by those of the pseudoexamples.
+  std::span<const double> sites;
   std::span<const double> pseudo_weights;  ///< [site - n][n]: weights of the pseudoexamples
   std::span<const double> scales;          ///< [d], > 0
-  std::span<const double> radius_factors;  ///< [site], > 0: multiply the dilations; empty: all 1
+  /// [site]: factors on the dilations, > 0. Empty: all factors are 1.
+  std::span<const double> radius_factors;
   /// If true, every dilation is the distance to the nearest other site of either sort, as in the
   /// paper.
   bool radii_from_all_sites = false;

@@ -9,7 +9,7 @@
 namespace stridewire {
 
 inline constexpr int kMaxIntervals = 8;  ///< Largest number of keytime intervals per movement.
-/// Shorter intervals are rejected when a library is loaded.
+/// Loading a library fails if a keytime interval is shorter than this, in seconds.
 inline constexpr double kMinIntervalS = 1e-3;
 
 /// kOutOfRange: there are fewer than 2 or more than kMaxIntervals + 1 keytimes, the first is not 0,

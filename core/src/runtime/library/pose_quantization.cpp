@@ -318,7 +318,7 @@ class BitAllocator {
   std::span<const RotationRange> ranges_;
   double max_error_m_;
   std::vector<Joint> joints_;
-  std::vector<Chain> chains_;  // From each leaf to the root.
+  std::vector<Chain> chains_;  // Chains of joints from each leaf to the root.
 };
 
 }  // namespace

@@ -40,13 +40,15 @@ struct Movement {
   /// Movement time at which it begins; above 0 if it continues a redirected swing.
   double start_offset_s = 0.0;
   double ease_out_s = kEaseOutS;     ///< T = min(kEaseOutS, duration).
-  std::vector<float> weights;        ///< [example], sum 1.
+  std::vector<float> weights;        ///< [example]: blend weights, whose sum is 1.
   Pose difference;                   ///< D = P - M(start_offset_s), in world space.
   PoseVelocity difference_velocity;  ///< Velocity of D at start_offset_s.
   TimeWarp warp;                     ///< Time warp of the blended keytimes.
-  FootPlan feet;                     ///< If not active, feet follow the blended pose.
+  /// Plan of the feet. If it is not active, feet follow the blended pose.
+  FootPlan feet;
 
-  ParameterValues parameters;       ///< Requested parameters after clamping.
+  /// Requested parameters after clamping to the range of the examples.
+  ParameterValues parameters;
   double heading_change_rad = 0.0;  ///< Blended heading change of the examples.
 
   [[nodiscard]] double duration_s() const { return warp.duration_s(); }

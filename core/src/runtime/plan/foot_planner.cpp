@@ -204,7 +204,7 @@ class Planner {
     return landing;
   }
 
-  // Positions where the feet of a jump land, [foot].
+  // Returns the positions where the feet of a jump land, [foot].
   std::array<DVec3, 2> ChooseJumpLanding(const FootLocks& locks, const RequestPlan& request) {
     const DVec3 centre =
         0.5 * (locks[0].print.position_m + locks[1].print.position_m) +
@@ -425,7 +425,7 @@ std::array<FeetAt, 2> Plan(const MotionLibrary& library, const FootLocks& locks,
     planner.SolveBase(locks, kBoth, times.release_s);
   }
 
-  // D = P - M, where P is the pose at which the previous movement ended.
+  // The difference pose is D = P - M, where P is the pose in which the previous movement ended.
   EvaluateBlend(group, library.layout(), movement, movement.start_offset_s, cache,
                 movement.difference);
   const FeetAt start = planner.FeetOf(movement.difference);

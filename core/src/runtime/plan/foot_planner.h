@@ -38,9 +38,9 @@ void StandOn(const FootLocks& locks, Movement& movement);
 
 /// Where a movement should bring the feet.
 struct LandingTarget {
-  /// Its `applied` parameters or, if it has one, its footprint are reached exactly.
+  /// Request whose `applied` parameters or, if it has one, whose footprint must be reached exactly.
   const RequestPlan& request;
-  /// Null: level ground at the height that the library and the request give.
+  /// Terrain; null for level ground at the height that the library and the request determine.
   const Terrain* terrain;
   /// A point on the line along which the body moves. Groups without a sideways parameter are
   /// steered back to that line.
@@ -76,7 +76,8 @@ std::array<FeetAt, 2> PlanFeet(const MotionLibrary& library, const FootLocks& lo
 struct LandingDecision {
   double extra_turn_rad = 0.0;  ///< Movement::extra_turn_rad
   bool is_on_terrain = false;
-  std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};  ///< [foot]: where the feet that move land.
+  /// [foot]: landing positions of the feet that move.
+  std::array<DVec3, 2> to_m{DVec3(0.0), DVec3(0.0)};
   // The following members are used for steps only.
   double turn_rad = 0.0;  ///< Turn of the foot at landing, relative to that of the library's step.
   double height_m = 0.0;  ///< Correction of the height of the blended foot at landing.

@@ -28,14 +28,14 @@ struct RequestPlan {
   std::optional<Footprint> exact;  ///< Footprint requested by a step.
   /// Largest error of the footprint that planting distributes over the swing.
   double most_residual_m = 0.25;
-  std::optional<DVec3> root_m;     ///< Steps: where the root should be at the end, seen from above.
+  std::optional<DVec3> root_m;     ///< Steps: position of the root at the end, seen from above.
   std::optional<double> turn_rad;  ///< Steps: the requested change of heading.
   bool is_side_given = false;      ///< Steps: true if the request specified the side.
   /// True if `applied` differs from `requested` by more than 1e-6.
   bool clamped = false;
   /// Distance of `applied` from `requested` in metres; a radian counts as 0.5 m.
   double distance_m = 0.0;
-  /// `distance_m` plus costs for extrapolation and for the positions of the feet.
+  /// Value of `distance_m` plus costs for extrapolation and for the positions of the feet.
   double cost_m = 0.0;
 };
 

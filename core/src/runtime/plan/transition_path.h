@@ -30,7 +30,7 @@ struct Stance {
 /// The next movement on the path to a requested step or jump: the request itself, or a step to
 /// insert before it.
 struct TransitionPath {
-  std::optional<RequestPlan> plan;  ///< Empty if there is no path.
+  std::optional<RequestPlan> plan;  ///< Plan of the next movement. Empty if there is no path.
   bool is_inserted = false;
 };
 

@@ -35,7 +35,7 @@ enum class WalkOutcome : std::uint8_t { kStep, kArrived, kRefused };
 struct WalkDecision {
   WalkOutcome outcome = WalkOutcome::kArrived;
   RequestPlan plan;  ///< The planned step; set for kStep.
-  /// Set for kRefused: why the walk ends, as one sentence in static storage.
+  /// Set for kRefused: the reason, as one sentence in static storage.
   const char* reason = "";
 };
 

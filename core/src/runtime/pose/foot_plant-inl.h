@@ -92,7 +92,7 @@ struct PlanCommon {
   SoaVec3 root_residual, root_residual_velocity;
   Float extra_turn, duration_s, start_offset_s, ease_out_s, keeps_above_ground, plant_fade_s;
   Float time_s;
-  Float per_duration, per_ease_out;  // 1 / duration_s and 1 / ease_out_s.
+  Float per_duration, per_ease_out;  // Reciprocals of duration_s and ease_out_s.
 
   HWY_INLINE Float OfDuration(Float x) const { return x * per_duration; }
   HWY_INLINE Float OfEaseOut(Float x) const { return x * per_ease_out; }

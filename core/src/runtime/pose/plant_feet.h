@@ -21,7 +21,7 @@ struct BlendedFoot {
   double flatness = 1.0;      ///< LegPose::Flatness.
 };
 
-/// [foot]: both feet at one time.
+/// [foot]: both feet at the same time.
 using FeetAt = std::array<BlendedFoot, 2>;
 
 /// Correction of one foot at one time.

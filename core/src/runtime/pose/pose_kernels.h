@@ -42,7 +42,8 @@ struct GridSamples {
   /// Weights of these points; 0 beyond the last point
   alignas(64) float weights[4][kBlock];
   alignas(64) double remaining_turn[kBlock];  ///< Fraction of the extra turn still to come
-  alignas(64) float is_eased[kBlock];  ///< 1 while part of the difference pose remains, else 0
+  /// 1 while part of the difference pose remains, otherwise 0.
+  alignas(64) float is_eased[kBlock];
   alignas(64) float fraction[kBlock];  ///< EaseOut of the elapsed fraction of the ease-out
   alignas(64) float slope_s[kBlock];   ///< EaseOutSlope of that fraction, times ease_out_s
 };
@@ -76,10 +77,13 @@ void BlendRows(const BlendRowsJob& run);
 struct RotationBlend {
   const float* row;  ///< Blended row in the layout of GridLayout
   std::size_t joint_count;
-  const float* difference;  ///< [joint] x y z w, or null
-  float fraction;           ///< In [0, 1]: r := r slerp(1, difference, fraction)
-  const float* velocity;    ///< [joint] x y z rotation vectors per second, or null
-  float seconds;            ///< r := r * (rotation by the vector seconds * velocity)
+  const float* difference;  ///< [joint] x y z w: difference pose, or null if there is none.
+  /// Factor on the difference pose, in [0, 1]: r := r slerp(1, difference, fraction).
+  float fraction;
+  /// [joint] x y z: velocity of the difference pose as rotation vectors per second, or null.
+  const float* velocity;
+  /// Factor on the velocity: r := r * (rotation by the vector seconds * velocity).
+  float seconds;
 };
 
 /// Writes the unit rotations to out[joint] x y z w. Returns false if a rotation of the row is
@@ -119,9 +123,10 @@ struct FinishPosesJob {
   const double* extra_turn_rad;  ///< [kBlock]: Movement::extra_turn_rad
   const double* remaining_turn;  ///< GridSamples::remaining_turn
   // Remaining difference poses. Unused if `ease` is null.
-  const float* ease;      ///< Output of PrepareDifferences; null if no lane has a difference left
-  const float* velocity;  ///< [joint][x y z][kBlock]; null if no lane is inertial
-  const float* fastest;   ///< Output of FindLargestVelocities for `velocity`
+  const float* ease;  ///< Output of PrepareDifferences; null if no lane has a difference left
+  /// [joint][x y z][kBlock]: velocity of the difference pose; null if no lane is inertial
+  const float* velocity;
+  const float* fastest;        ///< Output of FindLargestVelocities for `velocity`
   const float* root_ease_m;    ///< [x y z][kBlock]: difference of the root position
   const float* root_ease_m_s;  ///< [x y z][kBlock]: velocity of that difference
   const float* fraction;       ///< GridSamples::fraction
@@ -146,19 +151,21 @@ struct PlantPosesJob {
   const float* plan;     ///< [kPackedPlanFloats][kBlock]: transposed PackedFootPlan of each lane
   const double* time_s;  ///< [kBlock]: time since the start of the movement
   const double* base_m;  ///< [x y z][kBlock]: base position of the movement
-  float* root_m;         ///< [x y z][kBlock]: in world space; changed
-  float* rotations;      ///< [joint][x y z w][kBlock]; hips, knees and ankles are changed
+  float* root_m;         ///< [x y z][kBlock]: root positions in world space; changed by planting
+  /// [joint][x y z w][kBlock]: rotations; those of hips, knees and ankles are changed
+  float* rotations;
 };
 /// Plants the feet of the first `count` lanes, as PlantFeet does. `rig` must be usable.
 void PlantPoses(const LegRig& rig, const PlantPosesJob& block, std::size_t count);
 
-/// One pose to plant in place.
+/// Arguments for planting the feet of one pose in place.
 struct PlantPoseJob {
   const float* plan = nullptr;  ///< PackedFootPlan
   double time_s = 0.0;          ///< Time since the start of the movement
   double base_m[3] = {};        ///< Base position of the movement
-  float* root_m = nullptr;      ///< [3]: in world space; changed
-  float* rotations = nullptr;   ///< [joint] x y z w; hips, knees and ankles are changed
+  float* root_m = nullptr;      ///< [3]: root position in world space; changed by planting
+  /// [joint] x y z w: rotations; those of hips, knees and ankles are changed
+  float* rotations = nullptr;
 };
 /// Plants the feet of one pose. The result has the same bytes as that of PlantPoses.
 void PlantPose(const LegRig& rig, const PlantPoseJob& job);

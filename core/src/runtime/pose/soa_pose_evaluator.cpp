@@ -177,7 +177,8 @@ void SoaPoseEvaluator::Work::CollectDifferences() {
   for (std::size_t i = 0; i < lanes; ++i) {
     const Movement& of = movement(i);
     is_inertial_lane.of[i] = 0.0f;
-    if (samples[0].is_eased[i] == 0.0f) continue;  // Later poses have no difference left either.
+    // Once a difference pose has faded out, later poses do not need it either.
+    if (samples[0].is_eased[i] == 0.0f) continue;
     is_eased = true;
     differences[i] = &of.difference.rotations[0].x;
     for (std::size_t c = 0; c < 3; ++c) {

@@ -13,10 +13,12 @@ namespace stridewire {
 /// evaluate several ticks at once. It then loads, blends and transposes the movement's data only
 /// once.
 struct SampleRun {
-  const Movement* movement = nullptr;  ///< If its feet are planted, FootPlan::packed is set.
-  double time_s = 0.0;                 ///< Time of the first pose; clamped to the movement.
-  double step_s = 0.0;                 ///< Length of a tick. Times are summed tick by tick.
-  int ticks_apart = 1;                 ///< Ticks between two poses.
+  /// Movement to evaluate. If its feet are planted, its FootPlan::packed must be set.
+  const Movement* movement = nullptr;
+  double time_s = 0.0;  ///< Time of the first pose; clamped to the movement.
+  /// Length of a tick in seconds. The times of poses are summed tick by tick.
+  double step_s = 0.0;
+  int ticks_apart = 1;  ///< Ticks between two poses.
 };
 
 /// Evaluates up to SoaPose::kLanes sample runs side by side, with difference poses and planted
@@ -55,9 +57,10 @@ class SoaPoseEvaluator {
 
 /// A request for a single pose of a movement.
 struct PoseJob {
-  const Movement* movement = nullptr;  ///< If its feet are planted, FootPlan::packed is set.
-  double time_s = 0.0;                 ///< Time of the pose; clamped to the movement.
-  Pose* pose = nullptr;                ///< Output.
+  /// Movement to evaluate. If its feet are planted, its FootPlan::packed must be set.
+  const Movement* movement = nullptr;
+  double time_s = 0.0;   ///< Time of the pose; clamped to the movement.
+  Pose* pose = nullptr;  ///< Output.
 };
 
 /// Evaluates single poses, up to SoaPose::kLanes at a time. Never allocates.

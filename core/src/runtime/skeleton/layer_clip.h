@@ -30,8 +30,8 @@ struct LayerClip {
   bool is_looping = false;
   /// Joints that the clip animates, in increasing order. Neither the root nor a joint of a leg.
   std::span<const int> joints;
-  std::span<const float> weights;    ///< [index in joints], in (0, 1].
-  std::span<const float> rotations;  ///< [frame][index in joints][x, y, z, w], local.
+  std::span<const float> weights;    ///< [index in joints]: weights in (0, 1].
+  std::span<const float> rotations;  ///< [frame][index in joints][x, y, z, w]: local rotations.
 
   [[nodiscard]] int frame_count() const {
     return static_cast<int>(rotations.size() / (4 * joints.size()));

@@ -32,16 +32,18 @@ struct LegRig {
   };
   /// A side and its offsets in flat arrays, for the planting kernels.
   struct Bones {
-    std::size_t count = 0;                   ///< Number of joints in the chain.
-    std::size_t joints[kMaxLegChain]{};      ///< [index in chain]
-    std::size_t rig_joints[kMaxLegChain]{};  ///< [index in chain]: indices in LegRig::joints.
-    float offsets_m[kMaxLegChain][3]{};  ///< [index in chain]: in the frame of the previous joint.
-    std::size_t hip = 0;                 ///< Indices in the chain.
+    std::size_t count = 0;               ///< Number of joints in the chain.
+    std::size_t joints[kMaxLegChain]{};  ///< [index in chain]
+    /// [index in chain]: index of the joint in LegRig::joints.
+    std::size_t rig_joints[kMaxLegChain]{};
+    /// [index in chain]: offset in the frame of the previous joint.
+    float offsets_m[kMaxLegChain][3]{};
+    std::size_t hip = 0;  ///< Indices in the chain.
     std::size_t knee = 0;
     std::size_t ankle = 0;
-    float ball_m[3]{};     ///< In the frame of the last joint.
-    float toe_tip_m[3]{};  ///< In the frame of the last joint.
-    float heel_m[3]{};     ///< In the frame of the ankle.
+    float ball_m[3]{};     ///< Position of the ball in the frame of the last joint.
+    float toe_tip_m[3]{};  ///< Position of the tip of the toes in the frame of the last joint.
+    float heel_m[3]{};     ///< Position of the heel in the frame of the ankle.
     float thigh_m = 0.0f;
     float shank_m = 0.0f;
     float ball_height_m = 0.0f;
@@ -51,7 +53,7 @@ struct LegRig {
   };
 
   std::array<Side, 2> sides;   ///< [foot]
-  std::array<Bones, 2> bones;  ///< [foot]; set if the rig is usable.
+  std::array<Bones, 2> bones;  ///< [foot]: bones of the leg; set if the rig is usable.
   static constexpr std::size_t kMaxJointsOfLegs = 2 * kMaxLegChain - 1;
   /// Joints of both chains, in increasing order, the root first. Set if usable.
   std::vector<int> joints;

@@ -15,7 +15,7 @@ class SoaPose {
   explicit SoaPose(int joint_count) : numbers_(3 + 4 * static_cast<std::size_t>(joint_count)) {}
 
   [[nodiscard]] std::size_t joint_count() const { return (numbers_.size() - 3) / 4; }
-  /// [x y z][kLanes], in world space.
+  /// [x y z][kLanes]: positions of the roots in world space.
   [[nodiscard]] float* roots_m() { return numbers_[0].of; }
   [[nodiscard]] const float* roots_m() const { return numbers_[0].of; }
   /// [joint][x y z w][kLanes].
@@ -30,7 +30,7 @@ class SoaPose {
   void Set(std::size_t lane, ConstPoseSpan pose);
 
  private:
-  // One cache line.
+  // A group of floats that fills one cache line.
   struct alignas(64) Numbers {
     float of[kLanes] = {};
   };

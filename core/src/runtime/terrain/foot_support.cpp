@@ -22,8 +22,8 @@ constexpr double kMaxSlope = 1.0;
 constexpr double kForgivenM = 0.005;
 
 struct SolePoint {
-  double side;     // Metres to the left of the ball.
-  double forward;  // Metres in front of the ball.
+  double side;     // Distance to the left of the ball, in metres.
+  double forward;  // Distance in front of the ball, in metres.
   double height;
   bool is_reached;
 };

@@ -69,7 +69,7 @@ void SolveFactored(const Matrix& factor, std::size_t rows, Vector& right) {
 // Solves for one Gauss-Newton step of the weights (see CorrectWeights).
 class WeightStep {
  public:
-  // `slopes` is J, [d][n], in metres.
+  // The argument `slopes` is J, [d][n], in metres.
   WeightStep(std::span<const double> weights, std::span<const double> slopes, std::size_t d)
       : weights_(weights), slopes_(slopes), n_(weights.size()), rows_(d + 1) {
     min_usage_ = kMinUsage * SumOfMagnitudes(weights) / static_cast<double>(n_);

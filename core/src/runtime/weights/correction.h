@@ -10,7 +10,7 @@
 
 namespace stridewire {
 
-/// When a correction stops.
+/// Conditions under which a correction stops.
 struct CorrectionLimits {
   int max_iterations = 3;
   double tolerance_m = 1e-5;  ///< Stop when the error is at most this.
@@ -26,8 +26,9 @@ inline constexpr double kMaxCorrectedWeightSum = 2.5;
 
 /// Result of a correction.
 struct Correction {
-  double error_m = 0.0;          ///< |p^ - a| as in LargestDifference; <= initial_error_m
-  double initial_error_m = 0.0;  ///< e(p^) = |p^ - a(p^)|: the error without correction
+  /// Error with correction: |p^ - a| as in LargestDifference; <= initial_error_m
+  double error_m = 0.0;
+  double initial_error_m = 0.0;  ///< Error without correction: e(p^) = |p^ - a(p^)|
   int iterations = 0;
 };
 

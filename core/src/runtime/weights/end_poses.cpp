@@ -102,7 +102,8 @@ void EndPoses::BlendEnd(const Movement& movement, bool is_end) {
             movement.weights.begin());
         blended = DQuat(GridLayout::RotationOf(rows + largest * row_floats, j));
         norm = std::sqrt(glm::dot(blended, blended));
-        link.per_norm = 0.0;  // This rotation does not depend on the weights smoothly.
+        // The derivative is 0, because this rotation does not depend smoothly on the weights.
+        link.per_norm = 0.0;
       }
       link.rotation = blended * (1.0 / norm);
       link.arm = arm;

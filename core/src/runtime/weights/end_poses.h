@@ -44,11 +44,11 @@ class EndPoses {
     DVec3 ball;  // The same vector in the axes of the parent.
   };
   struct End {
-    std::array<std::vector<Link>, 2> links;  // [foot], in the order of chains_.
+    std::array<std::vector<Link>, 2> links;  // [foot]: links in the order of chains_.
     DVec3 root_m;
     double sine = 0.0;  // Sine and cosine of the root's yaw.
     double cosine = 1.0;
-    std::array<DVec3, 2> arms_m;  // [foot]: from the root to the ball, in the base frame.
+    std::array<DVec3, 2> arms_m;  // [foot]: vector from the root to the ball, in the base frame.
     [[nodiscard]] DVec3 Ball(std::size_t foot) const { return root_m + arms_m[foot]; }
   };
   // Derivative of a measurement by the numbers in an example's row.
@@ -78,7 +78,8 @@ class EndPoses {
   const Skeleton& skeleton_;
   GridLayout layout_;
   const MotionGroup* group_ = nullptr;
-  std::array<std::vector<int>, 2> chains_;  // [foot]: from the ball's joint to the root.
+  // [foot]: joints from the joint of the ball to the root.
+  std::array<std::vector<int>, 2> chains_;
   double sign_ = 1.0;  // +1 if "left minus right" is "moving minus fixed", else -1.
   double heading_change_rad_ = 0.0;
   double sine_ = 0.0;  // Sine and cosine of heading_change_rad_.

@@ -35,7 +35,7 @@ class StickFigure {
 
  private:
   const Skeleton& skeleton_;
-  std::vector<int> sides_;  // Per joint and end site: 0 left, 1 right, 2 middle.
+  std::vector<int> sides_;  // Side of each joint and end site: 0 left, 1 right, 2 middle.
   std::array<std::string, 3> lines_;
 };
 

@@ -33,15 +33,16 @@ using RequestId = std::uint64_t;  ///< Chosen by the client. 0: a step that the 
 /// Sequence number of a command in its session: 1, 2, 3, ... (STATE_MACHINE.md, "Commands").
 using Seq = std::uint64_t;
 
-/// What a session may do in a world. Only controllers may command avatars.
+/// Permissions of a session in a world. Only controllers may command avatars.
 enum class Role : std::uint8_t { kController = 0, kObserver = 1 };
 /// Moving foot of a requested step. kAuto is the foot that did not move last.
 enum class FootChoice : std::uint8_t { kAuto = 0, kLeft = 1, kRight = 2 };
 /// When a request begins, and whether it replaces queued requests.
 enum class Interrupt : std::uint8_t {
-  kNone = 0,           ///< After all queued requests.
-  kAfterMovement = 1,  ///< After the current movement. Drops the queue; a stand or walk ends.
-  kNow = 2,            ///< As soon as the feet allow. Drops the queue.
+  kNone = 0,  ///< The request begins after all queued requests.
+  /// The request begins after the current movement. Drops the queue; a stand or walk ends.
+  kAfterMovement = 1,
+  kNow = 2,  ///< The request begins as soon as the feet allow it. Drops the queue.
 };
 /// A foot of an avatar.
 enum class FootSide : std::uint8_t { kLeft = 0, kRight = 1 };
@@ -60,13 +61,16 @@ struct Placement {
 /// First message of a connection.
 struct Hello {
   static constexpr MessageType kType = MessageType::kHello;
-  std::uint16_t protocol_min = kProtocolVersion;  ///< At least 1, at most protocol_max.
+  /// Lowest version that the client supports; at least 1, at most protocol_max.
+  std::uint16_t protocol_min = kProtocolVersion;
   std::uint16_t protocol_max = kProtocolVersion;
-  std::string client_name;  ///< For the server's log, 1 to kMaxNameBytes.
+  std::string client_name;  ///< Name of the client for the server's log, 1 to kMaxNameBytes.
   std::string auth_token;   ///< Secret that a server may require; may be empty.
   std::vector<std::byte>
-      resume_token;  ///< From Welcome, to resume a session. Empty: a new session.
-  std::uint64_t last_events_number = 0;  ///< When resuming: the last received Events::number.
+      /// Token from Welcome, to resume a session. Empty: the client requests a new session.
+      resume_token;
+  /// When resuming: number of the last received Events message.
+  std::uint64_t last_events_number = 0;
   bool operator==(const Hello&) const = default;
 };
 
@@ -89,7 +93,8 @@ struct LeaveWorld {
 
 /// An avatar to spawn.
 struct SpawnItem {
-  AvatarId avatar = 0;  ///< 0: the server chooses an id and returns it in the Reply.
+  /// Id of the new avatar. 0: the server chooses an id and returns it in the Reply.
+  AvatarId avatar = 0;
   Placement start;
   bool operator==(const SpawnItem&) const = default;
 };
@@ -115,7 +120,7 @@ struct Remove {
 /// Target of a foot in the world.
 struct Footprint {
   DVec3 position_m = DVec3(0.0);      ///< Position of the ball of the foot.
-  std::optional<double> heading_rad;  ///< Absent: the server chooses.
+  std::optional<double> heading_rad;  ///< Heading of the foot. Absent: the server chooses it.
   bool operator==(const Footprint&) const = default;
 };
 
@@ -155,7 +160,7 @@ struct WalkMovement {
   DVec3 position_m = DVec3(0.0);   ///< Destination of the base frame. The terrain gives its height.
   double heading_rad = 0.0;        ///< Heading of the base frame at the destination.
   std::vector<DVec3> waypoints_m;  ///< Positions to pass, in this order; at most kMaxWaypoints.
-  std::optional<double> speed_m_s;  ///< Absent: the server chooses.
+  std::optional<double> speed_m_s;  ///< Walking speed. Absent: the server chooses it.
   bool operator==(const WalkMovement&) const = default;
 };
 
@@ -200,7 +205,7 @@ struct HeightFieldInfo {
   double cell_m = 0.0;           ///< Distance between neighbouring samples.
   std::uint16_t columns = 0;     ///< Number of samples along x, 2 to kMaxTerrainColumns.
   std::uint16_t rows = 0;        ///< Number of samples along z, 2 to kMaxTerrainColumns.
-  std::vector<float> heights_m;  ///< columns * rows heights; x varies fastest.
+  std::vector<float> heights_m;  ///< Heights of columns * rows samples; x varies fastest.
   bool operator==(const HeightFieldInfo&) const = default;
 };
 
@@ -225,16 +230,16 @@ struct SetTerrain {
   static constexpr MessageType kType = MessageType::kSetTerrain;
   Seq seq = 0;
   WorldId world = 0;
-  std::optional<TerrainInfo> terrain;  ///< Absent: flat at y = 0.
+  std::optional<TerrainInfo> terrain;  ///< The new terrain. Absent: flat at y = 0.
   bool operator==(const SetTerrain&) const = default;
 };
 
 /// Starts, changes or ends a layer of an avatar. The server checks the ranges item by item.
 struct LayerItem {
   AvatarId avatar = 0;    ///< Not 0.
-  std::string layer;      ///< One of WorldInfo::layers, 1 to kMaxNameBytes.
+  std::string layer;      ///< Name of the layer, one of WorldInfo::layers; 1 to kMaxNameBytes.
   bool fade_out = false;  ///< Fades the layer out and ends it. `weight` and `speed` are ignored.
-  double weight = 1.0;    ///< Above 0, at most 1.
+  double weight = 1.0;    ///< Weight of the layer, above 0 and at most 1.
   double blend_s = 0.3;   ///< Time until weight and speed reach their new values, 0 to 10.
   double speed = 1.0;     ///< Playback speed, 0.1 to 4. 1 plays as recorded.
   bool operator==(const LayerItem&) const = default;
@@ -272,10 +277,13 @@ struct RateRing {
 /// leaves at a distance of `radius_m` + `leave_m`.
 struct Region {
   GroundPoint centre_m;
-  double radius_m = 0.0;          ///< Above 0.
-  std::optional<double> leave_m;  ///< At least 0. Absent: the server chooses.
+  double radius_m = 0.0;  ///< Above 0.
+  /// Additional radius at which avatars leave, at least 0. Absent: the server chooses it.
+  std::optional<double> leave_m;
   std::vector<RateRing>
-      rings;  ///< At most kMaxRateRings. Beyond them Observe::every_n_ticks applies.
+      /// Rings from the inside out, at most kMaxRateRings. Beyond them Observe::every_n_ticks
+      /// applies.
+      rings;
   /// Detail of each ring, or empty to use Observe::detail everywhere. Needs PoseMode::kQuantised.
   std::vector<PoseDetail> ring_details;
   bool operator==(const Region&) const = default;
@@ -287,7 +295,7 @@ struct Observe {
   Seq seq = 0;
   WorldId world = 0;
   SubscriptionId subscription = 0;  ///< Not 0.
-  PoseMode mode = PoseMode::kFull;  ///< One of kFull, kQuantised and kMovement.
+  PoseMode mode = PoseMode::kFull;  ///< Requested mode: kFull, kQuantised or kMovement.
   /// Ids to observe, also of avatars that do not exist yet. Empty: all avatars.
   std::vector<AvatarId> avatars;
   std::uint16_t every_n_ticks = 1;  ///< 1 to kMaxEveryNTicks
@@ -323,7 +331,8 @@ struct FetchLibrary {
   std::uint64_t nonce = 0;   ///< LibraryPiece repeats it.
   std::string hash;          ///< WorldInfo::library_hash
   std::uint64_t offset = 0;  ///< Position in the file, in bytes.
-  std::uint32_t length = 0;  ///< 1 to kMaxPieceBytes. The server may send fewer bytes.
+  /// Requested number of bytes, 1 to kMaxPieceBytes. The server may send fewer.
+  std::uint32_t length = 0;
   bool operator==(const FetchLibrary&) const = default;
 };
 
@@ -373,7 +382,7 @@ struct Welcome {
   std::uint64_t session = 0;                  ///< Not 0.
   /// Secret with which Hello resumes the session after a lost connection.
   std::vector<std::byte> resume_token;
-  bool resumed = false;  ///< False: the session is new.
+  bool resumed = false;  ///< True if the previous session continues, false if the session is new.
   /// Last command that the server has accepted; 0 for a new session.
   Seq last_seq = 0;
   double tick_hz = 60.0;  ///< Above 0.
@@ -441,7 +450,7 @@ struct WorldInfo {
 struct ReplyItem {
   std::uint32_t index = 0;  ///< Index in the command's list of items or avatars.
   AvatarId avatar = 0;
-  RequestId request_id = 0;  ///< Only in the Reply to a Request.
+  RequestId request_id = 0;  ///< Id of the request. Only in the Reply to a Request.
   StatusCode code = StatusCode::kOk;
   std::string text;
   bool operator==(const ReplyItem&) const = default;
@@ -478,7 +487,7 @@ struct PoseBatchInfo {
   std::uint16_t parts = 1;
   std::uint64_t tick = 0;
   double server_time_s = 0.0;       ///< Server time of the tick.
-  PoseMode mode = PoseMode::kFull;  ///< One of kFull, kQuantised and the compact modes.
+  PoseMode mode = PoseMode::kFull;  ///< Mode of the poses: kFull, kQuantised or a compact mode.
   std::uint16_t joint_count = 0;    ///< 1 to kMaxJoints
   bool is_partial = false;          ///< True if an avatar that is not in the batch may still exist.
   bool operator==(const PoseBatchInfo&) const = default;
@@ -490,9 +499,10 @@ struct PoseBatchInfo {
 struct PoseBatch {
   static constexpr MessageType kType = MessageType::kPoseBatch;
   PoseBatchInfo info;
-  std::span<const AvatarId> avatars;    ///< 0 to kMaxItems ids, none of them 0.
-  std::span<const std::uint8_t> flags;  ///< One per avatar.
-  std::span<const std::byte> poses;     ///< One pose after the other; see PoseBatchReader.
+  std::span<const AvatarId> avatars;    ///< Ids of the avatars, at most kMaxItems, none of them 0.
+  std::span<const std::uint8_t> flags;  ///< Flags of each avatar.
+  /// Encoded poses, one after the other; see PoseBatchReader.
+  std::span<const std::byte> poses;
 
   /// Bytes of the i-th pose of a full or quantised batch.
   [[nodiscard]] std::span<const std::byte> pose(std::size_t i) const {
@@ -516,7 +526,7 @@ enum class EventType : std::uint8_t {
   kSpawned = 6,     ///< base
   kRemoved = 7,
   kEntered = 8,  ///< The avatar has entered the region that this session observes.
-  kLeft = 9,     ///< The avatar has left that region or the world.
+  kLeft = 9,     ///< The avatar has left the observed region or the world.
 };
 
 /// Parameters of a movement. The names are 0 start_x_m, 1 start_y_m, 2 start_z_m, 3 end_x_m,
@@ -532,7 +542,7 @@ struct ParameterSet {
 struct Event {
   EventType type = EventType::kAccepted;
   AvatarId avatar = 0;
-  RequestId request_id = 0;  ///< 0: a step that the server inserted.
+  RequestId request_id = 0;  ///< Id of the request. 0: a step that the server inserted.
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
   std::uint64_t tick = 0;
@@ -599,7 +609,7 @@ struct Landing {
 
 /// A layer that an avatar plays.
 struct PlayingLayer {
-  std::string layer;       ///< One of WorldInfo::layers.
+  std::string layer;       ///< Name of the layer, one of WorldInfo::layers.
   double weight = 0.0;     ///< Current weight.
   double time_s = 0.0;     ///< Position in the clip in seconds.
   double speed = 1.0;      ///< Current playback speed.
@@ -612,8 +622,9 @@ struct CurrentMovement {
   RequestId request_id = 0;
   MovementKind kind = MovementKind::kStand;
   std::int16_t group = -1;
-  double started_s = 0.0;          ///< Server time of the start.
-  std::vector<double> keytimes_s;  ///< Relative to the start; the first is 0. At most kMaxKeytimes.
+  double started_s = 0.0;  ///< Server time of the start.
+  /// Keytimes relative to the start; the first is 0. At most kMaxKeytimes.
+  std::vector<double> keytimes_s;
   /// Generic time, 0 to the number of keytimes - 1 (paper, Eq. (3)).
   double generic_time = 0.0;
   /// Time after the start at which the difference pose has faded out.
@@ -658,7 +669,7 @@ struct AvatarState {
 struct WorldTerrain {
   static constexpr MessageType kType = MessageType::kWorldTerrain;
   WorldId world = 0;
-  std::optional<TerrainInfo> terrain;  ///< Absent: flat at y = 0.
+  std::optional<TerrainInfo> terrain;  ///< The terrain. Absent: flat at y = 0.
   bool operator==(const WorldTerrain&) const = default;
 };
 
@@ -674,16 +685,17 @@ struct Movements {
   static constexpr MessageType kType = MessageType::kMovements;
   WorldId world = 0;
   std::uint16_t shard = 0;
-  std::uint16_t part = 0;        ///< Below `parts`.
-  std::uint16_t parts = 1;       ///< Number of messages that contain the changes of this step.
-  std::uint16_t more_steps = 0;  ///< Steps that follow before the poses of `tick` are displayed.
-  std::uint64_t step = 0;        ///< Step number of the shard. A gap makes all its avatars unknown.
+  std::uint16_t part = 0;   ///< Below `parts`.
+  std::uint16_t parts = 1;  ///< Number of messages that contain the changes of this step.
+  /// Number of steps that follow before the poses of `tick` are displayed.
+  std::uint16_t more_steps = 0;
+  std::uint64_t step = 0;  ///< Step number of the shard. A gap makes all its avatars unknown.
   std::uint64_t tick = 0;
   double server_time_s = 0.0;  ///< Server time of the tick.
   /// True: the records are states after `step`. False: the records are changes in `step`.
   bool states = false;
-  std::vector<AvatarId> avatars;    ///< 0 to kMaxItems ids, none of them 0.
-  std::vector<std::uint8_t> flags;  ///< One per avatar.
+  std::vector<AvatarId> avatars;    ///< Ids of the avatars, at most kMaxItems, none of them 0.
+  std::vector<std::uint8_t> flags;  ///< Flags of each avatar.
   std::vector<std::uint32_t> ends;  ///< End of each avatar's record in `records`, in bytes.
   std::vector<std::byte> records;
   bool operator==(const Movements&) const = default;

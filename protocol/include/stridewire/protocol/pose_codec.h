@@ -11,9 +11,10 @@ namespace stridewire::protocol {
 
 /// Layouts of poses on the wire.
 enum class PoseMode : std::uint8_t {
-  kFull = 0,       ///< float32 root position (x, y, z) and float32 quaternions (x, y, z, w).
-  kQuantised = 1,  ///< Root as 3 x int32 in fixed point; 48 bits per joint ("smallest three").
-  kMovement = 2,   ///< Movement records instead of poses (Movements).
+  kFull = 0,  ///< Root position (x, y, z) and quaternions (x, y, z, w) as float32.
+  /// Root position as 3 x int32 in fixed point; 48 bits per rotation ("smallest three").
+  kQuantised = 1,
+  kMovement = 2,  ///< Movement records instead of poses (Movements).
   /// The joints have as many bits as the library requires (compact_codec.h). The server sends this
   /// mode, kCompactReduced and kCompactRoot to subscriptions of kQuantised. A client cannot request
   /// these three modes.
@@ -25,7 +26,7 @@ enum class PoseMode : std::uint8_t {
 /// Which joints a compact pose contains. Omitted joints are decoded to their reference rotations.
 enum class PoseDetail : std::uint8_t {
   kAll = 0,
-  kReduced = 1,  ///< The joints in WorldInfo::reduced_joints.
+  kReduced = 1,  ///< The root joint only.
   kRoot = 2,     ///< The root only.
 };
 

@@ -68,7 +68,7 @@ class PoseRows {
   std::size_t pose_count_ = 0;
 
   std::span<std::byte> Room(std::size_t begin, std::size_t length);
-  const CompactCodec* codec_ = nullptr;  // Not null in compact modes
+  const CompactCodec* codec_ = nullptr;  // Codec of the poses; not null in compact modes
   CompactCodec::Block block_;
 };
 

@@ -9,12 +9,12 @@ namespace stridewire::protocol {
 /// codes, so a receiver treats an unknown code by its hundreds.
 enum class StatusCode : std::uint16_t {
   kOk = 0,
-  // 100 to 199: the caller made an invalid request.
+  // Codes 100 to 199: the caller made an invalid request.
   kInvalidArgument = 100,
   kOutOfRange = 101,
   kUnsupported = 102,
   kVersionMismatch = 103,
-  kUnauthorised = 104,  ///< The auth token is missing or not sufficient.
+  kUnauthorised = 104,  ///< The auth token is missing or does not grant enough rights.
   kNotAllowed = 105,    ///< Only a controller may send this command.
   kNotJoined = 106,
   kNoSuchWorld = 107,
@@ -28,13 +28,13 @@ enum class StatusCode : std::uint16_t {
   kForgotten = 113,
   kUnexpectedMessage = 114,  ///< The state of the session does not allow the message.
   kAlreadyJoined = 115,
-  // 200 to 299: the data is invalid.
+  // Codes 200 to 299: the data is invalid.
   kMalformed = 200,   ///< The bytes violate the standard.
   kNoMovement = 201,  ///< The library has no such movement or layer.
-  // 300 to 399: the network failed.
+  // Codes 300 to 399: the network failed.
   kTimeout = 300,  ///< Nothing was received for longer than the timeout.
   kTooSlow = 301,  ///< The peer does not read fast enough.
-  // 400 to 499: the server failed.
+  // Codes 400 to 499: the server failed.
   kLimitReached = 400,
   kQueueFull = 401,
   kShuttingDown = 402,
