@@ -127,8 +127,8 @@ Status Terrain::IndexBoxes() {
     bounds_.min = {std::min(bounds_.min.x, box.min_m.x), std::min(bounds_.min.z, box.min_m.z)};
     bounds_.max = {std::max(bounds_.max.x, box.max_m.x), std::max(bounds_.max.z, box.max_m.z)};
   }
-  // Start with nearly square cells, about as many as there are boxes. Halve them while the fullest
-  // cell gets emptier.
+  // Start with nearly square cells, one per box on average. Halve them while the fullest cell gets
+  // emptier.
   const double width = std::max(bounds_.max.x - bounds_.min.x, kMinIndexedM);
   const double depth = std::max(bounds_.max.z - bounds_.min.z, kMinIndexedM);
   double cell = std::sqrt(width * depth / static_cast<double>(data_.boxes.size()));
