@@ -1,14 +1,13 @@
 """Phrases that the project's prose avoids; see "Language" in CONTRIBUTING.md.
 
-The patterns hit twice in 18,568 comments, sentences and strings of Box2D, ozz-animation and
-meshoptimizer.
+They hit twice in 18,568 comments, sentences and strings of Box2D, ozz-animation and meshoptimizer.
 """
 import re
 
 # Parts of the pattern for `3 bytes a pose`, which is written "3 bytes per pose".
 NUMBER = (
     r'(?:\d[\d,.]*(?:\s*(?:to|-|–|and|or|%)\s*\d[\d,.]*)?|one|two|three|four|five|six|seven|eight|'
-    r'nine|ten|twelve|sixteen|few|fewer|several|many|more|most|least|how many|how much|some|'
+    r'nine|ten|twelve|sixteen|few|fewer|several|many|more|most|least|some|how (?:many|much)|'
     r'thousand|million|hundred)')
 UNIT = (
     r'(?:bytes?|bits?|[kKMG]i?B|ns|us|µs|μs|ms|mm|cm|m|seconds?|minutes?|cycles?|instructions?|'
@@ -48,7 +47,7 @@ PATTERNS = {name: re.compile(pattern, re.I) for name, pattern in {
         r'\bas many (?:[\w-]+ ){1,6}as (?:may|might|wait|will)\b',
     '"anew" instead of "again"': r'\banew\b',
     '"till" instead of "until"': r'\btill\b',
-    '"such as" without an example': r'\bnot such as\b|\b(?:is|are|was|were|be|been|ones?) such as\b',
+    '"such as" without an example': r'\b(?:not|is|are|was|were|be|been|ones?) such as\b',
     '"work out" instead of "compute"':
         r'\bworked out\b|\bwork(?:s|ing)? (?:\w+ )?out (?:the|a|an|what|how|which|where|its|their|'
         r'it|them|all|every|each)\b|\bwork(?:s|ing)? (?:it|them|this|that) out\b',

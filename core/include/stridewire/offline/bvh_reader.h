@@ -14,8 +14,8 @@
 
 namespace stridewire {
 
-/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y up,
-/// facing +Z at identity rotations.
+/// A whole recording, read from a file and converted to the conventions of base/math.h: metres, +Y
+/// up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< As the caller gave it.
   Skeleton skeleton;  ///< With both legs identified.
