@@ -47,7 +47,10 @@ HTML_TEXT = re.compile(
 
 
 def files(root):
-    """Files of a checkout that git does not ignore, or all files of another folder, sorted."""
+    """Lists the files of a checkout that git does not ignore, sorted.
+
+    Without git, lists all files that are not in `build`.
+    """
     listing = subprocess.run(
         ['git', '-C', root, 'ls-files', '-z', '--cached', '--others', '--exclude-standard'],
         capture_output=True, text=True)
@@ -56,6 +59,7 @@ def files(root):
     else:
         found = [os.path.relpath(os.path.join(folder, name), root)
                  for folder, _, names in os.walk(root) for name in names]
+        found = [path for path in found if not path.startswith(('build/', '.git/'))]
     return sorted({path for path in found
                    if os.path.isfile(os.path.join(root, path)) and not EXCLUDED.search(path)})
 
