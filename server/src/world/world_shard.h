@@ -66,8 +66,8 @@ class WorldShard {
   [[nodiscard]] std::shared_ptr<const std::vector<protocol::Event>> TakeEvents();
 
   /// Encodes the poses of `tick` in `mode`: of all avatars, with a complete batch, if `all` is
-  /// true; otherwise of selected avatars and regions. Returns false if no observer needs the
-  /// delivery, because it has no poses and the previous one had none either.
+  /// true; otherwise of selected avatars and regions. Returns false if nobody needs the delivery,
+  /// because it has no poses and the previous one had none either.
   [[nodiscard]] bool Encode(protocol::PoseMode mode, std::uint64_t tick, bool all,
                             protocol::PoseBatchComposer& composer, PoseDelivery& delivery);
 

@@ -68,10 +68,10 @@ extern "C" {
 /// Maximum number of rings of a region.
 #define STRIDEWIRE_MAX_RATE_RINGS 4
 
-/// Result of a call or command. The hundreds stand for the party that can act: 1xx the caller, 2xx
-/// the author of the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also
-/// occur in the protocol, codes x50 to x99 only in this library. Future versions may add codes, so
-/// handle an unknown code by its hundreds.
+/// Result of a call or command. The hundreds tell who can act: 1xx the caller, 2xx the author of
+/// the data, 3xx the network, 4xx the operator of the server. Codes x00 to x49 also occur in the
+/// protocol, codes x50 to x99 only in this library. Future versions may add codes, so handle an
+/// unknown code by its hundreds.
 ///
 /// The _MAX enumerator of this and other enums only fixes the size of the type. It is not a value.
 typedef enum stridewire_status {

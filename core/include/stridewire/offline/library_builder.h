@@ -16,14 +16,14 @@ namespace stridewire {
 /// Which of the extracted examples LibraryBuilder keeps.
 struct SelectionOptions {
   /// Upper bound on the error of a step that is left out: the mean distance between its joints and
-  /// those of the step blended from the kept examples, at equal generic times. It also bounds the
-  /// distance of the step's parameters from the hull of the kept examples, grown by 10 %. Unit:
-  /// metres; one radian counts as 0.5 m. 0 keeps every step.
+  /// those of the step blended from the kept examples, at equal generic times. It also bounds how far
+  /// the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres; one
+  /// radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
   /// A step is an outlier if its pose or duration differs from what all other steps predict for its
   /// parameters by this many deviations (1.4826 MAD) more than usual. Only steps inside the hull of
-  /// the others are tested, because steps at the edge of the hull are rare, not wrong. Groups have
-  /// at least eight steps, and at most one step in ten is removed. 0 disables the test.
+  /// the others are tested, in groups of at least eight, and at most one in ten is removed: steps at
+  /// the edge of the hull are rare, not wrong. 0 disables the test.
   double outlier_deviations = 0.0;
 };
 

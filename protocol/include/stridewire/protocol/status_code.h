@@ -5,8 +5,8 @@
 
 namespace stridewire::protocol {
 
-/// Result of a command. The hundreds stand for the party that can act. Future versions may add
-/// codes, so a receiver treats an unknown code by its hundreds.
+/// Result of a command. The hundreds tell who can act. Future versions may add codes, so a receiver
+/// treats an unknown code by its hundreds.
 enum class StatusCode : std::uint16_t {
   kOk = 0,
   // 100 to 199: the caller made an invalid request.
