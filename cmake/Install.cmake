@@ -1,5 +1,5 @@
-# `cmake --install` installs the libraries, their headers, the programs and the package files with which
-# find_package(stridewire) provides stridewire::core, ::offline, ::protocol and ::client.
+# `cmake --install` installs the libraries, their headers, the programs and the package files, with
+# which find_package(stridewire) provides stridewire::core, ::offline, ::protocol and ::client.
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/stridewire)

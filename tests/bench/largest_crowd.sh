@@ -32,7 +32,10 @@ while [[ $# -gt 0 ]]; do
       [[ $# -ge 2 && $2 =~ ^[1-9][0-9]*$ ]] || bad_usage "$1 needs a whole number above 0"
       declare "${1#--}=$2"
       shift 2 ;;
-    --fail-if) [[ $# -ge 2 ]] || bad_usage "$1 needs a value"; fail_ifs+=(--fail-if "$2"); shift 2 ;;
+    --fail-if)
+      [[ $# -ge 2 ]] || bad_usage "$1 needs a value"
+      fail_ifs+=(--fail-if "$2")
+      shift 2 ;;
     --bin) [[ $# -ge 2 ]] || bad_usage "$1 needs a value"; bin=$2; shift 2 ;;
     -h | --help) usage; exit 0 ;;
     --) shift; more=("$@"); break ;;

@@ -276,7 +276,7 @@ double ThreadTimeS() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Two an observer.
+// Raises the limit of open files: each observer needs two sockets.
 bool AllowSockets(std::size_t count) {
   rlimit files{};
   if (getrlimit(RLIMIT_NOFILE, &files) != 0) return false;
@@ -323,7 +323,7 @@ void Observe(benchmark::State& state, const std::shared_ptr<const Crowd>& crowd,
   const auto write_all = [&] {
     for (Writer& writer : writers) writer.Write();
   };
-  // Who enters a region is told of in the first tick; windows open in some.
+  // The first tick reports the avatars that enter a region; in later ticks windows open.
   for (int tick = 0; tick < 8; ++tick) {
     if (way != Through::kFloor) host.Tick(crowd->delivery);
     for (std::size_t i = 0; i < writers.size(); ++i) writers[i].Begin(all_wanted[i].frames);

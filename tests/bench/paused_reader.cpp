@@ -1,6 +1,8 @@
-// paused_reader STRIDEWIRED [SECONDS [AVATARS [WRITE_TIMEOUT_S]]]: what a WebSocket client that stops reading
-// for a while costs the server, and what it gets when it reads again. Prints one figure a line; 1: the
-// server kept more than it may, or gave no fresh pose.
+// paused_reader STRIDEWIRED [SECONDS [AVATARS [WRITE_TIMEOUT_S]]]
+//
+// Measures the memory that the server needs for a WebSocket client that stops reading for a while,
+// and what the client receives when it reads again. Prints one figure per line. The exit code is 1
+// if the server buffered more than its limit allows, or sent no recent pose.
 #include <unistd.h>
 
 #include <cstdio>
@@ -19,7 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using test::PortIn;
 
-// Resident memory of a process in KiB, as the system tells it; of a child by its parent's list.
+// Returns the resident memory of a process in KiB.
 std::size_t ResidentKiB(const std::string& pid) {
   std::ifstream status("/proc/" + pid + "/status");
   std::string line;

@@ -6,9 +6,11 @@
 
 namespace stridewire {
 
-/// The straight steps of the generated library with another number of examples a foot (at least 4) or of joints (at least
-/// as many as it has), for benchmarks of what either costs. More examples are blends of those there are; joints more are
-/// chains of ten on the first joint's head that turn as others do. Aborts if the builder refuses.
+/// Returns a library with the straight steps of the generated library, but with `examples` examples
+/// per foot (at least 4) and `joints` joints (at least those of the generated library). Benchmarks
+/// use it to measure the cost of either. Additional examples are blends of the existing ones.
+/// Additional joints are chains of ten joints on the head, which rotate like existing joints.
+/// Aborts if the builder reports an error.
 [[nodiscard]] std::shared_ptr<const MotionLibrary> MakeScaledLibrary(int examples, int joints);
 
 }  // namespace stridewire

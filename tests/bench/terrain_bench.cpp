@@ -1,5 +1,5 @@
-// What the ground costs: queries over rough ground with slabs on it, and the largest terrain there may
-// be, from its message to its index. stridewire-bench --benchmark_filter=terrain
+// Measures queries of a rough height field with slabs on it, and the time to decode and index the
+// largest terrain that is allowed. stridewire-bench --benchmark_filter=terrain
 #include <benchmark/benchmark.h>
 
 #include <memory>

@@ -2,7 +2,7 @@
 # docs/PAPER_MAP.md names in `backquotes` is there.
 #
 #   a/b.h          a file, from the root, core/include/stridewire or core/src
-#   Suite.Name     a GoogleTest test, with or without what it is instantiated for, or one that ctest alone knows
+#   Suite.Name     a GoogleTest test, with or without an instantiation prefix, or a test of ctest
 #   Name() Name    what one of the files of the same line has
 cmake_minimum_required(VERSION 3.25)
 
@@ -66,6 +66,7 @@ foreach(line IN LISTS lines)
   endforeach()
 endforeach()
 if(checked LESS 100)
-  message(SEND_ERROR "only ${checked} names found on docs/PAPER_MAP.md: the page or this check is broken")
+  message(SEND_ERROR "only ${checked} names found on docs/PAPER_MAP.md, expected at least 100: "
+                     "the page or this check is broken")
 endif()
 message(STATUS "${checked} names checked")

@@ -120,7 +120,8 @@ export class AvatarCommands {
     this.playingLayers.set(world, playing);
     this.host.goLive();
     ++this.recentToggles;
-    void world.setLayers(avatars.map((avatar) => ({avatar, layer, enabled: !off}))).then((reply) => {
+    const commands = avatars.map((avatar) => ({avatar, layer, enabled: !off}));
+    void world.setLayers(commands).then((reply) => {
       if (!reply.ok || reply.accepted === 0) {
         this.notifyRefused(reply);
         return;

@@ -35,7 +35,7 @@ class MovementFeed {
   /// True if the client receives every step unchanged.
   [[nodiscard]] bool covers_all() const { return covers_all_; }
   /// Returns the part of `step` that concerns the selected avatars. Also reports avatars that are
-  /// not selected any more as gone: as many as fit into `max_bytes`, the others with the next step.
+  /// not selected any more as gone, up to `max_bytes`. The rest are reported with the next step.
   [[nodiscard]] protocol::Movements Select(const protocol::Movements& step, std::size_t max_bytes);
 
   /// Movements were dropped, so the client has no valid avatars.

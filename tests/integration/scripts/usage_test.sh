@@ -16,7 +16,7 @@ for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/bench/lar
   message=$("$script" --no-such-option 2>&1 >/dev/null) || result=$?
   [[ $result -eq 2 ]] || complain "$script --no-such-option ended with $result, not 2"
   [[ $message == *--no-such-option* ]] || complain "$script does not name the option: $message"
-  [[ $(wc -l <<<"$message") -eq 1 ]] || complain "$script needs more than a line to refuse: $message"
+  [[ $(wc -l <<<"$message") -eq 1 ]] || complain "$script printed more than one line: $message"
 done
 
 # An option without its value, and values that make no sense.

@@ -54,12 +54,13 @@ inline constexpr float kRootStepsPerM = 16384.0f;
 /// Largest coordinate of a quantised root position in metres.
 inline constexpr float kMaxRootM = 131'071.0f;
 
-/// Largest error of a quantised rotation in radians; a component is off by at most 2.2e-5.
+/// Largest error of a quantised rotation in radians. The error of a component is at most 2.2e-5.
 ///
-/// A joint is encoded as three little-endian u16. The largest component is dropped (of equal ones
-/// the lowest index), after negating the quaternion if that component is negative. Each other
-/// component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so that 0 is exact. Bit 15
-/// of the first and second word are bits 0 and 1 of the dropped index; bit 15 of the third is 0.
+/// Each joint is encoded as three little-endian u16. The largest component is dropped (of equal
+/// ones, the one with the lowest index), after negating the quaternion if that component is
+/// negative. Each other component c becomes floor(c sqrt(2) 16383 + 16384.5) in bits 0 to 14, so
+/// that 0 is exact. Bit 15 of the first and second word are bits 0 and 1 of the dropped index; bit
+/// 15 of the third is 0.
 inline constexpr double kMaxQuantisedAngleRad = 1.6e-4;
 
 /// Largest deviation of a quaternion's length from 1.
