@@ -36,10 +36,11 @@ class PoseHistory {
   /// Returns the index of the oldest pose with a tick above `tick`, if any.
   [[nodiscard]] std::optional<std::size_t> FirstAfterTick(std::uint64_t tick) const;
 
-  /// How Sample computed a pose.
+  /// Describes how Sample computed a pose.
   struct Sampled {
-    std::size_t index = 0;      ///< Index of the newest pose at or before the sampled time.
-    bool interpolated = false;  ///< False if pose `index` is returned unchanged.
+    std::size_t index = 0;  ///< Index of the newest pose at or before the sampled time.
+    /// True if the pose was interpolated, false if pose `index` is returned unchanged.
+    bool interpolated = false;
   };
 
   /// Computes the pose at `time_s` by cubic Hermite interpolation, which is continuous in its first

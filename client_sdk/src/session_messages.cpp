@@ -176,7 +176,7 @@ void Session::Handle(const protocol::WorldInfo& message, double now_s) {
     if (command == unanswered_.end()) return;
     if (!std::holds_alternative<protocol::JoinWorld>(command->second.message)) {
       return LoseConnection(STRIDEWIRE_PROTOCOL_ERROR,
-                            "the server sent WorldInfo for a command that is no JoinWorld", now_s);
+                            "the server sent WorldInfo for a command other than JoinWorld", now_s);
     }
     world = &worlds_.at(command->second.world);
   } else {

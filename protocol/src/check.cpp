@@ -132,7 +132,7 @@ void CheckRequestItem(Findings& found, const RequestItem& item, std::int64_t ind
       found.FiniteVector(step->at->position_m, "Request.at_m", index);
       found.Finite(step->at->heading_rad.value_or(0.0), "Request.heading_rad", index);
     }
-    found.That(step->at || !step->exact_only, ErrorCode::kMalformed, "must_be_met without at_m",
+    found.That(step->at || !step->exact_only, ErrorCode::kMalformed, "must_be_met requires at_m",
                "Request.at_m", index);
   } else if (const auto* jump = std::get_if<JumpMovement>(&item.movement)) {
     found.Finite(jump->length_m, "Request.length_m", index);
@@ -272,7 +272,7 @@ void CheckSkeleton(Findings& found, const SkeletonInfo& skeleton) {
 Status Check(const Hello& m) {
   Findings found;
   found.That(m.protocol_min >= 1 && m.protocol_min <= m.protocol_max, ErrorCode::kOutOfRange,
-             "versions are not 1 <= min <= max", "Hello.protocol_min", m.protocol_min);
+             "expected 1 <= protocol_min <= protocol_max", "Hello.protocol_min", m.protocol_min);
   found.Name(m.client_name, "Hello.client_name");
   found.Text(m.auth_token, kMaxAuthTokenBytes, "Hello.auth_token");
   found.ResumeToken(m.resume_token.size(), "Hello.resume_token");
@@ -336,7 +336,7 @@ namespace {
 
 void CheckRegion(Findings& found, const Observe& m) {
   const Region& region = *m.region;
-  found.That(m.avatars.empty(), ErrorCode::kMalformed, "a region excludes a list of avatars",
+  found.That(m.avatars.empty(), ErrorCode::kMalformed, "avatars must be empty if a region is given",
              "Observe.avatars");
   found.Finite(region.centre_m.x, "Region.centre_m");
   found.Finite(region.centre_m.z, "Region.centre_m");
@@ -350,18 +350,18 @@ void CheckRegion(Findings& found, const Observe& m) {
     const auto index = static_cast<std::int64_t>(i);
     found.Finite(ring.to_m, "RateRing.to_m", index);
     found.That(ring.to_m > before_m, ErrorCode::kOutOfRange,
-               "not above the radius of the previous ring", "RateRing.to_m", index);
+               "expected a radius above that of the previous ring", "RateRing.to_m", index);
     found.That(ring.every_n_ticks >= 1 && ring.every_n_ticks <= kMaxEveryNTicks,
-               ErrorCode::kOutOfRange, "not 1 to 3600 ticks", "RateRing.every_n_ticks", index);
+               ErrorCode::kOutOfRange, "expected 1 to 3600 ticks", "RateRing.every_n_ticks", index);
     before_m = ring.to_m;
   }
   const std::vector<PoseDetail>& details = region.ring_details;
   if (details.empty()) return;
   found.That(details.size() == region.rings.size(), ErrorCode::kMalformed,
-             "not one detail per ring", "Region.ring_details",
+             "expected one detail per ring", "Region.ring_details",
              static_cast<std::int64_t>(details.size()));
   found.That(m.mode == PoseMode::kQuantised, ErrorCode::kUnsupported,
-             "levels of detail need mode 1 (quantised)", "Region.ring_details");
+             "levels of detail require mode 1 (quantised)", "Region.ring_details");
   for (std::size_t i = 0; i < details.size(); ++i) {
     found.Known(details[i], PoseDetail::kRoot, "Region.ring_details", static_cast<std::int64_t>(i));
   }
@@ -377,12 +377,13 @@ Status Check(const Observe& m) {
   found.Known(m.mode, PoseMode::kMovement, "Observe.mode");
   found.Avatars(m.avatars, 0, "Observe.avatars");
   found.That(m.every_n_ticks >= 1 && m.every_n_ticks <= kMaxEveryNTicks, ErrorCode::kOutOfRange,
-             "not 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
-  found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed, "replace without a region",
+             "expected 1 to 3600 ticks", "Observe.every_n_ticks", m.every_n_ticks);
+  found.That(m.region.has_value() || !m.replace, ErrorCode::kMalformed, "replace requires a region",
              "Observe.replace");
   found.Known(m.detail, PoseDetail::kRoot, "Observe.detail");
   found.That(m.detail == PoseDetail::kAll || m.mode == PoseMode::kQuantised,
-             ErrorCode::kUnsupported, "levels of detail need mode 1 (quantised)", "Observe.detail");
+             ErrorCode::kUnsupported, "levels of detail require mode 1 (quantised)",
+             "Observe.detail");
   if (m.region) CheckRegion(found, m);
   return found.Result();
 }
@@ -440,7 +441,7 @@ Status Check(const WorldInfo& m) {
   }
   if (!m.rotation_codes.empty()) {
     found.That(m.rotation_codes.size() == m.skeleton.joints.size(), ErrorCode::kShapeMismatch,
-               "not one code per joint", "WorldInfo.rotation_codes",
+               "expected one code per joint", "WorldInfo.rotation_codes",
                static_cast<std::int64_t>(m.rotation_codes.size()));
   }
   if (const Status status = CheckRotationCodes(m.rotation_codes); !status) {
@@ -495,23 +496,23 @@ Status Check(const PoseBatch& m) {
   const PoseBatchInfo& info = m.info;
   found.Id(info.world, "PoseBatch.world");
   found.That(info.parts >= 1 && info.parts <= kMaxBatchParts && info.part < info.parts,
-             ErrorCode::kOutOfRange, "not part 0 to parts - 1 of 1 to 1024", "PoseBatch.part",
-             info.part);
+             ErrorCode::kOutOfRange, "expected part below parts, and parts from 1 to 1024",
+             "PoseBatch.part", info.part);
   found.Finite(info.server_time_s, "PoseBatch.server_time_s");
   found.Known(info.mode, PoseMode::kCompactRoot, "PoseBatch.mode");
   found.That(info.mode != PoseMode::kMovement, ErrorCode::kUnsupported,
              "mode 2 (movement) has no poses", "PoseBatch.mode");
   found.That(info.joint_count >= 1 && info.joint_count <= kMaxJoints, ErrorCode::kOutOfRange,
-             "not 1 to 256 joints", "PoseBatch.joint_count", info.joint_count);
+             "expected 1 to 256 joints", "PoseBatch.joint_count", info.joint_count);
   found.Avatars(m.avatars, 0, "PoseBatch.avatars");
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
-             "not one flag per avatar", "PoseBatch.flags",
+             "expected one flag per avatar", "PoseBatch.flags",
              static_cast<std::int64_t>(m.flags.size()));
   const bool has_all =
       IsCompact(info.mode)
           ? CompactPoseBytes(m).has_value()
           : m.poses.size() == m.avatars.size() * PoseBytes(info.mode, info.joint_count);
-  found.That(has_all, ErrorCode::kShapeMismatch, "not one pose per avatar", "PoseBatch.poses",
+  found.That(has_all, ErrorCode::kShapeMismatch, "expected one pose per avatar", "PoseBatch.poses",
              static_cast<std::int64_t>(m.poses.size()));
   return found.Result();
 }
@@ -626,9 +627,9 @@ Status Check(const WorldTerrain& m) {
 Status Check(const FetchLibrary& m) {
   Findings found;
   found.That(m.length >= 1 && m.length <= kMaxPieceBytes, ErrorCode::kOutOfRange,
-             "not 1 byte to 1 MiB", "FetchLibrary.length", m.length);
+             "expected 1 byte to 1 MiB", "FetchLibrary.length", m.length);
   found.Name(m.hash, "FetchLibrary.hash");
-  found.That(m.offset < kMaxLibraryBytes, ErrorCode::kOutOfRange, "not below 1 GiB",
+  found.That(m.offset < kMaxLibraryBytes, ErrorCode::kOutOfRange, "expected an offset below 1 GiB",
              "FetchLibrary.offset", static_cast<std::int64_t>(m.offset));
   return found.Result();
 }
@@ -637,14 +638,15 @@ Status Check(const Movements& m) {
   Findings found;
   found.Id(m.world, "Movements.world");
   found.That(m.parts >= 1 && m.parts <= kMaxBatchParts && m.part < m.parts, ErrorCode::kOutOfRange,
-             "not part 0 to parts - 1 of 1 to 1024", "Movements.part", m.part);
+             "expected part below parts, and parts from 1 to 1024", "Movements.part", m.part);
   found.Finite(m.server_time_s, "Movements.server_time_s");
   found.Avatars(m.avatars, 0, "Movements.avatars");
   found.That(m.flags.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
-             "not one flag per avatar", "Movements.flags",
+             "expected one flag per avatar", "Movements.flags",
              static_cast<std::int64_t>(m.flags.size()));
-  found.That(m.ends.size() == m.avatars.size(), ErrorCode::kShapeMismatch, "not one end per avatar",
-             "Movements.ends", static_cast<std::int64_t>(m.ends.size()));
+  found.That(m.ends.size() == m.avatars.size(), ErrorCode::kShapeMismatch,
+             "expected one end per avatar", "Movements.ends",
+             static_cast<std::int64_t>(m.ends.size()));
   std::uint32_t before = 0;
   for (std::size_t i = 0; i < m.ends.size(); ++i) {
     found.That(m.ends[i] >= before && m.ends[i] - before <= kMaxRecordBytes, ErrorCode::kOutOfRange,

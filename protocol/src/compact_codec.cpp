@@ -140,7 +140,7 @@ Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
     if (code.smallest_three_bits != 0) {
       if (code.smallest_three_bits < RotationQuantization::kMinFreeBits ||
           code.smallest_three_bits > RotationQuantization::kMaxFreeBits) {
-        return wrong(ErrorCode::kOutOfRange, "free_bits is not 0 and not 8 to 15", j);
+        return wrong(ErrorCode::kOutOfRange, "free_bits is neither 0 nor from 8 to 15", j);
       }
     } else if (j == 0) {
       return wrong(ErrorCode::kMalformed, "free_bits of the root is 0", j);
@@ -150,14 +150,14 @@ Status CheckRotationCodes(std::span<const RotationQuantization> codes) {
       return wrong(ErrorCode::kOutOfRange, "reference is not a unit quaternion", j);
     }
     if (!(code.least_w >= RotationQuantization::kMinLeastW && code.least_w <= 1.0f)) {
-      return wrong(ErrorCode::kOutOfRange, "least_w is not 0.3 to 1", j);
+      return wrong(ErrorCode::kOutOfRange, "least_w is not from 0.3 to 1", j);
     }
     for (int c = 0; c < 3; ++c) {
       if (!(std::abs(code.low[c]) <= 1.0f)) {
-        return wrong(ErrorCode::kOutOfRange, "low is not -1 to 1", j);
+        return wrong(ErrorCode::kOutOfRange, "low is not from -1 to 1", j);
       }
       if (!(code.step[c] >= RotationQuantization::kMinStep && code.step[c] <= 2.0f)) {
-        return wrong(ErrorCode::kOutOfRange, "step is not 2^-20 to 2", j);
+        return wrong(ErrorCode::kOutOfRange, "step is not from 2^-20 to 2", j);
       }
       if (code.bits[static_cast<std::size_t>(c)] > RotationQuantization::kMaxBits) {
         return wrong(ErrorCode::kOutOfRange, "a component has more than 16 bits", j);

@@ -162,7 +162,7 @@ void Unpack(Unpacker& u, const wire::RequestItem& w, RequestItem& item, const ch
     case wire::MovementType::Walk: {
       WalkMovement walk;
       if (w.at_m() == nullptr || !w.heading_rad()) {
-        u.Wrong(ErrorCode::kMalformed, "a walk without at_m or heading_rad", type_field,
+        u.Wrong(ErrorCode::kMalformed, "a walk requires at_m and heading_rad", type_field,
                 static_cast<std::int64_t>(index));
         break;
       }

@@ -111,7 +111,7 @@ Expected<FrameHeader> ReadFrameHeader(std::span<const std::byte, kFrameHeaderByt
                 static_cast<std::int64_t>(type));
   }
   if (!MaySend(sender, type)) {
-    return Fail(ErrorCode::kMalformed, "message type goes the other way", "frame.type",
+    return Fail(ErrorCode::kMalformed, "this side may not send messages of this type", "frame.type",
                 static_cast<std::int64_t>(type));
   }
   if (Load<std::uint32_t>(bytes.data() + 12) != 0) {
@@ -119,11 +119,11 @@ Expected<FrameHeader> ReadFrameHeader(std::span<const std::byte, kFrameHeaderByt
   }
   const auto payload_bytes = Load<std::uint32_t>(bytes.data() + 8);
   if (payload_bytes > MaxPayloadBytes(type, limits)) {
-    return Fail(ErrorCode::kLimitExceeded, "payload is longer than its type may be",
+    return Fail(ErrorCode::kLimitExceeded, "the payload exceeds the limit of its message type",
                 "frame.payload_bytes", payload_bytes);
   }
   if (payload_bytes == 0 || payload_bytes % kPayloadAlignment != 0) {
-    return Fail(ErrorCode::kMalformed, "payload length is not a multiple of 8 above 0",
+    return Fail(ErrorCode::kMalformed, "payload length is not a positive multiple of 8",
                 "frame.payload_bytes", payload_bytes);
   }
   return FrameHeader{type, payload_bytes};
@@ -141,7 +141,7 @@ Expected<FrameView> ParseFrame(std::span<const std::byte> bytes, Sender sender,
   const auto header = ReadFrameHeader(bytes.first<kFrameHeaderBytes>(), sender, limits);
   if (!header) return std::unexpected(header.error());
   if (bytes.size() != kFrameHeaderBytes + header->payload_bytes) {
-    return Fail(ErrorCode::kMalformed, "frame is not as long as its header says",
+    return Fail(ErrorCode::kMalformed, "the length of the frame differs from its header",
                 "frame.payload_bytes", header->payload_bytes);
   }
   return FrameView{header->type, bytes.subspan(kFrameHeaderBytes)};

@@ -13,7 +13,7 @@
 
 namespace stridewire::record {
 
-/// What to record, and from which server.
+/// Options of a recording.
 struct Options {
   std::string host;
   std::uint16_t port = 0;

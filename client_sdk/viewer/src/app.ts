@@ -59,7 +59,7 @@ const pickReachPx = 28;
 export interface AppOptions {
   /** Host and port of the server. */
   readonly host: string;
-  /** Whether to use TLS. */
+  /** True if the connection uses TLS. */
   readonly secure: boolean;
 }
 
@@ -97,7 +97,7 @@ export class App {
   private lastSelectionCheckMs = 0;
   /** The pane that the user clicked last. It receives commands if no avatar is selected. */
   private activePane: WorldPane | null = null;
-  /** Whether the statistics panel was closed to make room for the inspector. */
+  /** True if the statistics panel was closed to make room for the inspector. */
   private statisticsClosed = false;
 
   private readonly overlay: Overlay;

@@ -33,7 +33,7 @@ export const initialWalkerCount = 8;
 const staleStateMs = 1000;
 
 export class AvatarCommands {
-  /** Whether commands go to all avatars of the world instead of the selected one. */
+  /** True if commands go to all avatars of the world instead of the selected one. */
   allAvatars = false;
   /** The world whose terrain this page is changing. */
   private terrainRequestedFor: World | null = null;
@@ -101,7 +101,7 @@ export class AvatarCommands {
     this.host.resetTerrainChoice();
   }
 
-  /** Whether all targets play the layer, as far as the page knows. */
+  /** Returns whether all targets play the layer, as far as the page knows. */
   isLayerPlaying(layer: string): boolean {
     const pane = this.host.commandedPane();
     const avatars = this.targets();
@@ -134,7 +134,7 @@ export class AvatarCommands {
     }).finally(() => this.expireToggle());
   }
 
-  /** Whether foot planting is on for all targets, as far as the page knows. */
+  /** Returns whether foot planting is enabled for all targets, as far as the page knows. */
   areFeetPlanted(): boolean {
     const pane = this.host.commandedPane();
     const unplanted = pane && this.unplantedAvatars.get(pane.world);

@@ -8,7 +8,7 @@ const followDistanceM = 5.2;
 /** All panes share the camera's angles and distance, but each has its own camera target. */
 export class CameraControl {
   readonly orbit = new Orbit();
-  /** Whether the cameras keep all avatars in view. Panning, zooming and following end it. */
+  /** True while the cameras keep all avatars in view. Panning, zooming and following end it. */
   framesAll = true;
 
   constructor(private readonly panes: readonly WorldPane[]) {}

@@ -53,7 +53,7 @@ export class FootprintTool {
 
   constructor(private readonly host: FootprintHost) {}
 
-  /** Whether clicks on the ground request steps. */
+  /** Returns whether clicks on the ground request steps. */
   get active(): boolean {
     return this.active_;
   }

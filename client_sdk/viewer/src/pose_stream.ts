@@ -27,7 +27,7 @@ export function streamName(stream: PoseStream): string {
 
 export interface StreamCost {
   readonly name: string;
-  /** Whether this is the stream in use. */
+  /** True for the stream in use. */
   readonly active: boolean;
   readonly bytesPerPose: number;
   readonly bytesPerS: number;

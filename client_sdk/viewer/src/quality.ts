@@ -3,12 +3,12 @@
 export type FigureStyle = 'bodies' | 'lines';
 export type QualityChoice = 'auto' | 'high' | 'low';
 
-/** What is drawn at one quality level. */
+/** Drawing options of one quality level. */
 export interface QualityLevel {
   readonly style: FigureStyle;
   /** Resolution along each axis, relative to full resolution. */
   readonly scale: number;
-  /** Whether bodies cast shadows. Without them, each avatar has soft blobs on the ground. */
+  /** True if bodies cast shadows. Otherwise each avatar has soft blobs on the ground. */
   readonly shadows: boolean;
   /** Bodies with fewer faces and lighting per vertex instead of per pixel. */
   readonly coarse: boolean;

@@ -42,7 +42,7 @@ export class TerrainSurface {
     this.cells = cells;
   }
 
-  /** Whether the terrain is the plane y = 0. */
+  /** Returns whether the terrain is the plane y = 0. */
   get isFlat(): boolean {
     return this.source === null;
   }

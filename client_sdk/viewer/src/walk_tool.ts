@@ -27,7 +27,7 @@ interface Walk extends Goal {
   readonly pane: WorldPane;
   readonly avatar: number;
   readonly requestId: bigint;
-  /** Whether the server has accepted the request. */
+  /** True if the server has accepted the request. */
   accepted: boolean;
   polledMs: number;
   /** Number of polls in a row that did not find the walk in the queue. */
@@ -41,7 +41,7 @@ const maxWalks = 64;
 const dragPx = 8;
 /** A touch that is held longer than this sets a waypoint. */
 const longPressMs = 600;
-/** For goals closer than this, the avatar keeps its heading. */
+/** If the goal is closer than this, the avatar keeps its heading. */
 const minHeadingDistanceM = 0.5;
 /**
  * Interval at which the page checks that a walk is still queued, because another client may have
@@ -52,7 +52,7 @@ const pollIntervalMs = 500;
 const maxMissedPolls = 3;
 
 export class WalkTool {
-  /** Whether clicks on the ground request walks. */
+  /** True if clicks on the ground request walks. */
   active = false;
   private readonly walks: Walk[] = [];
   /** Walks that have ended, although the last inspected queue may still contain them. */

@@ -42,12 +42,14 @@ export interface ClientOptions {
   authToken?: string;
   /** WebSocket class to use. Default: the global one. In Node.js, pass that of the package `ws`. */
   webSocket?: new (url: string) => WebSocketLike;
-  /** How far `Client.renderTimeS` is behind server time, 0 to 60. Default 0.1. */
+  /** Delay of `Client.renderTimeS` behind server time in seconds, 0 to 60. Default 0.1. */
   renderDelayS?: number;
   /** A clock in milliseconds that never runs backwards. Default: `performance.now`. */
   now?: () => number;
-  /** Whether to spawn this client's avatars again if the session is lost. They return to their last
-   * known positions. Default false. */
+  /**
+   * True: if the session is lost, the client spawns its avatars again, at their last known
+   * positions. Default false.
+   */
   respawn?: boolean;
   /** Limit of commands without a reply, 1 to 2^20. Further ones fail with `commands_full`.
    * Default 4096. */

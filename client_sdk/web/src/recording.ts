@@ -27,7 +27,7 @@ interface RecordedTick {
 
 /** The decoded poses of a recorded tick. The buffers are reused for other ticks. */
 interface DecodedTick {
-  /** Null if the buffers are free or outdated. */
+  /** The recorded tick that the buffers contain; null if they are free or outdated. */
   source: RecordedTick | null;
   /** Increases with each use, to find the least recently used buffers. */
   lastUse: number;

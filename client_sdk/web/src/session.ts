@@ -56,7 +56,9 @@ const inspectTimeoutS = 10;
 export interface Command {
   readonly world: WorldHandle;
   readonly message: CommandMessage;
-  /** Null for commands that the session itself sends after a lost session. */
+  /**
+   * Called with the reply. Null for commands that the session itself sends after a lost session.
+   */
   answer: ((reply: Reply) => void) | null;
 }
 

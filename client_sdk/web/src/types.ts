@@ -66,7 +66,9 @@ export type Parameters = {readonly [name in ParameterName]?: number};
 export interface Reply {
   /** True if the command was carried out. Single items may still have failed, see `items`. */
   readonly ok: boolean;
-  /** One of `Status`, 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server. */
+  /**
+   * Status code, one of `Status`; 0 if ok. 1xx: the caller, 2xx: data, 3xx: network, 4xx: server.
+   */
   readonly code: number;
   /** Name of the code, for example `no_such_avatar`. */
   readonly status: string;
@@ -74,7 +76,10 @@ export interface Reply {
   readonly text: string;
   /** Number of items that succeeded. */
   readonly accepted: number;
-  /** For a spawn: all items, in order. For other commands: the items that failed. */
+  /**
+   * Results of the items. For a spawn: of all items, in order. For other commands: of the items
+   * that failed.
+   */
   readonly items: readonly ReplyItem[];
 }
 
@@ -130,7 +135,7 @@ export interface Terrain {
 export interface SpawnItem {
   /** Id of the avatar in its world, 1 to 2^32 - 1. Absent or 0: the server chooses. */
   avatar?: number;
-  /** Where the avatar stands. */
+  /** World position of the avatar's base frame. */
   positionM: Vec3;
   headingRad: number;
 }
@@ -143,7 +148,10 @@ export interface LayerRequest {
   readonly avatar: number;
   /** Name of the layer, one of `World.layers`. */
   readonly layer: string;
-  /** False fades the layer out and ends it; `weight` and `speed` are then ignored. Default true. */
+  /**
+   * True starts or changes the layer. False fades it out and ends it; `weight` and `speed` are then
+   * ignored. Default true.
+   */
   readonly enabled?: boolean;
   /** Weight of the layer, above 0 and at most 1. Default 1. */
   readonly weight?: number;
@@ -227,7 +235,7 @@ export interface QueuedRequest {
   readonly exactOnly: boolean;
 }
 
-/** What an avatar is doing at a tick: the result of `World.inspect`. */
+/** State of an avatar at a tick: the result of `World.inspect`. */
 export interface AvatarState {
   readonly avatar: number;
   readonly tick: number;
@@ -242,7 +250,7 @@ export interface AvatarState {
   readonly queueSize: number;
   /** The first 16 requests of the queue. */
   readonly queue: readonly QueuedRequest[];
-  /** Whether foot planting is enabled, see `World.setPlanting`. */
+  /** True if foot planting is enabled, see `World.setPlanting`. */
   readonly plantingEnabled: boolean;
   /** Active layers, at most four. Later ones are blended over earlier ones. */
   readonly layers: readonly PlayingLayer[];
@@ -272,7 +280,10 @@ export interface Landing {
 
 /** The movement that an avatar carries out. A stand has no group, keytimes or weights. */
 export interface CurrentMovement {
-  /** 0n if the server inserted the movement, for example a step between two requests. */
+  /**
+   * Id of the request; 0n if the server inserted the movement, for example a step between two
+   * requests.
+   */
   readonly requestId: bigint;
   readonly kind: MovementKind;
   /** Index of the group of examples in the motion library; -1: none. */
@@ -327,8 +338,10 @@ export interface Region {
   /** Avatars leave the region at `radiusM + leaveMarginM` from the centre. At least 0. Absent: the
    * server chooses. */
   leaveMarginM?: number;
-  /** At most 4, from the inside out. Beyond the last ring, rate and detail of the observation
-   * apply. */
+  /**
+   * Rings of the region, at most 4, from the inside out. Beyond the last ring, rate and detail of
+   * the observation apply.
+   */
   rings?: readonly RegionRing[];
 }
 
@@ -345,7 +358,10 @@ export interface Observation {
   region?: Region;
   /** The server sends one pose per this many ticks, 1 to 3600. Default 1. */
   everyNTicks?: number;
-  /** Whether to receive the world's events. Default false; controllers always receive them. */
+  /**
+   * True if the client also receives the world's events. Default false; controllers always receive
+   * them.
+   */
   withEvents?: boolean;
   /** Default `all`. Other values require mode `quantised`. */
   detail?: PoseDetail;
@@ -368,7 +384,10 @@ export interface Subscription {
 export interface WorldEvent {
   readonly type: WorldEventType;
   readonly avatar: number;
-  /** 0n if the event belongs to no request, for example a step that the server inserted. */
+  /**
+   * Id of the request; 0n if the event belongs to no request, for example a step that the server
+   * inserted.
+   */
   readonly requestId: bigint;
   readonly tick: number;
   /** Server time, on the same clock as poses. */
@@ -484,9 +503,9 @@ export interface CrowdPose {
   count: number;
   /** Joints per avatar. */
   jointCount: number;
-  /** One id per avatar. */
+  /** Id of each avatar. */
   avatars: Uint32Array;
-  /** One set of `PoseFlag` bits per avatar. */
+  /** Bits of `PoseFlag` for each avatar. */
   flags: Uint8Array;
   /** Three numbers per avatar: world position of the root. */
   rootsM: Float32Array;

@@ -6,7 +6,7 @@
 
 namespace stridewire {
 
-// One struct of command line options per command. The Run functions return the exit code.
+// Command line options, with one struct per command. The Run functions return the exit code.
 
 struct BuildCommand {
   std::vector<std::string> files;

@@ -48,12 +48,12 @@ struct Config {
   double tick_hz = 60.0;
   int shards = 0;  ///< Number of shards. 0: one per processor.
   int max_catch_up_ticks = 10;
-  bool run_time_correction = true;  ///< Whether to correct the blend weights of each movement.
-  /// Whether to keep feet fixed on the ground between landing and lifting.
+  bool run_time_correction = true;  ///< True: the blend weights of each movement are corrected.
+  /// True: feet stay fixed on the ground between landing and lifting.
   bool foot_planting = true;
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.
   bool allow_insecure = false;
-  /// Whether to create a world that the file does not name when a client joins it.
+  /// True: when a client joins a world that the file does not name, the server creates it.
   bool open_worlds = true;
   bool persistent = false;  ///< WorldConfig::persistent of worlds that the file does not name.
   std::string log_level = "info";

@@ -8,7 +8,7 @@
 
 namespace stridewire::server {
 
-/// Why the server refuses a command of a client. Both members are sent to the client.
+/// Reason why the server refuses a command of a client. Both members are sent to the client.
 struct Refusal {
   protocol::StatusCode code = protocol::StatusCode::kInternal;
   std::string text;

@@ -114,9 +114,8 @@ class Connection : public Transport::User, public std::enable_shared_from_this<C
   std::span<const std::byte> unread_;
   bool is_text_ = false;          // True if the current WebSocket message is a text message.
   bool is_message_over_ = false;  // True if unread_ contains the end of the WebSocket message.
-  std::optional<protocol::FrameView>
-      // A complete frame, until the end of its WebSocket message has arrived.
-      whole_;
+  // A complete frame, until the end of its WebSocket message has arrived.
+  std::optional<protocol::FrameView> whole_;
   std::vector<std::byte> handed_over_;  // The bytes that were passed to Start.
   bool is_reading_ = false;
   bool is_processing_ = false;

@@ -68,7 +68,7 @@ class Session : private ConnectionHandler {
   [[nodiscard]] bool is_attached(TransportKind kind) const {
     return is_attached() && context_.connection->kind() == kind;
   }
-  /// What the session needs of its worlds.
+  /// Returns the part of the session that determines which data it needs from its worlds.
   [[nodiscard]] const SessionStream& stream() const { return stream_; }
 
  private:

@@ -406,7 +406,7 @@ void SessionCommands::Execute(protocol::Observe&& command) {
   if (membership == nullptr) return refuse(StatusCode::kNotJoined, kNotJoinedText);
   if (command.replace) return MoveRegion(command, membership->world);
   if (subscriptions.Contains(command.subscription)) {
-    return refuse(StatusCode::kSubscriptionExists, "a subscription with this id exists already");
+    return refuse(StatusCode::kSubscriptionExists, "a subscription with this id already exists");
   }
   if (subscriptions.size() >= static_cast<std::size_t>(limits.max_subscriptions)) {
     context_.host.metrics().Reached(Limit::kSubscriptions);

@@ -12,7 +12,7 @@
 
 namespace stridewire::server {
 
-/// What a session needs from the shard on which it lives. All functions must be called on the
+/// The interface of a session to the shard on which it lives. All functions must be called on the
 /// thread of the shard. They return at once; results arrive later.
 class SessionHost {
  public:

@@ -66,8 +66,8 @@ class SessionStream {
  public:
   explicit SessionStream(SessionContext& context);
 
-  // What the session needs of a world. Nothing while it has no connection, except events that are
-  // stored for the client.
+  // The following functions return the data that the session needs from a world. Without a
+  // connection it needs only the events that are stored for the client.
   [[nodiscard]] bool WantsEvents(WorldId world) const;
   [[nodiscard]] bool WantsMovements(WorldId world) const {
     return context_.connection != nullptr &&

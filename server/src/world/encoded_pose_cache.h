@@ -85,7 +85,8 @@ struct PoseScratch {
 class EncodedPoseCache {
  public:
   static constexpr std::size_t kMaxTicksAhead = 16;
-  /// With more avatars than this, the ring has only kMaxTicksAhead / 2 planes, to save memory.
+  /// If there are more avatars than this, the ring has only kMaxTicksAhead / 2 planes, to save
+  /// memory.
   static constexpr std::size_t kLargeCrowd = 32'768;
   /// Returns the number of phases for `avatar_count` avatars. A small crowd has fewer phases,
   /// because otherwise the avatars of one phase would not fill the SIMD lanes.
@@ -111,7 +112,8 @@ class EncodedPoseCache {
 
    private:
     friend class EncodedPoseCache;
-    EncodedPoseCache* cache_ = nullptr;  // Null until the first Schedule or Store.
+    // The cache that owns the slot; null until the first Schedule or Store.
+    EncodedPoseCache* cache_ = nullptr;
     std::uint32_t index_ = 0;
   };
 

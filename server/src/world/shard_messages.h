@@ -170,7 +170,8 @@ struct PoseInterest {
   std::shared_ptr<const std::vector<RegionFilter>> regions;
 };
 
-/// What the sessions of one shard need from a world. Replaces the previous Interest of this shard.
+/// Poses, movements and events that the sessions of one shard need from a world. Replaces the
+/// previous Interest of this shard.
 struct Interest {
   std::shared_ptr<World> world;
   int shard = 0;  ///< The shard of the sessions.

@@ -15,7 +15,7 @@ class WorldInterest {
   /// Replaces the interest of shard `interest.shard`.
   void Set(const Interest& interest);
 
-  /// What a shard needs in a given tick.
+  /// Poses that a shard must send in a given tick.
   struct Demand {
     bool all = false;     ///< True if a batch of all avatars is needed.
     bool subset = false;  ///< True if poses of selected avatars or regions are needed.

@@ -99,7 +99,7 @@ void WorldShard::Spawn(const WorldCommand& command, const SpawnPart& part, std::
       reply.text = "start: expected a position within 100 km and a heading within 10000 rad";
     } else if (avatars_.contains(id)) {
       reply.code = StatusCode::kAvatarExists;
-      reply.text = "an avatar with this id exists already";
+      reply.text = "an avatar with this id already exists";
     }
     if (reply.code != StatusCode::kOk) {
       budget_.Release(*world_);

@@ -528,7 +528,7 @@ TEST(Check, ExactOnlyNeedsAFootprint) {
   ASSERT_FALSE(status.has_value());
   EXPECT_EQ(status.error().code, ErrorCode::kMalformed);
   EXPECT_EQ(status.error().where, "Request.at_m");
-  EXPECT_STREQ(status.error().text, "must_be_met without at_m");
+  EXPECT_STREQ(status.error().text, "must_be_met requires at_m");
 }
 
 TEST(Check, Footprints) {

@@ -168,7 +168,7 @@ typedef struct stridewire_client_options {
   const char* client_name;
   /// Secret that the server may require, at most 4096 bytes, or NULL.
   const char* auth_token;
-  /// 1: after a lost session, spawn the avatars of this client again, each at its last known base
+  /// 1: after a lost session, the client spawns its avatars again, each at its last known base
   /// frame. Default 0.
   uint8_t respawn;
   /// Folder that caches motion libraries fetched for STRIDEWIRE_MOVEMENT, at most 4096 bytes. The
@@ -228,7 +228,7 @@ stridewire_status stridewire_client_last_error(stridewire_client* client, char* 
 // idle or closed), NO_SUCH_WORLD (unknown world number) and NOT_JOINED (the server refused the
 // world, or the client left it).
 
-/// What a client may do in a world.
+/// Role of a client in a world.
 typedef enum stridewire_role {
   STRIDEWIRE_CONTROLLER = 0,  ///< Commands avatars and receives all events of the world.
   STRIDEWIRE_OBSERVER = 1,    ///< Observes only.
@@ -266,8 +266,8 @@ stridewire_status stridewire_client_remove(stridewire_client* client, stridewire
 
 /// Type of a requested movement.
 typedef enum stridewire_movement_type {
-  STRIDEWIRE_STEP = 0,   ///< One step with given parameters or to a given footprint.
-  STRIDEWIRE_JUMP = 1,   ///< One jump with both feet.
+  STRIDEWIRE_STEP = 0,   ///< Step with given parameters or to a given footprint.
+  STRIDEWIRE_JUMP = 1,   ///< Jump with both feet.
   STRIDEWIRE_STAND = 2,  ///< Stand for a given time.
   STRIDEWIRE_WALK = 3,   ///< As many steps as needed to reach a position and heading.
   STRIDEWIRE_MOVEMENT_TYPE_MAX = 0x7fffffff
@@ -281,7 +281,8 @@ typedef enum stridewire_foot {
   STRIDEWIRE_FOOT_MAX = 0x7fffffff
 } stridewire_foot;
 
-/// When a requested movement begins, and whether it replaces queued movements.
+/// Time at which a requested movement begins. All values except STRIDEWIRE_QUEUED also drop the
+/// queue.
 typedef enum stridewire_interrupt {
   STRIDEWIRE_QUEUED = 0,  ///< The movement begins after all queued movements.
   /// The movement begins after the current movement. The queue is dropped.
@@ -404,7 +405,7 @@ stridewire_status stridewire_client_set_planting(stridewire_client* client, stri
                                                  const stridewire_planting* planting,
                                                  uint64_t* command);
 
-/// How the server sends poses.
+/// Form in which the server sends poses.
 typedef enum stridewire_pose_mode {
   STRIDEWIRE_FULL = 0,  ///< The server sends float32 values, without loss.
   /// Compressed. The error of each joint and end site is at most 1 mm.
@@ -490,8 +491,8 @@ stridewire_status stridewire_client_ping(stridewire_client* client);
 
 /// Type of an event. The comments list the fields of stridewire_event that the type uses.
 typedef enum stridewire_event_type {
-  // Events about the connection. This one uses resumed.
-  STRIDEWIRE_EVENT_CONNECTED = 0,        ///< resumed
+  // Events about the connection.
+  STRIDEWIRE_EVENT_CONNECTED = 0,        ///< Uses resumed. The handshake is complete.
   STRIDEWIRE_EVENT_CONNECT_FAILED = 1,   ///< Uses status, text. The client tries again.
   STRIDEWIRE_EVENT_CONNECTION_LOST = 2,  ///< Uses status, text. The client reconnects.
   STRIDEWIRE_EVENT_SESSION_LOST = 3,     ///< The server has no session of this client any more.
@@ -685,7 +686,7 @@ stridewire_status stridewire_client_server_time(stridewire_client* client, doubl
 /// 0.25 s.
 stridewire_status stridewire_client_render_time(stridewire_client* client, double* time_s);
 
-/// How a pose was obtained.
+/// Origin of a sampled pose.
 typedef enum stridewire_pose_kind {
   STRIDEWIRE_POSE_MISSING = 0,       ///< No pose is known for that time. Other fields are 0.
   STRIDEWIRE_POSE_INTERPOLATED = 1,  ///< Interpolated between two received poses, or exactly one.

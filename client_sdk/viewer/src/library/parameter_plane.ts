@@ -71,7 +71,7 @@ export class ParameterPlane {
     const margin = 0.1 * (max - min) || 0.05;
     return [min - margin, max + margin];
   }
-  /** Whether both axes show the same parameter. */
+  /** Returns whether both axes show the same parameter. */
   get isOneDimensional(): boolean {
     return this.x === this.y;
   }

@@ -4,7 +4,7 @@ import {Slider, button, h, setPressed, setText} from '../dom.js';
 import type {SampleTerrainName} from '../sample_terrains.js';
 import type {MovementRequest, Vec3} from '../sdk.js';
 
-/** What a click on the ground requests. */
+/** Tools for clicks on the ground. Each requests a type of movement. */
 export type ClickTool = 'step' | 'walk';
 
 export interface CommandActions {
@@ -180,7 +180,7 @@ export class CommandPanel {
     this.exactOnlyRow.hidden = !this.connected || this.tool !== 'step';
     this.actions.setTool(this.tool);
   }
-  /** Whether a step is rejected if the foot cannot reach the exact point. */
+  /** Returns whether a step is rejected if the foot cannot reach the exact point. */
   get exactOnly(): boolean {
     return this.connected && this.exactOnlyBox.checked;
   }

@@ -28,7 +28,7 @@ export class Inspector {
   readonly element: HTMLElement;
   /** The state that the panel shows; null if none is known. */
   state: AvatarState | null = null;
-  /** Whether the scene shows joint names at the selected avatar. */
+  /** True if the scene shows joint names at the selected avatar. */
   labels = false;
 
   private world: World | null = null;

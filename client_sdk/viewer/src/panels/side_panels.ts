@@ -6,9 +6,7 @@ export type PanelName = 'commands' | 'view' | 'inspect' | 'statistics';
 
 const narrowPx = 900;
 
-/**
- * Whether the page is too narrow for panels beside the scene, so that they cover its lower part.
- */
+/** Returns whether the page is so narrow that panels cover the lower part of the scene. */
 export function isNarrowPage(): boolean {
   return innerWidth < narrowPx;
 }

@@ -73,7 +73,7 @@ export class WorldView {
   readonly viewport = {x: 0, y: 0, width: 1, height: 1};
   /** The part of `viewport` that no panel covers. */
   readonly freeArea = {x: 0, y: 0, width: 1, height: 1};
-  /** Whether the camera has framed the avatars at least once. */
+  /** True if the camera has framed the avatars at least once. */
   wasFramed = false;
   desiredDistanceM = 8;
   /** Numbers of goals and waypoints drawn. */
@@ -92,7 +92,7 @@ export class WorldView {
   /** Foot balls at `previousTimeS`, 6 numbers per avatar. */
   private previousBalls = new Float32Array(0);
   private previousAvatars = new Uint32Array(0);
-  /** For the left and right foot of each avatar: 1 if it is planted. */
+  /** Two numbers per avatar, for its left and right foot: 1 if the foot is planted. */
   private planted = new Uint8Array(0);
   private previousTimeS = 0;
   private live = true;

@@ -24,10 +24,10 @@ export function checkRotationCodes(codes: readonly RotationCode[], jointCount: n
     }
     const squared = reference.reduce((sum, x) => sum + x * x, 0);
     if (!(Math.abs(squared - 1) <= 1e-5)) wrong('reference is not a unit quaternion');
-    if (!(leastW >= 0.3 - 1e-7 && leastW <= 1)) wrong('least_w is not 0.3 to 1');
+    if (!(leastW >= 0.3 - 1e-7 && leastW <= 1)) wrong('least_w is not from 0.3 to 1');
     for (let c = 0; c < 3; ++c) {
-      if (!(Math.abs(low[c]!) <= 1)) wrong('low is not -1 to 1');
-      if (!(step[c]! >= 2 ** -20 && step[c]! <= 2)) wrong('step is not 2^-20 to 2');
+      if (!(Math.abs(low[c]!) <= 1)) wrong('low is not from -1 to 1');
+      if (!(step[c]! >= 2 ** -20 && step[c]! <= 2)) wrong('step is not from 2^-20 to 2');
       if (bits[c]! > 16) wrong('has more than 16 bits');
     }
   });
@@ -58,7 +58,10 @@ export class CompactCodec {
    * not contain.
    */
   private readonly bits: Uint8Array;
-  /** Per joint: reference x, y, z, w; low x, y, z; step x, y, z; square of the smallest valid w. */
+  /**
+   * Numbers per joint: reference x, y, z, w; low x, y, z; step x, y, z; square of the smallest
+   * valid w.
+   */
   private readonly numbers: Float64Array;
 
   /**

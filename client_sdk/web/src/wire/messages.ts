@@ -138,7 +138,9 @@ export interface WorldInfo {
   leftLeg: Leg;
   rightLeg: Leg;
   layers: string[];
-  /** How rotations in compact poses are encoded: one per joint. Empty: no compact poses. */
+  /**
+   * Encoding of each joint's rotation in compact poses. Empty: the server sends no compact poses.
+   */
   rotationCodes: RotationCode[];
   /** Joints in poses of detail `reduced`, ascending. Empty: the server has no such detail. */
   fewerJoints: number[];

@@ -22,7 +22,7 @@ struct Capture {
   Clip clip;
   double unit_m = 1.0;  ///< Length of one file unit in metres, detected or given.
   int first_frame = 0;  ///< Number of frames at the start that hold an artificial rest pose.
-  std::vector<std::string> notes;  ///< What the reader assumed or repaired, one sentence each.
+  std::vector<std::string> notes;  ///< Assumptions and repairs of the reader, one sentence each.
 };
 
 /// Limits on a BVH file. A file that exceeds one of them is rejected with kLimitExceeded.

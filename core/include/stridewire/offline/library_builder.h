@@ -27,7 +27,7 @@ struct SelectionOptions {
   double outlier_deviations = 0.0;
 };
 
-/// What LibraryBuilder did with an extracted example.
+/// The use that LibraryBuilder makes of an extracted example.
 enum class ExampleFate : std::uint8_t {
   kKept,       ///< Stored as an example of its own.
   kAveraged,   ///< Stored as part of an average.
@@ -38,7 +38,7 @@ enum class ExampleFate : std::uint8_t {
 /// Returns "kept", "averaged", "redundant" or "outlier".
 [[nodiscard]] std::string_view ExampleFateName(ExampleFate fate);
 
-/// What LibraryBuilder did with one extracted example, and why.
+/// Describes how LibraryBuilder used one extracted example, and why.
 struct SelectedExample {
   std::string source;  ///< RawExample::source.
   bool mirrored = false;

@@ -87,7 +87,7 @@ struct Synthesis {
 
 inline constexpr int kMaxSynthesisFrames = 1 << 20;  ///< Longest result of Synthesize.
 
-/// What Synthesize plays.
+/// Arguments of Synthesize.
 struct SynthesisInput {
   std::shared_ptr<const MotionLibrary> library;
   BaseFrame start;

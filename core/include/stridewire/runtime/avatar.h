@@ -25,7 +25,7 @@ enum class AvatarEventType : std::uint8_t {
   kRejected,
 };
 
-/// How far a step would have missed a footprint that it had to hit exactly.
+/// Distance by which a step would have missed a footprint that it had to hit exactly.
 struct FootprintError {
   Footprint nearest;        ///< Nearest footprint in reach.
   double distance_m = 0.0;  ///< Distance from `nearest` to the requested footprint, >= 0.
@@ -61,7 +61,7 @@ struct AvatarEvent {
 /// out of reach: the left foot reaches (0.1, 0, 1.25) m heading 0 rad, 0.5 m and 3.5 degrees off".
 [[nodiscard]] std::string DescribeRejection(const AvatarEvent& event);
 
-/// How a movement that begins takes over from the pose displayed before it.
+/// Methods to continue smoothly from the previously displayed pose when a movement begins.
 enum class BlendKind : std::uint8_t {
   /// The difference pose fades out from rest (Semancik et al., Eq. (5)). Joint velocities may jump.
   kCubic,

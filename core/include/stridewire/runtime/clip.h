@@ -14,8 +14,8 @@ namespace stridewire {
 struct Clip {
   double fps = 0.0;  ///< Frames per second, in (0, 10000].
   int joint_count = 0;
-  std::vector<Vec3> root_positions_m;  ///< [frame]
-  std::vector<Quat> rotations;         ///< [frame * joint_count + joint]
+  std::vector<Vec3> root_positions_m;  ///< [frame]: position of the root
+  std::vector<Quat> rotations;         ///< Rotation of a joint: [frame * joint_count + joint]
 
   [[nodiscard]] int frame_count() const { return static_cast<int>(root_positions_m.size()); }
   [[nodiscard]] double duration_s() const {

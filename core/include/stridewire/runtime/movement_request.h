@@ -91,8 +91,9 @@ struct MovementRequest {
 
 /// Starts, changes or ends a layer clip of the library, which plays over the movements.
 struct LayerRequest {
-  int layer = 0;         ///< Index in MotionLibrary::layers().
-  bool enabled = true;   ///< False ends the layer; weight and speed are then ignored.
+  int layer = 0;  ///< Index in MotionLibrary::layers().
+  /// True starts or changes the layer. False ends it; weight and speed are then ignored.
+  bool enabled = true;
   double weight = 1.0;   ///< Factor on the joint weights of the clip, in (0, 1].
   double blend_s = 0.3;  ///< Seconds until weight and speed are reached, in [0, kMaxLayerBlendS].
   double speed = 1.0;    ///< Playback speed, kMinLayerSpeed to kMaxLayerSpeed; 1: as recorded.

@@ -61,7 +61,7 @@ struct GroupOfOthers {
   CardinalBasis basis;
   std::vector<double> linear;
   std::vector<double> radial;
-  MotionGroup group;  // Spans into the other members.
+  MotionGroup group;  // The group. Its spans refer to the other members.
 };
 
 // Fits a group to sites. `shares` [site][example] is the blend of examples that each site
@@ -138,7 +138,7 @@ std::vector<double> NearestWeights(const MotionGroup& group, int left_out, std::
   return weights;
 }
 
-// One left-out movement, synthesized by one method.
+// Comparison of one left-out movement with its synthesis by one method.
 struct Comparison {
   bool is_valid = false;
   PoseError pose;

@@ -41,7 +41,7 @@ struct Sites {
 struct Candidate {
   Sites sites;
   CardinalBasis basis;
-  MotionGroup group;  // Spans into `sites` and `basis`.
+  MotionGroup group;  // The group. Its spans refer to `sites` and `basis`.
 };
 
 Expected<std::shared_ptr<const Candidate>> Fit(const MotionGroup& original, Sites sites,
@@ -106,7 +106,8 @@ GroupQuality QualityOf(const HullSurvey& survey, double condition) {
 struct Pass {
   RadiusRule radii = RadiusRule::kExamples;
   double radius_factor = 1.0;  // Factor on the radii of the examples.
-  // Also adds sites that increase the error, because later sites may reduce it again.
+  // True if the pass also adds sites that increase the error, because later sites may reduce it
+  // again.
   bool accepts_any = false;
   bool tries_own_radii = true;  // Tries several radii for a new site.
 };

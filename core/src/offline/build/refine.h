@@ -11,7 +11,7 @@
 
 namespace stridewire {
 
-/// How pseudoexamples are chosen.
+/// Rules by which pseudoexamples are chosen.
 enum class RefineRule : std::uint8_t {
   kAmended,  ///< Tries several passes and keeps only what reduces the largest error.
   kBare,     ///< The rule of the paper: radii from all sites; every pseudoexample is added.

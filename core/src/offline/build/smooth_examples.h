@@ -38,7 +38,8 @@ inline constexpr int kExamplesPerCoefficient = 4;
 // weights of the others are 0.
 struct SmoothGroup {
   std::vector<double> sites, dilations, linear, radial;
-  MotionGroup group;  // Spans into the other members; its sites are the examples used.
+  // The group. Its spans refer to the other members, and its sites are the examples used.
+  MotionGroup group;
 };
 
 // Fits smooth weights to `examples`. Returns null if they cannot be solved.

@@ -21,7 +21,7 @@ struct BvhJoint {
   int line = 0;               ///< Line number of the joint's OFFSET.
   DVec3 offset = DVec3(0.0);  ///< The joint's OFFSET, in file units.
   std::vector<BvhChannel> channels;
-  int first_channel = 0;  ///< Index of its first number in the row of a frame.
+  int first_channel = 0;  ///< Index of the joint's first number in the row of a frame.
 };
 
 struct BvhEndSite {

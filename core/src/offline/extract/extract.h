@@ -68,7 +68,7 @@ struct Extraction {
   std::vector<ExtractedExample> general_steps;
   std::vector<ExtractedExample> jump_examples;  ///< Jumps with length, height and turn.
   double ball_height_m[2] = {0.0, 0.0};  ///< Height of resting balls above the floor, by foot.
-  /// False if no foot ever stood on the ground. Then the heights are 0.
+  /// True if any foot ever stood on the ground. Otherwise the heights are 0.
   bool has_contacts = false;
 
   struct Stand {

@@ -16,7 +16,7 @@ constexpr double kHalfSupportDefaultS = 0.08;
 // Least part of the usual half support that must remain where the recording cuts it off.
 constexpr double kHalfSupportMinShare = 0.5;
 
-// One lift of a foot with the contacts around it.
+// A swing of a foot with the contacts before and after it.
 struct Swing {
   Foot moving = Foot::kLeft;
   const Contact* before = nullptr;  // Contacts of the moving foot.

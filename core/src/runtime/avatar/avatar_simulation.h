@@ -24,7 +24,7 @@
 
 namespace stridewire {
 
-/// What happened to an avatar's movement during an Advance. Movement records are derived from this.
+/// Changes of an avatar's movement during an Advance. Movement records are derived from them.
 struct AvatarChange {
   /// A change record cannot express what happened; send the whole state.
   bool needs_state = false;
@@ -122,7 +122,7 @@ class AvatarSimulation {
   /// Everything that the displayed pose and the next movement depend on. It corresponds to pose()
   /// until the next Advance, Teleport or SetLayer.
   [[nodiscard]] const AvatarBody& body() const { return body_; }
-  /// What the last Advance changed, including calls of Teleport and SetLayer before it.
+  /// Returns the changes of the last Advance, including calls of Teleport and SetLayer before it.
   [[nodiscard]] const AvatarChange& change() const { return change_; }
   /// True if a movement that begins now continues with the velocity of the previous one.
   [[nodiscard]] bool keeps_speed() const { return moved_until_s_ == time_s_; }
@@ -224,7 +224,7 @@ class AvatarSimulation {
   double movement_time_s_ = 0.0;
   double next_event_s_ = -1.0;  // Movement time before which no event can happen; -1 if unknown.
   std::uint64_t revision_ = 0;
-  // At most one of these is true: a movement is in progress, or a requested stand is.
+  // At most one of the following is true: a movement is in progress, or a requested stand is.
   bool is_moving_ = false;
   bool is_in_stand_ = false;
   bool is_idle_reported_ = false;

@@ -214,7 +214,8 @@ Status LoadWeights(const fb::Group& from, MotionGroup& group) {
   }
   if (!AllSane(group.sites) || !AllSane(group.site_weights) || !AllSane(group.dilations) ||
       !AllSane(group.linear) || !AllSane(group.radial)) {
-    return Fail(ErrorCode::kMalformed, "a group's weight tables hold a number out of range");
+    return Fail(ErrorCode::kMalformed,
+                "a group's weight tables contain a number that is out of range");
   }
   for (const double dilation : group.dilations) {
     if (!(dilation > 1e-9))
@@ -254,7 +255,8 @@ Status LoadTimes(const fb::Group& from, MotionGroup& group) {
   }
   if (!AllWithin(group.heading_change_rad, kMaxYawRad) ||
       !AllWithin(group.keytimes_s, kMaxMovementS)) {
-    return Fail(ErrorCode::kMalformed, "a group's time tables hold a number out of range");
+    return Fail(ErrorCode::kMalformed,
+                "a group's time tables contain a number that is out of range");
   }
   for (std::size_t e = 0; e < n; ++e) {
     const Status status =
@@ -277,7 +279,7 @@ Status LoadGrid(const fb::Group& from, const GridLayout& layout, std::size_t joi
     return Fail(ErrorCode::kMalformed, "a group's grid is not aligned to 64 bytes");
   }
   if (!AllSane(group.grid)) {
-    return Fail(ErrorCode::kMalformed, "a group's grid holds a number out of range");
+    return Fail(ErrorCode::kMalformed, "a group's grid contains a number that is out of range");
   }
   for (std::size_t row = 0; row < group.grid.size(); row += row_floats) {
     const float* x = &group.grid[row];
@@ -512,7 +514,7 @@ Status MotionLibrary::Load() {
   if (payload_bytes != payload.size()) {
     return Fail(ErrorCode::kMalformed, payload_bytes > payload.size()
                                            ? "the file is truncated"
-                                           : "the file is longer than its header says");
+                                           : "the file is longer than its header states");
   }
   const auto expected_header = MakeLibraryHeader(payload);
   if (std::memcmp(expected_header.data(), bytes_.data(), kLibraryHeaderBytes) != 0) {
@@ -541,7 +543,8 @@ Status MotionLibrary::Load() {
     const fb::Quat& q = *root.stand_rotations()->Get(static_cast<flatbuffers::uoffset_t>(j));
     stand_pose_.rotations[j] = Quat(q.w(), q.x(), q.y(), q.z());
     if (!(std::fabs(glm::length(stand_pose_.rotations[j]) - 1.0f) <= kUnitTolerance)) {
-      return Fail(ErrorCode::kMalformed, "the stand pose holds a rotation not of unit length",
+      return Fail(ErrorCode::kMalformed,
+                  "the stand pose contains a rotation that is not of unit length",
                   static_cast<std::int64_t>(j));
     }
   }

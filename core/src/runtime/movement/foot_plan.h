@@ -39,7 +39,8 @@ struct FootTrajectory {
   double lift_m = 0.0;  ///< Additional height in the middle of the swing, to clear the ground.
   /// Sideways offset in the middle of the swing, to pass the other foot.
   DVec3 aside_m = DVec3(0.0);
-  double root_weight = 0.0;  ///< How much the root follows this foot; 1 for both feet together.
+  /// Weight with which the root follows this foot; the weights of both feet sum to 1.
+  double root_weight = 0.0;
   /// Shift of the root that is complete at the end of the movement.
   DVec3 root_shift_m = DVec3(0.0);
 

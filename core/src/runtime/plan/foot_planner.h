@@ -36,7 +36,7 @@ using FootLocks = std::array<FootLock, 2>;  ///< [foot]
 /// Turns `movement` into one in which both feet stay locked.
 void StandOn(const FootLocks& locks, Movement& movement);
 
-/// Where a movement should bring the feet.
+/// Target to which a movement should bring the feet.
 struct LandingTarget {
   /// Request whose `applied` parameters or, if it has one, whose footprint must be reached exactly.
   const RequestPlan& request;

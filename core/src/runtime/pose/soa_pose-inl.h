@@ -61,7 +61,7 @@ void FindLargestVelocities(const float* velocity, std::size_t joint_count, std::
   }
 }
 
-// How much of the difference poses remains in the lanes of one vector.
+// Remaining difference poses in the lanes of one vector.
 struct DifferenceState {
   bool is_any = false;
   bool is_any_inertial = false;

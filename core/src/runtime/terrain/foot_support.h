@@ -13,7 +13,7 @@ struct Sole {
   double half_width_m = 0.0;
 };
 
-/// How a sole would be supported by the ground.
+/// Support of a sole by the ground.
 struct FootSupport {
   Vec3 normal = Vec3(0.0f, 1.0f, 0.0f);  ///< Normal of the best-fitting plane; unit, y > 0.
   double plane_height_m = 0.0;           ///< Height of that plane at the ball.

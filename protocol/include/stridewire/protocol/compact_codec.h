@@ -110,7 +110,8 @@ class CompactCodec {
 
    private:
     friend class CompactCodec;
-    // One number of each pose. Aligned to a cache line, so that no vector crosses two lines.
+    // The same number of each pose of a block. Aligned to a cache line, so that no vector crosses
+    // two lines.
     struct alignas(64) Floats {
       float of[kBlock];
     };

@@ -37,7 +37,7 @@ using Seq = std::uint64_t;
 enum class Role : std::uint8_t { kController = 0, kObserver = 1 };
 /// Moving foot of a requested step. kAuto is the foot that did not move last.
 enum class FootChoice : std::uint8_t { kAuto = 0, kLeft = 1, kRight = 2 };
-/// When a request begins, and whether it replaces queued requests.
+/// Time at which a request begins. All values except kNone also drop the queue.
 enum class Interrupt : std::uint8_t {
   kNone = 0,  ///< The request begins after all queued requests.
   /// The request begins after the current movement. Drops the queue; a stand or walk ends.
@@ -221,7 +221,7 @@ struct TerrainBoxInfo {
 /// there.
 struct TerrainInfo {
   std::optional<HeightFieldInfo> height_field;
-  std::vector<TerrainBoxInfo> boxes;  ///< At most kMaxTerrainBoxes.
+  std::vector<TerrainBoxInfo> boxes;  ///< Boxes on the ground, at most kMaxTerrainBoxes.
   bool operator==(const TerrainInfo&) const = default;
 };
 
@@ -593,13 +593,13 @@ struct ErrorNotice {
 struct Pong {
   static constexpr MessageType kType = MessageType::kPong;
   std::uint64_t nonce = 0;
-  double time_s = 0.0;  ///< Copied from Ping.
+  double time_s = 0.0;  ///< Client time, copied from Ping.
   double server_time_s = 0.0;
   std::uint64_t tick = 0;
   bool operator==(const Pong&) const = default;
 };
 
-/// Where a foot will land in the current movement.
+/// Planned landing of a foot in the current movement.
 struct Landing {
   FootSide foot = FootSide::kLeft;
   DVec3 position_m = DVec3(0.0);  ///< Position of the ball of the foot.
@@ -633,7 +633,7 @@ struct CurrentMovement {
   ParameterSet applied;
   bool extrapolated = false;
   bool clamped = false;
-  std::vector<float> weights;  ///< One weight per example of the group, at most kMaxWeights.
+  std::vector<float> weights;  ///< Weight of each example of the group, at most kMaxWeights.
   std::vector<std::uint8_t>
       parameter_names;  ///< Parameters of the group; names as in ParameterSet.
   /// Parameters of the examples, example by example. May be empty.

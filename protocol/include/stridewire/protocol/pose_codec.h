@@ -26,8 +26,8 @@ enum class PoseMode : std::uint8_t {
 /// Which joints a compact pose contains. Omitted joints are decoded to their reference rotations.
 enum class PoseDetail : std::uint8_t {
   kAll = 0,
-  kReduced = 1,  ///< The root joint only.
-  kRoot = 2,     ///< The root only.
+  kReduced = 1,  ///< The joints that WorldInfo::reduced_joints lists.
+  kRoot = 2,     ///< The root joint only.
 };
 
 /// Returns whether CompactCodec decodes poses of this mode.
