@@ -16,7 +16,8 @@ add_custom_command(OUTPUT ${STRIDEWIRE_NODE_MODULES}
 add_custom_target(web_modules DEPENDS ${STRIDEWIRE_NODE_MODULES})
 
 # stridewire_node_test(NAME LABEL SECONDS ARGUMENTS...): runs a test script with node in the
-# caller's folder. A skipped test counts as a failure, because ctest provides everything that it needs.
+# caller's folder. A skipped test counts as a failure, because ctest provides everything that the
+# test needs.
 function(stridewire_node_test name label seconds)
   add_test(NAME ${name} COMMAND ${STRIDEWIRE_NODE} ${ARGN}
            WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
