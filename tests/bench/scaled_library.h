@@ -6,9 +6,11 @@
 
 namespace stridewire {
 
-/// The straight steps of the generated library with another number of examples a foot (at least 4) or of joints (at least
-/// as many as it has), for benchmarks of what either costs. More examples are blends of those there are; joints more are
-/// chains of ten on the first joint's head that turn as others do. Aborts if the builder refuses.
+/// Returns a library with the straight steps of the generated library, but with another number of
+/// examples per foot (at least 4) or of joints (at least the original number). Benchmarks use it to
+/// measure the influence of these numbers. Additional examples are blends of the original ones.
+/// Additional joints form chains of ten on the root and rotate like other joints. Aborts if the
+/// library cannot be built.
 [[nodiscard]] std::shared_ptr<const MotionLibrary> MakeScaledLibrary(int examples, int joints);
 
 }  // namespace stridewire

@@ -14,8 +14,8 @@
 
 namespace stridewire {
 
-/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y up,
-/// facing +Z at identity rotations.
+/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y
+/// up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.
   Skeleton skeleton;  ///< Skeleton whose legs have both been identified.

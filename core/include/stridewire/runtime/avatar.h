@@ -113,8 +113,8 @@ class Avatar {
   int CancelQueue();
 
   /// Starts, changes or ends a layer with the next Advance. Errors: kNotFound if the layer does not
-  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if four layers
-  /// are already playing.
+  /// exist, kOutOfRange if a number is not finite or out of its range, kLimitExceeded if four
+  /// layers are already playing.
   [[nodiscard]] Status SetLayer(const LayerRequest& request);
 
   /// Moves the avatar to `start` at once, standing. Drops the queue and keeps the layers.

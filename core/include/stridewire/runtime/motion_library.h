@@ -62,7 +62,7 @@ struct Parameter {
   ParameterName name = ParameterName::kStartZ;
   double min = 0.0;  ///< Smallest value among the examples.
   double max = 0.0;  ///< Largest value among the examples.
-  /// Subtracted from values before the linear part is evaluated (Section 3: rank deficiency).
+  /// Value that is subtracted before the linear part is evaluated (Section 3: rank deficiency).
   double centre = 0.0;
   double scale = 1.0;  ///< Values are divided by it before distances are computed; > 0.
 };
