@@ -1,19 +1,20 @@
 #!/usr/bin/env bash
-# Measures what movements, poses and messages cost on one core of this machine, prints a table and
-# writes one CSV with commit, compiler and processor.
+# Measures the cost of movements, poses and messages on one core of this machine. Prints a table and
+# writes a CSV file with commit, compiler and processor.
 #
-#   tests/bench/run.sh                       # builtin, and the captures of subject 16 if they are there
-#   tests/bench/run.sh LIBRARY.swl ...       # builtin and these
+#   tests/bench/run.sh                       # builtin, and the captures of subject 16 if available
+#   tests/bench/run.sh LIBRARY.swl ...       # builtin and these libraries
 #   tests/bench/run.sh --min-time 2 --filter synthesize
 #
-# Crowds of 100 to 100,000 are told as multiples of a floor as well, which is measured in the same run: what reading their
-# bytes once and giving each float one multiply-add takes. For observers it is what giving the system their bytes takes.
-# Where there is AVX-512, crowds are measured with AVX2, too.
+# Times of crowds of 100 to 100,000 avatars are also printed as multiples of a floor, which is
+# measured in the same run: the time to read the necessary bytes once, with one multiply-add per
+# float. For observers, the floor is the time to pass their bytes to the operating system. On
+# machines with AVX-512, crowds are measured with AVX2 as well.
 #
-#   --out PATH       where the CSV goes: a file that ends in .csv, or a folder (default: build/release/bench)
-#   --min-time S     seconds for each benchmark (default: 0.5)
-#   --filter REGEX   only benchmarks whose name matches
-#   --no-build       the programs are built already
+#   --out PATH       CSV file (*.csv) or folder to write to (default: build/release/bench)
+#   --min-time S     seconds per benchmark (default: 0.5)
+#   --filter REGEX   run only benchmarks whose names match
+#   --no-build       do not build the programs
 set -euo pipefail
 
 usage() { sed -n '2,/^set -euo/{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"; }
@@ -69,7 +70,8 @@ load=$(cut -d ' ' -f 1 /proc/loadavg)
 
 raw=$(mktemp)
 trap 'rm -f "$raw"' EXIT
-# One core, but for what measures several (shards): what else runs on this machine is told by its load average in the CSV.
+# Use one core, except for benchmarks of several shards. The load average in the CSV file shows
+# whether other programs were running.
 bench() { "$@" --benchmark_min_time="$min_time" --benchmark_format=json "${libraries[@]}" >>"$raw"; }
 all_names=$("$bin/stridewire-bench" --benchmark_list_tests "${libraries[@]}" | grep -E -- "$filter" || true)
 one_of() { sed 's/[][\.*^$+?(){}|]/\\&/g' | paste -sd '|'; }
@@ -81,18 +83,19 @@ crowds=$({ grep -E '/crowd/' <<<"$all_names" || true; } | one_of)
 if [[ -n $crowds ]] && grep -q '"instruction_set": "AVX-512"' "$raw"; then
   bench taskset -c 0 "$bin/stridewire-bench" --instruction-set=AVX2 --benchmark_filter="^($crowds)\$"
 fi
-# One shard and two in turn: what is told of each is the median of five, so that whoever else is on the machine hits both.
+# Alternate between one shard and two, and take the median of five runs of each, so that other
+# programs affect both equally.
 [[ -z $several ]] || bench "$bin/stridewire-bench" --benchmark_filter="^($several)\$" --benchmark_repetitions=5 \
   --benchmark_enable_random_interleaving=true --benchmark_report_aggregates_only=true
 
-# One benchmark is one object; its keys stand one a line.
+# Each benchmark is a JSON object with one key per line.
 awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v csv="$csv" '
   function value(line) { sub(/^[^:]*: */, "", line); sub(/,$/, "", line); gsub(/"/, "", line); return line }
   function number(text) { return text == "" ? "" : sprintf("%.6g", text) }
   function quoted(text) { gsub(/"/, "\"\"", text); return "\"" text "\"" }
   BEGIN {
     print "benchmark,items_per_s,cpu_us,iterations,bytes_per_s,examples,parameters,library_bytes,bytes_per_example,times_floor,instruction_set,commit,compiler,cpu,load_average" > csv
-    printf "%-40s %14s %12s %10s %12s\n", "one core of " cpu, "items/s", "us an item", "MB/s", "times floor"
+    printf "%-40s %14s %12s %10s %12s\n", "one core of " cpu, "items/s", "us per item", "MB/s", "times floor"
   }
   /^ *"instruction_set":/ {
     set = value($0)
@@ -109,10 +112,11 @@ awk -v commit="$commit" -v compiler="$compiler" -v cpu="$cpu" -v load="$load" -v
     sub(/_median$/, "", f["name"])
     if ("error_message" in f) { print f["name"] ": " f["error_message"] > "/dev/stderr"; failed = 1 }
     name = f["name"]
-    # Who keeps the time itself counts processor time, without what readers do meanwhile.
+    # Benchmarks with manual time measure processor time without that of the readers.
     us = sub(/\/manual_time$/, "", name) ? f["real_time"] : f["cpu_time"]
     items = f["items_per_second"] != "" ? f["items_per_second"] : 1e6 / us
-    # PREFIX/KIND/SIZE is told beside PREFIX/floor/SIZE, measured before it with the same instruction set.
+    # PREFIX/KIND/SIZE is compared with PREFIX/floor/SIZE, which was measured before it with the
+    # same instruction set.
     times = ""
     if (match(name, /\/[^\/]+\/[^\/]+$/)) {
       split(substr(name, RSTART + 1), end, "/")

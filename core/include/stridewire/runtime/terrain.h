@@ -64,17 +64,17 @@ struct TerrainData {
 ///
 ///   height(x, z) = max(field(x, z) or 0, tops of all boxes that contain (x, z))
 ///
-/// Immutable, so avatars and threads may share it. Queries never allocate and give the same bytes on
-/// every machine. They find nearby boxes in a uniform grid. A position that is not finite is
+/// Immutable, so avatars and threads may share it. Queries never allocate and give the same bytes
+/// on every machine. They find nearby boxes in a uniform grid. A position that is not finite is
 /// outside the field and all boxes.
 class Terrain {
  public:
   /// Validates `data` and builds the spatial index.
   ///
-  /// Errors, with the field in `where`, for example "boxes[3].max_m": kOutOfRange if a number is not
-  /// finite or exceeds its limit, or max_m does not exceed min_m. kShapeMismatch if the size of
-  /// heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total or in one
-  /// cell of the index.
+  /// Errors, with the field in `where`, for example "boxes[3].max_m": kOutOfRange if a number is
+  /// not finite or exceeds its limit, or max_m does not exceed min_m. kShapeMismatch if the size of
+  /// heights_m is not columns x rows. kLimitExceeded if there are too many boxes, in total or in
+  /// one cell of the index.
   [[nodiscard]] static Expected<std::shared_ptr<const Terrain>> Make(TerrainData data);
 
   [[nodiscard]] const TerrainData& data() const { return data_; }
@@ -88,9 +88,9 @@ class Terrain {
   /// belongs to the one with larger coordinates, at the end of the field to the last cell.
   [[nodiscard]] Vec3 NormalAt(double x_m, double z_m) const;
 
-  /// Returns an upper bound for the height of the ground in a closed disc. It is exact for boxes and
-  /// for y = 0 outside the field. For the field it is the maximum over the square that encloses the
-  /// disc. A radius <= 0 means a point. The time grows with the square of the radius.
+  /// Returns an upper bound for the height of the ground in a closed disc. It is exact for boxes
+  /// and for y = 0 outside the field. For the field it is the maximum over the square that encloses
+  /// the disc. A radius <= 0 means a point. The time grows with the square of the radius.
   [[nodiscard]] double HighestWithin(double x_m, double z_m, double radius_m) const;
 
   /// Returns a lower bound for the height of the ground in a disc. Ground that is covered by boxes
