@@ -111,7 +111,7 @@ class GameServer {
     std::fflush(stdout);
   }
 
-  // The server has executed steps and reported foot strikes.
+  // Returns whether the server has executed steps and reported foot strikes.
   bool successful() const { return steps_ > 0 && foot_strikes_ > 0; }
 
  private:

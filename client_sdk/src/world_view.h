@@ -137,7 +137,7 @@ class WorldView : public PoseSink {
   std::map<protocol::AvatarId, std::uint64_t> left_;  // Tick at which each avatar left the region.
   std::uint64_t epoch_ = 1;
   std::vector<Quat> scratch_;
-  // Requested interval of poses in ticks. Set while Apply(Movements) runs.
+  // Interval of poses in ticks, as requested. Set while Apply(Movements) runs.
   std::uint64_t replica_every_n_ticks_ = 1;
   Counts* replica_counts_ = nullptr;  // Counters to update. Set while Apply(Movements) runs.
 };

@@ -7,14 +7,14 @@
 
 namespace stridewire {
 
-/// Benchmarks of whole crowds on a library.
+/// Registers benchmarks of whole crowds with a library.
 void RegisterCrowd(const std::string& name, const std::shared_ptr<const MotionLibrary>& library);
 
-/// What observers of a crowd of its avatars cost.
+/// Registers benchmarks of the cost of observers of a crowd.
 void RegisterObservers(const std::string& name,
                        const std::shared_ptr<const MotionLibrary>& library);
 
-/// What crowds cost with other numbers of examples and joints.
+/// Registers benchmarks of crowds with libraries that have other numbers of examples and joints.
 void RegisterScaledCrowds();
 
 }  // namespace stridewire

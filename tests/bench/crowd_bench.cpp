@@ -1,6 +1,6 @@
-// What a tick makes of a crowd: poses evaluated together, planted and encoded, over how many there
-// are. Beside them the floor of this machine and this run, the plain reference, and sampling every
-// example by itself.
+// Benchmarks of the work of a tick for a crowd: poses are evaluated together, planted and encoded.
+// The argument is the number of avatars. For comparison, the same run measures a lower bound for
+// this machine ("floor"), the reference implementation, and sampling each example separately.
 
 #include <benchmark/benchmark.h>
 
@@ -26,9 +26,10 @@ namespace {
 using Library = std::shared_ptr<const MotionLibrary>;
 
 constexpr double kTickS = 1.0 / 60.0;
-constexpr int kKinds = 240;  // Different steps, so that no branch is learnt by heart.
+// Number of different steps. There are enough of them that branch predictors cannot learn them.
+constexpr int kKinds = 240;
 
-// Steps of real walks, each at another time of its own, played again and again.
+// Avatars that repeat steps of real walks. Each starts at a different time within its step.
 class Steps {
  public:
   struct Walker {
@@ -66,7 +67,7 @@ class Steps {
     }
   }
 
-  // To the next tick.
+  // Advances all walkers to the next tick.
   void Advance() {
     for (Walker& walker : walkers_) {
       walker.time_s += kTickS;
@@ -90,10 +91,10 @@ void Count(benchmark::State& state, const Steps& steps, int count) {
   state.counters["examples"] = steps.examples();
 }
 
-// Poses of each tick, evaluated some ticks ahead as the server does (server::EncodedPoseCache), and
-// not kept.
+// Evaluates the poses of each tick, some ticks ahead as the server does (server::EncodedPoseCache),
+// and discards them.
 void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_feet) {
-  // Spread over shards: threads that share nothing but the library.
+  // The crowd is distributed over shards: threads that share only the library.
   const int count = static_cast<int>(state.range(0)) / state.threads();
   Steps steps(library, count, plants_feet);
   const auto phases = static_cast<int>(server::EncodedPoseCache::PhasesOf(steps.walkers().size()));
@@ -130,8 +131,8 @@ void EvaluateCrowd(benchmark::State& state, const Library& library, bool plants_
   Count(state, steps, count);
 }
 
-// All that a tick does for a pose: evaluated, planted, quantised and put into the frame that
-// observers share.
+// Does all the work of a tick for each pose: evaluates, plants and quantises it, and copies it into
+// the frame that observers share.
 void WholePose(benchmark::State& state, const Library& library) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, true);
@@ -181,7 +182,7 @@ void WholePose(benchmark::State& state, const Library& library) {
     }
     return status;
   };
-  // Until each walker has been evaluated in its phase.
+  // Warm up until each walker has been evaluated in its phase.
   for (std::size_t i = 0; i < 2 * server::EncodedPoseCache::kMaxTicksAhead; ++i) (void)tick();
   for (auto _ : state) {
     if (const Status status = tick(); !status) return state.SkipWithError(status.error().text);
@@ -190,8 +191,8 @@ void WholePose(benchmark::State& state, const Library& library) {
   Count(state, steps, count);
 }
 
-// Whole steps as a crowd makes them, sixteen side by side: parameters corrected, weights, thirty
-// frames.
+// Synthesizes whole steps, sixteen side by side: corrects the parameters, computes the weights and
+// evaluates thirty frames.
 void MakeSteps(benchmark::State& state, const Library& library) {
   constexpr std::size_t kSteps = 16;
   constexpr int kFrames = 30;
@@ -201,7 +202,7 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   std::vector<ParameterValues> wanted(kKinds);
   for (ParameterValues& parameters : wanted) {
     parameters.count = static_cast<int>(d);
-    // Half-way between two examples.
+    // Use parameters half-way between two examples.
     for (int corner = 0; corner < 2; ++corner) {
       const auto site =
           group.site(static_cast<int>(random() % static_cast<unsigned>(group.example_count)));
@@ -232,14 +233,14 @@ void MakeSteps(benchmark::State& state, const Library& library) {
   state.counters["examples"] = static_cast<double>(group.example_count);
 }
 
-// y += w x over floats, by the widest vectors there are.
+// Computes y += w x over floats, with the widest vectors of the machine.
 [[gnu::target_clones("avx512f", "avx2", "default")]] void MultiplyAdd(const float* x, float w,
                                                                       float* y, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) y[i] += w * x[i];
 }
 
-// Zeros that begin where a line of the cache does: figures would depend on where an allocator puts
-// them.
+// An array of zeros that begins at a cache line. Otherwise results would depend on the addresses
+// that the allocator returns.
 class LineAligned {
  public:
   explicit LineAligned(std::size_t count) : floats_(count + kLineFloats) {
@@ -256,10 +257,11 @@ class LineAligned {
   float* begin_;
 };
 
-// The floor: the bytes that poses can not do without when as many of a movement's are made at once,
-// each read and given one multiply-add. At 30 cells a second a stretch of eight passes seven grid
-// points, one of sixteen eleven, each with a row of all examples; each pose is of four of their
-// sums and, quantised, takes a quarter of a row; plan and difference are read once.
+// Measures a lower bound: touches only the bytes that are necessary for several poses of a
+// movement, with one multiply-add per float. At 30 cells per second, a run of eight poses passes
+// seven grid points, and a run of sixteen passes eleven. Each grid point has a row per example. A
+// pose combines four of their sums, and its quantised form is a quarter of a row. The foot plan and
+// the difference pose are read once.
 void Floor(benchmark::State& state, const Library& library) {
   const auto count = static_cast<std::size_t>(state.range(0));
   const std::size_t poses = server::EncodedPoseCache::PhasesOf(count);
@@ -268,7 +270,7 @@ void Floor(benchmark::State& state, const Library& library) {
   const auto row = static_cast<std::size_t>(library->layout().row_floats);
   const auto examples = static_cast<std::size_t>(group.example_count);
   const std::size_t points = static_cast<std::size_t>(group.grid_point_count) - passed;
-  // Plan and difference in whole lines, too.
+  // The foot plan and the difference pose also occupy whole cache lines.
   const std::size_t plan = (sizeof(PackedFootPlan) / sizeof(float) + 15) / 16 * 16;
   const std::size_t own = plan + row;
   LineAligned owns(count * own);
@@ -300,7 +302,7 @@ void Floor(benchmark::State& state, const Library& library) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(count));
 }
 
-// The same poses one by one, the plain way.
+// Evaluates the same poses one by one with the reference implementation.
 void ReferencePoses(benchmark::State& state, const Library& library, bool samples_examples) {
   const auto count = static_cast<int>(state.range(0));
   Steps steps(library, count, false);

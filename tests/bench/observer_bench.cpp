@@ -1,12 +1,12 @@
-// Measures the time per tick that the server needs for one more observer of a crowd. The poses are
-// encoded already. The session composes their frames and passes the bytes to the system. The floor,
-// measured in the same run, only passes the same bytes to the system.
+// Measures the cost of one more observer for a tick of the server. The poses are already encoded;
+// the session selects them and passes the bytes to the operating system. For comparison, the floor
+// is the cost of passing the same bytes to the operating system and nothing else.
 //
-//   in_process   sessions and their queues, above a transport that discards all data
-//   sockets      the same above TCP over loopback
-//   floor        one sendmsg per socket, of frames that exist already
+//   in_process   sessions and their queues, above a transport that discards all bytes
+//   sockets      the same with TCP over loopback
+//   floor        one sendmsg per socket with existing frames
 //
-// The clock is stopped while readers receive data, because everything runs on one core.
+// The readers read received bytes while the clock is stopped, so that everything runs on one core.
 
 #include <benchmark/benchmark.h>
 #include <spdlog/spdlog.h>
@@ -40,15 +40,16 @@ using server::PoseDelivery;
 using server::SharedFrame;
 
 constexpr std::uint32_t kAvatars = 1000;
-constexpr float kSideM = 100.0f;  // of the square they stand on
+constexpr float kSideM = 100.0f;  // Side of the square in which the avatars stand, in metres.
 constexpr std::size_t kNamedCount = 100;
-constexpr double kRegionRadiusM = 10.0;  // some 30 of them
+// About 30 avatars are in a region of this radius, in metres.
+constexpr double kRegionRadiusM = 10.0;
 constexpr std::size_t kSocketBufferBytes = std::size_t{4} << 20;
 
 enum class Watch : std::uint8_t { kAll, kNamed, kRegion };
 enum class Through : std::uint8_t { kInProcess, kSockets, kFloor };
 
-/// What a shard has of a tick: compact poses, encoded once.
+/// The poses of a shard for one tick: compact poses, encoded once.
 struct Crowd {
   explicit Crowd(const std::shared_ptr<const MotionLibrary>& library) {
     world = std::make_shared<server::World>();
@@ -96,7 +97,7 @@ struct Crowd {
   PoseDelivery delivery;
 };
 
-/// Two ends of a connection over loopback. What comes is counted and thrown away.
+/// Both ends of a connection over loopback. Received bytes are counted and discarded.
 class Reader {
  public:
   explicit Reader(tcp::acceptor& acceptor) : socket_(acceptor.get_executor()) {
@@ -107,7 +108,7 @@ class Reader {
   std::size_t Drain() {
     std::size_t bytes = 0;
     for (;;) {
-      // Without a buffer TCP throws away as many.
+      // Without a buffer, TCP discards this number of received bytes.
       const ssize_t some =
           recv(socket_.native_handle(), nullptr, std::size_t{1} << 30, MSG_TRUNC | MSG_DONTWAIT);
       if (some <= 0) return bytes;
@@ -119,7 +120,7 @@ class Reader {
   tcp::socket socket_;
 };
 
-/// Takes everything at once.
+/// A transport that sends everything at once.
 class NoTransport final : public server::Transport {
  public:
   explicit NoTransport(asio::io_context& context) : context_(context) {}
@@ -139,7 +140,7 @@ class NoTransport final : public server::Transport {
   asio::io_context& context_;
 };
 
-/// A shard that has sessions, all in one world, and no avatars.
+/// A shard without avatars. All its sessions observe the same world.
 class Host final : public server::SessionHost {
  public:
   explicit Host(const Crowd& crowd) : crowd_(crowd) {
@@ -181,7 +182,7 @@ class Host final : public server::SessionHost {
     sessions_.back()->Attach(std::move(connection), hello, false, commands);
   }
 
-  /// Delivers poses as Shard::Deliver does.
+  /// Delivers poses like Shard::Deliver.
   void Tick(const PoseDelivery& delivery) {
     server::SharedPoses poses(delivery, composer_, metrics_);
     for (const auto& session : sessions_) session->OnPoses(poses);
@@ -198,7 +199,7 @@ class Host final : public server::SessionHost {
   std::vector<std::unique_ptr<server::Session>> sessions_;
 };
 
-/// What an observer asks for, and the frames that come of it.
+/// The subscription of an observer, and the frames that it should receive.
 struct Wanted {
   protocol::Observe observe;
   std::vector<SharedFrame> frames;
@@ -232,7 +233,7 @@ Wanted Want(const Crowd& crowd, Watch watch, std::mt19937& random,
   return wanted;
 }
 
-/// Gives the system what it takes of some frames.
+/// Passes as many bytes of some frames to the operating system as it accepts.
 class Writer {
  public:
   explicit Writer(tcp::acceptor& acceptor) : socket_(acceptor.accept()) {
@@ -276,7 +277,7 @@ double ThreadTimeS() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// Raises the limit of open files: each observer needs two sockets.
+// Raises the limit on open files for `count` observers with two sockets each.
 bool AllowSockets(std::size_t count) {
   rlimit files{};
   if (getrlimit(RLIMIT_NOFILE, &files) != 0) return false;
@@ -287,7 +288,7 @@ bool AllowSockets(std::size_t count) {
 void Observe(benchmark::State& state, const std::shared_ptr<const Crowd>& crowd, Watch watch,
              Through way) {
   const auto count = static_cast<std::size_t>(state.range(0));
-  if (!AllowSockets(count)) return state.SkipWithError("the system gives too few sockets");
+  if (!AllowSockets(count)) return state.SkipWithError("the system allows too few open files");
   asio::io_context context(1);
   tcp::acceptor acceptor(context, tcp::endpoint(asio::ip::address_v4::loopback(), 0));
   Host host(*crowd);
@@ -323,7 +324,8 @@ void Observe(benchmark::State& state, const std::shared_ptr<const Crowd>& crowd,
   const auto write_all = [&] {
     for (Writer& writer : writers) writer.Write();
   };
-  // The first tick reports the avatars that enter a region; in later ticks windows open.
+  // In the first tick, sessions receive the avatars that enter their regions. A few ticks later,
+  // the TCP windows have opened.
   for (int tick = 0; tick < 8; ++tick) {
     if (way != Through::kFloor) host.Tick(crowd->delivery);
     for (std::size_t i = 0; i < writers.size(); ++i) writers[i].Begin(all_wanted[i].frames);
@@ -344,7 +346,7 @@ void Observe(benchmark::State& state, const std::shared_ptr<const Crowd>& crowd,
     }
     double taken_s = ThreadTimeS() - begin_s;
     for (std::size_t bytes = drain(); !readers.empty() && bytes < tick_bytes;) {
-      // The reader's window was full.
+      // The TCP window of the reader was full.
       begin_s = ThreadTimeS();
       write_all();
       context.poll();

@@ -1,8 +1,8 @@
 // paused_reader STRIDEWIRED [SECONDS [AVATARS [WRITE_TIMEOUT_S]]]
 //
-// Measures the memory that the server needs for a WebSocket client that stops reading for a while,
-// and what the client receives when it reads again. Prints one figure per line. The exit code is 1
-// if the server buffered more than its limit allows, or sent no recent pose.
+// Measures the memory of the server while a WebSocket client stops reading, and what the client
+// receives when it continues. Prints one value per line. The exit code is 1 if the server buffered
+// more than its limit or sent no current pose.
 #include <unistd.h>
 
 #include <cstdio>
@@ -21,7 +21,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using test::PortIn;
 
-// Returns the resident memory of a process in KiB.
+// Returns the resident memory of a process in KiB, as the operating system reports it.
 std::size_t ResidentKiB(const std::string& pid) {
   std::ifstream status("/proc/" + pid + "/status");
   std::string line;
@@ -70,7 +70,7 @@ int Run(int argc, char** argv) {
   const auto welcome = observer.SayHello();
   observer.Join("w", protocol::Role::kObserver);
   observer.Observe(world->world, 1, protocol::PoseMode::kQuantised);
-  // Until everything that is allocated once has been.
+  // Wait until the server has allocated all memory that it allocates only once.
   std::uint64_t last_tick = 0;
   std::uint64_t bytes = 0;
   const auto begin = Clock::now();
@@ -90,7 +90,7 @@ int Run(int argc, char** argv) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       largest_kib = std::max(largest_kib, ResidentKiB(pid));
     }
-    static_cast<void>(tick_now());  // the controller is heard of
+    static_cast<void>(tick_now());  // Prevents the idle timeout of the controller.
   }
   const long grown_kib = static_cast<long>(largest_kib) - static_cast<long>(before_kib);
   std::printf("resident at most   %zu KiB (+%ld) in %d s\n", largest_kib, grown_kib, seconds);
@@ -106,12 +106,13 @@ int Run(int argc, char** argv) {
   while (first_fresh == 0) {
     const auto message = reader->Receive(std::chrono::seconds(10));
     if (!message && !is_again && observer.is_closed()) {
-      // Let go meanwhile: comes back as a client does.
+      // The server has closed the connection. Resume the session like a client does.
       is_again = true;
       again.emplace(PortIn(ready, "http"));
       reader = &*again;
       const auto back = again->SayHello(welcome->resume_token);
-      std::printf("let go by the server; resumed: %s\n", back && back->resumed ? "yes" : "no");
+      std::printf("the server closed the connection; resumed: %s\n",
+                  back && back->resumed ? "yes" : "no");
       continue;
     }
     if (!message) break;

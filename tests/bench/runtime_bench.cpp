@@ -1,11 +1,12 @@
-// What movements, poses and messages cost on one core, on `builtin` and on every library named
-// after the options: stridewire-bench [--instruction-set=NAME] [--benchmark_…] [LIBRARY.swl …]
+// Measures the cost of movements, poses and messages on one core, for `builtin` and for each
+// library named after the options:
+//   stridewire-bench [--instruction-set=NAME] [--benchmark_...] [LIBRARY.swl ...]
 //
-// Kernels run with the widest vectors that there are (AVX-512, AVX2, SSE4, NEON), or with those
-// named. Floors are always as fast as the machine can be.
+// The kernels use the widest vectors of the machine (AVX-512, AVX2, SSE4, NEON), or the named
+// instruction set. The floors always use the fastest instruction set.
 //
-// A step counts as the paper counts it: weights, blended keytimes and the poses of its whole
-// length, here 30 of them.
+// A step is counted as in the paper: weights, blended keytimes and the poses of its whole duration,
+// here 30 of them.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -40,11 +41,13 @@ using Library = std::shared_ptr<const MotionLibrary>;
 using protocol::PoseMode;
 
 constexpr int kFramesAStep = 30;
-constexpr int kVariations = 256;  ///< Different parameters, so that no branch is learnt by heart.
+/// Number of different parameters. There are enough of them that branch predictors cannot learn
+/// them.
+constexpr int kVariations = 256;
 constexpr int kCrowd = 1000;
 constexpr double kTickS = 1.0 / 60.0;
 
-/// Parameters inside the hull of a group's examples: random means of three sites.
+/// Returns parameters inside the hull of a group's examples: random means of three sites.
 std::vector<std::vector<double>> Parameters(const MotionGroup& group) {
   std::mt19937 random(1);
   std::vector<std::vector<double>> all(kVariations);
@@ -82,7 +85,7 @@ void StartMovementAlone(benchmark::State& state, const Library& library, int gro
   AddGroupCounters(state, group);
 }
 
-/// The same with run-time correction: what an avatar pays when a movement starts.
+/// Starts a movement with run-time correction, as avatars do.
 void StartCorrected(benchmark::State& state, const Library& library, int group_index) {
   const MotionGroup& group = library->group(group_index);
   const auto parameters = Parameters(group);
@@ -153,7 +156,7 @@ void EvaluatePose(benchmark::State& state, const Library& library, int group_ind
   AddGroupCounters(state, group);
 }
 
-/// A crowd that walks without an end; what is random is the same every time.
+/// A crowd that walks without end. Its random numbers are the same in every run.
 class Crowd {
  public:
   Crowd(const Library& library, int size, const AvatarOptions& options = {})
@@ -161,8 +164,8 @@ class Crowd {
     for (int i = 0; i < size; ++i) {
       avatars_.emplace_back(library, BaseFrame{.position_m = DVec3(2.0 * i, 0.0, 0.0)}, options);
       Refill(avatars_.back());
-      // Each at another place of its walk.
-      // Not AvatarSimulation::Advance, which would allocate scratch memory per avatar.
+      // Each avatar starts at a different point of its walk.
+      // AvatarSimulation::Advance is not used, because it would allocate scratch memory per avatar.
       AvatarSimulation* one = &avatars_.back();
       for (int tick = 0; tick < i % 120; ++tick) {
         AvatarSimulation::AdvanceAll({&one, 1}, kTickS, plan_scratch_, evaluator_);
@@ -174,7 +177,7 @@ class Crowd {
     AdvanceStates();
     AvatarSimulation::UpdatePoses(all_, evaluator_);
   }
-  /// Without poses.
+  /// Advances the avatars without evaluating poses.
   void AdvanceStates() {
     for (AvatarSimulation& avatar : avatars_) {
       if (avatar.queue_size() < 2) Refill(avatar);
@@ -207,14 +210,14 @@ void AdvanceCrowd(benchmark::State& state, const Library& library, int count, bo
   state.SetItemsProcessed(state.iterations() * count);
 }
 
-/// What a tick costs beside the poses: movements ended, planned and begun.
+/// Measures a tick without poses: the ends, plans and starts of movements.
 void AdvanceStates(benchmark::State& state, const Library& library, int count) {
   Crowd crowd(library, count);
   for (auto _ : state) crowd.AdvanceStates();
   state.SetItemsProcessed(state.iterations() * count);
 }
 
-/// Walkers between two steps, at places all along their ways: what deciding on the next one costs.
+/// Measures the decision on the next step of walks at various points between start and goal.
 void PlanWalkSteps(benchmark::State& state, const Library& library, bool is_rough) {
   std::shared_ptr<const Terrain> terrain;
   if (is_rough) {
@@ -239,7 +242,7 @@ void PlanWalkSteps(benchmark::State& state, const Library& library, bool is_roug
   for (Place& place : places) {
     place.walk.position_m = DVec3(draw(-4.0, 4.0), 0.0, draw(-4.0, 4.0));
     place.walk.heading_rad = draw(-3.0, 3.0);
-    // In mid-stride, the left foot ahead.
+    // The avatar is in mid-stride with the left foot ahead.
     const double stride_m = draw(0.0, 0.6);
     place.stance.feet[0].position_m = DVec3(0.5 * gait.width_m, 0.0, stride_m);
     place.stance.feet[1].position_m = DVec3(-0.5 * gait.width_m, 0.0, 0.0);
@@ -306,7 +309,7 @@ protocol::CompactCodec CompactCodecOf(const Library& library) {
   return protocol::CompactCodec::Make(ChoosePoseQuantization(*library).joints, parents).value();
 }
 
-/// Poses as a batch encodes them: so many at once, copied in and their bytes out.
+/// Encodes poses in blocks, as for a batch: copies them in and their bytes out.
 void EncodeCompactPose(benchmark::State& state, const Library& library) {
   constexpr auto kBlock = protocol::CompactCodec::kBlock;
   const Crowd crowd(library, 64);
@@ -359,7 +362,7 @@ void DecodeCompactPose(benchmark::State& state, const Library& library) {
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(codec.pose_bytes()));
 }
 
-/// What a tick encodes for a crowd: one frame, to be shared by all observers.
+/// Encodes a crowd in one frame that all observers share.
 void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   const Crowd crowd(library, kCrowd);
   std::vector<protocol::AvatarId> numbers(kCrowd);
@@ -386,8 +389,8 @@ void EncodeBatch(benchmark::State& state, const Library& library, PoseMode mode)
   state.SetBytesProcessed(state.iterations() * static_cast<std::int64_t>(frame.size()));
 }
 
-/// What an observer of 100 out of 10,000 costs: their rows copied into a frame of its own. 50 such
-/// observers take turns, so that the rows are as cold as in a tick.
+/// Composes the frame of an observer of 100 out of 10,000 avatars by copying their rows. 50 such
+/// observers take turns, so that the rows are as cold in the cache as in a real tick.
 void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode) {
   constexpr std::size_t kRows = 10'000;
   constexpr std::size_t kPicked = 100;
@@ -419,7 +422,7 @@ void ComposeBatch(benchmark::State& state, const Library& library, PoseMode mode
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kPicked));
 }
 
-/// How large a library is: no time, only counters.
+/// Reports the size of a library. There are only counters and no meaningful time.
 void MeasureLibrary(benchmark::State& state, const Library& library) {
   int examples = 0;
   for (const MotionGroup& group : library->groups()) examples += group.example_count;
@@ -434,7 +437,7 @@ void OpenLibraryAgain(benchmark::State& state, const std::string& name) {
   for (auto _ : state) benchmark::DoNotOptimize(OpenLibrary(name));
 }
 
-/// One layer of weight `weight` over a pose.
+/// Applies one layer with weight `weight` to a pose.
 void ApplyLayerAlone(benchmark::State& state, const Library& library, int index, double weight) {
   const LayerClip& layer = library->layers()[static_cast<std::size_t>(index)];
   Pose pose = library->stand_pose();
@@ -452,7 +455,7 @@ void Register(const std::string& name, Arguments&&... arguments) {
       ->Unit(benchmark::kMicrosecond);
 }
 
-/// `path`: how to open it again.
+/// Registers all benchmarks of a library. `path` is its name or path, to open it again.
 void RegisterAll(const std::string& path, const Library& library) {
   const std::string name = std::filesystem::path(path).stem().string();
   Register(name + "/library", MeasureLibrary, library);
@@ -489,8 +492,8 @@ void RegisterAll(const std::string& path, const Library& library) {
   Register(name + "/decode_pose/compact", DecodeCompactPose, library);
 }
 
-/// The set the kernels run with from now on: the one of that name, or the widest. Empty: this
-/// machine has none.
+/// Selects the instruction set of the kernels: the one with this name, or the widest. Returns an
+/// empty text if this machine does not support it.
 std::string_view ChooseInstructionSet(std::string_view name) {
   for (const InstructionSet& set : kInstructionSets) {
     if ((hwy::SupportedTargets() & set.target) == 0 || (!name.empty() && name != set.name))

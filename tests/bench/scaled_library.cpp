@@ -17,7 +17,7 @@ namespace {
 constexpr double kFps = 120.0;
 constexpr int kJointsOfAChain = 10;
 
-// A step half-way between some of a group's.
+// Returns a step that blends three random examples of a group.
 RawExample BlendOf(const MotionLibrary& library, int group_index, std::mt19937& random) {
   const MotionGroup& group = library.group(group_index);
   constexpr int kMixed = 3;
@@ -62,7 +62,8 @@ void SetExampleCount(const MotionLibrary& library, int group, int count, RawGrou
   }
 }
 
-// The joint whose rotations one more joint has.
+// Returns the joint whose rotations the additional joint `joint` copies. `there` is the original
+// number of joints.
 std::size_t Twin(std::size_t joint, std::size_t there) { return 1 + joint % (there - 1); }
 
 void AddJoints(int joints, RawLibrary& raw) {

@@ -1,5 +1,5 @@
-// Measures queries of a rough height field with slabs on it, and the time to decode and index the
-// largest terrain that is allowed. stridewire-bench --benchmark_filter=terrain
+// Benchmarks of terrain: queries on uneven ground with slabs, and the largest possible terrain from
+// its message to its index. Run them with stridewire-bench --benchmark_filter=terrain
 #include <benchmark/benchmark.h>
 
 #include <memory>
@@ -34,7 +34,7 @@ TerrainData MakeGround(std::int32_t samples, double cell_m, int slabs) {
   return data;
 }
 
-/// 64 m square, a sample every 0.25 m, 2,000 slabs.
+/// Measures a query on a terrain of 64 m x 64 m with a sample every 0.25 m and 2,000 slabs.
 template <typename Query>
 void Ask(benchmark::State& state, const Query& query) {
   const auto terrain = Terrain::Make(MakeGround(257, 0.25, 2000));

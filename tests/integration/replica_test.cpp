@@ -154,7 +154,7 @@ TEST_P(ReplicaLibraries, HasTheBytesOfTheAvatarInEveryTick) {
       ASSERT_TRUE(IsSame(first.pose(), avatar.pose()))
           << "tick " << tick << " of " << round << ", seed " << kSeed;
       ASSERT_TRUE(IsSame(late->pose(), avatar.pose()))
-          << "tick " << tick << " of " << round << ", late replica, seed " << kSeed;
+          << "tick " << tick << " of " << round << " (late replica), seed " << kSeed;
       ASSERT_EQ(first.idle(), avatar.idle()) << "tick " << tick << " of " << round;
       figures.poses += 2;
     }
@@ -201,8 +201,7 @@ TEST_P(ReplicaLibraries, RecordsOfStepsAreSmall) {
     }
   }
   std::printf(
-      "%s: seed %u; %zu steps, %.1f bytes per step, at most %zu; "
-      "%.0f bytes per state, at most %zu\n",
+      "%s: seed %u; %zu steps, %.1f bytes per step (at most %zu), %.0f per state (at most %zu)\n",
       manner.name, kSeed, steps, static_cast<double>(bytes) / static_cast<double>(steps), largest,
       static_cast<double>(state_bytes) / static_cast<double>(states), largest_state);
   ASSERT_GT(steps, 100u);

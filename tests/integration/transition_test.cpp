@@ -383,7 +383,7 @@ TEST_P(TransitionSmoothness, IsThatOfTheMovementsThemselves) {
     for (std::size_t b = 0; b < kKinds; ++b) {
       if (counts[a][b] == 0 || (a == 3 && b == 3)) continue;
       const double ratio = across[a][b] / std::max(inside[a], inside[b]);
-      std::printf("%s: %-10s to %-10s %3d times, %5.2f rad/s a frame, %.2f of the examples'\n",
+      std::printf("%s: %-10s to %-10s %3d times, %5.2f rad/s per frame, %.2f of the examples'\n",
                   GetParam().name,
                   std::string(MovementKindName(static_cast<MovementKind>(a))).c_str(),
                   std::string(MovementKindName(static_cast<MovementKind>(b))).c_str(), counts[a][b],

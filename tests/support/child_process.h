@@ -15,8 +15,8 @@
 
 namespace stridewire::test {
 
-/// A program that runs beside the test, its stdout read line by line; stderr goes where the test's
-/// goes. Killed when it is still there at the end.
+/// A program that runs while the test continues. Its stdout is read line by line; its stderr is
+/// that of the test. The destructor kills the program if it still runs.
 class ChildProcess {
  public:
   ChildProcess(const std::string& program, const std::vector<std::string>& arguments) {
@@ -51,7 +51,7 @@ class ChildProcess {
     if (child_ > 0) kill(child_, signal);
   }
 
-  /// Waits for the end: the exit code, or -1 for an end by a signal.
+  /// Waits for the end of the program. Returns the exit code, or -1 if a signal ended it.
   int Wait() {
     int status = 0;
     while (child_ > 0 && waitpid(child_, &status, 0) < 0 && errno == EINTR) {
@@ -60,7 +60,8 @@ class ChildProcess {
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
 
-  /// The next line of stdout, without its end; empty after `timeout_s` or at the end of the output.
+  /// Returns the next line of stdout without its line end. Empty after `timeout_s` or at the end of
+  /// the output.
   std::optional<std::string> ReadLine(double timeout_s = 60.0) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
     for (;;) {
@@ -80,7 +81,7 @@ class ChildProcess {
     }
   }
 
-  /// The next line that begins like this; those before it are dropped.
+  /// Returns the next line that begins with this text, and drops the lines before it.
   std::optional<std::string> ReadLineThatBegins(const std::string& start, double timeout_s = 60.0) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::duration<double>(timeout_s);
     while (std::chrono::steady_clock::now() < until) {

@@ -4,7 +4,8 @@
 
 namespace stridewire {
 
-/// Numbers that are the same with any standard library, whose distributions differ.
+/// Random numbers that are the same with every standard library. The distributions of standard
+/// libraries differ.
 class Random {
  public:
   explicit Random(unsigned seed) : engine_(seed) {}

@@ -15,17 +15,18 @@
 
 namespace stridewire::test {
 
-/// What a program left behind.
+/// Exit code and output of a program.
 struct ProgramResult {
-  int exit_code = -1;  ///< -1: did not start, was ended by a signal or ran out of time.
-  int signal = 0;      ///< The signal that ended it, else 0.
+  /// Exit code; -1 if the program did not start, was killed by a signal or exceeded the timeout.
+  int exit_code = -1;
+  int signal = 0;  ///< Signal that killed the program; 0 if there was none.
   bool timed_out = false;
-  std::string out;  ///< stdout, at most 64 MiB of it
-  std::string err;  ///< stderr, likewise
+  std::string out;  ///< Output on stdout, at most 64 MiB.
+  std::string err;  ///< Output on stderr, at most 64 MiB.
 };
 
-/// Runs a program by its path, without a shell, with an empty stdin, and waits for its end; one
-/// that takes longer than `timeout_s` is killed. `arguments` do not include the program's name.
+/// Runs the program at a path, without a shell and with an empty stdin, and waits for its end.
+/// Kills it after `timeout_s`. `arguments` do not include the name of the program.
 inline ProgramResult RunProgram(const std::string& program,
                                 const std::vector<std::string>& arguments, double timeout_s = 120) {
   constexpr std::size_t kMaxOutput = std::size_t{64} << 20;

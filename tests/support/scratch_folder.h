@@ -11,7 +11,7 @@
 
 namespace stridewire::test {
 
-/// A folder of its own for a test, removed with everything in it.
+/// A temporary folder for one test. The destructor removes it and its contents.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -29,14 +29,14 @@ class ScratchFolder {
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::string File(const std::string& name) const { return (path_ / name).string(); }
 
-  /// Writes a file into it and returns its path.
+  /// Writes a file into the folder and returns its path.
   std::string Write(const std::string& name, std::string_view content) const {
     std::ofstream(path_ / name, std::ios::binary)
         .write(content.data(), static_cast<std::streamsize>(content.size()));
     return File(name);
   }
 
-  /// How many files and folders lie in it.
+  /// Returns the number of files and folders in it.
   [[nodiscard]] int Count() const {
     int count = 0;
     for (const auto& entry : std::filesystem::recursive_directory_iterator(path_)) {

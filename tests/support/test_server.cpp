@@ -15,7 +15,7 @@ server::Config TestConfig(int shards) {
   server::Config config;
   config.listen.port = 0;
   config.http.port = 0;
-  config.library = "toy";
+  config.library = "test";
   config.shards = shards;
   config.log_level = "warning";
   return config;
@@ -24,7 +24,7 @@ server::Config TestConfig(int shards) {
 TestServer::TestServer(server::Config config, server::ViewerFiles viewer) {
   server::Libraries libraries;
   libraries.Add(config.library,
-                config.library == "toy" ? MakeTestLibrary() : OpenLibrary(config.library).value());
+                config.library == "test" ? MakeTestLibrary() : OpenLibrary(config.library).value());
   server_ =
       std::make_unique<server::Server>(std::move(config), std::move(libraries), std::move(viewer));
   if (const Status status = server_->Start(); !status) {

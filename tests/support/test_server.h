@@ -14,7 +14,7 @@ namespace stridewire {
 /// Returns a configuration for tests: loopback addresses with ports that the system chooses.
 [[nodiscard]] server::Config TestConfig(int shards = 2);
 
-/// A server in this process, with real sockets. It uses the test library "toy" unless the
+/// A server in this process, with real sockets. It uses the test library "test" unless the
 /// configuration names another.
 class TestServer {
  public:

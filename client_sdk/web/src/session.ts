@@ -771,7 +771,7 @@ export class Session {
     this.lastEventsNumber = 0n;
     this.clock.reset();
 
-    // An unanswered Observe is sent again, and its caller gets the reply to that.
+    // An unanswered Observe is sent again, and its caller receives the reply to the second one.
     const observing = new Map<number, Command>();
     const unanswered = [...this.unanswered.values()];
     this.unanswered.clear();

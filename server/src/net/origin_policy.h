@@ -11,8 +11,9 @@ namespace stridewire::server {
 /// they send the origin of the page (header Origin, RFC 6454). A server that accepted every origin
 /// would let every page that its user visits control its avatars.
 ///
-/// Allowed are requests without Origin, because they do not come from a browser; the server's own
-/// pages, whose Origin has the host and port of the header Host; and the listed origins.
+/// Three kinds of requests are allowed: requests without Origin, because they do not come from a
+/// browser; requests of the server's own pages, whose Origin has the host and port of the header
+/// Host; and requests of the listed origins.
 ///
 /// If the server listens on a loopback address, a page counts as the server's own only if Host is
 /// an IP address or localhost. Other names could resolve to this machine because the page's owner

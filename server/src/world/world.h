@@ -24,7 +24,7 @@ struct World {
   WorldId id = 0;
   std::string name;
   std::shared_ptr<const MotionLibrary> library;
-  std::shared_ptr<const PoseQuantizations> quantizations;  ///< Of `library`.
+  std::shared_ptr<const PoseQuantizations> quantizations;  ///< Compact pose formats of `library`.
   bool persistent = false;  ///< True if avatars outlive the session that spawned them.
   AvatarOptions avatar_options;
   double interest_cell_m = 8.0;  ///< Cell size of the grid that finds the avatars of a region.

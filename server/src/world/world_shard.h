@@ -35,7 +35,7 @@ struct WorldShardDef {
   int max_queue = 256;
   /// Largest payload of a Movements message.
   std::size_t max_bulk_bytes = protocol::kMaxBulkBytes;
-  const TickClock& clock;  ///< Copied.
+  const TickClock& clock;  ///< Clock of the ticks; copied.
   AvatarBudget& budget;
   ThreadMetrics& metrics;
   /// Scratch memory of the world's library and of this thread. If null, the WorldShard allocates

@@ -1,13 +1,14 @@
 #!/usr/bin/env bash
-# example_config_test.sh STRIDEWIRED CONFIG.toml: the server takes the example configuration, it
-# names every key there is, and says what is the default anyway (its worlds apart).
+# example_config_test.sh STRIDEWIRED CONFIG.toml: checks that the server accepts the example
+# configuration, that it contains every key, and that its values are the defaults, except for its
+# worlds.
 set -euo pipefail
 stridewired=$1
 config=$2
 failed=0
 complain() { echo "FAILED: $*" >&2; failed=1; }
 
-# What the environment says would count more than the file.
+# Environment variables would override the file.
 for name in $(compgen -e STRIDEWIRE_ || true); do unset "$name"; done
 
 "$stridewired" --config "$config" --check-config || complain "--check-config ended with $?"

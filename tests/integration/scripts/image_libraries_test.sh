@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# image_libraries_test.sh DOCKERFILE PROGRAM: the container image installs every package whose
-# shared libraries the program is linked with (less those that every Debian image has).
+# image_libraries_test.sh DOCKERFILE PROGRAM: checks that the container image installs every package
+# whose shared libraries the program is linked with, except those that every Debian image contains.
 set -euo pipefail
 dockerfile=$1
 program=$2

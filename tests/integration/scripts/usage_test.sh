@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# usage_test.sh ROOT: every script explains itself, and refuses an option it does not know with
-# exit code 2 and one sentence that names it.
+# usage_test.sh ROOT: checks that every script prints its usage with --help, and rejects an unknown
+# option with exit code 2 and one sentence that contains the option.
 set -euo pipefail
 cd "$1"
 failed=0
@@ -19,7 +19,7 @@ for script in deploy/install_deps.sh deploy/demo.sh tests/run.sh tests/bench/lar
   [[ $(wc -l <<<"$message") -eq 1 ]] || complain "$script printed more than one line: $message"
 done
 
-# An option without its value, and values that make no sense.
+# Options without a value, and invalid values.
 refuses() {
   local result=0 message
   message=$("$@" 2>&1 >/dev/null) || result=$?

@@ -216,9 +216,9 @@ TEST_F(ServerHttp, ListsWorldsInInfoJson) {
   EXPECT_EQ(info["open_worlds"], true);
   EXPECT_FALSE(info["version"].get<std::string>().empty());
   EXPECT_EQ(info["worlds"], nlohmann::json::parse(R"([
-    {"name": "hall", "library": "toy", "avatars": 0},
-    {"name": "own", "library": "toy", "avatars": 0},
-    {"name": "plaza", "library": "toy", "avatars": 3}])"));
+    {"name": "hall", "library": "test", "avatars": 0},
+    {"name": "own", "library": "test", "avatars": 0},
+    {"name": "plaza", "library": "test", "avatars": 3}])"));
 }
 
 TEST_F(ServerHttp, RequiresAnUpgradeForStream) {
@@ -246,7 +246,7 @@ class ServerLibraries : public testing::Test {
 
 TEST_F(ServerLibraries, DescribeTheirGroups) {
   ASSERT_EQ(list.size(), 1u);
-  EXPECT_EQ(list[0]["name"], "toy");
+  EXPECT_EQ(list[0]["name"], "test");
   const nlohmann::json skeleton = Get(folder + "/skeleton.json");
   EXPECT_EQ(skeleton["names"].size(), skeleton["parents"].size());
   EXPECT_EQ(skeleton["offsets_m"].size(), 3 * skeleton["names"].size());

@@ -1,9 +1,9 @@
-/* Compiled as C99: the ABI needs nothing newer. */
+/** Compiled as C99, because the ABI must not require a newer standard. */
 #include <string.h>
 
 #include "stridewire/client.h"
 
-/* 0, or the number of the line that did not do what it should. */
+/** Returns 0, or the number of the line that failed. */
 int StridewireUsedFromC(void) {
   stridewire_client_options options;
   stridewire_client* client = NULL;

@@ -16,8 +16,8 @@ TEST(LatencyProbes, MeasureUntilThePoseAfterTheEvent) {
   LatencyProbes probes(2);
   probes.Schedule(1, 7, 100 * kMs, 105 * kMs);
   probes.Started(1, 7, 50);
-  probes.Pose(1, 49, 110 * kMs, true);   // Still by what was before.
-  probes.Pose(1, 50, 116 * kMs, false);  // Started, but nothing to see.
+  probes.Pose(1, 49, 110 * kMs, true);   // The pose still belongs to the previous movement.
+  probes.Pose(1, 50, 116 * kMs, false);  // The movement has started, but the pose has not changed.
   EXPECT_EQ(probes.open_count(), 1u);
   probes.Pose(1, 51, 133 * kMs, true);
   probes.Pose(1, 52, 150 * kMs, true);
@@ -65,7 +65,8 @@ TEST(LatencyProbes, IgnoreOtherRequestsAndAvatars) {
 TEST(LatencyProbes, CountAnInvisibleStepWithItsWaitingTime) {
   LatencyProbes probes(3);
   probes.Schedule(0, 7, 0, 0);
-  probes.Schedule(0, 8, 900 * kMs, 1000 * kMs);  // The next one is due, the last is not to be seen.
+  // The next step is due although the previous one never became visible.
+  probes.Schedule(0, 8, 900 * kMs, 1000 * kMs);
   EXPECT_EQ(OnlyTimeMs(probes), 1000.0);
   EXPECT_EQ(probes.Finish(1500 * kMs), 1u);
   EXPECT_EQ(probes.times().count(), 2u);

@@ -618,10 +618,10 @@ TEST(WorldShard, StartsWithTheTerrainOfItsWorld) {
 
 TEST(WorldDirectory, SetsTheTerrainOfAWorld) {
   Config config;
-  config.library = "toy";
+  config.library = "test";
   config.worlds["hall"] = {.library = "", .terrain = "hall.json", .persistent = false};
   Libraries libraries;
-  libraries.Add("toy", MakeTestLibrary());
+  libraries.Add("test", MakeTestLibrary());
   Terrains terrains;
   terrains.Add("hall.json", TerrainOfHeight(0.5)->terrain);
   WorldDirectory directory(config, libraries, terrains);
@@ -651,11 +651,11 @@ TEST(WorldDirectory, SetsTheTerrainOfAWorld) {
 
 TEST(WorldDirectory, CountsMembersAndRemovesEmptyWorlds) {
   Config config;
-  config.library = "toy";
+  config.library = "test";
   config.limits.max_worlds = 2;
   config.worlds["hall"] = {.library = "", .terrain = "", .persistent = true};
   Libraries libraries;
-  libraries.Add("toy", MakeTestLibrary());
+  libraries.Add("test", MakeTestLibrary());
   const Terrains terrains;
   WorldDirectory directory(config, libraries, terrains);
   const auto hall = directory.Join("hall");

@@ -346,7 +346,7 @@ typedef struct stridewire_height_field {
   double cell_m;           ///< Distance between neighbouring samples, 0.01 to 1000.
   uint32_t columns;        ///< Samples along x, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
   uint32_t rows;           ///< Samples along z, 2 to STRIDEWIRE_MAX_TERRAIN_COLUMNS.
-  const float* heights_m;  ///< columns * rows heights, row by row along x.
+  const float* heights_m;  ///< Heights of columns * rows samples, row by row along x.
 } stridewire_height_field;
 
 /// A block with vertical sides and a flat top.

@@ -54,7 +54,7 @@ export class PlaybackControls {
     this.playback.seek(this.playback.timeS + seconds);
   }
 
-  /** `range`: the times that can be shown. It ends at the time that a live view shows. */
+  /** `range` contains the times that can be shown. It ends at the time that a live view shows. */
   update(range: TimeRange | null): void {
     this.range = range;
     const {playback} = this;

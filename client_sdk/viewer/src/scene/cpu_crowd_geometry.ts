@@ -36,8 +36,9 @@ export class CpuCrowdGeometry {
   private readonly tint: THREE.BufferAttribute;
 
   /**
-   * `capacity`: number of avatars. `pointCount`: points per avatar. `indices`: the lines or
-   * triangles of one avatar. `flat`: each has the colour of its last point, without interpolation.
+   * `capacity` is the number of avatars, `pointCount` the number of points per avatar. `indices`
+   * contains the lines or triangles of one avatar. If `flat`, each has the colour of its last
+   * point, without interpolation.
    */
   constructor(
     private readonly capacity: number, readonly pointCount: number,

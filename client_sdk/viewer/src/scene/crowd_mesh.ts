@@ -213,7 +213,8 @@ export class CrowdMesh {
   }
 
   /**
-   * `coarse`: bodies with few faces, lit per vertex. `simplified`: stick figures with few lines.
+   * If `coarse`, bodies have few faces and are lit per vertex. If `simplified`, stick figures have
+   * few lines.
    */
   setStyle(style: FigureStyle, coarse: boolean, simplified: boolean): void {
     if (style === this.style && coarse === this.coarse && simplified === this.simplified) return;

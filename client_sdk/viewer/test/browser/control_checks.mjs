@@ -5,7 +5,7 @@ import assert from 'node:assert/strict';
 import {assertNear, sharedChecks, spawnedByCard} from './controls_page.mjs';
 import {differingShare, waitFor, waitForCamera} from './support.mjs';
 
-/** Names of all controls that the page has at present: the part of the page, and the control. */
+/** Names of all current controls of the page: the part of the page, and the control. */
 export const controlNames = (page) => page.evaluate(() => [...document.querySelectorAll(
   'button, input, select, summary, a[href], textarea, [role=application]')].map((element) => {
   const part = element.closest('section')?.id.replace('panel-', '') ??
@@ -19,7 +19,7 @@ export const controlNames = (page) => page.evaluate(() => [...document.querySele
     .replace(/^\d+ joints$/, 'Joints')}`;
 }));
 
-/** `t`: result of `openControlsPage`. Returns pairs of a control's name and its check. */
+/** `t` is the result of `openControlsPage`. Returns pairs of a control's name and its check. */
 export function controlChecks(t) {
   const shared = sharedChecks(t);
   return [

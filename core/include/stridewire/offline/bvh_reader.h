@@ -14,7 +14,7 @@
 
 namespace stridewire {
 
-/// A whole recording, read from a file and converted to the conventions of base/math.h: metres, +Y
+/// A whole recording as read from a file, converted to the conventions of base/math.h: metres, +Y
 /// up, facing +Z at identity rotations.
 struct Capture {
   std::string path;   ///< Path of the file, as passed by the caller.

@@ -16,9 +16,9 @@ namespace stridewire {
 /// Which of the extracted examples LibraryBuilder keeps.
 struct SelectionOptions {
   /// Upper bound on the error of a step that is left out: the mean distance between its joints and
-  /// those of the step blended from the kept examples, at equal generic times. It also bounds the
-  /// distance of the step's parameters from the hull of the kept examples, grown by 10 %. Unit:
-  /// metres; one radian counts as 0.5 m. 0 keeps every step.
+  /// those of the step blended from the kept examples, at equal generic times. It also bounds how
+  /// far the step's parameters lie outside the hull of the kept examples, grown by 10 %. Metres;
+  /// one radian counts as 0.5 m. 0 keeps every step.
   double max_pose_error_m = 0.0;
   /// A step is an outlier if its pose or duration differs from what all other steps predict for its
   /// parameters by this number of deviations (1.4826 MAD) more than usual. Only steps inside the

@@ -68,8 +68,8 @@ struct UnreachableFootprint {
 
 /// Starts, changes or stops a layer when a movement begins.
 struct LayerCue {
-  /// Index of that movement in the list of requests. The number of requests means after all of
-  /// them, which has no visible effect.
+  /// Index of that movement in the list of requests. If it equals the number of requests, the cue
+  /// takes effect after all movements and is not visible.
   std::size_t before = 0;
   std::string layer;  ///< Name of the layer.
   bool enabled = true;

@@ -62,7 +62,7 @@ struct Parameter {
   ParameterName name = ParameterName::kStartZ;
   double min = 0.0;  ///< Smallest value among the examples.
   double max = 0.0;  ///< Largest value among the examples.
-  /// Subtracted from values before the linear part is evaluated (Section 3: rank deficiency).
+  /// Value that is subtracted before the linear part is evaluated (Section 3: rank deficiency).
   double centre = 0.0;
   double scale = 1.0;  ///< Values are divided by it before distances are computed; > 0.
 };
@@ -126,7 +126,7 @@ struct MotionGroup {
   std::span<const double> site_weights;  ///< [site - n][example]: weights of pseudoexamples.
   /// [site]: radius of influence, in units of Parameter::scale.
   std::span<const double> dilations;
-  double radius_factor = 1.0;  ///< Factor in the dilations of the examples.
+  double radius_factor = 1.0;  ///< Factor that `dilations` of the examples include.
   /// [1 + d][example]: coefficients a of the linear part. Row 0 is the constant.
   std::span<const double> linear;
   /// [site][example]: coefficients r of the radial functions.

@@ -50,9 +50,11 @@ void ForwardKinematics(const Skeleton& skeleton, ConstPoseSpan pose, std::span<V
                                  const Vec3& offset_m);
 
 /// Pose arithmetic (paper, Section 5). Sums do not commute:
+///
 ///   A + B = {t_A + t_B, r_B r_A}
 ///   A - B = {t_A - t_B, r_B^-1 r_A}
 ///   c A = {c t_A, slerp(1, r_A, c)}
+///
 /// so that (A - B) + B = A. All poses must have the same number of joints. `out` may alias an
 /// input.
 void Add(ConstPoseSpan a, ConstPoseSpan b, PoseSpan out);

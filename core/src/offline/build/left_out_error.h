@@ -37,7 +37,7 @@ struct BlendSet {
 // Measures how well sets reproduce left-out examples. Not thread-safe, since it has scratch memory.
 class LeftOutProbe {
  public:
-  // `units`: metres per unit of each parameter.
+  // `units` contains the metres per unit of each parameter.
   LeftOutProbe(const GridLayout& layout, const Skeleton& skeleton, std::span<const double> units)
       : layout_(layout), skeleton_(skeleton), units_(units.begin(), units.end()) {}
 

@@ -39,7 +39,7 @@ struct FootTrajectory {
   double lift_m = 0.0;  ///< Additional height in the middle of the swing, to clear the ground.
   /// Sideways offset in the middle of the swing, to pass the other foot.
   DVec3 aside_m = DVec3(0.0);
-  /// Weight with which the root follows this foot; the weights of both feet sum to 1.
+  /// Share of the foot's correction by which the root moves; the shares of both feet sum to 1.
   double root_weight = 0.0;
   /// Shift of the root that is complete at the end of the movement.
   DVec3 root_shift_m = DVec3(0.0);

@@ -25,7 +25,7 @@ struct CorrectionOf {
   Vector offset;
   Number swing;       // Elapsed fraction of the swing: 0 before release, 1 after landing.
   Number turned;      // Fraction of the change in heading and tilt that is complete.
-  Number turn;        // Added to the heading, radians.
+  Number turn;        // Turn that is added to the heading, in radians.
   Number free_turn;   // Turn that would be added if the heading were not locked.
   Vector root_shift;  // Part of FootTrajectory::root_shift_m that is complete.
 };

@@ -83,7 +83,7 @@ struct SoaPoseEvaluator::Work {
   std::size_t row_floats;
   int max_count;
 
-  // The block that is being evaluated:
+  // The following members describe the block that is being evaluated.
   std::array<SampleRun, kBlock> runs;
   std::size_t lanes = 0;
   std::size_t count = 0;

@@ -324,8 +324,8 @@ struct Ping {
   bool operator==(const Ping&) const = default;
 };
 
-/// Requests a piece of the library of a joined world. A query like InspectAvatar, answered by
-/// LibraryPiece.
+/// Requests a piece of the library of a joined world. The server answers with LibraryPiece. Like
+/// InspectAvatar, it is a query without a sequence number.
 struct FetchLibrary {
   static constexpr MessageType kType = MessageType::kFetchLibrary;
   std::uint64_t nonce = 0;   ///< LibraryPiece repeats it.

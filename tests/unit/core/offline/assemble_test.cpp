@@ -454,8 +454,8 @@ TEST(LibraryAssembler, CombinesAllCapturesOfASubject) {
   for (std::size_t g = 0; g < 2; ++g) {
     for (const RawExample& example : library->groups[g].examples) {
       EXPECT_EQ(example.heading_change_rad, 0.0);
-      // A row of straight steps does not veer: each ends on the line it started on, but for those
-      // too short to tell their direction.
+      // A row of straight steps must not veer: each step ends on the line on which it started.
+      // Steps that are too short to determine their direction are ignored.
       const Vec3 end = example.clip.root_positions_m.back();
       EXPECT_NEAR(end.x, 0.0, end.z > 0.3f ? 1e-4 : 0.05) << example.source;
     }
